@@ -1,0 +1,98 @@
+#: make setup   a Python environment in .venv with what `make run` needs
+#: make run     set up if needed, then start the server      (ARGS="--help")
+#: make test    set up for development and run every check: what CI does
+#: make check   the same: lint, import rules, types, web client, all tests
+#: make fast    only the tests that together take less than half a minute
+#: make bench   only the measurements, on a quiet machine
+#: make lock    write requirements/*.txt anew from pyproject.toml (UPGRADE=1: newest versions)
+#: make clean   remove .venv, node_modules and caches
+#: Needs Python 3.11 or later and make; uses uv where there is one. PYTHON=... picks the Python.
+
+.DEFAULT_GOAL := help
+.PHONY: help setup dev run test check lint contracts types web pytest fast bench lock clean
+
+BIN := .venv/bin
+WEB := web_client/node_modules/.package-lock.json
+UV := $(shell command -v uv)
+export UV_SYSTEM_CERTS ?= true
+export PIP_DISABLE_PIP_VERSION_CHECK ?= 1
+RECENT := -c 'import sys; sys.exit(sys.version_info < (3, 11))'
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$p $(RECENT) 2>/dev/null && echo $$p && break; done)
+
+PIP := $(if $(UV),$(UV) pip install --python $(BIN)/python,$(BIN)/python -m pip install)
+LOCKED := $(PIP) --require-hashes --only-binary :all: -r
+PROJECT := $(PIP) --no-deps --no-build-isolation --editable .
+
+help:
+	@sed -n 's/^#: //p' Makefile
+
+setup: .venv/core.stamp
+
+dev: .venv/dev.stamp $(WEB)
+
+$(BIN)/python:
+	@"$(PYTHON)" $(RECENT) 2>/dev/null || { \
+		echo "Lightleash needs Python 3.11 or later; here python3 is: $$(python3 --version 2>&1)." >&2; \
+		echo "Install one, or name it: make PYTHON=/path/to/python3.12 $(MAKECMDGOALS)" >&2; exit 1; }
+	$(if $(UV),$(UV) venv --no-python-downloads --python "$(PYTHON)" .venv,"$(PYTHON)" -m venv .venv)
+
+.venv/core.stamp: requirements/core.txt pyproject.toml | $(BIN)/python
+	$(LOCKED) requirements/core.txt
+	$(PROJECT)
+	@touch $@
+
+.venv/dev.stamp: requirements/dev.txt pyproject.toml | $(BIN)/python
+	$(LOCKED) requirements/dev.txt
+	$(PROJECT)
+	@touch $@
+
+# Node is needed for the checks of the web client only, never to run Lightleash.
+$(WEB): web_client/package.json web_client/package-lock.json
+	@if command -v npm >/dev/null; then cd web_client && npm ci --ignore-scripts; \
+	else echo "!!! npm is missing: the web client will not be checked" >&2; fi
+
+run: setup
+	$(BIN)/lightleash serve $(ARGS)
+
+test: check
+
+check: lint contracts types web pytest
+
+lint: dev
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+contracts: dev
+	$(BIN)/lint-imports --no-logo
+
+types: dev
+	$(BIN)/mypy
+
+web: dev
+	@if [ -e $(WEB) ]; then cd web_client && npm run check && npm test; \
+	else echo "!!! SKIPPED: types and tests of the web client (npm is missing)" >&2; fi
+
+pytest: dev
+	$(BIN)/pytest $(ARGS)
+
+fast: dev
+	$(BIN)/pytest -m "not e2e and not bench and not slow" $(ARGS)
+
+bench: dev
+	$(BIN)/pytest -m bench -s $(ARGS)
+
+lock: dev
+	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt
+	$(BIN)/uv pip compile $(COMPILE) --group dev -c requirements/core.txt pyproject.toml \
+		-o requirements/dev.txt
+	cd web_client && npm install --package-lock-only --ignore-scripts
+
+COMPILE := --quiet --universal --python-version 3.11 --only-binary :all: --generate-hashes \
+	--no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" \
+	$(if $(UPGRADE),--upgrade)
+
+clean:
+	rm -rf .venv web_client/node_modules build dist .mypy_cache .pytest_cache .ruff_cache \
+		.import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

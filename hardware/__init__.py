@@ -1,0 +1,1 @@
+"""Everything that is, or stands for, a robot or a phone."""
