@@ -1,0 +1,65 @@
+"""The phone's own attitude from raw gyroscope and accelerometer, without a magnetometer.
+
+The yaw of f is free (nothing in the method needs north) and drifts with the gyroscope's bias,
+which costs the virtual camera millimetres; the browser's fused orientation jumps and would cost
+centimetres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.frames import GRAVITY, Array, R_fc_level_from_specific_force, cross, exp
+from pipeline.signals import PhoneImu
+
+GAIN = 0.15
+"""Pull towards the accelerometer's vertical [1/s]: slow, for hands accelerate all ways."""
+BIAS_GAIN = 0.01
+"""[1/s²]."""
+MAX_GAP_S = 0.2
+"""Longer without samples: what was integrated is worth nothing, start anew."""
+
+
+class Attitude:
+    """Complementary filter on SO(3) (after Mahony, Hamel, Pflimlin 2008, the paper's [20])."""
+
+    def __init__(self) -> None:
+        """Unknown until the first sample."""
+        self._R_fc: Array | None = None
+        self._bias = np.zeros(3)
+        self._t = -np.inf
+        self.resets = 0
+
+    @property
+    def R_fc(self) -> Array | None:
+        """Attitude at the last sample, (3, 3), or None before the first."""
+        return self._R_fc
+
+    @property
+    def bias_omega(self) -> Array:
+        """Gyroscope bias (3,) [rad/s]."""
+        return self._bias
+
+    @property
+    def up_in_c(self) -> Array | None:
+        """Opposite of gravity in camera axes, or None before the first sample."""
+        return None if self._R_fc is None else self._R_fc[2]
+
+    def add(self, imu: PhoneImu) -> None:
+        """Take a sample; samples not newer than the last are ignored."""
+        dt = imu.t - self._t
+        if dt <= 0.0:
+            return
+        self._t = imu.t
+        norm = float(np.sqrt(imu.a_m_cf_in_c @ imu.a_m_cf_in_c))
+        if self._R_fc is None or dt > MAX_GAP_S:
+            if norm > 0.5 * GRAVITY:
+                self.resets += self._R_fc is not None
+                self._R_fc = R_fc_level_from_specific_force(imu.a_m_cf_in_c)
+            return
+        R_fc = self._R_fc @ exp((imu.omega_m_cf_in_c - self._bias) * dt)
+        if 0.7 * GRAVITY < norm < 1.3 * GRAVITY:
+            tilt = cross(imu.a_m_cf_in_c / norm, R_fc[2])
+            R_fc = R_fc @ exp(GAIN * dt * tilt)
+            self._bias = self._bias - BIAS_GAIN * dt * tilt
+        self._R_fc = R_fc

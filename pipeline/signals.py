@@ -1,0 +1,179 @@
+"""What flows between the stages: frozen values; nobody edits an array they were given.
+
+Times `t` are seconds on one monotonic clock (the server's); arrays are float64; SI units and
+radians.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.frames import Array
+
+Image = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhoneImu:
+    """One motion sample of the phone."""
+
+    t: float
+    """Capture time [s]."""
+    omega_m_cf_in_c: Array
+    """Gyroscope (3,) [rad/s]."""
+    a_m_cf_in_c: Array
+    """Accelerometer (3,) [m/s²]: specific force, +9.8 up at rest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyImu:
+    """One motion sample of the robot."""
+
+    t: float
+    """Sampling time [s]."""
+    omega_m_bf_in_b: Array
+    """Gyroscope (3,) [rad/s]."""
+    a_m_bf_in_b: Array
+    """Accelerometer (3,) [m/s²]: specific force, +9.8 up at rest."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One decoded picture."""
+
+    t: float
+    """Capture time of its middle row [s]."""
+    luma: Image
+    """(height, width) grey levels; never written to."""
+    full_range: bool = True
+    """False: video luma, black at 16 and white at 235."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spots:
+    """Bright spots found in a picture."""
+
+    pixels: Array
+    """(n, 2) sub-pixel centroids (u right, v down), pixel centres at integers."""
+    covariances: Array
+    """(n, 2, 2) [px²]."""
+    brightness: Array
+    """(n,) integrated contrast, for ranking only."""
+    area: Array
+    """(n,) pixels above the threshold."""
+
+    def __len__(self) -> int:
+        """Count of the spots."""
+        return len(self.pixels)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Match:
+    """Spots named as LEDs."""
+
+    led: npt.NDArray[np.intp]
+    """(m,) index of the LED in the robot file."""
+    spot: npt.NDArray[np.intp]
+    """(m,) index of its spot."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RelativePose:
+    """Pose of the body relative to the camera at the time of a picture."""
+
+    t: float
+    """Capture time [s]."""
+    p_bc_in_c: Array
+    """(3,) [m]."""
+    R_cb: Array
+    """(3, 3)."""
+    covariance: Array
+    """(6, 6) of (δp in c [m], θ in b [rad]) with R = R̂ Exp(θ)."""
+    reprojection_px: float
+    """RMS of the LEDs' reprojection errors [px]."""
+    leds: int
+    """How many LEDs it rests on."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RelativeState:
+    """The estimator's view of now."""
+
+    t: float
+    p_bc_in_c: Array
+    """(3,) [m]."""
+    R_cb: Array
+    """(3, 3)."""
+    u_bf_in_c: Array
+    """(3,) [m/s]: velocity of the body *in the frame of the camera's inertial motion removed*,
+
+    u = ^c v_{b/c} + ^c ω_{c/f} × ^c p, i.e. the derivative of CG seen from f, in c's axes.
+    """
+    omega_bf_in_b: Array
+    """(3,) [rad/s], bias removed."""
+    omega_cf_in_c: Array
+    """(3,) [rad/s]."""
+    R_ic: Array
+    """(3, 3) rotation of the camera from its last IMU sample (i) to now, by which p, R and u were
+    carried on."""
+    sigma_p: float
+    """Largest standard deviation of the position [m]."""
+    sigma_theta: float
+    """Largest standard deviation of the attitude [rad]."""
+    age: float
+    """Since the last fused picture was taken [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VirtualView:
+    """The robot as the virtual camera sees it."""
+
+    R_fv: Array
+    """(3, 3) attitude of the virtual camera."""
+    omega_vf_in_v: Array
+    """(3,) [rad/s]. Eq. (24)."""
+    p_bv_in_v: Array
+    """(3,) [m]. Eq. (23)."""
+    R_vb: Array
+    """(3, 3). Eq. (22)."""
+    v_bv_in_v: Array
+    """(3,) [m/s], as seen from v."""
+    omega_bf_in_b: Array
+    """(3,) [rad/s]."""
+
+
+class Mode(IntEnum):
+    """State of the failsafe machine."""
+
+    DISARMED = 0
+    ARMED = 1
+    TRACK = 2
+    HOLD = 3
+    RAMP = 4
+    STOPPED = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Operator:
+    """What the page's main thread last said, judged by the age of the nonce it echoed."""
+
+    t: float
+    """When the echoed nonce was sent [s]: the message can't be younger than it claims."""
+    held: bool
+    """The hold-to-move button is pressed."""
+    press: int
+    """Counts presses: a new value is a new press."""
+
+
+@dataclass(frozen=True, slots=True)
+class Requests:
+    """Wishes of people, each true for one tick."""
+
+    arm: bool = False
+    disarm: bool = False
+    stop: bool = False
+    reset: bool = False

@@ -1,0 +1,180 @@
+"""What server and control process tell each other: msgpack in unix datagrams, never blocking.
+
+The server sends *inputs* to `control.sock`; the control process sends `ControlStatus` to
+`server.sock`. Either side may die and come back: a datagram to nobody is dropped and counted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+from pathlib import Path
+
+import msgspec
+
+Triple = tuple[float, float, float]
+MAX_DATAGRAM = 16_384
+
+
+class PhoneImuInput(msgspec.Struct, tag="imu", array_like=True, frozen=True):
+    """One motion sample of the phone, in camera axes, on the server's monotonic clock."""
+
+    t: float
+    omega: Triple
+    a: Triple
+
+
+class PoseInput(msgspec.Struct, tag="pose", array_like=True, frozen=True):
+    """One pose measured in a picture; `covariance` is the (6, 6) row by row."""
+
+    t: float
+    p: Triple
+    R: tuple[float, float, float, float, float, float, float, float, float]
+    covariance: list[float]
+    reprojection_px: float
+    leds: int
+
+
+class OperatorInput(msgspec.Struct, tag="operator", array_like=True, frozen=True):
+    """Sign of life and hold-to-move button; `t` is when the echoed nonce was sent."""
+
+    t: float
+    held: bool
+    press: int
+
+
+class RequestInput(msgspec.Struct, tag="request", array_like=True, frozen=True):
+    """A wish of a person, already checked for its role."""
+
+    what: str
+
+
+class ReadyInput(msgspec.Struct, tag="ready", array_like=True, frozen=True):
+    """What the server has against arming, nothing when all is well; sent at 10 Hz."""
+
+    refusals: list[str]
+
+
+Input = PhoneImuInput | PoseInput | OperatorInput | RequestInput | ReadyInput
+
+
+class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
+    """The state of control at one tick, sent at 50 Hz."""
+
+    t: float
+    epoch: int
+    """Of this control process; a new one starts disarmed."""
+    mode: int
+    reason: str
+    refusals: list[str]
+    pose_age: float
+    operator_age: float
+    phone_imu_age: float
+    body_imu_age: float
+    body_imu_rate_hz: float
+    p_bc_in_c: Triple | None
+    R_cb_wxyz: tuple[float, float, float, float] | None
+    R_fc_wxyz: tuple[float, float, float, float] | None
+    """Attitude of the phone."""
+    R_fv_wxyz: tuple[float, float, float, float] | None
+    """Attitude of the virtual camera."""
+    reference_p_in_v: Triple | None
+    reference_R_wxyz: tuple[float, float, float, float] | None
+    """R_vr."""
+    error_m: float | None
+    error_rad: float | None
+    sigma_p: float | None
+    thrusts: list[float]
+    saturated: bool
+    up_in_b: Triple | None
+    """Direction of gravity's opposite in the body, for vision's prior and gate."""
+    omega_b: Triple
+    body_samples: list[tuple[float, float, float, float, float, float, float]]
+    """Body IMU since the last status, for recordings: t, ω in b, specific force in b."""
+    poses_fused: int
+    poses_dropped: int
+    inputs_dropped: int
+    realtime: str
+    lateness_ms: dict[str, float]
+    """p50, p99, p999, max and missed of the last 10 s."""
+    fuse_ms: float
+    """Capture of the last fused picture → fused."""
+    step_ms: float
+    """Median CPU time of a tick."""
+
+
+_encoder = msgspec.msgpack.Encoder()
+_input_decoder = msgspec.msgpack.Decoder(Input)
+_status_decoder = msgspec.msgpack.Decoder(ControlStatus)
+
+
+class Endpoint:
+    """One end of the link: a bound unix datagram socket and the path of the other one."""
+
+    def __init__(self, own: Path, other: Path) -> None:
+        """Bind `own`, taking the place of a dead predecessor."""
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(own)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.bind(str(own))
+        self._other = str(other)
+        self.dropped = 0
+
+    def fileno(self) -> int:
+        """For event loops."""
+        return self._socket.fileno()
+
+    def send(self, message: Input | ControlStatus) -> bool:
+        """Send, or drop and count when the other end is gone or full."""
+        try:
+            self._socket.sendto(_encoder.encode(message), self._other)
+        except (FileNotFoundError, ConnectionRefusedError, BlockingIOError):
+            self.dropped += 1
+            return False
+        return True
+
+    def _datagrams(self, limit: int) -> list[bytes]:
+        datagrams: list[bytes] = []
+        with contextlib.suppress(BlockingIOError):
+            while len(datagrams) < limit:
+                datagrams.append(self._socket.recv(MAX_DATAGRAM))
+        return datagrams
+
+    def inputs(self, limit: int = 64) -> list[Input]:
+        """What has arrived from the server, oldest first; what can't be decoded is counted."""
+        inputs: list[Input] = []
+        for datagram in self._datagrams(limit):
+            try:
+                inputs.append(_input_decoder.decode(datagram))
+            except msgspec.MsgspecError:
+                self.dropped += 1
+        return inputs
+
+    def statuses(self, limit: int = 64) -> list[ControlStatus]:
+        """What has arrived from the control process, oldest first."""
+        statuses: list[ControlStatus] = []
+        for datagram in self._datagrams(limit):
+            try:
+                statuses.append(_status_decoder.decode(datagram))
+            except msgspec.MsgspecError:
+                self.dropped += 1
+        return statuses
+
+    def close(self) -> None:
+        """Close and unlink."""
+        path = self._socket.getsockname()
+        self._socket.close()
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(path)
+
+
+def server_end(directory: Path) -> Endpoint:
+    """The server's end in the runtime directory."""
+    return Endpoint(directory / "server.sock", directory / "control.sock")
+
+
+def control_end(directory: Path) -> Endpoint:
+    """The control process's end."""
+    return Endpoint(directory / "control.sock", directory / "server.sock")

@@ -1,0 +1,217 @@
+"""What the control process does in a tick, without sockets and clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from hardware.follower import BodySample, ThrustCommand
+from hardware.robot_file import RobotFile
+
+from pipeline.config import TeleopConfig
+from pipeline.frames import Array, wxyz_from_R
+from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, RelativePose, Requests
+from pipeline.teleop import Inputs, Output, Teleop
+from server.control_link import (
+    ControlStatus,
+    Input,
+    OperatorInput,
+    PhoneImuInput,
+    PoseInput,
+    ReadyInput,
+    RequestInput,
+    Triple,
+)
+
+SERVER_SILENT_S = 0.5
+"""Without word from the server for longer, arming is refused."""
+
+
+class Controller:
+    """One robot's control; everything it is told comes with a time."""
+
+    def __init__(self, robot_file: RobotFile, config: TeleopConfig, epoch: int) -> None:
+        """Disarmed, until somebody asks."""
+        self.teleop = Teleop(robot_file.robot, config)
+        self._epoch = epoch
+        self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
+        self._t_ready = -np.inf
+        self._up_in_b: Array | None = None
+        self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
+        self._fuse_ms = 0.0
+
+    def tick(
+        self,
+        now: float,
+        messages: Iterable[Input],
+        body: Sequence[BodyImu],
+        robot_reason: str,
+    ) -> tuple[ThrustCommand, Output]:
+        """One control period.
+
+        Args:
+            now: Time [s].
+            messages: From the server, oldest first.
+            body: The robot's samples on our clock, oldest first.
+            robot_reason: Why the robot itself refuses thrust; empty if it doesn't.
+        """
+        phone, poses, operator, wishes = self._sort(messages, now)
+        for sample in body:
+            self._follow_gravity(sample)
+            self._body_samples.append(
+                (sample.t, *_triple(sample.omega_m_bf_in_b), *_triple(sample.a_m_bf_in_b))
+            )
+        output = self.teleop.step(
+            Inputs(
+                t=now,
+                phone_imu=tuple(phone),
+                body_imu=tuple(body),
+                poses=tuple(poses),
+                operator=operator,
+                requests=wishes,
+                refusals=self._why_not(now, robot_reason),
+            )
+        )
+        if poses:
+            self._fuse_ms = 1e3 * (now - poses[-1].t)
+        return ThrustCommand(output.thrusts, output.armed), output
+
+    def _sort(
+        self, messages: Iterable[Input], now: float
+    ) -> tuple[list[PhoneImu], list[RelativePose], Operator | None, Requests]:
+        phone: list[PhoneImu] = []
+        poses: list[RelativePose] = []
+        operator: Operator | None = None
+        wishes: set[str] = set()
+        for message in messages:
+            match message:
+                case PhoneImuInput():
+                    phone.append(PhoneImu(message.t, np.array(message.omega), np.array(message.a)))
+                case PoseInput():
+                    poses.append(_pose(message))
+                case OperatorInput():
+                    operator = Operator(message.t, message.held, message.press)
+                case RequestInput():
+                    wishes.add(message.what)
+                case ReadyInput():
+                    self._refusals, self._t_ready = tuple(message.refusals), now
+        known = Requests.__slots__
+        return phone, poses, operator, Requests(**{w: True for w in wishes if w in known})
+
+    def _why_not(self, now: float, robot_reason: str) -> tuple[str, ...]:
+        if now - self._t_ready > SERVER_SILENT_S:
+            return ("The server is silent.",)
+        return (*self._refusals, robot_reason) if robot_reason else self._refusals
+
+    def _follow_gravity(self, sample: BodyImu) -> None:
+        """Low-passed direction of the specific force, turned with the gyroscope: up in b."""
+        norm = float(np.sqrt(sample.a_m_bf_in_b @ sample.a_m_bf_in_b))
+        if norm < 1.0:
+            return
+        up = sample.a_m_bf_in_b / norm
+        if self._up_in_b is None:
+            self._up_in_b = up
+            return
+        turned = self._up_in_b - 0.005 * np.array(
+            [
+                sample.omega_m_bf_in_b[1] * self._up_in_b[2]
+                - sample.omega_m_bf_in_b[2] * self._up_in_b[1],
+                sample.omega_m_bf_in_b[2] * self._up_in_b[0]
+                - sample.omega_m_bf_in_b[0] * self._up_in_b[2],
+                sample.omega_m_bf_in_b[0] * self._up_in_b[1]
+                - sample.omega_m_bf_in_b[1] * self._up_in_b[0],
+            ]
+        )
+        mixed = turned + 0.01 * (up - turned)
+        self._up_in_b = mixed / float(np.sqrt(mixed @ mixed))
+
+    def status(
+        self,
+        output: Output,
+        realtime: str,
+        lateness_ms: dict[str, float],
+        step_ms: float,
+        dropped: int,
+    ) -> ControlStatus:
+        """All that a supervisor may want to know, and the body's samples since the last one."""
+        relative, view = output.relative, output.view
+        reference, error = output.reference, output.error
+        ekf = self.teleop.ekf
+        samples, self._body_samples = self._body_samples, []
+        return ControlStatus(
+            t=output.t,
+            epoch=self._epoch,
+            mode=int(output.failsafe.mode),
+            reason=output.failsafe.reason,
+            refusals=list(output.refusals),
+            pose_age=output.ages.pose,
+            operator_age=output.ages.operator,
+            phone_imu_age=output.ages.phone_imu,
+            body_imu_age=output.ages.body_imu,
+            body_imu_rate_hz=len(samples) / 0.02,
+            p_bc_in_c=_triple(relative.p_bc_in_c) if relative else None,
+            R_cb_wxyz=wxyz_from_R(relative.R_cb) if relative else None,
+            R_fc_wxyz=wxyz_from_R(output.R_fc) if output.R_fc is not None else None,
+            R_fv_wxyz=wxyz_from_R(view.R_fv) if view else None,
+            reference_p_in_v=_triple(reference.p_rv_in_v) if reference else None,
+            reference_R_wxyz=wxyz_from_R(reference.R_vr) if reference else None,
+            error_m=_norm(error.e_p_in_v) if error else None,
+            error_rad=_norm(error.e_eta_in_b) if error else None,
+            sigma_p=relative.sigma_p if relative else None,
+            thrusts=output.thrusts.tolist(),
+            saturated=output.saturated,
+            up_in_b=_triple(self._up_in_b) if self._up_in_b is not None else None,
+            omega_b=_triple(relative.omega_bf_in_b) if relative else (0.0, 0.0, 0.0),
+            body_samples=samples,
+            poses_fused=ekf.fused,
+            poses_dropped=ekf.dropped,
+            inputs_dropped=dropped,
+            realtime=realtime,
+            lateness_ms=lateness_ms,
+            fuse_ms=self._fuse_ms,
+            step_ms=step_ms,
+        )
+
+
+class BodyClock:
+    """Dates the robot's samples on our clock: the least delay of the last second is believed."""
+
+    def __init__(self) -> None:
+        """No sample yet."""
+        self._excess = np.full(200, np.inf)
+        self._count = 0
+
+    def imu(self, sample: BodySample, t_received: float) -> BodyImu:
+        """The sample on our clock; never later than its arrival."""
+        t_robot = sample.t_us * 1e-6
+        self._excess[self._count % len(self._excess)] = t_received - t_robot
+        self._count += 1
+        return BodyImu(t_robot + float(self._excess.min()), sample.omega_in_b, sample.a_in_b)
+
+    def forget(self) -> None:
+        """The robot has restarted: its clock is a new one."""
+        self._excess[:] = np.inf
+
+
+def mode_name(mode: int) -> str:
+    """Name of a failsafe mode."""
+    return Mode(mode).name
+
+
+def _pose(message: PoseInput) -> RelativePose:
+    return RelativePose(
+        t=message.t,
+        p_bc_in_c=np.array(message.p),
+        R_cb=np.array(message.R).reshape(3, 3),
+        covariance=np.array(message.covariance).reshape(6, 6),
+        reprojection_px=message.reprojection_px,
+        leds=message.leds,
+    )
+
+
+def _triple(v: Array) -> Triple:
+    return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _norm(v: Array) -> float:
+    return float(np.sqrt(v @ v))

@@ -1,0 +1,110 @@
+"""From a phone's records to the pipeline's signals: clocks, axes, liveness. Sans-I/O."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.clock_offset import ClockOffset
+from pipeline.frames import R_cd
+from pipeline.signals import Operator, PhoneImu
+from server.wire import Motion, Picture, Ping, Pong, Record, Touch, WireError
+
+REMEMBERED_NONCES = 64
+FUTURE_S = 0.05
+"""A capture later than this after its arrival is a broken clock."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EncodedFrame:
+    """A picture as it came, with its capture time on our clock."""
+
+    t: float
+    t_received: float
+    sequence: int
+    picture: Picture
+
+
+Signal = PhoneImu | Operator | EncodedFrame
+
+
+class Ingest:
+    """One phone's stream. Ask it for a PING 20 times a second; feed it every record."""
+
+    def __init__(self, new_nonce: Callable[[], int]) -> None:
+        """`new_nonce` gives unpredictable 64-bit numbers (live) or a seeded sequence (tests)."""
+        self._new_nonce = new_nonce
+        self._asked: OrderedDict[int, float] = OrderedDict()
+        self._answered: set[int] = set()
+        self._last_motion_t = -np.inf
+        self._pings = 0
+        self.clock = ClockOffset()
+        self.visible = True
+        self.unsynchronised = 0
+        """Records dropped because the phone's clock wasn't known yet."""
+
+    def ping(self, now: float) -> Record:
+        """The next PING, to be sent at `now` [s]."""
+        nonce = self._new_nonce()
+        self._asked[nonce] = now
+        while len(self._asked) > REMEMBERED_NONCES:
+            old, _ = self._asked.popitem(last=False)
+            self._answered.discard(old)
+        self._pings += 1
+        return Record(self._pings & 0xFFFFFFFF, int(now * 1e6), Ping(nonce))
+
+    def record(self, record: Record, now: float) -> Signal | None:
+        """The signal in a record that arrived at `now` [s], or None (none in it, no clock yet).
+
+        Raises:
+            WireError: an unknown nonce, a capture from the future, or a record that pages don't
+            send.
+        """
+        match record.body:
+            case Pong():
+                self._pong(record, record.body, now)
+                return None
+            case Touch():
+                return self._touch(record.body)
+            case Motion():
+                return self._motion(record, record.body, now)
+            case Picture():
+                t = self._dated(record, "frame.time", now)
+                return None if t is None else EncodedFrame(t, now, record.sequence, record.body)
+        raise WireError("type", "record.kind", "MOTION, FRAME, TOUCH or PONG from a page")
+
+    def _pong(self, record: Record, pong: Pong, now: float) -> None:
+        asked = self._asked.get(pong.nonce)
+        if asked is None or pong.nonce in self._answered:
+            raise WireError("value", "pong.nonce", "the nonce of a PING of the last 3 s, once")
+        self._answered.add(pong.nonce)
+        self.clock.add(asked, record.t_us * 1e-6, now)
+
+    def _touch(self, touch: Touch) -> Operator | None:
+        self.visible = touch.visible
+        asked = self._asked.get(touch.nonce)
+        if asked is None:
+            if touch.nonce == 0:  # before the first PING reached the page
+                return None
+            raise WireError("value", "touch.nonce", "the nonce of a PING of the last 3 s")
+        return Operator(asked, touch.held and touch.visible, touch.press)
+
+    def _motion(self, record: Record, motion: Motion, now: float) -> PhoneImu | None:
+        t = self._dated(record, "motion.time", now)
+        if t is None or t <= self._last_motion_t:
+            return None
+        self._last_motion_t = t
+        R = R_cd(motion.screen_angle_deg)
+        return PhoneImu(t, R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration))
+
+    def _dated(self, record: Record, field: str, now: float) -> float | None:
+        if not self.clock.ready:
+            self.unsynchronised += 1
+            return None
+        t = self.clock.local(record.t_us * 1e-6)
+        if t > now + FUTURE_S:
+            raise WireError("value", field, "not later than its arrival")
+        return t

@@ -1,0 +1,156 @@
+"""The JSON messages of the protocol: one `msgspec` struct each, `type` is its tag.
+
+Together with the records of `wire.py` they are the whole protocol.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from server.wire import MAX_MESSAGE_BYTES, WireError
+
+Text = Annotated[str, Meta(max_length=200)]
+Side = Annotated[int, Meta(ge=16, le=4096)]
+
+
+class Hello(msgspec.Struct, tag="hello", forbid_unknown_fields=True, frozen=True):
+    """Page → server, first: who is there."""
+
+    version: int
+    """Protocol version of the page."""
+    role: Literal["operator", "supervisor", "video"]
+    """`video`: the second socket of an operator, for frames alone."""
+    device: Text = ""
+    """Names the camera's calibration: what the browser or a virtual phone says of itself."""
+    session: Annotated[str, Meta(max_length=64)] = ""
+    """On the video socket: the session of the operator it belongs to."""
+    sensors: Text = ""
+    """Which interface delivers motion, for the supervisor to read."""
+    video: Text = ""
+    """How frames are encoded, for the supervisor to read."""
+
+
+class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=True):
+    """Page → server: a wish of a person. The control process decides."""
+
+    what: Literal["arm", "disarm", "stop", "reset", "key_frame"]
+
+
+class Log(msgspec.Struct, tag="log", forbid_unknown_fields=True, frozen=True):
+    """Page → server: a fault on the page that a supervisor should read."""
+
+    text: Text
+
+
+class Welcome(msgspec.Struct, tag="welcome", frozen=True):
+    """Server → page: the answer to hello."""
+
+    session: str
+    version: int
+    robot: str
+    """Name of the robot."""
+    width: Side
+    """Wanted picture."""
+    height: Side
+    frame_rate_hz: int
+    bitrate_bps: int
+
+
+class Refused(msgspec.Struct, tag="refused", frozen=True):
+    """Server → page: something was not taken; nothing else of the sender was lost."""
+
+    code: str
+    field: str
+    allowed: str
+    fatal: bool = False
+    """True: the server closes the connection after this."""
+
+
+class Stream(msgspec.Struct, frozen=True):
+    """Health of one stream."""
+
+    age_ms: float | None
+    """Of its newest item; None before the first."""
+    rate_hz: float
+    dropped: int = 0
+    """Superseded, too old or refused, since the start."""
+
+
+class Status(msgspec.Struct, tag="status", frozen=True):
+    """Server → page, 10 Hz: the truth about the robot, on every screen."""
+
+    mode: Literal["DISARMED", "ARMED", "TRACK", "HOLD", "RAMP", "STOPPED", "LOST"]
+    """LOST: the control process does not answer."""
+    reason: str
+    """Why the mode is what it is, in words for the person who can mend it."""
+    ready: bool
+    """`arm` would be granted."""
+    refusals: list[str]
+    """What keeps it from being granted, each in words."""
+    robot: str
+    operator: str
+    """The device of the operator, or ""."""
+    streams: dict[str, Stream]
+    """By name: operator, phone_imu, video, pose, body_imu, control."""
+    latency_ms: dict[str, float]
+    """By stage, in order: encode+network, decode, detect, identify, pose, fuse, control."""
+    leds: int
+    """LEDs in the last picture."""
+    reprojection_px: float | None
+    position_mm: list[float] | None
+    """Of the body relative to the camera, in the camera's axes."""
+    error_mm: float | None
+    """Distance from the reference, while tracking."""
+    error_deg: float | None
+    sigma_mm: float | None
+    saturated: bool
+    recording: str
+    """Name of the running recording, or ""."""
+    phones: int
+    supervisors: int
+    realtime: str
+    """Class of the control loop: what holds its schedule."""
+    control: dict[str, float]
+    """Lateness of the control loop: p50_ms, p99_ms, p999_ms, missed."""
+    messages: list[str]
+    """The newest events, newest first."""
+
+
+FromPage = Hello | Command | Log
+ToPage = Welcome | Refused | Status
+
+_decoder = msgspec.json.Decoder(FromPage)
+_to_page_decoder = msgspec.json.Decoder(ToPage)
+_encoder = msgspec.json.Encoder()
+
+
+def encode_message(message: FromPage | ToPage) -> str:
+    """JSON text of a message."""
+    return _encoder.encode(message).decode()
+
+
+def decode_message(text: str | bytes) -> FromPage:
+    """The message in `text`.
+
+    Raises:
+        WireError: too long, not JSON, an unknown type or field, or a value out of its range.
+    """
+    if len(text) > MAX_MESSAGE_BYTES:
+        raise WireError("size", "message", f"at most {MAX_MESSAGE_BYTES} bytes")
+    try:
+        message: FromPage = _decoder.decode(text)
+    except msgspec.ValidationError as error:
+        reason, _, path = str(error).partition(" - at ")
+        raise WireError("value", path.strip("`") or "message", reason) from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise WireError("type", "message", "JSON text") from error
+    return message
+
+
+def decode_from_server(text: str | bytes) -> ToPage:
+    """The message of a server in `text`, for clients written in Python."""
+    message: ToPage = _to_page_decoder.decode(text)
+    return message

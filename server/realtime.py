@@ -1,0 +1,68 @@
+"""Keeping 200 Hz: scheduling class, locked memory, absolute schedule, and how well it holds."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import time
+
+import numpy as np
+
+FIFO_PRIORITY = 50
+MCL_CURRENT, MCL_FUTURE = 1, 2
+
+
+def claim() -> str:
+    """Ask for SCHED_FIFO and locked memory, without garbage collection; says what was granted."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(FIFO_PRIORITY))
+    except (AttributeError, PermissionError, OSError):
+        return "timing degraded: SCHED_FIFO was not permitted (needs CAP_SYS_NICE)"
+    libc = ctypes.CDLL(None, use_errno=True)
+    locked = libc.mlockall(MCL_CURRENT | MCL_FUTURE) == 0
+    return f"SCHED_FIFO {FIFO_PRIORITY}" + ("" if locked else ", memory not locked")
+
+
+class Schedule:
+    """Wakes at t0, t0 + period, …: lateness does not add up; late and missed ticks count."""
+
+    def __init__(self, period: float, window: int = 2000) -> None:
+        """Ticks every `period` [s]; statistics over the last `window` ticks."""
+        self.period = period
+        self._next = time.monotonic() + period
+        self._lateness = np.zeros(window)
+        self.ticks = 0
+        self.missed = 0
+        """Ticks that never ran because one before them took too long."""
+
+    def wait(self) -> float:
+        """Sleep until the next tick is due; gives the time now [s, monotonic]."""
+        delay = self._next - time.monotonic()
+        if delay > 0.0:
+            time.sleep(delay)
+        now = time.monotonic()
+        late = now - self._next
+        self._lateness[self.ticks % len(self._lateness)] = late
+        self.ticks += 1
+        skipped = int(late / self.period)
+        self.missed += skipped
+        self._next += (skipped + 1) * self.period
+        return now
+
+    def lateness_ms(self) -> dict[str, float]:
+        """p50, p99, p99.9 and worst lateness of the window [ms], and all missed ticks."""
+        seen = self._lateness[: min(self.ticks, len(self._lateness))]
+        if not len(seen):
+            return {}
+        p50, p99, p999 = 1e3 * np.percentile(seen, (50.0, 99.0, 99.9))
+        return {
+            "p50": round(float(p50), 3),
+            "p99": round(float(p99), 3),
+            "p999": round(float(p999), 3),
+            "max": round(1e3 * float(seen.max()), 3),
+            "missed": float(self.missed),
+        }

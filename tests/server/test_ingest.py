@@ -1,0 +1,119 @@
+"""Ingest: dates on our clock, camera axes, and liveness that can't be faked by old bytes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.frames import GRAVITY
+from pipeline.signals import Operator, PhoneImu
+from server.ingest import EncodedFrame, Ingest
+from server.wire import Codec, Motion, Picture, Ping, Pong, Record, Touch, WireError
+
+OFFSET = 4321.5
+
+
+def counting() -> Ingest:
+    nonces = iter(range(1000, 9000))
+    return Ingest(lambda: next(nonces))
+
+
+def nonce_of(ping: Record) -> int:
+    assert isinstance(ping.body, Ping)
+    return ping.body.nonce
+
+
+def pong(ping: Record, t: float) -> Record:
+    return Record(1, int((t + OFFSET) * 1e6), Pong(nonce_of(ping), ping.t_us))
+
+
+def synchronised() -> Ingest:
+    ingest = counting()
+    for k in range(6):
+        ping = ingest.ping(0.05 * k)
+        assert ingest.record(pong(ping, 0.05 * k + 0.002), 0.05 * k + 0.004) is None
+    return ingest
+
+
+FLAT = Motion((1.0, 2.0, 3.0), (0.0, 0.0, GRAVITY), None, 0)
+
+
+def at(t: float) -> int:
+    return int((t + OFFSET) * 1e6)
+
+
+def test_captures_are_dated_on_our_clock() -> None:
+    ingest = synchronised()
+    sample = ingest.record(Record(1, at(1.0), FLAT), 1.02)
+    assert isinstance(sample, PhoneImu)
+    assert sample.t == pytest.approx(1.0, abs=1e-3)
+    frame = ingest.record(Record(1, at(0.9), Picture(Codec.H264, True, 64, 64, 0, b"x")), 1.02)
+    assert isinstance(frame, EncodedFrame)
+    assert frame.t == pytest.approx(0.9, abs=1e-3)
+
+
+def test_nothing_is_dated_before_the_clock_is_known() -> None:
+    ingest = counting()
+    assert ingest.record(Record(1, at(1.0), FLAT), 1.02) is None
+    assert ingest.unsynchronised == 1
+
+
+@pytest.mark.parametrize(
+    ("angle", "up_in_device"),
+    [(0, (0.0, 1.0, 0.0)), (90, (1.0, 0.0, 0.0)), (180, (0.0, -1.0, 0.0)), (270, (-1.0, 0.0, 0.0))],
+)
+def test_up_is_up_however_the_screen_is_turned(
+    angle: int, up_in_device: tuple[float, float, float]
+) -> None:
+    force = tuple(GRAVITY * u for u in up_in_device)
+    motion = replace(FLAT, acceleration=force, screen_angle_deg=angle)
+    sample = synchronised().record(Record(1, at(1.0), motion), 1.0)
+    assert isinstance(sample, PhoneImu)
+    np.testing.assert_allclose(sample.a_m_cf_in_c, [0.0, 0.0, GRAVITY], atol=1e-9)
+
+
+def test_looking_along_the_back_of_the_phone_is_forward() -> None:
+    spin = replace(FLAT, rotation_rate=(0.0, 0.0, -1.0))  # about the rear camera's axis
+    sample = synchronised().record(Record(1, at(1.0), spin), 1.0)
+    assert isinstance(sample, PhoneImu)
+    np.testing.assert_allclose(sample.omega_m_cf_in_c, [1.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_the_operator_is_as_old_as_the_nonce_it_echoes() -> None:
+    ingest = synchronised()
+    ping = ingest.ping(2.0)
+    said = ingest.record(Record(9, at(2.5), Touch(True, True, 4, nonce_of(ping))), 2.5)
+    assert isinstance(said, Operator)
+    assert (said.t, said.held, said.press) == (2.0, True, 4)
+
+
+def test_a_hidden_page_holds_nothing() -> None:
+    ingest = synchronised()
+    nonce = nonce_of(ingest.ping(2.0))
+    said = ingest.record(Record(9, 1, Touch(True, False, 4, nonce)), 2.5)
+    assert isinstance(said, Operator)
+    assert not said.held
+
+
+def test_invented_and_repeated_nonces_are_refused() -> None:
+    ingest = synchronised()
+    ping = ingest.ping(2.0)
+    with pytest.raises(WireError, match=r"touch\.nonce"):
+        ingest.record(Record(1, 1, Touch(True, True, 1, 77)), 2.0)
+    ingest.record(pong(ping, 2.0), 2.0)
+    with pytest.raises(WireError, match=r"pong\.nonce"):
+        ingest.record(pong(ping, 2.0), 2.0)
+    for k in range(100):
+        ingest.ping(3.0 + k)
+    with pytest.raises(WireError, match=r"touch\.nonce"):
+        ingest.record(Record(1, 1, Touch(True, True, 1, nonce_of(ping))), 4.0)
+
+
+def test_captures_from_the_future_and_repeated_ones_are_not_taken() -> None:
+    ingest = synchronised()
+    with pytest.raises(WireError, match="not later than its arrival"):
+        ingest.record(Record(1, at(3.0), FLAT), 2.0)
+    assert ingest.record(Record(1, at(2.0), FLAT), 2.0) is not None
+    assert ingest.record(Record(1, at(2.0), FLAT), 2.0) is None

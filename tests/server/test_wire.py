@@ -1,0 +1,92 @@
+"""Wire: what is written is read, and nothing else is."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server import wire
+from server.wire import Codec, Record, WireError
+
+MOTION = wire.Motion((0.1, 0.2, 0.3), (0.0, 0.0, 9.8), (1.0, 0.0, 0.0, 0.0), 90)
+PICTURE = wire.Picture(Codec.H264, True, 1280, 720, 90, b"\x00\x00\x00\x01x")
+BODIES = [
+    replace(MOTION, rotation_rate=(0.5, 0.25, -2.0), acceleration=(0.0, 1.0, 9.75)),
+    replace(MOTION, orientation_wxyz=None, rotation_rate=(0.5,) * 3, acceleration=(0.5,) * 3),
+    PICTURE,
+    wire.Touch(True, True, 3, 2**64 - 1),
+    wire.Pong(7, 2**40),
+    wire.Ping(2**63),
+    wire.Credit(2**32 - 1),
+    wire.Thumbnail(b"\xff\xd8jpeg"),
+]
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda b: type(b).__name__)
+def test_what_is_encoded_is_decoded(body: wire.Body) -> None:
+    record = Record(2**32 - 1, 1_234_567_890_123, body)
+    assert wire.decode(wire.encode(record)) == record
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_give_a_record_or_a_named_error(data: bytes) -> None:
+    try:
+        wire.decode(data)
+    except WireError as error:
+        assert error.field
+        assert error.allowed
+
+
+@given(st.sampled_from(BODIES), st.integers(0, 60), st.integers(0, 255))
+def test_a_flipped_byte_gives_a_record_or_a_named_error(
+    body: wire.Body, at: int, value: int
+) -> None:
+    data = bytearray(wire.encode(Record(1, 2, body)))
+    data[at % len(data)] = value
+    try:
+        wire.decode(bytes(data))
+    except WireError as error:
+        assert error.code in ("type", "size", "version", "value")
+
+
+NAN, INF = float("nan"), float("inf")
+BAD = [
+    ("motion.rotation_rate", replace(MOTION, rotation_rate=(NAN, 0.0, 0.0))),
+    ("motion.acceleration", replace(MOTION, acceleration=(0.0, INF, 0.0))),
+    ("motion.acceleration", replace(MOTION, acceleration=(0.0, 1e4, 0.0))),
+    ("motion.orientation_wxyz", replace(MOTION, orientation_wxyz=(0.1, 0.0, 0.0, 0.0))),
+    ("motion.screen_angle_deg", replace(MOTION, screen_angle_deg=45)),
+    ("frame.size", replace(PICTURE, width=30_000, height=30_000)),
+    ("frame.size", replace(PICTURE, width=0)),
+    ("frame.data", replace(PICTURE, codec=Codec.JPEG)),
+    ("frame", replace(PICTURE, data=b"")),
+]
+
+
+@pytest.mark.parametrize(("field", "body"), BAD)
+def test_bad_values_are_refused_by_name(field: str, body: wire.Body) -> None:
+    with pytest.raises(WireError) as refusal:
+        wire.decode(wire.encode(Record(1, 2, body)))
+    assert refusal.value.field == field
+
+
+def test_another_version_is_told_to_reload() -> None:
+    data = bytearray(wire.encode(Record(1, 2, MOTION)))
+    data[1] = wire.VERSION + 1
+    with pytest.raises(WireError, match="reload") as refusal:
+        wire.decode(bytes(data))
+    assert refusal.value.code == "version"
+
+
+def test_sizes_are_bounded() -> None:
+    with pytest.raises(WireError, match="bytes"):
+        wire.decode(b"")
+    with pytest.raises(WireError, match="bytes"):
+        wire.decode(bytes(wire.MAX_RECORD_BYTES + 1))
+    head = struct.pack("<BBBBIq", wire.MAGIC, wire.VERSION, wire.Kind.TOUCH, 0, 1, 2)
+    with pytest.raises(WireError, match="touch"):
+        wire.decode(head + b"1234")
