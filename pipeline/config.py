@@ -34,10 +34,10 @@ TABLE_II_WITHOUT_EKF = Gains(  # Table II (b)
     Ki=_row(90.0, 150.0, 200.0, 15.0, 15.0, 5.0),
     Kd=_row(10.0, 15.0, 15.0, 0.5, 0.5, 1.0),
 )
-PHONE = Gains(  # softer: for pictures 60-120 ms old, tuned by `lightleash experiments loop`
-    Kp=_row(60.0, 60.0, 80.0, 2.5, 2.5, 2.5),
-    Ki=_row(50.0, 50.0, 70.0, 3.0, 3.0, 3.0),
-    Kd=_row(28.0, 28.0, 28.0, 0.7, 0.7, 1.0),
+PHONE = Gains(  # softer: for pictures 60-120 ms old, see `lightleash experiments loop`
+    Kp=_row(80.0, 80.0, 120.0, 4.0, 4.0, 4.0),
+    Ki=_row(90.0, 90.0, 150.0, 8.0, 8.0, 8.0),
+    Kd=_row(30.0, 30.0, 30.0, 0.9, 0.9, 1.4),
 )
 
 
@@ -60,6 +60,8 @@ class IdentifyConfig:
     tolerance_px: float = 3.0
     """Largest reprojection error of one LED."""
     min_leds: int = 4
+    shift_px: float = 15.0
+    """How far an LED may be from where it is predicted while tracking."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,28 +83,40 @@ class EkfConfig:
     """Body gyroscope [rad/s]."""
     sigma_a_b: float = 0.15
     """Body accelerometer [m/s²]."""
-    sigma_omega_c: float = 0.005
+    sigma_omega_c: float = 0.003
     """Phone gyroscope [rad/s]."""
-    sigma_a_c: float = 0.08
+    sigma_a_c: float = 0.05
     """Phone accelerometer, its 0.1 m/s² rounding included [m/s²]."""
-    walk_omega_b: float = 3.0
+    walk_omega_b: float = 0.3
     """How fast ω_b wanders between samples [rad/s/√s]."""
-    walk_a_b: float = 15.0
+    walk_a_b: float = 3.0
     """[m/s²/√s]."""
-    walk_a_c: float = 15.0
+    walk_a_c: float = 3.0
     """[m/s²/√s]."""
-    walk_delta_c: float = 60.0
+    walk_delta_c: float = 17.0
     """[rad/s²/√s]."""
-    walk_v: float = 0.02
+    walk_v: float = 0.01
     """Model error of the velocity [m/s/√s]."""
+    tau_delta_c: float = 0.02
+    """Fading time of δ_c [s]; inf is the paper's Eq. (11)."""
     walk_bias_omega: float = 1e-4
     walk_bias_a: float = 2e-3
+    initial_v: float = 0.5
+    """At a start: of the body seen from f [m/s]."""
+    initial_omega: float = 0.5
+    """Of the sample nearest to the first picture [rad/s]."""
+    initial_a: float = 3.0
+    """[m/s²]."""
     initial_bias_omega: float = 0.03
     initial_bias_a: float = 0.3
+    max_step_s: float = 0.005
+    """Longest step of the integration."""
     horizon_s: float = 0.5
     """Pictures older than this are dropped and counted."""
     gate_chi2: float = 22.5
     """99.9 % of χ² with 6 degrees of freedom."""
+    rejections_before_restart: int = 5
+    """So many poses in a row beyond the gate: the filter is wrong, not the pictures."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,162 @@
+"""Camera files: ROS camera_info YAML and Kalibr camchains, found by device and picture size."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from pipeline.camera import MODELS, Camera
+from pipeline.frames import Array
+
+CAMERAS = Path(__file__).parent / "cameras"
+KALIBR_MODELS = {"radtan": "plumb_bob", "equidistant": "equidistant"}
+
+
+class CameraFileError(ValueError):
+    """A camera file that can't be used, or none for a camera.
+
+    Attributes:
+        file: Which file, or which camera was looked for.
+        key: Which key of it.
+        allowed: What would have been allowed.
+    """
+
+    def __init__(self, file: str, key: str, allowed: str) -> None:
+        super().__init__(f"{file}: {key}: {allowed}" if key else f"{file}: {allowed}")
+        self.file, self.key, self.allowed = file, key, allowed
+
+
+def load_camera(path: Path) -> tuple[str, Camera]:
+    """Name and camera of a file.
+
+    Raises:
+        CameraFileError: names file, key and what is allowed.
+    """
+    try:
+        table = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise CameraFileError(str(path), "", str(error)) from error
+    if not isinstance(table, dict):
+        raise CameraFileError(str(path), "", "a YAML mapping: camera_info or a Kalibr camchain")
+    reader = _Reader(str(path), table)
+    return reader.kalibr("cam0") if "cam0" in table else reader.camera_info()
+
+
+def find_camera(
+    device: str, width: int, height: int, folders: Sequence[Path] = (CAMERAS,)
+) -> Camera:
+    """The calibrated camera of `device` for pictures of that size.
+
+    A file belongs to a device when its camera_name, in lower case and with everything but letters
+    and digits turned into dashes, is the device's.
+
+    Raises:
+        CameraFileError: no calibration; says which there are.
+    """
+    known: list[str] = []
+    for path in sorted(p for folder in folders for p in folder.glob("*.yaml")):
+        name, camera = load_camera(path)
+        if slug(name) == slug(device) and (camera.width, camera.height) == (width, height):
+            return camera
+        known.append(f"{name} {camera.width}x{camera.height}")
+    raise CameraFileError(
+        f"camera {device!r} at {width}x{height}",
+        "",
+        f"no calibration; there is one for: {', '.join(known) or 'no camera at all'}",
+    )
+
+
+def slug(name: str) -> str:
+    """Letters and digits in lower case, dashes between."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+
+
+class _Reader:
+    """Checks every key it reads."""
+
+    def __init__(self, file: str, table: dict[str, Any]) -> None:
+        self._file, self._table = file, table
+
+    def camera_info(self) -> tuple[str, Camera]:
+        table = self._table
+        model = str(self._get(table, "distortion_model"))
+        K = self._numbers(table, "camera_matrix", 9).reshape(3, 3)
+        readout = float(
+            self._number(
+                table.get("rolling_shutter_readout_s", 0.0), "rolling_shutter_readout_s", 0.0, 0.1
+            )
+        )
+        distortion = self._numbers(table, "distortion_coefficients", None)
+        camera = self._camera(
+            self._size(table, "image_width"),
+            self._size(table, "image_height"),
+            K,
+            model,
+            distortion,
+            readout,
+        )
+        return str(table.get("camera_name", Path(self._file).stem)), camera
+
+    def kalibr(self, name: str) -> tuple[str, Camera]:
+        table = self._table[name]
+        if not isinstance(table, dict):
+            self._refuse(name, "a mapping")
+        model = KALIBR_MODELS.get(str(self._get(table, "distortion_model")))
+        if model is None:
+            self._refuse(f"{name}.distortion_model", ", ".join(KALIBR_MODELS))
+        fu, fv, pu, pv = self._numbers(table, "intrinsics", 4)
+        width, height = (int(n) for n in self._numbers(table, "resolution", 2))
+        K = np.array([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]])
+        distortion = self._numbers(table, "distortion_coeffs", 4)
+        return Path(self._file).stem, self._camera(width, height, K, str(model), distortion, 0.0)
+
+    def _camera(
+        self, width: int, height: int, K: Array, model: str, distortion: Array, readout_s: float
+    ) -> Camera:
+        if model not in MODELS:
+            self._refuse("distortion_model", ", ".join(MODELS))
+        if len(distortion) not in MODELS[model]:
+            counts = " or ".join(str(n) for n in MODELS[model])
+            self._refuse("distortion_coefficients", f"{counts} numbers for {model}")
+        if (
+            K[0, 0] <= 0.0
+            or K[1, 1] <= 0.0
+            or K[0, 1] != 0.0
+            or not np.array_equal(K[2], (0, 0, 1))
+        ):
+            self._refuse("camera_matrix", "[fx, 0, cx, 0, fy, cy, 0, 0, 1] with fx, fy > 0")
+        return Camera(width, height, K, model, distortion, readout_s)
+
+    def _get(self, table: dict[str, Any], key: str) -> Any:
+        if key not in table:
+            self._refuse(key, "must be there")
+        return table[key]
+
+    def _size(self, table: dict[str, Any], key: str) -> int:
+        return int(self._number(self._get(table, key), key, 16, 8192))
+
+    def _number(self, value: Any, key: str, low: float, high: float) -> float:
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not number or not low <= value <= high:
+            self._refuse(key, f"a number from {low:g} to {high:g}")
+        return float(value)
+
+    def _numbers(self, table: dict[str, Any], key: str, count: int | None) -> Array:
+        value = self._get(table, key)
+        data = value.get("data") if isinstance(value, dict) else value
+        try:
+            numbers = np.array(data, dtype=np.float64)
+        except (TypeError, ValueError):
+            numbers = np.array(np.nan)
+        right = numbers.ndim == 1 and (count is None or len(numbers) == count)
+        if not right or not bool(np.isfinite(numbers).all()):
+            self._refuse(key, f"{count if count else 'a list of'} finite numbers")
+        return numbers
+
+    def _refuse(self, key: str, allowed: str) -> None:
+        raise CameraFileError(self._file, key, allowed)

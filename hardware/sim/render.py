@@ -1,0 +1,143 @@
+"""What a phone's camera sees of the LEDs: light, point spread, saturation, noise, gamma, 8 bits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from pipeline.camera import Camera
+from pipeline.frames import Array
+from pipeline.signals import Image
+
+RelativePoseAt = Callable[[float], tuple[Array, Array]]
+"""(R_cb (3, 3), p_bc_in_c (3,) [m]) at a time [s] relative to the middle of the exposure."""
+
+BANK = 64
+"""Extra rows and columns of the noise, from which each picture takes its own part."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """The room, the light and the sensor; linear light, 1 saturates."""
+
+    led_radius_m: float = 0.008
+    led_light: float = 3.0
+    """Of a LED's surface: above 1 it saturates."""
+    blur_px: float = 0.9
+    """Standard deviation of the point spread."""
+    halo: float = 0.015
+    """Share of the light in a wide skirt."""
+    halo_px: float = 6.0
+    room: float = 0.02
+    """Background light; brighter towards the top."""
+    noise: float = 0.002
+    """Standard deviation of the sensor's noise in linear light, at black."""
+    exposure_s: float = 0.004
+    sub_exposures: int = 4
+    distractors: int = 0
+    """Lamps that are no LEDs, fixed in the picture."""
+
+
+def render(
+    camera: Camera,
+    pose: RelativePoseAt,
+    leds_in_b: Array,
+    look: Look,
+    rng: np.random.Generator,
+) -> Image:
+    """Luma (height, width), full range, sRGB-like gamma."""
+    room, noise = _stage(camera.width, camera.height, look)
+    du, dv = rng.integers(0, BANK, 2)
+    image = room.copy()
+    for patch, v, u in _lights(camera, pose, leds_in_b, look):
+        v1, u1 = max(v, 0), max(u, 0)
+        v2, u2 = min(v + len(patch), camera.height), min(u + patch.shape[1], camera.width)
+        if v1 < v2 and u1 < u2:
+            light = _linear(image[v1:v2, u1:u2]) + patch[v1 - v : v2 - v, u1 - u : u2 - u]
+            image[v1:v2, u1:u2] = _gamma(np.minimum(light, 1.0))
+    grain = noise[dv : dv + camera.height, du : du + camera.width]
+    # int8 noise in grey levels on a uint8 picture: saturating addition of the two halves
+    return _grainy(image, grain)
+
+
+def _lights(
+    camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: Look
+) -> list[tuple[Array, int, int]]:
+    """Patches of light with the row and column of their corner."""
+    lights: list[tuple[Array, int, int]] = []
+    times = (np.arange(look.sub_exposures) + 0.5) / look.sub_exposures - 0.5
+    seen = [_projected(camera, pose(t * look.exposure_s), leds_in_b) for t in times]
+    for led in range(len(leds_in_b)):
+        track = [(uv[led], radius[led]) for uv, radius in seen if radius[led] > 0.0]
+        if track:
+            lights.append(_patch(track, look.led_light, look.sub_exposures, look))
+    lamps = np.random.default_rng(look.distractors)
+    for _ in range(look.distractors):
+        place = lamps.uniform(0.02, 0.98, 2) * (camera.width, camera.height)
+        lights.append(_patch([(place, lamps.uniform(1.0, 4.0))], lamps.uniform(0.5, 3.0), 1, look))
+    return lights
+
+
+def _projected(camera: Camera, at: tuple[Array, Array], leds_in_b: Array) -> tuple[Array, Array]:
+    """Pixels (n, 2) and apparent radii (n,) [px]; radius 0 behind the camera."""
+    R_cb, p_bc_in_c = at
+    points = p_bc_in_c + leds_in_b @ R_cb.T
+    ahead = points[:, 0] > 0.1
+    safe = np.where(ahead[:, None], points, np.array([1.0, 0.0, 0.0]))
+    radius = camera.focal_px * 0.008 / safe[:, 0]
+    return camera.pixels(safe), np.where(ahead, radius, 0.0)
+
+
+def _patch(
+    track: list[tuple[Array, float]], light: float, exposures: int, look: Look
+) -> tuple[Array, int, int]:
+    """A disc blurred by the point spread, with its halo, smeared along `track`."""
+    centres = np.array([centre for centre, _ in track])
+    radius = max(r for _, r in track)
+    reach = radius + 3.0 * look.halo_px
+    left, top = np.floor(centres.min(axis=0) - reach).astype(int)
+    right, bottom = np.ceil(centres.max(axis=0) + reach).astype(int)
+    u, v = np.arange(left, right + 1.0), np.arange(top, bottom + 1.0)
+    patch = np.zeros((len(v), len(u)))
+    for (cu, cv), r in track:
+        distance2 = (u[None] - cu) ** 2 + (v[:, None] - cv) ** 2
+        # a disc convolved with a Gaussian: a smooth edge of the Gaussian's width
+        edge = (np.sqrt(distance2) - r) / look.blur_px
+        core = 1.0 / (1.0 + np.exp(1.702 * edge))
+        halo = look.halo * np.exp(-0.5 * distance2 / (look.halo_px**2 + r * r))
+        patch += light * (core + halo) / exposures
+    return patch, int(top), int(left)
+
+
+@lru_cache(maxsize=4)
+def _stage(width: int, height: int, look: Look) -> tuple[Image, Image]:
+    """The empty room in grey levels, and a bank of noise offset by 128."""
+    rng = np.random.default_rng(0)
+    fall = np.linspace(1.3, 0.7, height)[:, None] * np.linspace(0.9, 1.1, width)[None]
+    room = _gamma(look.room * fall)
+    slope = 255.0 / 2.2 * look.room ** (1.0 / 2.2 - 1.0)  # grey levels per unit of light there
+    sigma = max(0.6, look.noise * slope)
+    grain = rng.normal(128.0, sigma, (height + BANK, width + BANK))
+    return room, np.clip(np.round(grain), 0, 255).astype(np.uint8)
+
+
+def _grainy(image: Image, grain: Image) -> Image:
+    import cv2
+
+    return np.asarray(cv2.addWeighted(image, 1.0, grain, 1.0, -128.0), dtype=np.uint8)
+
+
+def _gamma(light: Array) -> Image:
+    grey: Image = np.round(255.0 * np.clip(light, 0.0, 1.0) ** (1.0 / 2.2)).astype(np.uint8)
+    return grey
+
+
+_LINEAR: Array = (np.arange(256) / 255.0) ** 2.2
+
+
+def _linear(image: Image) -> Array:
+    linear: Array = _LINEAR[image]
+    return linear

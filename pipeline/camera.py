@@ -1,0 +1,68 @@
+"""Camera: points in camera axes to pixels and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.frames import Array, R_co
+
+MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
+"""Distortion models (the names of ROS) and how many coefficients they take."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Intrinsics of one lens at one picture size; pixel centres at integers."""
+
+    width: int
+    height: int
+    K: Array
+    """(3, 3) [px]."""
+    model: str
+    """One of `MODELS`."""
+    distortion: Array
+    """(k,)."""
+    readout_s: float = 0.0
+    """Rolling shutter: from the first row's exposure to the last one's [s]."""
+
+    def pixels(self, points_in_c: Array) -> Array:
+        """Pixels (n, 2) of points (n, 3) in front of the camera."""
+        points_in_o = np.ascontiguousarray(points_in_c @ R_co)  # = (R_oc @ p) for each row
+        zero = np.zeros(3)
+        if self.model == "equidistant":
+            rays = points_in_o.reshape(-1, 1, 3)
+            pixels, _ = cv2.fisheye.projectPoints(rays, zero, zero, self.K, self.distortion)
+        else:
+            pixels, _ = cv2.projectPoints(points_in_o, zero, zero, self.K, self.distortion)
+        flat: Array = pixels.reshape(-1, 2)
+        return flat
+
+    def normalised(self, pixels: Array) -> Array:
+        """Undistorted image coordinates (n, 2) on the plane one metre ahead: right, down [m]."""
+        points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
+        if self.model == "equidistant":
+            flat = cv2.fisheye.undistortPoints(points, self.K, self.distortion)
+        else:
+            flat = cv2.undistortPoints(points, self.K, self.distortion)
+        rows: Array = flat.reshape(-1, 2)
+        return rows
+
+    @property
+    def focal_px(self) -> float:
+        """Mean focal length [px]."""
+        return 0.5 * float(self.K[0, 0] + self.K[1, 1])
+
+    def sees(self, pixels: Array, margin_px: float = 0.0) -> Array:
+        """(n,) whether pixels lie inside the picture, `margin_px` from its border."""
+        size = np.array([self.width, self.height])
+        low, high = margin_px - 0.5, size - 0.5 - margin_px
+        inside: Array = ((pixels > low) & (pixels < high)).all(axis=1)
+        return inside
+
+
+def points_of(normalised: Array) -> Array:
+    """Points (n, 3) in c, one metre ahead, of normalised image coordinates (n, 2)."""
+    return np.column_stack((np.ones(len(normalised)), -normalised[:, 0], -normalised[:, 1]))

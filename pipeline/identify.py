@@ -1,0 +1,215 @@
+"""Which spot is which LED? LEDs carry no name: only together, and against rivals, are they known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from pipeline import pnp
+from pipeline.camera import Camera, points_of
+from pipeline.config import IdentifyConfig
+from pipeline.frames import Array, R_between, exp
+from pipeline.identify_kernels import pair_hypotheses
+from pipeline.signals import Match, Spots
+
+BRIGHTEST = 14
+"""Spots considered when starting from nothing with gravity known."""
+BRIGHTEST_ALONE = 8
+"""The same without gravity: any three of them may be any three LEDs."""
+TRIED = 40
+"""Hypotheses refined when starting from nothing."""
+LOOSE_PX = 12.0
+"""A hypothesis before its refinement: gravity is known to degrees only."""
+RIVAL = 2.5
+"""Another explanation whose RMS is not this much worse is a rival."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Naming:
+    """Spots with names, and the pose that gives them."""
+
+    match: Match
+    fit: pnp.Fit
+
+
+def while_tracking(
+    camera: Camera,
+    leds_in_b: Array,
+    spots: Spots,
+    predicted: tuple[Array, Array],
+    config: IdentifyConfig,
+) -> Naming | None:
+    """Name spots near where LEDs are predicted: LEDs shift together, lamps don't."""
+    p_bc_in_c, R_cb = predicted
+    expected = camera.pixels(p_bc_in_c + leds_in_b @ R_cb.T)
+    match = _common_shift(expected, spots.pixels, config.shift_px)
+    if match is None or len(match.led) < config.min_leds:
+        return None
+    return _verified(camera, leds_in_b, spots, match, config, guess=predicted)
+
+
+def _common_shift(expected: Array, seen: Array, reach_px: float) -> Match | None:
+    """The assignment that most LEDs agree with after one common shift of the picture."""
+    best: tuple[int, float, Match] | None = None
+    for led in range(len(expected)):
+        for spot in range(len(seen)):
+            shift = seen[spot] - expected[led]
+            if float(np.abs(shift).max()) > 3.0 * reach_px:
+                continue
+            match, cost = _nearest(expected + shift, seen, reach_px)
+            key = (len(match.led), -cost)
+            if best is None or key > best[:2]:
+                best = (*key, match)
+    return best[2] if best else None
+
+
+def _nearest(expected: Array, seen: Array, reach_px: float) -> tuple[Match, float]:
+    """Each LED takes the nearest spot within reach; a spot belongs to one LED only."""
+    distance = np.linalg.norm(expected[:, None] - seen[None], axis=2)
+    leds: list[int] = []
+    taken: list[int] = []
+    cost = 0.0
+    for led, spot in sorted(np.ndindex(distance.shape), key=lambda at: distance[at]):
+        if distance[led, spot] > reach_px:
+            break
+        if led not in leds and spot not in taken:
+            leds.append(led)
+            taken.append(spot)
+            cost += float(distance[led, spot])
+    return Match(np.array(leds, dtype=np.intp), np.array(taken, dtype=np.intp)), cost
+
+
+def from_gravity(
+    camera: Camera,
+    leds_in_b: Array,
+    spots: Spots,
+    up_in_c: Array,
+    up_in_b: Array,
+    config: IdentifyConfig,
+) -> Naming | None:
+    """Start with roll and pitch known from two accelerometers: yaw and place from every pair."""
+    brightest = Spots(
+        spots.pixels[:BRIGHTEST],
+        spots.covariances[:BRIGHTEST],
+        spots.brightness[:BRIGHTEST],
+        spots.area[:BRIGHTEST],
+    )
+    if len(brightest) < config.min_leds:
+        return None
+    normalised = camera.normalised(brightest.pixels)
+    level = R_between(up_in_b, up_in_c)  # b to c, up to a turn about up
+    reach = LOOSE_PX / camera.focal_px
+    scores, places, yaws = pair_hypotheses(
+        points_of(normalised), leds_in_b, level, np.ascontiguousarray(up_in_c), reach
+    )
+    order = np.lexsort((yaws, -scores))[:TRIED]
+    guesses = [
+        (places[k], exp(yaws[k] * up_in_c) @ level) for k in order if scores[k] >= config.min_leds
+    ]
+    return _best(camera, leds_in_b, brightest, guesses, config)
+
+
+def from_nothing(
+    camera: Camera, leds_in_b: Array, spots: Spots, config: IdentifyConfig
+) -> Naming | None:
+    """Start without any prior: three spots give up to four poses; all LEDs are demanded."""
+    few = min(len(spots), BRIGHTEST_ALONE)
+    if few < len(leds_in_b):
+        return None
+    normalised = camera.normalised(spots.pixels[:few])
+    guesses = [
+        pose
+        for triple in permutations(range(few), 3)
+        for pose in pnp.starts(leds_in_b[:3], normalised[list(triple)])
+        if _explains(leds_in_b, normalised, pose, 3.0 / camera.focal_px) == len(leds_in_b)
+    ]
+    demanding = IdentifyConfig(config.tolerance_px, len(leds_in_b), config.shift_px)
+    return _best(camera, leds_in_b, spots, guesses, demanding)
+
+
+def _explains(leds_in_b: Array, normalised: Array, pose: tuple[Array, Array], reach: float) -> int:
+    """How many LEDs lie within `reach` of a spot."""
+    q = pose[0] + leds_in_b @ pose[1].T
+    if q[:, 0].min() < 0.1:
+        return 0
+    flat = np.column_stack((-q[:, 1] / q[:, 0], -q[:, 2] / q[:, 0]))
+    distance2 = ((flat[:, None] - normalised[None]) ** 2).sum(axis=2).min(axis=1)
+    return int((distance2 < reach * reach).sum())
+
+
+def _best(
+    camera: Camera,
+    leds_in_b: Array,
+    spots: Spots,
+    guesses: list[tuple[Array, Array]],
+    config: IdentifyConfig,
+) -> Naming | None:
+    """The best explanation, unless a different one is nearly as good: then none."""
+    namings: dict[bytes, Naming] = {}
+    for p_bc_in_c, R_cb in guesses:
+        expected = camera.pixels(p_bc_in_c + leds_in_b @ R_cb.T)
+        match = _common_shift(expected, spots.pixels, 2.0 * LOOSE_PX)
+        if match is None or len(match.led) < config.min_leds:
+            continue
+        naming = _verified(camera, leds_in_b, spots, match, config, None)
+        if naming is not None:
+            order = np.argsort(naming.match.led)
+            name = np.stack((naming.match.led[order], naming.match.spot[order])).tobytes()
+            namings.setdefault(name, naming)
+    ranked = sorted(namings.values(), key=lambda n: (-len(n.match.led), n.fit.rms_px))
+    if not ranked:
+        return None
+    if len(ranked) > 1 and _rivals(ranked[0], ranked[1]):
+        return None
+    return ranked[0]
+
+
+def _rivals(best: Naming, other: Naming) -> bool:
+    """Whether `other` explains nearly as much nearly as well, and says something else."""
+    if len(other.match.led) < len(best.match.led):
+        return False
+    floor_px = 0.15  # below it, residuals are noise and say nothing
+    return other.fit.rms_px < RIVAL * max(best.fit.rms_px, floor_px)
+
+
+def _verified(
+    camera: Camera,
+    leds_in_b: Array,
+    spots: Spots,
+    match: Match,
+    config: IdentifyConfig,
+    guess: tuple[Array, Array] | None,
+) -> Naming | None:
+    """Solve; while an LED fits badly and enough are left, leave the worst one out."""
+    while True:
+        fit = pnp.solve(camera, leds_in_b, spots, match, guess)
+        if fit is None:
+            return None
+        misfit = np.linalg.norm(fit.residuals_px, axis=1)
+        if float(misfit.max()) <= config.tolerance_px:
+            return Naming(match, fit)
+        if len(match.led) <= config.min_leds:
+            return None
+        match = _without_worst(camera, leds_in_b, spots, match, guess)
+
+
+def _without_worst(
+    camera: Camera,
+    leds_in_b: Array,
+    spots: Spots,
+    match: Match,
+    guess: tuple[Array, Array] | None,
+) -> Match:
+    """Leave one out: the one whose absence helps most."""
+
+    def cost(one: int) -> float:
+        fit = pnp.solve(camera, leds_in_b, spots, _dropped(match, one), guess)
+        return fit.chi2 if fit is not None else float("inf")
+
+    return _dropped(match, min(range(len(match.led)), key=cost))
+
+
+def _dropped(match: Match, one: int) -> Match:
+    return Match(np.delete(match.led, one), np.delete(match.spot, one))
