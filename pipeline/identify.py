@@ -1,4 +1,4 @@
-"""Which spot is which LED? LEDs carry no name: only together, and against rivals, are they known."""
+"""Which spot is which LED? Only together, and against rivals, are they known."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def refine(
     p_bc_in_c: Array,
     R_cb: Array,
 ) -> Fit | None:
-    """Maximum likelihood by Gauss-Newton from a start; None if it leaves the space before the camera.
+    """Maximum likelihood by Gauss-Newton; None if it leaves the space before the camera.
 
     Args:
         camera: For its focal length.

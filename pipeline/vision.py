@@ -1,4 +1,4 @@
-"""Spots → names → pose, from picture to picture: what the server, replays and experiments all run."""
+"""Spots → names → pose, from picture to picture: what all that looks runs."""
 
 from __future__ import annotations
 

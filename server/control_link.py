@@ -12,9 +12,19 @@ import socket
 from pathlib import Path
 
 import msgspec
+import numpy as np
+
+from pipeline.frames import Array
+from pipeline.signals import Operator, PhoneImu, RelativePose
 
 Triple = tuple[float, float, float]
+Nine = tuple[float, float, float, float, float, float, float, float, float]
 MAX_DATAGRAM = 16_384
+
+
+def triple(v: Array) -> Triple:
+    """Plain floats of a (3,) array."""
+    return (float(v[0]), float(v[1]), float(v[2]))
 
 
 class PhoneImuInput(msgspec.Struct, tag="imu", array_like=True, frozen=True):
@@ -24,16 +34,43 @@ class PhoneImuInput(msgspec.Struct, tag="imu", array_like=True, frozen=True):
     omega: Triple
     a: Triple
 
+    @classmethod
+    def of(cls, sample: PhoneImu) -> PhoneImuInput:
+        """To be sent."""
+        return cls(sample.t, triple(sample.omega_m_cf_in_c), triple(sample.a_m_cf_in_c))
+
+    def sample(self) -> PhoneImu:
+        """As received."""
+        return PhoneImu(self.t, np.array(self.omega), np.array(self.a))
+
 
 class PoseInput(msgspec.Struct, tag="pose", array_like=True, frozen=True):
     """One pose measured in a picture; `covariance` is the (6, 6) row by row."""
 
     t: float
     p: Triple
-    R: tuple[float, float, float, float, float, float, float, float, float]
+    R: Nine
     covariance: list[float]
     reprojection_px: float
     leds: int
+
+    @classmethod
+    def of(cls, pose: RelativePose) -> PoseInput:
+        """To be sent."""
+        covariance = pose.covariance.ravel().tolist()
+        R: Nine = tuple(pose.R_cb.ravel().tolist())
+        return cls(pose.t, triple(pose.p_bc_in_c), R, covariance, pose.reprojection_px, pose.leds)
+
+    def pose(self) -> RelativePose:
+        """As received."""
+        return RelativePose(
+            t=self.t,
+            p_bc_in_c=np.array(self.p),
+            R_cb=np.array(self.R).reshape(3, 3),
+            covariance=np.array(self.covariance).reshape(6, 6),
+            reprojection_px=self.reprojection_px,
+            leds=self.leds,
+        )
 
 
 class OperatorInput(msgspec.Struct, tag="operator", array_like=True, frozen=True):
@@ -42,6 +79,15 @@ class OperatorInput(msgspec.Struct, tag="operator", array_like=True, frozen=True
     t: float
     held: bool
     press: int
+
+    @classmethod
+    def of(cls, operator: Operator) -> OperatorInput:
+        """To be sent."""
+        return cls(operator.t, operator.held, operator.press)
+
+    def operator(self) -> Operator:
+        """As received."""
+        return Operator(self.t, self.held, self.press)
 
 
 class RequestInput(msgspec.Struct, tag="request", array_like=True, frozen=True):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from hardware.follower import BodySample, ThrustCommand
-from hardware.robot_file import RobotFile
 
+from hardware.follower import ThrustCommand
 from pipeline.config import TeleopConfig
-from pipeline.frames import Array, wxyz_from_R
-from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, RelativePose, Requests
+from pipeline.frames import Array, cross, wxyz_from_R
+from pipeline.robot import Robot
+from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose, Requests
 from pipeline.teleop import Inputs, Output, Teleop
 from server.control_link import (
     ControlStatus,
@@ -20,7 +20,7 @@ from server.control_link import (
     PoseInput,
     ReadyInput,
     RequestInput,
-    Triple,
+    triple,
 )
 
 SERVER_SILENT_S = 0.5
@@ -30,13 +30,13 @@ SERVER_SILENT_S = 0.5
 class Controller:
     """One robot's control; everything it is told comes with a time."""
 
-    def __init__(self, robot_file: RobotFile, config: TeleopConfig, epoch: int) -> None:
+    def __init__(self, robot: Robot, config: TeleopConfig) -> None:
         """Disarmed, until somebody asks."""
-        self.teleop = Teleop(robot_file.robot, config)
-        self._epoch = epoch
+        self.teleop = Teleop(robot, config)
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
-        self._up_in_b: Array | None = None
+        self.up_in_b: Array | None = None
+        self.omega_bf_in_b = np.zeros(3)
         self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
         self._fuse_ms = 0.0
 
@@ -59,7 +59,7 @@ class Controller:
         for sample in body:
             self._follow_gravity(sample)
             self._body_samples.append(
-                (sample.t, *_triple(sample.omega_m_bf_in_b), *_triple(sample.a_m_bf_in_b))
+                (sample.t, *triple(sample.omega_m_bf_in_b), *triple(sample.a_m_bf_in_b))
             )
         output = self.teleop.step(
             Inputs(
@@ -72,6 +72,8 @@ class Controller:
                 refusals=self._why_not(now, robot_reason),
             )
         )
+        if output.relative is not None:
+            self.omega_bf_in_b = output.relative.omega_bf_in_b
         if poses:
             self._fuse_ms = 1e3 * (now - poses[-1].t)
         return ThrustCommand(output.thrusts, output.armed), output
@@ -88,9 +90,9 @@ class Controller:
                 case PhoneImuInput():
                     phone.append(PhoneImu(message.t, np.array(message.omega), np.array(message.a)))
                 case PoseInput():
-                    poses.append(_pose(message))
+                    poses.append(message.pose())
                 case OperatorInput():
-                    operator = Operator(message.t, message.held, message.press)
+                    operator = message.operator()
                 case RequestInput():
                     wishes.add(message.what)
                 case ReadyInput():
@@ -109,25 +111,17 @@ class Controller:
         if norm < 1.0:
             return
         up = sample.a_m_bf_in_b / norm
-        if self._up_in_b is None:
-            self._up_in_b = up
+        if self.up_in_b is None:
+            self.up_in_b = up
             return
-        turned = self._up_in_b - 0.005 * np.array(
-            [
-                sample.omega_m_bf_in_b[1] * self._up_in_b[2]
-                - sample.omega_m_bf_in_b[2] * self._up_in_b[1],
-                sample.omega_m_bf_in_b[2] * self._up_in_b[0]
-                - sample.omega_m_bf_in_b[0] * self._up_in_b[2],
-                sample.omega_m_bf_in_b[0] * self._up_in_b[1]
-                - sample.omega_m_bf_in_b[1] * self._up_in_b[0],
-            ]
-        )
+        turned = self.up_in_b - 0.005 * cross(sample.omega_m_bf_in_b, self.up_in_b)
         mixed = turned + 0.01 * (up - turned)
-        self._up_in_b = mixed / float(np.sqrt(mixed @ mixed))
+        self.up_in_b = mixed / float(np.sqrt(mixed @ mixed))
 
     def status(
         self,
         output: Output,
+        epoch: int,
         realtime: str,
         lateness_ms: dict[str, float],
         step_ms: float,
@@ -140,7 +134,7 @@ class Controller:
         samples, self._body_samples = self._body_samples, []
         return ControlStatus(
             t=output.t,
-            epoch=self._epoch,
+            epoch=epoch,
             mode=int(output.failsafe.mode),
             reason=output.failsafe.reason,
             refusals=list(output.refusals),
@@ -149,19 +143,19 @@ class Controller:
             phone_imu_age=output.ages.phone_imu,
             body_imu_age=output.ages.body_imu,
             body_imu_rate_hz=len(samples) / 0.02,
-            p_bc_in_c=_triple(relative.p_bc_in_c) if relative else None,
+            p_bc_in_c=triple(relative.p_bc_in_c) if relative else None,
             R_cb_wxyz=wxyz_from_R(relative.R_cb) if relative else None,
             R_fc_wxyz=wxyz_from_R(output.R_fc) if output.R_fc is not None else None,
             R_fv_wxyz=wxyz_from_R(view.R_fv) if view else None,
-            reference_p_in_v=_triple(reference.p_rv_in_v) if reference else None,
+            reference_p_in_v=triple(reference.p_rv_in_v) if reference else None,
             reference_R_wxyz=wxyz_from_R(reference.R_vr) if reference else None,
             error_m=_norm(error.e_p_in_v) if error else None,
             error_rad=_norm(error.e_eta_in_b) if error else None,
             sigma_p=relative.sigma_p if relative else None,
             thrusts=output.thrusts.tolist(),
             saturated=output.saturated,
-            up_in_b=_triple(self._up_in_b) if self._up_in_b is not None else None,
-            omega_b=_triple(relative.omega_bf_in_b) if relative else (0.0, 0.0, 0.0),
+            up_in_b=triple(self.up_in_b) if self.up_in_b is not None else None,
+            omega_b=triple(self.omega_bf_in_b),
             body_samples=samples,
             poses_fused=ekf.fused,
             poses_dropped=ekf.dropped,
@@ -171,46 +165,6 @@ class Controller:
             fuse_ms=self._fuse_ms,
             step_ms=step_ms,
         )
-
-
-class BodyClock:
-    """Dates the robot's samples on our clock: the least delay of the last second is believed."""
-
-    def __init__(self) -> None:
-        """No sample yet."""
-        self._excess = np.full(200, np.inf)
-        self._count = 0
-
-    def imu(self, sample: BodySample, t_received: float) -> BodyImu:
-        """The sample on our clock; never later than its arrival."""
-        t_robot = sample.t_us * 1e-6
-        self._excess[self._count % len(self._excess)] = t_received - t_robot
-        self._count += 1
-        return BodyImu(t_robot + float(self._excess.min()), sample.omega_in_b, sample.a_in_b)
-
-    def forget(self) -> None:
-        """The robot has restarted: its clock is a new one."""
-        self._excess[:] = np.inf
-
-
-def mode_name(mode: int) -> str:
-    """Name of a failsafe mode."""
-    return Mode(mode).name
-
-
-def _pose(message: PoseInput) -> RelativePose:
-    return RelativePose(
-        t=message.t,
-        p_bc_in_c=np.array(message.p),
-        R_cb=np.array(message.R).reshape(3, 3),
-        covariance=np.array(message.covariance).reshape(6, 6),
-        reprojection_px=message.reprojection_px,
-        leds=message.leds,
-    )
-
-
-def _triple(v: Array) -> Triple:
-    return (float(v[0]), float(v[1]), float(v[2]))
 
 
 def _norm(v: Array) -> float:

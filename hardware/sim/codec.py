@@ -1,4 +1,4 @@
-"""Pictures to bytes and back: H.264 and VP8 through FFmpeg, JPEG through OpenCV. Hostile bytes are refused."""
+"""Pictures to bytes and back: H.264, VP8, JPEG. Hostile bytes are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the hand meant: where the robot should be if everything were known, to measure tracking by."""
+"""What the hand meant: where the robot should be if everything were known; tracking's measure."""
 
 from __future__ import annotations
 

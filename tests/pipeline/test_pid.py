@@ -51,9 +51,7 @@ def test_rates_are_the_derivatives_of_the_errors(seed: int) -> None:
 
 def test_at_the_reference_and_at_rest_nothing_is_asked() -> None:
     view = random_view(np.random.default_rng(0))
-    still = VirtualView(
-        view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3)
-    )
+    still = VirtualView(view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3))
     wrench = Pid(GAINS).wrench(pose_error(still, Reference.here(still)), still)
     np.testing.assert_allclose(wrench, np.zeros(6), atol=1e-9)
 
@@ -61,9 +59,7 @@ def test_at_the_reference_and_at_rest_nothing_is_asked() -> None:
 def test_gains_act_along_the_axes_of_the_body() -> None:
     rng = np.random.default_rng(1)
     view = random_view(rng)
-    still = VirtualView(
-        view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3)
-    )
+    still = VirtualView(view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3))
     along_body_z = still.R_vb @ np.array([0.0, 0.0, 0.1])
     error = pose_error(still, Reference(still.p_bv_in_v + along_body_z, still.R_vb))
     np.testing.assert_allclose(
@@ -94,9 +90,7 @@ def test_a_learnt_force_stays_where_it_is_in_f_when_everything_turns() -> None:
 
 def test_what_the_thrusters_could_not_give_is_not_integrated_for_ever() -> None:
     view = random_view(np.random.default_rng(3))
-    still = VirtualView(
-        view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3)
-    )
+    still = VirtualView(view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3))
     error = pose_error(still, Reference(still.p_bv_in_v + 0.5, still.R_vb))
     limit, pid = 5.0, Pid(GAINS)
     for _ in range(20_000):

@@ -1,0 +1,69 @@
+/* Robot's end of the Lightleash link: gate, watchdog and ramp, for firmware.
+ *
+ * The same rules as hardware/robot_end.py, the same bytes as hardware/datagram.py; both are held
+ * against each other by tests/hardware/test_watchdog.py. No heap, no clock, no I/O, no globals: the
+ * firmware brings the datagrams, the time (one monotonic clock, in microseconds) and random numbers.
+ * Call everything from one task.
+ */
+#ifndef LIGHTLEASH_WATCHDOG_H
+#define LIGHTLEASH_WATCHDOG_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define LL_MAX_THRUSTERS 16
+#define LL_MAX_BYTES (64 + 4 * LL_MAX_THRUSTERS)
+#define LL_NONCES 32
+
+#define LL_SILENCE_US 60000
+#define LL_MAX_AGE_US 40000
+#define LL_HANDSHAKE_US 500000
+#define LL_MAX_JUMP 200u
+
+typedef enum { LL_IDLE, LL_RUNNING, LL_RAMP, LL_REFUSING } ll_state;
+
+typedef enum {
+    LL_NONE, LL_STARTED, LL_SILENT, LL_MALFORMED, LL_THRUSTERS, LL_NONCE, LL_STALE, LL_EPOCH,
+    LL_COUNTER, LL_NOT_FINITE, LL_LIMITS, LL_RISE, LL_ZERO_FIRST, LL_HANDSHAKE
+} ll_refusal;
+
+typedef struct {
+    uint8_t thrusters; /* 1 to LL_MAX_THRUSTERS */
+    double f_max;      /* [N] */
+    double max_rise;   /* per command [N] */
+    int64_t ramp_us;   /* one period of the suspension */
+} ll_limits;
+
+typedef struct {
+    ll_limits limits;
+    uint32_t boot_id;
+    ll_state state;
+    ll_refusal refusal;
+    uint32_t epoch;     /* followed now or last, 0 none */
+    uint32_t candidate; /* epoch in its handshake, 0 none */
+    uint32_t counter;   /* of the newest command taken */
+    int64_t taken_us;   /* when that was */
+    int64_t since_us;   /* when the ramp or the handshake began */
+    float thrusts[LL_MAX_THRUSTERS];
+    struct { uint32_t nonce; int64_t sent_us; } nonces[LL_NONCES];
+    uint32_t samples;
+} ll_watchdog;
+
+/* Refusing, until zero thrust has been seen for long enough. `boot_id`: another one each start. */
+void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id);
+
+/* Take or refuse a datagram; LL_NONE if it was taken. Any bytes are safe. */
+ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us);
+
+/* What the thrusters are to give now [N]. Ask at least every 5 ms, whatever else happens. */
+void ll_setpoint(ll_watchdog *w, int64_t now_us, float *thrusts);
+
+/* Write the next sample, to be sent to control; gives its size. `nonce`: random, not 0. */
+size_t ll_sample(ll_watchdog *w, int64_t now_us, uint32_t nonce, const float gyro[3],
+                 const float accelerometer[3], const float *thrusts, uint8_t out[LL_MAX_BYTES]);
+
+/* Zero at once, then refuse. */
+void ll_halt(ll_watchdog *w);
+
+#endif

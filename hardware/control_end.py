@@ -1,0 +1,124 @@
+"""The control process's end of the link, sans-I/O: epochs, counters, nonces."""
+
+from __future__ import annotations
+
+import secrets
+
+import numpy as np
+
+from hardware.datagram import (
+    U32,
+    Command,
+    LinkError,
+    Sample,
+    decode_sample,
+    encode_command,
+    epoch_after,
+    is_later,
+)
+from hardware.follower import BodySample, FollowerState, ThrustCommand, check_command
+from hardware.robot_file import RobotFile
+from pipeline.frames import Array
+
+SENT_KEPT = 256
+
+
+class ControlEnd:
+    """Turns thrusts into datagrams and datagrams into samples. Times are [s], monotonic."""
+
+    def __init__(self, thrusters: int, f_max: float, max_rise: float, epoch: int) -> None:
+        """For a robot whose thrusters give up to `f_max` and rise by `max_rise` per command [N]."""
+        self.thrusters, self.epoch = thrusters, epoch
+        self._f_max, self._max_rise = f_max, max_rise
+        self._counter = 0
+        self._last = np.zeros(thrusters)
+        self._sent_at = [0.0] * SENT_KEPT
+        self._newest: Sample | None = None
+        self.limited = 0
+        """Commands that rose faster than the robot allows and were slowed down."""
+        self.dropped = 0
+        """Datagrams that were damaged, repeated or overtaken."""
+
+    @classmethod
+    def of(cls, robot_file: RobotFile, epoch: int | None = None) -> ControlEnd:
+        """For the robot of a robot file; a random epoch by default, which no other process has."""
+        if epoch is None:
+            epoch = 1 + secrets.randbelow(U32 - 1)
+        robot = robot_file.robot
+        return cls(robot.A.shape[1], robot.f_max, robot_file.link.max_rise, epoch)
+
+    def command(self, command: ThrustCommand, now: float) -> bytes:
+        """The datagram for `command`.
+
+        It echoes the newest sample its sender can have known: a late command can't seem fresh.
+
+        Raises:
+            FollowerError: a command no robot may be told.
+        """
+        check_command(command, self.thrusters, self._f_max)
+        if not command.armed and self._newest and self._is_outdated(self._newest):
+            self._renew(self._newest)
+        self._counter = (self._counter + 1) % U32
+        self._last = self._slowed(command.thrusts)
+        self._sent_at[self._counter % SENT_KEPT] = now
+        newest = self._newest
+        return encode_command(
+            Command(
+                epoch=self.epoch,
+                counter=self._counter,
+                robot_time_us=newest.t_us if newest else 0,
+                nonce=newest.nonce if newest else 0,
+                armed=command.armed,
+                thrusts=tuple(self._last.tolist()),
+            )
+        )
+
+    def receive(self, data: bytes, now: float) -> BodySample | None:
+        """The sample in `data`; None and counted if it is none, or not newer than the last."""
+        try:
+            sample = decode_sample(data)
+        except LinkError:
+            self.dropped += 1
+            return None
+        if len(sample.thrusts) != self.thrusters or not self._is_newer(sample):
+            self.dropped += 1
+            return None
+        self._newest = sample
+        return BodySample(
+            t_us=sample.t_us,
+            omega_in_b=np.array(sample.omega_in_b),
+            a_in_b=np.array(sample.a_in_b),
+            thrusts=np.array(sample.thrusts),
+            state=sample.state,
+            boot_id=sample.boot_id,
+            refusal=sample.refusal,
+            round_trip_s=self._round_trip(sample, now),
+        )
+
+    def _is_newer(self, sample: Sample) -> bool:
+        last = self._newest
+        return (
+            last is None or sample.boot_id != last.boot_id or is_later(sample.counter, last.counter)
+        )
+
+    def _is_outdated(self, robot: Sample) -> bool:
+        """Whether the robot would never again take our epoch."""
+        refusing = robot.state == FollowerState.REFUSING and robot.epoch != 0
+        return refusing and not is_later(self.epoch, robot.epoch)
+
+    def _renew(self, robot: Sample) -> None:
+        self.epoch = epoch_after(robot.epoch)
+        self._counter = 0
+        self._last = np.zeros(self.thrusters)
+
+    def _slowed(self, thrusts: Array) -> Array:
+        """`thrusts`, none rising faster than the robot takes: late is better than refused."""
+        slowed: Array = np.minimum(thrusts, self._last + self._max_rise)
+        self.limited += int(bool((slowed < thrusts).any()))
+        return slowed
+
+    def _round_trip(self, sample: Sample, now: float) -> float | None:
+        behind = (self._counter - sample.accepted) % U32
+        if sample.epoch != self.epoch or behind >= SENT_KEPT or sample.accepted == 0:
+            return None
+        return now - self._sent_at[sample.accepted % SENT_KEPT]

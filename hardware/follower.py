@@ -1,0 +1,149 @@
+"""What every robot, real or simulated, offers: take thrusts, give what its body sensors say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.frames import Array
+
+
+class FollowerError(RuntimeError):
+    """A follower can't do what it was asked.
+
+    Attributes:
+        what: What failed.
+        allowed: What would have been allowed, or how to mend it.
+    """
+
+    def __init__(self, what: str, allowed: str) -> None:
+        super().__init__(f"{what}: {allowed}")
+        self.what, self.allowed = what, allowed
+
+
+class FollowerState(IntEnum):
+    """What the robot itself does."""
+
+    IDLE = 0
+    """Ready; no thrust."""
+    RUNNING = 1
+    """Follows the commands."""
+    RAMP = 2
+    """Heard nothing it could accept: goes down to zero by itself."""
+    REFUSING = 3
+    """No thrust until it has seen zero of a new epoch for half a second."""
+
+
+class Refusal(IntEnum):
+    """Why the robot does not follow, or did not take the last command; see `EXPLANATIONS`."""
+
+    NONE = 0
+    STARTED = 1
+    SILENT = 2
+    MALFORMED = 3
+    THRUSTERS = 4
+    NONCE = 5
+    STALE = 6
+    EPOCH = 7
+    COUNTER = 8
+    NOT_FINITE = 9
+    LIMITS = 10
+    RISE = 11
+    ZERO_FIRST = 12
+    HANDSHAKE = 13
+
+
+EXPLANATIONS: dict[Refusal, str] = {
+    Refusal.NONE: "",
+    Refusal.STARTED: "The robot has just started: it waits for zero thrust.",
+    Refusal.SILENT: "The robot heard no valid command in time and went to zero by itself.",
+    Refusal.MALFORMED: "The robot received something that is no command.",
+    Refusal.THRUSTERS: "The command is for another number of thrusters: is it another robot?",
+    Refusal.NONCE: "The command answers nothing the robot has lately sent.",
+    Refusal.STALE: "Commands reach the robot too late.",
+    Refusal.EPOCH: "The command is of another control process than the robot follows.",
+    Refusal.COUNTER: "The command is old, repeated or far ahead.",
+    Refusal.NOT_FINITE: "A thrust is not a number.",
+    Refusal.LIMITS: "A thrust is outside the robot's limits.",
+    Refusal.RISE: "A thrust rises faster than the robot allows.",
+    Refusal.ZERO_FIRST: "A new control process must begin with zero thrust.",
+    Refusal.HANDSHAKE: "The robot is still making sure that thrust is zero.",
+}
+"""For the person who can mend it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ThrustCommand:
+    """Thrusts for the next period."""
+
+    thrusts: Array
+    """(m,) [N], each 0 (off) to the robot's f_max."""
+    armed: bool
+    """Thrust is meant. False demands zeros, and lets the link begin a new epoch if it must."""
+
+    @classmethod
+    def zero(cls, thrusters: int) -> ThrustCommand:
+        """Nothing meant, nothing commanded."""
+        return cls(np.zeros(thrusters), armed=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodySample:
+    """One sample of the robot's body sensors, and what the robot says of itself."""
+
+    t_us: int
+    """Sampling time on the robot's own monotonic clock [µs]."""
+    omega_in_b: Array
+    """Gyroscope (3,) [rad/s], biased."""
+    a_in_b: Array
+    """Accelerometer (3,) [m/s²]: specific force, +9.8 up at rest, biased."""
+    thrusts: Array
+    """(m,) [N] that the robot has set its thrusters to; in simulation what they give."""
+    state: FollowerState
+    boot_id: int
+    """Another one: the robot has restarted, and so has its clock."""
+    refusal: Refusal
+    """Why the state is RAMP or REFUSING; else why the newest command was not taken."""
+    round_trip_s: float | None
+    """From sending the newest accepted command to this sample's arrival [s]; None if unknown."""
+
+
+class Follower(Protocol):
+    """One robot. Used from one thread; no method waits for the robot."""
+
+    thrusters: int
+    """m."""
+
+    def exchange(self, command: ThrustCommand) -> list[BodySample]:
+        """Send `command` and give all samples that have arrived since the last call, oldest first.
+
+        Raises:
+            FollowerError: wrong shape, not finite, outside the limits, thrust while not armed, or
+                closed. Nothing was sent. A lost link is no error: samples stay away.
+        """
+
+    def stop(self) -> None:
+        """Command zero thrust at once, several times; never raises for a lost link."""
+
+    def close(self) -> None:
+        """Stop, then give the link back. May be called twice."""
+
+
+def check_command(command: ThrustCommand, thrusters: int, f_max: float) -> None:
+    """Refuse what no robot may be told.
+
+    Raises:
+        FollowerError: says what is allowed.
+    """
+    thrusts = command.thrusts
+    if thrusts.shape != (thrusters,):
+        raise FollowerError(f"thrusts of shape {thrusts.shape}", f"({thrusters},)")
+    if not bool(np.isfinite(thrusts).all()):
+        raise FollowerError(f"thrusts {thrusts}", "finite numbers")
+    if bool((thrusts < 0.0).any() or (thrusts > f_max).any()):
+        raise FollowerError(f"thrusts {thrusts} N", f"0 to {f_max:g} N each")
+    if not command.armed and bool(thrusts.any()):
+        raise FollowerError(f"thrusts {thrusts} N without `armed`", "zeros")

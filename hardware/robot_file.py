@@ -1,0 +1,178 @@
+"""Robot files: a robot in TOML, checked and turned into SI.
+
+`load_robot("ames")` reads `hardware/robots/ames.toml`, which explains every key.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from math import pi, radians, sqrt
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from hardware.robot_physics import allocation_matrix, faults
+from hardware.robot_schema import BodyImuSection, RobotSchema
+from hardware.sim.parameters import BodyImuParameters, PlantParameters
+from pipeline.config import Gains
+from pipeline.frames import GRAVITY
+from pipeline.robot import Robot
+
+ROBOTS = Path(__file__).parent / "robots"
+
+
+class RobotFileError(ValueError):
+    """A robot file that can't be used.
+
+    Attributes:
+        file: Which file.
+        key: Where in it, with dots; empty for the whole file.
+        allowed: What is wrong and what would be allowed.
+    """
+
+    def __init__(self, file: str, key: str, allowed: str) -> None:
+        super().__init__(": ".join(filter(None, (file, key, allowed))))
+        self.file, self.key, self.allowed = file, key, allowed
+
+
+@dataclass(frozen=True, slots=True)
+class LinkParameters:
+    """Where the robot listens and what it takes."""
+
+    host: str
+    port: int
+    max_rise: float
+    """How much more a thruster may be told than one command before [N]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotFile:
+    """A robot."""
+
+    robot: Robot
+    plant: PlantParameters
+    gains: Mapping[str, Gains]
+    link: LinkParameters
+
+
+def load_robot(name_or_path: str | Path) -> RobotFile:
+    """The robot called so, or in the file at that path (ending in `.toml`).
+
+    Raises:
+        RobotFileError: names file, key and what is allowed.
+    """
+    path = _find(name_or_path)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise RobotFileError(str(path), "", str(error)) from error
+    try:
+        schema = RobotSchema.model_validate(table)
+    except ValidationError as error:
+        raise _explained(path, error) from error
+    robot_file = _converted(schema)
+    for key, reason in faults(robot_file.robot, robot_file.plant):
+        raise RobotFileError(str(path), key, reason)
+    return robot_file
+
+
+def _find(name_or_path: str | Path) -> Path:
+    path = Path(name_or_path)
+    if path.suffix == ".toml":
+        return path
+    known = sorted(file.stem for file in ROBOTS.glob("*.toml"))
+    if str(name_or_path) not in known:
+        raise RobotFileError(
+            str(name_or_path), "", f"no such robot; allowed: {_named(str(name_or_path), known)}"
+        )
+    return ROBOTS / f"{path}.toml"
+
+
+def _named(wrong: str, known: list[str]) -> str:
+    close = get_close_matches(wrong, known, n=1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    return f"{', '.join(known)} or a path ending in .toml{hint}"
+
+
+def _explained(path: Path, error: ValidationError) -> RobotFileError:
+    """The first fault; a misspelt key comes before the one that is then missing."""
+    faults = error.errors()
+    fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
+    where = fault["loc"]
+    key, reason = ".".join(map(str, where)), str(fault["msg"])
+    if fault["type"] in ("extra_forbidden", "missing"):
+        known = _keys_at(where[:-1])
+        close = get_close_matches(str(where[-1]), known, n=1)
+        hint = f"; did you mean {close[0]!r}?" if close and fault["type"] != "missing" else ""
+        kind = "missing" if fault["type"] == "missing" else "unknown key"
+        reason = f"{kind}{hint}; allowed here: {', '.join(known)}"
+    else:
+        reason = f"{reason}, not {fault['input']!r}"
+    return RobotFileError(str(path), key, reason)
+
+
+def _keys_at(where: tuple[int | str, ...]) -> list[str]:
+    """Keys of the section at a place of the file."""
+    section: Any = RobotSchema
+    for step in where:
+        if isinstance(section, type) and issubclass(section, BaseModel):
+            section = section.model_fields[str(step)].annotation
+        else:  # list[X] or dict[str, X]
+            section = get_args(section)[-1]
+    return list(section.model_fields)
+
+
+def _converted(schema: RobotSchema) -> RobotFile:
+    body, suspension, units = schema.body, schema.suspension, schema.thrusters.units
+    positions = np.array([unit.position_in_body_m for unit in units])
+    directions = np.array([unit.direction_in_body for unit in units])
+    torques = schema.thrusters.torque_per_thrust_m * np.array([float(u.spin) for u in units])
+    plant = PlantParameters(
+        mass=body.mass_kg,
+        inertia=np.array(body.inertia_kg_m2),
+        cable_length=suspension.length_m,
+        cable_stiffness=suspension.stiffness_n_m,
+        cable_damping=suspension.damping_n_s_m,
+        hook_above_com=suspension.hook_above_com_m,
+        air_damping=schema.air.damping_n_s_m,
+        air_damping_rotation=schema.air.damping_n_m_s,
+        thruster_positions_in_b=positions,
+        thruster_directions_in_b=directions,
+        thruster_torques=torques,
+        f_max=schema.thrusters.f_max_n,
+        lag=schema.thrusters.lag_s,
+        delay=schema.thrusters.delay_s,
+        imu=_imu(schema.body_imu),
+    )
+    robot = Robot(
+        name=schema.name,
+        leds_in_b=np.array([led.position_in_body_m for led in schema.leds]),
+        A=allocation_matrix(positions, directions, torques),
+        f_min=schema.thrusters.f_min_n,
+        f_max=schema.thrusters.f_max_n,
+        suspension_period_s=2.0
+        * pi
+        * sqrt((suspension.length_m + suspension.hook_above_com_m) / GRAVITY),
+    )
+    gains = {
+        name: Gains(np.array(rows.Kp), np.array(rows.Ki), np.array(rows.Kd))
+        for name, rows in schema.gains.items()
+    }
+    link = LinkParameters(schema.link.host, schema.link.port, schema.link.max_rise_per_command_n)
+    return RobotFile(robot, plant, gains, link)
+
+
+def _imu(section: BodyImuSection) -> BodyImuParameters:
+    return BodyImuParameters(
+        gyro_noise=radians(section.gyro_noise_deg_s_rthz),
+        acc_noise=1e-6 * GRAVITY * section.acc_noise_ug_rthz,
+        gyro_bias=radians(section.gyro_bias_deg_s),
+        acc_bias=1e-3 * GRAVITY * section.acc_bias_mg,
+        gyro_step=radians(section.gyro_step_deg_s),
+        acc_step=1e-3 * GRAVITY * section.acc_step_mg,
+    )

@@ -1,0 +1,118 @@
+"""What may stand in a robot file: every key, its unit in its name, its range."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Row = Annotated[list[Annotated[float, Field(ge=0.0, le=1e4)]], Field(min_length=6, max_length=6)]
+
+
+class Section(BaseModel):
+    """A table of the file: no other keys, no other types, only finite numbers."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Body(Section):
+    """[body]."""
+
+    mass_kg: Annotated[float, Field(gt=0.05, le=100.0)]
+    inertia_kg_m2: Annotated[
+        list[Annotated[float, Field(gt=1e-6, le=100.0)]], Field(min_length=3, max_length=3)
+    ]
+    """Principal moments about the body axes."""
+
+
+class Suspension(Section):
+    """[suspension]."""
+
+    length_m: Annotated[float, Field(gt=0.1, le=20.0)]
+    """Anchor to hook with the robot hanging at rest."""
+    stiffness_n_m: Annotated[float, Field(gt=0.1, le=1e5)]
+    damping_n_s_m: Annotated[float, Field(ge=0.0, le=1e3)]
+    hook_above_com_m: Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Air(Section):
+    """[air]: damping of motion through it."""
+
+    damping_n_s_m: Annotated[float, Field(ge=0.0, le=100.0)]
+    damping_n_m_s: Annotated[float, Field(ge=0.0, le=10.0)]
+
+
+class Thruster(Section):
+    """[[thrusters.units]]."""
+
+    position_in_body_m: Vector
+    direction_in_body: Vector
+    """Unit vector of the force on the body."""
+    spin: Literal[1, -1]
+    """+1: the body feels the reaction torque along the direction, −1: against it."""
+
+
+class Thrusters(Section):
+    """[thrusters]."""
+
+    f_min_n: Annotated[float, Field(ge=0.0, le=100.0)]
+    f_max_n: Annotated[float, Field(gt=0.0, le=100.0)]
+    torque_per_thrust_m: Annotated[float, Field(ge=0.0, le=0.5)]
+    lag_s: Annotated[float, Field(gt=0.0, le=1.0)]
+    delay_s: Annotated[float, Field(ge=0.0, le=0.5)]
+    units: Annotated[list[Thruster], Field(min_length=7, max_length=16)]
+
+
+class BodyImuSection(Section):
+    """[body_imu]: of one axis."""
+
+    gyro_noise_deg_s_rthz: NotNegative
+    acc_noise_ug_rthz: NotNegative
+    gyro_bias_deg_s: NotNegative
+    """Standard deviation of what it is wrong by after a start."""
+    acc_bias_mg: NotNegative
+    gyro_step_deg_s: NotNegative
+    """Rounded to multiples of this; 0 not at all."""
+    acc_step_mg: NotNegative
+
+
+class Led(Section):
+    """[[leds]]."""
+
+    position_in_body_m: Vector
+
+
+class GainsSection(Section):
+    """[gains.NAME], over (x, y, z, roll, pitch, yaw)."""
+
+    Kp: Row
+    """[N/m, N m/rad]."""
+    Ki: Row
+    """[N/(m s), N m/(rad s)]."""
+    Kd: Row
+    """[N s/m, N m s/rad]."""
+
+
+class LinkSection(Section):
+    """[link]."""
+
+    host: Annotated[str, Field(min_length=1, max_length=253)]
+    port: Annotated[int, Field(ge=1, le=65535)]
+    max_rise_per_command_n: Positive
+
+
+class RobotSchema(Section):
+    """The file."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")]
+    body: Body
+    suspension: Suspension
+    air: Air
+    thrusters: Thrusters
+    body_imu: BodyImuSection
+    leds: Annotated[list[Led], Field(min_length=4, max_length=16)]
+    gains: Annotated[dict[str, GainsSection], Field(min_length=1)]
+    link: LinkSection

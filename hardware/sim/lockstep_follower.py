@@ -1,0 +1,79 @@
+"""A simulated robot in virtual time, in the process of a test or experiment."""
+
+from __future__ import annotations
+
+from hardware.control_end import ControlEnd
+from hardware.follower import BodySample, FollowerError, ThrustCommand
+from hardware.robot_file import RobotFile
+from hardware.sim.plant import Plant, PlantOptions
+from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
+
+HERE = ("lockstep", 0)
+
+
+class LockstepFollower:
+    """The same bytes, gate, watchdog and plant as over UDP; time passes only in `advance`."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        seed: int = 0,
+        epoch: int = 1,
+        options: PlantOptions | None = None,
+    ) -> None:
+        """A robot hanging at rest at time 0, refusing thrust."""
+        self._robot = SimulatedRobot(robot_file, seed, seed + 1, seeded_nonces(seed), options)
+        self._end = ControlEnd.of(robot_file, epoch)
+        self.thrusters = self._end.thrusters
+        self.connected = True
+        """False: the link loses everything, both ways."""
+        self._now_us = 0
+        self._arrived: list[BodySample] = []
+        self._closed = False
+
+    @property
+    def plant(self) -> Plant:
+        """The truth, and the place for disturbances."""
+        return self._robot.plant
+
+    @property
+    def epoch(self) -> int:
+        """Under which commands are sent; a new one after the robot has gone to zero by itself."""
+        return self._end.epoch
+
+    @property
+    def t(self) -> float:
+        """Virtual time [s]; the robot's clock shows the same."""
+        return 1e-6 * self._now_us
+
+    def advance(self, dt: float = 0.005) -> None:
+        """Let `dt` [s] pass, whole ticks of 5 ms."""
+        for _ in range(round(1e6 * dt / TICK_US)):
+            self._now_us += TICK_US
+            data = self._robot.tick(self._now_us)
+            if self.connected and self._robot.end.peer(self._now_us) is not None:
+                sample = self._end.receive(data, self.t)
+                self._arrived += [sample] if sample else []
+
+    def exchange(self, command: ThrustCommand) -> list[BodySample]:
+        """Send `command` and give what has arrived. See `Follower`."""
+        if self._closed:
+            raise FollowerError("the link is closed", "an open one")
+        self._send(command)
+        arrived, self._arrived = self._arrived, []
+        return arrived
+
+    def stop(self) -> None:
+        """Zero thrust."""
+        if not self._closed:
+            self._send(ThrustCommand.zero(self.thrusters))
+
+    def close(self) -> None:
+        """Stop and close."""
+        self.stop()
+        self._closed = True
+
+    def _send(self, command: ThrustCommand) -> None:
+        data = self._end.command(command, self.t)
+        if self.connected:
+            self._robot.receive(data, HERE, self._now_us)

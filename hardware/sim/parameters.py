@@ -1,0 +1,65 @@
+"""What a simulated robot is made of; read from a robot file by `hardware.robot_file`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.frames import GRAVITY, Array
+
+
+@dataclass(frozen=True, slots=True)
+class BodyImuParameters:
+    """Errors of the body's motion sensors, per axis; steps of 0 are no rounding."""
+
+    gyro_noise: float
+    """[rad/s/√Hz]."""
+    acc_noise: float
+    """[m/s²/√Hz]."""
+    gyro_bias: float
+    """Standard deviation after a start [rad/s]."""
+    acc_bias: float
+    """[m/s²]."""
+    gyro_step: float
+    """[rad/s]."""
+    acc_step: float
+    """[m/s²]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlantParameters:
+    """What moves the robot, for simulation."""
+
+    mass: float
+    """[kg]."""
+    inertia: Array
+    """(3,) principal moments about the body axes [kg m²]."""
+    cable_length: float
+    """Anchor to hook, hanging at rest [m]."""
+    cable_stiffness: float
+    """[N/m]."""
+    cable_damping: float
+    """[N s/m]."""
+    hook_above_com: float
+    """[m]."""
+    air_damping: float
+    """[N s/m]."""
+    air_damping_rotation: float
+    """[N m s]."""
+    thruster_positions_in_b: Array
+    """(m, 3) [m]."""
+    thruster_directions_in_b: Array
+    """(m, 3) unit vectors."""
+    thruster_torques: Array
+    """(m,) reaction torque along the direction per thrust [m], signed."""
+    f_max: float
+    """[N]."""
+    lag: float
+    """Time constant of a thruster [s]."""
+    delay: float
+    """From command to thruster [s]."""
+    imu: BodyImuParameters
+
+    @property
+    def cable_rest_length(self) -> float:
+        """Shorter than this, the cable is slack [m]."""
+        return self.cable_length - self.mass * GRAVITY / self.cable_stiffness

@@ -1,0 +1,216 @@
+"""A phone nobody holds: what its sensors and its camera would give, in virtual time. Sans-I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from math import ceil, floor, radians
+
+import numpy as np
+
+from hardware.sim.hand import Hand
+from hardware.sim.render import Look, render
+from pipeline.camera import Camera
+from pipeline.frames import Array, R_cd, exp, log, wxyz_from_R
+from pipeline.signals import Image
+
+BodyHistory = Callable[[float], tuple[Array, Array]]
+"""(R_fb (3, 3), p_bf_in_f (3,) [m]) of the robot at a time [s]."""
+
+REMEMBERED_DELAYS = 1024
+
+
+@dataclass(frozen=True, slots=True)
+class PhoneClock:
+    """The phone's own clock: it began at another time and runs a little fast."""
+
+    offset_s: float = 1234.0
+    drift_ppm: float = 40.0
+
+    def at(self, t: float) -> float:
+        """What it shows [s] at our time `t` [s]."""
+        return t * (1.0 + 1e-6 * self.drift_ppm) + self.offset_s
+
+
+@dataclass(frozen=True, slots=True)
+class PhoneOptions:
+    """Rates, delays and faults; the defaults are those of a phone with Chromium."""
+
+    screen_angle_deg: int = 90
+    """Landscape."""
+    motion_rate_hz: float = 60.0
+    frame_rate_hz: float = 30.0
+    motion_delay_s: tuple[float, float] = (0.015, 0.040)
+    """Between capture and arrival, evenly spread; nothing overtakes."""
+    picture_delay_s: tuple[float, float] = (0.060, 0.120)
+    sigma_omega: float = radians(0.03)
+    """White noise of the gyroscope, one axis [rad/s]."""
+    sigma_a: float = 0.006
+    """Of the accelerometer [m/s²]."""
+    bias_omega: float = 0.002
+    """Standard deviation of the constant bias, one axis [rad/s]."""
+    bias_a: float = 0.05
+    """[m/s²]."""
+    step_omega: float = radians(0.1)
+    """The browser rounds to multiples of this [rad/s]; 0: not at all."""
+    step_a: float = 0.1
+    """[m/s²]."""
+    step_angle: float = radians(0.1)
+    """Of the orientation's rotation angle [rad]."""
+
+
+PERFECT = PhoneOptions(
+    sigma_omega=0.0,
+    sigma_a=0.0,
+    bias_omega=0.0,
+    bias_a=0.0,
+    step_omega=0.0,
+    step_a=0.0,
+    step_angle=0.0,
+)
+"""Sensors without noise, bias and rounding."""
+
+
+class EventKind(Enum):
+    """What arrives."""
+
+    MOTION = "motion"
+    PICTURE = "picture"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Event:
+    """Something taken at `t_capture` that arrives at `t_deliver` [s]."""
+
+    t_deliver: float
+    t_capture: float
+    kind: EventKind
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionReading:
+    """What the browser's motion events say, in the device's axes."""
+
+    omega_m_in_d: Array
+    """(3,) [rad/s]."""
+    a_m_in_d: Array
+    """(3,) [m/s²], +9.8 up at rest."""
+    R_ed_wxyz: tuple[float, float, float, float]
+    """Attitude of the device as the browser gives it; earth axes are f's."""
+    screen_angle_deg: int
+
+
+class Stream:
+    """Captures at a fixed rate; each arrives after its own delay, in order. Any window of time."""
+
+    def __init__(
+        self,
+        kind: EventKind,
+        rate_hz: float,
+        delay_s: tuple[float, float],
+        rng: np.random.Generator,
+    ) -> None:
+        """Phase and delays are drawn once from `rng`."""
+        self._kind, self._rate, self._delay_s = kind, rate_hz, delay_s
+        self._phase = float(rng.uniform())
+        self._delays = rng.uniform(*delay_s, REMEMBERED_DELAYS)
+        self._lookback = ceil((delay_s[1] - delay_s[0]) * rate_hz)
+
+    def _capture(self, k: int) -> float:
+        return (k + self._phase) / self._rate
+
+    def _deliver(self, k: int) -> float:
+        """Nothing overtakes: as late as the latest of those before it."""
+        recent = range(k - self._lookback, k + 1)
+        return max(self._capture(j) + float(self._delays[j % REMEMBERED_DELAYS]) for j in recent)
+
+    def captures(self, t_from: float, t_to: float) -> list[Event]:
+        """What is captured within [t_from, t_to)."""
+        first = ceil(t_from * self._rate - self._phase)
+        last = ceil(t_to * self._rate - self._phase)
+        return [Event(self._deliver(k), self._capture(k), self._kind) for k in range(first, last)]
+
+    def deliveries(self, t_from: float, t_to: float) -> list[Event]:
+        """What arrives within [t_from, t_to), in order."""
+        first = floor((t_from - self._delay_s[1]) * self._rate - self._phase)
+        last = ceil((t_to - self._delay_s[0]) * self._rate - self._phase)
+        events = (Event(self._deliver(k), self._capture(k), self._kind) for k in range(first, last))
+        return [event for event in events if t_from <= event.t_deliver < t_to]
+
+
+class VirtualPhone:
+    """Camera, sensors and clock of a phone in a hand."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        hand: Hand,
+        leds_in_b: Array,
+        look: Look,
+        rng: np.random.Generator,
+        options: PhoneOptions = PhoneOptions(),
+        clock: PhoneClock = PhoneClock(),
+    ) -> None:
+        """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says."""
+        self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
+        self._leds_in_b, self._look = leds_in_b, look
+        schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
+        self._bias_omega = schedule.normal(0.0, 1.0, 3) * options.bias_omega
+        self._bias_a = schedule.normal(0.0, 1.0, 3) * options.bias_a
+        self._R_cd = R_cd(options.screen_angle_deg)
+        self.motions = Stream(
+            EventKind.MOTION, options.motion_rate_hz, options.motion_delay_s, schedule
+        )
+        self.pictures = Stream(
+            EventKind.PICTURE, options.frame_rate_hz, options.picture_delay_s, schedule
+        )
+
+    def events(self, t_from: float, t_to: float) -> list[Event]:
+        """What arrives within [t_from, t_to), in order; windows that join lose nothing."""
+        streams = (self.motions, self.pictures)
+        return sorted(
+            (event for stream in streams for event in stream.deliveries(t_from, t_to)),
+            key=lambda event: event.t_deliver,
+        )
+
+    def motion(self, t: float) -> MotionReading:
+        """The reading of the motion sensors at `t` [s]; noise follows the order of the calls."""
+        o, rng = self.options, self._sensor_rng
+        omega_in_d = self._R_cd.T @ self.hand.omega_in_c(t) + self._bias_omega
+        a_in_d = self._R_cd.T @ self.hand.specific_force_in_c(t) + self._bias_a
+        R_ed = self.hand.pose(t)[0] @ self._R_cd
+        return MotionReading(
+            _rounded(omega_in_d + o.sigma_omega * rng.normal(0.0, 1.0, 3), o.step_omega),
+            _rounded(a_in_d + o.sigma_a * rng.normal(0.0, 1.0, 3), o.step_a),
+            wxyz_from_R(_rounded_rotation(R_ed, o.step_angle)),
+            o.screen_angle_deg,
+        )
+
+    def relative_pose(self, t: float, body: BodyHistory) -> tuple[Array, Array]:
+        """True (R_cb (3, 3), p_bc_in_c (3,) [m]) at `t` [s]."""
+        R_fc, p_cf_in_f = self.hand.pose(t)
+        R_fb, p_bf_in_f = body(t)
+        return R_fc.T @ R_fb, R_fc.T @ (p_bf_in_f - p_cf_in_f)
+
+    def picture(self, t: float, body: BodyHistory) -> Image:
+        """Luma (height, width) of a picture whose middle row is exposed around `t` [s]."""
+
+        def pose(dt: float) -> tuple[Array, Array]:
+            return self.relative_pose(t + dt, body)
+
+        return render(self.camera, pose, self._leds_in_b, self._look, self._picture_rng)
+
+
+def _rounded(values: Array, step: float) -> Array:
+    """Nearest multiples of `step`; 0 leaves the values."""
+    return np.round(values / step) * step if step > 0.0 else values
+
+
+def _rounded_rotation(R: Array, step: float) -> Array:
+    """The same axis, the angle a multiple of `step` [rad]."""
+    theta = log(R)
+    angle = float(np.sqrt(theta @ theta))
+    if step <= 0.0 or angle == 0.0:
+        return R
+    return exp(theta * (round(angle / step) * step / angle))

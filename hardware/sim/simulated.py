@@ -1,0 +1,67 @@
+"""A whole simulated robot without sockets and clocks: plant, watchdog, memory of where it was."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from hardware.datagram import U32, triple
+from hardware.robot_end import LinkLimits, Peer, RobotEnd
+from hardware.robot_file import RobotFile
+from hardware.sim.plant import Plant, PlantOptions
+from pipeline.frames import Array
+
+TICK_US = 5_000
+HISTORY = 50
+"""Poses remembered: 0.25 s."""
+
+Nonces = Callable[[], int]
+
+
+def seeded_nonces(seed: int) -> Nonces:
+    """Repeatable nonces, for virtual time."""
+    rng = np.random.default_rng((seed, 1))
+    return lambda: int(rng.integers(1, U32))
+
+
+class SimulatedRobot:
+    """Ticks at 200 Hz of whatever clock its owner has."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        seed: int,
+        boot_id: int,
+        nonces: Nonces,
+        options: PlantOptions | None = None,
+    ) -> None:
+        """Hanging at rest, refusing thrust."""
+        self.plant = Plant(robot_file.plant, np.random.default_rng(seed), options)
+        self.end = RobotEnd(LinkLimits.of(robot_file), boot_id)
+        self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
+        """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
+        self._nonces = nonces
+        self._setpoint = np.zeros(robot_file.robot.A.shape[1])
+
+    def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
+        """A datagram has come from `peer`."""
+        self.end.receive(data, peer, now_us)
+
+    def tick(self, now_us: int) -> bytes:
+        """Move on to `now_us`, one tick after the last; gives the sample to be sent."""
+        self.plant.step(self._setpoint, 1e-6 * TICK_US)
+        self._setpoint = self.end.setpoint(now_us)
+        self.history.append((now_us, self.plant.wxyz_fb, self.plant.p_bf_in_f))
+        return self._sample(now_us, self.plant.thrusts)
+
+    def shut_down(self, now_us: int) -> bytes:
+        """Thrusters off; gives the last sample."""
+        self.end.halt()
+        self._setpoint = np.zeros_like(self._setpoint)
+        return self._sample(now_us, self._setpoint)
+
+    def _sample(self, now_us: int, thrusts: Array) -> bytes:
+        omega, a = self.plant.imu()
+        return self.end.sample(now_us, self._nonces(), triple(omega), triple(a), thrusts)

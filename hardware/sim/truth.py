@@ -1,0 +1,135 @@
+"""Where the simulated robot really is, for simulated phones on the same machine only.
+
+Request: any 8 bytes, to the truth port on the loopback interface. Answer, little-endian:
+
+| offset | type    | field                                                            |
+|--------|---------|------------------------------------------------------------------|
+| 0      | 8 bytes | those of the request                                             |
+| 8      | 4 bytes | magic `LLtr`                                                     |
+| 12     | u8      | version, 1                                                       |
+| 13     | u8      | m, thrusters                                                     |
+| 14     | u16     | n, poses, at most 50 (0.25 s at 200 Hz)                          |
+| 16     | n × 64  | 8 × f64, oldest first: CLOCK_MONOTONIC of this machine [s],      |
+|        |         | attitude wxyz_fb, position of the centre of mass p_bf_in_f [m]   |
+| …      | m × f32 | thrusts of the last one [N]                                      |
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+import struct
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware.follower import FollowerError
+from pipeline.frames import Array, R_from_wxyz, exp, log
+
+REQUEST_BYTES = 8
+MAGIC, VERSION = b"LLtr", 1
+HEAD = struct.Struct("<8s4sBBH")
+MAX_BYTES = 8_192
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """The last quarter of a second."""
+
+    t: Array
+    """(n,) growing, monotonic clock [s]."""
+    wxyz_fb: Array
+    """(n, 4)."""
+    p_bf_in_f: Array
+    """(n, 3) [m]."""
+    thrusts: Array
+    """(m,) at the last of them [N]."""
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """(R_fb (3, 3), p_bf_in_f (3,)) at `t` [s], between its two ticks; at either end that's."""
+        last = len(self.t) - 1
+        after = int(np.clip(np.searchsorted(self.t, t), min(1, last), last))
+        before = max(after - 1, 0)
+        span = float(self.t[after] - self.t[before])
+        share = min(max((t - float(self.t[before])) / span, 0.0), 1.0) if span > 0.0 else 0.0
+        R = R_from_wxyz(self.wxyz_fb[before])
+        turn = log(R.T @ R_from_wxyz(self.wxyz_fb[after]))
+        p: Array = (1.0 - share) * self.p_bf_in_f[before] + share * self.p_bf_in_f[after]
+        return R @ exp(share * turn), p
+
+
+def encode_truth(
+    request: bytes, poses: Sequence[tuple[float, Array, Array]], thrusts: Array
+) -> bytes:
+    """The answer to `request`; `poses` are (t [s], wxyz_fb, p_bf_in_f [m]), oldest first."""
+    head = HEAD.pack(request, MAGIC, VERSION, len(thrusts), len(poses))
+    rows = b"".join(struct.pack("<8d", t, *wxyz, *p) for t, wxyz, p in poses)
+    return head + rows + struct.pack(f"<{len(thrusts)}f", *thrusts)
+
+
+def decode_truth(data: bytes, request: bytes) -> Truth | None:
+    """The answer to `request` in `data`; None if it is none, or empty."""
+    if len(data) < HEAD.size:
+        return None
+    echoed, magic, version, thrusters, n = HEAD.unpack_from(data)
+    if (echoed, magic, version) != (request, MAGIC, VERSION) or n == 0:
+        return None
+    if len(data) != HEAD.size + 64 * n + 4 * thrusters:
+        return None
+    rows = np.frombuffer(data, "<f8", 8 * n, HEAD.size).reshape(n, 8).astype(np.float64)
+    thrusts = np.frombuffer(data, "<f4", thrusters, HEAD.size + 64 * n).astype(np.float64)
+    return Truth(rows[:, 0], rows[:, 1:5], rows[:, 5:8], thrusts)
+
+
+class TruthClient:
+    """Asks a simulated robot's process on this machine."""
+
+    def __init__(self, port: int, timeout: float = 0.05) -> None:
+        """Truth on `port`; an answer is waited for no longer than `timeout` [s]."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.connect(("127.0.0.1", port))
+        self._port, self._timeout = port, timeout
+        self._requests = 0
+        self._newest: Truth | None = None
+
+    def latest(self) -> Truth:
+        """What the robot knows now.
+
+        Raises:
+            FollowerError: no answer in time.
+        """
+        self._requests += 1
+        request = self._requests.to_bytes(REQUEST_BYTES, "little")
+        deadline = time.monotonic() + self._timeout
+        try:
+            self._socket.send(request)
+            while (left := deadline - time.monotonic()) > 0.0:
+                if select.select([self._socket], [], [], left)[0]:
+                    truth = decode_truth(self._socket.recv(MAX_BYTES), request)
+                    if truth is not None:
+                        self._newest = truth
+                        return truth
+        except OSError as error:
+            raise FollowerError(f"truth on port {self._port}: {error}", "a running one") from error
+        raise FollowerError(f"no truth on port {self._port}", "a running simulated robot")
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """(R_fb (3, 3), p_bf_in_f (3,) [m]) at `t` [s, monotonic].
+
+        Asks the robot only if `t` is newer than what it has told. A time beyond its memory gives
+        the nearest it has.
+
+        Raises:
+            FollowerError: no answer in time.
+        """
+        truth = self._newest
+        if truth is None or t > truth.t[-1]:
+            truth = self.latest()
+        return truth.at(t)
+
+    def close(self) -> None:
+        """Give the socket back."""
+        self._socket.close()

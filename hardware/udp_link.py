@@ -1,0 +1,120 @@
+"""Our own link over UDP: the default way to a robot, simulated or real.
+
+| file                | what                                                             |
+|---------------------|------------------------------------------------------------------|
+| `datagram.py`       | both datagrams, byte by byte                                     |
+| `control_end.py`    | the control process's end without a socket                       |
+| `robot_end.py`      | the robot's end without a socket: gate, watchdog, ramp           |
+| `deploy/watchdog/`  | the robot's end in C, for firmware                               |
+| this file           | the socket of the control process                                |
+
+The robot listens on a port and sends samples, at its own rate, to whom it last heard; so the first
+command, of zero thrust, is also the knock on the door. Neither end ever waits for the other.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+
+from hardware.control_end import ControlEnd
+from hardware.datagram import MAX_BYTES
+from hardware.follower import BodySample, FollowerError, ThrustCommand
+from hardware.robot_file import RobotFile
+
+MAX_SAMPLES = 256
+"""Taken in one exchange; the rest waits for the next."""
+STOP_REPEATS = 5
+
+
+class UdpFollower:
+    """A robot at the other end of the network."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        end: ControlEnd,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Ready to exchange with `host`:`port`; sends nothing yet.
+
+        Raises:
+            FollowerError: no such host.
+        """
+        self.thrusters = end.thrusters
+        self._end, self._clock = end, clock
+        try:
+            family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        except OSError as error:
+            what = f"robot at {host}:{port}: {error}"
+            raise FollowerError(what, "a host this machine knows") from error
+        self._socket = socket.socket(family, kind)
+        self._socket.setblocking(False)
+        self._socket.connect(address)  # from here on the kernel drops whatever others send
+        self._closed = False
+        self.lost = 0
+        """Commands known to have gone nowhere: nobody listens, or a full queue."""
+
+    @property
+    def epoch(self) -> int:
+        """Under which commands are sent; a new one after the robot has gone to zero by itself."""
+        return self._end.epoch
+
+    @property
+    def dropped(self) -> int:
+        """Datagrams that were damaged, repeated or overtaken."""
+        return self._end.dropped
+
+    def exchange(self, command: ThrustCommand) -> list[BodySample]:
+        """Send `command` and give what has arrived. See `Follower`."""
+        if self._closed:
+            raise FollowerError("the link is closed", "an open one")
+        self._send(command)
+        samples = (self._end.receive(data, self._clock()) for data in self._arrived())
+        return [sample for sample in samples if sample is not None]
+
+    def stop(self) -> None:
+        """Zero thrust, several times."""
+        for _ in range(0 if self._closed else STOP_REPEATS):
+            self._send(ThrustCommand.zero(self.thrusters))
+
+    def close(self) -> None:
+        """Stop and close."""
+        self.stop()
+        self._closed = True
+        self._socket.close()
+
+    def _send(self, command: ThrustCommand) -> None:
+        data = self._end.command(command, self._clock())
+        try:
+            self._socket.send(data)
+        except OSError:  # refused: nobody listens there (yet); or the way is down or full
+            self.lost += 1
+
+    def _arrived(self) -> list[bytes]:
+        arrived: list[bytes] = []
+        for _ in range(MAX_SAMPLES):
+            try:
+                arrived.append(self._socket.recv(MAX_BYTES + 1))
+            except BlockingIOError:
+                break
+            except OSError:  # tells of an earlier command that met a closed port
+                self.lost += 1
+        return arrived
+
+
+def connect(
+    robot_file: RobotFile,
+    epoch: int | None = None,
+    host: str | None = None,
+    port: int | None = None,
+) -> UdpFollower:
+    """A link to the robot of a robot file; `host` and `port` override the file's.
+
+    Raises:
+        FollowerError: no such host.
+    """
+    link = robot_file.link
+    return UdpFollower(host or link.host, port or link.port, ControlEnd.of(robot_file, epoch))

@@ -1,0 +1,127 @@
+"""The control process: 200 Hz between the server's datagrams and the robot's link.
+
+It knows nothing of HTTP and outlives the server: without word from it, `Teleop` holds, ramps down
+and disarms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hardware.control_end import ControlEnd
+from hardware.robot_file import RobotFile, load_robot
+from hardware.udp_link import UdpFollower
+from pipeline.config import TeleopConfig, VirtualCameraConfig
+from pipeline.paper_ekf import warm_up
+from pipeline.signals import BodyImu
+from server import realtime
+from server.control_link import Endpoint, control_end
+from server.controller import Controller
+from server.robot_link import RobotLink
+
+PERIOD_S = 0.005
+STATUS_EVERY = 4
+"""Ticks: 50 Hz."""
+LATENESS_EVERY = 200
+"""Ticks: 1 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlOptions:
+    """How the control process was started."""
+
+    runtime: Path
+    robot: str
+    host: str
+    port: int
+    gains: str
+    tau_1: float
+    tau_2: float
+
+
+def parse(argv: Sequence[str] | None) -> ControlOptions:
+    """Options from the command line."""
+    parser = argparse.ArgumentParser(prog="control", description=__doc__)
+    parser.add_argument("--runtime", type=Path, required=True, help="directory of the sockets")
+    parser.add_argument("--robot", default="ames", help="name or path of a robot file")
+    parser.add_argument("--host", default="127.0.0.1", help="of the robot")
+    parser.add_argument("--port", type=int, required=True, help="of the robot (UDP)")
+    parser.add_argument("--gains", default="phone", help="name of a gain set in the robot file")
+    virtual = VirtualCameraConfig()
+    parser.add_argument("--tau-1", type=float, default=virtual.tau_1, help="[s], 0: no filter")
+    parser.add_argument("--tau-2", type=float, default=virtual.tau_2, help="[s]")
+    return ControlOptions(**vars(parser.parse_args(argv)))
+
+
+def teleop_config(robot_file: RobotFile, gains: str, tau_1: float, tau_2: float) -> TeleopConfig:
+    """The default configuration with a gain set of the robot file.
+
+    Raises:
+        SystemExit: no such gain set; says which there are.
+    """
+    if gains not in robot_file.gains:
+        raise SystemExit(f"gains: {gains!r} is not one of {', '.join(robot_file.gains)}")
+    virtual_camera = VirtualCameraConfig(tau_1=tau_1, tau_2=tau_2)
+    return replace(TeleopConfig(), gains=robot_file.gains[gains], virtual_camera=virtual_camera)
+
+
+def run(options: ControlOptions) -> None:
+    """Keep the schedule until SIGTERM or SIGINT, then stop the robot."""
+    robot_file = load_robot(options.robot)
+    config = teleop_config(robot_file, options.gains, options.tau_1, options.tau_2)
+    warm_up()
+    controller = Controller(robot_file.robot, config)
+    follower = UdpFollower(options.host, options.port, ControlEnd.of(robot_file))
+    endpoint = control_end(options.runtime)
+    stopping: list[int] = []
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda n, _frame: stopping.append(n))
+    try:
+        _loop(controller, follower, endpoint, realtime.claim(), stopping)
+    finally:
+        follower.close()
+        endpoint.close()
+
+
+def _loop(
+    controller: Controller,
+    follower: UdpFollower,
+    endpoint: Endpoint,
+    granted: str,
+    stopping: list[int],
+) -> None:
+    """Tick until told to stop."""
+    schedule, link = realtime.Schedule(PERIOD_S), RobotLink(follower)
+    body: list[BodyImu] = []
+    lateness: dict[str, float] = {}
+    cpu_ms = np.zeros(LATENESS_EVERY)
+    while not stopping:
+        now = schedule.wait()
+        cpu = time.thread_time()
+        command, output = controller.tick(now, endpoint.inputs(), body, link.reason)
+        body = link.exchange(command, now)
+        cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (time.thread_time() - cpu)
+        if schedule.ticks % LATENESS_EVERY == 0:
+            lateness = schedule.lateness_ms()
+        if schedule.ticks % STATUS_EVERY == 0:
+            endpoint.send(
+                controller.status(
+                    output,
+                    epoch=follower.epoch,
+                    realtime=granted,
+                    lateness_ms=lateness,
+                    step_ms=float(np.median(cpu_ms)),
+                    dropped=endpoint.dropped + follower.dropped,
+                )
+            )
+
+
+if __name__ == "__main__":
+    run(parse(None))

@@ -1,0 +1,225 @@
+"""The whole loop in virtual time: simulated robot, virtual phone, records, vision, control.
+
+The same bytes and the same code as live, without sockets, clocks and threads; as fast as the CPU
+allows, and the same for a seed every time.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from hardware.camera_file import find_camera
+from hardware.sim.codec import Encoder
+from hardware.sim.render import Look
+
+from hardware.robot_file import RobotFile
+from hardware.sim.hand import make_hand
+from hardware.sim.intent import Intent
+from hardware.sim.lockstep_follower import LockstepFollower
+from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
+from hardware.sim.truth import Truth
+from pipeline.config import TeleopConfig
+from pipeline.frames import Array, log
+from pipeline.signals import BodyImu, Mode, Operator, PhoneImu
+from pipeline.teleop import Output
+from server.control_link import (
+    Input,
+    OperatorInput,
+    PhoneImuInput,
+    PoseInput,
+    ReadyInput,
+    RequestInput,
+)
+from server.controller import Controller
+from server.ingest import EncodedFrame, Ingest
+from server.phone_script import DEVICE, PhoneScript, VirtualOperator
+from server.robot_link import RobotLink
+from server.sight import Sight
+from server.wire import Ping, Record, decode, encode
+
+PERIOD_S = 0.005
+EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20}
+NETWORK_TICKS = 2
+"""10 ms one way for what is small."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is simulated."""
+
+    hand: str = "steady"
+    seed: int = 0
+    latency_s: tuple[float, float] = (0.060, 0.120)
+    """Of a picture, from capture to arrival."""
+    frame_rate_hz: float = 30.0
+    width: int = 1280
+    height: int = 720
+    codec: str = "h264"
+    bitrate_bps: int = 3_000_000
+
+
+@dataclass(slots=True)
+class Trace:
+    """What happened while tracking, one row a tick."""
+
+    t: list[float] = field(default_factory=list)
+    error_in_f: list[Array] = field(default_factory=list)
+    """Body minus intended place (3,) [m]."""
+    turn: list[Array] = field(default_factory=list)
+    """From the intended attitude (3,) [rad]."""
+    estimate_error_in_c: list[Array] = field(default_factory=list)
+    """Estimated minus true relative position (3,) [m]."""
+    thrusts: list[Array] = field(default_factory=list)
+    saturated: list[bool] = field(default_factory=list)
+    intended_in_f: list[Array] = field(default_factory=list)
+    body_in_f: list[Array] = field(default_factory=list)
+    pictures: int = 0
+    poses: int = 0
+    left: str = ""
+    """Why tracking ended, if it did."""
+
+
+class Lockstep:
+    """One flight. `advance` moves everything by one control period."""
+
+    def __init__(self, robot_file: RobotFile, config: TeleopConfig, scene: Scene) -> None:
+        """Everything at rest at time 0."""
+        self.scene, self._config = scene, config
+        self.follower = LockstepFollower(robot_file, scene.seed)
+        self.controller = Controller(robot_file.robot, config)
+        self.trace = Trace()
+        self._script = make_script(robot_file, scene)
+        nonces = np.random.default_rng((scene.seed, 7))
+        self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
+        camera = self._script.phone.camera
+        self._sight = Sight(camera, robot_file.robot, config.gates)
+        self._link = RobotLink(self.follower)
+        self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
+        self._on_their_way: deque[tuple[int, Record]] = deque()
+        self._inbox: list[Input] = []
+        self._body: list[BodyImu] = []
+        self._intent: Intent | None = None
+        self._ticks = 0
+
+    @property
+    def t(self) -> float:
+        """Virtual time [s]."""
+        return self.follower.t
+
+    def run(self, seconds: float) -> Trace:
+        """Fly until `seconds`, or until tracking ends."""
+        while self.t < seconds and not self.trace.left:
+            self.advance()
+        return self.trace
+
+    def advance(self) -> Output:
+        """One control period of everything."""
+        t_before = self.t
+        self.follower.advance(PERIOD_S)
+        self._ticks += 1
+        plant = self.follower.plant
+        self._poses.append((self.t, plant.wxyz_fb, plant.p_bf_in_f))
+        self._hear_phone(t_before)
+        self._hear_small_talk()
+        inbox, self._inbox = self._inbox, []
+        command, output = self.controller.tick(self.t, inbox, self._body, self._link.reason)
+        self._body = self._link.exchange(command, self.t)
+        wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
+        if wish is not None:
+            self._inbox.append(RequestInput(wish.what))
+        self._measure(output)
+        return output
+
+    def _robot_at(self, t: float) -> tuple[Array, Array]:
+        times, wxyz, p = zip(*self._poses, strict=True)
+        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0)).at(t)
+
+    def _hear_phone(self, t_before: float) -> None:
+        """Sensors and pictures that arrive within this period."""
+        for event in self._script.phone.events(t_before, self.t):
+            if event.t_capture < PERIOD_S:
+                continue
+            if event.kind == EventKind.MOTION:
+                self._take(self._script.motion(event.t_capture))
+            else:
+                self._take(self._script.picture(event.t_capture, self._robot_at))
+
+    def _hear_small_talk(self) -> None:
+        """PING there and PONG back, TOUCH, and the server's readiness, each at its rate."""
+        if self._ticks % EVERY_TICKS["ping"] == 0:
+            self._send_later(self._ingest.ping(self.t))
+        if self._ticks % EVERY_TICKS["touch"] == 0:
+            self._send_later(self._script.touch(self.t))
+        if self._ticks % EVERY_TICKS["ready"] == 0:
+            clock = [] if self._ingest.clock.ready else ["The phone's clock is not known yet."]
+            self._inbox.append(ReadyInput(clock))
+        while self._on_their_way and self._on_their_way[0][0] <= self._ticks:
+            _, record = self._on_their_way.popleft()
+            if isinstance(record.body, Ping):
+                ping = record.body
+                self._send_later(self._script.pong(ping.nonce, record.t_us, self.t))
+            else:
+                self._take(record)
+
+    def _send_later(self, record: Record) -> None:
+        self._on_their_way.append((self._ticks + NETWORK_TICKS, record))
+
+    def _take(self, record: Record) -> None:
+        """What the server does with a record: the bytes, not the object, go on."""
+        match self._ingest.record(decode(encode(record)), self.t):
+            case PhoneImu() as sample:
+                self._sight.feel(sample)
+                self._inbox.append(PhoneImuInput.of(sample))
+            case Operator() as operator:
+                self._inbox.append(OperatorInput.of(operator))
+            case EncodedFrame() as frame:
+                self._see(frame)
+
+    def _see(self, frame: EncodedFrame) -> None:
+        up_in_b, omega = self.controller.up_in_b, self.controller.omega_bf_in_b
+        sighting = self._sight.see([frame], up_in_b, omega)
+        self.trace.pictures += 1
+        if sighting is not None and sighting.pose is not None:
+            self.trace.poses += 1
+            self._inbox.append(PoseInput.of(sighting.pose))
+
+    def _measure(self, output: Output) -> None:
+        """Compare with what the hand meant, since the button was pressed."""
+        plant, trace = self.follower.plant, self.trace
+        body = (plant.R_fb, plant.p_bf_in_f)
+        hand = self._script.phone.hand.pose(self.t)
+        if output.failsafe.mode != Mode.TRACK:
+            trace.left = output.failsafe.reason if self._intent is not None else ""
+            return
+        if self._intent is None:
+            self._intent = Intent(self._config.virtual_camera, hand, body)
+        R_fr, p_rf = self._intent.step(hand, PERIOD_S)
+        trace.t.append(self.t)
+        trace.error_in_f.append(body[1] - p_rf)
+        trace.turn.append(log(R_fr.T @ body[0]))
+        trace.intended_in_f.append(p_rf)
+        trace.body_in_f.append(body[1])
+        trace.thrusts.append(output.thrusts)
+        trace.saturated.append(output.saturated)
+        if output.relative is not None:
+            true_p_bc_in_c = hand[0].T @ (body[1] - hand[1])
+            trace.estimate_error_in_c.append(output.relative.p_bc_in_c - true_p_bc_in_c)
+
+
+def make_script(robot_file: RobotFile, scene: Scene) -> PhoneScript:
+    """The virtual phone of a scene, with its page and its holder."""
+    options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
+    phone = VirtualPhone(
+        find_camera(DEVICE, scene.width, scene.height),
+        make_hand(scene.hand, seed=scene.seed),
+        robot_file.robot.leds_in_b,
+        Look(),
+        np.random.default_rng((scene.seed, 3)),
+        options,
+    )
+    encoder = Encoder(
+        scene.width, scene.height, scene.frame_rate_hz, scene.bitrate_bps, scene.codec
+    )
+    return PhoneScript(phone, encoder, VirtualOperator())

@@ -1,0 +1,233 @@
+"""The two websockets of a phone's page, spoken from Python: for virtual phones and replays."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import os
+import ssl
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import WebSocketException
+
+from server.messages import (
+    Command,
+    Hello,
+    Refused,
+    Status,
+    ToPage,
+    Welcome,
+    decode_from_server,
+    encode_message,
+)
+from server.wire import VERSION, Credit, Picture, Ping, Record, WireError, decode, encode
+
+MAX_IN_FLIGHT = 3
+"""Pictures sent and not yet taken by the server."""
+RUN_FILE = "lightleash-run.json"
+TIMEOUT_S = 10.0
+
+
+class PhoneClientError(Exception):
+    """The server can't be found, or doesn't take us; says why in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """Where a server is and what opens its door."""
+
+    url: str
+    """http://… or https://…"""
+    token: str
+    truth_port: int = 0
+    """UDP port of the simulated robot's true pose; 0: not known."""
+    ca: Path | None = None
+    """Certificate of the authority that signed the server's."""
+
+
+def runtime_directory() -> Path:
+    """Where a running server leaves word of itself."""
+    own = os.environ.get("XDG_RUNTIME_DIR")
+    return Path(own) / "lightleash" if own else Path(f"/tmp/lightleash-{os.getuid()}")
+
+
+def running_server(directory: Path | None = None) -> Access:
+    """The server running on this machine, as its run file tells.
+
+    Raises:
+        PhoneClientError: there is none, or its run file makes no sense.
+    """
+    path = (directory or runtime_directory()) / RUN_FILE
+    try:
+        run = json.loads(path.read_text())
+        url = run["http_url"] or run["https_url"]
+        return Access(str(url), str(run["operator_token"]), int(run.get("truth_port") or 0))
+    except FileNotFoundError as error:
+        why = "no server is running here: start `lightleash serve`, or name one with --url"
+        raise PhoneClientError(why) from error
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise PhoneClientError(f"{path}: not a run file of `lightleash serve`: {error}") from error
+
+
+def add_access_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options that say where the server is."""
+    parser.add_argument("--url", help="of the server; default: the one running here")
+    parser.add_argument("--token", help="of an operator; goes with --url")
+    parser.add_argument("--ca", type=Path, help="certificate of the server's own authority (PEM)")
+
+
+def access_of(arguments: argparse.Namespace) -> Access:
+    """The server these options mean.
+
+    Raises:
+        PhoneClientError: there is none, or url and token don't come together.
+    """
+    if (arguments.url is None) != (arguments.token is None):
+        raise PhoneClientError("--url and --token go together")
+    if arguments.url is None:
+        return running_server()
+    if not arguments.url.startswith(("http://", "https://")):
+        raise PhoneClientError(f"--url {arguments.url}: allowed: http://… or https://…")
+    return Access(arguments.url, arguments.token, ca=arguments.ca)
+
+
+class PhoneClient:
+    """An operator's page: the control socket, and the video socket that belongs to it."""
+
+    def __init__(
+        self,
+        access: Access,
+        on_ping: Callable[[int, int], Record],
+        on_status: Callable[[Status], Command | None],
+    ) -> None:
+        """`on_ping(nonce, server time [µs])` gives the PONG; `on_status` may give a wish."""
+        self._access = access
+        self._on_ping, self._on_status = on_ping, on_status
+        self._sockets: list[ClientConnection] = []
+        self._unanswered: set[int] = set()
+        self._credit = asyncio.Event()
+        self._credit.set()
+        self.refusals: list[Refused] = []
+
+    async def open(self, device: str) -> Welcome:
+        """Connect both sockets and be welcomed as `device`.
+
+        Raises:
+            PhoneClientError: no server there, or it refuses us.
+        """
+        try:
+            async with asyncio.timeout(TIMEOUT_S):
+                hello = Hello(VERSION, "operator", device, sensors="simulated", video="simulated")
+                main = await self._socket("/ws/phone", hello)
+                welcome = _welcome(await main.recv())
+                hello = Hello(VERSION, "video", device, session=welcome.session)
+                await self._socket("/ws/video", hello)
+        except (OSError, WebSocketException) as error:  # TimeoutError is an OSError
+            why = str(error) or "it does not answer"
+            raise PhoneClientError(f"{self._access.url}: {why}") from error
+        return welcome
+
+    async def _socket(self, path: str, hello: Hello) -> ClientConnection:
+        url = self._access.url.rstrip("/").replace("http", "ws", 1) + path
+        token = {"Authorization": f"Bearer {self._access.token}"}
+        tls = ssl.create_default_context(cafile=self._access.ca) if url[:3] == "wss" else None
+        socket = await connect(url, additional_headers=token, compression=None, proxy=None, ssl=tls)
+        self._sockets.append(socket)
+        await socket.send(encode_message(hello))
+        return socket
+
+    @property
+    def has_credit(self) -> bool:
+        """Another picture may be sent."""
+        return self._credit.is_set()
+
+    async def credit(self) -> None:
+        """Wait until another picture may be sent."""
+        await self._credit.wait()
+
+    async def send(self, record: Record) -> None:
+        """Send a record: pictures on the video socket, all else on the other."""
+        main, video = self._sockets
+        if isinstance(record.body, Picture):
+            self._unanswered.add(record.sequence)
+            if len(self._unanswered) >= MAX_IN_FLIGHT:
+                self._credit.clear()
+            await video.send(encode(record))
+        else:
+            await main.send(encode(record))
+
+    async def wish(self, command: Command) -> None:
+        """Send a wish."""
+        await self._sockets[0].send(encode_message(command))
+
+    async def run(self) -> None:
+        """Answer the server for ever.
+
+        Raises:
+            PhoneClientError: it closed a socket, or speaks another language.
+        """
+        await asyncio.gather(*(self._read(socket) for socket in self._sockets))
+
+    async def close(self) -> None:
+        """Close both sockets."""
+        for socket in reversed(self._sockets):
+            await socket.close()
+
+    async def _read(self, socket: ClientConnection) -> None:
+        why = "the server closed the connection"
+        try:
+            async for data in socket:
+                if isinstance(data, bytes):
+                    await self._take(decode(data))
+                else:
+                    await self._read_message(data)
+        except (WebSocketException, WireError) as error:
+            why = str(error)
+        words = [_words(refused) for refused in self.refusals[-1:]]
+        raise PhoneClientError(": ".join((self._access.url, *words, why)))
+
+    async def _take(self, record: Record) -> None:
+        match record.body:
+            case Ping(nonce=nonce):
+                await self.send(self._on_ping(nonce, record.t_us))
+            case Credit(sequence=sequence):
+                self._unanswered = {sent for sent in self._unanswered if sent > sequence}
+                if len(self._unanswered) < MAX_IN_FLIGHT:
+                    self._credit.set()
+
+    async def _read_message(self, text: str) -> None:
+        message = _message(text)
+        if isinstance(message, Refused):
+            self.refusals = [*self.refusals[-9:], message]
+        elif isinstance(message, Status):
+            command = self._on_status(message)
+            if command is not None:
+                await self.wish(command)
+
+
+def _message(data: str | bytes) -> ToPage:
+    try:
+        return decode_from_server(data)
+    except msgspec.MsgspecError as error:
+        raise WireError("type", "message", f"a message of a server: {error}") from error
+
+
+def _welcome(data: str | bytes) -> Welcome:
+    try:
+        message = _message(data)
+    except WireError as error:
+        raise PhoneClientError(f"this is no Lightleash server: {error}") from error
+    if isinstance(message, Refused):
+        raise PhoneClientError(f"the server refuses: {_words(message)}")
+    if not isinstance(message, Welcome):
+        raise PhoneClientError("the server answers hello with something else than welcome")
+    return message
+
+
+def _words(refused: Refused) -> str:
+    return f"{refused.field}: {refused.allowed} ({refused.code})"

@@ -1,0 +1,52 @@
+"""The robot's samples on our clock, and what the robot itself has against flying."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState, ThrustCommand
+from pipeline.signals import BodyImu
+
+
+class BodyClock:
+    """Dates the robot's samples on our clock: the least delay of the last second is believed."""
+
+    def __init__(self) -> None:
+        """No sample yet."""
+        self._excess = np.full(200, np.inf)
+        self._count = 0
+
+    def imu(self, sample: BodySample, t_received: float) -> BodyImu:
+        """The sample on our clock; never later than its arrival."""
+        t_robot = sample.t_us * 1e-6
+        self._excess[self._count % len(self._excess)] = t_received - t_robot
+        self._count += 1
+        return BodyImu(t_robot + float(self._excess.min()), sample.omega_in_b, sample.a_in_b)
+
+    def forget(self) -> None:
+        """The robot has restarted: its clock is a new one."""
+        self._excess[:] = np.inf
+
+
+class RobotLink:
+    """The robot's samples on our clock, and what it says against flying."""
+
+    def __init__(self, follower: Follower) -> None:
+        """Nothing heard yet."""
+        self.follower = follower
+        self._clock = BodyClock()
+        self._boot_id: int | None = None
+        self.reason = "The robot has not answered yet."
+
+    def exchange(self, command: ThrustCommand, now: float) -> list[BodyImu]:
+        """Send thrusts; the samples that have come meanwhile."""
+        samples = self.follower.exchange(command)
+        for sample in samples:
+            if self._boot_id is not None and sample.boot_id != self._boot_id:
+                self._clock.forget()
+            self._boot_id = sample.boot_id
+        if samples:
+            last = samples[-1]
+            refuses = last.state in (FollowerState.RAMP, FollowerState.REFUSING)
+            self.reason = EXPLANATIONS[last.refusal] if refuses else ""
+        return [self._clock.imu(sample, now) for sample in samples]

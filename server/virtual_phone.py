@@ -1,0 +1,149 @@
+"""`lightleash phone`: a phone nobody holds, on the real websockets of a running server."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import sys
+import time
+from math import degrees
+
+import numpy as np
+
+from hardware.camera_file import find_camera
+from hardware.follower import FollowerError
+from hardware.robot_file import load_robot
+from hardware.sim.codec import Encoder
+from hardware.sim.hand import HANDS, REST_S, START_DISTANCE_M, make_hand
+from hardware.sim.phone import PhoneOptions, VirtualPhone
+from hardware.sim.render import Look
+from hardware.sim.truth import TruthClient
+from pipeline.frames import Array
+from server.live_phone import EXPOSED_S, LivePhone
+from server.phone_client import PhoneClientError, access_of, add_access_arguments
+from server.phone_script import CODECS, DEVICE, PhoneScript, VirtualOperator
+
+WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
+
+
+def make_script(arguments: argparse.Namespace, truth_port: int) -> PhoneScript:
+    """The phone, its page and its operator as the command line describes them."""
+    options = PhoneOptions(frame_rate_hz=arguments.fps, picture_delay_s=arguments.latency_ms)
+    start = _robot_now(truth_port) - np.array([START_DISTANCE_M, 0.0, 0.0])
+    hand = make_hand(
+        arguments.hand,
+        seed=arguments.seed,
+        p_start_in_f=start,
+        t_start=time.monotonic(),
+        rest_s=arguments.rest,
+    )
+    leds_in_b = load_robot(arguments.robot).robot.leds_in_b
+    rng = np.random.default_rng(arguments.seed)
+    camera = find_camera(DEVICE, WIDTH, HEIGHT)
+    phone = VirtualPhone(camera, hand, leds_in_b, Look(), rng, options)
+    encoder = Encoder(WIDTH, HEIGHT, arguments.fps, BITRATE_BPS, arguments.codec)
+    return PhoneScript(phone, encoder, VirtualOperator())
+
+
+def _robot_now(truth_port: int) -> Array:
+    """Where the simulated robot is, p_bf_in_f (3,) [m].
+
+    Raises:
+        FollowerError: it does not answer.
+    """
+    if not truth_port:
+        return np.zeros(3)
+    truth = TruthClient(truth_port, timeout=2.0)
+    try:
+        p_bf_in_f: Array = truth.latest().p_bf_in_f[-1]
+        return p_bf_in_f
+    finally:
+        truth.close()
+
+
+def summary(live: LivePhone) -> dict[str, float | str]:
+    """What the run came to."""
+    score = live.score
+    return {
+        "mode": live.script.operator.mode,
+        "presses": live.script.operator.presses,
+        "tracked_s": round(score.tracked_s, 2),
+        "rms_mm": round(1e3 * score.rms_m, 2),
+        "rms_deg": round(degrees(score.rms_rad), 3),
+        "max_mm": round(1e3 * score.max_m, 1),
+        "pictures": live.sent,
+        "skipped": live.skipped,
+    }
+
+
+def _line(live: LivePhone) -> str:
+    status, score = live.status, live.score
+    mode = status.mode if status else "connected"
+    leds = f" · {status.leds} LEDs" if status else ""
+    words = f" · {status.reason}" if status and status.reason else ""
+    rms = f" · error {1e3 * score.rms_m:.1f} mm RMS" if score.tracked_s else ""
+    return f"{mode}{leds} · {live.sent} pictures, {live.skipped} skipped{rms}{words}"
+
+
+def _show(live: LivePhone) -> None:
+    """One line that is written over on a terminal; nothing otherwise."""
+    if sys.stdout.isatty():
+        sys.stdout.write(f"\r\x1b[K{_line(live)[:120]}")
+        sys.stdout.flush()
+
+
+def _latency(text: str) -> tuple[float, float]:
+    low, _, high = text.partition("-")
+    seconds = (1e-3 * float(low), 1e-3 * float(high or low))
+    if not EXPOSED_S <= seconds[0] <= seconds[1] <= 2.0:
+        raise argparse.ArgumentTypeError(f"{text}: allowed: 30 to 2000, as in 60-120")
+    return seconds
+
+
+def _rate(text: str) -> float:
+    rate = float(text)
+    if not 1.0 <= rate <= 60.0:
+        raise argparse.ArgumentTypeError(f"{text}: allowed: 1 to 60")
+    return rate
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="lightleash phone", description=__doc__)
+    add_access_arguments(parser)
+    parser.add_argument("--hand", default="demo", help=f"{', '.join(HANDS)}, or a CSV file")
+    parser.add_argument("--rest", type=float, default=REST_S, help="seconds before it moves")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="then leave politely")
+    parser.add_argument("--codec", choices=tuple(CODECS), default="h264")
+    parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
+    parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
+    parser.add_argument("--seed", type=int, default=0, help="of hand, noise and delays")
+    parser.add_argument("--robot", default="ames", help="robot file with the LEDs")
+    parser.add_argument("--truth-port", type=int, help="UDP port of the simulated robot's truth")
+    return parser
+
+
+async def _play(arguments: argparse.Namespace) -> LivePhone:
+    access = access_of(arguments)
+    port = access.truth_port if arguments.truth_port is None else arguments.truth_port
+    live = LivePhone(access, make_script(arguments, port), port)
+    await live.run(arguments.seconds, _show)
+    return live
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; gives the exit status."""
+    arguments = _parser().parse_args(argv)
+    try:
+        live = asyncio.run(_play(arguments))
+    except KeyboardInterrupt:
+        return 130
+    except (PhoneClientError, FollowerError, ValueError, OSError) as error:
+        sys.stderr.write(f"lightleash phone: {error}\n")
+        return 1
+    sys.stdout.write(f"\n{json.dumps(summary(live))}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,75 @@
+"""Robots in real time for the contract of followers and for the tests of whole processes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+
+from hardware import udp_link
+from hardware.robot_file import load_robot
+
+AMES = load_robot("ames")
+
+
+class RealTimeRig:
+    """A robot's process and a follower of this one; time passes on an absolute schedule."""
+
+    def __init__(self, process: subprocess.Popen[str], port: int, truth_port: int = 0) -> None:
+        self.process, self.port, self.truth_port = process, port, truth_port
+        self.follower = udp_link.connect(AMES, host="127.0.0.1", port=port)
+        self.f_max = AMES.robot.f_max
+        self._now = time.monotonic()
+
+    def advance(self, dt: float) -> None:
+        self._now = max(self._now + dt, time.monotonic() - 0.02)
+        time.sleep(max(0.0, self._now - time.monotonic()))
+
+    def cut_link(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+    def close(self) -> None:
+        self.follower.close()
+        self.process.terminate()
+        self.process.wait(5.0)
+        if self.process.stdout:
+            self.process.stdout.close()
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
+    return subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True)
+
+
+def simulated_robot() -> RealTimeRig:
+    process = start(
+        (sys.executable, "-m", "hardware.sim.robot", "--port", "0", "--truth-port", "0")
+    )
+    assert process.stdout
+    ready = process.stdout.readline().split()
+    assert ready[0] == "ready"
+    ports = dict(word.split("=") for word in ready[1:])
+    return RealTimeRig(process, int(ports["port"]), int(ports["truth_port"]))
+
+
+@contextlib.contextmanager
+def priority() -> Iterator[None]:
+    """The test before everything else on a busy machine, where that is permitted."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(40))
+    try:
+        yield
+    finally:
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, *before)

@@ -1,0 +1,113 @@
+"""What every follower must do: inherit `FollowerContract` and give it a rig."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import pytest
+
+from hardware.follower import BodySample, Follower, FollowerError, FollowerState, ThrustCommand
+
+
+class Rig(Protocol):
+    """A follower with its robot, and time that passes when told."""
+
+    follower: Follower
+    f_max: float
+
+    def advance(self, dt: float) -> None: ...
+
+    def cut_link(self) -> None: ...
+
+
+class FollowerContract:
+    @pytest.fixture
+    def rig(self) -> Rig:
+        raise NotImplementedError
+
+    @staticmethod
+    def fly(rig: Rig, thrust: float, duration: float) -> list[BodySample]:
+        thrusts = np.full(rig.follower.thrusters, thrust)
+        samples: list[BodySample] = []
+        for _ in range(round(duration / 0.005)):
+            samples += rig.follower.exchange(ThrustCommand(thrusts, armed=thrust > 0.0))
+            rig.advance(0.005)
+        return samples
+
+    def ready(self, rig: Rig) -> None:
+        samples = self.fly(rig, 0.0, 0.7)
+        assert samples[-1].state == FollowerState.IDLE
+
+    def test_is_ready_after_half_a_second_of_zero_and_not_before(self, rig: Rig) -> None:
+        early = self.fly(rig, 0.0, 0.4)
+        assert {s.state for s in early} == {FollowerState.REFUSING}
+        assert self.fly(rig, 0.0, 0.4)[-1].state == FollowerState.IDLE
+
+    def test_refuses_thrust_that_did_not_begin_with_zero(self, rig: Rig) -> None:
+        samples = self.fly(rig, 1.0, 1.0)
+        assert {s.state for s in samples} == {FollowerState.REFUSING}
+        assert max(s.thrusts.max() for s in samples) == 0.0
+
+    def test_follows_thrust_and_says_so(self, rig: Rig) -> None:
+        self.ready(rig)
+        samples = self.fly(rig, 1.0, 0.5)
+        assert samples[-1].state == FollowerState.RUNNING
+        assert samples[-1].thrusts == pytest.approx(1.0, abs=1e-3)
+
+    def test_samples_come_in_order_of_the_robots_clock_with_a_round_trip(self, rig: Rig) -> None:
+        self.ready(rig)
+        samples = self.fly(rig, 0.5, 0.5)
+        times = np.array([s.t_us for s in samples])
+        assert (np.diff(times) > 0).all()
+        assert len({s.boot_id for s in samples}) == 1
+        known = [s.round_trip_s for s in samples if s.round_trip_s is not None]
+        assert len(known) > len(samples) // 2
+        assert min(known) >= 0.0
+
+    def test_stop_is_zero_at_once(self, rig: Rig) -> None:
+        self.ready(rig)
+        self.fly(rig, 2.0, 0.2)
+        rig.follower.stop()
+        rig.advance(0.010)
+        samples = self.fly(rig, 0.0, 0.3)
+        assert samples[-1].state == FollowerState.IDLE
+        assert samples[-1].thrusts.max() < 1e-2
+
+    def test_silence_ramps_to_zero_then_refuses_until_a_new_handshake(self, rig: Rig) -> None:
+        self.ready(rig)
+        self.fly(rig, 2.0, 0.2)
+        rig.advance(0.100)
+        ramp = self.fly(rig, 2.0, 0.3)
+        assert ramp[-1].state == FollowerState.RAMP
+        assert 1.0 < ramp[-1].thrusts.max() < 2.0
+        refused = self.fly(rig, 2.0, 2.5)
+        assert refused[-1].state == FollowerState.REFUSING
+        assert refused[-1].thrusts.max() < 1e-2
+        self.ready(rig)
+
+    def test_a_lost_link_is_no_error_but_silence(self, rig: Rig) -> None:
+        self.ready(rig)
+        rig.cut_link()
+        self.fly(rig, 1.0, 0.1)
+        assert self.fly(rig, 1.0, 0.2) == []
+
+    @pytest.mark.parametrize("thrust", [-0.1, np.nan, np.inf, 1e3])
+    def test_refuses_to_send_what_no_robot_may_be_told(self, rig: Rig, thrust: float) -> None:
+        thrusts = np.zeros(rig.follower.thrusters)
+        thrusts[-1] = thrust
+        with pytest.raises(FollowerError):
+            rig.follower.exchange(ThrustCommand(thrusts, armed=True))
+
+    def test_refuses_wrong_shapes_and_thrust_without_arming(self, rig: Rig) -> None:
+        with pytest.raises(FollowerError, match="shape"):
+            rig.follower.exchange(ThrustCommand(np.zeros(3), armed=True))
+        with pytest.raises(FollowerError, match="armed"):
+            rig.follower.exchange(ThrustCommand(np.ones(rig.follower.thrusters), armed=False))
+
+    def test_a_closed_one_sends_nothing_and_closes_again(self, rig: Rig) -> None:
+        rig.follower.close()
+        rig.follower.close()
+        rig.follower.stop()
+        with pytest.raises(FollowerError, match="closed"):
+            rig.follower.exchange(ThrustCommand.zero(rig.follower.thrusters))

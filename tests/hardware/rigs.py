@@ -1,0 +1,64 @@
+"""Robots in virtual time for the contract of followers."""
+
+from __future__ import annotations
+
+import socket
+
+from hardware.control_end import ControlEnd
+from hardware.robot_file import RobotFile
+from hardware.sim.lockstep_follower import LockstepFollower
+from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
+from hardware.udp_link import UdpFollower
+
+
+class LockstepRig:
+    def __init__(self, robot_file: RobotFile) -> None:
+        self.follower = LockstepFollower(robot_file)
+        self.f_max = robot_file.robot.f_max
+
+    def advance(self, dt: float) -> None:
+        self.follower.advance(dt)
+
+    def cut_link(self) -> None:
+        self.follower.connected = False
+
+
+class LoopbackRig:
+    """Real sockets between the follower and a simulated robot, but virtual time at both ends."""
+
+    def __init__(self, robot_file: RobotFile) -> None:
+        self.robot = SimulatedRobot(robot_file, 0, 7, seeded_nonces(0))
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.setblocking(False)
+        self.now_us = 0
+        self.connected = True
+        self.f_max = robot_file.robot.f_max
+        self.follower = UdpFollower(
+            *self.socket.getsockname(), ControlEnd.of(robot_file), lambda: 1e-6 * self.now_us
+        )
+
+    def advance(self, dt: float) -> None:
+        for _ in range(round(1e6 * dt / TICK_US)):
+            self.receive()
+            self.now_us += TICK_US
+            data = self.robot.tick(self.now_us)
+            peer = self.robot.end.peer(self.now_us)
+            if peer and self.connected:
+                self.socket.sendto(data, peer)
+
+    def receive(self) -> None:
+        while True:
+            try:
+                data, peer = self.socket.recvfrom(2048)
+            except BlockingIOError:
+                return
+            if self.connected:
+                self.robot.receive(data, peer, self.now_us)
+
+    def cut_link(self) -> None:
+        self.connected = False
+
+    def close(self) -> None:
+        self.follower.close()
+        self.socket.close()

@@ -1,0 +1,169 @@
+"""Robot files: the default one is right, and each mistake is named with its place."""
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hardware.robot_end import LinkLimits
+from hardware.robot_file import ROBOTS, RobotFileError, load_robot
+from hardware.robot_physics import positive_null_vector
+from pipeline import config
+from pipeline.frames import GRAVITY
+
+AMES = load_robot("ames")
+TEXT = (ROBOTS / "ames.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def changed(tmp_path):
+    """Load the default robot with a part of its text replaced."""
+
+    def load(pattern, replacement, count=1):
+        text, n = re.subn(pattern, replacement, TEXT, count=count)
+        assert n, pattern
+        path = tmp_path / "changed.toml"
+        path.write_text(text, encoding="utf-8")
+        return load_robot(path)
+
+    return load
+
+
+def test_the_default_robot_has_the_identified_numbers_in_si():
+    plant, robot = AMES.plant, AMES.robot
+    assert (plant.mass, plant.cable_length, plant.lag, plant.delay) == (3.5, 1.3, 0.025, 0.015)
+    assert plant.cable_rest_length == pytest.approx(1.3 - 3.5 * GRAVITY / 42.0)
+    assert (robot.f_min, robot.f_max) == (0.2, 3.0)
+    assert robot.suspension_period_s == pytest.approx(2.314, abs=1e-3)
+    assert plant.imu.gyro_step == pytest.approx(np.deg2rad(1.0 / 16.4))
+    assert plant.imu.acc_step == pytest.approx(GRAVITY / 512.0)
+
+
+def test_its_allocation_matrix_is_the_balanced_octorotors():
+    A = AMES.robot.A
+    assert A.shape == (6, 8)
+    singular = np.linalg.svd(A[:3], compute_uv=False)
+    np.testing.assert_allclose(singular, np.sqrt(8.0 / 3.0), atol=1e-5)
+    np.testing.assert_allclose(A @ np.ones(8), 0.0, atol=1e-5)
+    for half in (np.repeat((1.0, 0.0), 4), np.repeat((0.0, 1.0), 4)):
+        np.testing.assert_allclose(A @ half, 0.0, atol=1e-5)
+    assert np.linalg.matrix_rank(A) == 6
+    n = positive_null_vector(A)
+    assert n is not None
+    assert n.min() >= 1.0
+    np.testing.assert_allclose(A @ n, 0.0, atol=1e-4)
+
+
+def test_its_gain_sets_are_those_of_the_configuration():
+    pairs = {
+        "phone": config.PHONE,
+        "paper_with_ekf": config.TABLE_II_WITH_EKF,
+        "paper_without_ekf": config.TABLE_II_WITHOUT_EKF,
+    }
+    assert set(AMES.gains) == set(pairs)
+    for name, gains in pairs.items():
+        for row in ("Kp", "Ki", "Kd"):
+            np.testing.assert_array_equal(getattr(AMES.gains[name], row), getattr(gains, row))
+
+
+def test_its_leds_are_on_the_cameras_side_at_arms_length_and_not_in_a_plane():
+    leds = AMES.robot.leds_in_b
+    assert leds.shape == (5, 3)
+    distances = np.linalg.norm(leds, axis=1)
+    assert ((distances >= 0.25) & (distances <= 0.35)).all()
+    assert (leds[:, 0] < 0.0).all()
+    assert np.linalg.svd(leds - leds.mean(axis=0), compute_uv=False)[-1] > 0.1
+
+
+def test_every_number_says_what_it_rests_on():
+    head = TEXT[: TEXT.index("[body_imu]")]
+    for line in head.splitlines():
+        if re.match(r"[a-z_0-9]+ = [\[\d]", line) and not line.startswith(("units", "length_m")):
+            assert re.search(r"# .*(known|identified|chosen)", line), line
+
+
+def test_the_links_limits_are_the_robots():
+    limits = LinkLimits.of(AMES)
+    assert (limits.thrusters, limits.f_max, limits.max_rise) == (8, 3.0, AMES.link.max_rise)
+    assert limits.ramp_us == pytest.approx(1e6 * AMES.robot.suspension_period_s, abs=1.0)
+
+
+MISTAKES = {
+    "misspelt key": ("mass_kg", "mas_kg", "body.mas_kg", "did you mean 'mass_kg'"),
+    "key without unit": ("lag_s", "lag", "thrusters.lag", "did you mean 'lag_s'"),
+    "missing key": (r"stiffness_n_m = .*", "", "suspension.stiffness_n_m", "missing"),
+    "unknown table": (r"\[air\]", "[wind]", "wind", "allowed here: name, body"),
+    "key of a led": (r"(leds\]\]\n)position", r"\1place", "leds.0.place", "position_in"),
+    "text for a number": ("mass_kg = 3.5", 'mass_kg = "3.5"', "body.mass_kg", "number"),
+    "true for a number": ("mass_kg = 3.5", "mass_kg = true", "body.mass_kg", "number"),
+    "a fraction for a port": ("port = 47001", "port = 1.5", "link.port", "integer"),
+    "not a number": ("mass_kg = 3.5", "mass_kg = nan", "body.mass_kg", "finite"),
+    "infinite": ("f_max_n = 3.0", "f_max_n = inf", "thrusters.f_max_n", "finite"),
+    "negative mass": ("mass_kg = 3.5", "mass_kg = -1", "body.mass_kg", "greater than 0.05"),
+    "a port too large": ("port = 47001", "port = 70000", "link.port", "65535"),
+    "two coordinates": (
+        r"\[\[leds\]\]\nposition_in_body_m = .*",
+        "[[leds]]\nposition_in_body_m = [-0.1, 0.2]",
+        "leds.0.position_in_body_m",
+        "at least 3",
+    ),
+    "a spin of two": ("spin = 1", "spin = 2", "thrusters.units.0.spin", "1 or -1"),
+    "gains of five": (r"Kp = \[[\d.]+, ", "Kp = [", "gains.phone.Kp", "at least 6"),
+    "negative gains": (r"Kp = \[", "Kp = [-", "gains.phone.Kp.0", "greater"),
+    "an impossible inertia": (r"0\.05, 0\.05, 0\.09", "0.05, 0.05, 0.2", "body.inertia", "sum"),
+    "a cable without length": ("length_m = 1.3", "length_m = 0.5", "suspension.stiff", "above 68"),
+    "f_min above f_max": ("f_min_n = 0.2", "f_min_n = 3.2", "thrusters.f_min_n", "below f_max_n"),
+    "a long direction": (r"\[-0\.788675", "[-1.788675", "thrusters.units.0.direct", "length 1"),
+    "centimetres": (r"\[0\.202073, 0", "[20.2073, 0", "thrusters.units.0.pos", "within 3 m"),
+    "not TOML": (r"\[body\]", "[body", "", "Expected"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_named_with_file_key_and_what_is_allowed(changed, mistake):
+    pattern, replacement, key, allowed = MISTAKES[mistake]
+    with pytest.raises(RobotFileError) as caught:
+        changed(pattern, replacement)
+    assert caught.value.key.startswith(key)
+    assert allowed in caught.value.allowed
+    assert "changed.toml" in str(caught.value)
+
+
+def test_thrusters_that_all_push_one_way_are_refused(changed):
+    with pytest.raises(RobotFileError, match=r"thrusters\.units.*all axes"):
+        changed(r"direction_in_body = \[[^\]]*\]", "direction_in_body = [0.0, 0.0, 1.0]", 8)
+
+
+def test_thrusters_that_cannot_cancel_are_refused(changed):
+    with pytest.raises(RobotFileError, match=r"thrusters\.units.*cancel"):
+        changed(r"(direction_in_body = \[)(-?)(0\.\d+)", r"\1 \3", 8)
+
+
+def test_leds_in_one_plane_are_refused(changed):
+    with pytest.raises(RobotFileError, match="not in one plane"):
+        changed(r"(\[\[leds\]\]\nposition_in_body_m = \[)[-\d.]+", r"\1-0.2", 5)
+
+
+def test_leds_in_one_place_are_refused(changed):
+    led = "[[leds]]\nposition_in_body_m = [-0.2, 0.1, 0.1]"
+    with pytest.raises(RobotFileError, match=r"leds\.1.*from the others"):
+        changed(r"\[\[leds\]\]\nposition_in_body_m = .*", led, 2)
+
+
+def test_an_unknown_robot_is_refused_with_those_there_are():
+    with pytest.raises(RobotFileError, match=r"ames.*did you mean 'ames'"):
+        load_robot("amse")
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(RobotFileError, match=r"nothing\.toml"):
+        load_robot(tmp_path / "nothing.toml")
+
+
+def test_all_robots_in_the_folder_load():
+    for path in Path(ROBOTS).glob("*.toml"):
+        robot_file = load_robot(path.stem)
+        assert robot_file.robot.name == path.stem
+        assert all(getattr(robot_file.plant, f.name) is not None for f in fields(robot_file.plant))

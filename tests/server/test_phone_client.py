@@ -1,0 +1,175 @@
+"""A page's two sockets against a small server on the loopback interface."""
+
+import asyncio
+import json
+
+import pytest
+from websockets.asyncio.server import serve
+
+from server.messages import Command, Refused, Status, Welcome, encode_message
+from server.phone_client import RUN_FILE, Access, PhoneClient, PhoneClientError, running_server
+from server.wire import Codec, Credit, Picture, Ping, Pong, Record, decode, encode
+
+pytestmark = pytest.mark.e2e
+
+WELCOME = Welcome("s1", 1, "ames", 1280, 720, 30, 4_000_000)
+JPEG = b"\xff\xd8" + bytes(30)
+
+
+def status(mode):
+    fields = {name: None for name in Status.__struct_fields__}
+    numbers = dict.fromkeys(("leds", "phones", "supervisors"), 0)
+    texts = dict.fromkeys(("robot", "operator", "recording", "realtime", "reason"), "")
+    flags = {"ready": True, "saturated": False}
+    tables = {"streams": {}, "latency_ms": {}, "control": {}, "refusals": [], "messages": []}
+    return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
+
+
+def picture(sequence):
+    return Record(sequence, 1, Picture(Codec.JPEG, True, 640, 360, 90, JPEG))
+
+
+class Server:
+    """Keeps what it hears; `after_hello` says what it sends on the main socket."""
+
+    def __init__(self, after_hello, credit=True):
+        self.after_hello, self.credit = after_hello, credit
+        self.heard, self.hellos, self.tokens = [], [], []
+
+    async def __call__(self, socket):
+        self.tokens.append(socket.request.headers["Authorization"])
+        self.hellos.append(json.loads(await socket.recv()))
+        if socket.request.path == "/ws/phone":
+            for message in self.after_hello:
+                await socket.send(message)
+        async for data in socket:
+            self.heard.append((socket.request.path, data))
+            if socket.request.path == "/ws/video" and self.credit:
+                await socket.send(encode(Record(1, 1, Credit(decode(data).sequence))))
+
+    async def session(self, talk):
+        """Run `talk(client)` against this server."""
+        async with serve(self, "127.0.0.1", 0) as listening:
+            port = listening.sockets[0].getsockname()[1]
+            client = PhoneClient(Access(f"http://127.0.0.1:{port}", "secret"), self.pong, self.wish)
+            try:
+                await talk(client)
+            finally:
+                await client.close()
+
+    def pong(self, nonce, server_time_us):
+        return Record(1, 77, Pong(nonce, server_time_us))
+
+    def wish(self, shown):
+        return Command("arm") if shown.mode == "DISARMED" else None
+
+
+def test_hello_pong_and_wish():
+    ping = encode(Record(5, 123, Ping(42)))
+    server = Server([encode_message(WELCOME), ping, encode_message(status("DISARMED"))])
+
+    async def talk(client):
+        assert await client.open("a device") == WELCOME
+        running = asyncio.create_task(client.run())
+        async with asyncio.timeout(5.0):
+            while len(server.heard) < 2:
+                await asyncio.sleep(0)
+        running.cancel()
+
+    asyncio.run(server.session(talk))
+    assert server.tokens == ["Bearer secret"] * 2
+    main, video = server.hellos
+    assert (main["role"], main["device"]) == ("operator", "a device")
+    assert (video["role"], video["session"]) == ("video", "s1")
+    (_, pong), (_, wish) = server.heard
+    assert decode(pong).body == Pong(42, 123)
+    assert json.loads(wish) == {"type": "command", "what": "arm"}
+
+
+def test_three_pictures_are_under_way_and_no_more():
+    server = Server([encode_message(WELCOME)], credit=False)
+
+    async def talk(client):
+        await client.open("a device")
+        for k in range(3):
+            assert client.has_credit
+            await client.send(picture(k))
+        assert not client.has_credit
+        await client._take(Record(1, 1, Credit(0)))
+        assert client.has_credit
+
+    asyncio.run(server.session(talk))
+
+
+def test_credit_of_a_later_picture_covers_the_earlier():
+    server = Server([encode_message(WELCOME)])
+
+    async def talk(client):
+        await client.open("a device")
+        running = asyncio.create_task(client.run())
+        async with asyncio.timeout(5.0):
+            for k in range(20):
+                await client.credit()
+                await client.send(picture(k))
+        running.cancel()
+
+    asyncio.run(server.session(talk))
+    paths = [path for path, _ in server.heard]
+    assert paths.count("/ws/video") >= 17
+
+
+@pytest.mark.parametrize(
+    ("first", "why"),
+    [
+        (encode_message(Refused("role", "token", "an operator's", True)), "token: an operator's"),
+        (encode_message(status("LOST")), "something else than welcome"),
+        ('{"type":"salut"}', "no Lightleash server"),
+        (encode(Record(5, 123, Ping(42))), "no Lightleash server"),
+    ],
+)
+def test_another_answer_than_welcome_is_told(first, why):
+    async def talk(client):
+        with pytest.raises(PhoneClientError, match=why):
+            await client.open("a device")
+
+    asyncio.run(Server([first]).session(talk))
+
+
+def test_a_closed_connection_is_told_with_its_reason():
+    class Closing(Server):
+        async def __call__(self, socket):
+            await socket.recv()
+            await socket.send(encode_message(WELCOME))
+            await socket.send(encode_message(Refused("rate", "frame", "30 a second", True)))
+            await socket.close(1008, "refused")
+
+    async def talk(client):
+        await client.open("a device")
+        with pytest.raises(PhoneClientError, match="30 a second"):
+            await client.run()
+
+    asyncio.run(Closing([]).session(talk))
+
+
+def test_no_server_is_told():
+    client = PhoneClient(Access("http://127.0.0.1:9", "t"), None, None)
+    with pytest.raises(PhoneClientError, match=r"127\.0\.0\.1:9"):
+        asyncio.run(client.open("a device"))
+
+
+def test_run_file_tells_where_the_server_is(tmp_path):
+    run = {"http_url": "http://127.0.0.1:8080", "https_url": "", "operator_token": "t", "pid": 1}
+    (tmp_path / RUN_FILE).write_text(json.dumps(run | {"truth_port": 9000}))
+    assert running_server(tmp_path) == Access("http://127.0.0.1:8080", "t", 9000)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"http_url": 1'])
+def test_a_broken_run_file_is_named(tmp_path, text):
+    (tmp_path / RUN_FILE).write_text(text)
+    with pytest.raises(PhoneClientError, match=RUN_FILE):
+        running_server(tmp_path)
+
+
+def test_no_run_file_says_how_to_start_a_server(tmp_path):
+    with pytest.raises(PhoneClientError, match="lightleash serve"):
+        running_server(tmp_path)

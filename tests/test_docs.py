@@ -1,0 +1,54 @@
+"""The documents say what the code does: equation map, configuration, protocol."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+CITED = re.compile(r"Eq\.\s*((?:\(\d+\)(?:\s*-\s*|,\s*|\s+and\s+)?)+)")
+
+
+def equations(text: str) -> set[int]:
+    """Numbers of the equations cited in `text`; `(5)-(8)` is a range."""
+    numbers: set[int] = set()
+    for cited in CITED.findall(text):
+        for first, last in re.findall(r"\((\d+)\)(?:\s*-\s*\((\d+)\))?", cited):
+            numbers |= set(range(int(first), int(last or first) + 1))
+    return numbers
+
+
+def docstrings(path: Path) -> str:
+    """Docstrings of the functions, classes and methods of a module, without its own."""
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, kinds)]
+    return "\n".join(ast.get_docstring(node) or "" for node in nodes)
+
+
+def test_the_equation_map_and_the_docstrings_agree() -> None:
+    cited = {
+        (number, path.name)
+        for path in (ROOT / "pipeline").glob("*.py")
+        for number in equations(docstrings(path))
+        if path.name not in ("teleop.py", "config.py")  # the composition names them all
+    }
+    rows = re.findall(
+        r"^\| \((\d+)\)(?:-\((\d+)\))? \|.*\| (.*) \|$",
+        (ROOT / "ARCHITECTURE.md").read_text(),
+        re.MULTILINE,
+    )
+    mapped = {
+        (number, name)
+        for first, last, files in rows
+        for number in range(int(first), int(last or first) + 1)
+        for name in re.findall(r"`pipeline/([a-z_]+\.py)`", files)
+    }
+    assert cited == mapped
+
+
+def test_every_equation_from_1_to_24_has_a_home() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text()
+    rows = re.findall(r"^\| \((\d+)\)(?:-\((\d+)\))? \|", text, re.MULTILINE)
+    numbers = {n for first, last in rows for n in range(int(first), int(last or first) + 1)}
+    assert numbers == set(range(1, 25))

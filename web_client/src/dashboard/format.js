@@ -1,0 +1,55 @@
+/** Numbers for people: of one width, with a dash for what is not known. */
+
+/**
+ * @param {number | null | undefined} value
+ * @param {number} decimals
+ */
+export function number(value, decimals = 0) {
+  return value === null || value === undefined || !Number.isFinite(value) ? '–' : value.toFixed(decimals);
+}
+
+/**
+ * A span of time in the unit that reads best.
+ * @param {number | null} ms
+ */
+export function age(ms) {
+  if (ms === null) return '–';
+  return ms < 10_000 ? `${Math.round(ms)} ms` : `${Math.round(ms / 1000)} s`;
+}
+
+/**
+ * How worrying an age is, by the timers of the failsafe machine.
+ * @param {number | null} ms
+ * @returns {'' | 'warn' | 'bad'}
+ */
+export function alarm(ms) {
+  if (ms === null || ms >= 150) return 'bad';
+  return ms >= 60 ? 'warn' : '';
+}
+
+/**
+ * Length of a vector given in mm [m].
+ * @param {number[] | null} mm
+ */
+export function metres(mm) {
+  return mm === null ? null : Math.hypot(...mm) / 1000;
+}
+
+/**
+ * The end of a scale for a total: one of a few, so that bars don't breathe.
+ * @param {number} totalMs
+ */
+export function scaleEnd(totalMs) {
+  return [100, 200, 400, 800, 1600, 3200].find((end) => totalMs <= end) ?? totalMs;
+}
+
+/** @type {Record<string, string>} */
+const STREAMS = {
+  operator: 'Operator', phone_imu: 'Phone motion', video: 'Video', pose: 'Pose', body_imu: 'Robot motion',
+  control: 'Control',
+};
+
+/** @param {string} name Of a stream on the wire. */
+export function streamName(name) {
+  return STREAMS[name] ?? name;
+}

@@ -1,0 +1,150 @@
+/** The supervisor page: joins link, board and buttons. The only module here that acts by itself. */
+
+/** @import {ToPage} from '../protocol_types.js' */
+/** @import {Received} from '../protocol.js' */
+/** @import {Event} from './model.js' */
+/** @import {Invite} from './phone_card.js' */
+
+import { BoardView } from './view.js';
+import { EMPTY, reduce } from './model.js';
+import { Link, socketUrl } from '../link.js';
+import { PhoneCard } from './phone_card.js';
+import { Kind, VERSION } from '../protocol.js';
+import { Problem, adviceFor, platformOf } from '../problems.js';
+import { StopPost } from '../stop.js';
+import { ask, roleFrom, tokenOf, whoAmI } from '../pairing.js';
+
+const TICK_MS = 100;
+const STOP_TICK_MS = 50;
+
+const fetchHere = window.fetch.bind(window);
+const platform = platformOf(navigator);
+const stopPost = new StopPost(fetchHere);
+let board = EMPTY;
+let shown = false;
+let virtual = false;
+
+const link = new Link(socketUrl('ws/supervisor', document.baseURI), {
+  onOpen: () => {
+    link.sendMessage({
+      type: 'hello', version: VERSION, role: 'supervisor', device: '', session: '', sensors: '', video: '',
+    });
+  },
+  onMessage: take,
+  onRecord: record,
+  onClose: (wasWelcome) => {
+    dispatch({ type: 'disconnected' });
+    if (!wasWelcome) void checkPairing();
+  },
+}, {
+  WebSocket,
+  setTimeout: (callback, ms) => window.setTimeout(callback, ms),
+  clearTimeout: (id) => window.clearTimeout(id),
+});
+
+const view = new BoardView(document, {
+  onWish: (what) => void link.sendMessage({ type: 'command', what }),
+  onStop: () => {
+    dispatch({ type: 'stop' });
+    sendStop();
+  },
+  onVirtual: () => void toggleVirtual(),
+  onRecord: () => void request(board.status?.recording ? 'DELETE' : 'POST', 'api/recording'),
+  onCode: () => card.toggle(),
+  onReload: () => window.location.reload(),
+});
+const card = new PhoneCard(document, URL, fetchInvite);
+
+/** @param {Event} event */
+function dispatch(event) {
+  board = reduce(board, event);
+  if (shown) return;
+  shown = true;
+  requestAnimationFrame(() => {
+    shown = false;
+    const { problem } = board;
+    view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
+    view.text('virtual', isVirtual() ? 'Stop virtual phone' : 'Start virtual phone');
+  });
+}
+
+/** @param {ToPage} message */
+function take(message) {
+  const now = performance.now();
+  if (message.type === 'welcome') dispatch({ type: 'welcomed' });
+  if (message.type === 'status') dispatch({ type: 'status', status: message, now });
+  if (message.type !== 'refused') return;
+  dispatch({ type: 'refused', refused: message, now });
+  if (message.fatal) link.close();
+}
+
+/** @param {Received} received */
+function record(received) {
+  if (received.kind === Kind.PICTURE) card.take(received.data, performance.now());
+}
+
+function sendStop() {
+  link.sendMessage({ type: 'command', what: 'stop' });
+  stopPost.send();
+}
+
+/**
+ * @param {'POST' | 'DELETE'} method
+ * @param {string} path
+ */
+async function request(method, path) {
+  const fault = await ask(fetchHere, method, path);
+  if (fault !== '') dispatch({ type: 'notice', text: `Not done: ${fault}`, now: performance.now() });
+  return fault === '';
+}
+
+function isVirtual() {
+  return virtual || /virtual/i.test(board.status?.operator ?? '');
+}
+
+async function toggleVirtual() {
+  const stop = isVirtual();
+  if (await request(stop ? 'DELETE' : 'POST', 'api/virtual-phone')) virtual = !stop;
+}
+
+/** @returns {Promise<Invite | null>} */
+async function fetchInvite() {
+  try {
+    const response = await fetchHere('api/invite', { credentials: 'same-origin', cache: 'no-store' });
+    return response.ok ? await response.json() : null;
+  } catch {
+    return null;
+  }
+}
+
+/** The server hung up before welcoming us: perhaps it does not know this page any more. */
+async function checkPairing() {
+  const role = await whoAmI(fetchHere).catch(() => 'supervisor');
+  if (role !== null) return;
+  link.close();
+  dispatch({ type: 'problem', problem: new Problem('not_supervisor') });
+}
+
+async function arrive() {
+  try {
+    const role = await roleFrom(fetchHere, tokenOf(window.location.hash));
+    if (role === null) throw new Problem('not_supervisor');
+    if (role !== 'supervisor') throw new Problem('wrong_role');
+    window.history.replaceState(null, '', window.location.pathname + window.location.search);
+    /** @type {HTMLIFrameElement} */ (view.find('scene')).src = 'view/';
+    link.open();
+  } catch (error) {
+    const problem = error instanceof Problem ? error : new Problem('server_error', String(error));
+    dispatch({ type: 'problem', problem });
+  }
+}
+
+void arrive().then(() => {
+  window.setInterval(() => {
+    if (board.linked) card.tick(performance.now());
+    dispatch({ type: 'tick', now: performance.now() });
+  }, TICK_MS);
+  window.setInterval(() => {
+    if (board.stopping) sendStop();
+  }, STOP_TICK_MS);
+});

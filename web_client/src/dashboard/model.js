@@ -1,0 +1,136 @@
+/** The supervisor's page as a pure function: what is known, and what an event makes of it. */
+
+/** @import {Refused, Status} from '../protocol_types.js' */
+/** @import {ShownMode} from '../session_types.js' */
+
+import { Problem } from '../problems.js';
+import { STATUS_LIFE_MS } from '../session.js';
+
+/** Twenty seconds of Status at 10 Hz. */
+export const REMEMBERED = 200;
+const NOTICE_MS = 5000;
+
+/** @typedef {{ errorMm: number | null, errorDeg: number | null, sigmaMm: number | null }} Sample */
+
+/**
+ * @typedef {object} Board
+ * @property {boolean} linked The server has welcomed us.
+ * @property {boolean} heard The newest Status is young enough to be believed.
+ * @property {Status | null} status
+ * @property {number} statusAtMs
+ * @property {boolean} stopping STOP was asked for and not yet confirmed.
+ * @property {readonly Sample[]} history Oldest first.
+ * @property {{ text: string, untilMs: number } | null} notice
+ * @property {Problem | null} problem
+ */
+
+/**
+ * @typedef {{ type: 'welcomed' } | { type: 'disconnected' } | { type: 'problem', problem: Problem }
+ *   | { type: 'status', status: Status, now: number } | { type: 'refused', refused: Refused, now: number }
+ *   | { type: 'notice', text: string, now: number } | { type: 'tick', now: number } | { type: 'stop' }} Event
+ */
+
+/** @type {Board} */
+export const EMPTY = Object.freeze({
+  linked: false,
+  heard: false,
+  status: null,
+  statusAtMs: -Infinity,
+  stopping: false,
+  history: [],
+  notice: null,
+  problem: null,
+});
+
+/**
+ * @param {Board} board
+ * @param {Event} event
+ * @returns {Board}
+ */
+export function reduce(board, event) {
+  switch (event.type) {
+    case 'welcomed':
+      return { ...board, linked: true, problem: null };
+    case 'disconnected':
+      return { ...board, linked: false, heard: false };
+    case 'problem':
+      return { ...board, linked: false, heard: false, problem: event.problem };
+    case 'status':
+      return heardFrom(board, event.status, event.now);
+    case 'refused':
+      return refused(board, event.refused, event.now);
+    case 'notice':
+      return { ...board, notice: { text: event.text, untilMs: event.now + NOTICE_MS } };
+    case 'stop':
+      return { ...board, stopping: true };
+    case 'tick':
+      return ticked(board, event.now);
+  }
+}
+
+/**
+ * @param {Board} board
+ * @param {Status} status
+ * @param {number} now
+ * @returns {Board}
+ */
+function heardFrom(board, status, now) {
+  const sample = { errorMm: status.error_mm, errorDeg: status.error_deg, sigmaMm: status.sigma_mm };
+  return {
+    ...board,
+    status,
+    statusAtMs: now,
+    heard: true,
+    stopping: board.stopping && status.mode !== 'STOPPED',
+    history: [...board.history.slice(1 - REMEMBERED), sample],
+  };
+}
+
+/**
+ * @param {Board} board
+ * @param {Refused} refusal
+ * @param {number} now
+ * @returns {Board}
+ */
+function refused(board, refusal, now) {
+  const words = `${refusal.field}: ${refusal.allowed}`;
+  if (refusal.fatal) {
+    const code = refusal.code === 'version' ? 'old_page' : refusal.code === 'role' ? 'wrong_role' : 'refused';
+    return reduce(board, { type: 'problem', problem: new Problem(code, words) });
+  }
+  return reduce(board, { type: 'notice', text: `Not taken: ${words}`, now });
+}
+
+/**
+ * @param {Board} board
+ * @param {number} now
+ * @returns {Board}
+ */
+function ticked(board, now) {
+  const heard = board.heard && now - board.statusAtMs <= STATUS_LIFE_MS;
+  const notice = board.notice !== null && now < board.notice.untilMs ? board.notice : null;
+  return { ...board, heard, notice };
+}
+
+/**
+ * @param {Board} board
+ * @returns {ShownMode}
+ */
+export function shownMode(board) {
+  if (!board.linked) return 'NO_LINK';
+  if (!board.heard || board.status === null) return 'NO_WORD';
+  return board.status.mode;
+}
+
+/**
+ * Which wishes make sense now.
+ * @param {Board} board
+ */
+export function wishes(board) {
+  const mode = shownMode(board);
+  return {
+    arm: mode === 'DISARMED' && board.status?.ready === true,
+    disarm: mode === 'ARMED' || mode === 'TRACK' || mode === 'HOLD',
+    reset: mode === 'STOPPED',
+  };
+}

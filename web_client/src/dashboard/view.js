@@ -1,0 +1,258 @@
+/** The supervisor page's DOM. Elements are made once; a new Status only changes their text and width. */
+
+/** @import {Board} from './model.js' */
+/** @import {Advice} from '../problems.js' */
+/** @import {Status} from '../protocol_types.js' */
+
+import { MODE_WORDS } from '../mode_words.js';
+import { age, alarm, metres, number, scaleEnd, streamName } from './format.js';
+import { drawLines } from './sparkline.js';
+import { REMEMBERED, shownMode, wishes } from './model.js';
+
+/** @typedef {{ onWish: (what: 'arm' | 'disarm' | 'reset') => void, onStop: () => void, onVirtual: () => void,
+ *   onRecord: () => void, onCode: () => void, onReload: () => void }} Wishes */
+
+const ERROR_COLOUR = '#7cc4ff';
+const SIGMA_COLOUR = '#fbbf24';
+
+export class BoardView {
+  /**
+   * @param {Document} document
+   * @param {Wishes} handlers
+   */
+  constructor(document, handlers) {
+    this.document = document;
+    /** Rows made so far, by name. @type {Map<string, HTMLElement>} */
+    this.rows = new Map();
+    for (const what of /** @type {const} */ (['arm', 'disarm', 'reset'])) {
+      this.find(what).addEventListener('click', () => handlers.onWish(what));
+    }
+    for (const type of ['pointerdown', 'click']) this.find('stop').addEventListener(type, handlers.onStop);
+    this.find('virtual').addEventListener('click', handlers.onVirtual);
+    this.find('record').addEventListener('click', handlers.onRecord);
+    this.find('code').addEventListener('click', handlers.onCode);
+    this.find('reload').addEventListener('click', handlers.onReload);
+  }
+
+  /** @param {string} id */
+  find(id) {
+    const element = this.document.getElementById(id);
+    if (element === null) throw new Error(`supervisor.html has no #${id}`);
+    return element;
+  }
+
+  /**
+   * @param {Board} board
+   * @param {Advice | null} advice
+   */
+  render(board, advice) {
+    this.show('blocked', advice !== null);
+    this.show('board', advice === null);
+    this.text('problem-title', advice?.title ?? '');
+    this.list('problem-steps', advice?.steps ?? []);
+    this.head(board);
+    const { status } = board;
+    if (status === null) return;
+    this.arming(status);
+    this.phone(status);
+    for (const [name, stream] of Object.entries(status.streams)) this.stream(name, stream);
+    this.tracking(status, board);
+    this.latency(status.latency_ms);
+    this.control(status);
+    this.list('events', status.messages);
+  }
+
+  /** @param {Board} board */
+  head(board) {
+    const mode = shownMode(board);
+    const [name, meaning] = MODE_WORDS[mode];
+    this.find('status').dataset.mode = mode;
+    this.text('mode', name);
+    this.text('meaning', meaning);
+    this.text('reason', board.heard ? board.status?.reason ?? '' : '');
+    this.text('robot', board.status?.robot ?? '–');
+    for (const [what, can] of Object.entries(wishes(board))) {
+      /** @type {HTMLButtonElement} */ (this.find(what)).disabled = !can;
+    }
+    this.find('stop').classList.toggle('asked', board.stopping);
+    const text = board.stopping ? 'STOP sent: waiting for the robot to confirm' : board.notice?.text ?? '';
+    this.show('notice', text !== '');
+    this.text('notice', text);
+  }
+
+  /** @param {Status} status */
+  arming({ ready, refusals, mode }) {
+    const waiting = mode === 'DISARMED';
+    this.text('ready', !waiting ? mode.toLowerCase() : ready ? 'ready' : `${refusals.length} to mend`);
+    this.find('ready').className = `badge ${waiting ? (ready ? 'good' : 'bad') : ''}`;
+    const fine = refusals.length === 0;
+    this.list('refusals', fine ? ['Nothing is in the way'] : refusals);
+    this.find('refusals').firstElementChild?.classList.toggle('fine', fine);
+  }
+
+  /** @param {Status} status */
+  phone({ operator, phones, supervisors, recording }) {
+    this.text('operator', operator || 'none');
+    this.find('operator').title = operator;
+    this.text('crowd', `phones ${phones} · supervisors ${supervisors}`);
+    this.text('recording', recording || 'not recording');
+    this.text('record', recording ? 'Stop recording' : 'Record');
+    this.find('record').classList.toggle('on', recording !== '');
+  }
+
+  /**
+   * @param {string} name
+   * @param {Status['streams'][string]} stream
+   */
+  stream(name, stream) {
+    const row = this.row('streams', name, 'tr', () => {
+      const cells = [streamName(name), '', '', '', ''].map((text) => this.make('td', text));
+      const gauge = this.make('div', '');
+      gauge.className = 'gauge';
+      gauge.append(this.make('i', ''));
+      cells[2]?.append(gauge);
+      return cells;
+    });
+    const [, ageCell, gaugeCell, rateCell, droppedCell] = row.children;
+    write(ageCell, age(stream.age_ms));
+    write(rateCell, `${number(stream.rate_hz)} Hz`);
+    write(droppedCell, String(stream.dropped));
+    const bar = /** @type {HTMLElement} */ (gaugeCell?.firstElementChild?.firstElementChild);
+    bar.className = alarm(stream.age_ms);
+    bar.style.width = `${Math.min(100, ((stream.age_ms ?? 200) / 200) * 100)}%`;
+  }
+
+  /**
+   * @param {Status} status
+   * @param {Board} board
+   */
+  tracking(status, { history }) {
+    this.figure('figures', 'Error', number(status.error_mm, 1), 'mm');
+    this.figure('figures', 'Turned', number(status.error_deg, 2), '°');
+    this.figure('figures', 'σ', number(status.sigma_mm, 1), 'mm');
+    this.figure('figures', 'Distance', number(metres(status.position_mm), 2), 'm');
+    this.figure('figures', 'Lights', String(status.leds), '');
+    this.figure('figures', 'Misfit', number(status.reprojection_px, 2), 'px');
+    this.show('saturated', status.saturated);
+    this.graph('graph-mm', [
+      { values: history.map((sample) => sample.sigmaMm), colour: SIGMA_COLOUR },
+      { values: history.map((sample) => sample.errorMm), colour: ERROR_COLOUR },
+    ]);
+    this.graph('graph-deg', [{ values: history.map((sample) => sample.errorDeg), colour: ERROR_COLOUR }]);
+  }
+
+  /**
+   * @param {string} id
+   * @param {import('./sparkline.js').Line[]} lines
+   */
+  graph(id, lines) {
+    const ratio = this.document.defaultView?.devicePixelRatio ?? 1;
+    drawLines(/** @type {HTMLCanvasElement} */ (this.find(id)), lines, REMEMBERED, ratio);
+  }
+
+  /** @param {Status['latency_ms']} stages */
+  latency(stages) {
+    const total = Object.values(stages).reduce((sum, ms) => sum + ms, 0);
+    const end = scaleEnd(total);
+    this.text('total', total > 0 ? `${Math.round(total)} ms from light to thrust` : 'no picture yet');
+    this.text('scale', `${Math.round(end)} ms`);
+    Object.entries(stages).forEach(([name, ms], i) => {
+      const part = this.row('stack', name, 'i', () => []);
+      part.className = `tone-${i % 8}`;
+      part.title = name;
+      part.style.width = `${(ms / end) * 100}%`;
+      const row = this.row('stages', name, 'div', () => [
+        this.make('i', ''), this.make('dt', name), this.make('dd', ''),
+      ]);
+      /** @type {HTMLElement} */ (row.firstElementChild).className = `tone-${i % 8}`;
+      write(row.lastElementChild, number(ms, 1));
+    });
+  }
+
+  /** @param {Status} status */
+  control({ realtime, control }) {
+    this.text('realtime', realtime || '–');
+    this.figure('control', 'p50', number(control.p50_ms, 2), 'ms');
+    this.figure('control', 'p99', number(control.p99_ms, 2), 'ms');
+    this.figure('control', 'p99.9', number(control.p999_ms, 2), 'ms');
+    this.figure('control', 'Missed', number(control.missed), '');
+  }
+
+  /**
+   * @param {string} list
+   * @param {string} name
+   * @param {string} value
+   * @param {string} unit
+   */
+  figure(list, name, value, unit) {
+    const row = this.row(list, name, 'div', () => {
+      const figure = this.make('dd', '');
+      figure.append(this.make('span', ''), this.make('small', unit));
+      return [this.make('dt', name), figure];
+    });
+    write(row.lastElementChild?.firstElementChild, value);
+  }
+
+  /**
+   * The element of that name in a list, made at its first use.
+   * @param {string} list
+   * @param {string} name
+   * @param {string} tag
+   * @param {() => HTMLElement[]} children
+   */
+  row(list, name, tag, children) {
+    const key = `${list} ${name}`;
+    const known = this.rows.get(key);
+    if (known !== undefined) return known;
+    const row = this.make(tag, '');
+    row.append(...children());
+    this.find(list).append(row);
+    this.rows.set(key, row);
+    return row;
+  }
+
+  /**
+   * @param {string} tag
+   * @param {string} text
+   */
+  make(tag, text) {
+    const element = this.document.createElement(tag);
+    element.textContent = text;
+    return element;
+  }
+
+  /**
+   * @param {string} id
+   * @param {string} text
+   */
+  text(id, text) {
+    write(this.find(id), text);
+  }
+
+  /**
+   * @param {string} id
+   * @param {boolean} visible
+   */
+  show(id, visible) {
+    this.find(id).hidden = !visible;
+  }
+
+  /**
+   * @param {string} id
+   * @param {string[]} items
+   */
+  list(id, items) {
+    const element = this.find(id);
+    const old = [...element.children].map((child) => child.textContent);
+    if (old.length === items.length && old.every((text, i) => text === items[i])) return;
+    element.replaceChildren(...items.map((text) => this.make('li', text)));
+  }
+}
+
+/**
+ * @param {Element | null | undefined} element
+ * @param {string} text
+ */
+function write(element, text) {
+  if (element && element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,219 @@
+/** Frames to bytes: H.264 where the browser can, else JPEG. */
+
+/** @import {Frame} from './frame_source.js' */
+/** @import {Wanted} from './camera.js' */
+
+import { Problem } from './problems.js';
+import { Codec, MAX_RECORD_BYTES } from './protocol.js';
+
+const KEY_EVERY_US = 2e6;
+const JPEG_QUALITY = 0.7;
+const HEADERS_BYTES = 24;
+
+/**
+ * A frame without its picture.
+ * @typedef {Pick<Frame, 'width' | 'height' | 'captureUs' | 'screenAngle'>} About
+ */
+
+/**
+ * @typedef {object} Encoded
+ * @property {number} codec One of `Codec`.
+ * @property {boolean} key
+ * @property {About} about
+ * @property {Uint8Array} data
+ */
+
+/**
+ * `encode` takes the frame over and calls `onEncoded` or `onLost` once for it.
+ * @typedef {object} Encoder
+ * @property {string} name
+ * @property {(frame: Frame) => void} encode
+ * @property {() => void} requestKey
+ * @property {() => void} close
+ */
+
+/**
+ * @typedef {object} Outlet
+ * @property {(encoded: Encoded) => void} onEncoded
+ * @property {() => void} onLost One frame that was taken will not come out.
+ * @property {(error: unknown) => void} onFailure The encoder is of no more use.
+ */
+
+/** @typedef {Wanted & { bitrate_bps: number }} Stream */
+
+/**
+ * H.264 settings to try, best first: constrained baseline, at the lowest level that has the picture.
+ * @param {Stream} stream
+ * @returns {VideoEncoderConfig[]}
+ */
+export function h264Candidates(stream) {
+  const blocks = Math.ceil(stream.width / 16) * Math.ceil(stream.height / 16);
+  const fits = LEVELS.filter(([, size, rate]) => blocks <= size && blocks * stream.frame_rate_hz <= rate);
+  return fits.flatMap(([level]) => [`42E0${level}`, `4200${level}`]).map((profile) => ({
+    codec: `avc1.${profile}`,
+    width: stream.width,
+    height: stream.height,
+    bitrate: stream.bitrate_bps,
+    framerate: stream.frame_rate_hz,
+    latencyMode: 'realtime',
+    avc: { format: 'annexb' },
+  }));
+}
+
+/** Levels 3.1 to 5.1: name, blocks in a picture, blocks a second. @type {[string, number, number][]} */
+const LEVELS = [
+  ['1F', 3600, 108000], ['20', 5120, 216000], ['28', 8192, 245760], ['2A', 8704, 522240],
+  ['33', 36864, 983040],
+];
+
+/**
+ * The first settings the browser can encode with, or null.
+ * @param {Pick<typeof VideoEncoder, 'isConfigSupported'> | undefined} Encoders
+ * @param {Stream} stream
+ */
+export async function supportedH264(Encoders, stream) {
+  for (const config of h264Candidates(stream)) {
+    const answer = await Encoders?.isConfigSupported(config).catch(() => null);
+    if (answer?.supported) return config;
+  }
+  return null;
+}
+
+/** @implements {Encoder} */
+export class H264Encoder {
+  name = 'H.264';
+
+  /**
+   * @param {typeof VideoEncoder} Encoders
+   * @param {VideoEncoderConfig} config Its size is replaced by that of the frames.
+   * @param {Outlet} outlet
+   */
+  constructor(Encoders, config, outlet) {
+    this.config = config;
+    this.outlet = outlet;
+    this.wantsKey = true;
+    this.lastKeyUs = -Infinity;
+    /** Frames in the encoder by time stamp. @type {Map<number, About>} */
+    this.inside = new Map();
+    this.encoder = new Encoders({
+      output: (chunk) => this.output(chunk),
+      error: (error) => outlet.onFailure(error),
+    });
+  }
+
+  /** @param {Frame} frame */
+  encode(frame) {
+    const image = /** @type {VideoFrame} */ (frame.image);
+    try {
+      this.fit(frame);
+      const keyFrame = this.wantsKey || frame.captureUs - this.lastKeyUs >= KEY_EVERY_US;
+      this.inside.set(image.timestamp, aboutOf(frame));
+      this.encoder.encode(image, { keyFrame });
+      if (keyFrame) this.lastKeyUs = frame.captureUs;
+      this.wantsKey = this.wantsKey && !keyFrame;
+    } catch (error) {
+      this.inside.delete(image.timestamp);
+      this.outlet.onLost();
+      this.outlet.onFailure(error);
+    } finally {
+      frame.close();
+    }
+  }
+
+  /**
+   * The phone was turned, or this is the first frame.
+   * @param {Frame} frame
+   */
+  fit({ width, height }) {
+    const same = this.config.width === width && this.config.height === height;
+    if (same && this.encoder.state === 'configured') return;
+    this.config = { ...this.config, width, height };
+    this.encoder.configure(this.config);
+    this.wantsKey = true;
+  }
+
+  /** @param {EncodedVideoChunk} chunk */
+  output(chunk) {
+    const about = this.inside.get(chunk.timestamp);
+    this.inside.delete(chunk.timestamp);
+    if (about === undefined) return;
+    const data = new Uint8Array(chunk.byteLength);
+    if (data.byteLength + HEADERS_BYTES > MAX_RECORD_BYTES) {
+      this.wantsKey = true;
+      this.outlet.onLost();
+      return;
+    }
+    chunk.copyTo(data);
+    this.outlet.onEncoded({ codec: Codec.H264, key: chunk.type === 'key', about, data });
+  }
+
+  requestKey() {
+    this.wantsKey = true;
+  }
+
+  close() {
+    if (this.encoder.state !== 'closed') this.encoder.close();
+  }
+}
+
+/** @implements {Encoder} */
+export class JpegEncoder {
+  name = 'JPEG';
+
+  /**
+   * @param {new (width: number, height: number) => OffscreenCanvas} Canvas
+   * @param {Outlet} outlet
+   */
+  constructor(Canvas, outlet) {
+    this.canvas = new Canvas(16, 16);
+    this.context = this.canvas.getContext('2d', { alpha: false });
+    this.outlet = outlet;
+    this.quality = JPEG_QUALITY;
+    this.newestUs = -Infinity;
+    if (this.context === null) throw new Problem('encoder_missing');
+  }
+
+  /** @param {Frame} frame */
+  encode(frame) {
+    const { canvas } = this;
+    if (canvas.width !== frame.width || canvas.height !== frame.height) {
+      canvas.width = frame.width;
+      canvas.height = frame.height;
+    }
+    this.context?.drawImage(frame.image, 0, 0, frame.width, frame.height);
+    frame.close();
+    void this.compress(aboutOf(frame));
+  }
+
+  /** @param {About} about */
+  async compress(about) {
+    try {
+      const blob = await this.canvas.convertToBlob({ type: 'image/jpeg', quality: this.quality });
+      const data = new Uint8Array(await blob.arrayBuffer());
+      if (data.byteLength + HEADERS_BYTES > MAX_RECORD_BYTES) {
+        this.quality = Math.max(0.3, this.quality - 0.1);
+        this.outlet.onLost();
+      } else if (about.captureUs < this.newestUs) { // overtaken by a later one
+        this.outlet.onLost();
+      } else {
+        this.newestUs = about.captureUs;
+        this.outlet.onEncoded({ codec: Codec.JPEG, key: true, about, data });
+      }
+    } catch (error) {
+      this.outlet.onLost();
+      this.outlet.onFailure(error);
+    }
+  }
+
+  requestKey() {} // every JPEG is one
+
+  close() {}
+}
+
+/**
+ * @param {Frame} frame
+ * @returns {About}
+ */
+function aboutOf({ width, height, captureUs, screenAngle }) {
+  return { width, height, captureUs, screenAngle };
+}

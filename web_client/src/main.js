@@ -1,0 +1,279 @@
+/** The phone page: joins browser, sensors, links and screen. The only module that acts by itself. */
+
+/** @import {Effect, Event} from './session_types.js' */
+/** @import {Stream} from './encoder.js' */
+/** @import {Welcome} from './protocol_types.js' */
+
+import { CameraFeed } from './camera_feed.js';
+import { Feedback } from './feedback.js';
+import { Imu, requestMotionPermission, screenAngleOf } from './imu.js';
+import { Phone } from './phone.js';
+import { Problem, adviceFor, platformOf } from './problems.js';
+import { Rate } from './clock.js';
+import { stayAwake, toggleFullScreen } from './display.js';
+import { StopPost } from './stop.js';
+import { USUAL, deviceName } from './camera.js';
+import { VideoSender } from './video.js';
+import { View } from './view.js';
+import { INITIAL, reduce, touchOf, wish } from './session.js';
+import { roleFrom, tokenOf, whoAmI } from './pairing.js';
+
+const TICK_MS = 33;
+const STOP_TICK_MS = 50;
+const HEALTH_MS = 500;
+const SILENT_MOTION_MS = 3000;
+
+const scope = /** @type {Record<string, any>} */ (/** @type {unknown} */ (window));
+const platform = platformOf(navigator);
+const fetchHere = window.fetch.bind(window);
+const stopPost = new StopPost(fetchHere);
+const feedback = new Feedback(navigator, window.AudioContext, platform !== 'android');
+const motionRate = new Rate();
+const identity = { device: '', sensors: '', video: '' };
+let state = INITIAL;
+let shown = false;
+let startedAtMs = Infinity;
+
+const screenAngle = () => screenAngleOf(screen, scope.orientation);
+
+function startWorker() {
+  return new Worker(new URL('./frame_worker.js', import.meta.url), { type: 'module' });
+}
+
+const phone = new Phone({
+  base: document.baseURI,
+  performance,
+  links: {
+    WebSocket,
+    setTimeout: (callback, ms) => window.setTimeout(callback, ms),
+    clearTimeout: (id) => window.clearTimeout(id),
+  },
+  dispatch,
+  identity: () => identity,
+  onWelcome: (welcome) => void welcomed(welcome),
+  onUnwelcome: () => void checkPairing(),
+});
+
+const view = new View(document, window, {
+  onStart: () => void start(),
+  onReload: () => window.location.reload(),
+  onPress: () => dispatch({ type: 'press' }),
+  onRelease: () => dispatch({ type: 'release' }),
+  onStop: () => dispatch({ type: 'stop' }),
+  onWish: () => dispatch({ type: 'ask', what: wish(state).what }),
+  onSound: () => {
+    feedback.unlock();
+    feedback.sound = !feedback.sound;
+    view.sound(feedback.sound);
+  },
+  onFull: document.fullscreenEnabled ? () => void toggleFullScreen(document, screen) : null,
+});
+
+const video = new VideoSender({
+  performance,
+  send: (record) => phone.sendFrame(record),
+  log: (text) => phone.log(text),
+  VideoEncoder: scope.VideoEncoder,
+  OffscreenCanvas: scope.OffscreenCanvas,
+});
+phone.video = video;
+
+const camera = new CameraFeed({
+  mediaDevices: navigator.mediaDevices,
+  performance,
+  video: view.video,
+  preview: (stream) => view.preview(stream),
+  Processor: scope.MediaStreamTrackProcessor,
+  startWorker: scope.VideoFrame && scope.Worker ? startWorker : undefined,
+  screenAngle,
+  onFrame: (frame) => {
+    if (phone.videoLink.isOpen) video.offer(frame);
+    else frame.close();
+  },
+  onLost: (text) => {
+    notice(text);
+    phone.log(text);
+  },
+});
+
+const imu = new Imu({
+  events: window,
+  performance,
+  screenAngle,
+  negated: platform === 'ios',
+  setTimeout: (callback, ms) => window.setTimeout(callback, ms),
+  sensors: scope,
+}, (tUs, motion) => {
+  motionRate.add(performance.now());
+  phone.sendMotion(tUs, motion);
+});
+
+/** @param {Event} event */
+function dispatch(event) {
+  const outcome = reduce(state, event);
+  state = outcome.state;
+  outcome.effects.forEach(perform);
+  if (!shown) {
+    shown = true;
+    requestAnimationFrame(show);
+  }
+}
+
+function show() {
+  shown = false;
+  const { problem } = state;
+  view.render(state, problem === null ? null : adviceFor(problem, platform, window.location.port));
+}
+
+/** @param {Effect} effect */
+function perform(effect) {
+  switch (effect.type) {
+    case 'touch':
+      if (state.linked) phone.sendTouch(touchOf(state));
+      break;
+    case 'command':
+      phone.command(effect.what);
+      break;
+    case 'post_stop':
+      stopPost.send();
+      break;
+    case 'feel':
+      feedback.signal(effect.mode);
+      break;
+    case 'close_link':
+      phone.close();
+  }
+}
+
+/** Everything a tap starts; what fails is told with the way to mend it. */
+async function start() {
+  const motionAllowed = requestMotionPermission(window); // must come first: it needs the tap itself
+  motionAllowed.catch(() => {}); // awaited below
+  feedback.unlock();
+  dispatch({ type: 'start' });
+  try {
+    step('Pairing with the server…');
+    await ensurePaired();
+    step('Waiting for your permission: motion sensors…');
+    await motionAllowed;
+    step('Waiting for your permission: camera…');
+    if (!camera.isLive) await camera.open();
+    identity.device = await deviceName(navigator, screen, window.devicePixelRatio, camera.lens);
+    await begin();
+  } catch (error) {
+    dispatch({ type: 'problem', problem: asProblem(error) });
+  }
+}
+
+async function begin() {
+  identity.video = await video.prepare({ ...USUAL, bitrate_bps: 4e6 });
+  if (video.encoder === null) throw new Problem('encoder_missing');
+  imu.stop();
+  imu.start();
+  startedAtMs = performance.now();
+  identity.sensors = imu.source;
+  void stayAwake(navigator);
+  dispatch({ type: 'started' });
+  phone.open();
+}
+
+async function ensurePaired() {
+  const role = await roleFrom(fetchHere, tokenOf(window.location.hash));
+  if (role === null) throw new Problem('not_paired');
+  // The token has done its work: nobody shall find it in the address.
+  window.history.replaceState(null, '', window.location.pathname + window.location.search);
+}
+
+/** The server hung up before welcoming us: perhaps it does not know this phone any more. */
+async function checkPairing() {
+  try {
+    if ((await whoAmI(fetchHere)) !== null) return;
+    dispatch({ type: 'problem', problem: new Problem('not_paired') });
+  } catch {
+    // Not to be reached: the link tries again by itself.
+  }
+}
+
+/** @param {Welcome} welcome */
+async function welcomed(welcome) {
+  /** @type {Stream} */
+  const stream = welcome;
+  try {
+    const words = await camera.settle(stream);
+    identity.video = await video.prepare(stream);
+    phone.log(`${identity.device}: ${words}, ${identity.video}`);
+  } catch (error) {
+    phone.log(`camera: ${error}`);
+  }
+}
+
+async function comeBack() {
+  void stayAwake(navigator);
+  try {
+    const words = await camera.revive();
+    if (words !== '') phone.log(`camera again: ${words}`);
+  } catch (error) {
+    notice(`The camera does not come back: ${asProblem(error).message}`);
+  }
+}
+
+function reportHealth() {
+  const now = performance.now();
+  dispatch({
+    type: 'health',
+    health: {
+      fps: video.frames.perSecond(now),
+      rttMs: video.credits.roundTripMs,
+      imuHz: motionRate.perSecond(now),
+      kbps: video.bytes.perSecond(now) * 0.008,
+    },
+  });
+  const silent = now - startedAtMs > SILENT_MOTION_MS && motionRate.perSecond(now) === 0;
+  if (silent !== state.motionSilent) dispatch({ type: 'motion_silent', silent });
+}
+
+/** @param {string} text */
+function step(text) {
+  dispatch({ type: 'step', text });
+}
+
+/** @param {string} text */
+function notice(text) {
+  dispatch({ type: 'notice', text, now: performance.now() });
+}
+
+/**
+ * @param {unknown} error
+ * @returns {Problem}
+ */
+function asProblem(error) {
+  return error instanceof Problem ? error : new Problem('server_error', String(error));
+}
+
+async function arrive() {
+  if (!window.isSecureContext) {
+    dispatch({ type: 'problem', problem: new Problem('insecure') });
+    return;
+  }
+  const token = tokenOf(window.location.hash);
+  if (token === '' && (await whoAmI(fetchHere).catch(() => 'operator')) === null) {
+    dispatch({ type: 'problem', problem: new Problem('not_paired') });
+    return;
+  }
+  dispatch({ type: 'step', text: '' });
+}
+
+document.addEventListener('visibilitychange', () => {
+  dispatch({ type: 'visibility', visible: !document.hidden });
+  if (!document.hidden && state.phase === 'operating') void comeBack();
+});
+window.addEventListener('pagehide', () => dispatch({ type: 'visibility', visible: false }));
+window.addEventListener('pageshow', () => dispatch({ type: 'visibility', visible: !document.hidden }));
+window.addEventListener('unhandledrejection', (event) => phone.log(`page: ${event.reason}`));
+window.addEventListener('error', (event) => phone.log(`page: ${event.message}`));
+view.sound(feedback.sound);
+void arrive().then(() => {
+  window.setInterval(() => dispatch({ type: 'tick', now: performance.now() }), TICK_MS);
+  window.setInterval(() => dispatch({ type: 'stop_tick' }), STOP_TICK_MS);
+  window.setInterval(reportHealth, HEALTH_MS);
+});

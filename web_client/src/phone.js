@@ -1,0 +1,158 @@
+/** The phone's two links and what travels on them: who we are, motion, touch, pictures, wishes. */
+
+/** @import {Command, Hello, ToPage, Welcome} from './protocol_types.js' */
+/** @import {Motion, Received, Touch} from './protocol.js' */
+/** @import {Surroundings as LinkSurroundings} from './link.js' */
+/** @import {Event} from './session_types.js' */
+/** @import {VideoSender} from './video.js' */
+
+import { nowUs } from './clock.js';
+import { Link, socketUrl } from './link.js';
+import { Kind, MAX_RECORD_BYTES, VERSION, encodeMotion, encodePong, encodeTouch } from './protocol.js';
+
+const LOG_EVERY_MS = 200;
+
+/** @typedef {{ device: string, sensors: string, video: string }} Identity */
+
+/**
+ * @typedef {object} Surroundings
+ * @property {string} base Address of the page.
+ * @property {{ now(): number }} performance
+ * @property {LinkSurroundings} links
+ * @property {(event: Event) => void} dispatch
+ * @property {() => Identity} identity
+ * @property {(welcome: Welcome) => void} onWelcome
+ * @property {() => void} onUnwelcome A connection ended before the server welcomed us.
+ */
+
+export class Phone {
+  /** @param {Surroundings} surroundings */
+  constructor(surroundings) {
+    this.surroundings = surroundings;
+    this.session = '';
+    this.loggedMs = -Infinity;
+    this.sequences = { motion: 0, touch: 0, pong: 0 };
+    /** @type {VideoSender | null} */
+    this.video = null;
+    const { base, links } = surroundings;
+    this.link = new Link(socketUrl('ws/phone', base), {
+      onOpen: () => this.hello('operator'),
+      onMessage: (message) => this.take(message),
+      onRecord: (record) => this.record(record),
+      onClose: (wasWelcome) => this.closed(wasWelcome),
+    }, links);
+    this.videoLink = new Link(socketUrl('ws/video', base), {
+      onOpen: () => this.videoOpened(),
+      onMessage: (message) => this.take(message),
+      onRecord: (record) => this.record(record),
+      onClose: () => {},
+    }, links, { silenceMs: 0 });
+  }
+
+  open() {
+    this.link.open();
+  }
+
+  close() {
+    this.link.close();
+    this.videoLink.close();
+  }
+
+  /** @param {'operator' | 'video'} role */
+  hello(role) {
+    const session = role === 'video' ? this.session : '';
+    /** @type {Hello} */
+    const hello = { type: 'hello', version: VERSION, role, session, ...this.surroundings.identity() };
+    (role === 'video' ? this.videoLink : this.link).sendMessage(hello);
+  }
+
+  videoOpened() {
+    this.hello('video');
+    this.video?.restart();
+  }
+
+  /** @param {boolean} wasWelcome */
+  closed(wasWelcome) {
+    this.videoLink.close();
+    this.surroundings.dispatch({ type: 'disconnected' });
+    if (!wasWelcome) this.surroundings.onUnwelcome();
+  }
+
+  /** @param {ToPage} message */
+  take(message) {
+    const { dispatch, performance } = this.surroundings;
+    const now = performance.now();
+    switch (message.type) {
+      case 'welcome':
+        this.welcomed(message);
+        break;
+      case 'status':
+        dispatch({ type: 'status', status: message, now });
+        break;
+      case 'refused':
+        dispatch({ type: 'refused', refused: message, now });
+        break;
+      case 'command':
+        if (message.what === 'key_frame') this.video?.requestKey();
+    }
+  }
+
+  /** @param {Welcome} welcome */
+  welcomed(welcome) {
+    if (welcome.session === this.session && this.videoLink.isOpen) return; // said again, on the video link
+    this.session = welcome.session;
+    this.sequences = { motion: 0, touch: 0, pong: 0 };
+    this.videoLink.failures = 0;
+    this.videoLink.open();
+    this.surroundings.dispatch({ type: 'welcomed' });
+    this.surroundings.onWelcome(welcome);
+  }
+
+  /** @param {Received} record */
+  record(record) {
+    if (record.kind === Kind.PING) {
+      this.sequences.pong += 1;
+      const now = nowUs(this.surroundings.performance);
+      this.link.sendRecord(encodePong(this.sequences.pong, now, record));
+      this.surroundings.dispatch({ type: 'ping', nonce: record.nonce });
+    } else if (record.kind === Kind.CREDIT) {
+      this.video?.credit(record.taken);
+    }
+  }
+
+  /**
+   * @param {number} tUs
+   * @param {Motion} motion
+   */
+  sendMotion(tUs, motion) {
+    if (this.session === '') return;
+    this.sequences.motion += 1;
+    this.link.sendRecord(encodeMotion(this.sequences.motion, tUs, motion));
+  }
+
+  /** @param {Touch} touch */
+  sendTouch(touch) {
+    this.sequences.touch += 1;
+    // Never dropped: a release must get through, and an old one says nothing that a newer one does not.
+    const now = nowUs(this.surroundings.performance);
+    this.link.sendRecord(encodeTouch(this.sequences.touch, now, touch), Infinity);
+  }
+
+  /** @param {ArrayBuffer} record */
+  sendFrame(record) {
+    return this.videoLink.sendRecord(record, MAX_RECORD_BYTES);
+  }
+
+  /** @param {Command['what']} what */
+  command(what) {
+    return this.link.sendMessage({ type: 'command', what });
+  }
+
+  /** @param {string} text For the supervisor to read; a flood of them is cut. */
+  log(text) {
+    const now = this.surroundings.performance.now();
+    if (now - this.loggedMs < LOG_EVERY_MS) return;
+    this.loggedMs = now;
+    this.link.sendMessage({ type: 'log', text: text.slice(0, 200) });
+  }
+}

@@ -1,0 +1,217 @@
+/**
+ * The phone page as a pure function: what is known, and what an event makes of it. The page only asks; the
+ * control process decides, and `Status` alone says what is true.
+ */
+
+/** @import {Status, Refused} from './protocol_types.js' */
+/** @import {Touch} from './protocol.js' */
+/** @import {Effect, Event, Outcome, ShownMode, State} from './session_types.js' */
+
+import { Problem } from './problems.js';
+
+/** A Status older than this is no news any more [ms]. */
+export const STATUS_LIFE_MS = 500;
+const NOTICE_MS = 5000;
+
+/** @type {State} */
+export const INITIAL = Object.freeze({
+  phase: 'welcome',
+  step: '',
+  problem: null,
+  notice: null,
+  linked: false,
+  status: null,
+  statusAtMs: -Infinity,
+  heard: false,
+  held: false,
+  visible: true,
+  press: 0,
+  nonce: 0n,
+  stopping: false,
+  motionSilent: false,
+  health: { fps: 0, rttMs: null, imuHz: 0, kbps: 0 },
+});
+
+/**
+ * What an event makes of the state.
+ * @param {State} state
+ * @param {Event} event
+ * @returns {Outcome}
+ */
+export function reduce(state, event) {
+  const outcome = transition(state, event);
+  const mode = shownMode(outcome.state);
+  const news = mode !== shownMode(state) && outcome.state.phase === 'operating';
+  return news
+    ? { state: outcome.state, effects: [...outcome.effects, { type: 'feel', mode }] }
+    : outcome;
+}
+
+/**
+ * @param {State} state
+ * @param {Event} event
+ * @returns {Outcome}
+ */
+function transition(state, event) {
+  switch (event.type) {
+    case 'start':
+      return to({ ...state, phase: 'starting', step: '', problem: null });
+    case 'step':
+      return to({ ...state, step: event.text });
+    case 'problem':
+      return blocked(state, event.problem);
+    case 'started':
+      return to({ ...state, phase: 'operating', step: '' });
+    case 'welcomed':
+      return to({ ...state, linked: true, problem: null }, { type: 'touch' });
+    case 'disconnected':
+      return to({ ...state, linked: false, heard: false, held: false, nonce: 0n });
+    case 'status':
+      return heardFrom(state, event.status, event.now);
+    case 'refused':
+      return refused(state, event.refused, event.now);
+    case 'notice':
+      return to(noticed(state, event.text, event.now));
+    case 'ping':
+      return to({ ...state, nonce: event.nonce });
+    case 'tick':
+      return ticked(state, event.now);
+    case 'press':
+      return pressed(state);
+    case 'release':
+      return released(state);
+    case 'visibility':
+      return seen(state, event.visible);
+    case 'stop':
+      return to({ ...state, stopping: true, held: false }, ...STOP, { type: 'touch' });
+    case 'stop_tick':
+      return state.stopping ? to(state, ...STOP) : to(state);
+    case 'ask':
+      return to(state, { type: 'command', what: event.what });
+    case 'motion_silent':
+      return to({ ...state, motionSilent: event.silent });
+    case 'health':
+      return to({ ...state, health: event.health });
+  }
+}
+
+/** @type {Effect[]} */
+const STOP = [{ type: 'command', what: 'stop' }, { type: 'post_stop' }];
+
+/**
+ * @param {State} state
+ * @param {...Effect} effects
+ * @returns {Outcome}
+ */
+function to(state, ...effects) {
+  return { state, effects };
+}
+
+/**
+ * Back to the first screen, with what is to be mended.
+ * @param {State} state
+ * @param {Problem} problem
+ */
+function blocked(state, problem) {
+  /** @type {State} */
+  const back = { ...state, phase: 'welcome', step: '', problem, linked: false, heard: false, held: false };
+  return to(back, { type: 'close_link' });
+}
+
+/**
+ * @param {State} state
+ * @param {Status} status
+ * @param {number} now
+ */
+function heardFrom(state, status, now) {
+  const stopping = state.stopping && status.mode !== 'STOPPED';
+  return to({ ...state, status, statusAtMs: now, heard: true, stopping });
+}
+
+/**
+ * @param {State} state
+ * @param {Refused} refusal
+ * @param {number} now
+ */
+function refused(state, refusal, now) {
+  const words = `${refusal.field}: ${refusal.allowed}`;
+  if (refusal.fatal && refusal.code === 'version') return blocked(state, new Problem('old_page', words));
+  if (refusal.fatal && refusal.code === 'role') {
+    return to({ ...state, problem: new Problem('taken', words) });
+  }
+  return to(noticed(state, `Not taken: ${words}`, now));
+}
+
+/**
+ * @param {State} state
+ * @param {string} text
+ * @param {number} now
+ * @returns {State}
+ */
+function noticed(state, text, now) {
+  return { ...state, notice: { text, untilMs: now + NOTICE_MS } };
+}
+
+/**
+ * @param {State} state
+ * @param {number} now
+ */
+function ticked(state, now) {
+  const heard = state.heard && now - state.statusAtMs <= STATUS_LIFE_MS;
+  const notice = state.notice !== null && now < state.notice.untilMs ? state.notice : null;
+  const next = { ...state, heard, notice };
+  return state.linked ? to(next, { type: 'touch' }) : to(next);
+}
+
+/** @param {State} state */
+function pressed(state) {
+  if (state.held || !state.visible || !state.linked) return to(state);
+  return to({ ...state, held: true, press: (state.press + 1) >>> 0 }, { type: 'touch' });
+}
+
+/** @param {State} state */
+function released(state) {
+  return state.held ? to({ ...state, held: false }, { type: 'touch' }) : to(state);
+}
+
+/**
+ * A page nobody sees is not held.
+ * @param {State} state
+ * @param {boolean} visible
+ */
+function seen(state, visible) {
+  return to({ ...state, visible, held: state.held && visible }, { type: 'touch' });
+}
+
+/**
+ * The mode to show: that of the robot only while the server is heard.
+ * @param {State} state
+ * @returns {ShownMode}
+ */
+export function shownMode(state) {
+  if (!state.linked) return 'NO_LINK';
+  if (!state.heard || state.status === null) return 'NO_WORD';
+  return state.status.mode;
+}
+
+/**
+ * What the page says of its holder.
+ * @param {State} state
+ * @returns {Touch}
+ */
+export function touchOf(state) {
+  return { held: state.held, visible: state.visible, press: state.press, nonce: state.nonce };
+}
+
+/**
+ * What the button beside STOP does now, and whether it may.
+ * @param {State} state
+ * @returns {{ what: 'arm' | 'disarm' | 'reset', enabled: boolean }}
+ */
+export function wish(state) {
+  const mode = shownMode(state);
+  if (mode === 'STOPPED') return { what: 'reset', enabled: !state.held };
+  if (mode === 'ARMED' || mode === 'TRACK' || mode === 'HOLD') return { what: 'disarm', enabled: true };
+  const ready = mode === 'DISARMED' && state.status?.ready === true;
+  return { what: 'arm', enabled: ready && !state.held };
+}

@@ -1,0 +1,53 @@
+/** What the phone page knows, what can happen to it, and what it then does. */
+
+/** @import {Refused, Status} from './protocol_types.js' */
+/** @import {Problem} from './problems.js' */
+
+/** @typedef {Status['mode'] | 'NO_LINK' | 'NO_WORD'} ShownMode */
+
+/**
+ * @typedef {object} Health
+ * @property {number} fps Frames sent per second.
+ * @property {number | null} rttMs Quickest way there and back of the last frames.
+ * @property {number} imuHz
+ * @property {number} kbps Video [kbit/s].
+ */
+
+/**
+ * @typedef {object} State
+ * @property {'welcome' | 'starting' | 'operating'} phase
+ * @property {string} step What is being done while starting.
+ * @property {Problem | null} problem What the person has to mend.
+ * @property {{ text: string, untilMs: number } | null} notice A passing remark.
+ * @property {boolean} linked The server has welcomed us.
+ * @property {Status | null} status
+ * @property {number} statusAtMs When it came.
+ * @property {boolean} heard It is young enough to be believed.
+ * @property {boolean} held
+ * @property {boolean} visible
+ * @property {number} press Counts presses.
+ * @property {bigint} nonce The newest one of a PING.
+ * @property {boolean} stopping STOP was asked for and not yet confirmed.
+ * @property {boolean} motionSilent No motion sensor has answered.
+ * @property {Health} health
+ */
+
+/**
+ * @typedef {{ type: 'start' } | { type: 'step', text: string } | { type: 'problem', problem: Problem }
+ *   | { type: 'started' } | { type: 'welcomed' } | { type: 'disconnected' }
+ *   | { type: 'status', status: Status, now: number } | { type: 'refused', refused: Refused, now: number }
+ *   | { type: 'notice', text: string, now: number } | { type: 'ping', nonce: bigint }
+ *   | { type: 'tick', now: number } | { type: 'press' } | { type: 'release' }
+ *   | { type: 'visibility', visible: boolean } | { type: 'stop' } | { type: 'stop_tick' }
+ *   | { type: 'ask', what: 'arm' | 'disarm' | 'reset' } | { type: 'motion_silent', silent: boolean }
+ *   | { type: 'health', health: Health }} Event
+ */
+
+/**
+ * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop' | 'reset' }
+ *   | { type: 'post_stop' } | { type: 'feel', mode: ShownMode } | { type: 'close_link' }} Effect
+ */
+
+/** @typedef {{ state: State, effects: Effect[] }} Outcome */
+
+export {};

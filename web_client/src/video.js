@@ -1,0 +1,127 @@
+/** Camera frames to FRAME records, never more under way than the server has credited. */
+
+/** @import {Encoded, Encoder, Outlet, Stream} from './encoder.js' */
+/** @import {Frame} from './frame_source.js' */
+
+import { Rate } from './clock.js';
+import { Credits } from './credits.js';
+import { H264Encoder, JpegEncoder, supportedH264 } from './encoder.js';
+import { encodeFrame } from './protocol.js';
+
+/**
+ * @typedef {object} Surroundings
+ * @property {{ now(): number }} performance
+ * @property {(record: ArrayBuffer) => boolean} send Whether the record went out.
+ * @property {(text: string) => void} log
+ * @property {typeof VideoEncoder | undefined} VideoEncoder
+ * @property {(new (width: number, height: number) => OffscreenCanvas) | undefined} OffscreenCanvas
+ */
+
+export class VideoSender {
+  /** @param {Surroundings} surroundings */
+  constructor(surroundings) {
+    this.surroundings = surroundings;
+    this.sequence = 0;
+    this.credits = new Credits();
+    this.frames = new Rate();
+    this.bytes = new Rate();
+    /** @type {Encoder | null} */
+    this.encoder = null;
+    this.dropped = 0;
+  }
+
+  /**
+   * Chooses the encoder for a stream; resolves with its name.
+   * @param {Stream} stream
+   * @returns {Promise<string>}
+   */
+  async prepare(stream) {
+    const { VideoEncoder: Encoders } = this.surroundings;
+    const config = await supportedH264(Encoders, stream);
+    this.encoder?.close();
+    this.credits.encoding = 0;
+    this.encoder = config !== null && Encoders !== undefined
+      ? new H264Encoder(Encoders, config, this.outlet())
+      : this.jpegEncoder();
+    return this.encoder?.name ?? 'none';
+  }
+
+  jpegEncoder() {
+    const Canvas = this.surroundings.OffscreenCanvas;
+    return Canvas === undefined ? null : new JpegEncoder(Canvas, this.outlet());
+  }
+
+  /** A new connection: nothing is under way on it, and its first picture must be a key. */
+  restart() {
+    const { encoding } = this.credits;
+    this.credits = new Credits();
+    this.credits.encoding = encoding;
+    this.sequence = 0;
+    this.encoder?.requestKey();
+  }
+
+  requestKey() {
+    this.encoder?.requestKey();
+  }
+
+  /**
+   * Takes a frame over: encodes it or drops it. Frames are dropped before the encoder, never after: those
+   * that follow would lean on them.
+   * @param {Frame} frame
+   */
+  offer(frame) {
+    if (this.encoder === null || !this.credits.mayTake(this.surroundings.performance.now())) {
+      this.dropped += 1;
+      frame.close();
+      return;
+    }
+    this.credits.taken();
+    this.encoder.encode(frame);
+  }
+
+  /**
+   * @param {number} sequence The server has taken this FRAME.
+   */
+  credit(sequence) {
+    this.credits.credit(sequence, this.surroundings.performance.now());
+  }
+
+  /** @returns {Outlet} */
+  outlet() {
+    return {
+      onEncoded: (encoded) => this.send(encoded),
+      onLost: () => this.credits.lost(),
+      onFailure: (error) => this.failed(error),
+    };
+  }
+
+  /** @param {Encoded} encoded */
+  send({ about, ...picture }) {
+    const now = this.surroundings.performance.now();
+    const sequence = (this.sequence + 1) >>> 0;
+    const { width, height, screenAngle } = about;
+    const record = encodeFrame(
+      sequence, about.captureUs, { ...picture, width, height, screen_angle_deg: screenAngle },
+    );
+    if (!this.surroundings.send(record)) {
+      this.credits.lost();
+      this.encoder?.requestKey();
+      return;
+    }
+    this.sequence = sequence;
+    this.credits.wasSent(sequence, now);
+    this.frames.add(now);
+    this.bytes.add(now, record.byteLength);
+  }
+
+  /**
+   * The encoder has failed: JPEG always works.
+   * @param {unknown} error
+   */
+  failed(error) {
+    this.surroundings.log(`${this.encoder?.name} encoder: ${error}`);
+    this.encoder?.close();
+    this.credits.encoding = 0;
+    this.encoder = this.encoder instanceof JpegEncoder ? null : this.jpegEncoder();
+  }
+}

@@ -1,0 +1,232 @@
+/** The phone page's DOM: shows a state, reports what fingers do. Nothing else touches the document. */
+
+/** @import {State, ShownMode} from './session_types.js' */
+/** @import {Advice} from './problems.js' */
+
+import { MODE_WORDS } from './mode_words.js';
+import { attachHold } from './hold_button.js';
+import { shownMode, wish } from './session.js';
+
+const WISH_WORDS = { arm: 'Arm', disarm: 'Disarm', reset: 'Reset' };
+const MOST_REFUSALS = 4;
+
+/**
+ * @typedef {object} Wishes
+ * @property {() => void} onStart
+ * @property {() => void} onReload
+ * @property {() => void} onPress
+ * @property {() => void} onRelease
+ * @property {() => void} onStop
+ * @property {() => void} onWish
+ * @property {() => void} onSound
+ * @property {(() => void) | null} onFull Null where the page can't fill the screen.
+ */
+
+export class View {
+  /**
+   * @param {Document} document
+   * @param {Window} window
+   * @param {Wishes} wishes
+   */
+  constructor(document, window, wishes) {
+    /** @param {string} id */
+    const find = (id) => {
+      const element = document.getElementById(id);
+      if (element === null) throw new Error(`index.html has no #${id}`);
+      return element;
+    };
+    this.find = find;
+    this.document = document;
+    this.start = /** @type {HTMLButtonElement} */ (find('start'));
+    this.wish = /** @type {HTMLButtonElement} */ (find('wish'));
+    this.video = /** @type {HTMLVideoElement} */ (find('preview'));
+    this.start.addEventListener('click', wishes.onStart);
+    find('reload').addEventListener('click', wishes.onReload);
+    this.wish.addEventListener('click', wishes.onWish);
+    find('sound').addEventListener('click', wishes.onSound);
+    for (const type of ['pointerdown', 'click']) find('stop').addEventListener(type, wishes.onStop);
+    const { onFull } = wishes;
+    find('full').hidden = onFull === null;
+    if (onFull !== null) find('full').addEventListener('click', onFull);
+    attachHold(find('hold'), { window, document }, wishes);
+    this.text('host', window.location.host);
+  }
+
+  /** @param {MediaStream} stream */
+  preview(stream) {
+    this.video.srcObject = stream;
+    void this.video.play().catch(() => {}); // the attribute `autoplay` tries again
+  }
+
+  /** @param {boolean} on */
+  sound(on) {
+    this.find('sound').setAttribute('aria-pressed', String(on));
+  }
+
+  /**
+   * @param {State} state
+   * @param {Advice | null} advice On the state's problem.
+   */
+  render(state, advice) {
+    const operating = state.phase === 'operating';
+    this.show('welcome', !operating);
+    this.show('operate', operating);
+    if (operating) this.operating(state, advice);
+    else this.welcome(state, advice);
+  }
+
+  /**
+   * @param {State} state
+   * @param {Advice | null} advice
+   */
+  welcome(state, advice) {
+    const starting = state.phase === 'starting';
+    this.show('intro', advice === null);
+    this.show('art', advice === null);
+    this.show('problem', advice !== null);
+    this.text('problem-title', advice?.title ?? '');
+    this.list('problem-steps', advice?.steps ?? []);
+    const old = state.problem?.code === 'old_page';
+    this.show('reload', old);
+    this.show('start', !old && (advice === null || advice.retry));
+    this.start.disabled = starting;
+    this.text('start', starting ? 'Starting…' : advice === null ? 'Start' : 'Try again');
+    this.text('step', state.step);
+  }
+
+  /**
+   * @param {State} state
+   * @param {Advice | null} advice
+   */
+  operating(state, advice) {
+    const mode = shownMode(state);
+    const [name, meaning] = MODE_WORDS[mode];
+    this.data('status', 'mode', mode);
+    this.text('mode', name);
+    this.text('meaning', meaning);
+    this.reasons(state, mode, advice);
+    this.notice(state);
+    this.health(state);
+    const { what, enabled } = wish(state);
+    this.text('wish', WISH_WORDS[what]);
+    this.data('wish', 'what', what);
+    this.wish.disabled = !enabled;
+    this.find('stop').classList.toggle('asked', state.stopping);
+    this.hold(state, mode);
+  }
+
+  /**
+   * @param {State} state
+   * @param {ShownMode} mode
+   * @param {Advice | null} advice
+   */
+  reasons(state, mode, advice) {
+    const own = ownReason(state, mode);
+    this.text('reason', advice?.title ?? own ?? state.status?.reason ?? '');
+    const refusals = advice?.steps ?? (mode === 'DISARMED' ? state.status?.refusals ?? [] : []);
+    this.list('refusals', refusals, MOST_REFUSALS);
+  }
+
+  /** @param {State} state */
+  notice(state) {
+    const text = state.stopping ? 'STOP sent: waiting for the robot to confirm' : state.notice?.text ?? '';
+    this.show('notice', text !== '');
+    this.text('notice', text);
+  }
+
+  /** @param {State} state */
+  health({ health, status, heard }) {
+    this.text('h-leds', heard && status ? String(status.leds) : '–');
+    this.text('h-fps', `${Math.round(health.fps)} fps`);
+    this.text('h-rtt', health.rttMs === null ? '–' : `${Math.round(health.rttMs)} ms`);
+    this.text('h-imu', `${Math.round(health.imuHz)} Hz`);
+    this.text('h-kbps', `${(health.kbps / 1000).toFixed(1)} Mb/s`);
+  }
+
+  /**
+   * @param {State} state
+   * @param {ShownMode} mode
+   */
+  hold(state, mode) {
+    const { look, title, hint } = holdWords(state.held, mode);
+    this.data('hold', 'look', look);
+    this.find('hold').setAttribute('aria-pressed', String(state.held));
+    this.text('hold-title', title);
+    this.text('hold-hint', hint);
+  }
+
+  /**
+   * @param {string} id
+   * @param {string} text
+   */
+  text(id, text) {
+    const element = this.find(id);
+    if (element.textContent !== text) element.textContent = text;
+  }
+
+  /**
+   * @param {string} id
+   * @param {boolean} visible
+   */
+  show(id, visible) {
+    const element = this.find(id);
+    if (element.hidden === visible) element.hidden = !visible;
+  }
+
+  /**
+   * @param {string} id
+   * @param {string} key
+   * @param {string} value
+   */
+  data(id, key, value) {
+    const { dataset } = this.find(id);
+    if (dataset[key] !== value) dataset[key] = value;
+  }
+
+  /**
+   * @param {string} id
+   * @param {string[]} items
+   * @param {number} most Longer lists end with a count of the others.
+   */
+  list(id, items, most = Infinity) {
+    const shown = items.length > most ? items.slice(0, most - 1) : items;
+    const rest = items.length - shown.length;
+    const words = rest > 0 ? [...shown, `and ${rest} more`] : shown;
+    const element = this.find(id);
+    if (element.dataset.items === words.join('\n')) return;
+    element.dataset.items = words.join('\n');
+    element.replaceChildren(...words.map((text, i) => {
+      const item = this.document.createElement('li');
+      item.textContent = text;
+      item.classList.toggle('more', rest > 0 && i === shown.length);
+      return item;
+    }));
+  }
+}
+
+/**
+ * What the page knows better than the server.
+ * @param {State} state
+ * @param {ShownMode} mode
+ */
+function ownReason(state, mode) {
+  const last = state.status === null ? '' : ` Last known: ${state.status.mode}.`;
+  if (mode === 'NO_LINK') return `Without a link the robot stops by itself.${last}`;
+  if (mode === 'NO_WORD') return `No word from the server: what the robot does is not known.${last}`;
+  if (state.motionSilent) return 'This phone’s motion sensors say nothing: it can’t lead the robot.';
+  return null;
+}
+
+/**
+ * @param {boolean} held
+ * @param {ShownMode} mode
+ * @returns {{ look: 'idle' | 'ready' | 'moving' | 'waiting', title: string, hint: string }}
+ */
+export function holdWords(held, mode) {
+  if (held && mode === 'TRACK') return { look: 'moving', title: 'Moving', hint: 'Let go to keep still' };
+  if (held) return { look: 'waiting', title: 'Held', hint: 'The robot does not follow yet' };
+  if (mode === 'ARMED' || mode === 'HOLD') return { look: 'ready', title: 'Hold to move', hint: '' };
+  if (mode === 'TRACK') return { look: 'ready', title: 'Hold to move', hint: 'Released' };
+  const hint = mode === 'DISARMED' ? 'Arm first' : '';
+  return { look: 'idle', title: 'Hold to move', hint };
+}

@@ -1,0 +1,113 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { existsSync, readFileSync, readdirSync } from 'node:fs';
+import { dirname, join, resolve } from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { gzipSync } from 'node:zlib';
+
+const ROOT = fileURLToPath(new URL('..', import.meta.url));
+const PAGES = ['index.html', 'supervisor.html'];
+
+/** @param {string} path */
+const read = (path) => readFileSync(join(ROOT, path), 'utf8');
+
+/** @param {string} folder @returns {string[]} */
+const files = (folder) => readdirSync(join(ROOT, folder), { withFileTypes: true })
+  .flatMap((entry) => (entry.isDirectory() ? files(join(folder, entry.name)) : [join(folder, entry.name)]));
+
+const MODULES = files('src');
+
+/** Every file a page needs, through its modules. @param {string} page */
+function needed(page) {
+  const found = new Set([page]);
+  for (const path of found) {
+    const text = read(path);
+    const names = [
+      ...text.matchAll(/(?:src|href)="((?!#|\.\/"|view\/)[^"]+)"/g), ...text.matchAll(/^import .*?from '([^']+)'/gms),
+      ...text.matchAll(/new URL\('([^']+\.js)'/g),
+    ];
+    for (const [, name] of names) found.add(join(dirname(path), name ?? ''));
+  }
+  return [...found];
+}
+
+test('pages have no inline script, style or handler: the policy forbids them', () => {
+  for (const page of PAGES) {
+    const text = read(page);
+    assert.doesNotMatch(text, /<style|\sstyle=|\son\w+=|javascript:/i, page);
+    for (const [, inside] of text.matchAll(/<script[^>]*>([^]*?)<\/script>/g)) assert.equal(inside, '', page);
+  }
+});
+
+test('nothing comes from another host', () => {
+  for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css']) {
+    const addresses = read(path).match(/https?:\/\/[\w.-]+/g) ?? [];
+    const foreign = addresses.filter((address) => !/localhost|www\.w3\.org|^https:\/\/host$/.test(address));
+    assert.deepEqual(foreign, [], path);
+  }
+});
+
+test('every file a page names is there, and a page weighs less than 50 kB on the wire', () => {
+  for (const page of PAGES) {
+    const paths = needed(page);
+    for (const path of paths) assert.ok(existsSync(resolve(ROOT, path)), `${page} needs ${path}`);
+    const bytes = paths.reduce((sum, path) => sum + gzipSync(read(path)).byteLength, 0);
+    assert.ok(bytes < 50_000, `${page}: ${bytes} bytes`);
+  }
+});
+
+test('no module is left over', () => {
+  const used = new Set(PAGES.flatMap(needed));
+  const onlyTypes = ['src/protocol_types.js', 'src/session_types.js'];
+  assert.deepEqual(MODULES.filter((path) => !used.has(path) && !onlyTypes.includes(path)), []);
+});
+
+test('every element the views look for is in their page', () => {
+  for (const [page, ...views] of [
+    ['index.html', 'src/view.js'],
+    ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/main.js'],
+  ]) {
+    const ids = new Set([...read(page ?? '').matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));
+    for (const view of views) {
+      const wanted = [...read(view).matchAll(/(?:find|text|show|data|list|figure|graph|row)\('([a-z][\w-]*)'/g)];
+      assert.ok(wanted.length > 0);
+      for (const [, id] of wanted) assert.ok(ids.has(id), `${view} looks for #${id} in ${page}`);
+    }
+  }
+});
+
+test('every button has a name that can be read out', () => {
+  for (const page of PAGES) {
+    for (const [button, inside] of read(page).matchAll(/<button[^>]*>([^]*?)<\/button>/g)) {
+      const words = (inside ?? '').replace(/<svg[^]*?<\/svg>|<[^>]+>/g, '').trim();
+      assert.ok(words !== '' || /aria-label="[^"]+"/.test(button), button);
+    }
+  }
+});
+
+/** Relative luminance of #rrggbb. @param {string} colour */
+function luminance(colour) {
+  const [r, g, b] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16) / 255)
+    .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * (r ?? 0) + 0.7152 * (g ?? 0) + 0.0722 * (b ?? 0);
+}
+
+test('every mode’s words stand out from its ground by 4.5 or more', () => {
+  let checked = 0;
+  for (const [, rule] of read('style.css').matchAll(/\[data-mode[^{]*\{([^}]*)\}/g)) {
+    const ground = /--mode: (#\w{6})/.exec(rule ?? '')?.[1] ?? '';
+    const words = /--on-mode: (#\w{6})/.exec(rule ?? '')?.[1] ?? '#ffffff';
+    const [light, dark] = [luminance(ground), luminance(words)].sort((a, b) => b - a);
+    assert.ok(((light ?? 0) + 0.05) / ((dark ?? 0) + 0.05) >= 4.5, `${words} on ${ground}`);
+    checked += 1;
+  }
+  assert.ok(checked >= 7);
+});
+
+test('STOP is grey and black, never red on yellow: a page is no emergency stop', () => {
+  const rules = [...read('style.css').matchAll(/^\.stop[^{]*\{([^}]*)\}/gm)].map(([, rule]) => rule ?? '').join();
+  for (const [colour] of rules.matchAll(/#\w{6}/g)) {
+    const [r, g, b] = [1, 3, 5].map((at) => colour.slice(at, at + 2));
+    assert.ok(r === g && g === b, colour);
+  }
+});

@@ -1,0 +1,129 @@
+import assert from 'node:assert/strict';
+import { beforeEach, test } from 'node:test';
+
+import { Phone } from '../src/phone.js';
+import { FakeSocket, FakeTime, fakeWebSocket, pingOf } from './fakes.js';
+
+/** @type {string[]} */
+let log = [];
+let time = new FakeTime();
+/** @type {Phone} */
+let phone;
+
+beforeEach(() => {
+  log = [];
+  time = new FakeTime();
+  phone = new Phone({
+    base: 'https://robot:8443/',
+    performance: time,
+    links: { WebSocket: fakeWebSocket(), setTimeout: time.setTimeout, clearTimeout: time.clearTimeout },
+    dispatch: (event) => log.push(event.type),
+    identity: () => ({ device: 'Pixel 7', sensors: 'DeviceMotion', video: 'H.264' }),
+    onWelcome: () => log.push('onWelcome'),
+    onUnwelcome: () => log.push('onUnwelcome'),
+  });
+  phone.open();
+});
+
+const WELCOME = {
+  type: 'welcome', session: 's1', version: 1, robot: 'ames', width: 1280, height: 720, frame_rate_hz: 30, bitrate_bps: 4e6,
+};
+
+/** @param {FakeSocket | undefined} socket */
+const firstMessage = (socket) => JSON.parse(String(socket?.sent[0]));
+
+test('hello comes first, and the video socket follows the welcome with its session', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  assert.deepEqual(firstMessage(main), {
+    type: 'hello', version: 1, role: 'operator', session: '', device: 'Pixel 7', sensors: 'DeviceMotion', video: 'H.264',
+  });
+  assert.equal(FakeSocket.made.length, 1);
+  main?.says(WELCOME);
+  const video = FakeSocket.made[1];
+  video?.opens();
+  assert.equal(video?.url, 'wss://robot:8443/ws/video');
+  assert.deepEqual([firstMessage(video).role, firstMessage(video).session], ['video', 's1']);
+  video?.says(WELCOME);
+  assert.equal(FakeSocket.made.length, 2, 'a welcome on the video socket opens nothing');
+});
+
+test('a PING is answered at once with its nonce and its time', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  time.ms = 77;
+  main?.says(pingOf(42n, 1234));
+  const pong = new DataView(/** @type {ArrayBuffer} */ (main?.sent.at(-1)));
+  assert.deepEqual(
+    [pong.getUint8(2), pong.getBigInt64(8, true), pong.getBigUint64(16, true), pong.getBigInt64(24, true)],
+    [4, 77_000n, 42n, 1234n],
+  );
+  assert.equal(log.at(-1), 'ping');
+});
+
+test('motion waits for the welcome, numbers from one, and is dropped on a full socket', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  /** @type {import('../src/protocol.js').Motion} */
+  const motion = { rotation_rate: [0, 0, 0], acceleration: [0, 0, 9.8], orientation_wxyz: null, screen_angle_deg: 0 };
+  phone.sendMotion(1, motion);
+  assert.equal(main?.sent.length, 1);
+  main?.says(WELCOME);
+  phone.sendMotion(2, motion);
+  if (main) main.bufferedAmount = 5000;
+  phone.sendMotion(3, motion);
+  if (main) main.bufferedAmount = 0;
+  phone.sendMotion(4, motion);
+  const numbers = main?.sent.slice(1).map((record) => new DataView(/** @type {ArrayBuffer} */ (record)).getUint32(4, true));
+  assert.deepEqual(numbers, [1, 3], 'the gap shows what was dropped');
+});
+
+test('a touch goes out even on a full socket', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  if (main) main.bufferedAmount = 1e6;
+  phone.sendTouch({ held: false, visible: true, press: 1, nonce: 1n });
+  assert.equal(main?.sent.length, 2);
+});
+
+test('losing the main link ends the video link and asks whether we are still known', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  FakeSocket.newest.opens();
+  const video = FakeSocket.newest;
+  main?.drops();
+  assert.equal(video.readyState, 3);
+  assert.equal(log.includes('onUnwelcome'), false);
+  time.advance(250);
+  FakeSocket.newest.drops();
+  assert.equal(log.at(-1), 'onUnwelcome');
+});
+
+test('credits and wishes for a key reach the encoder', () => {
+  /** @type {string[]} */
+  const heard = [];
+  phone.video = /** @type {any} */ ({
+    restart: () => heard.push('restart'), requestKey: () => heard.push('key'), credit: (/** @type {number} */ n) => heard.push(`credit ${n}`),
+  });
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  FakeSocket.newest.opens();
+  const credit = new DataView(new ArrayBuffer(20));
+  [0x4c, 1, 130].forEach((byte, i) => credit.setUint8(i, byte));
+  credit.setUint32(16, 9, true);
+  FakeSocket.newest.says(credit.buffer);
+  FakeSocket.newest.says({ type: 'command', what: 'key_frame' });
+  assert.deepEqual(heard, ['restart', 'credit 9', 'key']);
+});
+
+test('a flood of faults on the page does not become a flood on the wire', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  for (let i = 0; i < 100; i++) phone.log('x'.repeat(500));
+  assert.equal(main?.sent.length, 2);
+  assert.equal(JSON.parse(String(main?.sent[1])).text.length, 200);
+});
