@@ -107,6 +107,8 @@ class EkfConfig:
     """Of the sample nearest to the first picture [rad/s]."""
     initial_a: float = 3.0
     """[m/s²]."""
+    initial_delta: float = 2.0
+    """[rad/s²]."""
     initial_bias_omega: float = 0.03
     initial_bias_a: float = 0.3
     max_step_s: float = 0.005

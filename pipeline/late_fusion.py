@@ -181,7 +181,6 @@ def imu_variances(c: EkfConfig) -> Array:
 
 def initial_variances(c: EkfConfig) -> Array:
     """(30,) at a start; those of the pose come with it."""
-    delta = c.walk_delta_c * np.sqrt(0.5 * c.tau_delta_c)
     rate, force = c.initial_omega, c.initial_a
-    sigmas = (0.0, 0.0, c.initial_v, rate, rate, force, force, delta)
+    sigmas = (0.0, 0.0, c.initial_v, rate, rate, force, force, c.initial_delta)
     return np.repeat(np.square((*sigmas, c.initial_bias_omega, c.initial_bias_a)), 3)

@@ -5,7 +5,7 @@ fuses both in the past and predicts to now.
 
 Deviations from the paper: gravity stays in the accelerations (see `relative_model`); δ_c of
 Eq. (11) fades with `tau_delta_c`, because the straight line through two 60 Hz gyroscope samples is
-a bad guess 50 ms beyond them (a hand trembles at 9 Hz): 5.0 instead of 5.9 mm in `bench_ekf`.
+a bad guess 50 ms beyond them (a hand trembles at 9 Hz): 4.8 instead of 5.6 mm in `bench_ekf`.
 
 Limit: roll, pitch and yaw are singular at a relative pitch of ±90°. Within 1.1° of it the filter
 forgets everything, counts it, and starts again at the first picture away from it.

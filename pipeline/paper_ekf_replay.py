@@ -147,9 +147,9 @@ def replay(
 ) -> int:
     """Carry x, P from span[0] to span[1], fusing the samples in between.
 
-    The samples are sorted by time; those after span[0] up to span[1] are used. `r` (2, 6) are the
-    variances by kind; `steps` = (longest step [s], fading time of δ_c [s]). R_ic gathers the
-    camera's rotation since the phone's last sample. Gives FAILED or how many samples were used.
+    The samples are sorted by time; `r` (2, 6) are the variances by kind; `steps` = (longest step,
+    fading time of δ_c) [s]. R_ic gathers the camera's rotation since the phone's last sample.
+    Gives FAILED or how many samples were used.
     """
     t, t_end = span
     first = np.searchsorted(times, t, side="right")
@@ -163,9 +163,7 @@ def replay(
         if not fuse_imu(x, P, kinds[n], values[n], r[kinds[n]], work):
             return FAILED
         if kinds[n] == PHONE:
-            for i in range(3):
-                for j in range(3):
-                    R_ic[i, j] = 1.0 if i == j else 0.0
+            R_ic[:] = np.eye(3)
         used += 1
     if not _carry(x, P, R_ic, t_end - t, walk, steps, work):
         return FAILED

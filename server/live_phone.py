@@ -12,11 +12,10 @@ import numpy as np
 from hardware.follower import FollowerError
 from hardware.sim.phone import Event, Stream
 from hardware.sim.truth import TruthClient
-from pipeline.config import VirtualCameraConfig
 from pipeline.frames import Array
 from server.messages import Command, Status
 from server.phone_client import Access, PhoneClient
-from server.phone_script import DEVICE, TOUCH_S, PhoneScript, Score
+from server.phone_script import DEVICE, SYNCHRONISED_PONGS, TOUCH_S, PhoneScript, Score
 from server.wire import Record
 
 EXPOSED_S = 0.03
@@ -64,7 +63,7 @@ class LivePhone:
         self.script = script
         self._seen, self._scored = SeenRobot(truth_port), SeenRobot(truth_port)
         self.client = PhoneClient(access, self._pong, self._status)
-        self.score = Score(script.phone, VirtualCameraConfig())
+        self.score = Score(script.phone, access.virtual_camera)
         self.skipped = self.sent = 0
         """Pictures not made for want of time or credit; pictures sent."""
         self.status: Status | None = None
@@ -125,6 +124,8 @@ class LivePhone:
 
     async def _pictures(self) -> None:
         """Make each picture as soon as it can be; skip what there is no time or credit for."""
+        while self.script.pongs < SYNCHRONISED_PONGS:  # the first picture is the key to the others
+            await asyncio.sleep(TOUCH_S)
         loop = asyncio.get_running_loop()
         with ThreadPoolExecutor(1, "camera") as thread:
             for event in _endless(self.script.phone.pictures):
@@ -133,8 +134,9 @@ class LivePhone:
                 if late or self._made.full() or not self.client.has_credit:
                     self.skipped += 1
                     continue
-                make, t = self.script.picture, event.t_capture
-                record = await loop.run_in_executor(thread, make, t, self._seen.pose)
+                make, t, key = self.script.picture, event.t_capture, self.client.key_wanted
+                self.client.key_wanted = False
+                record = await loop.run_in_executor(thread, make, t, self._seen.pose, key)
                 await self._made.put((event.t_deliver, record))
 
     async def _deliveries(self) -> None:

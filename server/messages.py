@@ -34,7 +34,10 @@ class Hello(msgspec.Struct, tag="hello", forbid_unknown_fields=True, frozen=True
 
 
 class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=True):
-    """Page → server: a wish of a person. The control process decides."""
+    """Page → server: a wish of a person; the control process decides.
+
+    `key_frame` travels server → page: the next FRAME must be decodable alone.
+    """
 
     what: Literal["arm", "disarm", "stop", "reset", "key_frame"]
 
@@ -120,7 +123,7 @@ class Status(msgspec.Struct, tag="status", frozen=True):
 
 
 FromPage = Hello | Command | Log
-ToPage = Welcome | Refused | Status
+ToPage = Welcome | Refused | Status | Command
 
 _decoder = msgspec.json.Decoder(FromPage)
 _to_page_decoder = msgspec.json.Decoder(ToPage)

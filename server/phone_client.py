@@ -15,6 +15,7 @@ import msgspec
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
+from pipeline.config import VirtualCameraConfig
 from server.messages import (
     Command,
     Hello,
@@ -31,6 +32,7 @@ MAX_IN_FLIGHT = 3
 """Pictures sent and not yet taken by the server."""
 RUN_FILE = "lightleash-run.json"
 TIMEOUT_S = 10.0
+DEFAULT_CAMERA = VirtualCameraConfig()
 
 
 class PhoneClientError(Exception):
@@ -48,6 +50,8 @@ class Access:
     """UDP port of the simulated robot's true pose; 0: not known."""
     ca: Path | None = None
     """Certificate of the authority that signed the server's."""
+    virtual_camera: VirtualCameraConfig = DEFAULT_CAMERA
+    """How the server smooths the phone's turns: its lag is no tracking error."""
 
 
 def runtime_directory() -> Path:
@@ -66,7 +70,14 @@ def running_server(directory: Path | None = None) -> Access:
     try:
         run = json.loads(path.read_text())
         url = run["http_url"] or run["https_url"]
-        return Access(str(url), str(run["operator_token"]), int(run.get("truth_port") or 0))
+        tau_1 = float(run.get("tau_1", DEFAULT_CAMERA.tau_1))
+        tau_2 = float(run.get("tau_2", DEFAULT_CAMERA.tau_2))
+        return Access(
+            str(url),
+            str(run["operator_token"]),
+            int(run.get("truth_port") or 0),
+            virtual_camera=VirtualCameraConfig(tau_1, tau_2),
+        )
     except FileNotFoundError as error:
         why = "no server is running here: start `lightleash serve`, or name one with --url"
         raise PhoneClientError(why) from error
@@ -113,6 +124,8 @@ class PhoneClient:
         self._credit = asyncio.Event()
         self._credit.set()
         self.refusals: list[Refused] = []
+        self.key_wanted = False
+        """The server can't decode without a key frame; whoever sends one takes this back."""
 
     async def open(self, device: str) -> Welcome:
         """Connect both sockets and be welcomed as `device`.
@@ -204,6 +217,8 @@ class PhoneClient:
         message = _message(text)
         if isinstance(message, Refused):
             self.refusals = [*self.refusals[-9:], message]
+        elif isinstance(message, Command):
+            self.key_wanted |= message.what == "key_frame"
         elif isinstance(message, Status):
             command = self._on_status(message)
             if command is not None:

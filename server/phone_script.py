@@ -16,6 +16,8 @@ from server.wire import Codec, Kind, Motion, Picture, Pong, Record, Touch
 
 DEVICE = "lightleash-virtual-phone"
 TOUCH_S = 1.0 / 30.0
+SYNCHRONISED_PONGS = 8
+"""After so many answers the server can date what comes."""
 SCORE_STEP_S = 0.005
 CODECS = {"jpeg": Codec.JPEG, "h264": Codec.H264, "vp8": Codec.VP8}
 
@@ -92,6 +94,7 @@ class PhoneScript:
         self._encoder = encoder
         self._sequences = dict.fromkeys(Kind, 0)
         self._nonce = 0
+        self.pongs = 0
 
     def motion(self, t: float) -> Record:
         """MOTION of the sensors at `t` [s]."""
@@ -102,9 +105,9 @@ class PhoneScript:
         body = Motion((x, y, z), (a_x, a_y, a_z), reading.R_ed_wxyz, angle)
         return self._record(Kind.MOTION, t, body)
 
-    def picture(self, t: float, robot: BodyHistory) -> Record:
-        """FRAME exposed around `t` [s]; must be called in the order of time, from one thread."""
-        data, key = self._encoder.encode(self.phone.picture(t, robot))
+    def picture(self, t: float, robot: BodyHistory, key: bool = False) -> Record:
+        """FRAME exposed around `t` [s], decodable alone if `key`; in the order of time only."""
+        data, key = self._encoder.encode(self.phone.picture(t, robot), key)
         camera, angle = self.phone.camera, self.phone.options.screen_angle_deg
         codec = CODECS[self._encoder.codec]
         body = Picture(codec, key, camera.width, camera.height, angle, data)
@@ -118,6 +121,7 @@ class PhoneScript:
     def pong(self, nonce: int, server_time_us: int, t: float) -> Record:
         """The answer to a PING that reached the page at `t` [s]."""
         self._nonce = nonce
+        self.pongs += 1
         return self._record(Kind.PONG, t, Pong(nonce, server_time_us))
 
     def _record(self, kind: Kind, t: float, body: Motion | Picture | Touch | Pong) -> Record:

@@ -43,6 +43,8 @@ ENCODINGS = {
     SERVER_MESSAGES: "json",
     STATUS: "json",
 }
+DEVICE_KEY, ROBOT_KEY, CAMERA_KEY, SETTINGS_KEY = "device", "robot_file", "camera_file", "settings"
+"""Metadata: phone, text of the robot's and the camera's file, settings of the server."""
 CHUNK_BYTES = 131_072
 FLUSH_S = 0.25
 CAPACITY = 4_096

@@ -21,14 +21,13 @@ from server.phone_client import (
     access_of,
     add_access_arguments,
 )
+from server.phone_script import SYNCHRONISED_PONGS
 from server.recording import RecordingError
 from server.recording_files import Recording, read, recover
 from server.wire import Picture, Pong, Record, Touch, WireError, decode
 
 PHONE_CLOCK_OFFSET_S = 1000.0
 """Of the replayed phone's clock: any will do, the server must find it."""
-SYNCHRONISED_PINGS = 8
-"""So many answers, and the server can date what we send."""
 DEVICE = "lightleash-replay"
 
 
@@ -75,8 +74,8 @@ def _clock_offsets(records: list[tuple[float, Record]]) -> list[float]:
 class Replay:
     """A recorded phone as a living one: its records re-timed, PINGs answered. Sans-I/O.
 
-    Times on the replayed phone's clock keep the recorded latency, at any speed. The nonces of
-    TOUCH are the living server's: an echo of old ones would be the lie they are to unmask.
+    Captures and arrivals are as far apart as recorded, divided by the speed. The nonces of TOUCH
+    are the living server's: an echo of old ones would be the lie they are there to unmask.
     """
 
     def __init__(self, records: list[Timed], speed: float = 1.0) -> None:
@@ -99,7 +98,8 @@ class Replay:
 
     def retimed(self, t_due: float, recorded: Timed) -> Record:
         """The record as it is sent at `t_due` [s]."""
-        record = replace(recorded.record, t_us=_phone_us(t_due - recorded.latency_s))
+        t_captured = t_due - recorded.latency_s / self._speed
+        record = replace(recorded.record, t_us=_phone_us(t_captured))
         if isinstance(record.body, Touch):
             return replace(record, body=replace(record.body, nonce=self._nonce))
         return record
@@ -153,7 +153,7 @@ async def play(recording: Recording, access: Access, speed: float) -> Played:
 
 
 async def _send(replay: Replay, client: PhoneClient, played: Played) -> None:
-    while replay.pings < SYNCHRONISED_PINGS:
+    while replay.pings < SYNCHRONISED_PONGS:
         await asyncio.sleep(0.02)
     decodable = True
     for t_due, recorded in replay.due(now()):

@@ -69,11 +69,13 @@ static void receive(int fd, ll_watchdog *w, peer *to)
     struct sockaddr_in from;
     socklen_t length = sizeof from;
     ssize_t size;
-    while ((size = recvfrom(fd, data, sizeof data, MSG_DONTWAIT, (struct sockaddr *)&from, &length)) >= 0) {
+    while ((size = recvfrom(fd, data, sizeof data, MSG_DONTWAIT, (struct sockaddr *)&from,
+                            &length)) >= 0) {
         int64_t now_us = clock_us();
         if (ll_receive(w, data, (size_t)size, now_us) == LL_MALFORMED)
             continue;
-        bool same = from.sin_addr.s_addr == to->address.sin_addr.s_addr && from.sin_port == to->address.sin_port;
+        bool same = from.sin_addr.s_addr == to->address.sin_addr.s_addr &&
+                    from.sin_port == to->address.sin_port;
         if (same || now_us - to->heard_us > LL_SILENCE_US)
             *to = (peer){from, now_us};
         length = sizeof from;
@@ -90,16 +92,19 @@ static void tick(int fd, ll_watchdog *w, const peer *to)
     sense(gyro, accelerometer);
     size_t size = ll_sample(w, now_us, random_u32(), gyro, accelerometer, thrusts, out);
     if (now_us - to->heard_us <= FORGET_PEER_US)
-        sendto(fd, out, size, MSG_DONTWAIT, (const struct sockaddr *)&to->address, sizeof to->address);
+        sendto(fd, out, size, MSG_DONTWAIT, (const struct sockaddr *)&to->address,
+               sizeof to->address);
 }
 
 int main(int argc, char **argv)
 {
     if (argc != 6 || atoi(argv[2]) < 1 || atoi(argv[2]) > LL_MAX_THRUSTERS) {
-        fprintf(stderr, "usage: %s PORT THRUSTERS(1-%d) F_MAX_N MAX_RISE_N RAMP_MS\n", argv[0], LL_MAX_THRUSTERS);
+        fprintf(stderr, "usage: %s PORT THRUSTERS(1-%d) F_MAX_N MAX_RISE_N RAMP_MS\n", argv[0],
+                LL_MAX_THRUSTERS);
         return 2;
     }
-    ll_limits limits = {(uint8_t)atoi(argv[2]), atof(argv[3]), atof(argv[4]), 1000 * (int64_t)atoi(argv[5])};
+    ll_limits limits = {(uint8_t)atoi(argv[2]), atof(argv[3]), atof(argv[4]),
+                        1000 * (int64_t)atoi(argv[5])};
     struct sockaddr_in own = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(argv[1]))};
     own.sin_addr.s_addr = htonl(INADDR_ANY);
     int fd = socket(AF_INET, SOCK_DGRAM, 0);

@@ -1,8 +1,8 @@
 /* Robot's end of the Lightleash link: gate, watchdog and ramp, for firmware.
  *
  * The same rules as hardware/robot_end.py, the same bytes as hardware/datagram.py; both are held
- * against each other by tests/hardware/test_watchdog.py. No heap, no clock, no I/O, no globals: the
- * firmware brings the datagrams, the time (one monotonic clock, in microseconds) and random numbers.
+ * against each other by tests/hardware/test_watchdog.py. No heap, no clock, no I/O, no globals:
+ * the firmware brings datagrams, time (one monotonic clock, in microseconds) and random numbers.
  * Call everything from one task.
  */
 #ifndef LIGHTLEASH_WATCHDOG_H

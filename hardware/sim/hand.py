@@ -159,13 +159,11 @@ def steady_wander(rng: np.random.Generator) -> Part:
     return _noise(rng, 0.05 + 0.4 * _strata(rng, 12), 5e-3, 0.4)
 
 
-def three_pole_wander(
-    rng: np.random.Generator, corner_hz: float, sigma_m: float, sigma_deg: float
-) -> Part:
-    """White noise through three poles at `corner_hz`: sines drawn from (1 + (f/f₀)²)⁻³."""
+def three_poles(rng: np.random.Generator, hz: float, sigma_m: float, sigma_deg: float) -> Part:
+    """White noise through three poles at `hz`: sines drawn from (1 + (f/f₀)²)⁻³."""
     u = np.linspace(0.0, np.pi / 2.0, 2001)
     share = np.cumsum(np.cos(u) ** 4)  # of the power below f = f₀ tan u
-    frequencies: Array = corner_hz * np.tan(np.interp(_strata(rng, 24), share / share[-1], u))
+    frequencies: Array = hz * np.tan(np.interp(_strata(rng, 24), share / share[-1], u))
     return _noise(rng, frequencies, sigma_m, sigma_deg)
 
 
@@ -240,10 +238,9 @@ def make_hand(
 HANDS: dict[str, Callable[[np.random.Generator], tuple[Part, ...]]] = {
     "still": lambda rng: (),
     "steady": lambda rng: (steady_wander(rng), tremor(rng)),
-    # within what the AMES' thrusters can follow against their suspension
-    "moving": lambda rng: (three_pole_wander(rng, 0.3, 0.03, 1.0), tremor(rng)),
-    # beyond it: most of the time the thrusters are at their limits
-    "restless": lambda rng: (three_pole_wander(rng, 0.5, 0.05, 3.0), tremor(rng)),
+    # "moving" is what the AMES' thrusters can follow; "restless" keeps them at their limits
+    "moving": lambda rng: (three_poles(rng, 0.3, 0.03, 1.0), tremor(rng)),
+    "restless": lambda rng: (three_poles(rng, 0.5, 0.05, 3.0), tremor(rng)),
     "demo": lambda rng: (demo(), tremor(rng)),
     "circle": lambda rng: (circle(), tremor(rng)),
     "step_x": lambda rng: (step(0, STEP_M),),

@@ -5,7 +5,7 @@ from zlib import crc32
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hardware.datagram import (
@@ -43,16 +43,19 @@ samples = st.builds(
 )
 
 
+@settings(max_examples=40)
 @given(commands)
 def test_commands_are_read_as_written(command):
     assert decode_command(encode_command(command)) == command
 
 
+@settings(max_examples=40)
 @given(samples)
 def test_samples_are_read_as_written(sample):
     assert decode_sample(encode_sample(sample)) == sample
 
 
+@settings(max_examples=40)
 @given(st.binary(max_size=2 * MAX_BYTES))
 def test_any_bytes_give_nothing_but_a_link_error(data):
     for decode in (decode_command, decode_sample):
@@ -60,6 +63,7 @@ def test_any_bytes_give_nothing_but_a_link_error(data):
             decode(data)
 
 
+@settings(max_examples=40)
 @given(commands, st.data())
 def test_any_damage_of_up_to_four_bytes_in_a_row_is_found(command, data):
     good = bytearray(encode_command(command))
@@ -72,6 +76,7 @@ def test_any_damage_of_up_to_four_bytes_in_a_row_is_found(command, data):
             decode_command(bytes(good))
 
 
+@settings(max_examples=40)
 @given(st.binary(max_size=MAX_BYTES))
 def test_a_right_crc_around_anything_gives_a_command_or_a_link_error(data):
     data = b"LLcm\1" + data
@@ -109,6 +114,7 @@ def test_a_sample_that_is_not_a_number_is_refused(value):
         decode_sample(encode_sample(sample))
 
 
+@settings(max_examples=40)
 @given(u32, st.integers(1, 2**31 - 1))
 def test_later_is_later_round_the_corner_and_never_both_ways(a, ahead):
     assert is_later((a + ahead) % 2**32, a)
@@ -116,6 +122,7 @@ def test_later_is_later_round_the_corner_and_never_both_ways(a, ahead):
     assert not is_later(a, a)
 
 
+@settings(max_examples=40)
 @given(u32)
 def test_the_next_epoch_is_later_and_never_none(epoch):
     assert epoch_after(epoch) != 0

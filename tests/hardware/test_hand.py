@@ -50,7 +50,8 @@ def test_hand_rests_level_before_it_moves(kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "sigma_mm", "sigma_deg"), [("steady", 5.0, 0.4), ("moving", 50.0, 3.0)]
+    ("kind", "sigma_mm", "sigma_deg"),
+    [("steady", 5.0, 0.4), ("moving", 30.0, 1.0), ("restless", 50.0, 3.0)],
 )
 def test_wander_has_the_promised_spread(kind, sigma_mm, sigma_deg):
     offsets, angles = [], []

@@ -232,14 +232,14 @@ def test_a_push_moves_it_and_ends():
     plant.step(OFF, 0.001)
     assert plant.a_bf_in_f[1] == pytest.approx(-4.0 / AMES.plant.mass, rel=1e-2)
     assert plant.alpha_bf_in_b[2] == pytest.approx(0.1 / 0.09, rel=1e-2)
-    run(plant, OFF, 20.0)
-    assert np.abs(plant.p_bf_in_f).max() < 5e-3
+    run(plant, OFF, 10.0)
+    assert np.abs(plant.p_bf_in_f).max() < 0.02
 
 
 def test_a_lasting_force_displaces_it_by_the_pendulums_stiffness():
     plant = make()
     plant.external_wrench_in_f[:] = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    run(plant, OFF, 30.0)
+    run(plant, OFF, 20.0)
     angle = 1.0 / (AMES.plant.mass * GRAVITY)
     assert plant.p_bf_in_f[0] == pytest.approx(1.33 * angle, rel=0.02)
     assert rpy_from_R(plant.R_fb)[1] == pytest.approx(-angle, rel=0.05)
@@ -248,7 +248,7 @@ def test_a_lasting_force_displaces_it_by_the_pendulums_stiffness():
 def test_wind_carries_it_along():
     plant = make()
     plant.wind_in_f[:] = (0.0, 2.0, 0.0)
-    run(plant, OFF, 30.0)
+    run(plant, OFF, 20.0)
     drag = 2.0 * AMES.plant.air_damping
     assert plant.p_bf_in_f[1] == pytest.approx(1.33 * drag / (AMES.plant.mass * GRAVITY), rel=0.03)
 

@@ -245,7 +245,7 @@ def test_samples_go_to_who_was_heard_and_not_to_who_interrupts(flying):
     assert flying.end.peer(flying.now_us + 5_000_001) is None
 
 
-@settings(max_examples=200)
+@settings(max_examples=50)
 @given(st.lists(st.binary(max_size=120), max_size=20))
 def test_no_bytes_whatever_give_thrust(datagrams):
     bench = Bench()
@@ -265,7 +265,7 @@ steps = st.tuples(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(st.booleans(), st.lists(steps, max_size=60))
 def test_thrust_is_always_within_limits_and_never_without_a_fresh_handshake(shaken, traffic):
     bench = Bench()

@@ -27,6 +27,7 @@ rng = np.random.default_rng(7)
 AMPLITUDE, PHASE = rng.uniform(0.3, 0.9, (2, 6)), rng.uniform(0.0, 6.0, (2, 6))
 RATE = rng.uniform(0.4, 1.1, (2, 6))
 OFFSET = np.array([np.zeros(6), (2.5, 0.2, 0.3, 0.4, -0.3, 0.9)])
+UP = np.array([0.0, 0.0, GRAVITY])
 TIMES = np.linspace(0.0, 8.0, 41)
 
 
@@ -66,7 +67,7 @@ def felt(who, t):
     R, R1 = pose_in_f(who, t)[1], rate(lambda s: pose_in_f(who, s)[1], t)
     R2 = second_rate(lambda s: pose_in_f(who, s)[1], t)
     a = second_rate(lambda s: pose_in_f(who, s)[0], t)
-    return R, vee(R.T @ R1), vee(R.T @ R2 + R1.T @ R1), R.T @ (a + (0.0, 0.0, GRAVITY))
+    return R, vee(R.T @ R1), vee(R.T @ R2 + R1.T @ R1), R.T @ (a + UP)
 
 
 @cache

@@ -4,69 +4,19 @@ import asyncio
 import json
 
 import pytest
-from websockets.asyncio.server import serve
 
-from server.messages import Command, Refused, Status, Welcome, encode_message
+from pipeline.config import VirtualCameraConfig
+from server.messages import Refused, encode_message
 from server.phone_client import RUN_FILE, Access, PhoneClient, PhoneClientError, running_server
-from server.wire import Codec, Credit, Picture, Ping, Pong, Record, decode, encode
+from server.wire import Credit, Ping, Pong, Record, decode, encode
+from tests.server.page_server import WELCOME, PageServer, picture, status
 
 pytestmark = pytest.mark.e2e
-
-WELCOME = Welcome("s1", 1, "ames", 1280, 720, 30, 4_000_000)
-JPEG = b"\xff\xd8" + bytes(30)
-
-
-def status(mode):
-    fields = {name: None for name in Status.__struct_fields__}
-    numbers = dict.fromkeys(("leds", "phones", "supervisors"), 0)
-    texts = dict.fromkeys(("robot", "operator", "recording", "realtime", "reason"), "")
-    flags = {"ready": True, "saturated": False}
-    tables = {"streams": {}, "latency_ms": {}, "control": {}, "refusals": [], "messages": []}
-    return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
-
-
-def picture(sequence):
-    return Record(sequence, 1, Picture(Codec.JPEG, True, 640, 360, 90, JPEG))
-
-
-class Server:
-    """Keeps what it hears; `after_hello` says what it sends on the main socket."""
-
-    def __init__(self, after_hello, credit=True):
-        self.after_hello, self.credit = after_hello, credit
-        self.heard, self.hellos, self.tokens = [], [], []
-
-    async def __call__(self, socket):
-        self.tokens.append(socket.request.headers["Authorization"])
-        self.hellos.append(json.loads(await socket.recv()))
-        if socket.request.path == "/ws/phone":
-            for message in self.after_hello:
-                await socket.send(message)
-        async for data in socket:
-            self.heard.append((socket.request.path, data))
-            if socket.request.path == "/ws/video" and self.credit:
-                await socket.send(encode(Record(1, 1, Credit(decode(data).sequence))))
-
-    async def session(self, talk):
-        """Run `talk(client)` against this server."""
-        async with serve(self, "127.0.0.1", 0) as listening:
-            port = listening.sockets[0].getsockname()[1]
-            client = PhoneClient(Access(f"http://127.0.0.1:{port}", "secret"), self.pong, self.wish)
-            try:
-                await talk(client)
-            finally:
-                await client.close()
-
-    def pong(self, nonce, server_time_us):
-        return Record(1, 77, Pong(nonce, server_time_us))
-
-    def wish(self, shown):
-        return Command("arm") if shown.mode == "DISARMED" else None
 
 
 def test_hello_pong_and_wish():
     ping = encode(Record(5, 123, Ping(42)))
-    server = Server([encode_message(WELCOME), ping, encode_message(status("DISARMED"))])
+    server = PageServer([encode_message(WELCOME), ping, encode_message(status("DISARMED"))])
 
     async def talk(client):
         assert await client.open("a device") == WELCOME
@@ -87,7 +37,7 @@ def test_hello_pong_and_wish():
 
 
 def test_three_pictures_are_under_way_and_no_more():
-    server = Server([encode_message(WELCOME)], credit=False)
+    server = PageServer([encode_message(WELCOME)], credit=False)
 
     async def talk(client):
         await client.open("a device")
@@ -102,7 +52,7 @@ def test_three_pictures_are_under_way_and_no_more():
 
 
 def test_credit_of_a_later_picture_covers_the_earlier():
-    server = Server([encode_message(WELCOME)])
+    server = PageServer([encode_message(WELCOME)])
 
     async def talk(client):
         await client.open("a device")
@@ -132,11 +82,11 @@ def test_another_answer_than_welcome_is_told(first, why):
         with pytest.raises(PhoneClientError, match=why):
             await client.open("a device")
 
-    asyncio.run(Server([first]).session(talk))
+    asyncio.run(PageServer([first]).session(talk))
 
 
 def test_a_closed_connection_is_told_with_its_reason():
-    class Closing(Server):
+    class Closing(PageServer):
         async def __call__(self, socket):
             await socket.recv()
             await socket.send(encode_message(WELCOME))
@@ -161,6 +111,8 @@ def test_run_file_tells_where_the_server_is(tmp_path):
     run = {"http_url": "http://127.0.0.1:8080", "https_url": "", "operator_token": "t", "pid": 1}
     (tmp_path / RUN_FILE).write_text(json.dumps(run | {"truth_port": 9000}))
     assert running_server(tmp_path) == Access("http://127.0.0.1:8080", "t", 9000)
+    (tmp_path / RUN_FILE).write_text(json.dumps(run | {"tau_1": 3.18, "tau_2": 0.16}))
+    assert running_server(tmp_path).virtual_camera == VirtualCameraConfig(3.18, 0.16)
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"http_url": 1'])

@@ -1,6 +1,8 @@
 """The virtual phone's page and person: polite, in order, understood by the server's ingest."""
 
+import asyncio
 import itertools
+import json
 
 import numpy as np
 import pytest
@@ -14,8 +16,12 @@ from pipeline.config import VirtualCameraConfig
 from pipeline.frames import exp
 from pipeline.signals import Operator, PhoneImu
 from server.ingest import EncodedFrame, Ingest
+from server.live_phone import LivePhone
+from server.messages import encode_message
 from server.phone_script import Manners, PhoneScript, Score, VirtualOperator
-from server.wire import Codec, Picture, Touch, decode, encode
+from server.virtual_phone import main, summary
+from server.wire import Codec, Motion, Picture, Ping, Pong, Record, Touch, decode, encode
+from tests.server.page_server import WELCOME, PageServer, status
 
 LEDS_IN_B = np.array(
     [[0.2, 0.2, 0.1], [0.2, -0.2, 0.15], [0.1, 0.1, -0.2], [0.25, -0.1, -0.1], [0.3, 0.0, 0.0]]
@@ -155,6 +161,70 @@ def test_pictures_are_numbered_encoded_and_dated(name, codec):
     assert frames[0].picture.codec == codec
     assert frames[0].picture.key
     assert frames[0].picture.screen_angle_deg == 90
+
+
+def test_a_key_frame_comes_when_asked():
+    script = make_script(codec="h264")
+    keys = [script.picture(1.0 + k / 30.0, hanging_still, key=k == 2).body.key for k in range(4)]
+    assert keys == [True, False, True, False]
+
+
+class Meeting(PageServer):
+    """Pings its page, shows one mode after the other, and asks for a key frame."""
+
+    async def __call__(self, socket):
+        if socket.request.path == "/ws/phone":
+            pings = [encode(Record(k, k, Ping(100 + k))) for k in range(20)]
+            modes = [encode_message(status(mode)) for mode in ("DISARMED", "ARMED")]
+            self.after_hello = [encode_message(WELCOME), *pings, *modes]
+        await super().__call__(socket)
+
+
+@pytest.mark.e2e
+def test_live_phone_plays_its_part_on_real_sockets():
+    """One and a half seconds of real time; rates are asked for loosely: the machine may be busy."""
+    server = Meeting([])
+    shown = []
+
+    async def talk(access):
+        live = LivePhone(access, make_script(codec="h264"), truth_port=0)
+        await live.run(1.5, shown.append)
+        return live
+
+    live = asyncio.run(server.serve(talk))
+    video = [decode(data).body for path, data in server.heard if path == "/ws/video"]
+    main = [data for path, data in server.heard if path == "/ws/phone"]
+    records = [decode(data).body for data in main if isinstance(data, bytes)]
+    messages = [json.loads(data)["what"] for data in main if isinstance(data, str)]
+    assert messages == ["arm", "disarm"]
+    assert len(video) == live.sent > 15
+    assert video[0].key
+    assert sum(isinstance(body, Motion) for body in records) > 45
+    assert sum(isinstance(body, Pong) for body in records) == 20
+    touches = [body for body in records if isinstance(body, Touch)]
+    assert [held for held, _ in itertools.groupby(body.held for body in touches)] == [
+        False, True, False,
+    ]  # fmt: skip
+    assert shown
+    assert json.dumps(summary(live))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--latency-ms", "5"], ["--fps", "500"], ["--codec", "gif"]],
+)
+def test_command_refuses_what_it_cannot_play(arguments):
+    with pytest.raises(SystemExit):
+        main([*arguments, "--url", "http://127.0.0.1:9", "--token", "t"])
+
+
+@pytest.mark.e2e
+@pytest.mark.parametrize(
+    ("arguments", "words"), [(["--hand", "juggling"], "juggling"), ([], r"127.0.0.1:9")]
+)
+def test_command_says_what_is_wrong(arguments, words, capsys):
+    assert main([*arguments, "--url", "http://127.0.0.1:9", "--token", "t"]) == 1
+    assert words in capsys.readouterr().err
 
 
 def test_a_robot_that_follows_exactly_scores_nothing():

@@ -1,14 +1,14 @@
 /** The phone page: joins browser, sensors, links and screen. The only module that acts by itself. */
 
 /** @import {Effect, Event} from './session_types.js' */
-/** @import {Stream} from './encoder.js' */
 /** @import {Welcome} from './protocol_types.js' */
 
+import { browserOf } from './browser.js';
 import { CameraFeed } from './camera_feed.js';
 import { Feedback } from './feedback.js';
-import { Imu, requestMotionPermission, screenAngleOf } from './imu.js';
+import { Imu, requestMotionPermission } from './imu.js';
 import { Phone } from './phone.js';
-import { Problem, adviceFor, platformOf } from './problems.js';
+import { Problem, adviceFor, problemOf } from './problems.js';
 import { Rate } from './clock.js';
 import { stayAwake, toggleFullScreen } from './display.js';
 import { StopPost } from './stop.js';
@@ -16,16 +16,14 @@ import { USUAL, deviceName } from './camera.js';
 import { VideoSender } from './video.js';
 import { View } from './view.js';
 import { INITIAL, reduce, touchOf, wish } from './session.js';
-import { roleFrom, tokenOf, whoAmI } from './pairing.js';
+import { becomeKnown, tokenOf, whoAmI } from './pairing.js';
 
 const TICK_MS = 33;
 const STOP_TICK_MS = 50;
 const HEALTH_MS = 500;
 const SILENT_MOTION_MS = 3000;
 
-const scope = /** @type {Record<string, any>} */ (/** @type {unknown} */ (window));
-const platform = platformOf(navigator);
-const fetchHere = window.fetch.bind(window);
+const { scope, platform, fetchHere, links, screenAngle, startWorker, later } = browserOf(window);
 const stopPost = new StopPost(fetchHere);
 const feedback = new Feedback(navigator, window.AudioContext, platform !== 'android');
 const motionRate = new Rate();
@@ -34,20 +32,10 @@ let state = INITIAL;
 let shown = false;
 let startedAtMs = Infinity;
 
-const screenAngle = () => screenAngleOf(screen, scope.orientation);
-
-function startWorker() {
-  return new Worker(new URL('./frame_worker.js', import.meta.url), { type: 'module' });
-}
-
 const phone = new Phone({
   base: document.baseURI,
   performance,
-  links: {
-    WebSocket,
-    setTimeout: (callback, ms) => window.setTimeout(callback, ms),
-    clearTimeout: (id) => window.clearTimeout(id),
-  },
+  links,
   dispatch,
   identity: () => identity,
   onWelcome: (welcome) => void welcomed(welcome),
@@ -84,7 +72,7 @@ const camera = new CameraFeed({
   video: view.video,
   preview: (stream) => view.preview(stream),
   Processor: scope.MediaStreamTrackProcessor,
-  startWorker: scope.VideoFrame && scope.Worker ? startWorker : undefined,
+  startWorker,
   screenAngle,
   onFrame: (frame) => {
     if (phone.videoLink.isOpen) video.offer(frame);
@@ -101,7 +89,7 @@ const imu = new Imu({
   performance,
   screenAngle,
   negated: platform === 'ios',
-  setTimeout: (callback, ms) => window.setTimeout(callback, ms),
+  setTimeout: later,
   sensors: scope,
 }, (tUs, motion) => {
   motionRate.add(performance.now());
@@ -153,7 +141,7 @@ async function start() {
   dispatch({ type: 'start' });
   try {
     step('Pairing with the server…');
-    await ensurePaired();
+    if ((await becomeKnown(fetchHere, window)) === null) throw new Problem('not_paired');
     step('Waiting for your permission: motion sensors…');
     await motionAllowed;
     step('Waiting for your permission: camera…');
@@ -161,7 +149,7 @@ async function start() {
     identity.device = await deviceName(navigator, screen, window.devicePixelRatio, camera.lens);
     await begin();
   } catch (error) {
-    dispatch({ type: 'problem', problem: asProblem(error) });
+    dispatch({ type: 'problem', problem: problemOf(error) });
   }
 }
 
@@ -177,13 +165,6 @@ async function begin() {
   phone.open();
 }
 
-async function ensurePaired() {
-  const role = await roleFrom(fetchHere, tokenOf(window.location.hash));
-  if (role === null) throw new Problem('not_paired');
-  // The token has done its work: nobody shall find it in the address.
-  window.history.replaceState(null, '', window.location.pathname + window.location.search);
-}
-
 /** The server hung up before welcoming us: perhaps it does not know this phone any more. */
 async function checkPairing() {
   try {
@@ -196,11 +177,9 @@ async function checkPairing() {
 
 /** @param {Welcome} welcome */
 async function welcomed(welcome) {
-  /** @type {Stream} */
-  const stream = welcome;
   try {
-    const words = await camera.settle(stream);
-    identity.video = await video.prepare(stream);
+    const words = await camera.settle(welcome);
+    identity.video = await video.prepare(welcome);
     phone.log(`${identity.device}: ${words}, ${identity.video}`);
   } catch (error) {
     phone.log(`camera: ${error}`);
@@ -213,7 +192,7 @@ async function comeBack() {
     const words = await camera.revive();
     if (words !== '') phone.log(`camera again: ${words}`);
   } catch (error) {
-    notice(`The camera does not come back: ${asProblem(error).message}`);
+    notice(`The camera does not come back: ${problemOf(error).message}`);
   }
 }
 
@@ -240,14 +219,6 @@ function step(text) {
 /** @param {string} text */
 function notice(text) {
   dispatch({ type: 'notice', text, now: performance.now() });
-}
-
-/**
- * @param {unknown} error
- * @returns {Problem}
- */
-function asProblem(error) {
-  return error instanceof Problem ? error : new Problem('server_error', String(error));
 }
 
 async function arrive() {

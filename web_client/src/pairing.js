@@ -65,6 +65,17 @@ export async function roleFrom(fetch, token) {
 }
 
 /**
+ * The page's role by the token in its address, which is removed: nobody shall find it there.
+ * @param {Fetch} fetch
+ * @param {{ location: Location, history: History }} window
+ */
+export async function becomeKnown(fetch, { location, history }) {
+  const role = await roleFrom(fetch, tokenOf(location.hash));
+  if (role !== null) history.replaceState(null, '', location.pathname + location.search);
+  return role;
+}
+
+/**
  * A request that changes something; resolves with an error text, or "" when it was taken.
  * @param {Fetch} fetch
  * @param {'POST' | 'DELETE'} method

@@ -21,6 +21,14 @@ export class Problem extends Error {
   }
 }
 
+/**
+ * @param {unknown} error
+ * @returns {Problem}
+ */
+export function problemOf(error) {
+  return error instanceof Problem ? error : new Problem('server_error', String(error));
+}
+
 /** @typedef {{ title: string, steps: string[], retry: boolean }} Advice */
 
 /**

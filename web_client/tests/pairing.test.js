@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { ask, pair, roleFrom, tokenOf, whoAmI } from '../src/pairing.js';
+import { ask, becomeKnown, pair, roleFrom, tokenOf, whoAmI } from '../src/pairing.js';
 import { StopPost } from '../src/stop.js';
 
 /** @import {Fetch} from '../src/pairing.js' */
@@ -46,6 +46,20 @@ test('without a token the cookie decides', async () => {
   const { fetch, asked } = server({ 'api/whoami': [401, {}] });
   assert.equal(await roleFrom(fetch, ''), null);
   assert.deepEqual(asked.map(({ path }) => path), ['api/whoami']);
+});
+
+test('the token leaves the address as soon as it has done its work, and not before', async () => {
+  for (const [status, left] of /** @type {const} */ ([[200, ['/lab/?x=1']], [401, []]])) {
+    const { fetch } = server({ 'api/pair': [status, { role: 'operator' }], 'api/whoami': [401, {}] });
+    /** @type {string[]} */
+    const addresses = [];
+    const window = /** @type {any} */ ({
+      location: { hash: '#k=t', pathname: '/lab/', search: '?x=1' },
+      history: { replaceState: (/** @type {any} */ _, /** @type {any} */ __, /** @type {string} */ url) => addresses.push(url) },
+    });
+    await becomeKnown(fetch, window).catch(() => {});
+    assert.deepEqual(addresses, left);
+  }
 });
 
 test('too many tries, a broken server and no server are told apart', async () => {

@@ -5,20 +5,20 @@
 /** @import {Event} from './model.js' */
 /** @import {Invite} from './phone_card.js' */
 
+import { browserOf } from '../browser.js';
 import { BoardView } from './view.js';
 import { EMPTY, reduce } from './model.js';
 import { Link, socketUrl } from '../link.js';
 import { PhoneCard } from './phone_card.js';
 import { Kind, VERSION } from '../protocol.js';
-import { Problem, adviceFor, platformOf } from '../problems.js';
+import { Problem, adviceFor, problemOf } from '../problems.js';
 import { StopPost } from '../stop.js';
-import { ask, roleFrom, tokenOf, whoAmI } from '../pairing.js';
+import { ask, becomeKnown, whoAmI } from '../pairing.js';
 
 const TICK_MS = 100;
 const STOP_TICK_MS = 50;
 
-const fetchHere = window.fetch.bind(window);
-const platform = platformOf(navigator);
+const { fetchHere, links, platform } = browserOf(window);
 const stopPost = new StopPost(fetchHere);
 let board = EMPTY;
 let shown = false;
@@ -36,11 +36,7 @@ const link = new Link(socketUrl('ws/supervisor', document.baseURI), {
     dispatch({ type: 'disconnected' });
     if (!wasWelcome) void checkPairing();
   },
-}, {
-  WebSocket,
-  setTimeout: (callback, ms) => window.setTimeout(callback, ms),
-  clearTimeout: (id) => window.clearTimeout(id),
-});
+}, links);
 
 const view = new BoardView(document, {
   onWish: (what) => void link.sendMessage({ type: 'command', what }),
@@ -127,15 +123,13 @@ async function checkPairing() {
 
 async function arrive() {
   try {
-    const role = await roleFrom(fetchHere, tokenOf(window.location.hash));
+    const role = await becomeKnown(fetchHere, window);
     if (role === null) throw new Problem('not_supervisor');
     if (role !== 'supervisor') throw new Problem('wrong_role');
-    window.history.replaceState(null, '', window.location.pathname + window.location.search);
     /** @type {HTMLIFrameElement} */ (view.find('scene')).src = 'view/';
     link.open();
   } catch (error) {
-    const problem = error instanceof Problem ? error : new Problem('server_error', String(error));
-    dispatch({ type: 'problem', problem });
+    dispatch({ type: 'problem', problem: problemOf(error) });
   }
 }
 

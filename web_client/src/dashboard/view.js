@@ -4,6 +4,7 @@
 /** @import {Advice} from '../problems.js' */
 /** @import {Status} from '../protocol_types.js' */
 
+import { Elements, write } from './elements.js';
 import { MODE_WORDS } from '../mode_words.js';
 import { age, alarm, metres, number, scaleEnd, streamName } from './format.js';
 import { drawLines } from './sparkline.js';
@@ -15,15 +16,13 @@ import { REMEMBERED, shownMode, wishes } from './model.js';
 const ERROR_COLOUR = '#7cc4ff';
 const SIGMA_COLOUR = '#fbbf24';
 
-export class BoardView {
+export class BoardView extends Elements {
   /**
    * @param {Document} document
    * @param {Wishes} handlers
    */
   constructor(document, handlers) {
-    this.document = document;
-    /** Rows made so far, by name. @type {Map<string, HTMLElement>} */
-    this.rows = new Map();
+    super(document);
     for (const what of /** @type {const} */ (['arm', 'disarm', 'reset'])) {
       this.find(what).addEventListener('click', () => handlers.onWish(what));
     }
@@ -32,13 +31,6 @@ export class BoardView {
     this.find('record').addEventListener('click', handlers.onRecord);
     this.find('code').addEventListener('click', handlers.onCode);
     this.find('reload').addEventListener('click', handlers.onReload);
-  }
-
-  /** @param {string} id */
-  find(id) {
-    const element = this.document.getElementById(id);
-    if (element === null) throw new Error(`supervisor.html has no #${id}`);
-    return element;
   }
 
   /**
@@ -192,67 +184,4 @@ export class BoardView {
     });
     write(row.lastElementChild?.firstElementChild, value);
   }
-
-  /**
-   * The element of that name in a list, made at its first use.
-   * @param {string} list
-   * @param {string} name
-   * @param {string} tag
-   * @param {() => HTMLElement[]} children
-   */
-  row(list, name, tag, children) {
-    const key = `${list} ${name}`;
-    const known = this.rows.get(key);
-    if (known !== undefined) return known;
-    const row = this.make(tag, '');
-    row.append(...children());
-    this.find(list).append(row);
-    this.rows.set(key, row);
-    return row;
-  }
-
-  /**
-   * @param {string} tag
-   * @param {string} text
-   */
-  make(tag, text) {
-    const element = this.document.createElement(tag);
-    element.textContent = text;
-    return element;
-  }
-
-  /**
-   * @param {string} id
-   * @param {string} text
-   */
-  text(id, text) {
-    write(this.find(id), text);
-  }
-
-  /**
-   * @param {string} id
-   * @param {boolean} visible
-   */
-  show(id, visible) {
-    this.find(id).hidden = !visible;
-  }
-
-  /**
-   * @param {string} id
-   * @param {string[]} items
-   */
-  list(id, items) {
-    const element = this.find(id);
-    const old = [...element.children].map((child) => child.textContent);
-    if (old.length === items.length && old.every((text, i) => text === items[i])) return;
-    element.replaceChildren(...items.map((text) => this.make('li', text)));
-  }
-}
-
-/**
- * @param {Element | null | undefined} element
- * @param {string} text
- */
-function write(element, text) {
-  if (element && element.textContent !== text) element.textContent = text;
 }

@@ -1,0 +1,192 @@
+"""Composition root: routes, processes of its own, and the two listeners."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import segno
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+
+from server.clock import now
+from server.hub import Hub
+from server.messages import Command
+from server.metrics import exposition
+from server.recording import RecordingError
+from server.security import COOKIE, Doors
+from server.websocket import PageServer
+
+CLIENT = Path(__file__).resolve().parents[1] / "web_client"
+MAX_BODY = 4_096
+log = logging.getLogger("lightleash")
+
+
+class VirtualPhone:
+    """The virtual phone of the supervisor's button: a process like any other phone."""
+
+    def __init__(self) -> None:
+        """Not started."""
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether it is alive."""
+        return self._process is not None and self._process.poll() is None
+
+    def start(self) -> None:
+        """Start it, unless it runs."""
+        if not self.running:
+            command = [sys.executable, "-m", "server.virtual_phone", "--hand", "demo"]
+            self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+
+    def stop(self) -> None:
+        """Ask it to leave; it lets go of the button first."""
+        if self._process is not None and self.running:
+            self._process.send_signal(signal.SIGINT)
+
+
+class Api:
+    """The HTTP side: few requests, each small."""
+
+    def __init__(self, hub: Hub, doors: Doors, invite_url: str, authority: Path | None) -> None:
+        """`invite_url` is what the QR code says."""
+        self._hub, self._doors, self._invite = hub, doors, invite_url
+        self._authority = authority
+        self.phone = VirtualPhone()
+
+    def routes(self) -> Sequence[BaseRoute]:
+        """All of `/api/`, and the small ones beside it."""
+        return [
+            Route("/api/pair", self._pair, methods=["POST"]),
+            Route("/api/whoami", self._who_am_i),
+            Route("/api/stop", self._stop, methods=["POST"]),
+            Route("/api/virtual-phone", self._virtual_phone, methods=["POST", "DELETE"]),
+            Route("/api/recording", self._recording, methods=["POST", "DELETE"]),
+            Route("/api/invite", self._invitation),
+            Route("/api/invite.svg", self._invitation_svg),
+            Route("/api/status", self._status),
+            Route("/ca.crt", self._certificate),
+            Route("/healthz", self._health),
+            Route("/metrics", self._metrics),
+        ]
+
+    async def _pair(self, request: Request) -> Response:
+        address = request.client.host if request.client is not None else ""
+        if not self._doors.may_try(address, now()):
+            return _refusal(429, "token", "10 tries a minute")
+        body = await _body(request)
+        try:
+            token = json.loads(body)["token"] if body is not None else None
+        except (ValueError, LookupError, TypeError):
+            token = None
+        if not isinstance(token, str):
+            return _refusal(400, "token", 'JSON: {"token": "…"}')
+        paired = self._doors.pair(token)
+        if paired is None:
+            log.warning("pairing refused for %s", address)
+            return _refusal(401, "token", "the link of this run: scan the QR code again")
+        role, session = paired
+        secure = request.url.scheme == "https"
+        response = JSONResponse({"role": role})
+        name = f"__Host-{COOKIE}" if secure else COOKIE
+        response.set_cookie(name, session, httponly=True, secure=secure, samesite="strict")
+        return response
+
+    async def _who_am_i(self, request: Request) -> Response:
+        return JSONResponse({"role": request.scope["role"]})
+
+    async def _stop(self, request: Request) -> Response:
+        self._hub.wish(Command("stop"), str(request.scope["role"]))
+        return JSONResponse({"stopping": True}, 202)
+
+    async def _virtual_phone(self, request: Request) -> Response:
+        if request.method == "POST":
+            self.phone.start()
+        else:
+            self.phone.stop()
+        return JSONResponse({"running": self.phone.running}, 202)
+
+    async def _recording(self, request: Request) -> Response:
+        recordings = self._hub.recordings
+        if request.method == "DELETE":
+            path = recordings.stop()
+            self._hub.say(f"Recorded: {path}" if path else "No recording was running.")
+            return JSONResponse({"path": path})
+        try:
+            name = recordings.start()
+        except RecordingError as error:
+            return _refusal(507, "recording", str(error))
+        self._hub.say(f"Recording {name}.")
+        return JSONResponse({"name": name}, 202)
+
+    async def _invitation(self, _request: Request) -> Response:
+        return JSONResponse({"url": self._invite})
+
+    async def _invitation_svg(self, _request: Request) -> Response:
+        code = segno.make(self._invite, error="m")
+        svg = code.svg_inline(scale=6, border=2, dark="#000", light="#fff", omitsize=False)
+        head = svg.replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+        return Response(head, media_type="image/svg+xml")
+
+    async def _status(self, _request: Request) -> Response:
+        return Response(self._hub.snapshot(), media_type="application/json")
+
+    async def _certificate(self, _request: Request) -> Response:
+        if self._authority is None:
+            return _refusal(404, "ca.crt", "this server has a certificate of its owner's")
+        return FileResponse(self._authority, media_type="application/x-x509-ca-cert")
+
+    async def _health(self, _request: Request) -> Response:
+        return JSONResponse({"ok": True, "pid": os.getpid()})
+
+    async def _metrics(self, _request: Request) -> Response:
+        return Response(exposition(self._hub), media_type="text/plain; version=0.0.4")
+
+
+def make_app(
+    api: Api, pages: PageServer, view: Sequence[BaseRoute]
+) -> Starlette:
+    """The application, without its guard."""
+    return Starlette(
+        routes=[
+            Route("/", _page("index.html")),
+            Route("/supervisor", _page("supervisor.html")),
+            *api.routes(),
+            WebSocketRoute("/ws/phone", pages.phone),
+            WebSocketRoute("/ws/video", pages.video),
+            WebSocketRoute("/ws/supervisor", pages.supervisor),
+            *view,
+            Mount("/", StaticFiles(directory=CLIENT)),
+        ]
+    )
+
+
+def _page(name: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
+    async def page(_request: Request) -> Response:
+        return FileResponse(CLIENT / name, media_type="text/html; charset=utf-8")
+
+    return page
+
+
+async def _body(request: Request) -> bytes | None:
+    """The body, or None if it is longer than anything we take."""
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > MAX_BODY:
+            return None
+    return body
+
+
+def _refusal(status: int, field: str, allowed: str) -> Response:
+    return JSONResponse({"code": "refused", "field": field, "allowed": allowed}, status)

@@ -1,0 +1,190 @@
+"""Where everything meets: the operator's phone, the pages that watch, control, recordings, events."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+import numpy as np
+
+from pipeline.robot import Robot
+from server.clock import now
+from server.control_link import ControlStatus, Input, ReadyInput, RequestInput, server_end
+from server.latest import Meter
+from server.messages import Command, Hello, Status, ToPage, encode_message
+from server.operator import OperatorPhone
+from server.recorder import Recordings
+from server.status import build
+from server.vision import jpeg
+from server.wire import Credit, Record, Thumbnail, encode
+
+log = logging.getLogger("lightleash")
+
+LEASE_S = 2.0
+"""A phone silent for longer may be taken over from."""
+EVENTS = 12
+TICK_S = 0.1
+
+
+class Page(Protocol):
+    """A connection that things can be sent to, from the event loop; never blocks."""
+
+    def push(self, data: str | bytes) -> None:
+        """Send when possible; the newest wins."""
+
+
+class Hub:
+    """One robot, at most one operator, any number of supervisors."""
+
+    def __init__(self, runtime: Path, robot: Robot, cameras: list[Path], recordings: Recordings) -> None:
+        """Listens to control in `runtime`."""
+        self.robot, self.recordings = robot, recordings
+        self._cameras = cameras
+        self._control = server_end(runtime)
+        self.phone: OperatorPhone | None = None
+        self._phone_pages: dict[str, Page] = {}
+        self.supervisors: set[Page] = set()
+        self.status: ControlStatus | None = None
+        self.control_meter = Meter()
+        self.events: deque[str] = deque(maxlen=EVENTS)
+        self._last_mode = ""
+        self._shown: Status | None = None
+        self.virtual_phone: Callable[[], bool] = lambda: False
+
+    async def run(self) -> None:
+        """Serve until cancelled."""
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self._control.fileno(), self._hear_control)
+        try:
+            while True:
+                await asyncio.sleep(TICK_S)
+                self._tick()
+        finally:
+            loop.remove_reader(self._control.fileno())
+            if self.phone is not None:
+                self.phone.close()
+            self.recordings.stop()
+            self._control.close()
+
+    def to_control(self, message: Input) -> None:
+        """Hand something to the control process."""
+        self._control.send(message)
+
+    def say(self, text: str) -> None:
+        """An event that people should see, and the log keep."""
+        log.info("%s", text)
+        self.events.appendleft(text)
+
+    def wish(self, command: Command, who: str) -> None:
+        """A person's wish, already checked for its role."""
+        if command.what != "key_frame":
+            self.say(f"{who}: {command.what}")
+            self.to_control(RequestInput(command.what))
+
+    def greet(self, hello: Hello, page: Page) -> OperatorPhone | None:
+        """Give the lease to a phone; None while another one is alive."""
+        current = self.phone
+        if current is not None:
+            if current.meters["operator"].age(now()) < LEASE_S:
+                return None
+            self.part(current)
+        loop = asyncio.get_running_loop()
+
+        def soon(data: str | bytes, name: str) -> None:
+            loop.call_soon_threadsafe(self._push, name, data)
+
+        self.phone = OperatorPhone(
+            hello,
+            self.robot,
+            self._cameras,
+            self.to_control,
+            now,
+            on_taken=lambda n: soon(encode(Record(n, int(1e6 * now()), Credit(n))), "video"),
+            on_key_wanted=lambda: soon(encode_message(Command("key_frame")), "operator"),
+        )
+        self._phone_pages = {"operator": page}
+        self.recordings.device = self.phone.device
+        self.say(f"{self.phone.device} leads.")
+        return self.phone
+
+    def join_video(self, session: str, page: Page) -> OperatorPhone | None:
+        """The video socket of the phone that has the lease; None for anyone else."""
+        if self.phone is None or self.phone.id != session:
+            return None
+        self._phone_pages["video"] = page
+        return self.phone
+
+    def part(self, phone: OperatorPhone) -> None:
+        """A phone has gone."""
+        if self.phone is phone:
+            self.phone, self._phone_pages = None, {}
+            self.say(f"{phone.device} has left.")
+            phone.close()
+
+    def _push(self, name: str, data: str | bytes) -> None:
+        page = self._phone_pages.get(name)
+        if page is not None:
+            page.push(data)
+            if isinstance(data, bytes):
+                self.recordings.record("server", data, now())
+
+    def ping(self) -> None:
+        """Ask the phone for a sign of life; called 20 times a second."""
+        if self.phone is not None:
+            self._push("operator", encode(self.phone.ingest.ping(now())))
+
+    def _hear_control(self) -> None:
+        for status in self._control.statuses():
+            self.status = status
+            self.control_meter.tick(now(), status.t)
+            self.recordings.status(status, now())
+            up = np.array(status.up_in_b) if status.up_in_b is not None else None
+            if self.phone is not None and self.phone.vision is not None:
+                self.phone.vision.know(up, np.array(status.omega_b))
+
+    def refusals(self) -> list[str]:
+        """What the server has against arming."""
+        if self.phone is None:
+            return ["No phone is connected: scan the code, or start the virtual phone."]
+        return self.phone.refusals(now())
+
+    def _tick(self) -> None:
+        self.to_control(ReadyInput(self.refusals()))
+        status = build(self)
+        if status.mode != self._last_mode:
+            self.say(f"{status.mode}: {status.reason}")
+            self._last_mode = status.mode
+        self._shown = status
+        self.broadcast(status)
+        self._show_picture()
+
+    def broadcast(self, message: ToPage) -> None:
+        """To every page."""
+        text = encode_message(message)
+        self.recordings.message("server", text, now())
+        for page in (*self.supervisors, self._phone_pages.get("operator")):
+            if page is not None:
+                page.push(text)
+
+    def _show_picture(self) -> None:
+        vision = self.phone.vision if self.phone is not None else None
+        if vision is None:
+            return
+        vision.watched = bool(self.supervisors)
+        if vision.watched and vision.thumbnail is not None:
+            picture, vision.thumbnail = vision.thumbnail, None
+            self.last_thumbnail = picture
+            data = encode(Record(0, int(1e6 * now()), Thumbnail(jpeg(picture))))
+            for page in self.supervisors:
+                page.push(data)
+
+    last_thumbnail: object = None
+
+    def snapshot(self) -> bytes:
+        """The last status as JSON, for people with a terminal."""
+        return msgspec.json.encode(self._shown)

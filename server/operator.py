@@ -1,0 +1,131 @@
+"""One operator's phone at the server: its clock, its stream, its eyes, and what it still lacks."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+
+from hardware.camera_file import CameraFileError, find_camera
+from pipeline.config import GatesConfig
+from pipeline.robot import Robot
+from pipeline.signals import Operator, PhoneImu
+from pipeline.vision import Sighting
+from server.control_link import Input, OperatorInput, PhoneImuInput, PoseInput
+from server.ingest import EncodedFrame, Ingest
+from server.latest import Meter
+from server.messages import Hello
+from server.sight import Sight
+from server.vision import VisionThread
+from server.wire import Record, WireError
+
+STALE_S = 1.0
+"""A stream silent for longer keeps the robot from being armed."""
+
+
+class OperatorPhone:
+    """From hello to goodbye."""
+
+    def __init__(
+        self,
+        hello: Hello,
+        robot: Robot,
+        cameras: list[Path],
+        to_control: Callable[[Input], object],
+        clock: Callable[[], float],
+        on_taken: Callable[[int], None],
+        on_key_wanted: Callable[[], None],
+    ) -> None:
+        """`to_control` may be called from the vision thread as well."""
+        self.id = secrets.token_urlsafe(12)
+        self.device, self.hello = hello.device or "a phone", hello
+        self.ingest = Ingest(lambda: 1 + secrets.randbits(63))
+        self._robot, self._cameras = robot, cameras
+        self._to_control, self._clock = to_control, clock
+        self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
+        self.vision: VisionThread | None = None
+        self._size: tuple[int, int] | None = None
+        self.camera_problem = ""
+        self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
+        self.sighting: Sighting | None = None
+        self.latency_ms: dict[str, float] = {}
+
+    def take(self, record: Record, now: float) -> None:
+        """A record of this phone, from either of its sockets.
+
+        Raises:
+            WireError: not believable, or a picture without a calibration.
+        """
+        match self.ingest.record(record, now):
+            case PhoneImu() as sample:
+                self.meters["phone_imu"].tick(now, sample.t)
+                self._to_control(PhoneImuInput.of(sample))
+                if self.vision is not None:
+                    self.vision.feel(sample)
+            case Operator() as operator:
+                self.meters["operator"].tick(now, operator.t)
+                self._to_control(OperatorInput.of(operator))
+            case EncodedFrame() as frame:
+                self._see(frame, now)
+
+    def _see(self, frame: EncodedFrame, now: float) -> None:
+        self.meters["video"].tick(now, frame.t)
+        size = (frame.picture.width, frame.picture.height)
+        if size != self._size:
+            self._open_eyes(size)
+        if self.vision is None:
+            self._on_taken(frame.sequence)
+            raise WireError("calibration", "frame", self.camera_problem)
+        self.vision.offer(frame)
+
+    def _open_eyes(self, size: tuple[int, int]) -> None:
+        """Begin to look, or begin again at another picture size: that is another camera."""
+        self.close()
+        self._size, self.camera_problem = size, ""
+        try:
+            camera = find_camera(self.device, *size, self._cameras)
+        except CameraFileError as error:
+            self.camera_problem = str(error)
+            return
+        sight = Sight(camera, self._robot, GatesConfig(), self._clock)
+        self.vision = VisionThread(sight, self._sighted, self._on_taken, self._on_key_wanted)
+
+    def _sighted(self, sighting: Sighting, frame: EncodedFrame) -> None:
+        """In the vision thread: hand the pose on, remember where the time went."""
+        now = self._clock()
+        if sighting.pose is not None:
+            self._to_control(PoseInput.of(sighting.pose))
+            self.meters["pose"].tick(now, sighting.t)
+        took = {name: 1e3 * s for name, s in sighting.took_s.items()}
+        self.latency_ms = {
+            "capture to arrival": 1e3 * (frame.t_received - frame.t),
+            "waiting": 1e3 * (now - frame.t_received) - sum(took.values()),
+            **took,
+        }
+        self.sighting = sighting
+
+    def refusals(self, now: float) -> list[str]:
+        """What this phone still lacks, in words for the person who can mend it."""
+        if not self.ingest.clock.ready:
+            return ["The phone's clock is not known yet: wait a moment."]
+        why = []
+        if not self.ingest.visible:
+            why.append("The page on the phone is hidden: bring it to the front.")
+        if self.meters["phone_imu"].age(now) > STALE_S:
+            why.append("The phone's motion sensors are silent: allow them in the browser.")
+        if self.camera_problem:
+            why.append(f"The camera is not calibrated: {self.camera_problem}.")
+        elif self.meters["video"].age(now) > STALE_S:
+            why.append("No pictures from the phone: allow the camera in the browser.")
+        elif self.vision is not None and self.vision.failed:
+            why.append(self.vision.failed)
+        elif self.meters["pose"].age(now) > STALE_S:
+            found = self.sighting.reason if self.sighting is not None else ""
+            why.append(f"The robot is not seen. {found}".strip())
+        return why
+
+    def close(self) -> None:
+        """Stop looking."""
+        if self.vision is not None:
+            self.vision.stop()
+            self.vision = None

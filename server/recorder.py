@@ -1,0 +1,55 @@
+"""Starting and stopping recordings of what the hub sees."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from server.control_link import ControlStatus
+from server.recording import Direction, Recorder
+
+
+class Recordings:
+    """At most one recording at a time."""
+
+    def __init__(self, directory: Path, metadata: dict[str, str]) -> None:
+        """Files go to `directory`; `metadata` goes into each."""
+        self._directory, self._metadata = directory, metadata
+        self._recorder: Recorder | None = None
+        self.device = ""
+
+    @property
+    def name(self) -> str:
+        """Of the running recording, or ""."""
+        return self._recorder.name if self._recorder is not None else ""
+
+    def start(self) -> str:
+        """Begin, unless one is running; gives its name."""
+        if self._recorder is None:
+            name = time.strftime("%Y%m%d-%H%M%S")
+            metadata = {**self._metadata, "device": self.device}
+            self._recorder = Recorder(self._directory, name, metadata)
+        return self.name
+
+    def stop(self) -> str:
+        """End; gives the path of the file, or ""."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is None:
+            return ""
+        recorder.close()
+        return str(recorder.path)
+
+    def record(self, direction: Direction, data: bytes, t: float) -> None:
+        """A record that came or went."""
+        if self._recorder is not None:
+            self._recorder.record(direction, data, t)
+
+    def message(self, direction: Direction, text: str, t: float) -> None:
+        """A message that came or went."""
+        if self._recorder is not None:
+            self._recorder.message(direction, text, t)
+
+    def status(self, status: ControlStatus, t: float) -> None:
+        """A status of the control process."""
+        if self._recorder is not None:
+            self._recorder.status(status, t)

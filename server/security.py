@@ -1,0 +1,174 @@
+"""Who may come in: tokens, cookies, Host and Origin. Pure ASGI, so that websockets are guarded too."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterable
+from http.cookies import CookieError, SimpleCookie
+from typing import Literal
+
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+Role = Literal["operator", "supervisor"]
+COOKIE = "lightleash"
+PUBLIC_FILES = (".js", ".css", ".svg")
+PUBLIC_PATHS = {"/", "/supervisor", "/api/pair", "/healthz", "/ca.crt"}
+OPERATOR_PATHS = {"/api/whoami", "/api/stop", "/ws/phone", "/ws/video"}
+"""What an operator may reach; everything else is the supervisor's."""
+PAIR_TRIES, PAIR_WINDOW_S = 10, 60.0
+
+PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+    "media-src 'self' blob:; connect-src 'self'; worker-src 'self'; frame-src 'self'; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+)
+HEADERS = {
+    "content-security-policy": PAGE_POLICY,
+    "permissions-policy": "camera=(self), accelerometer=(self), gyroscope=(self), magnetometer=(self)",
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+}
+
+
+class Doors:
+    """Tokens of this run, and the sessions they were exchanged for."""
+
+    def __init__(self) -> None:
+        """New tokens: yesterday's link opens nothing."""
+        self.operator_token = secrets.token_urlsafe(16)
+        self.supervisor_token = secrets.token_urlsafe(16)
+        self._sessions: dict[str, Role] = {}
+        self._tries: dict[str, list[float]] = {}
+
+    def role_of_token(self, token: str) -> Role | None:
+        """Whose token it is, in constant time."""
+        given = token.encode()
+        if secrets.compare_digest(given, self.supervisor_token.encode()):
+            return "supervisor"
+        if secrets.compare_digest(given, self.operator_token.encode()):
+            return "operator"
+        return None
+
+    def pair(self, token: str) -> tuple[Role, str] | None:
+        """Exchange a token for a session: (role, cookie's value)."""
+        role = self.role_of_token(token)
+        if role is None:
+            return None
+        session = secrets.token_urlsafe(24)
+        self._sessions[session] = role
+        return role, session
+
+    def may_try(self, address: str, now: float) -> bool:
+        """Whether `address` may try another token."""
+        if len(self._tries) > 1000:
+            self._tries.clear()
+        recent = [t for t in self._tries.get(address, []) if t > now - PAIR_WINDOW_S]
+        self._tries[address] = [*recent, now]
+        return len(recent) < PAIR_TRIES
+
+    def role_of(self, headers: dict[str, str]) -> Role | None:
+        """Role by bearer token or cookie."""
+        scheme, _, token = headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer":
+            return self.role_of_token(token.strip())
+        try:
+            cookie = SimpleCookie(headers.get("cookie", ""))
+        except CookieError:
+            return None
+        roles = [
+            self._sessions[morsel.value]
+            for name, morsel in cookie.items()
+            if name in (COOKIE, f"__Host-{COOKIE}") and morsel.value in self._sessions
+        ]
+        return "supervisor" if "supervisor" in roles else roles[0] if roles else None
+
+
+class Guard:
+    """Refuses foreign hosts and origins, and those without the role; adds the security headers."""
+
+    def __init__(self, app: ASGIApp, doors: Doors, hosts: Iterable[str]) -> None:
+        """`hosts` are the names and addresses this server answers to."""
+        self._app, self._doors = app, doors
+        self._hosts = {host.lower() for host in hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let in or turn away."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = {k.decode("latin-1").lower(): v.decode("latin-1") for k, v in scope["headers"]}
+        role = self._doors.role_of(headers)
+        refusal = self._refusal(scope, headers, role)
+        if refusal is not None:
+            await _refuse(refusal, scope, receive, send)
+            return
+        scope["role"] = role
+        await self._app(scope, receive, _with_headers(scope, send))
+
+    def _refusal(
+        self, scope: Scope, headers: dict[str, str], role: Role | None
+    ) -> tuple[int, str, str] | None:
+        """(status, field, allowed), or None for welcome."""
+        host = headers.get("host", "")
+        name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
+        if name.lower() not in self._hosts:
+            return 421, "Host", "an address of this server"
+        bearer = headers.get("authorization", "").lower().startswith("bearer ")
+        changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+        if changes and not bearer and not self._is_own(scope, headers, host):
+            return 403, "Origin", "this server's own pages"
+        path: str = scope["path"]
+        is_file = path.endswith(PUBLIC_FILES) and not path.startswith("/api/")
+        if path in PUBLIC_PATHS or (is_file and not changes):
+            return None
+        if role is None:
+            return 401, "role", "pair first: open the link or scan the QR code"
+        if role == "operator" and path not in OPERATOR_PATHS:
+            return 403, "role", "supervisor"
+        return None
+
+    def _is_own(self, scope: Scope, headers: dict[str, str], host: str) -> bool:
+        """A page of another site can neither know our origin nor set our header."""
+        scheme = {"ws": "http", "wss": "https"}.get(scope["scheme"], scope["scheme"])
+        if headers.get("origin") != f"{scheme}://{host}":
+            return False
+        return scope["type"] == "websocket" or "x-lightleash" in headers
+
+
+async def _refuse(
+    refusal: tuple[int, str, str], scope: Scope, receive: Receive, send: Send
+) -> None:
+    status, field, allowed = refusal
+    body = {"code": "role" if status == 401 else "refused", "field": field, "allowed": allowed}
+    response = JSONResponse(body, status)
+    if scope["type"] == "websocket":
+        if "websocket.http.response" in scope.get("extensions", {}):
+            await response(scope, receive, _as_denial(send))
+        else:
+            await send({"type": "websocket.close", "code": 1008})
+        return
+    await response(scope, receive, send)
+
+
+def _as_denial(send: Send) -> Send:
+    async def renamed(message: Message) -> None:
+        kind = message["type"].replace("http.response", "websocket.http.response")
+        await send({**message, "type": kind})
+
+    return renamed
+
+
+def _with_headers(scope: Scope, send: Send) -> Send:
+    if scope["type"] == "websocket":
+        return send
+
+    async def extended(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            present = {name.lower() for name, _ in message["headers"]}
+            extra = [(k.encode(), v.encode()) for k, v in HEADERS.items() if k.encode() not in present]
+            message = {**message, "headers": [*message["headers"], *extra]}
+        await send(message)
+
+    return extended

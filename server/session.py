@@ -1,0 +1,103 @@
+"""One page, sans-I/O: what it may say and when. Faults answer the sender and cost nobody else anything."""
+
+from __future__ import annotations
+
+from server.messages import Command, FromPage, Hello, Log, decode_message
+from server.wire import VERSION, Motion, Picture, Pong, Record, Touch, WireError, decode
+
+MAX_FAULTS = 50
+"""More, and the connection is closed."""
+ALLOWED: dict[str, tuple[type, ...]] = {
+    "operator": (Motion, Touch, Pong),
+    "video": (Picture,),
+    "supervisor": (),
+}
+"""Kinds of record by role."""
+MESSAGES: dict[str, tuple[type, ...]] = {
+    "operator": (Command, Log),
+    "video": (Log,),
+    "supervisor": (Command, Log),
+}
+
+
+class Bucket:
+    """So many at once, so many a second."""
+
+    def __init__(self, rate: float, burst: float) -> None:
+        """Full."""
+        self._rate, self._burst = rate, burst
+        self._level, self._t = burst, 0.0
+
+    def take(self, now: float, amount: float = 1.0) -> bool:
+        """Whether `amount` was left; if so, it is gone."""
+        self._level = min(self._burst, self._level + self._rate * max(0.0, now - self._t))
+        self._t = now
+        if self._level < amount:
+            return False
+        self._level -= amount
+        return True
+
+
+class Session:
+    """State of one connection: waiting for hello, then open as a role."""
+
+    def __init__(self, path_role: str) -> None:
+        """`path_role` is what the address says: operator, video or supervisor."""
+        self.role = path_role
+        self.hello: Hello | None = None
+        self.faults = 0
+        self._records = Bucket(rate=300.0, burst=600.0)
+        self._bytes = Bucket(rate=4e6, burst=4e6)
+        self._messages = Bucket(rate=40.0, burst=80.0)
+
+    @property
+    def hopeless(self) -> bool:
+        """Too many faults."""
+        return self.faults > MAX_FAULTS
+
+    def receive(self, data: str | bytes, now: float) -> FromPage | Record:
+        """What the page said.
+
+        Raises:
+            WireError: it may not say that, or not now; counted.
+        """
+        try:
+            if isinstance(data, bytes):
+                return self._record(data, now)
+            return self._message(data, now)
+        except WireError:
+            self.faults += 1
+            raise
+
+    def _record(self, data: bytes, now: float) -> Record:
+        if self.hello is None:
+            raise WireError("order", "record", "after hello")
+        if not self._records.take(now) or not self._bytes.take(now, len(data)):
+            raise WireError("rate", "record", "300 records and 4 MB a second")
+        record = decode(data)
+        if not isinstance(record.body, ALLOWED[self.role]):
+            names = ", ".join(kind.__name__.lower() for kind in ALLOWED[self.role]) or "none"
+            raise WireError("role", "record.kind", f"as {self.role}: {names}")
+        return record
+
+    def _message(self, text: str, now: float) -> FromPage:
+        if not self._messages.take(now):
+            raise WireError("rate", "message", "40 a second")
+        message = decode_message(text)
+        if isinstance(message, Hello):
+            return self._greeted(message)
+        if self.hello is None:
+            raise WireError("order", "message", "hello first")
+        if not isinstance(message, MESSAGES[self.role]):
+            raise WireError("role", "message.type", f"not as {self.role}")
+        return message
+
+    def _greeted(self, hello: Hello) -> Hello:
+        if self.hello is not None:
+            raise WireError("order", "hello", "once")
+        if hello.version != VERSION:
+            raise WireError("version", "hello.version", f"{VERSION}: reload the page")
+        if hello.role != self.role:
+            raise WireError("role", "hello.role", f"{self.role} at this address")
+        self.hello = hello
+        return hello

@@ -1,0 +1,99 @@
+"""The truth about the robot, as every screen shows it."""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import TYPE_CHECKING, Literal, cast
+
+from pipeline.signals import Mode
+from server.clock import now
+from server.control_link import ControlStatus
+from server.messages import Status, Stream
+
+if TYPE_CHECKING:
+    from server.hub import Hub
+
+LOST_S = 0.3
+"""A control process silent for longer is lost."""
+ModeName = Literal["DISARMED", "ARMED", "TRACK", "HOLD", "RAMP", "STOPPED", "LOST"]
+
+
+def build(hub: Hub) -> Status:
+    """From what the hub knows now."""
+    t, control, phone = now(), hub.status, hub.phone
+    lost = control is None or hub.control_meter.age(t) > LOST_S
+    refusals = ["The control process does not answer."] if lost or control is None else control.refusals
+    sighting = phone.sighting if phone is not None else None
+    found = sighting is not None and sighting.pose is not None
+    return Status(
+        mode="LOST" if lost or control is None else cast(ModeName, Mode(control.mode).name),
+        reason=_reason(control, lost),
+        ready=not refusals,
+        refusals=list(refusals),
+        robot=hub.robot.name,
+        operator=phone.device if phone is not None else "",
+        streams=_streams(hub, t),
+        latency_ms=_latency(hub),
+        leds=len(sighting.match.led) if sighting is not None and sighting.match else 0,
+        reprojection_px=_rounded(sighting.pose.reprojection_px, 2)
+        if found and sighting and sighting.pose
+        else None,
+        position_mm=[round(1e3 * x, 1) for x in control.p_bc_in_c]
+        if control is not None and control.p_bc_in_c is not None
+        else None,
+        error_mm=_rounded(control.error_m, 1, 1e3) if control else None,
+        error_deg=_rounded(control.error_rad, 2, degrees(1.0)) if control else None,
+        sigma_mm=_rounded(control.sigma_p, 1, 1e3) if control else None,
+        saturated=control.saturated if control else False,
+        recording=hub.recordings.name,
+        phones=int(phone is not None),
+        supervisors=len(hub.supervisors),
+        realtime=control.realtime if control else "",
+        control=_control(control),
+        messages=list(hub.events),
+    )
+
+
+def _reason(control: ControlStatus | None, lost: bool) -> str:
+    if lost or control is None:
+        return "The control process does not answer; the robot stops by its own watchdog."
+    return control.reason
+
+
+def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | None:
+    return None if value is None else round(scale * value, digits)
+
+
+def _control(control: ControlStatus | None) -> dict[str, float]:
+    if control is None:
+        return {}
+    lateness = {f"{name}_ms": value for name, value in control.lateness_ms.items()}
+    missed = lateness.pop("missed_ms", 0.0)
+    return {**lateness, "missed": missed, "step_ms": round(control.step_ms, 3)}
+
+
+def _latency(hub: Hub) -> dict[str, float]:
+    stages = dict(hub.phone.latency_ms) if hub.phone is not None else {}
+    if stages and hub.status is not None:
+        stages["to control"] = max(0.0, hub.status.fuse_ms - sum(stages.values()))
+        stages["control"] = hub.status.step_ms
+    return {name: round(max(0.0, ms), 2) for name, ms in stages.items()}
+
+
+def _streams(hub: Hub, t: float) -> dict[str, Stream]:
+    streams = {}
+    if hub.phone is not None:
+        streams = {name: meter.stream(t) for name, meter in hub.phone.meters.items()}
+        vision = hub.phone.vision
+        if vision is not None:
+            video = streams["video"]
+            lost = vision.dropped + vision.undecodable
+            streams["video"] = Stream(video.age_ms, video.rate_hz, lost)
+    control = hub.status
+    if control is not None:
+        age = control.body_imu_age + hub.control_meter.age(t)
+        age_ms = round(1e3 * age, 1) if age < 1e6 else None
+        streams["body_imu"] = Stream(age_ms, round(control.body_imu_rate_hz, 1), 0)
+        link = hub.control_meter.stream(t)
+        streams["control"] = Stream(link.age_ms, link.rate_hz, control.inputs_dropped)
+    return streams

@@ -1,0 +1,130 @@
+"""The vision thread: newest picture → pose → control. Decoding and looking never hold up the event loop."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.frames import Array
+from pipeline.signals import Image, PhoneImu
+from pipeline.vision import Sighting
+from server.ingest import EncodedFrame
+from server.sight import Sight
+
+MAX_WAITING = 8
+"""Encoded pictures; more, and the stream starts anew at a key frame."""
+THUMBNAIL_WIDTH = 480
+THUMBNAIL_S = 0.1
+
+Picture = npt.NDArray[np.uint8]
+
+
+class VisionThread:
+    """Owns one phone's `Sight`. Pictures go in, sightings come out; between them nothing queues up."""
+
+    def __init__(
+        self,
+        sight: Sight,
+        on_sighting: Callable[[Sighting, EncodedFrame], None],
+        on_taken: Callable[[int], None],
+        on_key_wanted: Callable[[], None],
+    ) -> None:
+        """Callbacks run in this thread."""
+        self._sight = sight
+        self._on_sighting, self._on_taken = on_sighting, on_taken
+        self._on_key_wanted = on_key_wanted
+        self._waiting: deque[EncodedFrame] = deque()
+        self._condition = threading.Condition()
+        self._running = True
+        self._prior: tuple[Array | None, Array] = (None, np.zeros(3))
+        self._t_thumbnail = 0.0
+        self.watched = False
+        """Whether anyone wants thumbnails."""
+        self.thumbnail: Picture | None = None
+        """(h, w, 3) RGB, with what was found."""
+        self.dropped = 0
+        self.failed = ""
+        """Why the thread died, if it did."""
+        self._thread = threading.Thread(target=self._run, name="vision", daemon=True)
+        self._thread.start()
+
+    @property
+    def undecodable(self) -> int:
+        """Pictures that were garbage or needed a lost one."""
+        return self._sight.undecodable
+
+    def feel(self, sample: PhoneImu) -> None:
+        """The phone's motion, for the prior."""
+        self._sight.feel(sample)
+
+    def know(self, up_in_b: Array | None, omega_bf_in_b: Array) -> None:
+        """What control knows of the body, for the prior."""
+        self._prior = (up_in_b, omega_bf_in_b)
+
+    def offer(self, frame: EncodedFrame) -> None:
+        """A picture has come."""
+        with self._condition:
+            if len(self._waiting) >= MAX_WAITING:
+                self.dropped += len(self._waiting)
+                self._waiting.clear()
+                self._sight.needs_key = True
+            self._waiting.append(frame)
+            self._condition.notify()
+
+    def stop(self) -> None:
+        """End the thread."""
+        with self._condition:
+            self._running = False
+            self._condition.notify()
+        self._thread.join(timeout=2.0)
+
+    def _run(self) -> None:
+        try:
+            while self._running:
+                self._turn()
+        except Exception as error:  # the server must say so, not fall silent
+            self.failed = f"vision failed: {error!r}"
+            raise
+
+    def _turn(self) -> None:
+        with self._condition:
+            self._condition.wait_for(lambda: self._waiting or not self._running)
+            frames = list(self._waiting)
+            self._waiting.clear()
+        if not frames:
+            return
+        self._on_taken(frames[-1].sequence)
+        self.dropped += len(frames) - 1
+        sighting = self._sight.see(frames, *self._prior)
+        if sighting is None:
+            self._on_key_wanted()
+            return
+        self._on_sighting(sighting, frames[-1])
+        now = time.monotonic()
+        if self.watched and now - self._t_thumbnail > THUMBNAIL_S and self._sight.luma is not None:
+            self._t_thumbnail = now
+            self.thumbnail = draw(self._sight.luma, sighting)
+
+
+def draw(luma: Image, sighting: Sighting) -> Picture:
+    """A small picture (h, w, 3) RGB: found LEDs circled in green, other lights in orange."""
+    scale = THUMBNAIL_WIDTH / luma.shape[1]
+    small = cv2.resize(luma, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    picture = cv2.cvtColor(small, cv2.COLOR_GRAY2RGB)
+    found = set(sighting.match.spot.tolist()) if sighting.match is not None else set()
+    for index, (u, v) in enumerate(scale * sighting.spots.pixels):
+        colour = (80, 255, 120) if index in found else (255, 160, 60)
+        cv2.circle(picture, (round(u), round(v)), 9, colour, 1, cv2.LINE_AA)
+    return np.asarray(picture, dtype=np.uint8)
+
+
+def jpeg(picture: Picture) -> bytes:
+    """A thumbnail's bytes."""
+    _, data = cv2.imencode(".jpg", picture[:, :, ::-1], (cv2.IMWRITE_JPEG_QUALITY, 75))
+    return data.tobytes()

@@ -1,0 +1,193 @@
+"""Thin shells around `Session` and `Hub`: one coroutine reads a page, one writes to it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+
+from server.clock import now
+from server.hub import Hub
+from server.messages import Command, Hello, Log, Refused, Welcome, encode_message
+from server.operator import OperatorPhone
+from server.session import Session
+from server.settings import VideoSettings
+from server.wire import VERSION, Record, WireError
+
+PING_S = 0.05
+MAX_UNSENT = 16
+"""Of one page; a page that does not read loses the oldest."""
+HELLO_S = 5.0
+
+
+class Connection:
+    """A page at the other end of a websocket."""
+
+    def __init__(self, socket: WebSocket) -> None:
+        """Not accepted yet."""
+        self._socket = socket
+        self._unsent: deque[str | bytes] = deque(maxlen=MAX_UNSENT)
+        self._news = asyncio.Event()
+
+    def push(self, data: str | bytes) -> None:
+        """Send when possible."""
+        self._unsent.append(data)
+        self._news.set()
+
+    def refuse(self, error: WireError, fatal: bool = False) -> None:
+        """Tell the page what was not taken."""
+        refused = Refused(error.code, error.field, error.allowed, fatal)
+        self.push(encode_message(refused))
+
+    async def write(self) -> None:
+        """Send what is pushed, until cancelled."""
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            while self._unsent:
+                data = self._unsent.popleft()
+                if isinstance(data, bytes):
+                    await self._socket.send_bytes(data)
+                else:
+                    await self._socket.send_text(data)
+
+    async def read(self) -> str | bytes:
+        """The next thing the page says.
+
+        Raises:
+            WebSocketDisconnect: it has gone.
+        """
+        message = await self._socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1000))
+        data = message.get("bytes")
+        return data if data is not None else str(message.get("text", ""))
+
+    async def close(self, code: int = 1000) -> None:
+        """Send the last words and close."""
+        while self._unsent and self._socket.application_state == WebSocketState.CONNECTED:
+            data = self._unsent.popleft()
+            await (
+                self._socket.send_bytes(data)
+                if isinstance(data, bytes)
+                else self._socket.send_text(data)
+            )
+        if self._socket.application_state == WebSocketState.CONNECTED:
+            await self._socket.close(code)
+
+
+class PageServer:
+    """Serves the three kinds of socket."""
+
+    def __init__(self, hub: Hub, video: VideoSettings) -> None:
+        """For the pages of one robot."""
+        self._hub, self._video = hub, video
+
+    async def phone(self, socket: WebSocket) -> None:
+        """`/ws/phone`: an operator."""
+        await self._serve(socket, "operator")
+
+    async def video(self, socket: WebSocket) -> None:
+        """`/ws/video`: an operator's pictures."""
+        await self._serve(socket, "video")
+
+    async def supervisor(self, socket: WebSocket) -> None:
+        """`/ws/supervisor`: someone who watches."""
+        await self._serve(socket, "supervisor")
+
+    async def _serve(self, socket: WebSocket, role: str) -> None:
+        await socket.accept()
+        page, session = Connection(socket), Session(role)
+        phone: OperatorPhone | None = None
+        writer = asyncio.create_task(page.write())
+        pinger: asyncio.Task[None] | None = None
+        try:
+            phone = await self._greet(page, session)
+            if role == "operator":
+                pinger = asyncio.create_task(self._ping())
+            while not session.hopeless:
+                await self._listen(page, session, phone)
+        except WireError as error:
+            page.refuse(error, fatal=True)
+        except (WebSocketDisconnect, RuntimeError, TimeoutError):
+            pass  # it has gone, or never said hello
+        finally:
+            for task in (writer, pinger):
+                if task is not None:
+                    task.cancel()
+            self._hub.supervisors.discard(page)
+            if role == "operator" and phone is not None:
+                self._hub.part(phone)
+            await _quietly(page.close(1008 if session.faults else 1000))
+
+    async def _greet(self, page: Connection, session: Session) -> OperatorPhone | None:
+        """Hear hello, answer welcome, take the place; raises WireError if there is none."""
+        hello = session.receive(await asyncio.wait_for(page.read(), HELLO_S), now())
+        if not isinstance(hello, Hello):
+            raise WireError("order", "message", "hello first")
+        phone: OperatorPhone | None = None
+        if session.role == "operator":
+            phone = self._hub.greet(hello, page)
+            if phone is None:
+                raise WireError("lease", "hello.role", "another phone leads the robot now")
+        elif session.role == "video":
+            phone = self._hub.join_video(hello.session, page)
+            if phone is None:
+                raise WireError("lease", "hello.session", "the session of the phone that leads")
+        else:
+            self._hub.supervisors.add(page)
+        video = self._video
+        page.push(
+            encode_message(
+                Welcome(
+                    session=phone.id if phone is not None else "",
+                    version=VERSION,
+                    robot=self._hub.robot.name,
+                    width=video.width,
+                    height=video.height,
+                    frame_rate_hz=video.frame_rate_hz,
+                    bitrate_bps=video.bitrate_bps,
+                )
+            )
+        )
+        return phone
+
+    async def _listen(
+        self, page: Connection, session: Session, phone: OperatorPhone | None
+    ) -> None:
+        """Take one thing the page says; a fault is answered and costs nobody else anything."""
+        data = await page.read()
+        t = now()
+        if phone is not None:
+            if isinstance(data, bytes):
+                self._hub.recordings.record("phone", data, t)
+            else:
+                self._hub.recordings.message("phone", data, t)
+        try:
+            said = session.receive(data, t)
+            if isinstance(said, Record) and phone is not None:
+                phone.take(said, t)
+            elif isinstance(said, Command):
+                self._hub.wish(said, phone.device if phone is not None else "supervisor")
+            elif isinstance(said, Log):
+                self._hub.say(f"page: {_printable(said.text)}")
+        except WireError as error:
+            page.refuse(error, fatal=session.hopeless)
+
+    async def _ping(self) -> None:
+        while True:
+            self._hub.ping()
+            await asyncio.sleep(PING_S)
+
+
+async def _quietly(closing: object) -> None:
+    try:
+        await closing  # type: ignore[misc]
+    except (RuntimeError, WebSocketDisconnect):
+        pass
+
+
+def _printable(text: str) -> str:
+    """Without control characters: a log is read in terminals."""
+    return "".join(c if c.isprintable() else "·" for c in text)

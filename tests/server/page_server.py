@@ -1,0 +1,68 @@
+"""A small server on the loopback interface, for clients that play a page."""
+
+import json
+
+from websockets.asyncio.server import serve
+
+from server.messages import Command, Status, Welcome
+from server.phone_client import Access, PhoneClient
+from server.wire import Codec, Credit, Picture, Pong, Record, decode, encode
+
+WELCOME = Welcome("s1", 1, "ames", 1280, 720, 30, 4_000_000)
+JPEG = b"\xff\xd8" + bytes(30)
+
+
+def status(mode):
+    fields = {name: None for name in Status.__struct_fields__}
+    numbers = dict.fromkeys(("leds", "phones", "supervisors"), 0)
+    texts = dict.fromkeys(("robot", "operator", "recording", "realtime", "reason"), "")
+    flags = {"ready": True, "saturated": False}
+    tables = {"streams": {}, "latency_ms": {}, "control": {}, "refusals": [], "messages": []}
+    return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
+
+
+def picture(sequence):
+    return Record(sequence, 1, Picture(Codec.JPEG, True, 640, 360, 90, JPEG))
+
+
+class PageServer:
+    """Keeps what it hears; `after_hello` says what it sends on the main socket."""
+
+    def __init__(self, after_hello, credit=True):
+        self.after_hello, self.credit = after_hello, credit
+        self.heard, self.hellos, self.tokens = [], [], []
+
+    async def __call__(self, socket):
+        self.tokens.append(socket.request.headers["Authorization"])
+        self.hellos.append(json.loads(await socket.recv()))
+        if socket.request.path == "/ws/phone":
+            for message in self.after_hello:
+                await socket.send(message)
+        async for data in socket:
+            self.heard.append((socket.request.path, data))
+            if socket.request.path == "/ws/video" and self.credit:
+                await socket.send(encode(Record(1, 1, Credit(decode(data).sequence))))
+
+    async def serve(self, talk):
+        """Run `talk(access)` while this server listens."""
+        async with serve(self, "127.0.0.1", 0) as listening:
+            port = listening.sockets[0].getsockname()[1]
+            return await talk(Access(f"http://127.0.0.1:{port}", "secret"))
+
+    async def session(self, talk):
+        """Run `talk(client)` against this server."""
+
+        async def with_client(access):
+            client = PhoneClient(access, self.pong, self.wish)
+            try:
+                await talk(client)
+            finally:
+                await client.close()
+
+        await self.serve(with_client)
+
+    def pong(self, nonce, server_time_us):
+        return Record(1, 77, Pong(nonce, server_time_us))
+
+    def wish(self, shown):
+        return Command("arm") if shown.mode == "DISARMED" else None

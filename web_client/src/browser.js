@@ -1,0 +1,34 @@
+/** What the pages take from the browser, gathered in one place. */
+
+/** @import {Fetch} from './pairing.js' */
+/** @import {Surroundings} from './link.js' */
+
+import { platformOf } from './problems.js';
+import { screenAngleOf } from './imu.js';
+
+/** @param {Window & typeof globalThis} window */
+export function browserOf(window) {
+  /** Also what TypeScript does not know yet. @type {Record<string, any>} */
+  const scope = window;
+  /** @type {Fetch} */
+  const fetchHere = window.fetch.bind(window);
+  /** @type {(callback: () => void, ms: number) => number} */
+  const later = (callback, ms) => window.setTimeout(callback, ms);
+  /** @type {Surroundings} */
+  const links = {
+    WebSocket: window.WebSocket,
+    setTimeout: later,
+    clearTimeout: (id) => window.clearTimeout(id),
+  };
+  const canWork = scope.VideoFrame !== undefined && scope.Worker !== undefined;
+  const frameWorker = new URL('./frame_worker.js', import.meta.url);
+  return {
+    scope,
+    fetchHere,
+    later,
+    links,
+    platform: platformOf(window.navigator),
+    screenAngle: () => screenAngleOf(window.screen, scope.orientation),
+    startWorker: canWork ? () => new Worker(frameWorker, { type: 'module' }) : undefined,
+  };
+}
