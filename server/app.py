@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import logging
 import os
@@ -73,7 +74,6 @@ class Api:
             Route("/api/virtual-phone", self._virtual_phone, methods=["POST", "DELETE"]),
             Route("/api/recording", self._recording, methods=["POST", "DELETE"]),
             Route("/api/invite", self._invitation),
-            Route("/api/invite.svg", self._invitation_svg),
             Route("/api/status", self._status),
             Route("/ca.crt", self._certificate),
             Route("/healthz", self._health),
@@ -130,13 +130,11 @@ class Api:
         return JSONResponse({"name": name}, 202)
 
     async def _invitation(self, _request: Request) -> Response:
-        return JSONResponse({"url": self._invite})
-
-    async def _invitation_svg(self, _request: Request) -> Response:
-        code = segno.make(self._invite, error="m")
-        svg = code.svg_inline(scale=6, border=2, dark="#000", light="#fff", omitsize=False)
-        head = svg.replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
-        return Response(head, media_type="image/svg+xml")
+        svg = io.BytesIO()
+        segno.make(self._invite, error="m").save(
+            svg, kind="svg", scale=6, border=2, dark="#000", light="#fff", xmldecl=False
+        )
+        return JSONResponse({"url": self._invite, "qr_svg": svg.getvalue().decode()})
 
     async def _status(self, _request: Request) -> Response:
         return Response(self._hub.snapshot(), media_type="application/json")
@@ -153,9 +151,7 @@ class Api:
         return Response(exposition(self._hub), media_type="text/plain; version=0.0.4")
 
 
-def make_app(
-    api: Api, pages: PageServer, view: Sequence[BaseRoute]
-) -> Starlette:
+def make_app(api: Api, pages: PageServer, view: Sequence[BaseRoute]) -> Starlette:
     """The application, without its guard."""
     return Starlette(
         routes=[

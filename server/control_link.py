@@ -58,7 +58,7 @@ class PoseInput(msgspec.Struct, tag="pose", array_like=True, frozen=True):
     def of(cls, pose: RelativePose) -> PoseInput:
         """To be sent."""
         covariance = pose.covariance.ravel().tolist()
-        R: Nine = tuple(pose.R_cb.ravel().tolist())
+        R: Nine = tuple(pose.R_cb.ravel().tolist())  # type: ignore[assignment]
         return cls(pose.t, triple(pose.p_bc_in_c), R, covariance, pose.reprojection_px, pose.leds)
 
     def pose(self) -> RelativePose:

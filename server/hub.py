@@ -1,4 +1,4 @@
-"""Where everything meets: the operator's phone, the pages that watch, control, recordings, events."""
+"""Where all meets: the operator's phone, pages that watch, control, recordings, events."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ class Page(Protocol):
 class Hub:
     """One robot, at most one operator, any number of supervisors."""
 
-    def __init__(self, runtime: Path, robot: Robot, cameras: list[Path], recordings: Recordings) -> None:
+    def __init__(
+        self, runtime: Path, robot: Robot, cameras: list[Path], recordings: Recordings
+    ) -> None:
         """Listens to control in `runtime`."""
         self.robot, self.recordings = robot, recordings
         self._cameras = cameras

@@ -68,9 +68,14 @@ class LivePhone:
         """Pictures not made for want of time or credit; pictures sent."""
         self.status: Status | None = None
         self._made: asyncio.Queue[tuple[float, Record]] = asyncio.Queue(8)
+        self._leave = asyncio.Event()
+
+    def leave(self) -> None:
+        """Let go of the button, disarm and end the run."""
+        self._leave.set()
 
     async def run(self, seconds: float, report: Callable[[LivePhone], None]) -> None:
-        """Connect and play for `seconds`; `report` is called twice a second.
+        """Connect and play for `seconds`, or until `leave`; `report` is called twice a second.
 
         Raises:
             PhoneClientError: the server is not there, refuses or goes away.
@@ -85,18 +90,22 @@ class LivePhone:
             self._reports(report),
         )
         tasks = [asyncio.create_task(part) for part in parts]
+        leaving = asyncio.create_task(self._wait_to_leave())
         try:
-            await _first_failure(tasks, seconds)
+            await _first_failure([*tasks, leaving], seconds)
             self.script.operator.leaving = True
             await _first_failure(tasks, LEAVE_S)
             await self.client.wish(Command("disarm"))
         finally:
-            for task in tasks:
+            for task in (*tasks, leaving):
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.gather(*tasks, leaving, return_exceptions=True)
             await self.client.close()
             self._seen.close()
             self._scored.close()
+
+    async def _wait_to_leave(self) -> None:
+        await self._leave.wait()
 
     def _pong(self, nonce: int, server_time_us: int) -> Record:
         return self.script.pong(nonce, server_time_us, time.monotonic())

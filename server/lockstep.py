@@ -10,15 +10,15 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
-from hardware.camera_file import find_camera
-from hardware.sim.codec import Encoder
-from hardware.sim.render import Look
 
+from hardware.camera_file import find_camera
 from hardware.robot_file import RobotFile
+from hardware.sim.codec import Encoder
 from hardware.sim.hand import make_hand
 from hardware.sim.intent import Intent
 from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
+from hardware.sim.render import Look
 from hardware.sim.truth import Truth
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array, log

@@ -15,7 +15,9 @@ def exposition(hub: Hub) -> bytes:
     mode = Gauge("lightleash_mode", "1 for the present mode", ["mode"], registry=registry)
     for name in (*Mode.__members__, "LOST"):
         mode.labels(name).set(name == status.mode)
-    age = Gauge("lightleash_stream_age_seconds", "of the newest item", ["stream"], registry=registry)
+    age = Gauge(
+        "lightleash_stream_age_seconds", "of the newest item", ["stream"], registry=registry
+    )
     rate = Gauge("lightleash_stream_rate_hertz", "items a second", ["stream"], registry=registry)
     lost = Gauge("lightleash_stream_dropped", "items dropped", ["stream"], registry=registry)
     for name, stream in status.streams.items():
@@ -26,7 +28,9 @@ def exposition(hub: Hub) -> bytes:
     latency = Gauge("lightleash_latency_seconds", "by stage", ["stage"], registry=registry)
     for name, ms in status.latency_ms.items():
         latency.labels(name).set(1e-3 * ms)
-    control = Gauge("lightleash_control", "lateness [ms] and missed ticks", ["figure"], registry=registry)
+    control = Gauge(
+        "lightleash_control", "lateness [ms] and missed ticks", ["figure"], registry=registry
+    )
     for name, value in status.control.items():
         control.labels(name).set(value)
     if status.error_mm is not None:

@@ -92,7 +92,7 @@ class Recorder:
         """Why the recording ended early, or ""."""
         self._max_bytes = max_bytes
         self._closing = threading.Event()
-        self._queue: queue.Queue[_Item] = queue.Queue(CAPACITY)
+        self._queue: queue.Queue[_Item | None] = queue.Queue(CAPACITY)
         try:
             directory.mkdir(parents=True, exist_ok=True)
             if self.path.exists():
@@ -120,8 +120,10 @@ class Recorder:
         self._put(_Item(STATUS, t, status))
 
     def close(self) -> None:
-        """Write what is waiting, close and rename the file."""
+        """Write what is waiting, close and rename the file; waits for the disk."""
         self._closing.set()
+        with suppress(queue.Full):
+            self._queue.put_nowait(None)  # wakes the thread
         self._thread.join()
 
     def _put(self, item: _Item) -> None:
@@ -148,8 +150,9 @@ class Recorder:
         while not (self._closing.is_set() and self._queue.empty()):
             with suppress(queue.Empty):
                 item = self._queue.get(timeout=FLUSH_S)
-                _add(writer, channels[item.topic], item)
-                self.written += 1
+                if item is not None:
+                    _add(writer, channels[item.topic], item)
+                    self.written += 1
             if time.monotonic() - flushed >= FLUSH_S:
                 writer.flush()  # type: ignore[no-untyped-call]
                 flushed = time.monotonic()

@@ -1,4 +1,4 @@
-"""Who may come in: tokens, cookies, Host and Origin. Pure ASGI, so that websockets are guarded too."""
+"""Who may come in: tokens, cookies, Host, Origin. Pure ASGI: it guards websockets too."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ PAGE_POLICY = (
     "media-src 'self' blob:; connect-src 'self'; worker-src 'self'; frame-src 'self'; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
+SENSORS = "camera=(self), accelerometer=(self), gyroscope=(self), magnetometer=(self)"
 HEADERS = {
-    "content-security-policy": PAGE_POLICY,
-    "permissions-policy": "camera=(self), accelerometer=(self), gyroscope=(self), magnetometer=(self)",
+    "permissions-policy": SENSORS,
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "cache-control": "no-store",
@@ -105,7 +105,7 @@ class Guard:
             await _refuse(refusal, scope, receive, send)
             return
         scope["role"] = role
-        await self._app(scope, receive, _with_headers(scope, send))
+        await self._app(scope, receive, _with_headers(scope, headers.get("host", ""), send))
 
     def _refusal(
         self, scope: Scope, headers: dict[str, str], role: Role | None
@@ -160,14 +160,20 @@ def _as_denial(send: Send) -> Send:
     return renamed
 
 
-def _with_headers(scope: Scope, send: Send) -> Send:
+def _with_headers(scope: Scope, host: str, send: Send) -> Send:
     if scope["type"] == "websocket":
         return send
+    # older Safari does not count websockets of the same origin as 'self'
+    scheme = "wss" if scope["scheme"] == "https" else "ws"
+    policy = PAGE_POLICY.replace("connect-src 'self'", f"connect-src 'self' {scheme}://{host}")
+    headers = {"content-security-policy": policy, **HEADERS}
 
     async def extended(message: Message) -> None:
         if message["type"] == "http.response.start":
             present = {name.lower() for name, _ in message["headers"]}
-            extra = [(k.encode(), v.encode()) for k, v in HEADERS.items() if k.encode() not in present]
+            extra = [
+                (k.encode(), v.encode()) for k, v in headers.items() if k.encode() not in present
+            ]
             message = {**message, "headers": [*message["headers"], *extra]}
         await send(message)
 

@@ -1,4 +1,4 @@
-"""The server process: the app on two listeners, HTTPS for phones and HTTP for this machine alone."""
+"""The server process: the app on HTTPS for phones and on HTTP for this machine alone."""
 
 from __future__ import annotations
 
@@ -81,7 +81,10 @@ async def serve(settings: Settings, runtime: Path, truth_port: int) -> None:
     """Serve until SIGTERM or SIGINT."""
     robot_file = load_robot(settings.robot)
     tls = _certificate(settings)
-    https, http = listen(settings.host, settings.https_port), listen("127.0.0.1", settings.http_port)
+    https, http = (
+        listen(settings.host, settings.https_port),
+        listen("127.0.0.1", settings.http_port),
+    )
     https_port, http_port = https.getsockname()[1], http.getsockname()[1]
     doors = Doors()
     recover_all(settings.state / "recordings")
@@ -93,7 +96,11 @@ async def serve(settings: Settings, runtime: Path, truth_port: int) -> None:
     )
     dashboard.start(lambda: (hub.status, hub.last_thumbnail))
     address = own_addresses()[0]
-    base = f"https://{address}:{https_port}" if ":" not in address else f"https://[{address}]:{https_port}"
+    base = (
+        f"https://{address}:{https_port}"
+        if ":" not in address
+        else f"https://[{address}]:{https_port}"
+    )
     invite = f"{base}/#k={doors.operator_token}"
     api = Api(hub, doors, invite, tls.authority)
     app = make_app(api, PageServer(hub, settings.video), view_routes(lambda: dashboard.port))

@@ -1,4 +1,4 @@
-"""One page, sans-I/O: what it may say and when. Faults answer the sender and cost nobody else anything."""
+"""One page, sans-I/O: what it may say and when. A fault costs nobody else anything."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings of `lightleash serve`: defaults < TOML file < environment < command line, one checked model."""
+"""Settings of `lightleash serve`: defaults < TOML file < environment < command line."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class VideoSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    width: int = Field(1280, ge=320, le=1920)
-    height: int = Field(720, ge=240, le=1080)
-    frame_rate_hz: int = Field(30, ge=5, le=60)
-    bitrate_bps: int = Field(3_000_000, ge=500_000, le=20_000_000)
+    width: int = Field(default=1280, ge=320, le=1920)
+    height: int = Field(default=720, ge=240, le=1080)
+    frame_rate_hz: int = Field(default=30, ge=5, le=60)
+    bitrate_bps: int = Field(default=3_000_000, ge=500_000, le=20_000_000)
 
 
 class Settings(BaseSettings):
@@ -62,7 +62,7 @@ class Settings(BaseSettings):
     record: bool = Field(False, description="record from the start")
     state: Path = Field(default_factory=state_directory, description="certificates, recordings")
     cameras: list[Path] = Field([], description="folders with calibrations of phones")
-    video: VideoSettings = VideoSettings()
+    video: VideoSettings = Field(default_factory=VideoSettings)
 
     @classmethod
     def settings_customise_sources(
@@ -94,7 +94,7 @@ def load(argv: Sequence[str], file: Path | None = None) -> Settings:
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise SettingsError(f"{file}: {error}") from error
     try:
-        settings = Settings(_cli_parse_args=list(argv), **values)
+        settings = Settings(_cli_parse_args=list(argv), **values)  # type: ignore[call-arg]
     except ValidationError as error:
         faults = (f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
         raise SettingsError("; ".join(faults)) from error

@@ -22,7 +22,9 @@ def build(hub: Hub) -> Status:
     """From what the hub knows now."""
     t, control, phone = now(), hub.status, hub.phone
     lost = control is None or hub.control_meter.age(t) > LOST_S
-    refusals = ["The control process does not answer."] if lost or control is None else control.refusals
+    refusals = (
+        ["The control process does not answer."] if lost or control is None else control.refusals
+    )
     sighting = phone.sighting if phone is not None else None
     found = sighting is not None and sighting.pose is not None
     return Status(

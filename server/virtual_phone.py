@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import signal
 import sys
 import time
 from math import degrees
@@ -127,6 +128,8 @@ async def _play(arguments: argparse.Namespace) -> LivePhone:
     access = access_of(arguments)
     port = access.truth_port if arguments.truth_port is None else arguments.truth_port
     live = LivePhone(access, make_script(arguments, port), port)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, live.leave)
     await live.run(arguments.seconds, _show)
     return live
 
@@ -136,8 +139,6 @@ def main(argv: list[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     try:
         live = asyncio.run(_play(arguments))
-    except KeyboardInterrupt:
-        return 130
     except (PhoneClientError, FollowerError, ValueError, OSError) as error:
         sys.stderr.write(f"lightleash phone: {error}\n")
         return 1

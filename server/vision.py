@@ -1,4 +1,4 @@
-"""The vision thread: newest picture → pose → control. Decoding and looking never hold up the event loop."""
+"""The vision thread: newest picture → pose → control, beside the event loop."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Picture = npt.NDArray[np.uint8]
 
 
 class VisionThread:
-    """Owns one phone's `Sight`. Pictures go in, sightings come out; between them nothing queues up."""
+    """Owns one phone's `Sight`: pictures go in, sightings come out, nothing queues up between."""
 
     def __init__(
         self,

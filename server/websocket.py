@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections import deque
+from collections.abc import Awaitable
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
@@ -130,11 +132,11 @@ class PageServer:
         if session.role == "operator":
             phone = self._hub.greet(hello, page)
             if phone is None:
-                raise WireError("lease", "hello.role", "another phone leads the robot now")
+                raise WireError("role", "hello.role", "another phone leads the robot now")
         elif session.role == "video":
             phone = self._hub.join_video(hello.session, page)
             if phone is None:
-                raise WireError("lease", "hello.session", "the session of the phone that leads")
+                raise WireError("role", "hello.session", "the session of the phone that leads")
         else:
             self._hub.supervisors.add(page)
         video = self._video
@@ -181,11 +183,9 @@ class PageServer:
             await asyncio.sleep(PING_S)
 
 
-async def _quietly(closing: object) -> None:
-    try:
-        await closing  # type: ignore[misc]
-    except (RuntimeError, WebSocketDisconnect):
-        pass
+async def _quietly(closing: Awaitable[None]) -> None:
+    with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+        await closing
 
 
 def _printable(text: str) -> str:

@@ -209,6 +209,30 @@ def test_live_phone_plays_its_part_on_real_sockets():
     assert json.dumps(summary(live))
 
 
+@pytest.mark.e2e
+def test_a_phone_asked_to_leave_lets_go_first():
+    server = Meeting([])
+
+    async def talk(access):
+        live = LivePhone(access, make_script(), truth_port=0)
+
+        def leave_when_held(_live):
+            if live.script.operator.presses:
+                live.leave()
+
+        await live.run(60.0, leave_when_held)
+
+    asyncio.run(server.serve(talk))
+    main = [data for path, data in server.heard if path == "/ws/phone"]
+    last = next(
+        r.body
+        for r in map(decode, (d for d in main[::-1] if isinstance(d, bytes)))
+        if isinstance(r.body, Touch)
+    )
+    assert not last.held
+    assert json.loads(main[-1]) == {"type": "command", "what": "disarm"}
+
+
 @pytest.mark.parametrize(
     "arguments",
     [["--latency-ms", "5"], ["--fps", "500"], ["--codec", "gif"]],

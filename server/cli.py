@@ -1,0 +1,114 @@
+"""The `lightleash` command: one word chooses what it does."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import server
+
+HELP = f"""lightleash {server.__version__}: move your phone, and the robot follows
+
+usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
+
+  serve        server, control and simulated robot; prints the addresses of the pages
+  phone        a virtual phone that films the simulated robot and leads it
+  replay       push a recorded phone through a server, or through the pipeline alone
+  experiments  measure the loop, as tables and pictures
+  doctor       what this machine can do: real time, certificates, ports, codecs
+"""
+
+
+def _serve(argv: Sequence[str]) -> int:
+    from server import launcher
+    from server.settings import SettingsError
+
+    try:
+        arguments, file = _config_of(argv)
+        from server.settings import load
+
+        settings = load(arguments, file)
+    except SettingsError as error:
+        print(f"settings: {error}", file=sys.stderr)
+        return 2
+    return launcher.main(settings, argv)
+
+
+def _server(argv: Sequence[str]) -> int:
+    """The server process, as the launcher starts it."""
+    from server import serving
+    from server.settings import load
+
+    runtime, truth_port, *rest = argv
+    arguments, file = _config_of(rest)
+    return serving.main(load(arguments, file), Path(runtime), int(truth_port))
+
+
+def _config_of(argv: Sequence[str]) -> tuple[list[str], Path | None]:
+    """Takes `--config FILE` out of the arguments."""
+    arguments = list(argv)
+    if "--config" not in arguments:
+        return arguments, None
+    at = arguments.index("--config")
+    from server.settings import SettingsError
+
+    if at + 1 >= len(arguments):
+        raise SettingsError("--config: a TOML file must follow")
+    file = Path(arguments[at + 1])
+    del arguments[at : at + 2]
+    return arguments, file
+
+
+def _phone(argv: Sequence[str]) -> int:
+    from server.virtual_phone import main
+
+    return main(list(argv))
+
+
+def _replay(argv: Sequence[str]) -> int:
+    from server.replay import main
+
+    return main(list(argv))
+
+
+def _experiments(argv: Sequence[str]) -> int:
+    from server.experiments import main
+
+    return main(list(argv))
+
+
+def _doctor(argv: Sequence[str]) -> int:
+    from server.doctor import main
+
+    return main(list(argv))
+
+
+COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
+    "serve": _serve,
+    "phone": _phone,
+    "replay": _replay,
+    "experiments": _experiments,
+    "doctor": _doctor,
+    "_server": _server,
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry of the command."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    if not words or words[0] in ("-h", "--help", "help"):
+        print(HELP)
+        return 0
+    if words[0] in ("-V", "--version"):
+        print(f"lightleash {server.__version__}")
+        return 0
+    command = COMMANDS.get(words[0])
+    if command is None:
+        known = ", ".join(name for name in COMMANDS if not name.startswith("_"))
+        print(f"lightleash: {words[0]!r} is not one of {known}", file=sys.stderr)
+        return 2
+    try:
+        return command(words[1:])
+    except KeyboardInterrupt:
+        return 130
