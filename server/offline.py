@@ -22,11 +22,12 @@ import tempfile
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from hardware.camera_file import CameraFileError, find_camera, load_camera
+from hardware.camera_file import CAMERAS, CameraFileError, find_camera
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.camera import Camera
 from pipeline.config import TeleopConfig
@@ -43,10 +44,9 @@ from server.control_link import (
 )
 from server.controller import Controller
 from server.ingest import EncodedFrame, Ingest
-from server.messages import Command, decode_message
+from server.messages import Command, Hello, decode_message
 from server.recording import (
     CAMERA_KEY,
-    DEVICE_KEY,
     PHONE_MESSAGES,
     PHONE_RECORDS,
     ROBOT_KEY,
@@ -54,7 +54,7 @@ from server.recording import (
     STATUS,
     RecordingError,
 )
-from server.recording_files import Entry, Recording
+from server.recording_files import Entry, Recording, device_of
 from server.sight import Sight
 from server.wire import Picture, Ping, WireError, decode
 
@@ -83,14 +83,18 @@ class Offline:
         robot_file, camera = _setting(recording)
         config = TeleopConfig()
         self._controller = Controller(robot_file.robot, config)
-        self._sight = Sight(camera, robot_file.robot, config.gates)
+        self._new_sight = partial(Sight, camera, robot_file.robot, config.gates)
         self._nonces: deque[int] = deque()
-        self._ingest = Ingest(self._nonces.popleft)
+        self._greet()
         self._body = deque(_body_samples(recording))
         self._inbox: list[Input] = []
         self._seen: list[tuple[EncodedFrame, RelativePose | None]] = []
         self.refused = 0
         """Records that ingest refused, as the server did then."""
+
+    def _greet(self) -> None:
+        """A phone has come: nothing is known of its clock and its pictures."""
+        self._ingest, self._sight = Ingest(self._nonces.popleft), self._new_sight()
 
     def rows(self) -> Iterator[dict[str, str]]:
         """One row per picture.
@@ -127,7 +131,9 @@ class Offline:
         try:
             if entry.topic == PHONE_MESSAGES:
                 message = decode_message(entry.data)
-                if isinstance(message, Command):
+                if isinstance(message, Hello):
+                    self._greet()
+                elif isinstance(message, Command):
                     self._inbox.append(RequestInput(message.what))
                 return
             record = decode(entry.data)
@@ -181,9 +187,8 @@ def _setting(recording: Recording) -> tuple[RobotFile, Camera]:
                 robot_file = load_robot(folder / "robot.toml")
             if metadata.get(CAMERA_KEY):
                 (folder / "camera.yaml").write_text(metadata[CAMERA_KEY])
-                return robot_file, load_camera(folder / "camera.yaml")[1]
-        width, height = _picture_size(recording)
-        return robot_file, find_camera(metadata.get(DEVICE_KEY, ""), width, height)
+            device, size = device_of(recording), _picture_size(recording)
+            return robot_file, find_camera(device, *size, folders=(folder, CAMERAS))
     except (RobotFileError, CameraFileError) as error:
         raise RecordingError(recording.path, str(error), "a recording with both files") from error
 

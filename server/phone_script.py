@@ -16,6 +16,8 @@ from server.wire import Codec, Kind, Motion, Picture, Pong, Record, Touch
 
 DEVICE = "lightleash-virtual-phone"
 TOUCH_S = 1.0 / 30.0
+RELEASED_S = 0.3
+"""Between a press that changed nothing and the next."""
 SYNCHRONISED_PONGS = 8
 """After so many answers the server can date what comes."""
 SCORE_STEP_S = 0.005
@@ -28,10 +30,10 @@ class Manners:
 
     press_after_s: float = 0.7
     """Between ARMED and the press."""
-    hold_s: float = 2.0
-    """A press that changed nothing is given up after this."""
+    hold_s: float = 1.0
+    """A press that changed nothing is given up after this, and soon made anew."""
     pause_s: float = 1.0
-    """Before a new press or a new wish to arm."""
+    """Before a press after HOLD, and between wishes to arm."""
     again: bool = True
     """After HOLD press again, after DISARMED arm again; else once is enough."""
 
@@ -82,7 +84,7 @@ class VirtualOperator:
             waited -= manners.pause_s
         else:
             return False
-        return waited >= 0.0 and waited % (manners.hold_s + manners.pause_s) < manners.hold_s
+        return waited >= 0.0 and waited % (manners.hold_s + RELEASED_S) < manners.hold_s
 
 
 class PhoneScript:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+import msgspec
 import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
@@ -17,7 +18,15 @@ from mcap.records import Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from server.recording import PHONE_RECORDS, RecordingError, finish_file, start_file
+from server.messages import Status, decode_from_server
+from server.recording import (
+    DEVICE_KEY,
+    PHONE_RECORDS,
+    SERVER_MESSAGES,
+    RecordingError,
+    finish_file,
+    start_file,
+)
 from server.wire import VERSION
 
 MAX_MCAP_RECORD_BYTES = 64 << 20
@@ -59,6 +68,21 @@ class Recording:
         """(when received [s], bytes) of each binary record of the phone."""
         for entry in self.entries(PHONE_RECORDS):
             yield entry.t, entry.data
+
+
+def device_of(recording: Recording) -> str:
+    """The phone's name: the recording's, or the first operator a recorded status speaks of.
+
+    Raises:
+        RecordingError: the file is damaged.
+    """
+    device = recording.metadata.get(DEVICE_KEY, "")
+    for entry in () if device else recording.entries(SERVER_MESSAGES):
+        with suppress(msgspec.MsgspecError):
+            message = decode_from_server(entry.data)
+            if isinstance(message, Status) and message.operator:
+                return message.operator
+    return device
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from server.phone_client import (
 )
 from server.phone_script import SYNCHRONISED_PONGS
 from server.recording import RecordingError
-from server.recording_files import Recording, read, recover
+from server.recording_files import Recording, device_of, read, recover
 from server.wire import Picture, Pong, Record, Touch, WireError, decode
 
 PHONE_CLOCK_OFFSET_S = 1000.0
@@ -137,7 +137,7 @@ async def play(recording: Recording, access: Access, speed: float) -> Played:
         return None
 
     client = PhoneClient(access, lambda nonce, t_us: replay.pong(nonce, t_us, now()), shown)
-    await client.open(recording.metadata.get("device", DEVICE))
+    await client.open(device_of(recording) or DEVICE)
     answering = asyncio.create_task(client.run())
     sending = asyncio.create_task(_send(replay, client, played))
     try:

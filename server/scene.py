@@ -18,9 +18,22 @@ from pipeline.signals import Mode
 from server.control_link import ControlStatus
 
 Wxyz = tuple[float, float, float, float]
+Colour = tuple[int, int, int]
 Mesh = tuple[Array, npt.NDArray[np.uint32]]
 """Vertices (n, 3) [m] and faces (k, 3)."""
 
+FLOOR_Z = -1.3
+"""Of the grid [m]: about where the floor is under a phone held upright."""
+BACKGROUND: Colour = (20, 20, 20)
+PHONE: Colour = (120, 180, 255)
+STEADY: Colour = (60, 220, 130)
+"""The virtual camera and where it wants the robot."""
+BODY: Colour = (225, 228, 235)
+LED: Colour = (255, 214, 60)
+THRUST: Colour = (255, 110, 50)
+TRAIL: Colour = (90, 200, 255)
+CABLE: Colour = (170, 175, 185)
+STALE: Colour = (85, 88, 94)
 FRESH_S = 0.3
 """The robot is shown grey when its pose is older."""
 LONG_SIDE_FOV = 1.15
@@ -98,6 +111,19 @@ def yaw_wxyz(yaw: float) -> Wxyz:
     return (cos(yaw / 2.0), 0.0, 0.0, sin(yaw / 2.0))
 
 
+class Heading:
+    """Finds when f must be turned anew: a phone appears, or control starts over."""
+
+    def __init__(self) -> None:
+        """Nobody is there."""
+        self._epoch: int | None = None
+
+    def new_yaw(self, epoch: int, view: View) -> float | None:
+        """The yaw [rad] of a phone that has just appeared; None otherwise."""
+        known, self._epoch = self._epoch, None if view.phone is None else epoch
+        return view.yaw if self._epoch is not None and self._epoch != known else None
+
+
 class Trail:
     """The last positions of the body in f, as line segments of a fixed number."""
 
@@ -127,18 +153,11 @@ class Trail:
         return np.stack([points[:-1], points[1:]], axis=1)
 
 
-def fade(colour: tuple[int, int, int], into: tuple[int, int, int], n: int) -> npt.NDArray[np.uint8]:
+def fade(colour: Colour, into: Colour, n: int) -> npt.NDArray[np.uint8]:
     """(n, 2, 3) colours of segments, from `into` to `colour`."""
     share = np.linspace(0.0, 1.0, n + 1)[:, None]
     ends = np.asarray(into) * (1.0 - share) + np.asarray(colour) * share
     return np.stack([ends[:-1], ends[1:]], axis=1).astype(np.uint8)
-
-
-def thrust_arrows(positions: Array, directions: Array, thrusts: Array) -> npt.NDArray[np.float32]:
-    """(m, 2, 3) [m] in b: the force of each thruster, from its rotor on; idle ones are a speck."""
-    length = ARROW_M_PER_N * np.where(np.abs(thrusts) < ARROW_FROM_N, 1e-4, thrusts)
-    tips = positions + length[:, None] * directions
-    return np.stack([positions, tips], axis=1).astype(np.float32)
 
 
 def prism(start: Array, end: Array, radius: float, sides: int) -> Mesh:
@@ -165,27 +184,35 @@ def merged(meshes: list[Mesh]) -> Mesh:
     return np.vstack([vertices for vertices, _ in meshes]), np.vstack(faces)
 
 
-def airframe(positions: Array, directions: Array, hook_above_com: float) -> Mesh:
-    """Hub, an arm to each thruster at `positions`, its motor, and the mast with the hook, in b."""
-    up = np.array([0.0, 0.0, 1.0])
-    parts = [prism(-0.055 * up, 0.055 * up, 0.09, 8)]
-    parts.append(prism(0.05 * up, max(hook_above_com, 0.08) * up, 0.012, 8))
-    for position, direction in zip(positions, directions, strict=True):
-        parts.append(prism(np.zeros(3), position, 0.009, 6))
-        parts.append(prism(position - 0.02 * direction, position + 0.02 * direction, 0.018, 10))
-    return merged(parts)
+@dataclass(frozen=True, slots=True, eq=False)
+class Craft:
+    """What a robot looks like, in b."""
 
+    leds: Array
+    """(n, 3) [m]."""
+    positions: Array
+    """(m, 3) [m] of the thrusters."""
+    directions: Array
+    """(m, 3): of their force on the robot, unit vectors."""
+    hook_above_com: float
 
-def rotors(positions: Array, directions: Array) -> Mesh:
-    """The discs the propellers sweep, in b."""
-    return merged(
-        [
-            prism(p + 0.018 * d, p + 0.022 * d, ROTOR_RADIUS, 24)
-            for p, d in zip(positions, directions, strict=True)
-        ]
-    )
+    def airframe(self) -> Mesh:
+        """Hub, mast with the hook, an arm to each thruster and its motor, a rod to each LED."""
+        up, centre = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+        parts = [prism(-0.055 * up, 0.055 * up, 0.09, 8)]
+        parts.append(prism(0.05 * up, max(self.hook_above_com, 0.08) * up, 0.012, 8))
+        for p, d in zip(self.positions, self.directions, strict=True):
+            parts.append(prism(centre, p, 0.009, 6))
+            parts.append(prism(p - 0.02 * d, p + 0.02 * d, 0.018, 10))
+        return merged([*parts, *(prism(centre, led, 0.004, 5) for led in self.leds)])
 
+    def rotors(self) -> Mesh:
+        """The discs the propellers sweep."""
+        pairs = zip(self.positions, self.directions, strict=True)
+        return merged([prism(p + 0.018 * d, p + 0.022 * d, ROTOR_RADIUS, 24) for p, d in pairs])
 
-def led_arms(leds: Array) -> Mesh:
-    """Thin rods from the hub to each LED, in b."""
-    return merged([prism(np.zeros(3), led, 0.004, 5) for led in leds])
+    def arrows(self, thrusts: Array) -> npt.NDArray[np.float32]:
+        """(m, 2, 3) [m]: the force of each thruster [N], from its rotor on; idle is a speck."""
+        length = ARROW_M_PER_N * np.where(np.abs(thrusts) < ARROW_FROM_N, 1e-4, thrusts)
+        tips = self.positions + length[:, None] * self.directions
+        return np.stack([self.positions, tips], axis=1).astype(np.float32)

@@ -23,7 +23,7 @@ from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.live_phone import EXPOSED_S, LivePhone
 from server.phone_client import PhoneClientError, access_of, add_access_arguments
-from server.phone_script import CODECS, DEVICE, PhoneScript, VirtualOperator
+from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 
 WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
 
@@ -63,16 +63,17 @@ def _robot_now(truth_port: int) -> Array:
         truth.close()
 
 
-def summary(live: LivePhone) -> dict[str, float | str]:
-    """What the run came to."""
+def summary(live: LivePhone) -> dict[str, float | str | None]:
+    """What the run came to; no errors where nothing was tracked."""
     score = live.score
+    tracked = score.tracked_s > 0.0
     return {
         "mode": live.script.operator.mode,
         "presses": live.script.operator.presses,
         "tracked_s": round(score.tracked_s, 2),
-        "rms_mm": round(1e3 * score.rms_m, 2),
-        "rms_deg": round(degrees(score.rms_rad), 3),
-        "max_mm": round(1e3 * score.max_m, 1),
+        "rms_mm": round(1e3 * score.rms_m, 2) if tracked else None,
+        "rms_deg": round(degrees(score.rms_rad), 3) if tracked else None,
+        "max_mm": round(1e3 * score.max_m, 1) if tracked else None,
         "pictures": live.sent,
         "skipped": live.skipped,
     }
@@ -115,7 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--hand", default="demo", help=f"{', '.join(HANDS)}, or a CSV file")
     parser.add_argument("--rest", type=float, default=REST_S, help="seconds before it moves")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="then leave politely")
-    parser.add_argument("--codec", choices=tuple(CODECS), default="h264")
+    parser.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
     parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
     parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
     parser.add_argument("--seed", type=int, default=0, help="of hand, noise and delays")

@@ -6,6 +6,7 @@ import itertools
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ from server.ingest import EncodedFrame, Ingest
 from server.messages import encode_message
 from server.offline import COLUMNS, run_offline
 from server.recording import STATUS, Recorder, RecordingError
-from server.recording_files import read
+from server.recording_files import device_of, read
 from server.replay import Replay, play, timed
 from server.wire import Motion, Ping, Pong, Record, Touch, decode, encode
 from tests.server.page_server import WELCOME, PageServer, status
@@ -138,6 +139,17 @@ def test_offline_without_a_known_camera_says_so(tmp_path):
     recorder.close()
     with pytest.raises(RecordingError, match="no picture"):
         run_offline(read(recorder.path), tmp_path / "run.csv")
+
+
+def test_a_recording_begun_before_the_phone_came_knows_it_from_the_statuses(tmp_path):
+    recorder = Recorder(tmp_path, "early", {"device": ""})
+    recorder.record("phone", encode(Record(1, 5, AT_REST)), 1.0)
+    recorder.message("server", "not a message", 1.0)
+    shown = status("ARMED")
+    for k, name in enumerate(("", "a phone", "another")):
+        recorder.message("server", encode_message(msgspec.structs.replace(shown, operator=name)), k)
+    recorder.close()
+    assert device_of(read(recorder.path)) == "a phone"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,89 @@
+"""A real `lightleash serve` with folders of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+START_S = 60.0
+DEVICE = "Linux 412x915@1 / canvas camera"
+"""What the phone page calls itself in the Chromium of `chromium_phone`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Serving:
+    """A running server."""
+
+    process: subprocess.Popen[bytes]
+    runtime: Path
+    state: Path
+    http_url: str
+    https_url: str
+    operator_token: str
+    supervisor_token: str
+    truth_port: int
+    environment: dict[str, str]
+
+    @property
+    def local_https(self) -> str:
+        """HTTPS on the loopback interface."""
+        return f"https://127.0.0.1:{self.https_url.rsplit(':', 1)[1]}"
+
+    def request(self, method: str, path: str) -> dict[str, object]:
+        """A request as supervisor; gives its JSON."""
+        headers = {"Authorization": f"Bearer {self.supervisor_token}"}
+        request = urllib.request.Request(self.http_url + path, method=method, headers=headers)
+        with urllib.request.urlopen(request, timeout=5.0) as response:
+            answer: dict[str, object] = json.loads(response.read())
+            return answer
+
+
+@contextlib.contextmanager
+def serving(folder: Path, *arguments: str) -> Iterator[Serving]:
+    """Start it, wait until it answers, end it as a person would."""
+    runtime, state = folder / "run", folder / "state"
+    for path in (runtime, state):
+        path.mkdir(mode=0o700, exist_ok=True)
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(runtime), "XDG_STATE_HOME": str(state)}
+    command = [sys.executable, "-m", "server", "serve", "--https-port", "0", "--http-port", "0"]
+    log = (folder / "serve.log").open("wb")
+    process = subprocess.Popen(
+        [*command, *arguments], env=environment, stdout=log, stderr=subprocess.STDOUT
+    )
+    try:
+        run = _run_file(process, runtime / "lightleash" / "lightleash-run.json", folder)
+        yield Serving(
+            process,
+            runtime / "lightleash",
+            state / "lightleash",
+            *(str(run[k]) for k in ("http_url", "https_url", "operator_token", "supervisor_token")),
+            truth_port=int(str(run["truth_port"])),
+            environment=environment,
+        )
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(15.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+        log.close()
+
+
+def _run_file(process: subprocess.Popen[bytes], path: Path, folder: Path) -> dict[str, object]:
+    end = time.monotonic() + START_S
+    while time.monotonic() < end and process.poll() is None:
+        if path.exists():
+            with contextlib.suppress(ValueError):
+                run: dict[str, object] = json.loads(path.read_text())
+                return run
+        time.sleep(0.05)
+    raise RuntimeError(f"serve did not start: {(folder / 'serve.log').read_text()}")

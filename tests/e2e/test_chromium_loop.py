@@ -1,0 +1,97 @@
+"""A real Chromium leads the simulated robot, over TLS, through the page as it is."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+import pytest
+
+from hardware.robot_file import load_robot
+from hardware.sim.hand import make_hand
+from tests.e2e.chromium_phone import CALIBRATION, ChromiumPhone, browser
+from tests.e2e.serving import DEVICE, Serving, serving
+
+pytestmark = pytest.mark.e2e
+LANDSCAPE = {
+    "viewport": {"width": 915, "height": 412},
+    "has_touch": True,
+    "is_mobile": True,
+    "device_scale_factor": 1,
+}
+LEARNT_S = 8.0
+"""Of tracking, before the integral has learnt the suspension and the figure counts."""
+
+
+def calibrate(folder: Path) -> Path:
+    """A folder with the canvas camera's calibration."""
+    cameras = folder / "cameras"
+    cameras.mkdir()
+    (cameras / "canvas.yaml").write_text(CALIBRATION.format(name=DEVICE))
+    return cameras
+
+
+def start(phone: ChromiumPhone, server: Serving) -> None:
+    """Open the page, tap Start, wait until arming would be granted."""
+    phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+    phone.page.tap("#start")
+    phone.play_until("!document.querySelector('#wish').disabled", 25.0)
+
+
+def test_the_robot_follows_a_chromium_over_tls_and_stops_on_its_stop(
+    chromium: str, tmp_path: Path
+) -> None:
+    leds_in_b = load_robot("ames").robot.leds_in_b
+    cameras = calibrate(tmp_path)
+    with (
+        serving(tmp_path, "--cameras", str(cameras)) as server,
+        browser(chromium, **LANDSCAPE) as context,
+        ExitStack() as stack,
+    ):
+        hand = make_hand("moving", seed=2, t_start=time.monotonic() + 12.0)
+        phone = stack.enter_context(
+            closing(ChromiumPhone(context, hand, leds_in_b, server.truth_port))
+        )
+        refused: list[str] = []
+        phone.page.on("console", lambda message: refused.append(message.text))
+        start(phone, server)
+        phone.page.tap("#wish")
+        phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
+        phone.play(0.7)
+        phone.hold()
+        phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
+        distances = phone.track(20.0)
+        status = server.request("GET", "/api/status")
+        assert status["mode"] == "TRACK", status["reason"]
+        assert phone.rms_mm(distances, LEARNT_S) <= 40.0
+        streams = status["streams"]
+        assert isinstance(streams, dict)
+        assert streams["phone_imu"]["rate_hz"] >= 45.0
+        assert streams["video"]["rate_hz"] >= 20.0
+        phone.page.tap("#stop")
+        phone.play_until("document.body.innerText.includes('STOPPED')", 3.0)
+        assert not [text for text in refused if "Content Security Policy" in text]
+
+
+def test_a_phone_without_a_calibration_is_told_so_on_its_screen(
+    chromium: str, tmp_path: Path
+) -> None:
+    leds_in_b = load_robot("ames").robot.leds_in_b
+    with serving(tmp_path) as server, browser(chromium, **LANDSCAPE) as context:
+        still = ChromiumPhone(context, make_hand("still"), leds_in_b, server.truth_port)
+        with closing(still) as phone:
+            phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+            phone.page.tap("#start")
+            phone.play_until("document.body.innerText.includes('not calibrated')", 20.0)
+            assert DEVICE in phone.words()
+
+
+def test_yesterdays_link_is_refused_in_words(chromium: str, tmp_path: Path) -> None:
+    with serving(tmp_path) as server, browser(chromium, **LANDSCAPE) as context:
+        page = context.new_page()
+        page.goto(f"{server.local_https}/#k=yesterday")
+        if page.locator("#start").is_visible():
+            page.tap("#start")
+        page.wait_for_selector("#problem:visible", timeout=10_000)
+        assert "expired" in page.locator("#problem").inner_text().lower()
