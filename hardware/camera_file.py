@@ -50,7 +50,14 @@ def load_camera(path: Path) -> tuple[str, Camera]:
 def find_camera(
     device: str, width: int, height: int, folders: Sequence[Path] = (CAMERAS,)
 ) -> Camera:
-    """The calibrated camera of `device` for pictures of that size.
+    """The calibrated camera of `device`; see `find_camera_file`."""
+    return find_camera_file(device, width, height, folders)[1]
+
+
+def find_camera_file(
+    device: str, width: int, height: int, folders: Sequence[Path] = (CAMERAS,)
+) -> tuple[Path, Camera]:
+    """The file and the calibrated camera of `device` for pictures of that size.
 
     A file belongs to a device when its camera_name, in lower case and with everything but letters
     and digits turned into dashes, is the device's.
@@ -62,7 +69,7 @@ def find_camera(
     for path in sorted(p for folder in folders for p in folder.glob("*.yaml")):
         name, camera = load_camera(path)
         if slug(name) == slug(device) and (camera.width, camera.height) == (width, height):
-            return camera
+            return path, camera
         known.append(f"{name} {camera.width}x{camera.height}")
     raise CameraFileError(
         f"camera {device!r} at {width}x{height}",

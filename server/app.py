@@ -123,7 +123,7 @@ class Api:
             self._hub.say(f"Recorded: {path}" if path else "No recording was running.")
             return JSONResponse({"path": path})
         try:
-            name = recordings.start()
+            name = self._hub.start_recording()
         except RecordingError as error:
             return _refusal(507, "recording", str(error))
         self._hub.say(f"Recording {name}.")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -20,7 +19,7 @@ from server.messages import Command, Hello, Status, ToPage, encode_message
 from server.operator import OperatorPhone
 from server.recorder import Recordings
 from server.status import build
-from server.vision import jpeg
+from server.vision import Picture, jpeg
 from server.wire import Credit, Record, Thumbnail, encode
 
 log = logging.getLogger("lightleash")
@@ -56,7 +55,8 @@ class Hub:
         self.events: deque[str] = deque(maxlen=EVENTS)
         self._last_mode = ""
         self._shown: Status | None = None
-        self.virtual_phone: Callable[[], bool] = lambda: False
+        self.last_thumbnail: Picture | None = None
+        """What the phone saw, for the 3D view."""
 
     async def run(self) -> None:
         """Serve until cancelled."""
@@ -110,7 +110,7 @@ class Hub:
             on_key_wanted=lambda: soon(encode_message(Command("key_frame")), "operator"),
         )
         self._phone_pages = {"operator": page}
-        self.recordings.device = self.phone.device
+        self.recordings.message("phone", encode_message(hello), now())
         self.say(f"{self.phone.device} leads.")
         return self.phone
 
@@ -127,6 +127,19 @@ class Hub:
             self.phone, self._phone_pages = None, {}
             self.say(f"{phone.device} has left.")
             phone.close()
+
+    def start_recording(self) -> str:
+        """Begin to record, with what a replay must know of the phone that leads; gives the name.
+
+        Raises:
+            RecordingError: the file can't be made.
+        """
+        phone = self.phone
+        if phone is None:
+            return self.recordings.start()
+        name = self.recordings.start(phone.device, phone.camera_text)
+        self.recordings.message("phone", encode_message(phone.hello), now())
+        return name
 
     def _push(self, name: str, data: str | bytes) -> None:
         page = self._phone_pages.get(name)
@@ -184,8 +197,6 @@ class Hub:
             data = encode(Record(0, int(1e6 * now()), Thumbnail(jpeg(picture))))
             for page in self.supervisors:
                 page.push(data)
-
-    last_thumbnail: object = None
 
     def snapshot(self) -> bytes:
         """The last status as JSON, for people with a terminal."""

@@ -144,7 +144,8 @@ class Lockstep:
             if event.kind == EventKind.MOTION:
                 self._take(self._script.motion(event.t_capture))
             else:
-                self._take(self._script.picture(event.t_capture, self._robot_at))
+                key = self._sight.needs_key
+                self._take(self._script.picture(event.t_capture, self._robot_at, key))
 
     def _hear_small_talk(self) -> None:
         """PING there and PONG back, TOUCH, and the server's readiness, each at its rate."""

@@ -6,7 +6,7 @@ import secrets
 from collections.abc import Callable
 from pathlib import Path
 
-from hardware.camera_file import CameraFileError, find_camera
+from hardware.camera_file import CameraFileError, find_camera_file
 from pipeline.config import GatesConfig
 from pipeline.robot import Robot
 from pipeline.signals import Operator, PhoneImu
@@ -45,7 +45,7 @@ class OperatorPhone:
         self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
         self.vision: VisionThread | None = None
         self._size: tuple[int, int] | None = None
-        self.camera_problem = ""
+        self.camera_problem = self.camera_text = ""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.sighting: Sighting | None = None
         self.latency_ms: dict[str, float] = {}
@@ -83,10 +83,11 @@ class OperatorPhone:
         self.close()
         self._size, self.camera_problem = size, ""
         try:
-            camera = find_camera(self.device, *size, self._cameras)
+            path, camera = find_camera_file(self.device, *size, self._cameras)
         except CameraFileError as error:
             self.camera_problem = str(error)
             return
+        self.camera_text = path.read_text(encoding="utf-8")
         sight = Sight(camera, self._robot, GatesConfig(), self._clock)
         self.vision = VisionThread(sight, self._sighted, self._on_taken, self._on_key_wanted)
 

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from server.control_link import ControlStatus
-from server.recording import Direction, Recorder
+from server.recording import CAMERA_KEY, DEVICE_KEY, Direction, Recorder
 
 
 class Recordings:
@@ -16,19 +16,22 @@ class Recordings:
         """Files go to `directory`; `metadata` goes into each."""
         self._directory, self._metadata = directory, metadata
         self._recorder: Recorder | None = None
-        self.device = ""
 
     @property
     def name(self) -> str:
         """Of the running recording, or ""."""
         return self._recorder.name if self._recorder is not None else ""
 
-    def start(self) -> str:
-        """Begin, unless one is running; gives its name."""
+    def start(self, device: str = "", camera_text: str = "") -> str:
+        """Begin, unless one is running; gives its name.
+
+        Raises:
+            RecordingError: the file can't be made.
+        """
         if self._recorder is None:
             name = time.strftime("%Y%m%d-%H%M%S")
-            metadata = {**self._metadata, "device": self.device}
-            self._recorder = Recorder(self._directory, name, metadata)
+            own = {DEVICE_KEY: device, CAMERA_KEY: camera_text}
+            self._recorder = Recorder(self._directory, name, {**self._metadata, **own})
         return self.name
 
     def stop(self) -> str:

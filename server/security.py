@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import hmac
+import re
 import secrets
 from collections.abc import Iterable
-from http.cookies import CookieError, SimpleCookie
-from typing import Literal
+from typing import Literal, cast, get_args
 
+from starlette.requests import cookie_parser
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -17,6 +20,8 @@ PUBLIC_PATHS = {"/", "/supervisor", "/api/pair", "/healthz", "/ca.crt"}
 OPERATOR_PATHS = {"/api/whoami", "/api/stop", "/ws/phone", "/ws/video"}
 """What an operator may reach; everything else is the supervisor's."""
 PAIR_TRIES, PAIR_WINDOW_S = 10, 60.0
+PORT = re.compile(r":\d{1,5}$")
+"""The port at the end of a Host header; an IPv6 address is in brackets."""
 
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
@@ -33,18 +38,28 @@ HEADERS = {
 
 
 class Doors:
-    """Tokens of this run, and the sessions they were exchanged for."""
+    """Tokens of this run, and the sessions they are exchanged for.
 
-    def __init__(self) -> None:
-        """New tokens: yesterday's link opens nothing."""
-        self.operator_token = secrets.token_urlsafe(16)
-        self.supervisor_token = secrets.token_urlsafe(16)
-        self._sessions: dict[str, Role] = {}
+    Both follow from one secret, so that a server process that was started anew within a run still
+    knows the pages, and nothing has to be kept. Another run has another secret: yesterday's link
+    opens nothing.
+    """
+
+    def __init__(self, secret: bytes | None = None) -> None:
+        """By default with a secret of its own."""
+        self._secret = secret or secrets.token_bytes(32)
+        self.operator_token = self._sign("token operator")
+        self.supervisor_token = self._sign("token supervisor")
         self._tries: dict[str, list[float]] = {}
+
+    def _sign(self, text: str) -> str:
+        """128 bits that nobody else can make."""
+        digest = hmac.digest(self._secret, text.encode(), "sha256")[:16]
+        return base64.urlsafe_b64encode(digest).rstrip(b"=").decode()
 
     def role_of_token(self, token: str) -> Role | None:
         """Whose token it is, in constant time."""
-        given = token.encode()
+        given = token.encode("utf-8", "replace")
         if secrets.compare_digest(given, self.supervisor_token.encode()):
             return "supervisor"
         if secrets.compare_digest(given, self.operator_token.encode()):
@@ -56,33 +71,36 @@ class Doors:
         role = self.role_of_token(token)
         if role is None:
             return None
-        session = secrets.token_urlsafe(24)
-        self._sessions[session] = role
-        return role, session
+        session = f"{role}.{secrets.token_urlsafe(12)}"
+        return role, f"{session}.{self._sign(session)}"
+
+    def _role_of_session(self, value: str) -> Role | None:
+        """Role in a cookie that we have made."""
+        session, _, signature = value.encode("ascii", "replace").decode().rpartition(".")
+        role = session.partition(".")[0]
+        if role not in get_args(Role) or not hmac.compare_digest(signature, self._sign(session)):
+            return None
+        return cast(Role, role)
 
     def may_try(self, address: str, now: float) -> bool:
         """Whether `address` may try another token."""
         if len(self._tries) > 1000:
             self._tries.clear()
         recent = [t for t in self._tries.get(address, []) if t > now - PAIR_WINDOW_S]
-        self._tries[address] = [*recent, now]
-        return len(recent) < PAIR_TRIES
+        allowed = len(recent) < PAIR_TRIES
+        self._tries[address] = [*recent, now] if allowed else recent
+        return allowed
 
     def role_of(self, headers: dict[str, str]) -> Role | None:
         """Role by bearer token or cookie."""
         scheme, _, token = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
             return self.role_of_token(token.strip())
-        try:
-            cookie = SimpleCookie(headers.get("cookie", ""))
-        except CookieError:
-            return None
-        roles = [
-            self._sessions[morsel.value]
-            for name, morsel in cookie.items()
-            if name in (COOKIE, f"__Host-{COOKIE}") and morsel.value in self._sessions
-        ]
-        return "supervisor" if "supervisor" in roles else roles[0] if roles else None
+        cookies = cookie_parser(headers.get("cookie", ""))
+        values = (cookies.get(name, "") for name in (f"__Host-{COOKIE}", COOKIE))
+        roles = {self._role_of_session(value) for value in values}
+        greatest_first: tuple[Role, ...] = ("supervisor", "operator")
+        return next((role for role in greatest_first if role in roles), None)
 
 
 class Guard:
@@ -91,7 +109,7 @@ class Guard:
     def __init__(self, app: ASGIApp, doors: Doors, hosts: Iterable[str]) -> None:
         """`hosts` are the names and addresses this server answers to."""
         self._app, self._doors = app, doors
-        self._hosts = {host.lower() for host in hosts}
+        self._hosts = {f"[{host}]" if ":" in host else host.lower() for host in hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let in or turn away."""
@@ -112,8 +130,7 @@ class Guard:
     ) -> tuple[int, str, str] | None:
         """(status, field, allowed), or None for welcome."""
         host = headers.get("host", "")
-        name = host.rsplit(":", 1)[0] if not host.endswith("]") else host
-        if name.lower() not in self._hosts:
+        if PORT.sub("", host).lower() not in self._hosts:
             return 421, "Host", "an address of this server"
         bearer = headers.get("authorization", "").lower().startswith("bearer ")
         changes = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")

@@ -6,6 +6,9 @@ import datetime
 import ipaddress
 import os
 import socket
+import struct
+import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +21,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 LEAF_DAYS = 397
 AUTHORITY_DAYS = 3650
 RENEW_DAYS = 30
+SIOCGIFADDR = 0x8915
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +35,14 @@ class Certificate:
 
 
 def own_addresses() -> list[str]:
-    """IP addresses by which other machines may reach this one, loopback last."""
+    """IP addresses by which others may reach this machine, the likeliest first, loopback last."""
+    near = [ipaddress.ip_address(text) for text in (*_towards_others(), *_of_interfaces())]
+    useful = (str(a) for a in near if not (a.is_loopback or a.is_link_local))
+    return [*dict.fromkeys(useful), "127.0.0.1", "::1"]
+
+
+def _towards_others() -> list[str]:
+    """Addresses of the interfaces that lead to the rest of the world."""
     found: list[str] = []
     for target in ("192.0.2.1", "2001:db8::1"):  # documentation addresses: nothing is sent
         family = socket.AF_INET6 if ":" in target else socket.AF_INET
@@ -41,7 +52,25 @@ def own_addresses() -> list[str]:
                 found.append(probe.getsockname()[0])
             except OSError:
                 continue
-    return [*dict.fromkeys(a for a in found if not a.startswith("127.")), "127.0.0.1", "::1"]
+    return found
+
+
+def _of_interfaces() -> list[str]:
+    """IPv4 addresses of all interfaces, such as a hotspot for the phone; Linux only."""
+    if not sys.platform.startswith("linux"):
+        return []
+    import fcntl
+
+    found: list[str] = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        for _, name in socket.if_nameindex():
+            request = struct.pack("256s", name.encode()[:15])
+            try:
+                answer = fcntl.ioctl(probe, SIOCGIFADDR, request)
+            except OSError:  # an interface without an address
+                continue
+            found.append(socket.inet_ntoa(answer[20:24]))
+    return found
 
 
 def own_names() -> list[str]:
@@ -50,19 +79,20 @@ def own_names() -> list[str]:
     return [*own_addresses(), "localhost", host, f"{host}.local"]
 
 
-def certificate(state: Path) -> Certificate:
-    """The certificate in `state`, made or renewed if it must be."""
+def certificate(state: Path, names: Iterable[str] = ()) -> Certificate:
+    """The certificate in `state` for this machine and `names`, made or renewed if it must be."""
+    wanted = [*own_names(), *names]
     state.mkdir(parents=True, exist_ok=True, mode=0o700)
     paths = {name: state / f"{name}.pem" for name in ("ca", "ca-key", "server", "server-key")}
     if not (paths["ca"].exists() and paths["ca-key"].exists()):
         _make_authority(paths)
-    if not _is_good(paths["server"], paths["ca"]):
-        _make_leaf(paths)
+    if not _is_good(paths["server"], paths["ca"], wanted):
+        _make_leaf(paths, wanted)
     return Certificate(paths["server"], paths["server-key"], paths["ca"])
 
 
-def _is_good(path: Path, authority: Path) -> bool:
-    """Whether the certificate is ours, lasts, and names all addresses of today."""
+def _is_good(path: Path, authority: Path, wanted: Iterable[str]) -> bool:
+    """Whether the certificate is ours, lasts, and names all that is wanted."""
     try:
         leaf = x509.load_pem_x509_certificate(path.read_bytes())
         issuer = x509.load_pem_x509_certificate(authority.read_bytes())
@@ -72,7 +102,7 @@ def _is_good(path: Path, authority: Path) -> bool:
         return False
     named = {str(name.value) for name in names}
     left = leaf.not_valid_after_utc - datetime.datetime.now(datetime.UTC)
-    return left.days > RENEW_DAYS and set(own_names()) <= named
+    return left.days > RENEW_DAYS and set(wanted) <= named
 
 
 def _make_authority(paths: dict[str, Path]) -> None:
@@ -88,13 +118,13 @@ def _make_authority(paths: dict[str, Path]) -> None:
     _write(paths["ca-key"], _private(key), 0o600)
 
 
-def _make_leaf(paths: dict[str, Path]) -> None:
+def _make_leaf(paths: dict[str, Path], wanted: Iterable[str]) -> None:
     authority = x509.load_pem_x509_certificate(paths["ca"].read_bytes())
     authority_key = serialization.load_pem_private_key(paths["ca-key"].read_bytes(), None)
     assert isinstance(authority_key, ec.EllipticCurvePrivateKey)
     key = ec.generate_private_key(ec.SECP256R1())
     names: list[x509.GeneralName] = []
-    for name in own_names():
+    for name in dict.fromkeys(wanted):
         try:
             names.append(x509.IPAddress(ipaddress.ip_address(name)))
         except ValueError:

@@ -1,6 +1,6 @@
 """Make `chromium.mcap`: a real headless Chromium on the phone page leads the robot for some seconds.
 
-    python -m tests.data.record_chromium [seconds]
+python -m tests.data.record_chromium [seconds]
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ def main() -> None:
             leds_in_b = load_robot("ames").robot.leds_in_b
             made = ChromiumPhone(context, hand, leds_in_b, server.truth_port)
             with closing(made) as phone:
-                server.request("POST", "/api/recording")
                 start(phone, server)
+                server.request("POST", "/api/recording")
+                phone.play(1.0)
                 phone.page.tap("#wish")
                 phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
                 phone.play(0.7)

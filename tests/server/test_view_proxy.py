@@ -13,6 +13,7 @@ from starlette.applications import Starlette
 from starlette.testclient import TestClient
 from viser._messages import GuiUpdateMessage, ShareUrlRequest
 from websockets.asyncio.client import connect
+from websockets.asyncio.server import serve
 from websockets.exceptions import InvalidStatus
 
 from server.dashboard import _Viser
@@ -201,6 +202,22 @@ def test_when_viser_hangs_up_the_browser_is_hung_up_on(rig):
             await browser.recv()
             rig.viewer._websock_server.disconnect_all_clients()
             async with asyncio.timeout(5.0):
+                async for _ in browser:
+                    pass
+            return browser.close_code
+
+    assert asyncio.run(talk()) == 1001
+
+
+def test_when_viser_dies_in_the_middle_the_browser_is_hung_up_on(rig, monkeypatch):
+    async def die(connection):
+        await connection.send(b"scene")
+        connection.transport.abort()
+
+    async def talk():
+        async with serve(die, "127.0.0.1", 0, subprotocols=[SUBPROTOCOL]) as mortal:
+            monkeypatch.setattr(rig, "viewer_port", mortal.sockets[0].getsockname()[1])
+            async with rig.open() as browser, asyncio.timeout(5.0):
                 async for _ in browser:
                     pass
             return browser.close_code
