@@ -29,8 +29,8 @@ from server.robot_link import RobotLink
 PERIOD_S = 0.005
 STATUS_EVERY = 4
 """Ticks: 50 Hz."""
-LATENESS_EVERY = 200
-"""Ticks: 1 Hz."""
+LATENESS_EVERY = 400
+"""Ticks: every 2 s."""
 
 
 @dataclass(frozen=True, slots=True)

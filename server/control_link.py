@@ -143,7 +143,7 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     inputs_dropped: int
     realtime: str
     lateness_ms: dict[str, float]
-    """p50, p99, p999, max and missed of the last 10 s."""
+    """p50, p99, p999, max and missed of the last minute."""
     fuse_ms: float
     """Capture of the last fused picture → fused."""
     step_ms: float

@@ -139,6 +139,8 @@ def loop(arguments: argparse.Namespace) -> int:
     robot_file = load_robot(arguments.robot)
     virtual = TeleopConfig().virtual_camera
     config = teleop_config(robot_file, arguments.gains, virtual.tau_1, virtual.tau_2)
+    if arguments.live:
+        return live(arguments)
     low, high = arguments.latency_ms
     scene = Scene(
         latency_s=(1e-3 * low, 1e-3 * high), frame_rate_hz=arguments.fps, codec=arguments.codec
@@ -161,6 +163,18 @@ def loop(arguments: argparse.Namespace) -> int:
         (arguments.out / "loop.json").write_text(json.dumps(rows, indent=1))
         print(f"written: {arguments.out / 'loop.png'}, {arguments.out / 'loop.json'}")
     return 0 if all(not result.ended and result.tracked_s > 0 for result, _ in flights) else 1
+
+
+def live(arguments: argparse.Namespace) -> int:
+    """The same flights in real time, through a server of its own on this machine."""
+    from server import live_loop
+
+    with live_loop.server(arguments.robot, arguments.gains) as environment:
+        for hand in arguments.hands:
+            summary = live_loop.fly(environment, hand, arguments.seconds, arguments.seed)
+            figures = "  ".join(f"{name} {value}" for name, value in summary.items())
+            print(f"live  {hand:<9}  {figures}", flush=True)
+    return 0
 
 
 def _fly(flight: Lockstep, seconds: float, name: str) -> Trace:
@@ -188,6 +202,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     one.add_argument("--latency-ms", nargs=2, type=float, default=(60.0, 120.0))
     one.add_argument("--fps", type=float, default=30.0)
     one.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
+    one.add_argument("--live", action="store_true", help="in real time, through real processes")
     one.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")
     one.set_defaults(run=loop)
     arguments = parser.parse_args(argv)

@@ -90,6 +90,8 @@ class Lockstep:
         self.follower = LockstepFollower(robot_file, scene.seed)
         self.controller = Controller(robot_file.robot, config)
         self.trace = Trace()
+        self.lost: set[str] = set()
+        """What of the phone does not arrive now: motion, picture, touch."""
         self._script = make_script(robot_file, scene)
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
@@ -113,6 +115,10 @@ class Lockstep:
         while self.t < seconds and not self.trace.left:
             self.advance()
         return self.trace
+
+    def wish(self, what: str) -> None:
+        """A supervisor's wish."""
+        self._inbox.append(RequestInput(what))
 
     def advance(self) -> Output:
         """One control period of everything."""
@@ -139,7 +145,7 @@ class Lockstep:
     def _hear_phone(self, t_before: float) -> None:
         """Sensors and pictures that arrive within this period."""
         for event in self._script.phone.events(t_before, self.t):
-            if event.t_capture < PERIOD_S:
+            if event.t_capture < PERIOD_S or event.kind.value in self.lost:
                 continue
             if event.kind == EventKind.MOTION:
                 self._take(self._script.motion(event.t_capture))
@@ -161,7 +167,7 @@ class Lockstep:
             if isinstance(record.body, Ping):
                 ping = record.body
                 self._send_later(self._script.pong(ping.nonce, record.t_us, self.t))
-            else:
+            elif "touch" not in self.lost:
                 self._take(record)
 
     def _send_later(self, record: Record) -> None:

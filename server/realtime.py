@@ -30,7 +30,7 @@ def claim() -> str:
 class Schedule:
     """Wakes at t0, t0 + period, …: lateness does not add up; late and missed ticks count."""
 
-    def __init__(self, period: float, window: int = 2000) -> None:
+    def __init__(self, period: float, window: int = 12_000) -> None:
         """Ticks every `period` [s]; statistics over the last `window` ticks."""
         self.period = period
         self._next = time.monotonic() + period

@@ -1,0 +1,178 @@
+"""How well 200 Hz is held while the server decodes 720p30 and serves four supervisors.
+
+    python -m tests.bench.bench_control [seconds]
+
+Two runs: control as the process it is, and the very same loop as a thread of the server's process.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+from websockets.asyncio.client import connect
+
+from tests.e2e.serving import serving
+
+SUPERVISORS = 4
+
+
+def status_of(run: dict[str, str]) -> dict[str, object]:
+    headers = {"Authorization": f"Bearer {run['supervisor_token']}"}
+    request = urllib.request.Request(run["http_url"] + "/api/status", headers=headers)
+    with urllib.request.urlopen(request, timeout=10.0) as response:
+        status: dict[str, object] = json.loads(response.read())
+        return status
+
+
+async def watch(run: dict[str, str], seconds: float) -> int:
+    """A supervisor's page: takes everything that comes; gives how much that was."""
+    url = run["http_url"].replace("http", "ws") + "/ws/supervisor"
+    headers = {"Authorization": f"Bearer {run['supervisor_token']}"}
+    taken = 0
+    async with connect(url, additional_headers=headers, compression=None) as socket:
+        await socket.send('{"type":"hello","version":1,"role":"supervisor"}')
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                async for _ in socket:
+                    taken += 1
+    return taken
+
+
+def load(run: dict[str, str], environment: dict[str, str], seconds: float) -> dict[str, object]:
+    """Phone and supervisors for so long; gives the last status."""
+    phone = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "server.virtual_phone",
+            "--hand",
+            "moving",
+            "--seconds",
+            str(seconds + 8),
+        ],
+        env=environment,
+        stdout=subprocess.DEVNULL,
+    )
+
+    async def pages() -> None:
+        await asyncio.gather(*(watch(run, seconds + 4) for _ in range(SUPERVISORS)))
+
+    asyncio.run(pages())
+    status = status_of(run)
+    phone.wait()
+    return status
+
+
+def report(name: str, status: dict[str, object]) -> None:
+    control, streams = status["control"], status["streams"]
+    assert isinstance(control, dict)
+    assert isinstance(streams, dict)
+    figures = "  ".join(f"{key} {value}" for key, value in control.items())
+    video = streams.get("video", {}).get("rate_hz")
+    print(f"{name:<8} {figures}  video {video} fps  mode {status['mode']}  [{status['realtime']}]")
+
+
+def as_process(seconds: float) -> None:
+    with tempfile.TemporaryDirectory() as name, serving(Path(name)) as server:
+        run = {"http_url": server.http_url, "supervisor_token": server.supervisor_token}
+        report("process", load(run, server.environment, seconds))
+
+
+@contextlib.contextmanager
+def thread_server(folder: Path) -> Iterator[dict[str, str]]:
+    """This file as a process in which server and control share an interpreter."""
+    environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder), "XDG_STATE_HOME": str(folder)}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.bench.bench_control", "--thread-server", str(folder)],
+        env=environment,
+        stderr=subprocess.DEVNULL,
+    )
+    run_file = folder / "lightleash" / "lightleash-run.json"
+    while not run_file.exists():
+        time.sleep(0.1)
+    time.sleep(1.0)
+    try:
+        yield environment
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def serve_with_thread(folder: Path) -> None:
+    """Server in the main thread, the control loop in another."""
+    from hardware.control_end import ControlEnd
+    from hardware.robot_file import load_robot
+    from hardware.udp_link import UdpFollower
+    from pipeline.paper_ekf import warm_up
+    from server import control, serving as server_process
+    from server.control_link import control_end
+    from server.controller import Controller
+    from server.launcher import free_udp_port
+    from server.settings import load as load_settings
+
+    runtime = folder / "lightleash"
+    runtime.mkdir(mode=0o700)
+    port, truth_port = free_udp_port(), free_udp_port()
+    robot = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "hardware.sim.robot",
+            "--port",
+            str(port),
+            "--truth-port",
+            str(truth_port),
+        ]
+    )
+    robot_file = load_robot("ames")
+    config = control.teleop_config(robot_file, "phone", 0.525, 0.16)
+    warm_up()
+    stopping: list[int] = []
+    loop = threading.Thread(
+        target=control._loop,
+        args=(
+            Controller(robot_file.robot, config),
+            UdpFollower("127.0.0.1", port, ControlEnd.of(robot_file)),
+            control_end(runtime),
+            "a thread of the server",
+            stopping,
+        ),
+        daemon=True,
+    )
+    loop.start()
+    try:
+        settings = load_settings(["--https-port", "0", "--http-port", "0"])
+        server_process.main(settings, runtime, truth_port)
+    finally:
+        stopping.append(1)
+        robot.terminate()
+
+
+def as_thread(seconds: float) -> None:
+    with tempfile.TemporaryDirectory() as name, thread_server(Path(name)) as environment:
+        run = json.loads((Path(name) / "lightleash" / "lightleash-run.json").read_text())
+        report("thread", load(run, environment, seconds))
+
+
+def main() -> None:
+    if "--thread-server" in sys.argv:
+        serve_with_thread(Path(sys.argv[-1]))
+        return
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
+    as_process(seconds)
+    as_thread(seconds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""One fault each, in a flight of the whole loop in virtual time: which mode follows, and how soon.
+
+The flights track a steady hand for a second, then something goes wrong. `after(seconds)` gives the
+modes that were passed through and the largest thrust commanded at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from hardware.robot_file import load_robot
+from pipeline.config import TeleopConfig
+from pipeline.signals import Mode
+from server.lockstep import Lockstep, Scene
+
+pytestmark = pytest.mark.slow
+ROBOT = load_robot("ames")
+
+
+def tracking() -> Lockstep:
+    loop = Lockstep(ROBOT, TeleopConfig(), Scene(hand="steady", seed=8, codec="jpeg"))
+    while len(loop.trace.t) < 200:
+        loop.advance()
+        assert loop.t < 8.0, "never tracked"
+    return loop
+
+
+def after(loop: Lockstep, seconds: float) -> tuple[dict[str, float], float]:
+    """When each mode was entered [s after now], and the largest thrust at the end [N]."""
+    started, entered = loop.t, {}
+    while loop.t < started + seconds:
+        output = loop.advance()
+        entered.setdefault(output.failsafe.mode.name, round(loop.t - started, 3))
+    return entered, float(output.thrusts.max())
+
+
+LOSSES: list[tuple[str, Callable[[Lockstep], None], str, float]] = [
+    ("picture", lambda loop: loop.lost.add("picture"), "HOLD", 0.35),
+    ("motion", lambda loop: loop.lost.add("motion"), "HOLD", 0.20),
+    ("touch", lambda loop: loop.lost.add("touch"), "HOLD", 0.20),
+    ("disarm", lambda loop: loop.wish("disarm"), "RAMP", 0.011),
+    ("stop", lambda loop: loop.wish("stop"), "STOPPED", 0.011),
+]
+
+
+@pytest.mark.parametrize(("what", "happen", "mode", "within"), LOSSES, ids=lambda v: str(v)[:8])
+def test_a_loss_leaves_tracking_in_time_and_ends_in_zero_thrust(
+    what: str, happen: Callable[[Lockstep], None], mode: str, within: float
+) -> None:
+    loop = tracking()
+    loop._script.operator.leaving = what in ("disarm", "stop")
+    happen(loop)
+    entered, thrust = after(loop, 4.5)
+    assert entered[mode] <= within
+    assert thrust == 0.0
+    assert ("STOPPED" if what == "stop" else "DISARMED") in entered
+    assert float(np.abs(loop.follower.plant.thrusts).max()) < 0.02
+
+
+def test_a_lost_link_ramps_down_on_both_sides() -> None:
+    """The robot by its own watchdog after 60 ms, control because the robot is silent."""
+    loop = tracking()
+    loop.follower.connected = False
+    entered, _ = after(loop, 3.5)
+    assert entered["RAMP"] <= 0.17
+    assert float(np.abs(loop.follower.plant.thrusts).max()) < 0.02
+    loop.follower.connected = True
+    entered, thrust = after(loop, 0.4)
+    assert thrust == 0.0
+
+
+def test_leds_hidden_for_a_fifth_of_a_second_are_flown_through() -> None:
+    """The IMUs bridge it: still tracking, and hardly farther from the reference."""
+    loop = tracking()
+    loop.lost.add("picture")
+    entered, _ = after(loop, 0.15)
+    loop.lost.clear()
+    entered, _ = after(loop, 1.0)
+    assert set(entered) == {"TRACK"}
+    distances = np.linalg.norm(np.array(loop.trace.error_in_f[-200:]), axis=1)
+    assert distances.max() < 0.03
+
+
+def test_a_released_button_holds_and_a_new_press_goes_on_from_there() -> None:
+    loop = tracking()
+    loop.lost.add("touch")
+    entered, _ = after(loop, 0.3)
+    assert "HOLD" in entered
+    loop.lost.clear()
+    entered, _ = after(loop, 2.5)
+    assert "TRACK" in entered  # the virtual operator presses anew
+    assert "RAMP" not in entered
+
+
+def test_a_push_is_held_against() -> None:
+    """−4 N along y for good, the paper's disturbance: back within 3 cm in 3 s, still tracking."""
+    loop = tracking()
+    loop.follower.plant.external_wrench_in_f = np.array([0.0, -4.0, 0.0, 0.0, 0.0, 0.0])
+    entered, _ = after(loop, 4.0)
+    assert set(entered) == {"TRACK"}
+    distances = np.linalg.norm(np.array(loop.trace.error_in_f[-100:]), axis=1)
+    assert distances.max() < 0.03
+
+
+def test_the_machine_never_commands_thrust_outside_its_modes() -> None:
+    loop = Lockstep(ROBOT, TeleopConfig(), Scene(hand="steady", seed=9, codec="jpeg"))
+    while loop.t < 3.0:
+        output = loop.advance()
+        if output.failsafe.mode in (Mode.DISARMED, Mode.ARMED, Mode.STOPPED):
+            assert not output.thrusts.any()
+        else:
+            assert output.thrusts.max() <= ROBOT.robot.f_max
