@@ -38,7 +38,7 @@ def R_cd(screen_angle_deg: float) -> Array:
 
 
 def skew(v: Array) -> Array:
-    """Cross product matrix (3, 3): `skew(a) @ b` = a × b."""
+    """Cross product matrix (3, 3): `skew(a) @ b` = a × b; Ṙ_ab = skew(ω) R_ab. Eq. (2)."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 

@@ -30,7 +30,7 @@ class VirtualCamera:
         self._A = self._R_fv = None
 
     def step(self, R_fc: Array, omega_cf_in_c: Array, h: float) -> tuple[Array, Array]:
-        """Follow the camera for `h` seconds; gives R_fv and ^v ω_{v/f} (Eq. 24)."""
+        """Follow the camera for `h` seconds; gives R_fv and ^v ω_{v/f}. Eq. (24)."""
         if self._A is None or self._R_fv is None:
             self._A, self._R_fv = R_fc, R_fc
         if self._config.tau_1 <= 0.0:

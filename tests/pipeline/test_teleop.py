@@ -1,0 +1,105 @@
+"""Teleop: bumpless start, honest refusals, nothing that is not a number gets through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hardware.robot_file import load_robot
+from pipeline.config import TeleopConfig
+from pipeline.frames import GRAVITY
+from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, RelativePose, Requests
+from pipeline.teleop import Inputs, Output, Teleop
+
+ROBOT = load_robot("ames").robot
+UP = np.array([0.0, 0.0, GRAVITY])
+STILL = np.zeros(3)
+P = np.array([2.5, 0.0, 0.0])
+COVARIANCE = np.diag([1e-6, 1e-7, 1e-7, 1e-6, 1e-6, 1e-6])
+
+
+def run(
+    teleop: Teleop,
+    start: float,
+    seconds: float,
+    position: Callable[[float], np.ndarray] = lambda t: P,
+    held: bool = False,
+    arm_at: float = -1.0,
+    body_a: np.ndarray = UP,
+) -> list[Output]:
+    """Everything at rest, seen perfectly, 50 ms late."""
+    outputs = []
+    for k in range(round(start / 0.005), round((start + seconds) / 0.005)):
+        t = 0.005 * k
+        phone = (PhoneImu(t - 0.02, STILL, UP),) if k % 3 == 0 else ()
+        seen = t - 0.05
+        pose = RelativePose(seen, position(seen), np.eye(3), COVARIANCE, 0.1, 5)
+        outputs.append(
+            teleop.step(
+                Inputs(
+                    t=t,
+                    phone_imu=phone,
+                    body_imu=(BodyImu(t, STILL, body_a),),
+                    poses=(pose,) if k % 6 == 0 and seen > 0.0 else (),
+                    operator=Operator(t - 0.01, held, int(held)),
+                    requests=Requests(arm=abs(t - arm_at) < 1e-9),
+                )
+            )
+        )
+    return outputs
+
+
+def test_says_what_it_lacks_until_it_lacks_nothing() -> None:
+    outputs = run(Teleop(ROBOT, TeleopConfig()), 0.0, 1.5)
+    assert any("camera" in why for why in outputs[0].refusals)
+    assert outputs[-1].refusals == ()
+    assert outputs[-1].failsafe.mode == Mode.DISARMED
+
+
+def test_tracking_begins_where_the_robot_is_without_a_jump_of_thrust() -> None:
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    outputs = run(teleop, 1.5, 0.5, held=True)
+    first = next(o for o in outputs if o.failsafe.mode == Mode.TRACK)
+    assert first.error is not None
+    np.testing.assert_allclose(first.error.e_p_in_v, np.zeros(3), atol=1e-12)
+    wrench = ROBOT.A @ first.thrusts
+    assert np.abs(wrench[:3]).max() < 0.2
+    assert np.abs(wrench[3:]).max() < 0.02
+
+
+def test_a_robot_that_has_drifted_is_pulled_back() -> None:
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    run(teleop, 1.5, 0.3, held=True)
+    drifted = run(
+        teleop,
+        1.8,
+        0.5,
+        position=lambda t: P + [0.0, 0.03 * min(1.0, (t - 1.8) / 0.3), 0.0],
+        held=True,
+    )
+    assert drifted[-1].failsafe.mode == Mode.TRACK
+    assert (ROBOT.A @ drifted[-1].thrusts)[1] < -0.5
+
+
+def test_a_reference_out_of_reach_ends_the_flight() -> None:
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    far = run(
+        teleop, 1.5, 3.0, position=lambda t: P + [0.0, 0.4 * max(0.0, t - 1.6), 0.0], held=True
+    )
+    modes = {o.failsafe.mode for o in far}
+    assert Mode.RAMP in modes
+    assert far[-1].failsafe.mode in (Mode.RAMP, Mode.DISARMED)
+
+
+def test_thrusts_are_always_finite_and_within_limits() -> None:
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    bad = run(teleop, 1.5, 0.5, held=True, body_a=np.array([np.nan, 0.0, 9.8]))
+    for output in bad:
+        assert np.isfinite(output.thrusts).all()
+        assert 0.0 <= output.thrusts.min()
+        assert output.thrusts.max() <= ROBOT.f_max
