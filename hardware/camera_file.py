@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import yaml
@@ -15,6 +15,7 @@ from pipeline.frames import Array
 
 CAMERAS = Path(__file__).parent / "cameras"
 KALIBR_MODELS = {"radtan": "plumb_bob", "equidistant": "equidistant"}
+SIZES_PX = (16, 8192)
 
 
 class CameraFileError(ValueError):
@@ -100,8 +101,8 @@ class _Reader:
         )
         distortion = self._numbers(table, "distortion_coefficients", None)
         camera = self._camera(
-            self._size(table, "image_width"),
-            self._size(table, "image_height"),
+            self._size(self._get(table, "image_width"), "image_width"),
+            self._size(self._get(table, "image_height"), "image_height"),
             K,
             model,
             distortion,
@@ -117,7 +118,7 @@ class _Reader:
         if model is None:
             self._refuse(f"{name}.distortion_model", ", ".join(KALIBR_MODELS))
         fu, fv, pu, pv = self._numbers(table, "intrinsics", 4)
-        width, height = (int(n) for n in self._numbers(table, "resolution", 2))
+        width, height = (self._size(n, "resolution") for n in self._numbers(table, "resolution", 2))
         K = np.array([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]])
         distortion = self._numbers(table, "distortion_coeffs", 4)
         return Path(self._file).stem, self._camera(width, height, K, str(model), distortion, 0.0)
@@ -134,22 +135,29 @@ class _Reader:
             K[0, 0] <= 0.0
             or K[1, 1] <= 0.0
             or K[0, 1] != 0.0
+            or K[1, 0] != 0.0
             or not np.array_equal(K[2], (0, 0, 1))
         ):
             self._refuse("camera_matrix", "[fx, 0, cx, 0, fy, cy, 0, 0, 1] with fx, fy > 0")
         return Camera(width, height, K, model, distortion, readout_s)
 
-    def _get(self, table: dict[str, Any], key: str) -> Any:
+    def _get(self, table: dict[str, Any], key: str) -> object:
         if key not in table:
             self._refuse(key, "must be there")
         return table[key]
 
-    def _size(self, table: dict[str, Any], key: str) -> int:
-        return int(self._number(self._get(table, key), key, 16, 8192))
+    def _size(self, value: object, key: str) -> int:
+        size = self._number(value, key, *SIZES_PX)
+        if not size.is_integer():
+            self._refuse(key, "a whole number")
+        return int(size)
 
-    def _number(self, value: Any, key: str, low: float, high: float) -> float:
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not low <= value <= high:
+    def _number(self, value: object, key: str, low: float, high: float) -> float:
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, (int, float))
+            or not low <= value <= high
+        ):
             self._refuse(key, f"a number from {low:g} to {high:g}")
         return float(value)
 
@@ -165,5 +173,5 @@ class _Reader:
             self._refuse(key, f"{count if count else 'a list of'} finite numbers")
         return numbers
 
-    def _refuse(self, key: str, allowed: str) -> None:
+    def _refuse(self, key: str, allowed: str) -> NoReturn:
         raise CameraFileError(self._file, key, allowed)

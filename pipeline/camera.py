@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from pipeline.frames import Array, R_co
 
@@ -37,8 +38,7 @@ class Camera:
             pixels, _ = cv2.fisheye.projectPoints(rays, zero, zero, self.K, self.distortion)
         else:
             pixels, _ = cv2.projectPoints(points_in_o, zero, zero, self.K, self.distortion)
-        flat: Array = pixels.reshape(-1, 2)
-        return flat
+        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
 
     def normalised(self, pixels: Array) -> Array:
         """Undistorted image coordinates (n, 2) on the plane one metre ahead: right, down [m]."""
@@ -47,20 +47,19 @@ class Camera:
             flat = cv2.fisheye.undistortPoints(points, self.K, self.distortion)
         else:
             flat = cv2.undistortPoints(points, self.K, self.distortion)
-        rows: Array = flat.reshape(-1, 2)
-        return rows
+        return np.asarray(flat, dtype=np.float64).reshape(-1, 2)
 
     @property
     def focal_px(self) -> float:
         """Mean focal length [px]."""
         return 0.5 * float(self.K[0, 0] + self.K[1, 1])
 
-    def sees(self, pixels: Array, margin_px: float = 0.0) -> Array:
+    def sees(self, pixels: Array, margin_px: float = 0.0) -> npt.NDArray[np.bool_]:
         """(n,) whether pixels lie inside the picture, `margin_px` from its border."""
         size = np.array([self.width, self.height])
         low, high = margin_px - 0.5, size - 0.5 - margin_px
-        inside: Array = ((pixels > low) & (pixels < high)).all(axis=1)
-        return inside
+        inside = (pixels > low) & (pixels < high)
+        return np.asarray(inside.all(axis=1))
 
 
 def points_of(normalised: Array) -> Array:

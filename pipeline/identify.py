@@ -20,8 +20,10 @@ BRIGHTEST_ALONE = 8
 """The same without gravity: any three of them may be any three LEDs."""
 TRIED = 40
 """Hypotheses refined when starting from nothing."""
-LOOSE_PX = 12.0
-"""A hypothesis before its refinement: gravity is known to degrees only."""
+LOOSE_RAD = 0.14
+"""A hypothesis before its refinement: so far off may gravity be, as seen from the robot."""
+START_RMS_PX = 1.2
+"""What starts from nothing must fit this well; a wrong name or a lamp for an LED seldom does."""
 RIVAL = 2.5
 """Another explanation whose RMS is not this much worse is a rival."""
 
@@ -47,7 +49,7 @@ def while_tracking(
     match = _common_shift(expected, spots.pixels, config.shift_px)
     if match is None or len(match.led) < config.min_leds:
         return None
-    return _verified(camera, leds_in_b, spots, match, config, guess=predicted)
+    return _verified(camera, leds_in_b, spots, match, config, predicted)
 
 
 def _common_shift(expected: Array, seen: Array, reach_px: float) -> Match | None:
@@ -100,9 +102,12 @@ def from_gravity(
         return None
     normalised = camera.normalised(brightest.pixels)
     level = R_between(up_in_b, up_in_c)  # b to c, up to a turn about up
-    reach = LOOSE_PX / camera.focal_px
     scores, places, yaws = pair_hypotheses(
-        points_of(normalised), leds_in_b, level, np.ascontiguousarray(up_in_c), reach
+        points_of(normalised),
+        np.ascontiguousarray(leds_in_b),
+        level,
+        np.ascontiguousarray(up_in_c),
+        LOOSE_RAD * _radius(leds_in_b),
     )
     order = np.lexsort((yaws, -scores))[:TRIED]
     guesses = [
@@ -148,22 +153,34 @@ def _best(
 ) -> Naming | None:
     """The best explanation, unless a different one is nearly as good: then none."""
     namings: dict[bytes, Naming] = {}
+    tried: set[bytes] = set()
     for p_bc_in_c, R_cb in guesses:
         expected = camera.pixels(p_bc_in_c + leds_in_b @ R_cb.T)
-        match = _common_shift(expected, spots.pixels, 2.0 * LOOSE_PX)
-        if match is None or len(match.led) < config.min_leds:
+        reach_px = LOOSE_RAD * _radius(leds_in_b) / float(p_bc_in_c[0]) * camera.focal_px
+        match = _common_shift(expected, spots.pixels, reach_px)
+        if match is None or len(match.led) < config.min_leds or _name(match) in tried:
             continue
-        naming = _verified(camera, leds_in_b, spots, match, config, None)
-        if naming is not None:
-            order = np.argsort(naming.match.led)
-            name = np.stack((naming.match.led[order], naming.match.spot[order])).tobytes()
-            namings.setdefault(name, naming)
+        tried.add(_name(match))
+        naming = _verified(camera, leds_in_b, spots, match, config, (p_bc_in_c, R_cb), True)
+        if naming is not None and naming.fit.rms_px < START_RMS_PX:
+            namings.setdefault(_name(naming.match), naming)
     ranked = sorted(namings.values(), key=lambda n: (-len(n.match.led), n.fit.rms_px))
     if not ranked:
         return None
     if len(ranked) > 1 and _rivals(ranked[0], ranked[1]):
         return None
     return ranked[0]
+
+
+def _name(match: Match) -> bytes:
+    """The same for the same LEDs of the same spots, in whatever order."""
+    order = np.argsort(match.led)
+    return np.stack((match.led[order], match.spot[order])).tobytes()
+
+
+def _radius(leds_in_b: Array) -> float:
+    """Of the sphere about the body's centre that holds all LEDs [m]."""
+    return float(np.sqrt((leds_in_b**2).sum(axis=1).max()))
 
 
 def _rivals(best: Naming, other: Naming) -> bool:
@@ -180,11 +197,12 @@ def _verified(
     spots: Spots,
     match: Match,
     config: IdentifyConfig,
-    guess: tuple[Array, Array] | None,
+    guess: tuple[Array, Array],
+    algebra: bool = False,
 ) -> Naming | None:
     """Solve; while an LED fits badly and enough are left, leave the worst one out."""
     while True:
-        fit = pnp.solve(camera, leds_in_b, spots, match, guess)
+        fit = pnp.solve(camera, leds_in_b, spots, match, guess, algebra)
         if fit is None:
             return None
         misfit = np.linalg.norm(fit.residuals_px, axis=1)
@@ -200,7 +218,7 @@ def _without_worst(
     leds_in_b: Array,
     spots: Spots,
     match: Match,
-    guess: tuple[Array, Array] | None,
+    guess: tuple[Array, Array],
 ) -> Match:
     """Leave one out: the one whose absence helps most."""
 

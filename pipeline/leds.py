@@ -51,7 +51,8 @@ def _contrast(frame: Frame, config: LedsConfig) -> float:
 def _measured(
     luma: Image, windows: list[tuple[int, int, int]], contrast: float, config: LedsConfig
 ) -> Spots:
-    rows, out = [], np.empty(FIELDS)
+    rows: list[Array] = []
+    out = np.empty(FIELDS)
     for u, v, half in windows:
         if not measure(luma, u, v, half, out):
             continue
@@ -81,4 +82,6 @@ def _covariances(table: Array) -> Array:
     blurred = np.clip(eigenvalues[:, 1] / np.maximum(eigenvalues[:, 0], 0.3) - 1.5, 0.0, None)
     along = moments / size2[:, None, None]
     identity = np.eye(2)[None]
-    return compact[:, None, None] * (identity + 0.5 * blurred[:, None, None] * along)
+    shape = identity + 0.5 * blurred[:, None, None] * along
+    covariances: Array = compact[:, None, None] * shape
+    return covariances

@@ -70,6 +70,10 @@ class Pid:
         self._integral_force_in_f = np.zeros(3)
         self._integral_torque_in_b = np.zeros(3)
 
+    def take_over(self, force_in_f: Array) -> None:
+        """Go on from a force (3,) [N] that another controller has held: no jump of thrust."""
+        self._integral_force_in_f = force_in_f
+
     def wrench(self, error: PoseError, view: VirtualView) -> Array:
         """Force and torque on the body, in b (6,) [N, N m]. Eq. (20)."""
         Kp, Kd = self._gains.Kp, self._gains.Kd

@@ -59,7 +59,10 @@ def refine(
         residuals, J = linear
         JW = np.einsum("mij,mik->mjk", J, weights)
         information = np.einsum("mij,mjk->ik", JW, J)
-        step = np.linalg.solve(information, np.einsum("mij,mj->i", JW, residuals))
+        try:
+            step = np.linalg.solve(information, np.einsum("mij,mj->i", JW, residuals))
+        except np.linalg.LinAlgError:  # LEDs in one place or one line say too little
+            return None
         p_bc_in_c, R_cb = p_bc_in_c + step[:3], R_cb @ exp(step[3:])
         if float(step @ step) < CONVERGED:
             break
@@ -100,10 +103,8 @@ def starts(leds_in_b: Array, normalised: Array) -> list[tuple[Array, Array]]:
             _, turns, shifts = cv2.solveP3P(world, image, np.eye(3), None, flags=cv2.SOLVEPNP_P3P)
     except cv2.error:
         return []
-    poses = []
-    for turn, shift in zip(turns, shifts, strict=True):
-        poses.append((R_co @ shift.ravel(), R_co @ exp(turn.ravel())))
-    return poses
+    pairs = zip(np.asarray(turns, np.float64), np.asarray(shifts, np.float64), strict=True)
+    return [(R_co @ shift.ravel(), R_co @ exp(turn.ravel())) for turn, shift in pairs]
 
 
 def solve(
@@ -112,12 +113,19 @@ def solve(
     spots: Spots,
     match: Match,
     guess: tuple[Array, Array] | None = None,
+    algebra: bool = False,
 ) -> Fit | None:
-    """Best pose of named spots; `guess` (p_bc_in_c, R_cb) is tried before algebra."""
+    """Best pose of named spots, from `guess` (p_bc_in_c, R_cb) or algebra; with `algebra` both.
+
+    Four spots may have two poses that fit about equally: a guess far off may lead to the other one,
+    and so, seldom, does algebra.
+    """
     leds = leds_in_b[match.led]
     normalised = camera.normalised(spots.pixels[match.spot])
-    weights = np.linalg.inv(spots.covariances[match.spot])
-    candidates = [guess] if guess is not None else starts(leds, normalised)
+    weights: Array = np.linalg.inv(spots.covariances[match.spot]).astype(np.float64)
+    candidates = [guess] if guess is not None else []
+    if guess is None or algebra:
+        candidates += starts(leds, normalised)
     fits = [refine(camera, leds, normalised, weights, p, R) for p, R in candidates]
     return min((fit for fit in fits if fit is not None), key=lambda fit: fit.chi2, default=None)
 

@@ -16,49 +16,8 @@ FIELDS = 8
 """u, v, brightness, area, contrast, and the second moments uu, uv, vv."""
 
 
-@numba.njit(cache=True)
-def measure(luma: Image, u0: int, v0: int, half: int, out: Array) -> bool:
-    """Measure the spot whose brightest pixel is nearest (u0, v0); False if there is none.
-
-    The background is the median of the window's border; a spot that reaches the border is none.
-    """
-    height, width = luma.shape
-    left, right = max(0, u0 - half), min(width - 1, u0 + half)
-    top, bottom = max(0, v0 - half), min(height - 1, v0 + half)
-    if right - left < 4 or bottom - top < 4:
-        return False
-    background = _border_median(luma, left, right, top, bottom)
-    peak, pu, pv = -1, u0, v0
-    for v in range(top, bottom + 1):
-        for u in range(left, right + 1):
-            if luma[v, u] > peak:
-                peak, pu, pv = int(luma[v, u]), u, v
-    contrast = peak - background
-    if contrast <= 0.0:
-        return False
-    threshold = background + SHARE * contrast
-    columns, rows = right - left + 1, bottom - top + 1
-    member = np.zeros((rows, columns), dtype=np.uint8)
-    stack = np.empty((rows * columns, 2), dtype=np.int32)
-    stack[0, 0], stack[0, 1] = pv - top, pu - left
-    member[pv - top, pu - left] = 1
-    count, area = 1, 0
-    while count > 0:
-        count -= 1
-        r, c = stack[count, 0], stack[count, 1]
-        area += 1
-        if r == 0 or c == 0 or r == rows - 1 or c == columns - 1:
-            return False
-        for dr in range(-1, 2):
-            for dc in range(-1, 2):
-                rr, cc = r + dr, c + dc
-                if member[rr, cc] == 0 and luma[top + rr, left + cc] > threshold:
-                    member[rr, cc] = 1
-                    stack[count, 0], stack[count, 1] = rr, cc
-                    count += 1
-    _moments(luma, member, left, top, background, out)
-    out[3], out[4] = area, contrast
-    return True
+_LUMA = numba.types.Array(numba.uint8, 2, "A", readonly=True)
+"""Read-only and of any layout: a decoder's rows have gaps, and no picture may compile anew."""
 
 
 @numba.njit(cache=True)
@@ -102,3 +61,48 @@ def _moments(
     out[5] = suu / total - u * u
     out[6] = suv / total - u * v
     out[7] = svv / total - v * v
+
+
+@numba.njit((_LUMA, numba.int64, numba.int64, numba.int64, numba.float64[::1]), cache=True)
+def measure(luma: Image, u0: int, v0: int, half: int, out: Array) -> bool:
+    """Measure the spot of the window's brightest pixel; False if there is none.
+
+    The background is the median of the window's border; a spot that reaches the border is none.
+    """
+    height, width = luma.shape
+    left, right = max(0, u0 - half), min(width - 1, u0 + half)
+    top, bottom = max(0, v0 - half), min(height - 1, v0 + half)
+    if right - left < 4 or bottom - top < 4:
+        return False
+    background = _border_median(luma, left, right, top, bottom)
+    peak, pu, pv = -1, u0, v0
+    for v in range(top, bottom + 1):
+        for u in range(left, right + 1):
+            if luma[v, u] > peak:
+                peak, pu, pv = int(luma[v, u]), u, v
+    contrast = peak - background
+    if contrast <= 0.0:
+        return False
+    threshold = background + SHARE * contrast
+    columns, rows = right - left + 1, bottom - top + 1
+    member = np.zeros((rows, columns), dtype=np.uint8)
+    stack = np.empty((rows * columns, 2), dtype=np.int32)
+    stack[0, 0], stack[0, 1] = pv - top, pu - left
+    member[pv - top, pu - left] = 1
+    count, area = 1, 0
+    while count > 0:
+        count -= 1
+        r, c = stack[count, 0], stack[count, 1]
+        area += 1
+        if r == 0 or c == 0 or r == rows - 1 or c == columns - 1:
+            return False
+        for dr in range(-1, 2):
+            for dc in range(-1, 2):
+                rr, cc = r + dr, c + dc
+                if member[rr, cc] == 0 and luma[top + rr, left + cc] > threshold:
+                    member[rr, cc] = 1
+                    stack[count, 0], stack[count, 1] = rr, cc
+                    count += 1
+    _moments(luma, member, left, top, background, out)
+    out[3], out[4] = area, contrast
+    return True

@@ -197,8 +197,8 @@ class Teleop:
             self._virtual_camera.reset()
             view = self._virtual_camera.view(relative, R_fc, self._period)
             self._reference = Reference.here(view)
-            if before == Mode.ARMED:
-                self._pid.reset()
+            if before == Mode.HOLD:
+                self._pid.take_over(view.R_fv @ view.R_vb @ self._force_in_b)
             return view, pose_error(view, self._reference)
         if before == Mode.TRACK and view is not None:
             self._hold.start(self._force_in_b, view.R_fv @ view.R_vb)

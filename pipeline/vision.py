@@ -147,3 +147,23 @@ def _near(fit: pnp.Fit, predicted: tuple[Array, Array]) -> bool:
     shift = fit.p_bc_in_c - predicted[0]
     turn = log(predicted[1].T @ fit.R_cb)
     return float(shift @ shift) < 0.3**2 and float(turn @ turn) < 0.5**2
+
+
+def warm_up() -> None:
+    """Look at one picture, so that whatever is loaded or compiled once is so before the first."""
+    K = np.array([[400.0, 0.0, 160.0], [0.0, 400.0, 120.0], [0.0, 0.0, 1.0]])
+    camera = Camera(320, 240, K, "plumb_bob", np.zeros(5))
+    x, y, z = (0.1, 0.0, -0.1, 0.2, -0.2), (0.3, -0.3, 0.2, -0.1, 0.0), (0.2, 0.1, -0.3, -0.2, 0.3)
+    robot, place, up = (
+        np.column_stack((x, y, z)),
+        np.array([2.5, 0.0, 0.0]),
+        np.array([0.0, 0.0, 1.0]),
+    )
+    luma = np.zeros((240, 320), dtype=np.uint8)
+    for u, v in np.round(camera.pixels(robot + place)).astype(int):
+        luma[v - 1 : v + 2, u - 1 : u + 2] = 255
+    vision, prior = Vision(camera, robot), Prior(up, up, np.zeros(3), np.zeros(3))
+    for t in (0.0, 0.03):
+        sighting = vision.step(Frame(t, luma), prior)
+        if sighting.pose is not None:
+            vision.keep(sighting.pose)

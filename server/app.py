@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import io
-import json
 import logging
-import os
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
+import msgspec
 import segno
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -24,12 +25,22 @@ from server.hub import Hub
 from server.messages import Command
 from server.metrics import exposition
 from server.recording import RecordingError
-from server.security import COOKIE, Doors
+from server.security import COOKIE, PAIR_TRIES, Doors
 from server.websocket import PageServer
 
 CLIENT = Path(__file__).resolve().parents[1] / "web_client"
-MAX_BODY = 4_096
+LOOKS = sorted((*CLIENT.glob("*.css"), *CLIENT.glob("*.svg")))
+MAX_BODY, BODY_S = 4_096, 5.0
 log = logging.getLogger("lightleash")
+
+
+class Pairing(msgspec.Struct, forbid_unknown_fields=True):
+    """What `/api/pair` is asked."""
+
+    token: str
+
+
+_pairing = msgspec.json.Decoder(Pairing)
 
 
 class VirtualPhone:
@@ -83,15 +94,12 @@ class Api:
     async def _pair(self, request: Request) -> Response:
         address = request.client.host if request.client is not None else ""
         if not self._doors.may_try(address, now()):
-            return _refusal(429, "token", "10 tries a minute")
-        body = await _body(request)
+            return _refusal(429, "token", f"{PAIR_TRIES} tries a minute")
         try:
-            token = json.loads(body)["token"] if body is not None else None
-        except (ValueError, LookupError, TypeError):
-            token = None
-        if not isinstance(token, str):
+            pairing = _pairing.decode(await _body(request))
+        except msgspec.DecodeError:
             return _refusal(400, "token", 'JSON: {"token": "…"}')
-        paired = self._doors.pair(token)
+        paired = self._doors.pair(pairing.token)
         if paired is None:
             log.warning("pairing refused for %s", address)
             return _refusal(401, "token", "the link of this run: scan the QR code again")
@@ -145,7 +153,7 @@ class Api:
         return FileResponse(self._authority, media_type="application/x-x509-ca-cert")
 
     async def _health(self, _request: Request) -> Response:
-        return JSONResponse({"ok": True, "pid": os.getpid()})
+        return JSONResponse({"ok": True})
 
     async def _metrics(self, _request: Request) -> Response:
         return Response(exposition(self._hub), media_type="text/plain; version=0.0.4")
@@ -155,33 +163,37 @@ def make_app(api: Api, pages: PageServer, view: Sequence[BaseRoute]) -> Starlett
     """The application, without its guard."""
     return Starlette(
         routes=[
-            Route("/", _page("index.html")),
-            Route("/supervisor", _page("supervisor.html")),
+            Route("/", _file("index.html")),
+            Route("/supervisor", _file("supervisor.html")),
             *api.routes(),
             WebSocketRoute("/ws/phone", pages.phone),
             WebSocketRoute("/ws/video", pages.video),
             WebSocketRoute("/ws/supervisor", pages.supervisor),
             *view,
-            Mount("/", StaticFiles(directory=CLIENT)),
+            *(Route(f"/{path.name}", _file(path.name)) for path in LOOKS),
+            Mount("/src", StaticFiles(directory=CLIENT / "src")),
         ]
     )
 
 
-def _page(name: str):  # type: ignore[no-untyped-def]  # noqa: ANN202
-    async def page(_request: Request) -> Response:
-        return FileResponse(CLIENT / name, media_type="text/html; charset=utf-8")
+def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
+    async def file(_request: Request) -> Response:
+        return FileResponse(CLIENT / name)
 
-    return page
+    return file
 
 
-async def _body(request: Request) -> bytes | None:
-    """The body, or None if it is longer than anything we take."""
+async def _body(request: Request) -> bytes:
+    """The body; empty if it is longer than anything we take, or too long in coming."""
     body = b""
-    async for part in request.stream():
-        body += part
-        if len(body) > MAX_BODY:
-            return None
-    return body
+    with contextlib.suppress(TimeoutError, ClientDisconnect):
+        async with asyncio.timeout(BODY_S):
+            async for part in request.stream():
+                body += part
+                if len(body) > MAX_BODY:
+                    return b""
+            return body
+    return b""
 
 
 def _refusal(status: int, field: str, allowed: str) -> Response:

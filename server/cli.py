@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,15 +24,12 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
 
 def _serve(argv: Sequence[str]) -> int:
     from server import launcher
-    from server.settings import SettingsError
+    from server.settings import SettingsError, load
 
     try:
-        arguments, file = _config_of(argv)
-        from server.settings import load
-
-        settings = load(arguments, file)
+        settings = load(*_config_of(argv))
     except SettingsError as error:
-        print(f"settings: {error}", file=sys.stderr)
+        print(f"lightleash serve: {error}", file=sys.stderr)
         return 2
     return launcher.main(settings, argv)
 
@@ -38,11 +37,18 @@ def _serve(argv: Sequence[str]) -> int:
 def _server(argv: Sequence[str]) -> int:
     """The server process, as the launcher starts it."""
     from server import serving
+    from server.launcher import SECRET_VARIABLE
     from server.settings import load
 
-    runtime, truth_port, *rest = argv
-    arguments, file = _config_of(rest)
-    return serving.main(load(arguments, file), Path(runtime), int(truth_port))
+    runtime, truth_port, https, http, *rest = argv
+    given = serving.Given(
+        Path(runtime),
+        int(truth_port),
+        socket.socket(fileno=int(https)),
+        socket.socket(fileno=int(http)),
+        bytes.fromhex(os.environ.pop(SECRET_VARIABLE)),
+    )
+    return serving.main(load(*_config_of(rest)), given)
 
 
 def _config_of(argv: Sequence[str]) -> tuple[list[str], Path | None]:

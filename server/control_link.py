@@ -10,6 +10,7 @@ import contextlib
 import os
 import socket
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -19,7 +20,10 @@ from pipeline.signals import Operator, PhoneImu, RelativePose
 
 Triple = tuple[float, float, float]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
+ThirtySix = Annotated[list[float], msgspec.Meta(min_length=36, max_length=36)]
 MAX_DATAGRAM = 16_384
+LARGEST = 1e9
+"""No time, sensor or pose has a number beyond it."""
 
 
 def triple(v: Array) -> Triple:
@@ -50,7 +54,7 @@ class PoseInput(msgspec.Struct, tag="pose", array_like=True, frozen=True):
     t: float
     p: Triple
     R: Nine
-    covariance: list[float]
+    covariance: ThirtySix
     reprojection_px: float
     leds: int
 
@@ -103,6 +107,21 @@ class ReadyInput(msgspec.Struct, tag="ready", array_like=True, frozen=True):
 
 
 Input = PhoneImuInput | PoseInput | OperatorInput | RequestInput | ReadyInput
+
+
+def is_believable(message: Input) -> bool:
+    """Whether all its numbers are finite and of this world: no other may reach the state."""
+    match message:
+        case PhoneImuInput():
+            numbers: tuple[float, ...] = (message.t, *message.omega, *message.a)
+        case PoseInput():
+            measured = (*message.p, *message.R, *message.covariance)
+            numbers = (message.t, message.reprojection_px, *measured)
+        case OperatorInput():
+            numbers = (message.t,)
+        case _:
+            return True
+    return all(abs(number) <= LARGEST for number in numbers)
 
 
 class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
@@ -189,12 +208,17 @@ class Endpoint:
         return datagrams
 
     def inputs(self, limit: int = 64) -> list[Input]:
-        """What has arrived from the server, oldest first; what can't be decoded is counted."""
+        """What has arrived from the server, oldest first; what can't be believed is counted."""
         inputs: list[Input] = []
         for datagram in self._datagrams(limit):
             try:
-                inputs.append(_input_decoder.decode(datagram))
+                message = _input_decoder.decode(datagram)
             except msgspec.MsgspecError:
+                self.dropped += 1
+                continue
+            if is_believable(message):
+                inputs.append(message)
+            else:
                 self.dropped += 1
         return inputs
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
+import queue
 import socket
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -44,14 +45,24 @@ def realtime(seconds: float) -> Iterator[Finding]:
     results: multiprocessing.Queue[tuple[str, dict[str, float]]] = context.Queue()
     process = context.Process(target=_jitter, args=(seconds, results))
     process.start()
-    granted, late = results.get(timeout=seconds + 30.0)
-    process.join()
+    try:
+        granted, late = results.get(timeout=seconds + 30.0)
+    except queue.Empty:
+        yield Finding(BAD, "real time", "the test did not end", "see the messages above")
+        return
+    finally:
+        process.join(1.0)
     fifo = granted.startswith("SCHED_FIFO")
     advice = "give CAP_SYS_NICE (deploy/lightleash.service does), else only fly in simulation"
     yield Finding(GOOD if fifo else POOR, "real time", granted, "" if fifo else advice)
     text = ", ".join(f"{name} {value:g}" for name, value in late.items())
     held = late["p999"] <= LATE_MS
-    advice = "" if held else "close other programs; on a laptop, plug in the charger"
+    advice = (
+        ""
+        if held
+        else f"1 tick in 1000 is over {LATE_MS:g} ms late and the robot feels it: close "
+        "other programs; on a laptop, plug in the charger"
+    )
     yield Finding(
         GOOD if held else POOR, f"200 Hz for {seconds:g} s", f"late by ms: {text}", advice
     )

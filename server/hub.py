@@ -26,6 +26,8 @@ log = logging.getLogger("lightleash")
 
 LEASE_S = 2.0
 """A phone silent for longer may be taken over from."""
+INSIST_S, INSISTS = 0.01, 100
+"""How often and how many times a STOP is sent to a control process that can't take it."""
 EVENTS = 12
 TICK_S = 0.1
 
@@ -78,21 +80,33 @@ class Hub:
         self._control.send(message)
 
     def say(self, text: str) -> None:
-        """An event that people should see, and the log keep."""
+        """An event that people should see, and the log keep; control characters are taken out."""
+        text = "".join(c if c.isprintable() else "·" for c in text)
         log.info("%s", text)
         self.events.appendleft(text)
 
     def wish(self, command: Command, who: str) -> None:
         """A person's wish, already checked for its role."""
-        if command.what != "key_frame":
-            self.say(f"{who}: {command.what}")
-            self.to_control(RequestInput(command.what))
+        if command.what == "key_frame":
+            return
+        self.say(f"{who}: {command.what}")
+        insists = INSISTS if command.what in ("stop", "disarm") else 0
+        self._ask(RequestInput(command.what), insists)
+
+    def _ask(self, request: RequestInput, insists: int) -> None:
+        """Nobody may be there, or the queue may be full: what stops the robot is said again."""
+        if self._control.send(request):
+            return
+        if insists > 0:
+            asyncio.get_running_loop().call_later(INSIST_S, self._ask, request, insists - 1)
+        else:
+            self.say(f"{request.what} did not reach the control process: try again.")
 
     def greet(self, hello: Hello, page: Page) -> OperatorPhone | None:
         """Give the lease to a phone; None while another one is alive."""
         current = self.phone
         if current is not None:
-            if current.meters["operator"].age(now()) < LEASE_S:
+            if current.silent_for(now()) < LEASE_S:
                 return None
             self.part(current)
         loop = asyncio.get_running_loop()
@@ -111,6 +125,7 @@ class Hub:
         )
         self._phone_pages = {"operator": page}
         self.recordings.message("phone", encode_message(hello), now())
+        self.to_control(RequestInput("disarm"))  # never go on with another hand
         self.say(f"{self.phone.device} leads.")
         return self.phone
 
@@ -140,6 +155,13 @@ class Hub:
         name = self.recordings.start(phone.device, phone.camera_text)
         self.recordings.message("phone", encode_message(phone.hello), now())
         return name
+
+    def record(self, data: str | bytes, t: float) -> None:
+        """Keep what the leading phone said, if a recording runs."""
+        if isinstance(data, bytes):
+            self.recordings.record("phone", data, t)
+        else:
+            self.recordings.message("phone", data, t)
 
     def _push(self, name: str, data: str | bytes) -> None:
         page = self._phone_pages.get(name)

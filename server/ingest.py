@@ -37,6 +37,8 @@ class Ingest:
     def __init__(self, new_nonce: Callable[[], int]) -> None:
         """`new_nonce` gives unpredictable 64-bit numbers (live) or a seeded sequence (tests)."""
         self._new_nonce = new_nonce
+        # another phone's first press must not look like this one's: it would not count as new
+        self._press_base = (new_nonce() & 0x7FFFFFFF) << 32
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._answered: set[int] = set()
         self._last_motion_t = -np.inf
@@ -90,7 +92,7 @@ class Ingest:
             if touch.nonce == 0:  # before the first PING reached the page
                 return None
             raise WireError("value", "touch.nonce", "the nonce of a PING of the last 3 s")
-        return Operator(asked, touch.held and touch.visible, touch.press)
+        return Operator(asked, touch.held and touch.visible, self._press_base + touch.press)
 
     def _motion(self, record: Record, motion: Motion, now: float) -> PhoneImu | None:
         t = self._dated(record, "motion.time", now)

@@ -2,94 +2,50 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
-import os
+import secrets
 import shutil
 import signal
-import subprocess
+import socket
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import segno
 
 from hardware.robot_file import RobotFileError, load_robot
-from server.serving import RUN_FILE
+from server.child import Child
+from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.settings import Settings
 
-PR_SET_PDEATHSIG = 1
-BACKOFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
-STEADY_S = 10.0
-"""A process that has lived so long starts with the first back-off again."""
-GRACE_S = 3.0
-READY_S = 60.0
-TAIL = 12
+BACKLOG = 128
+MAX_DEATHS = 4
+"""Of one process before anything worked: better end, with the reason on the screen."""
+POLL_S = 0.05
+SECRET_VARIABLE = "_LIGHTLEASH_SECRET"
 
 
-@dataclass(slots=True)
-class Child:
-    """One of the processes."""
+def listen(host: str, port: int) -> socket.socket:
+    """A listening socket; port 0 takes any free one.
 
-    name: str
-    command: list[str]
-    process: subprocess.Popen[bytes] | None = None
-    started: float = 0.0
-    deaths: int = 0
-    due: float = 0.0
-    """When to start it [s]."""
-    environment: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def alive(self) -> bool:
-        """Whether it runs."""
-        return self.process is not None and self.process.poll() is None
-
-    def start(self, now: float) -> None:
-        """Start it; it ends with the launcher, however that ends."""
-        self.started = now
-        self.process = subprocess.Popen(
-            self.command,
-            preexec_fn=_die_with_parent,
-            start_new_session=True,
-            env={**os.environ, **self.environment},
-            stdout=sys.stderr,
-        )
-
-    def stop(self) -> None:
-        """Ask it to end, and make it end if it doesn't."""
-        if self.process is None:
-            return
-        if self.alive:
-            self.process.send_signal(signal.SIGTERM)
-        try:
-            self.process.wait(GRACE_S)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-
-
-def _die_with_parent() -> None:
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
-def runtime_directory() -> Path:
-    """Where sockets and the run file of this user's server are; for nobody else to read."""
-    own = os.environ.get("XDG_RUNTIME_DIR")
-    path = Path(own) / "lightleash" if own else Path(f"/tmp/lightleash-{os.getuid()}")
-    path.mkdir(mode=0o700, parents=True, exist_ok=True)
-    if path.stat().st_uid != os.getuid():
-        raise SystemExit(f"{path} belongs to somebody else: set XDG_RUNTIME_DIR")
-    path.chmod(0o700)
-    return path
+    Raises:
+        OSError: the port is taken or the address is not ours.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    bound = socket.socket(family, socket.SOCK_STREAM)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        bound.bind((host, port))
+        bound.listen(BACKLOG)
+    except OSError as error:
+        bound.close()
+        raise OSError(f"{host}, port {port}: {error.strerror}; choose another one") from error
+    return bound
 
 
 def free_udp_port() -> int:
     """A port nobody uses now."""
-    import socket
-
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -99,79 +55,82 @@ def free_udp_port() -> int:
 class Launcher:
     """Keeps the processes alive until told to stop."""
 
-    def __init__(self, settings: Settings, arguments: Sequence[str]) -> None:
-        """`arguments` are those of the command line, handed on to the server process."""
-        self._runtime = runtime_directory()
-        (self._runtime / RUN_FILE).unlink(missing_ok=True)
+    def __init__(self, children: Sequence[Child], run_file: Path) -> None:
+        """`children` are stopped in this order; the server tells of itself in `run_file`."""
+        self.children = children
+        self._run_file = run_file
         self._stopping = False
-        self.children = _children(settings, arguments, self._runtime)
+
+    def stop(self, *_: object) -> None:
+        """End soon; may be called from a signal handler."""
+        self._stopping = True
 
     def run(self) -> int:
-        """Start, announce, watch, stop."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: setattr(self, "_stopping", True))
+        """Start, announce, watch, stop; gives the exit code."""
         announced = False
         try:
             while not self._stopping:
-                self._revive(time.monotonic())
-                if not announced and (self._runtime / RUN_FILE).exists():
+                self.revive(time.monotonic())
+                if not announced and self._run_file.exists():
                     announced = True
-                    announce(json.loads((self._runtime / RUN_FILE).read_text()))
-                if not announced and self._hopeless():
+                    announce(json.loads(self._run_file.read_text()))
+                if not announced and self._is_hopeless():
                     return 1
-                time.sleep(0.05)
+                time.sleep(POLL_S)
         finally:
             print("\nStopping: robot first.", flush=True)
             for child in self.children:
                 child.stop()
+            self._run_file.unlink(missing_ok=True)
         return 0
 
-    def _revive(self, now: float) -> None:
+    def revive(self, now: float) -> None:
+        """Start whoever should run and doesn't."""
         for child in self.children:
-            if child.alive or now < child.due:
-                continue
-            if child.process is not None and child.due == 0.0:
-                if now - child.started > STEADY_S:
-                    child.deaths = 0
-                wait = BACKOFF_S[min(child.deaths, len(BACKOFF_S) - 1)]
-                child.deaths += 1
-                child.due = now + wait
-                print(
-                    f"The {child.name} process ended (exit {child.process.returncode}); "
-                    f"starting it again in {wait:g} s.",
-                    file=sys.stderr,
-                    flush=True,
-                )
-                continue
-            child.due = 0.0
-            child.start(now)
+            said = child.revive(now)
+            if said:
+                print(said, file=sys.stderr, flush=True)
 
-    def _hopeless(self) -> bool:
-        """Whether start-up fails again and again: better end with the reason on the screen."""
+    def _is_hopeless(self) -> bool:
         worst = max(self.children, key=lambda child: child.deaths)
-        if worst.deaths < 4:
+        if worst.deaths < MAX_DEATHS:
             return False
         print(f"The {worst.name} process does not start: see above.", file=sys.stderr)
         return True
 
 
-def _children(settings: Settings, arguments: Sequence[str], runtime: Path) -> list[Child]:
-    """Robot, control, server: the order in which they are stopped."""
-    python = [sys.executable, "-m"]
-    children = []
-    link = load_robot(settings.robot).link
-    port, truth_port = settings.robot_port or link.port, 0
-    host = settings.robot_host or link.host
+def children_of(
+    settings: Settings,
+    arguments: Sequence[str],
+    runtime: Path,
+    sockets: tuple[socket.socket, socket.socket],
+) -> list[Child]:
+    """Robot, control, server: the order in which they are stopped.
+
+    `sockets` (HTTPS, HTTP) and the secret of the run outlive the server process: one that is
+    started anew has the same address and still knows its pages.
+
+    Raises:
+        RobotFileError: no such robot, or it has no such gains.
+    """
+    robot_file = load_robot(settings.robot)
+    if settings.gains not in robot_file.gains:
+        raise RobotFileError(settings.robot, "gains", f"one of {', '.join(robot_file.gains)}")
+    link = robot_file.link
+    host, port = settings.robot_host or link.host, settings.robot_port or link.port
+    truth_port, children = 0, []
     if settings.simulate:
         host, port, truth_port = "127.0.0.1", free_udp_port(), free_udp_port()
         simulated = ["hardware.sim.robot", "--robot", settings.robot, "--port", str(port)]
-        children.append(Child("robot", [*python, *simulated, "--truth-port", str(truth_port)]))
+        children.append(Child("robot", [*simulated, "--truth-port", str(truth_port)]))
     control = ["server.control", "--runtime", str(runtime), "--robot", settings.robot]
     control += ["--host", host, "--port", str(port), "--gains", settings.gains]
     control += ["--tau-1", str(settings.tau_1_s), "--tau-2", str(settings.tau_2_s)]
-    children.append(Child("control", [*python, *control]))
-    server = ["server", "_server", str(runtime), str(truth_port), *arguments]
-    children.append(Child("server", [*python, *server]))
+    children.append(Child("control", control))
+    descriptors = tuple(s.fileno() for s in sockets)
+    server = ["server", "_server", str(runtime), str(truth_port), *map(str, descriptors)]
+    secret = {SECRET_VARIABLE: secrets.token_hex(32)}
+    children.append(Child("server", [*server, *arguments], secret, descriptors))
     return children
 
 
@@ -189,9 +148,19 @@ def announce(run: dict[str, object]) -> None:
 
 
 def main(settings: Settings, arguments: Sequence[str]) -> int:
-    """Entry of `lightleash serve`."""
+    """Entry of `lightleash serve`; `arguments` are handed on to the server process."""
+    runtime = runtime_directory()
     try:
-        return Launcher(settings, arguments).run()
-    except RobotFileError as error:
-        print(f"robot: {error}", file=sys.stderr)
+        with (
+            prepare(runtime),
+            listen(settings.host, settings.https_port) as https,
+            listen("127.0.0.1", settings.http_port) as http,
+        ):
+            children = children_of(settings, arguments, runtime, (https, http))
+            launcher = Launcher(children, runtime / RUN_FILE)
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, launcher.stop)
+            return launcher.run()
+    except (RobotFileError, BusyError, OSError) as error:
+        print(f"lightleash serve: {error}", file=sys.stderr)
         return 2

@@ -40,9 +40,8 @@ class Patience(H11Protocol):
         if self._head_due is None and (cycle is None or cycle.response_complete):
             self._expect_head()
         super().data_received(data)
-        if self.cycle is not cycle:
-            self._head_is_whole()
-        elif self.transport.get_protocol() is not self:  # a websocket now
+        is_websocket = self.transport.get_protocol() is not self
+        if self.cycle is not cycle or is_websocket:
             self._head_is_whole()
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -51,10 +50,10 @@ class Patience(H11Protocol):
         super().connection_lost(exc)
 
     def _of_same_address(self) -> int:
-        address = self.client[0] if self.client is not None else ""
+        address = _address(self)
         if address in LOOPBACK:
             return 0
-        return sum(c.client is not None and c.client[0] == address for c in self.connections)
+        return sum(_address(c) == address for c in self.connections)
 
     def _expect_head(self) -> None:
         self._head_due = self.loop.call_later(HEAD_S, self._late)
@@ -101,3 +100,9 @@ def listener(app: ASGIApp, tls: Certificate | None) -> Listener:
             ssl_keyfile=tls.key if tls else None,
         )
     )
+
+
+def _address(connection: object) -> str:
+    """Of the peer; uvicorn's kinds of connection have no common class."""
+    client: tuple[str, int] | None = getattr(connection, "client", None)
+    return client[0] if client is not None else ""

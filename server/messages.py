@@ -99,7 +99,7 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     streams: dict[str, Stream]
     """By name: operator, phone_imu, video, pose, body_imu, control."""
     latency_ms: dict[str, float]
-    """By stage, in order: encode+network, decode, detect, identify, pose, fuse, control."""
+    """By stage, in order: capture to arrival, waiting, decode, detect, …, to control, control."""
     leds: int
     """LEDs in the last picture."""
     reprojection_px: float | None
@@ -117,7 +117,7 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     realtime: str
     """Class of the control loop: what holds its schedule."""
     control: dict[str, float]
-    """Lateness of the control loop: p50_ms, p99_ms, p999_ms, missed."""
+    """Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms."""
     messages: list[str]
     """The newest events, newest first."""
 
@@ -148,7 +148,7 @@ def decode_message(text: str | bytes) -> FromPage:
     except msgspec.ValidationError as error:
         reason, _, path = str(error).partition(" - at ")
         raise WireError("value", path.strip("`") or "message", reason) from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise WireError("type", "message", "JSON text") from error
     return message
 

@@ -17,7 +17,7 @@ from server.latest import Meter
 from server.messages import Hello
 from server.sight import Sight
 from server.vision import VisionThread
-from server.wire import Record, WireError
+from server.wire import Picture, Record, WireError
 
 STALE_S = 1.0
 """A stream silent for longer keeps the robot from being armed."""
@@ -42,6 +42,7 @@ class OperatorPhone:
         self.ingest = Ingest(lambda: 1 + secrets.randbits(63))
         self._robot, self._cameras = robot, cameras
         self._to_control, self._clock = to_control, clock
+        self._greeted = clock()
         self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
         self.vision: VisionThread | None = None
         self._size: tuple[int, int] | None = None
@@ -49,6 +50,10 @@ class OperatorPhone:
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.sighting: Sighting | None = None
         self.latency_ms: dict[str, float] = {}
+
+    def silent_for(self, now: float) -> float:
+        """Since its last sign of life [s]; hello was the first."""
+        return min(self.meters["operator"].age(now), now - self._greeted)
 
     def take(self, record: Record, now: float) -> None:
         """A record of this phone, from either of its sockets.
@@ -67,6 +72,8 @@ class OperatorPhone:
                 self._to_control(OperatorInput.of(operator))
             case EncodedFrame() as frame:
                 self._see(frame, now)
+            case None if isinstance(record.body, Picture):  # it can't be dated yet
+                self._on_taken(record.sequence)
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)

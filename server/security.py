@@ -160,21 +160,10 @@ async def _refuse(
     status, field, allowed = refusal
     body = {"code": "role" if status == 401 else "refused", "field": field, "allowed": allowed}
     response = JSONResponse(body, status)
-    if scope["type"] == "websocket":
-        if "websocket.http.response" in scope.get("extensions", {}):
-            await response(scope, receive, _as_denial(send))
-        else:
-            await send({"type": "websocket.close", "code": 1008})
-        return
-    await response(scope, receive, send)
-
-
-def _as_denial(send: Send) -> Send:
-    async def renamed(message: Message) -> None:
-        kind = message["type"].replace("http.response", "websocket.http.response")
-        await send({**message, "type": kind})
-
-    return renamed
+    if scope["type"] == "http" or "websocket.http.response" in scope.get("extensions", {}):
+        await response(scope, receive, send)
+    else:
+        await send({"type": "websocket.close", "code": 1008})
 
 
 def _with_headers(scope: Scope, host: str, send: Send) -> Send:

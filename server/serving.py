@@ -14,7 +14,7 @@ from pathlib import Path
 from starlette.types import ASGIApp
 
 from hardware.camera_file import CAMERAS
-from hardware.robot_file import load_robot
+from hardware.robot_file import ROBOTS, load_robot
 from server.app import Api, make_app
 from server.dashboard import Dashboard
 from server.hub import Hub
@@ -139,10 +139,9 @@ def _certificate(settings: Settings) -> Certificate:
 
 def _metadata(settings: Settings) -> dict[str, str]:
     """What a recording must know to be understood later."""
-    robot = Path(settings.robot)
-    path = robot if robot.suffix == ".toml" else Path("hardware/robots") / f"{robot}.toml"
-    here = Path(__file__).resolve().parents[1]
-    text = (path if path.exists() else here / path).read_text(encoding="utf-8")
+    name = settings.robot
+    path = Path(name) if name.endswith(".toml") else ROBOTS / f"{name}.toml"
+    text = path.read_text(encoding="utf-8")
     return {ROBOT_KEY: text, SETTINGS_KEY: settings.model_dump_json()}
 
 

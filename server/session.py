@@ -5,8 +5,10 @@ from __future__ import annotations
 from server.messages import Command, FromPage, Hello, Log, decode_message
 from server.wire import VERSION, Motion, Picture, Pong, Record, Touch, WireError, decode
 
-MAX_FAULTS = 50
-"""More, and the connection is closed."""
+MAX_FAULTS, FAULTS_HZ = 50, 0.5
+"""So many faults at once, so many a second; more, and the connection is closed."""
+RECORDS_HZ, BYTES_HZ, MESSAGES_HZ = 300.0, 4e6, 40.0
+"""A connection may say so much a second; of records and messages twice that at once."""
 ALLOWED: dict[str, tuple[type, ...]] = {
     "operator": (Motion, Touch, Pong),
     "video": (Picture,),
@@ -45,15 +47,12 @@ class Session:
         """`path_role` is what the address says: operator, video or supervisor."""
         self.role = path_role
         self.hello: Hello | None = None
-        self.faults = 0
-        self._records = Bucket(rate=300.0, burst=600.0)
-        self._bytes = Bucket(rate=4e6, burst=4e6)
-        self._messages = Bucket(rate=40.0, burst=80.0)
-
-    @property
-    def hopeless(self) -> bool:
+        self.hopeless = False
         """Too many faults."""
-        return self.faults > MAX_FAULTS
+        self._faults = Bucket(FAULTS_HZ, burst=MAX_FAULTS)
+        self._records = Bucket(RECORDS_HZ, burst=2.0 * RECORDS_HZ)
+        self._bytes = Bucket(BYTES_HZ, burst=BYTES_HZ)
+        self._messages = Bucket(MESSAGES_HZ, burst=2.0 * MESSAGES_HZ)
 
     def receive(self, data: str | bytes, now: float) -> FromPage | Record:
         """What the page said.
@@ -66,14 +65,20 @@ class Session:
                 return self._record(data, now)
             return self._message(data, now)
         except WireError:
-            self.faults += 1
+            self.fault(now)
             raise
+
+    def fault(self, now: float) -> None:
+        """Count one."""
+        self.hopeless = self.hopeless or not self._faults.take(now)
 
     def _record(self, data: bytes, now: float) -> Record:
         if self.hello is None:
             raise WireError("order", "record", "after hello")
         if not self._records.take(now) or not self._bytes.take(now, len(data)):
-            raise WireError("rate", "record", "300 records and 4 MB a second")
+            raise WireError(
+                "rate", "record", f"{RECORDS_HZ:g} records, {1e-6 * BYTES_HZ:g} MB a second"
+            )
         record = decode(data)
         if not isinstance(record.body, ALLOWED[self.role]):
             names = ", ".join(kind.__name__.lower() for kind in ALLOWED[self.role]) or "none"
@@ -82,7 +87,7 @@ class Session:
 
     def _message(self, text: str, now: float) -> FromPage:
         if not self._messages.take(now):
-            raise WireError("rate", "message", "40 a second")
+            raise WireError("rate", "message", f"{MESSAGES_HZ:g} a second")
         message = decode_message(text)
         if isinstance(message, Hello):
             return self._greeted(message)

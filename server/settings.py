@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
     SettingsConfigDict,
 )
+
+PREFIX = "LIGHTLEASH_"
 
 
 def state_directory() -> Path:
@@ -34,16 +39,22 @@ class VideoSettings(BaseModel):
 
 
 class Settings(BaseSettings):
-    """How a server is started."""
+    """Start server, control and simulated robot.
+
+    Each option may also stand in a TOML file, named with --config FILE (--https-port is https_port
+    there, --video.width is width in [video]), or in the environment (LIGHTLEASH_HTTPS_PORT,
+    LIGHTLEASH_VIDEO__WIDTH). The command line beats the environment, that beats the file.
+    """
 
     model_config = SettingsConfigDict(
         extra="forbid",
-        env_prefix="LIGHTLEASH_",
+        env_prefix=PREFIX,
         env_nested_delimiter="__",
         cli_kebab_case=True,
         cli_prog_name="lightleash serve",
         cli_hide_none_type=True,
         cli_avoid_json=True,
+        cli_implicit_flags=True,
     )
 
     robot: str = Field("ames", description="name or path of a robot file")
@@ -56,9 +67,9 @@ class Settings(BaseSettings):
     names: list[str] = Field([], description="further host names this server is reached by")
     cert: Path | None = Field(None, description="certificate of your own (PEM)")
     key: Path | None = Field(None, description="its key (PEM)")
-    simulate: bool = Field(True, description="start the simulated robot")
-    robot_host: str | None = Field(None, description="of a real robot; default: the robot file's")
-    robot_port: int | None = Field(None, ge=1, le=65535, description="of a real robot")
+    simulate: bool = Field(True, description="a simulated robot; without it, the real one")
+    robot_host: str | None = Field(None, description="of the real one; default: the robot file's")
+    robot_port: int | None = Field(None, ge=1, le=65535, description="of the real one")
     record: bool = Field(False, description="record from the start")
     state: Path = Field(default_factory=state_directory, description="certificates, recordings")
     cameras: list[Path] = Field([], description="folders with calibrations of phones")
@@ -77,6 +88,9 @@ class Settings(BaseSettings):
         return env_settings, init_settings
 
 
+Settings.__doc__ = inspect.cleandoc(Settings.__doc__ or "")  # `--help` shows it as it is
+
+
 class SettingsError(ValueError):
     """Settings that can't be used; the text names each and what is allowed."""
 
@@ -85,8 +99,9 @@ def load(argv: Sequence[str], file: Path | None = None) -> Settings:
     """Settings from all four places.
 
     Raises:
-        SettingsError: an unknown key or a value out of its range.
+        SettingsError: an unknown key, a value out of its range, or two that don't go together.
     """
+    _refuse_unknown_variables()
     values: dict[str, Any] = {}
     if file is not None:
         try:
@@ -96,8 +111,41 @@ def load(argv: Sequence[str], file: Path | None = None) -> Settings:
     try:
         settings = Settings(_cli_parse_args=list(argv), **values)  # type: ignore[call-arg]
     except ValidationError as error:
-        faults = (f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
-        raise SettingsError("; ".join(faults)) from error
+        raise SettingsError("; ".join(map(_fault, error.errors()))) from error
     if (settings.cert is None) != (settings.key is None):
         raise SettingsError("cert, key: both or neither")
+    if settings.simulate and (settings.robot_host or settings.robot_port):
+        raise SettingsError("robot_host, robot_port: only with --no-simulate")
     return settings
+
+
+def _fault(error: ErrorDetails) -> str:
+    name = ".".join(map(str, error["loc"]))
+    if error["type"] != "extra_forbidden":
+        return f"{name}: {error['msg']}, not {error['input']!r}"
+    return _unknown(name, list(_names()))
+
+
+def _names() -> Iterator[str]:
+    """Of all settings; those of the picture begin with `video.`."""
+    yield from (name for name in Settings.model_fields if name != "video")
+    yield from (f"video.{name}" for name in VideoSettings.model_fields)
+
+
+def _unknown(name: str, known: list[str]) -> str:
+    close = get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(known)}"
+    return f"{name}: no such setting; {hint}"
+
+
+def _refuse_unknown_variables() -> None:
+    """A misspelt variable must not be ignored.
+
+    Raises:
+        SettingsError: there is one.
+    """
+    known = [PREFIX + name.upper().replace(".", "__") for name in _names()]
+    known.append(f"{PREFIX}VIDEO")
+    wrong = [name for name in os.environ if name.startswith(PREFIX) and name not in known]
+    if wrong:
+        raise SettingsError("; ".join(_unknown(name, known) for name in wrong))

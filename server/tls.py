@@ -86,17 +86,20 @@ def certificate(state: Path, names: Iterable[str] = ()) -> Certificate:
     paths = {name: state / f"{name}.pem" for name in ("ca", "ca-key", "server", "server-key")}
     if not (paths["ca"].exists() and paths["ca-key"].exists()):
         _make_authority(paths)
-    if not _is_good(paths["server"], paths["ca"], wanted):
+    if not _is_good(paths, wanted):
         _make_leaf(paths, wanted)
     return Certificate(paths["server"], paths["server-key"], paths["ca"])
 
 
-def _is_good(path: Path, authority: Path, wanted: Iterable[str]) -> bool:
-    """Whether the certificate is ours, lasts, and names all that is wanted."""
+def _is_good(paths: dict[str, Path], wanted: Iterable[str]) -> bool:
+    """Whether the certificate is ours, has its key, lasts, and names all that is wanted."""
     try:
-        leaf = x509.load_pem_x509_certificate(path.read_bytes())
-        issuer = x509.load_pem_x509_certificate(authority.read_bytes())
+        leaf = x509.load_pem_x509_certificate(paths["server"].read_bytes())
+        issuer = x509.load_pem_x509_certificate(paths["ca"].read_bytes())
         leaf.verify_directly_issued_by(issuer)
+        key = serialization.load_pem_private_key(paths["server-key"].read_bytes(), None)
+        if key.public_key() != leaf.public_key():
+            return False
         names = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except (OSError, ValueError, TypeError, InvalidSignature, x509.ExtensionNotFound):
         return False
@@ -112,6 +115,9 @@ def _make_authority(paths: dict[str, Path]) -> None:
         _builder(name, name, key, AUTHORITY_DAYS)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
         .add_extension(_usage(signs=True), critical=True)
+        .add_extension(
+            x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False
+        )
         .sign(key, hashes.SHA256())
     )
     _write(paths["ca"], certificate_.public_bytes(serialization.Encoding.PEM), 0o644)
@@ -133,6 +139,10 @@ def _make_leaf(paths: dict[str, Path], wanted: Iterable[str]) -> None:
         _builder(_name("Lightleash"), authority.subject, key, LEAF_DAYS)
         .add_extension(x509.SubjectAlternativeName(names), critical=False)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(
+            x509.AuthorityKeyIdentifier.from_issuer_public_key(authority_key.public_key()),
+            critical=False,
+        )
         .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
         .add_extension(_usage(signs=False), critical=True)
         .sign(authority_key, hashes.SHA256())

@@ -42,6 +42,7 @@ class VisionThread:
         self._waiting: deque[EncodedFrame] = deque()
         self._condition = threading.Condition()
         self._running = True
+        self._has_gap = False
         self._prior: tuple[Array | None, Array] = (None, np.zeros(3))
         self._t_thumbnail = 0.0
         self.watched = False
@@ -73,7 +74,7 @@ class VisionThread:
             if len(self._waiting) >= MAX_WAITING:
                 self.dropped += len(self._waiting)
                 self._waiting.clear()
-                self._sight.needs_key = True
+                self._has_gap = True
             self._waiting.append(frame)
             self._condition.notify()
 
@@ -95,10 +96,13 @@ class VisionThread:
     def _turn(self) -> None:
         with self._condition:
             self._condition.wait_for(lambda: self._waiting or not self._running)
-            frames = list(self._waiting)
+            frames, has_gap = list(self._waiting), self._has_gap
             self._waiting.clear()
+            self._has_gap = False
         if not frames:
             return
+        if has_gap:
+            self._sight.needs_key = True
         self._on_taken(frames[-1].sequence)
         self.dropped += len(frames) - 1
         sighting = self._sight.see(frames, *self._prior)

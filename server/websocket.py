@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 from collections import deque
 from collections.abc import Awaitable
 
@@ -17,10 +18,13 @@ from server.session import Session
 from server.settings import VideoSettings
 from server.wire import VERSION, Record, WireError
 
+log = logging.getLogger("lightleash")
+
 PING_S = 0.05
 MAX_UNSENT = 16
 """Of one page; a page that does not read loses the oldest."""
 HELLO_S = 5.0
+BUSY = WireError("role", "hello.role", "one phone at a time, and another one leads the robot now")
 
 
 class Connection:
@@ -107,10 +111,11 @@ class PageServer:
         try:
             phone = await self._greet(page, session)
             if role == "operator":
-                pinger = asyncio.create_task(self._ping())
+                pinger = asyncio.create_task(self._ping(phone))
             while not session.hopeless:
                 await self._listen(page, session, phone)
         except WireError as error:
+            log.warning("a page as %s is refused: %s", role, error)
             page.refuse(error, fatal=True)
         except (WebSocketDisconnect, RuntimeError, TimeoutError):
             pass  # it has gone, or never said hello
@@ -121,7 +126,7 @@ class PageServer:
             self._hub.supervisors.discard(page)
             if role == "operator" and phone is not None:
                 self._hub.part(phone)
-            await _quietly(page.close(1008 if session.faults else 1000))
+            await _quietly(page.close(1008 if session.hopeless or session.hello is None else 1000))
 
     async def _greet(self, page: Connection, session: Session) -> OperatorPhone | None:
         """Hear hello, answer welcome, take the place; raises WireError if there is none."""
@@ -132,7 +137,7 @@ class PageServer:
         if session.role == "operator":
             phone = self._hub.greet(hello, page)
             if phone is None:
-                raise WireError("role", "hello.role", "another phone leads the robot now")
+                raise BUSY
         elif session.role == "video":
             phone = self._hub.join_video(hello.session, page)
             if phone is None:
@@ -158,27 +163,30 @@ class PageServer:
     async def _listen(
         self, page: Connection, session: Session, phone: OperatorPhone | None
     ) -> None:
-        """Take one thing the page says; a fault is answered and costs nobody else anything."""
+        """Take one thing the page says; a fault is answered and costs nobody else anything.
+
+        Raises:
+            WireError: another phone has taken the lead.
+        """
         data = await page.read()
         t = now()
-        if phone is not None:
-            if isinstance(data, bytes):
-                self._hub.recordings.record("phone", data, t)
-            else:
-                self._hub.recordings.message("phone", data, t)
+        if phone is not None and self._hub.phone is not phone:
+            raise BUSY
         try:
             said = session.receive(data, t)
+            if phone is not None:
+                self._hub.record(data, t)
             if isinstance(said, Record) and phone is not None:
                 phone.take(said, t)
             elif isinstance(said, Command):
                 self._hub.wish(said, phone.device if phone is not None else "supervisor")
             elif isinstance(said, Log):
-                self._hub.say(f"page: {_printable(said.text)}")
+                self._hub.say(f"page: {said.text}")
         except WireError as error:
             page.refuse(error, fatal=session.hopeless)
 
-    async def _ping(self) -> None:
-        while True:
+    async def _ping(self, phone: OperatorPhone | None) -> None:
+        while phone is not None and self._hub.phone is phone:
             self._hub.ping()
             await asyncio.sleep(PING_S)
 
@@ -186,8 +194,3 @@ class PageServer:
 async def _quietly(closing: Awaitable[None]) -> None:
     with contextlib.suppress(RuntimeError, WebSocketDisconnect):
         await closing
-
-
-def _printable(text: str) -> str:
-    """Without control characters: a log is read in terminals."""
-    return "".join(c if c.isprintable() else "·" for c in text)

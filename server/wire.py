@@ -84,6 +84,7 @@ class Picture:
     height: int
     screen_angle_deg: int
     data: bytes
+    """A JPEG file, an H.264 access unit (Annex B) or a VP8 frame."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,8 @@ DECODERS = {"h264": "h264", "vp8": "vp8"}
 CODECS = ("h264", "vp8", "jpeg")
 BLACK, WHITE = 16, 235
 """Of video luma."""
+ALIGNMENT = 64
+"""FFmpeg's pictures grow to a multiple of this to each side [px] before they are checked."""
 
 
 class DecodeError(ValueError):
@@ -69,10 +71,10 @@ class Encoder:
             return data.tobytes(), True
         key = key or self._count % self._key_every == 0
         frame = av.VideoFrame(self.width, self.height, "yuv420p")
-        plane = np.frombuffer(frame.planes[0], np.uint8).reshape(self.height, -1)
+        plane = np.frombuffer(memoryview(frame.planes[0]), np.uint8).reshape(self.height, -1)
         cv2.LUT(luma, self._video_luma.astype(np.uint8), dst=plane[:, : self.width])
         for chroma in frame.planes[1:]:
-            np.frombuffer(chroma, np.uint8)[:] = 128
+            np.frombuffer(memoryview(chroma), np.uint8)[:] = 128
         frame.pts = self._count * self._ticks
         frame.pict_type = av.video.frame.PictureType.I if key else av.video.frame.PictureType.NONE
         self._count += 1
@@ -101,7 +103,8 @@ class Decoder:
     def _open(self) -> VideoCodecContext:
         context = av.CodecContext.create(DECODERS[self.codec], "r")
         assert isinstance(context, VideoCodecContext)
-        context.options = {"max_pixels": str(self.width * self.height)}
+        coded = [-(-size // ALIGNMENT) * ALIGNMENT for size in (self.width, self.height)]
+        context.options = {"max_pixels": str(coded[0] * coded[1])}
         context.thread_type = "SLICE"
         context.thread_count = 1
         return context
@@ -141,8 +144,9 @@ class Decoder:
         if frame.format.name not in ("yuv420p", "yuvj420p", "nv12", "gray"):
             raise DecodeError(f"pictures of format {frame.format.name}, not yuv420p")
         plane = frame.planes[0]
-        rows = np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)
-        return rows[:, : plane.width]
+        rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
+        luma: Image = rows[:, : plane.width]
+        return luma
 
 
 def jpeg_size(data: bytes) -> tuple[int, int] | None:

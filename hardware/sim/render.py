@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
+import cv2
 import numpy as np
 
 from pipeline.camera import Camera
@@ -59,8 +60,8 @@ def render(
             light = _linear(image[v1:v2, u1:u2]) + patch[v1 - v : v2 - v, u1 - u : u2 - u]
             image[v1:v2, u1:u2] = _gamma(np.minimum(light, 1.0))
     grain = noise[dv : dv + camera.height, du : du + camera.width]
-    # int8 noise in grey levels on a uint8 picture: saturating addition of the two halves
-    return _grainy(image, grain)
+    # the bank is offset by 128: a saturating addition of the noise in grey levels
+    return np.asarray(cv2.addWeighted(image, 1.0, grain, 1.0, -128.0), dtype=np.uint8)
 
 
 def _lights(
@@ -69,7 +70,7 @@ def _lights(
     """Patches of light with the row and column of their corner."""
     lights: list[tuple[Array, int, int]] = []
     times = (np.arange(look.sub_exposures) + 0.5) / look.sub_exposures - 0.5
-    seen = [_projected(camera, pose(t * look.exposure_s), leds_in_b) for t in times]
+    seen = [_projected(camera, pose(t * look.exposure_s), leds_in_b, look) for t in times]
     for led in range(len(leds_in_b)):
         track = [(uv[led], radius[led]) for uv, radius in seen if radius[led] > 0.0]
         if track:
@@ -81,13 +82,15 @@ def _lights(
     return lights
 
 
-def _projected(camera: Camera, at: tuple[Array, Array], leds_in_b: Array) -> tuple[Array, Array]:
+def _projected(
+    camera: Camera, at: tuple[Array, Array], leds_in_b: Array, look: Look
+) -> tuple[Array, Array]:
     """Pixels (n, 2) and apparent radii (n,) [px]; radius 0 behind the camera."""
     R_cb, p_bc_in_c = at
     points = p_bc_in_c + leds_in_b @ R_cb.T
     ahead = points[:, 0] > 0.1
     safe = np.where(ahead[:, None], points, np.array([1.0, 0.0, 0.0]))
-    radius = camera.focal_px * 0.008 / safe[:, 0]
+    radius = camera.focal_px * look.led_radius_m / safe[:, 0]
     return camera.pixels(safe), np.where(ahead, radius, 0.0)
 
 
@@ -122,12 +125,6 @@ def _stage(width: int, height: int, look: Look) -> tuple[Image, Image]:
     sigma = max(0.6, look.noise * slope)
     grain = rng.normal(128.0, sigma, (height + BANK, width + BANK))
     return room, np.clip(np.round(grain), 0, 255).astype(np.uint8)
-
-
-def _grainy(image: Image, grain: Image) -> Image:
-    import cv2
-
-    return np.asarray(cv2.addWeighted(image, 1.0, grain, 1.0, -128.0), dtype=np.uint8)
 
 
 def _gamma(light: Array) -> Image:

@@ -1,6 +1,6 @@
 """Make `docs/*.png`: both pages, at phone and desktop sizes, while a Chromium leads the robot.
 
-    python -m tests.e2e.screenshots [folder]
+python -m tests.e2e.screenshots [folder]
 """
 
 from __future__ import annotations

@@ -88,6 +88,14 @@ def test_a_learnt_force_stays_where_it_is_in_f_when_everything_turns() -> None:
     assert np.linalg.norm(force_in_f[0]) > 1.0
 
 
+def test_taking_over_a_held_force_goes_on_with_that_force() -> None:
+    pid, view, force_in_f = Pid(GAINS), random_view(np.random.default_rng(4)), np.ones(3)
+    still = VirtualView(view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3))
+    pid.take_over(force_in_f)
+    wrench = pid.wrench(pose_error(still, Reference.here(still)), still)
+    np.testing.assert_allclose(still.R_fv @ still.R_vb @ wrench[:3], force_in_f, atol=1e-9)
+
+
 def test_what_the_thrusters_could_not_give_is_not_integrated_for_ever() -> None:
     view = random_view(np.random.default_rng(3))
     still = VirtualView(view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3))

@@ -86,7 +86,19 @@ def test_the_operator_is_as_old_as_the_nonce_it_echoes() -> None:
     ping = ingest.ping(2.0)
     said = ingest.record(Record(9, at(2.5), Touch(True, True, 4, nonce_of(ping))), 2.5)
     assert isinstance(said, Operator)
-    assert (said.t, said.held, said.press) == (2.0, True, 4)
+    assert (said.t, said.held, said.press & 0xFFFFFFFF) == (2.0, True, 4)
+
+
+def test_the_first_press_of_another_phone_is_another_press() -> None:
+    presses = []
+    for first in (1, 2):
+        nonces = iter(range(first, 9000))
+        ingest = Ingest(lambda numbers=nonces: next(numbers))
+        nonce = nonce_of(ingest.ping(2.0))
+        said = ingest.record(Record(1, 1, Touch(True, True, 1, nonce)), 2.0)
+        assert isinstance(said, Operator)
+        presses.append(said.press)
+    assert presses[0] != presses[1]
 
 
 def test_a_hidden_page_holds_nothing() -> None:

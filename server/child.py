@@ -1,0 +1,93 @@
+"""A process that is kept alive: started anew with growing patience, and ended with its parent."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass, field
+
+PR_SET_PDEATHSIG = 1
+BACKOFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
+STEADY_S = 10.0
+"""A process that has lived so long starts with the first back-off again."""
+GRACE_S = 3.0
+
+
+@dataclass(slots=True)
+class Child:
+    """`python -m` with some arguments."""
+
+    name: str
+    arguments: list[str]
+    environment: dict[str, str] = field(default_factory=dict)
+    """Beside our own."""
+    descriptors: tuple[int, ...] = ()
+    """Open files that it inherits."""
+    process: subprocess.Popen[bytes] | None = None
+    deaths: int = 0
+    """In a row."""
+    _started: float = 0.0
+    _due: float | None = 0.0
+    """When to start it [s]; None while it should be alive."""
+
+    @property
+    def alive(self) -> bool:
+        """Whether it runs."""
+        return self.process is not None and self.process.poll() is None
+
+    def revive(self, now: float) -> str:
+        """Start it if it is due, notice its death; gives what people should read, or ""."""
+        if self._due is not None:
+            if now >= self._due:
+                self._start(now)
+            return ""
+        if self.alive or self.process is None:
+            return ""
+        if now - self._started > STEADY_S:
+            self.deaths = 0
+        wait = BACKOFF_S[min(self.deaths, len(BACKOFF_S) - 1)]
+        self.deaths += 1
+        self._due = now + wait
+        return (
+            f"The {self.name} process ended ({_ending(self.process.returncode)}); "
+            f"starting it again in {wait:g} s."
+        )
+
+    def _start(self, now: float) -> None:
+        """It ends with us, however we end; Ctrl-C in the terminal is for us alone."""
+        self._started, self._due = now, None
+        parent = os.getpid()
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", *self.arguments],
+            preexec_fn=lambda: _die_with(parent),
+            start_new_session=True,
+            env={**os.environ, **self.environment},
+            pass_fds=self.descriptors,
+            stdin=subprocess.DEVNULL,
+            stdout=sys.stderr,
+        )
+
+    def stop(self) -> None:
+        """Ask it to end, and make it end if it doesn't."""
+        if self.process is None:
+            return
+        if self.alive:
+            self.process.send_signal(signal.SIGTERM)
+        try:
+            self.process.wait(GRACE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+def _die_with(parent: int) -> None:
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:  # it died before we asked
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _ending(code: int) -> str:
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"

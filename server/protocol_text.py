@@ -1,0 +1,208 @@
+"""The words of `PROTOCOL.md` around its generated tables; every figure is the code's own."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+from starlette.routing import Route, WebSocketRoute
+
+from server import ingest, session, wire
+from server.app import MAX_BODY, Api
+from server.hub import LEASE_S, TICK_S
+from server.phone_client import MAX_IN_FLIGHT
+from server.security import COOKIE, OPERATOR_PATHS, PAIR_TRIES, PAIR_WINDOW_S, PUBLIC_PATHS
+from server.view_proxy import routes as view_routes
+from server.websocket import HELLO_S, PING_S
+from server.wire import Kind
+
+Layout = tuple[type[Any], struct.Struct | None, tuple[tuple[str, int], ...]]
+
+RECORDS: dict[Kind, Layout] = {
+    Kind.MOTION: (
+        wire.Motion,
+        wire.MOTION,
+        (
+            ("rotation_rate", 3),
+            ("acceleration", 3),
+            ("orientation_wxyz", 4),
+            ("screen_angle_deg", 1),
+            ("", 1),
+        ),
+    ),
+    Kind.FRAME: (
+        wire.Picture,
+        wire.FRAME,
+        (("codec", 1), ("", 1), ("width", 1), ("height", 1), ("screen_angle_deg", 1)),
+    ),
+    Kind.TOUCH: (
+        wire.Touch,
+        wire.TOUCH,
+        (("held", 1), ("visible", 1), ("", 1), ("press", 1), ("nonce", 1)),
+    ),
+    Kind.PONG: (wire.Pong, wire.PONG, (("nonce", 1), ("server_time_us", 1))),
+    Kind.PING: (wire.Ping, wire.PING, (("nonce", 1),)),
+    Kind.CREDIT: (wire.Credit, wire.CREDIT, (("sequence", 1),)),
+    Kind.PICTURE: (wire.Thumbnail, None, ()),
+}
+"""Fields of each payload in the order of its bytes; "" is padding."""
+
+CODES = {
+    "type": "not a record or message at all, or of a kind nobody knows",
+    "size": "too short or too long",
+    "version": "another version of the protocol",
+    "value": "out of its range, not finite, or a field nobody knows",
+    "order": "before `hello`, or `hello` twice",
+    "rate": "too much a second",
+    "role": "not as this role, or somebody else has the place",
+    "calibration": "no calibration of this camera at this picture size",
+}
+"""Every code of `Refused` and what it means."""
+
+REQUESTS = {
+    "POST /api/pair": 'body `{"token": "…"}`; answers `{"role": …}` and sets the cookie',
+    "GET /api/whoami": "the role this request has",
+    "POST /api/stop": "STOP, when the socket is gone or stuck",
+    "POST /api/virtual-phone": "start the virtual phone",
+    "DELETE /api/virtual-phone": "stop it",
+    "POST /api/recording": "start recording",
+    "DELETE /api/recording": "stop; answers with the path of the file",
+    "GET /api/invite": "the link for phones and its QR code (SVG)",
+    "GET /api/status": "the last `Status`",
+    "GET /ca.crt": "the authority to install on phones",
+    "GET /healthz": "whether the server lives",
+    "GET /metrics": "Prometheus",
+    "GET /view": "the 3D view's page",
+    "GET /view/": "the same",
+    "socket /view": "the 3D view's socket (viser's protocol); only a viewpoint may go up",
+    "socket /view/": "the same",
+}
+"""What each address is for; the three pages' sockets are told of above."""
+
+
+def _role(path: str) -> str:
+    if path in PUBLIC_PATHS:
+        return "anyone"
+    return "operator, supervisor" if path in OPERATOR_PATHS else "supervisor"
+
+
+def requests() -> str:
+    """The table of requests, in step with the routes.
+
+    Raises:
+        KeyError: a route has no words.
+    """
+    lines = ["| request | role | |", "|---|---|---|"]
+    api = Api.__new__(Api)  # only asked for its routes
+    for route in (*api.routes(), *view_routes(lambda: 0)):
+        assert isinstance(route, (Route, WebSocketRoute))
+        methods = ["socket"] if isinstance(route, WebSocketRoute) else sorted(route.methods or ())
+        for method in methods:
+            if method != "HEAD":
+                request = f"{method} {route.path}"
+                lines.append(f"| `{request}` | {_role(route.path)} | {REQUESTS[request]} |")
+    return "\n".join(lines)
+
+
+def page(records: str, messages: str) -> str:
+    """`PROTOCOL.md`."""
+    codes = "\n".join(f"| `{code}` | {words} |" for code, words in CODES.items())
+    return f"""# Protocol
+
+Version {wire.VERSION}. Generated from `server/wire.py`, `server/messages.py` and the server's
+routes by `python -m server.wire_types`: edit those, not this.
+
+## Sockets
+
+| websocket | role | page → server | server → page |
+|---|---|---|---|
+| `/ws/phone` | operator | `hello`, `command`, `log`; MOTION, TOUCH, PONG | `welcome`, `status`, \
+`refused`, `command` (`key_frame`); PING |
+| `/ws/video` | video | `hello`, `log`; FRAME | `welcome`, `refused`; CREDIT |
+| `/ws/supervisor` | supervisor | `hello`, `command`, `log` | `welcome`, `status`, `refused`; \
+PICTURE |
+
+A binary websocket message is one *record*, a text message is one JSON *message*. Compression is
+off. Phones come by HTTPS; the HTTP listener is for this machine alone.
+
+1. The page sends `hello` within {HELLO_S:g} s; nothing else is taken before it.
+2. The server answers `welcome`, or `refused` with `fatal` and closes. One phone leads at a time:
+   another one is refused (`role`) until the first has gone or was silent for {LEASE_S:g} s. A
+   phone that has lost its place is refused (`role`, `fatal`).
+3. An operator opens `/ws/video` with the `session` of its `welcome`. Pictures have a socket of
+   their own so that a large one never delays a sign of life.
+4. `status` comes every {1e3 * TICK_S:g} ms. A page that does not read loses the oldest, never the
+   newest.
+
+## Authentication
+
+The link shown by `lightleash serve` carries a token of this run behind `#k=`. The page takes it
+out of the address and sends it to `POST /api/pair`, which answers with a cookie: `{COOKIE}` on
+HTTP, `__Host-{COOKIE}` (Secure) on HTTPS; HttpOnly, SameSite=Strict. {PAIR_TRIES} tries in
+{PAIR_WINDOW_S:g} s for each address, then 429. Programs send `Authorization: Bearer <token>`
+instead.
+
+`Host` must be an address of this server (421). Websockets and every request but GET and HEAD must
+come from the server's own pages (403): `Origin` is the server's, and requests carry the header
+`X-Lightleash`. A bearer token stands for both. Without a role: 401, without the right one: 403.
+
+## Requests
+
+{requests()}
+
+Bodies up to {MAX_BODY} bytes. Pages (`/`, `/supervisor`) and their files need no role. Refusals
+are JSON, as below: `code`, `field`, `allowed`.
+
+## Records
+
+Little-endian: a header of {wire.HEADER.size} bytes, then the payload; at most
+{wire.MAX_RECORD_BYTES} bytes together. Kinds below 128 come from the page.
+
+{records}
+
+## Messages
+
+One JSON object each, at most {wire.MAX_MESSAGE_BYTES} bytes from a page. `type` says which.
+Unknown fields from a page are refused; a page ignores those it does not know.
+
+{messages}
+
+## Errors
+
+What can't be taken is answered by `refused` with code, field and what is allowed, to its sender
+alone; nothing else of the sender is lost. After {session.MAX_FAULTS} of them, of which one is
+forgiven every {1.0 / session.FAULTS_HZ:g} s, or when `fatal`, the server closes the connection.
+
+| code | |
+|---|---|
+{codes}
+
+A connection may send {session.RECORDS_HZ:g} records, {1e-6 * session.BYTES_HZ:g} MB and
+{session.MESSAGES_HZ:g} messages a second. A websocket message beyond the size of a record closes
+its connection (1009).
+
+## Flow control
+
+At most {MAX_IN_FLIGHT} FRAMEs may be under way. The server answers each it has taken, refused or
+replaced by a newer one with the CREDIT of the newest number: that one and all before it are done.
+Frames without credit are dropped on the phone, newest wins. `command` `key_frame` from the server
+asks for a FRAME that can be decoded alone.
+
+## Clocks and signs of life
+
+A PING comes every {1e3 * PING_S:g} ms with a fresh random nonce. The page answers PONG at once,
+stamped with its own clock; of the last answers the one with the shortest round trip gives the
+offset between the clocks (NTP's rule). MOTION and FRAME are dated by that; before it is known they
+are dropped, and dated more than {1e3 * ingest.FUTURE_S:g} ms after their arrival they are refused.
+
+TOUCH is made by the page's main thread and returns the newest nonce. The operator's age is that of
+the nonce, so old bytes, a hung page or a proxy that answers pings can't keep the robot flying. Of
+the last {ingest.REMEMBERED_NONCES} nonces each is taken; nonce 0 says that none has come yet. A
+PONG is taken once.
+
+## Versions
+
+`hello`, `welcome` and every record carry the version. There is no negotiation: the server serves
+the pages that fit it, and a page of another version is refused (`version`) and asks its user to
+reload. Any change to bytes, fields or their meaning raises it.
+"""

@@ -1,0 +1,86 @@
+"""The real app behind its real guard on a real socket; the test plays the control process."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import msgspec
+from websockets.asyncio.client import connect
+
+from hardware.camera_file import CAMERAS
+from hardware.robot_file import load_robot
+from server.app import Api, make_app
+from server.control_link import ControlStatus, Endpoint, control_end
+from server.hub import Hub
+from server.launcher import listen
+from server.listener import listener
+from server.recorder import Recordings
+from server.security import Doors, Guard
+from server.settings import VideoSettings
+from server.view_proxy import routes as view_routes
+from server.websocket import PageServer
+
+HOST = "127.0.0.1"
+
+
+def control_status(**changes: object) -> ControlStatus:
+    """What control says at rest, with some `changes`."""
+    plain = {"int": 0, "float": 0.0, "str": "", "bool": False}
+    values: dict[str, object] = {}
+    for name, hint in ControlStatus.__annotations__.items():
+        empty = {} if hint.startswith("dict") else [] if hint.startswith("list") else None
+        values[name] = plain.get(hint, empty)
+    values |= {"omega_b": (0.0, 0.0, 0.0), "thrusts": [0.0] * 8, "reason": "Not armed."}
+    return msgspec.convert(values | changes, ControlStatus, strict=False)
+
+
+class LiveServer:
+    """Hub, doors and guarded app; listens while `running`."""
+
+    port = 0
+
+    def __init__(self, folder: Path) -> None:
+        self.control: Endpoint = control_end(folder)
+        recordings = Recordings(folder / "recordings", {})
+        self.hub = Hub(folder, load_robot("ames").robot, [CAMERAS], recordings)
+        self.doors = Doors()
+        self.api = Api(self.hub, self.doors, "https://robot.lan:8443/#k=x", None)
+        pages = PageServer(self.hub, VideoSettings())
+        self.app = make_app(self.api, pages, view_routes(lambda: 1))
+        self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"])
+
+    def close(self) -> None:
+        """Give the sockets back."""
+        self.control.close()
+        self.hub._control.close()
+
+    def token(self, role: str) -> str:
+        """Of this run."""
+        doors = self.doors
+        return doors.supervisor_token if role == "supervisor" else doors.operator_token
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[LiveServer]:
+        """Listen, and run the hub."""
+        with listen(HOST, 0) as bound:
+            self.port = bound.getsockname()[1]
+            server = listener(self.guard, None)
+            tasks = [
+                asyncio.create_task(server.serve(sockets=[bound])),
+                asyncio.create_task(self.hub.run()),
+            ]
+            try:
+                yield self
+            finally:
+                server.should_exit = server.force_exit = True
+                tasks[1].cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+
+    def open(self, path: str, role: str, **options: object) -> connect:
+        """A websocket as a Python client opens it."""
+        headers = {"Authorization": f"Bearer {self.token(role)}"}
+        url = f"ws://{HOST}:{self.port}{path}"
+        return connect(url, **{"additional_headers": headers, "proxy": None, **options})

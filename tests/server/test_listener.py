@@ -1,0 +1,180 @@
+"""Impatience: heads that never end, too many from one address, messages too long."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import signal
+import socket
+from collections.abc import AsyncIterator
+from types import SimpleNamespace
+
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from server import listener as impatient
+from server.wire import MAX_RECORD_BYTES
+from tests.server.house import eventually
+
+OK = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
+LAST = b"GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+HEAD_S = 0.05
+FAR = "192.0.2.9"
+
+
+async def app(scope, receive, send):
+    """Greets over HTTP, echoes lengths over websockets."""
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.accept"})
+        while (message := await receive())["type"] != "websocket.disconnect":
+            if message["type"] == "websocket.receive":
+                await send({"type": "websocket.send", "text": str(len(message["bytes"]))})
+        return
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"a", b"b")]})
+    await send({"type": "http.response.body", "body": b"hello"})
+
+
+@contextlib.asynccontextmanager
+async def listening() -> AsyncIterator[SimpleNamespace]:
+    with socket.create_server(("127.0.0.1", 0)) as bound:
+        server = impatient.listener(app, None)
+        task = asyncio.create_task(server.serve(sockets=[bound]))
+        try:
+            await eventually(lambda: server.started)
+            yield SimpleNamespace(port=bound.getsockname()[1], server=server)
+        finally:
+            server.should_exit = True
+            await task
+
+
+@pytest.fixture(autouse=True)
+def hurried(monkeypatch):
+    monkeypatch.setattr(impatient, "HEAD_S", HEAD_S)
+
+
+async def speak(port, *parts):
+    """Send `parts`; all that comes back until the server closes."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    for part in parts:
+        writer.write(part)
+        await writer.drain()
+    async with asyncio.timeout(4.0):
+        answer = await reader.read()
+    writer.close()
+    return answer
+
+
+def test_a_head_that_never_ends_is_cut_off():
+    async def run():
+        async with listening() as here:
+            halves = (b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: x\r\nA: b\r\n")
+            answers = await asyncio.gather(*(speak(here.port, half) for half in halves))
+            assert answers == [b"", b"", b""]
+            assert not here.server.server_state.connections
+
+    asyncio.run(run())
+
+
+def test_a_second_head_on_the_same_connection_is_cut_off_too():
+    async def run():
+        async with listening() as here:
+            reader, writer = await asyncio.open_connection("127.0.0.1", here.port)
+            writer.write(OK)
+            assert (await reader.readuntil(b"hello")).startswith(b"HTTP/1.1 200")
+            writer.write(b"GET / HTTP/1.1\r\nHo")
+            async with asyncio.timeout(4.0):  # sooner than any other deadline: those are 5 s
+                await reader.read()
+            writer.close()
+
+    asyncio.run(run())
+
+
+def test_whole_requests_in_pieces_and_in_a_row_are_answered():
+    async def run():
+        async with listening() as here:
+            pieces = (OK[:3], OK[3:], OK + OK, LAST)
+            answer = await speak(here.port, *pieces)
+            assert answer.count(b"HTTP/1.1 200") == 4
+
+    asyncio.run(run())
+
+
+def test_a_websocket_may_be_silent_for_longer_than_a_head():
+    async def run():
+        async with listening() as here:
+            async with connect(f"ws://127.0.0.1:{here.port}/", proxy=None) as page:
+                end = asyncio.get_running_loop().time() + 3.0 * HEAD_S
+                await eventually(lambda: asyncio.get_running_loop().time() > end)
+                await page.send(b"123")
+                assert await page.recv() == "3"
+
+    asyncio.run(run())
+
+
+def test_the_longest_record_passes_and_a_longer_one_closes_that_connection_alone():
+    async def run():
+        async with listening() as here:
+            url = f"ws://127.0.0.1:{here.port}/"
+            async with connect(url, proxy=None) as one, connect(url, proxy=None) as other:
+                await one.send(bytes(MAX_RECORD_BYTES))
+                assert await one.recv() == str(MAX_RECORD_BYTES)
+                await one.send(bytes(MAX_RECORD_BYTES + 2048))
+                with pytest.raises(ConnectionClosed):
+                    await one.recv()
+                assert one.close_code == 1009
+                await other.send(b"12")
+                assert await other.recv() == "2"
+
+    asyncio.run(run())
+
+
+def test_messages_are_not_compressed_so_that_none_is_a_bomb():
+    async def run():
+        async with listening() as here:
+            async with connect(f"ws://127.0.0.1:{here.port}/", proxy=None) as page:
+                assert "Sec-WebSocket-Extensions" not in page.response.headers
+
+    asyncio.run(run())
+
+
+def test_one_address_gets_so_many_connections_and_another_still_gets_its_own(monkeypatch):
+    monkeypatch.setattr(impatient, "MAX_PER_ADDRESS", 2)
+    monkeypatch.setattr(impatient, "HEAD_S", 60.0)
+    addresses = {}
+
+    def address(connection):
+        return addresses.get(getattr(connection, "client", None), "127.0.0.1")
+
+    monkeypatch.setattr(impatient, "_address", address)
+
+    async def open_as(name, port):
+        bound = socket.socket()
+        bound.setblocking(False)
+        bound.bind(("127.0.0.1", 0))
+        addresses[bound.getsockname()] = name
+        await asyncio.get_running_loop().sock_connect(bound, ("127.0.0.1", port))
+        return await asyncio.open_connection(sock=bound)
+
+    async def run():
+        async with listening() as here:
+            crowd = [await open_as(FAR, here.port) for _ in range(4)]
+            async with asyncio.timeout(4.0):
+                assert await crowd[2][0].read() == b""
+                assert await crowd[3][0].read() == b""
+            assert b"200" in await speak(here.port, LAST)
+            for _, writer in crowd:
+                writer.close()
+
+    asyncio.run(run())
+
+
+def test_signals_are_left_to_their_owner():
+    owned = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.getsignal(number) for number in owned]
+
+    async def run():
+        async with listening():
+            assert [signal.getsignal(number) for number in owned] == before
+
+    asyncio.run(run())
