@@ -31,6 +31,8 @@ class Camera:
 
     def pixels(self, points_in_c: Array) -> Array:
         """Pixels (n, 2) of points (n, 3) in front of the camera."""
+        if len(points_in_c) == 0:
+            return np.zeros((0, 2))  # OpenCV refuses
         points_in_o = np.ascontiguousarray(points_in_c @ R_co)  # = (R_oc @ p) for each row
         zero = np.zeros(3)
         if self.model == "equidistant":
@@ -42,6 +44,8 @@ class Camera:
 
     def normalised(self, pixels: Array) -> Array:
         """Undistorted image coordinates (n, 2) on the plane one metre ahead: right, down [m]."""
+        if len(pixels) == 0:
+            return np.zeros((0, 2))
         points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
         if self.model == "equidistant":
             flat = cv2.fisheye.undistortPoints(points, self.K, self.distortion)

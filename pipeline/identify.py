@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
@@ -24,6 +24,9 @@ LOOSE_RAD = 0.14
 """A hypothesis before its refinement: so far off may gravity be, as seen from the robot."""
 START_RMS_PX = 1.2
 """What starts from nothing must fit this well; a wrong name or a lamp for an LED seldom does."""
+SUSPICIOUS_PX = 0.5
+EXPOSED = 0.25
+"""An RMS beyond the former that falls to this share without one LED: its spot is another lamp's."""
 RIVAL = 2.5
 """Another explanation whose RMS is not this much worse is a rival."""
 
@@ -55,27 +58,24 @@ def while_tracking(
 def _common_shift(expected: Array, seen: Array, reach_px: float) -> Match | None:
     """The assignment that most LEDs agree with after one common shift of the picture."""
     best: tuple[int, float, Match] | None = None
-    for led in range(len(expected)):
-        for spot in range(len(seen)):
-            shift = seen[spot] - expected[led]
-            if float(np.abs(shift).max()) > 3.0 * reach_px:
-                continue
-            match, cost = _nearest(expected + shift, seen, reach_px)
-            key = (len(match.led), -cost)
-            if best is None or key > best[:2]:
-                best = (*key, match)
+    shifts = seen[None] - expected[:, None]
+    for shift in shifts[np.abs(shifts).max(axis=2) <= 3.0 * reach_px]:
+        match, cost = _nearest(expected + shift, seen, reach_px)
+        key = (len(match.led), -cost)
+        if best is None or key > best[:2]:
+            best = (*key, match)
     return best[2] if best else None
 
 
 def _nearest(expected: Array, seen: Array, reach_px: float) -> tuple[Match, float]:
     """Each LED takes the nearest spot within reach; a spot belongs to one LED only."""
-    distance = np.linalg.norm(expected[:, None] - seen[None], axis=2)
+    apart = expected[:, None] - seen[None]
+    distance = np.sqrt((apart * apart).sum(axis=2))
+    near = np.argwhere(distance <= reach_px)
     leds: list[int] = []
     taken: list[int] = []
     cost = 0.0
-    for led, spot in sorted(np.ndindex(distance.shape), key=lambda at: distance[at]):
-        if distance[led, spot] > reach_px:
-            break
+    for led, spot in near[np.argsort(distance[near[:, 0], near[:, 1]])].tolist():
         if led not in leds and spot not in taken:
             leds.append(led)
             taken.append(spot)
@@ -154,16 +154,18 @@ def _best(
     """The best explanation, unless a different one is nearly as good: then none."""
     namings: dict[bytes, Naming] = {}
     tried: set[bytes] = set()
+    demanded = config  # grows: who explains fewer LEDs is no rival
     for p_bc_in_c, R_cb in guesses:
         expected = camera.pixels(p_bc_in_c + leds_in_b @ R_cb.T)
         reach_px = LOOSE_RAD * _radius(leds_in_b) / float(p_bc_in_c[0]) * camera.focal_px
         match = _common_shift(expected, spots.pixels, reach_px)
-        if match is None or len(match.led) < config.min_leds or _name(match) in tried:
+        if match is None or len(match.led) < demanded.min_leds or _name(match) in tried:
             continue
         tried.add(_name(match))
-        naming = _verified(camera, leds_in_b, spots, match, config, (p_bc_in_c, R_cb), True)
+        naming = _verified(camera, leds_in_b, spots, match, demanded, (p_bc_in_c, R_cb), True)
         if naming is not None and naming.fit.rms_px < START_RMS_PX:
             namings.setdefault(_name(naming.match), naming)
+            demanded = replace(demanded, min_leds=len(naming.match.led))
     ranked = sorted(namings.values(), key=lambda n: (-len(n.match.led), n.fit.rms_px))
     if not ranked:
         return None
@@ -201,16 +203,21 @@ def _verified(
     algebra: bool = False,
 ) -> Naming | None:
     """Solve; while an LED fits badly and enough are left, leave the worst one out."""
-    while True:
-        fit = pnp.solve(camera, leds_in_b, spots, match, guess, algebra)
-        if fit is None:
-            return None
-        misfit = np.linalg.norm(fit.residuals_px, axis=1)
-        if float(misfit.max()) <= config.tolerance_px:
-            return Naming(match, fit)
-        if len(match.led) <= config.min_leds:
-            return None
-        match = _without_worst(camera, leds_in_b, spots, match, guess)
+    fit = pnp.solve(camera, leds_in_b, spots, match, guess, algebra)
+    naming = Naming(match, fit) if fit is not None else None
+    while naming is not None:
+        misfit_px = float(np.linalg.norm(naming.fit.residuals_px, axis=1).max())
+        believable = misfit_px <= config.tolerance_px
+        if believable and naming.fit.rms_px <= SUSPICIOUS_PX:
+            return naming
+        if len(naming.match.led) <= config.min_leds:
+            return naming if believable else None
+        fewer = _without_worst(camera, leds_in_b, spots, naming.match, guess)
+        exposed = fewer is not None and fewer.fit.rms_px < EXPOSED * naming.fit.rms_px
+        if believable and not exposed:
+            return naming
+        naming = fewer
+    return None
 
 
 def _without_worst(
@@ -219,15 +226,12 @@ def _without_worst(
     spots: Spots,
     match: Match,
     guess: tuple[Array, Array],
-) -> Match:
+) -> Naming | None:
     """Leave one out: the one whose absence helps most."""
-
-    def cost(one: int) -> float:
-        fit = pnp.solve(camera, leds_in_b, spots, _dropped(match, one), guess)
-        return fit.chi2 if fit is not None else float("inf")
-
-    return _dropped(match, min(range(len(match.led)), key=cost))
-
-
-def _dropped(match: Match, one: int) -> Match:
-    return Match(np.delete(match.led, one), np.delete(match.spot, one))
+    namings = []
+    for one in range(len(match.led)):
+        fewer = Match(np.delete(match.led, one), np.delete(match.spot, one))
+        fit = pnp.solve(camera, leds_in_b, spots, fewer, guess)
+        if fit is not None:
+            namings.append(Naming(fewer, fit))
+    return min(namings, key=lambda naming: naming.fit.chi2, default=None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -95,16 +96,28 @@ def starts(leds_in_b: Array, normalised: Array) -> list[tuple[Array, Array]]:
     """Candidate poses (p_bc_in_c, R_cb) of 3 or more named spots, by algebra."""
     image = np.ascontiguousarray(normalised).reshape(-1, 1, 2)
     world = np.ascontiguousarray(leds_in_b)
+    found: list[tuple[Array, Array]] = []
     try:
+        if len(world) <= 4:  # of four, SQPNP alone misses the pose now and then
+            _, turns, shifts = cv2.solveP3P(
+                world[:3], image[:3], np.eye(3), None, flags=cv2.SOLVEPNP_P3P
+            )
+            found += _paired(turns, shifts)
         if len(world) >= 4:
             flag = cv2.SOLVEPNP_SQPNP
             _, turns, shifts, _ = cv2.solvePnPGeneric(world, image, np.eye(3), None, flags=flag)
-        else:
-            _, turns, shifts = cv2.solveP3P(world, image, np.eye(3), None, flags=cv2.SOLVEPNP_P3P)
+            found += _paired(turns, shifts)
     except cv2.error:
         return []
-    pairs = zip(np.asarray(turns, np.float64), np.asarray(shifts, np.float64), strict=True)
-    return [(R_co @ shift.ravel(), R_co @ exp(turn.ravel())) for turn, shift in pairs]
+    return found
+
+
+def _paired(
+    turns: Sequence[cv2.typing.MatLike], shifts: Sequence[cv2.typing.MatLike]
+) -> list[tuple[Array, Array]]:
+    """OpenCV's answers as poses (p_bc_in_c, R_cb)."""
+    rows = zip(np.asarray(turns, np.float64), np.asarray(shifts, np.float64), strict=True)
+    return [(R_co @ shift.ravel(), R_co @ exp(turn.ravel())) for turn, shift in rows]
 
 
 def solve(

@@ -44,6 +44,8 @@ class ControlOptions:
     gains: str
     tau_1: float
     tau_2: float
+    real: bool
+    """The robot is no simulation: it is not armed while the schedule can't be kept."""
 
 
 def parse(argv: Sequence[str] | None) -> ControlOptions:
@@ -57,6 +59,7 @@ def parse(argv: Sequence[str] | None) -> ControlOptions:
     virtual = VirtualCameraConfig()
     parser.add_argument("--tau-1", type=float, default=virtual.tau_1, help="[s], 0: no filter")
     parser.add_argument("--tau-2", type=float, default=virtual.tau_2, help="[s]")
+    parser.add_argument("--real", action="store_true", help="the robot is no simulation")
     return ControlOptions(**vars(parser.parse_args(argv)))
 
 
@@ -77,14 +80,18 @@ def run(options: ControlOptions) -> None:
     robot_file = load_robot(options.robot)
     config = teleop_config(robot_file, options.gains, options.tau_1, options.tau_2)
     warm_up()
-    controller = Controller(robot_file.robot, config)
+    granted = realtime.claim()
+    late = options.real and not granted.startswith(realtime.GRANTED)
+    controller = Controller(
+        robot_file.robot, config, f"No real robot with {granted}." if late else ""
+    )
     follower = UdpFollower(options.host, options.port, ControlEnd.of(robot_file))
     endpoint = control_end(options.runtime)
     stopping: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda n, _frame: stopping.append(n))
     try:
-        _loop(controller, follower, endpoint, realtime.claim(), stopping)
+        _loop(controller, follower, endpoint, granted, stopping)
     finally:
         follower.close()
         endpoint.close()

@@ -30,8 +30,9 @@ SERVER_SILENT_S = 0.5
 class Controller:
     """One robot's control; everything it is told comes with a time."""
 
-    def __init__(self, robot: Robot, config: TeleopConfig) -> None:
-        """Disarmed, until somebody asks."""
+    def __init__(self, robot: Robot, config: TeleopConfig, unfit: str = "") -> None:
+        """Disarmed, until somebody asks; `unfit` says why this process may never arm, if so."""
+        self._unfit = unfit
         self.teleop = Teleop(robot, config)
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
@@ -103,7 +104,7 @@ class Controller:
     def _why_not(self, now: float, robot_reason: str) -> tuple[str, ...]:
         if now - self._t_ready > SERVER_SILENT_S:
             return ("The server is silent.",)
-        return (*self._refusals, robot_reason) if robot_reason else self._refusals
+        return (*self._refusals, *(why for why in (robot_reason, self._unfit) if why))
 
     def _follow_gravity(self, sample: BodyImu) -> None:
         """Low-passed direction of the specific force, turned with the gyroscope: up in b."""

@@ -10,6 +10,8 @@ import time
 import numpy as np
 
 FIFO_PRIORITY = 50
+GRANTED = "SCHED_FIFO"
+"""How `claim` begins when it got what it asked for."""
 MCL_CURRENT, MCL_FUTURE = 1, 2
 
 
@@ -24,7 +26,7 @@ def claim() -> str:
         return "timing degraded: SCHED_FIFO was not permitted (needs CAP_SYS_NICE)"
     libc = ctypes.CDLL(None, use_errno=True)
     locked = libc.mlockall(MCL_CURRENT | MCL_FUTURE) == 0
-    return f"SCHED_FIFO {FIFO_PRIORITY}" + ("" if locked else ", memory not locked")
+    return f"{GRANTED} {FIFO_PRIORITY}" + ("" if locked else ", memory not locked")
 
 
 class Schedule:

@@ -59,7 +59,7 @@ async def serve(settings: Settings, given: Given) -> None:
     base = base_url(settings.host, given.https.getsockname()[1])
     api = Api(hub, doors, f"{base}/#k={doors.operator_token}", tls.authority)
     app = make_app(api, PageServer(hub, settings.video), view_routes(lambda: dashboard.port))
-    guarded = Guard(app, doors, [*own_names(), settings.host, *settings.names])
+    guarded = Guard(app, doors, [*own_names(), *settings.names])
     if settings.record:
         hub.start_recording()
     write_private(given.runtime / RUN_FILE, json.dumps(_run(settings, given, base, doors)))

@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import json
 import os
+import secrets
 import subprocess
 import sys
 import tempfile
@@ -100,6 +101,8 @@ def thread_server(folder: Path) -> Iterator[dict[str, str]]:
     )
     run_file = folder / "lightleash" / "lightleash-run.json"
     while not run_file.exists():
+        if process.poll() is not None:
+            raise RuntimeError("the server with control as a thread did not start")
         time.sleep(0.1)
     time.sleep(1.0)
     try:
@@ -115,10 +118,11 @@ def serve_with_thread(folder: Path) -> None:
     from hardware.robot_file import load_robot
     from hardware.udp_link import UdpFollower
     from pipeline.paper_ekf import warm_up
-    from server import control, serving as server_process
+    from server import control
+    from server import serving as server_process
     from server.control_link import control_end
     from server.controller import Controller
-    from server.launcher import free_udp_port
+    from server.launcher import free_udp_port, listen
     from server.settings import load as load_settings
 
     runtime = folder / "lightleash"
@@ -153,7 +157,9 @@ def serve_with_thread(folder: Path) -> None:
     loop.start()
     try:
         settings = load_settings(["--https-port", "0", "--http-port", "0"])
-        server_process.main(settings, runtime, truth_port)
+        sockets = listen("127.0.0.1", 0), listen("127.0.0.1", 0)
+        given = server_process.Given(runtime, truth_port, *sockets, secrets.token_bytes(32))
+        server_process.main(settings, given)
     finally:
         stopping.append(1)
         robot.terminate()
@@ -170,6 +176,7 @@ def main() -> None:
         serve_with_thread(Path(sys.argv[-1]))
         return
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
+    print(f"{seconds:g} s, a virtual phone at 720p30 and {SUPERVISORS} supervisors; lateness in ms")
     as_process(seconds)
     as_thread(seconds)
 

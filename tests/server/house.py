@@ -19,6 +19,7 @@ from server.clock import now
 from server.control_link import ControlStatus, Input, RequestInput, control_end
 from server.hub import Hub
 from server.listener import listener
+from server.phone_script import DEVICE
 from server.recorder import Recordings
 from server.security import Doors, Guard
 from server.settings import VideoSettings
@@ -132,8 +133,9 @@ class House:
         self.port = 0
 
     def close(self) -> None:
-        self.control.close()
-        self.hub._control.close()
+        for end in (self.control, self.hub._control):
+            if end.fileno() >= 0:
+                end.close()
 
     @contextlib.asynccontextmanager
     async def open(self) -> AsyncIterator[None]:
@@ -162,7 +164,7 @@ class House:
             yield Talker(one)
 
     @contextlib.asynccontextmanager
-    async def operator(self, device: str = "virtual phone") -> AsyncIterator[Talker]:
+    async def operator(self, device: str = DEVICE) -> AsyncIterator[Talker]:
         """An operator that was welcomed."""
         async with self.page("/ws/phone") as page:
             assert (await page.hello("operator", device=device))["type"] == "welcome"

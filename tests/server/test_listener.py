@@ -42,7 +42,8 @@ async def listening() -> AsyncIterator[SimpleNamespace]:
         task = asyncio.create_task(server.serve(sockets=[bound]))
         try:
             await eventually(lambda: server.started)
-            yield SimpleNamespace(port=bound.getsockname()[1], server=server)
+            port = bound.getsockname()[1]
+            yield SimpleNamespace(port=port, url=f"ws://127.0.0.1:{port}/", server=server)
         finally:
             server.should_exit = True
             await task
@@ -102,38 +103,38 @@ def test_whole_requests_in_pieces_and_in_a_row_are_answered():
 
 def test_a_websocket_may_be_silent_for_longer_than_a_head():
     async def run():
-        async with listening() as here:
-            async with connect(f"ws://127.0.0.1:{here.port}/", proxy=None) as page:
-                end = asyncio.get_running_loop().time() + 3.0 * HEAD_S
-                await eventually(lambda: asyncio.get_running_loop().time() > end)
-                await page.send(b"123")
-                assert await page.recv() == "3"
+        async with listening() as here, connect(here.url, proxy=None) as page:
+            end = asyncio.get_running_loop().time() + 3.0 * HEAD_S
+            await eventually(lambda: asyncio.get_running_loop().time() > end)
+            await page.send(b"123")
+            assert await page.recv() == "3"
 
     asyncio.run(run())
 
 
 def test_the_longest_record_passes_and_a_longer_one_closes_that_connection_alone():
     async def run():
-        async with listening() as here:
-            url = f"ws://127.0.0.1:{here.port}/"
-            async with connect(url, proxy=None) as one, connect(url, proxy=None) as other:
-                await one.send(bytes(MAX_RECORD_BYTES))
-                assert await one.recv() == str(MAX_RECORD_BYTES)
-                await one.send(bytes(MAX_RECORD_BYTES + 2048))
-                with pytest.raises(ConnectionClosed):
-                    await one.recv()
-                assert one.close_code == 1009
-                await other.send(b"12")
-                assert await other.recv() == "2"
+        async with (
+            listening() as here,
+            connect(here.url, proxy=None) as one,
+            connect(here.url, proxy=None) as other,
+        ):
+            await one.send(bytes(MAX_RECORD_BYTES))
+            assert await one.recv() == str(MAX_RECORD_BYTES)
+            await one.send(bytes(MAX_RECORD_BYTES + 2048))
+            with pytest.raises(ConnectionClosed):
+                await one.recv()
+            assert one.close_code == 1009
+            await other.send(b"12")
+            assert await other.recv() == "2"
 
     asyncio.run(run())
 
 
 def test_messages_are_not_compressed_so_that_none_is_a_bomb():
     async def run():
-        async with listening() as here:
-            async with connect(f"ws://127.0.0.1:{here.port}/", proxy=None) as page:
-                assert "Sec-WebSocket-Extensions" not in page.response.headers
+        async with listening() as here, connect(here.url, proxy=None) as page:
+            assert "Sec-WebSocket-Extensions" not in page.response.headers
 
     asyncio.run(run())
 
@@ -171,9 +172,9 @@ def test_one_address_gets_so_many_connections_and_another_still_gets_its_own(mon
 
 def test_signals_are_left_to_their_owner():
     owned = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.getsignal(number) for number in owned]
 
     async def run():
+        before = [signal.getsignal(number) for number in owned]
         async with listening():
             assert [signal.getsignal(number) for number in owned] == before
 

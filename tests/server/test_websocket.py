@@ -53,6 +53,7 @@ FAULTS = [
 def test_faults_are_told_by_name_to_their_maker_alone_and_control_hears_nothing(server):
     async def scene():
         async with server.operator() as page, server.supervisor() as watcher:
+            server.control.inputs()
             for code, field, data in FAULTS:
                 await page.socket.send(data)
                 refused = await page.until("refused")
@@ -253,7 +254,7 @@ def test_a_page_that_does_not_read_loses_the_oldest_and_holds_up_nobody(server):
         async with server.supervisor() as watcher, server.operator() as page:
             lazy = next(iter(server.hub.supervisors))
             for k in range(2_000):
-                lazy.push(str(k) * 1000)
+                lazy.push(f'{{"type": "{k}"}}')
             assert len(lazy._unsent) <= 16
             await page.say(type="log", text="still here")
             await watcher.until("status", phones=1)
@@ -310,7 +311,7 @@ def test_a_hub_whose_control_is_gone_says_that_a_stop_did_not_arrive(server, mon
 
 def test_a_camera_that_changes_its_picture_size_is_looked_up_anew(server):
     async def scene():
-        async with server.operator("virtual phone") as page, server.page("/ws/video") as video:
+        async with server.operator() as page, server.page("/ws/video") as video:
             await page.synchronise()
             await eventually(lambda: server.hub.phone.ingest.clock.ready)
             await video.hello("video", session=server.hub.phone.id)

@@ -1,0 +1,252 @@
+"""`lightleash serve` for real: its addresses, and the death of each of its processes in flight."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import ssl
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from websockets.sync.client import connect
+
+from hardware.follower import FollowerError
+from hardware.sim.truth import TruthClient
+from tests.e2e.serving import Serving, serving
+
+pytestmark = pytest.mark.e2e
+MODULES = {"robot": "hardware.sim.robot", "control": "server.control", "server": "_server"}
+ZERO_N = 1e-3
+RAMP_S = 6.0
+"""A ramp of one period of the suspension, with the failsafe's waits before it."""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    with serving(tmp_path_factory.mktemp("serve")) as running:
+        yield running
+
+
+def until(condition: Callable[[], bool], seconds: float, what: str) -> float:
+    """Wait for it; gives how long that took [s]."""
+    start = time.monotonic()
+    while not condition():
+        assert time.monotonic() < start + seconds, f"after {seconds} s still not: {what}"
+        time.sleep(0.02)
+    return time.monotonic() - start
+
+
+def processes(launcher: int) -> dict[str, int]:
+    """The launcher's children by name."""
+    found: dict[str, int] = {}
+    for pid in Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split():
+        with contextlib.suppress(OSError):
+            words = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+            found |= {name: int(pid) for name, module in MODULES.items() if module in words}
+    return found
+
+
+def status(server: Serving) -> dict[str, object]:
+    return server.request("GET", "/api/status")
+
+
+def mode(server: Serving) -> str:
+    """Of the robot, as the server says; "" while it says nothing."""
+    with contextlib.suppress(urllib.error.URLError, OSError, TypeError):
+        return str(status(server)["mode"])
+    return ""
+
+
+def body_imu_rate_hz(server: Serving) -> float:
+    streams = status(server)["streams"]
+    assert isinstance(streams, dict)
+    return float(streams["body_imu"]["rate_hz"])
+
+
+def thrust(truth: TruthClient) -> float:
+    """Sum of the thrusts the simulated robot makes [N]; zero while it is dead."""
+    try:
+        return float(np.abs(truth.latest().thrusts).sum())
+    except FollowerError:
+        return 0.0
+
+
+@contextlib.contextmanager
+def flight(server: Serving) -> Iterator[subprocess.Popen[bytes]]:
+    """A virtual phone leads the robot."""
+    command = [sys.executable, "-m", "server", "phone", "--hand", "steady", "--rest", "1"]
+    phone = subprocess.Popen(command, env=server.environment, stdout=subprocess.DEVNULL)
+    try:
+        until(lambda: mode(server) == "TRACK", 30.0, "TRACK")
+        yield phone
+    finally:
+        phone.send_signal(signal.SIGINT)
+        try:
+            phone.wait(10.0)
+        except subprocess.TimeoutExpired:
+            phone.kill()
+            phone.wait()
+        until(lambda: mode(server) == "DISARMED", 20.0, "DISARMED")
+
+
+def kill(server: Serving, name: str) -> int:
+    pid = processes(server.process.pid)[name]
+    os.kill(pid, signal.SIGKILL)
+    return pid
+
+
+def get(url: str, context: ssl.SSLContext | None = None) -> tuple[int, bytes]:
+    with urllib.request.urlopen(url, timeout=5.0, context=context) as response:
+        return response.status, response.read()
+
+
+def test_its_addresses_answer_and_the_certificate_holds_for_who_trusts_its_authority(
+    server: Serving,
+) -> None:
+    _, authority = get(f"{server.http_url}/ca.crt")
+    trusting = ssl.create_default_context(cadata=authority.decode())
+    for base in (server.https_url, server.local_https):
+        assert b"src/main.js" in get(f"{base}/", trusting)[1]
+    with pytest.raises(urllib.error.URLError, match="CERTIFICATE"):
+        get(f"{server.https_url}/")
+    assert b"src/dashboard/main.js" in get(f"{server.http_url}/supervisor")[1]
+    assert json.loads(get(f"{server.http_url}/healthz")[1]) == {"ok": True}
+
+
+def test_what_it_leaves_on_the_disk_is_for_its_user_alone(server: Serving) -> None:
+    assert server.runtime.stat().st_mode & 0o777 == 0o700
+    assert (server.runtime / "lightleash-run.json").stat().st_mode & 0o777 == 0o600
+    keys = list(server.state.glob("*key*"))
+    assert keys
+    assert {path.stat().st_mode & 0o777 for path in keys} == {0o600}
+
+
+def test_no_secret_is_in_a_command_line(server: Serving) -> None:
+    for pid in (server.process.pid, *processes(server.process.pid).values()):
+        words = Path(f"/proc/{pid}/cmdline").read_text()
+        assert server.operator_token not in words
+        assert server.supervisor_token not in words
+
+
+def test_all_three_run_and_wait_for_a_phone(server: Serving) -> None:
+    assert set(processes(server.process.pid)) == set(MODULES)
+    until(lambda: mode(server) == "DISARMED", 5.0, "DISARMED")
+    until(lambda: "No phone" in str(status(server)["refusals"]), 5.0, "what is missing")
+
+
+def test_a_second_one_in_the_same_place_is_refused_and_the_first_goes_on(server: Serving) -> None:
+    command = [sys.executable, "-m", "server", "serve", "--https-port", "0", "--http-port", "0"]
+    done = subprocess.run(command, env=server.environment, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "runs already" in done.stderr
+    assert status(server)["mode"] == "DISARMED"
+
+
+def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarmed(
+    server: Serving,
+) -> None:
+    with closing(TruthClient(server.truth_port)) as truth, flight(server) as phone:
+        assert thrust(truth) > 1.0
+        pid = kill(server, "control")
+        phone.send_signal(signal.SIGSTOP)  # it would arm again
+        try:
+            until(lambda: mode(server) == "LOST", 3.0, "LOST")
+            until(lambda: thrust(truth) < ZERO_N, RAMP_S, "no thrust")
+            until(lambda: mode(server) == "DISARMED", 10.0, "DISARMED")
+            assert processes(server.process.pid)["control"] != pid
+            assert thrust(truth) < ZERO_N
+        finally:
+            phone.send_signal(signal.SIGCONT)
+
+
+def test_the_server_killed_in_flight_leaves_control_to_ramp_down_and_comes_back_as_it_was(
+    server: Serving,
+) -> None:
+    with closing(TruthClient(server.truth_port)) as truth, flight(server) as phone:
+        assert thrust(truth) > 1.0
+        control = processes(server.process.pid)["control"]
+        kill(server, "server")
+        phone.send_signal(signal.SIGSTOP)
+        try:
+            until(lambda: thrust(truth) < ZERO_N, RAMP_S, "no thrust")
+            until(lambda: mode(server) == "DISARMED", 10.0, "DISARMED, with the old token")
+            assert processes(server.process.pid)["control"] == control
+        finally:
+            phone.send_signal(signal.SIGCONT)
+
+
+def test_a_robot_killed_in_flight_does_not_fly_on_when_it_is_back(server: Serving) -> None:
+    with closing(TruthClient(server.truth_port)) as truth, flight(server) as phone:
+        pid = kill(server, "robot")
+        phone.send_signal(signal.SIGSTOP)
+        try:
+            until(
+                lambda: processes(server.process.pid).get("robot") not in (pid, None), 5.0, "back"
+            )
+            until(lambda: mode(server) == "DISARMED", 10.0, "DISARMED")
+            until(lambda: body_imu_rate_hz(server) > 100.0, 10.0, "the robot's samples")
+            assert thrust(truth) < ZERO_N
+        finally:
+            phone.send_signal(signal.SIGCONT)
+
+
+def test_stop_over_plain_http_cuts_at_once_and_stays(server: Serving) -> None:
+    with closing(TruthClient(server.truth_port)) as truth, flight(server):
+        assert thrust(truth) > 1.0
+        server.request("POST", "/api/stop")
+        until(lambda: thrust(truth) < ZERO_N, 1.0, "no thrust")
+        until(lambda: mode(server) == "STOPPED", 1.0, "STOPPED")
+        until(lambda: "reset" in str(status(server)["refusals"]), 3.0, "reset")
+        reset(server)
+
+
+def reset(server: Serving) -> None:
+    """As a supervisor's page does it."""
+    url = server.http_url.replace("http", "ws") + "/ws/supervisor"
+    headers = {"Authorization": f"Bearer {server.supervisor_token}"}
+    with connect(url, additional_headers=headers, proxy=None) as page:
+        page.send(json.dumps({"type": "hello", "version": 1, "role": "supervisor"}))
+        page.recv()
+        for _ in range(20):
+            page.send(json.dumps({"type": "command", "what": "reset"}))
+            time.sleep(0.1)
+            if mode(server) != "STOPPED":
+                return
+    raise AssertionError("reset was not granted")
+
+
+def test_ctrl_c_ends_all_robot_first_and_leaves_no_socket(tmp_path: Path) -> None:
+    with serving(tmp_path) as server:
+        pids = processes(server.process.pid)
+        assert set(pids) == set(MODULES)
+    assert server.process.returncode == 0
+    assert not [pid for pid in pids.values() if Path(f"/proc/{pid}").exists()]
+    assert not list(server.runtime.glob("*.sock"))
+    assert not (server.runtime / "lightleash-run.json").exists()
+    assert "Stopping: robot first." in (tmp_path / "serve.log").read_text()
+
+
+def test_a_launcher_killed_takes_its_processes_with_it(tmp_path: Path) -> None:
+    with serving(tmp_path) as server:
+        pids = processes(server.process.pid)
+        server.process.kill()
+        server.process.wait()
+        until(lambda: not any(map(running, pids.values())), 5.0, "all gone")
+
+
+def running(pid: int) -> bool:
+    """Alive, and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

@@ -1,0 +1,143 @@
+"""A process kept alive: back-off, patience, and an end with its parent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from server.child import BACKOFF_S, STEADY_S, Child
+
+ROOT = Path(__file__).resolve().parents[2]
+NAME = "lightleash_test_program"
+SLEEPER = "import time; time.sleep(60)"
+STUBBORN = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); time.sleep(60)"
+WRITER = """
+import os
+for descriptor in ({given}, {kept}):
+    try:
+        os.write(descriptor, os.environ["WORD"].encode())
+    except OSError:
+        pass
+"""
+PARENT = f"""
+import time
+from server.child import Child
+child = Child("c", ["{NAME}"])
+child.revive(0.0)
+print(child.process.pid, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def program(tmp_path, monkeypatch):
+    """Gives arguments that make `python -m` run a text."""
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
+
+    def arguments(text):
+        (tmp_path / f"{NAME}.py").write_text(text)
+        return [NAME]
+
+    return arguments
+
+
+def wait_for(condition):
+    end = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.005)
+
+
+def die(child, now):
+    """Start it, wait for its death, and hear what is said of it."""
+    assert child.revive(now) == ""
+    wait_for(lambda: not child.alive)
+    return child.revive(now)
+
+
+def test_what_dies_at_once_is_started_with_growing_patience(program):
+    child, now = Child("c", program("raise SystemExit(3)")), 100.0
+    for wait in (*BACKOFF_S, BACKOFF_S[-1]):
+        said = die(child, now)
+        assert said == f"The c process ended (exit code 3); starting it again in {wait:g} s."
+        dead = child.process
+        assert child.revive(now + 0.99 * wait) == ""
+        assert child.process is dead
+        now += wait
+    assert child.deaths == len(BACKOFF_S) + 1
+
+
+def test_what_has_lived_long_is_started_soon(program):
+    child = Child("c", program(SLEEPER), deaths=4)
+    child.revive(0.0)
+    os.kill(child.process.pid, signal.SIGKILL)
+    wait_for(lambda: not child.alive)
+    assert "SIGKILL" in child.revive(STEADY_S + 1.0)
+    assert child.deaths == 1
+
+
+def test_what_lives_is_left_alone(program):
+    child = Child("c", program(SLEEPER))
+    child.revive(0.0)
+    process = child.process
+    assert child.revive(1e6) == ""
+    assert child.process is process
+    child.stop()
+
+
+def test_it_is_asked_to_end(program):
+    child = Child("c", program(SLEEPER))
+    child.revive(0.0)
+    child.stop()
+    assert child.process.returncode == -signal.SIGTERM
+
+
+def test_what_does_not_end_is_made_to(program, monkeypatch):
+    monkeypatch.setattr("server.child.GRACE_S", 0.05)
+    child = Child("c", program(STUBBORN))
+    child.revive(0.0)
+    wait_for(lambda: ignores_term(child.process.pid))
+    child.stop()
+    assert child.process.returncode == -signal.SIGKILL
+
+
+def test_what_never_started_and_what_has_ended_can_be_stopped(program):
+    Child("c", program(SLEEPER)).stop()
+    child = Child("c", program("pass"))
+    die(child, 0.0)
+    child.stop()
+
+
+def test_it_ends_with_its_parent_however_that_ends(program):
+    program(SLEEPER)
+    command = [sys.executable, "-c", PARENT]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as parent:
+        stat = Path(f"/proc/{int(parent.stdout.readline())}/stat")
+        assert stat.exists()
+        parent.kill()
+    wait_for(lambda: not stat.exists() or stat.read_text().split()[2] == "Z")
+
+
+def test_it_inherits_the_files_and_words_it_is_given_and_no_other_files(program):
+    given, kept = os.pipe(), os.pipe()
+    text = WRITER.format(given=given[1], kept=kept[1])
+    child = Child("c", program(text), {"WORD": "hello"}, (given[1],))
+    die(child, 0.0)
+    os.set_blocking(kept[0], False)
+    assert os.read(given[0], 9) == b"hello"
+    with pytest.raises(BlockingIOError):
+        os.read(kept[0], 9)
+    for descriptor in (*given, *kept):
+        os.close(descriptor)
+
+
+def ignores_term(pid):
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    mask = next(line.split()[1] for line in lines if line.startswith("SigIgn"))
+    return int(mask, 16) >> (signal.SIGTERM - 1) & 1

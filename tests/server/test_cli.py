@@ -1,0 +1,79 @@
+"""The command: one word, quick help, clear refusals."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+import server
+from server import cli
+
+
+def test_help_names_every_command(capsys):
+    for words in ([], ["--help"], ["-h"], ["help"]):
+        assert cli.main(words) == 0
+        said = capsys.readouterr().out
+        assert [name for name in cli.COMMANDS if name not in said] == ["_server"]
+
+
+def test_an_unknown_word_is_answered_with_those_there_are(capsys):
+    assert cli.main(["fly"]) == 2
+    said = capsys.readouterr().err
+    assert "'fly'" in said
+    assert "serve, phone, replay, experiments, doctor" in said
+    assert "_server" not in said
+
+
+def test_version(capsys):
+    assert cli.main(["--version"]) == 0
+    assert server.__version__ in capsys.readouterr().out
+
+
+def test_help_loads_nothing_heavy():
+    code = "import sys; from server.cli import main; main(['--help']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    heavy = {"numpy", "cv2", "av", "viser", "starlette", "pydantic", "mujoco", "asyncio"}
+    assert not heavy & set(done.stdout.split())
+
+
+@pytest.mark.parametrize("name", ["phone", "replay", "experiments", "doctor"])
+def test_each_command_gets_its_own_words(name, monkeypatch):
+    heard = []
+    module = {"phone": "virtual_phone"}.get(name, name)
+    stub = SimpleNamespace(main=lambda words: heard.append(words) or 7)
+    monkeypatch.setitem(sys.modules, f"server.{module}", stub)
+    monkeypatch.setattr(server, module, stub, raising=False)
+    assert cli.main([name, "--seconds", "3"]) == 7
+    assert heard == [["--seconds", "3"]]
+
+
+def test_a_command_ended_by_hand_says_so_with_its_code(monkeypatch):
+    def interrupted(words):
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(cli.COMMANDS, "doctor", interrupted)
+    assert cli.main(["doctor"]) == 130
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--config"], "a TOML file must follow"),
+        (["--config", "/nowhere.toml"], "/nowhere.toml"),
+        (["--https-port", "70000"], "65535"),
+        (["--robot", "nobody"], "no such robot"),
+        (["--gains", "none"], "paper_with_ekf"),
+    ],
+)
+def test_serve_refuses_in_one_line_before_anything_starts(
+    words, said, capsys, monkeypatch, tmp_path
+):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    ports = ["--http-port", "0"] + (["--https-port", "0"] if "--https-port" not in words else [])
+    assert cli.main(["serve", *ports, *words]) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1

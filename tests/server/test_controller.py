@@ -1,0 +1,190 @@
+"""Controller: what the control process does in a tick, in virtual time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, nan
+
+import msgspec
+import numpy as np
+
+from hardware.follower import ThrustCommand
+from hardware.robot_file import load_robot
+from pipeline.config import TeleopConfig
+from pipeline.frames import GRAVITY
+from pipeline.signals import BodyImu, Mode
+from pipeline.teleop import Output
+from server.control_link import (
+    ControlStatus,
+    Input,
+    OperatorInput,
+    PhoneImuInput,
+    PoseInput,
+    ReadyInput,
+    RequestInput,
+    control_end,
+    server_end,
+)
+from server.controller import SERVER_SILENT_S, Controller
+
+ROBOT = load_robot("ames").robot
+UP, STILL = (0.0, 0.0, GRAVITY), (0.0, 0.0, 0.0)
+EYE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+COVARIANCE = np.diag([1e-6] * 6).ravel().tolist()
+
+
+class Rig:
+    """A phone at rest that sees a robot at rest; time passes as `run` says."""
+
+    def __init__(self) -> None:
+        self.controller = Controller(ROBOT, TeleopConfig())
+        self.k = 0
+        self.held = False
+        self.press = 0
+        self.ready: list[str] | None = []
+
+    def said(self, t: float) -> list[Input]:
+        said: list[Input] = []
+        if self.k % 3 == 0:
+            said.append(PhoneImuInput(t - 0.02, STILL, UP))
+        if self.k % 6 == 0:
+            said.append(PoseInput(t - 0.05, (2.5, 0.0, 0.0), EYE, COVARIANCE, 0.2, 5))
+        if self.ready is not None:
+            said.append(ReadyInput(self.ready))
+        return [*said, OperatorInput(t - 0.01, self.held, self.press)]
+
+    def run(
+        self, seconds: float, extra: Sequence[Input] = (), robot_reason: str = ""
+    ) -> list[tuple[ThrustCommand, Output]]:
+        """`extra` comes in the first tick."""
+        out = []
+        for step in range(round(seconds / 0.005)):
+            self.k += 1
+            t = 100.0 + 0.005 * self.k
+            said = [*self.said(t), *(extra if step == 0 else ())]
+            body = [BodyImu(t - 0.003, np.zeros(3), np.array(UP))]
+            out.append(self.controller.tick(t, said, body, robot_reason))
+        return out
+
+    def track(self) -> None:
+        """Arm and press."""
+        self.run(1.0)
+        self.run(0.1, [RequestInput("arm")])
+        self.held, self.press = True, self.press + 1
+        assert self.run(0.5)[-1][1].failsafe.mode == Mode.TRACK
+
+    def status(self, output: Output) -> ControlStatus:
+        return self.controller.status(output, 1, "FIFO", {}, 0.5, 0)
+
+
+def test_it_is_armed_by_request_follows_a_press_and_stops_at_once():
+    rig = Rig()
+    assert not rig.run(1.0)[-1][0].armed
+    rig.track()
+    command, output = rig.run(0.1)[-1]
+    assert command.armed
+    command, output = rig.run(0.005, [RequestInput("stop")])[-1]
+    assert output.failsafe.mode == Mode.STOPPED
+    assert not command.armed
+    assert not command.thrusts.any()
+
+
+def test_a_stop_wins_over_every_other_wish_of_the_same_tick():
+    rig = Rig()
+    rig.track()
+    wishes = [RequestInput(what) for what in ("arm", "stop", "reset", "disarm")]
+    assert rig.run(0.05, wishes)[-1][1].failsafe.mode == Mode.STOPPED
+
+
+def test_an_unknown_wish_is_no_wish():
+    rig = Rig()
+    rig.run(1.0)
+    for what in ("", "fly", "__class__", "key_frame", "ARM"):
+        assert rig.run(0.01, [RequestInput(what)])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+def test_before_the_server_has_spoken_and_when_it_falls_silent_arming_is_refused():
+    rig = Rig()
+    rig.ready = None
+    output = rig.run(1.0)[-1][1]
+    assert "The server is silent." in output.refusals
+    rig.ready = []
+    assert rig.run(0.01)[-1][1].refusals == ()
+    rig.ready = None
+    assert rig.run(SERVER_SILENT_S - 0.02)[-1][1].refusals == ()
+    assert rig.run(0.04)[-1][1].refusals == ("The server is silent.",)
+    assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+def test_what_server_and_robot_have_against_arming_is_all_told():
+    rig = Rig()
+    rig.ready = ["No pictures."]
+    output = rig.run(1.0, robot_reason="The robot ramps.")[-1][1]
+    assert output.refusals[:2] == ("No pictures.", "The robot ramps.")
+    assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+def test_a_silent_server_ends_a_flight_in_a_ramp():
+    rig = Rig()
+    rig.track()
+    rig.said = lambda t: []  # type: ignore[method-assign]
+    limits = TeleopConfig().failsafe
+    seconds = limits.ramp_start + ROBOT.suspension_period_s + 0.2
+    modes = [output.failsafe.mode for _, output in rig.run(seconds)]
+    order = [mode for mode, before in zip(modes, [None, *modes], strict=False) if mode != before]
+    assert order == [Mode.TRACK, Mode.HOLD, Mode.RAMP, Mode.DISARMED]
+
+
+def test_what_is_no_number_never_reaches_the_state_by_a_datagram(tmp_path):
+    rig, server, control = Rig(), server_end(tmp_path), control_end(tmp_path)
+    rig.track()
+    heard: list[Input] = []
+    for bad in (nan, inf, -inf, 1e300):
+        server.send(PhoneImuInput(101.5, (bad, 0.0, 0.0), UP))
+        server.send(PhoneImuInput(bad, STILL, UP))
+        server.send(PoseInput(101.5, (bad, 0.0, 0.0), EYE, COVARIANCE, 0.2, 5))
+        server.send(PoseInput(101.5, STILL, EYE, [bad] * 36, 0.2, 5))
+        server.send(PoseInput(101.5, STILL, EYE, [], 0.2, 5))
+        server.send(OperatorInput(bad, True, 5))
+        heard += control.inputs()
+    server.close()
+    control.close()
+    output = rig.run(0.5, heard)[-1][1]
+    assert heard == []
+    assert control.dropped == 24
+    assert output.failsafe.mode == Mode.TRACK
+    assert output.relative is not None
+    assert np.isfinite(output.relative.p_bc_in_c).all()
+    assert np.isfinite(output.thrusts).all()
+
+
+def test_a_status_tells_everything_once_and_survives_the_link():
+    rig = Rig()
+    first = rig.status(rig.run(0.005)[-1][1])
+    assert first.p_bc_in_c is None
+    assert first.mode == Mode.DISARMED
+    rig.track()
+    rig.status(rig.run(0.1)[-1][1])
+    status = rig.status(rig.run(0.02)[-1][1])
+    assert len(status.body_samples) == 4
+    assert status.body_imu_rate_hz == 200.0
+    np.testing.assert_allclose(status.p_bc_in_c, (2.5, 0.0, 0.0), atol=1e-2)
+    np.testing.assert_allclose(status.up_in_b, (0.0, 0.0, 1.0), atol=1e-6)
+    assert status.error_m is not None
+    assert status.poses_fused > 0
+    assert 40.0 < status.fuse_ms < 80.0
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
+
+
+def test_up_in_the_body_follows_a_turn_and_ignores_free_fall():
+    controller = Controller(ROBOT, TeleopConfig())
+    rate, angle = np.array([0.5, 0.0, 0.0]), 0.0
+    for k in range(400):
+        angle = 0.5 * 0.005 * k
+        up = np.array([0.0, np.sin(angle), np.cos(angle)])
+        controller.tick(0.005 * k, [], [BodyImu(0.005 * k, rate, GRAVITY * up)], "")
+    assert controller.up_in_b is not None
+    assert float(controller.up_in_b @ up) > np.cos(np.radians(1.0))
+    before = controller.up_in_b
+    controller.tick(2.0, [], [BodyImu(2.0, rate, np.zeros(3))], "")
+    np.testing.assert_array_equal(controller.up_in_b, before)

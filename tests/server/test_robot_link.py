@@ -1,0 +1,97 @@
+"""RobotLink: the robot's samples on our clock, and its reasons in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hardware.follower import EXPLANATIONS, BodySample, FollowerState, Refusal, ThrustCommand
+from server.robot_link import BodyClock, RobotLink
+
+ZERO = ThrustCommand.zero(8)
+
+
+def sample(
+    t_us: int,
+    state: FollowerState = FollowerState.IDLE,
+    refusal: Refusal = Refusal.NONE,
+    boot_id: int = 1,
+) -> BodySample:
+    up = np.array([0.0, 0.0, 9.81])
+    return BodySample(t_us, np.zeros(3), up, np.zeros(8), state, boot_id, refusal, None)
+
+
+class Script:
+    """A follower that gives what it was told to give."""
+
+    thrusters = 8
+
+    def __init__(self) -> None:
+        self.commands: list[ThrustCommand] = []
+        self.next: list[BodySample] = []
+
+    def exchange(self, command: ThrustCommand) -> list[BodySample]:
+        self.commands.append(command)
+        given_, self.next = self.next, []
+        return given_
+
+    def stop(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+@given(
+    st.lists(st.floats(0.0, 0.2), min_size=5, max_size=100), st.floats(-1e5, 1e5), st.floats(0, 1)
+)
+def test_samples_are_never_later_than_they_arrive_and_their_spacing_stays(
+    delays: list[float], offset: float, start: float
+) -> None:
+    clock = BodyClock()
+    dated = []
+    for k, delay in enumerate([0.0, *delays]):
+        taken = start + 0.005 * k
+        t_us = round(1e6 * taken)
+        imu = clock.imu(sample(t_us), offset + 1e-6 * t_us + delay)
+        assert imu.t <= offset + 1e-6 * t_us + delay + 1e-9
+        dated.append(imu.t)
+    np.testing.assert_allclose(np.diff(dated), 0.005, atol=1e-6)
+    assert dated[0] == pytest.approx(offset + start, abs=1e-5)
+
+
+def test_a_path_that_grew_longer_is_believed_after_a_second() -> None:
+    clock = BodyClock()
+    for k in range(300):
+        clock.imu(sample(5_000 * k), 0.005 * k + 0.001)
+    for k in range(300, 501):
+        imu = clock.imu(sample(5_000 * k), 0.005 * k + 0.011)
+    assert imu.t == pytest.approx(2.5 + 0.011)
+
+
+def test_a_robot_that_restarts_has_another_clock() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    follower.next = [sample(50_000_000)]
+    link.exchange(ZERO, 100.0)
+    follower.next = [sample(5_000, boot_id=2)]
+    (imu,) = link.exchange(ZERO, 101.0)
+    assert imu.t == pytest.approx(101.0)
+
+
+def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    assert link.exchange(ZERO, 1.0) == []
+    assert link.reason == "The robot has not answered yet."
+    for refusal in Refusal:
+        for state in FollowerState:
+            follower.next = [sample(1_000, state, refusal)]
+            link.exchange(ZERO, 1.0)
+            refuses = state in (FollowerState.RAMP, FollowerState.REFUSING)
+            assert link.reason == (EXPLANATIONS[refusal] if refuses else "")
+    follower.next = []
+    before = link.reason
+    link.exchange(ZERO, 2.0)
+    assert link.reason == before
+    assert follower.commands[-1] is ZERO
