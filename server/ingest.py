@@ -37,8 +37,7 @@ class Ingest:
     def __init__(self, new_nonce: Callable[[], int]) -> None:
         """`new_nonce` gives unpredictable 64-bit numbers (live) or a seeded sequence (tests)."""
         self._new_nonce = new_nonce
-        # another phone's first press must not look like this one's: it would not count as new
-        self._press_base = (new_nonce() & 0x7FFFFFFF) << 32
+        self._press_base = 0
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._answered: set[int] = set()
         self._last_motion_t = -np.inf
@@ -51,6 +50,9 @@ class Ingest:
     def ping(self, now: float) -> Record:
         """The next PING, to be sent at `now` [s]."""
         nonce = self._new_nonce()
+        if self._pings == 0:
+            # another phone's first press must not look like this one's: it would not count as new
+            self._press_base = (nonce & 0x7FFFFFFF) << 32
         self._asked[nonce] = now
         while len(self._asked) > REMEMBERED_NONCES:
             old, _ = self._asked.popitem(last=False)

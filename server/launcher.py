@@ -158,7 +158,7 @@ def main(settings: Settings, arguments: Sequence[str]) -> int:
         ):
             children = children_of(settings, arguments, runtime, (https, http))
             launcher = Launcher(children, runtime / RUN_FILE)
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, launcher.stop)
             return launcher.run()
     except (RobotFileError, BusyError, OSError) as error:

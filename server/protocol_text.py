@@ -178,8 +178,8 @@ forgiven every {1.0 / session.FAULTS_HZ:g} s, or when `fatal`, the server closes
 {codes}
 
 A connection may send {session.RECORDS_HZ:g} records, {1e-6 * session.BYTES_HZ:g} MB and
-{session.MESSAGES_HZ:g} messages a second. A websocket message beyond the size of a record closes
-its connection (1009).
+{session.MESSAGES_HZ:g} messages a second; `stop` is always taken. A websocket message beyond the
+size of a record closes its connection (1009).
 
 ## Flow control
 

@@ -86,9 +86,9 @@ class Session:
         return record
 
     def _message(self, text: str, now: float) -> FromPage:
-        if not self._messages.take(now):
-            raise WireError("rate", "message", f"{MESSAGES_HZ:g} a second")
         message = decode_message(text)
+        if not self._messages.take(now) and message != Command("stop"):
+            raise WireError("rate", "message", f"{MESSAGES_HZ:g} a second")
         if isinstance(message, Hello):
             return self._greeted(message)
         if self.hello is None:

@@ -26,6 +26,9 @@ BLACK, WHITE = 16, 235
 """Of video luma."""
 ALIGNMENT = 64
 """FFmpeg's pictures grow to a multiple of this to each side [px] before they are checked."""
+MAX_SCANS = 32
+"""Of a JPEG: a progressive one has about ten, and a small hostile one thousands, each a pass."""
+SCAN = b"\xff\xda"
 
 
 class DecodeError(ValueError):
@@ -94,6 +97,7 @@ class Decoder:
             raise ValueError(f"codec: {codec!r} is not one of {', '.join(CODECS)}")
         self.codec, self.width, self.height = codec, width, height
         self._context = None if codec == "jpeg" else self._open()
+        self._whole = False
 
     @property
     def full_range(self) -> bool:
@@ -113,7 +117,8 @@ class Decoder:
         """Luma (height, width) of a picture; valid until the next call.
 
         Raises:
-            DecodeError: garbage, another size, or a picture that needs one that was lost.
+            DecodeError: garbage, damage, another size, or no key frame yet. A picture lost before
+                this one does not show in the bytes: who loses one must go on at a key frame.
         """
         if not data:
             raise DecodeError("an empty picture")
@@ -128,12 +133,19 @@ class Decoder:
         size = jpeg_size(data)
         if size != (self.width, self.height):
             raise DecodeError(f"a JPEG of size {size}, not {self.width}x{self.height}")
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
+        if data.count(SCAN) > MAX_SCANS:
+            raise DecodeError(f"a JPEG of {data.count(SCAN)} scans; at most {MAX_SCANS} are taken")
+        upright = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION  # as the sensor saw it
+        try:
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), upright)
+        except cv2.error as error:
+            raise DecodeError(f"not a JPEG: {error}") from error
         if image is None:
             raise DecodeError("not a whole JPEG")
         return np.asarray(image, dtype=np.uint8)
 
     def _video(self, context: VideoCodecContext, data: bytes) -> Image:
+        whole, self._whole = self._whole, False  # until all went well
         try:
             frames = context.decode(av.Packet(data))
         except av.error.FFmpegError as error:
@@ -141,10 +153,14 @@ class Decoder:
         if not frames:
             raise DecodeError(f"no {self.codec} picture in these bytes: wait for a key frame")
         frame = frames[-1]
+        # FFmpeg paints damage over with older pictures, and goes on from there: LEDs of the past
+        if frame.is_corrupt or not (whole or frame.key_frame):
+            raise DecodeError(f"damaged {self.codec}: wait for a key frame")
         if frame.format.name not in ("yuv420p", "yuvj420p", "nv12", "gray"):
             raise DecodeError(f"pictures of format {frame.format.name}, not yuv420p")
         plane = frame.planes[0]
         rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
+        self._whole = (plane.width, plane.height) == (self.width, self.height)
         luma: Image = rows[:, : plane.width]
         return luma
 

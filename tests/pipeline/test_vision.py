@@ -121,7 +121,7 @@ def test_who_jumps_is_found_again_in_the_same_picture():
 def test_an_led_outside_the_picture_does_no_harm():
     rng = np.random.default_rng(57)
     truth = truth_at(rng)
-    while CAMERA.sees(truth.pixels(), 8.0).sum() > 4:
+    while CAMERA.sees(truth.pixels()).sum() > 4:
         truth = replace(truth, p=truth.p + np.array([0.0, 0.01, 0.0]))
     for sighting in follow(vision(), [truth] * 4, rng):
         assert not is_wrong(sighting.pose, truth)

@@ -144,7 +144,9 @@ def test_a_virtual_phone_is_one_process_that_can_be_ended(house, client, monkeyp
     assert not house.api.phone.running
 
 
-@pytest.mark.parametrize("body", [b"", b"[]", b"{}", b'{"token": 1}', b"\xff", b'{"token": "' + bytes(5000)])
+@pytest.mark.parametrize(
+    "body", [b"", b"[]", b"{}", b'{"token": 1}', b"\xff", b'{"token": "' + bytes(5000)]
+)
 def test_a_pairing_that_is_none_is_refused_by_name(client, body):
     headers = {"Origin": BASE, "X-Lightleash": "1", "Authorization": ""}
     answer = client.post("/api/pair", content=body, headers=headers)

@@ -1,0 +1,160 @@
+import copy
+
+import numpy as np
+import pytest
+import yaml
+
+from hardware.camera_file import CAMERAS, CameraFileError, find_camera, load_camera, slug
+
+INFO = yaml.safe_load((CAMERAS / "virtual_phone.yaml").read_text())
+KALIBR = {
+    "cam0": {
+        "camera_model": "pinhole",
+        "intrinsics": [930.0, 931.0, 646.0, 354.0],
+        "distortion_model": "radtan",
+        "distortion_coeffs": [0.06, -0.11, 0.0006, -0.0004],
+        "resolution": [1280, 720],
+    }
+}
+
+
+def changed(table, path, value):
+    table = copy.deepcopy(table)
+    *parents, key = path
+    at = table
+    for parent in parents:
+        at = at[parent]
+    if value is None:
+        del at[key]
+    else:
+        at[key] = value
+    return table
+
+
+def written(tmp_path, table, name="phone.yaml"):
+    path = tmp_path / name
+    path.write_text(table if isinstance(table, str) else yaml.safe_dump(table))
+    return path
+
+
+def test_a_camera_info_file_is_read(tmp_path):
+    table = changed(INFO, ["rolling_shutter_readout_s"], 0.016)
+    name, camera = load_camera(written(tmp_path, table))
+    assert name == "lightleash-virtual-phone"
+    assert (camera.width, camera.height, camera.model) == (1280, 720, "plumb_bob")
+    assert camera.K.tolist() == [[930.0, 0.0, 646.0], [0.0, 931.5, 354.0], [0.0, 0.0, 1.0]]
+    assert camera.distortion.tolist() == [0.06, -0.11, 0.0006, -0.0004, 0.0]
+    assert camera.readout_s == 0.016
+
+
+def test_what_is_ours_in_it_may_be_missing(tmp_path):
+    table = changed(changed(INFO, ["rolling_shutter_readout_s"], None), ["camera_name"], None)
+    name, camera = load_camera(written(tmp_path, table, "nameless.yaml"))
+    assert name == "nameless"
+    assert camera.readout_s == 0.0
+
+
+def test_a_kalibr_camchain_is_read(tmp_path):
+    name, camera = load_camera(written(tmp_path, KALIBR, "pixel-7.yaml"))
+    assert name == "pixel-7"
+    assert (camera.width, camera.height, camera.model) == (1280, 720, "plumb_bob")
+    assert camera.K.tolist() == [[930.0, 0.0, 646.0], [0.0, 931.0, 354.0], [0.0, 0.0, 1.0]]
+    point = np.array([[2.0, 0.1, 0.1]])
+    assert camera.sees(camera.pixels(point)).all()
+
+
+def test_kalibrs_fisheye_is_equidistant(tmp_path):
+    table = changed(KALIBR, ["cam0", "distortion_model"], "equidistant")
+    assert load_camera(written(tmp_path, table))[1].model == "equidistant"
+
+
+K = ["camera_matrix", "data"]
+FAULTS = [
+    (["distortion_model"], "banana", "distortion_model", "plumb_bob, rational_polynomial"),
+    (["distortion_model"], "equidistant", "distortion_coefficients", "4 numbers for equidistant"),
+    (["distortion_model"], None, "distortion_model", "must be there"),
+    (["distortion_coefficients", "data"], [0.1] * 6, "distortion_coefficients", "4 or 5 numbers"),
+    (["distortion_coefficients", "data"], [0.1, float("nan"), 0, 0], "distortion_coef", "finite"),
+    (["distortion_coefficients"], None, "distortion_coefficients", "must be there"),
+    (K, [930.0, 0, 646.0, 0, 931.5, 354.0, 0, 0], "camera_matrix", "9 finite numbers"),
+    (K, [930.0, 0, 646.0, 0, float("inf"), 354.0, 0, 0, 1], "camera_matrix", "9 finite numbers"),
+    (K, [930.0, "x", 646.0, 0, 931.5, 354.0, 0, 0, 1], "camera_matrix", "9 finite numbers"),
+    (K, [[930.0, 0, 646.0], [0, 931.5, 354.0], [0, 0, 1]], "camera_matrix", "9 finite numbers"),
+    (K, [-930.0, 0, 646.0, 0, 931.5, 354.0, 0, 0, 1], "camera_matrix", "fx, fy > 0"),
+    (K, [930.0, 2.0, 646.0, 0, 931.5, 354.0, 0, 0, 1], "camera_matrix", "[fx, 0, cx"),
+    (K, [930.0, 0, 646.0, 2.0, 931.5, 354.0, 0, 0, 1], "camera_matrix", "[fx, 0, cx"),
+    (K, [930.0, 0, 646.0, 0, 931.5, 354.0, 0, 0, 2.0], "camera_matrix", "[fx, 0, cx"),
+    (["camera_matrix"], 5.0, "camera_matrix", "9 finite numbers"),
+    (["image_width"], None, "image_width", "must be there"),
+    (["image_width"], "wide", "image_width", "a number from 16 to 8192"),
+    (["image_width"], True, "image_width", "a number from 16 to 8192"),
+    (["image_height"], 720.5, "image_height", "a whole number"),
+    (["image_height"], 10**9, "image_height", "a number from 16 to 8192"),
+    (["rolling_shutter_readout_s"], 16.0, "rolling_shutter_readout_s", "from 0 to 0.1"),
+    (["rolling_shutter_readout_s"], float("nan"), "rolling_shutter_readout_s", "from 0 to 0.1"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "key", "allowed"), FAULTS)
+def test_each_fault_names_file_key_and_what_is_allowed(tmp_path, path, value, key, allowed):
+    file = written(tmp_path, changed(INFO, path, value))
+    with pytest.raises(CameraFileError) as raised:
+        load_camera(file)
+    assert raised.value.file == str(file)
+    assert key in raised.value.key
+    assert allowed in raised.value.allowed
+    assert str(file) in str(raised.value)
+
+
+KALIBR_FAULTS = [
+    (["cam0"], [1, 2], "cam0", "a mapping"),
+    (["cam0", "distortion_model"], "none", "distortion_model", "radtan, equidistant"),
+    (["cam0", "intrinsics"], [930.0, 931.0, 646.0], "intrinsics", "4 finite numbers"),
+    (["cam0", "distortion_coeffs"], [0.1] * 5, "distortion_coeffs", "4 finite numbers"),
+    (["cam0", "resolution"], [1280], "resolution", "2 finite numbers"),
+    (["cam0", "resolution"], [-1280, 720], "resolution", "a number from 16 to 8192"),
+    (["cam0", "resolution"], [1280.5, 720], "resolution", "a whole number"),
+    (["cam0", "resolution"], None, "resolution", "must be there"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "key", "allowed"), KALIBR_FAULTS)
+def test_each_fault_of_a_camchain_is_named_too(tmp_path, path, value, key, allowed):
+    with pytest.raises(CameraFileError) as raised:
+        load_camera(written(tmp_path, changed(KALIBR, path, value)))
+    assert key in raised.value.key
+    assert allowed in raised.value.allowed
+
+
+@pytest.mark.parametrize(
+    "text", ["", "just words", "- a\n- list", "{unbalanced", "!!python/name:os"]
+)
+def test_what_is_no_yaml_mapping_is_refused(tmp_path, text):
+    with pytest.raises(CameraFileError):
+        load_camera(written(tmp_path, text))
+
+
+def test_unreadable_files_are_refused(tmp_path):
+    with pytest.raises(CameraFileError):
+        load_camera(tmp_path / "missing.yaml")
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00\x80")
+    with pytest.raises(CameraFileError):
+        load_camera(tmp_path / "binary.yaml")
+
+
+def test_a_camera_is_found_by_device_and_size_whatever_its_spelling(tmp_path):
+    written(tmp_path, changed(INFO, ["camera_name"], "Pixel 7 (back)"), "a.yaml")
+    assert find_camera("pixel-7-back", 1280, 720, (CAMERAS, tmp_path)).width == 1280
+    assert slug("  Pixel 7 (Back)") == "pixel-7-back"
+
+
+@pytest.mark.parametrize("wanted", [("pixel-7", 1280, 720), ("lightleash-virtual-phone", 640, 480)])
+def test_a_camera_nobody_calibrated_is_refused_with_those_there_are(wanted):
+    with pytest.raises(CameraFileError, match="lightleash-virtual-phone 1280x720") as raised:
+        find_camera(*wanted)
+    assert wanted[0] in str(raised.value)
+
+
+def test_an_empty_folder_has_no_camera_at_all(tmp_path):
+    with pytest.raises(CameraFileError, match="no camera at all"):
+        find_camera("pixel-7", 1280, 720, (tmp_path,))

@@ -1,0 +1,144 @@
+"""Hub: one operator at a time, wishes that arrive, events that can be read."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from server.clock import now
+from server.control_link import ReadyInput, RequestInput
+from server.hub import EVENTS, LEASE_S
+from server.messages import Command, Hello
+from server.wire import VERSION, Ping, decode
+from tests.server.house import control_status, house_in, is_request
+
+
+class Paper:
+    """A page that keeps what it is sent."""
+
+    def __init__(self) -> None:
+        self.data: list[str | bytes] = []
+
+    def push(self, data: str | bytes) -> None:
+        self.data.append(data)
+
+
+@pytest.fixture
+def house(tmp_path):
+    with house_in(tmp_path) as made:
+        yield made
+
+
+def hello(device: str) -> Hello:
+    return Hello(VERSION, "operator", device)
+
+
+def in_loop(scene):
+    async def run():
+        return scene()
+
+    return asyncio.run(run())
+
+
+def test_one_phone_leads_until_it_has_been_silent(house, monkeypatch):
+    def scene():
+        hub = house.hub
+        first = hub.greet(hello("first"), Paper())
+        assert hub.greet(hello("second"), Paper()) is None
+        assert hub.phone is first
+        monkeypatch.setattr("server.hub.now", lambda: now() + LEASE_S)
+        second = hub.greet(hello("second"), Paper())
+        assert hub.phone is second is not None
+        hub.part(first)
+        assert hub.phone is second
+        hub.part(second)
+        assert hub.phone is None
+
+    in_loop(scene)
+
+
+def test_whoever_comes_to_lead_finds_the_robot_disarmed(house):
+    in_loop(lambda: house.hub.greet(hello("first"), Paper()))
+    assert any(map(is_request("disarm"), house.control.inputs()))
+
+
+def test_pings_go_to_the_phone_that_leads_alone(house, monkeypatch):
+    def scene():
+        old, new = Paper(), Paper()
+        house.hub.greet(hello("first"), old)
+        house.hub.ping()
+        monkeypatch.setattr("server.hub.now", lambda: now() + LEASE_S)
+        house.hub.greet(hello("second"), new)
+        house.hub.ping()
+        (ping,) = map(decode, new.data)
+        assert isinstance(ping.body, Ping)
+        assert len(old.data) == 1
+
+    in_loop(scene)
+
+
+def test_only_the_session_that_leads_may_send_pictures(house):
+    def scene():
+        assert house.hub.join_video("", Paper()) is None
+        phone = house.hub.greet(hello("first"), Paper())
+        assert house.hub.join_video("guess", Paper()) is None
+        assert house.hub.join_video(phone.id, Paper()) is phone
+        house.hub.part(phone)
+        assert house.hub.join_video(phone.id, Paper()) is None
+
+    in_loop(scene)
+
+
+def test_what_the_server_lacks_reaches_control_with_every_tick(house):
+    house.hub._tick()
+    (ready,) = house.control.inputs()
+    assert isinstance(ready, ReadyInput)
+    assert "No phone is connected" in ready.refusals[0]
+
+
+def test_wishes_reach_control_except_those_for_phones(house):
+    def scene():
+        for what in ("arm", "disarm", "stop", "reset", "key_frame"):
+            house.hub.wish(Command(what), "somebody")
+
+    in_loop(scene)
+    heard = [m.what for m in house.control.inputs() if isinstance(m, RequestInput)]
+    assert heard == ["arm", "disarm", "stop", "reset"]
+    assert house.hub.events[0] == "somebody: reset"
+
+
+def test_a_stop_is_said_again_until_control_can_take_it(house):
+    async def scene():
+        while house.hub._control.send(ReadyInput([])):
+            pass
+        house.hub.wish(Command("stop"), "somebody")
+        assert not any(map(is_request("stop"), house.control.inputs()))
+        heard = []
+        for _ in range(1000):
+            heard += house.control.inputs()
+            if any(map(is_request("stop"), heard)):
+                return
+            await asyncio.sleep(0.005)
+        raise AssertionError(heard)
+
+    asyncio.run(scene())
+
+
+def test_events_are_few_newest_first_and_hold_no_control_characters(house):
+    for k in range(2 * EVENTS):
+        house.hub.say(f"{k}\x1b]0;owned\x07\n")
+    assert len(house.hub.events) == EVENTS
+    assert house.hub.events[0] == f"{2 * EVENTS - 1}·]0;owned··"
+
+
+def test_a_change_of_mode_is_an_event_and_every_page_is_told(house):
+    watcher = Paper()
+    house.hub.supervisors.add(watcher)
+    house.control.send(control_status(mode=5, reason="STOP was pressed."))
+    house.hub._hear_control()
+    house.hub._tick()
+    assert house.hub.events[0] == "STOPPED: STOP was pressed."
+    house.hub._tick()
+    assert list(house.hub.events).count("STOPPED: STOP was pressed.") == 1
+    assert '"mode":"STOPPED"' in watcher.data[-1]

@@ -1,0 +1,135 @@
+"""One operator's phone: what it lacks, in words, and what it says, to control."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from hardware.camera_file import CAMERAS
+from server.control_link import OperatorInput, PhoneImuInput
+from server.messages import Hello
+from server.operator import STALE_S, OperatorPhone
+from server.phone_script import DEVICE
+from server.wire import VERSION, Motion, Ping, Pong, Record, Touch, WireError
+from tests.server.house import JPEG, ROBOT
+
+FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
+
+
+class Rig:
+    """A phone in virtual time; its clock is ours."""
+
+    def __init__(self, device: str) -> None:
+        self.t = 50.0
+        self.to_control: list[object] = []
+        self.taken: list[int] = []
+        hello = Hello(VERSION, "operator", device)
+        self.phone = OperatorPhone(
+            hello,
+            ROBOT,
+            [CAMERAS],
+            self.to_control.append,
+            lambda: self.t,
+            self.taken.append,
+            lambda: None,
+        )
+        self.nonce = 0
+
+    def say(self, body: object, sequence: int = 1) -> None:
+        self.phone.take(Record(sequence, int(1e6 * self.t), body), self.t)  # type: ignore[arg-type]
+
+    def synchronise(self) -> None:
+        for _ in range(6):
+            ping = self.phone.ingest.ping(self.t)
+            assert isinstance(ping.body, Ping)
+            self.nonce = ping.body.nonce
+            self.say(Pong(self.nonce, ping.t_us))
+            self.t += 0.05
+
+    def why(self) -> list[str]:
+        return self.phone.refusals(self.t)
+
+
+@pytest.fixture
+def rig():
+    made = Rig("Nobody's phone")
+    yield made
+    made.phone.close()
+
+
+def test_each_thing_that_lacks_is_told_to_the_person_who_can_mend_it(rig):
+    assert rig.why() == ["The phone's clock is not known yet: wait a moment."]
+    rig.synchronise()
+    motion, pictures = rig.why()
+    assert "motion sensors" in motion
+    assert "camera" in pictures
+    rig.say(FLAT)
+    assert rig.why() == [pictures]
+    rig.say(Touch(False, False, 0, rig.nonce))
+    assert rig.why() == ["The page on the phone is hidden: bring it to the front.", pictures]
+    rig.t += STALE_S + 0.1
+    assert motion in rig.why()
+
+
+def test_a_camera_without_a_calibration_is_told_as_long_as_it_films(rig):
+    rig.synchronise()
+    rig.say(FLAT)
+    for sequence in (1, 2):
+        with pytest.raises(WireError) as refused:
+            rig.say(JPEG, sequence)
+        assert refused.value.code == "calibration"
+        assert "Nobody" in refused.value.allowed or "nobody" in refused.value.allowed
+    assert rig.taken == [1, 2]
+    (why,) = rig.why()
+    assert why.startswith("The camera is not calibrated: ")
+
+
+def test_motion_and_touch_reach_control_at_their_own_times(rig):
+    rig.say(FLAT)
+    assert rig.to_control == []
+    rig.synchronise()
+    rig.say(FLAT)
+    rig.say(Touch(True, True, 3, rig.nonce))
+    imu, operator = rig.to_control
+    assert isinstance(imu, PhoneImuInput)
+    assert isinstance(operator, OperatorInput)
+    assert imu.t == pytest.approx(rig.t, abs=1e-3)
+    assert operator.t == pytest.approx(rig.t - 0.05)
+    assert operator.held
+
+
+def test_a_hidden_page_holds_no_button(rig):
+    rig.synchronise()
+    rig.say(Touch(True, False, 3, rig.nonce))
+    assert not rig.to_control[-1].held
+
+
+def test_hello_is_the_first_sign_of_life_and_old_nonces_are_none(rig):
+    rig.t += 1.0
+    assert rig.phone.silent_for(rig.t) == pytest.approx(1.0)
+    rig.synchronise()
+    rig.t += 1.0
+    rig.say(Touch(False, True, 0, rig.nonce))
+    assert rig.phone.silent_for(rig.t) == pytest.approx(1.05)
+
+
+def test_pictures_that_cannot_be_dated_are_given_back(rig):
+    rig.say(JPEG, 9)
+    assert rig.taken == [9]
+
+
+def test_a_calibrated_phone_has_eyes_until_it_leaves():
+    rig = Rig(DEVICE)
+    rig.synchronise()
+    rig.say(FLAT)
+    rig.say(JPEG)
+    assert rig.phone.vision is not None
+    assert rig.phone.camera_problem == ""
+    assert rig.why() == ["The robot is not seen."]
+    rig.t += STALE_S + 0.1
+    assert any("No pictures" in why for why in rig.why())
+    with pytest.raises(WireError, match="calibrat"):
+        rig.say(replace(JPEG, width=640, height=200))
+    assert rig.phone.vision is None
+    rig.phone.close()

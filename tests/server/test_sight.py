@@ -1,0 +1,191 @@
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hardware
+from hardware.robot_file import load_robot
+from hardware.sim.codec import Encoder
+from pipeline.config import GatesConfig
+from pipeline.frames import GRAVITY, exp
+from pipeline.signals import PhoneImu
+from server.ingest import EncodedFrame
+from server.sight import Sight
+from server.wire import Codec, Picture
+from tests.pipeline.seeing import CAMERA, is_wrong, moved, picture, truth_at
+
+ROBOT = load_robot(Path(hardware.__file__).parent / "robots" / "ames.toml").robot
+ZERO = np.zeros(3)
+DT = 1.0 / 30.0
+CODECS = {"h264": Codec.H264, "vp8": Codec.VP8, "jpeg": Codec.JPEG}
+
+
+def sight(**gates):
+    return Sight(CAMERA, ROBOT, GatesConfig(**gates))
+
+
+def encoder(codec="h264"):
+    return Encoder(CAMERA.width, CAMERA.height, 30.0, 3_000_000, codec)
+
+
+def sent(k, data, key, codec="h264", t=None):
+    shot = Picture(CODECS[codec], key, CAMERA.width, CAMERA.height, 0, data)
+    t = k * DT if t is None else t
+    return EncodedFrame(t, t + 0.05, k, shot)
+
+
+def shots(rng, n, codec="h264", with_=None, truth=None):
+    """Encoded pictures of a robot, and what was true."""
+    truth, camera_side = truth or truth_at(rng), with_ or encoder(codec)
+    for k in range(n):
+        yield sent(k, *camera_side.encode(picture(truth, rng)), codec), truth
+        truth = moved(truth, rng)
+
+
+def hold(eye, truth, t):
+    """The phone's motion sensors when held still as in `truth`."""
+    eye.feel(PhoneImu(t, ZERO, GRAVITY * truth.prior().up_in_c))
+
+
+def look(eye, frames, truth):
+    hold(eye, truth, frames[-1].t)
+    return eye.see(frames, truth.prior().up_in_b, ZERO)
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_encoded_pictures_become_poses(codec):
+    rng = np.random.default_rng(80)
+    eye = sight()
+    assert eye.needs_key
+    for frame, truth in shots(rng, 5, codec):
+        sighting = look(eye, [frame], truth)
+        assert sighting.reason == ""
+        assert sighting.t == frame.t
+        assert not is_wrong(sighting.pose, truth)
+    assert not eye.needs_key
+    assert eye.undecodable == 0
+    assert eye.luma.shape == (CAMERA.height, CAMERA.width)
+
+
+def test_of_several_pictures_all_are_decoded_and_the_newest_is_looked_at():
+    rng = np.random.default_rng(81)
+    frames, truths = zip(*shots(rng, 5), strict=True)
+    eye = sight()
+    sighting = look(eye, frames, truths[-1])
+    assert sighting.t == frames[-1].t
+    assert not is_wrong(sighting.pose, truths[-1])
+
+
+def test_no_pictures_are_no_sighting():
+    assert sight().see([], None, ZERO) is None
+
+
+def test_a_stream_begins_with_a_key_picture():
+    rng = np.random.default_rng(82)
+    camera_side = encoder()
+    (_, second), truths = zip(*shots(rng, 2, with_=camera_side), strict=True)
+    eye = sight()
+    assert look(eye, [second], truths[1]) is None
+    assert eye.needs_key
+    assert eye.undecodable == 0  # nobody tried
+    again = sent(2, *camera_side.encode(picture(truths[1], rng), key=True))
+    assert look(eye, [again], truths[1]).pose is not None
+
+
+@pytest.mark.parametrize("garbage", [b"", b"\x00" * 500, b"not a picture", b"\xff\xd8\xff"])
+def test_an_undecodable_picture_is_counted_and_the_stream_waits_for_a_key(garbage):
+    rng = np.random.default_rng(83)
+    camera_side, eye = encoder(), sight()
+    (first, second, third), truths = zip(*shots(rng, 3, with_=camera_side), strict=True)
+    assert look(eye, [first], truths[0]).pose is not None
+    assert (
+        look(eye, [replace(second, picture=replace(second.picture, data=garbage))], truths[1])
+        is None
+    )
+    assert eye.undecodable == 1
+    assert eye.needs_key
+    assert look(eye, [third], truths[2]) is None
+    assert eye.undecodable == 1
+    key = sent(3, *camera_side.encode(picture(truths[2], rng), key=True))
+    assert not is_wrong(look(eye, [key], truths[2]).pose, truths[2])
+    assert not eye.needs_key
+
+
+def test_a_picture_of_another_size_is_undecodable():
+    rng = np.random.default_rng(84)
+    small, truth = Encoder(640, 480, 30.0, 1_000_000), truth_at(rng)
+    eye = sight()
+    frame = sent(0, *small.encode(np.zeros((480, 640), np.uint8)))
+    assert look(eye, [frame], truth) is None
+    assert eye.undecodable == 1
+
+
+def test_the_codec_may_change_at_a_key_picture():
+    rng = np.random.default_rng(85)
+    eye, truth = sight(), truth_at(rng)
+    for codec in ("h264", "jpeg", "vp8", "h264"):
+        ((frame, _),) = shots(rng, 1, codec, truth=truth)
+        assert not is_wrong(look(eye, [frame], truth).pose, truth)
+
+
+def test_a_pose_that_gravity_contradicts_is_not_believed():
+    rng = np.random.default_rng(86)
+    eye = sight()
+    (first, second), (truth, after) = zip(*shots(rng, 2), strict=True)
+    assert eye.see([first], None, ZERO).pose is not None  # nothing contradicts
+    hold(eye, after, second.t)
+    upset = exp(np.array([0.5, 0.0, 0.0])) @ truth.prior().up_in_b
+    sighting = eye.see([second], upset, ZERO)
+    assert sighting.pose is None
+    assert sighting.reason.startswith("Not believed: gravity disagrees by")
+
+
+def test_a_pose_out_of_range_is_not_believed():
+    rng = np.random.default_rng(87)
+    ((frame, truth),) = shots(rng, 1)
+    sighting = look(sight(max_range_m=1.0), [frame], truth)
+    assert sighting.pose is None
+    assert "m away" in sighting.reason
+
+
+def test_why_nothing_is_seen_is_passed_on():
+    rng = np.random.default_rng(88)
+    dark = np.full((CAMERA.height, CAMERA.width), 40, np.uint8)
+    sighting = look(sight(), [sent(0, *encoder().encode(dark))], truth_at(rng))
+    assert sighting.reason == "No light in the picture is bright enough."
+
+
+def test_the_stages_are_timed():
+    rng = np.random.default_rng(89)
+    ticks = count()
+    eye = Sight(CAMERA, ROBOT, GatesConfig(), lambda: next(ticks))
+    ((frame, truth),) = shots(rng, 1)
+    assert set(look(eye, [frame], truth).took_s) == {"decode", "detect", "identify"}
+
+
+def test_the_phones_vertical_follows_its_gyroscope_at_once():
+    eye, up = sight(), np.array([0.0, 0.0, 1.0])
+    omega = np.array([0.0, 0.8, 0.0])
+    for k in range(61):
+        up_in_c = exp(-omega * 0.01 * k) @ up
+        eye.feel(PhoneImu(0.01 * k, omega, GRAVITY * up_in_c))
+    assert np.degrees(np.arccos(eye._up_in_c @ up_in_c)) < 0.5
+
+
+def test_a_shake_hardly_tilts_the_phones_vertical_but_the_long_run_does():
+    eye, up = sight(), np.array([0.0, 0.0, 1.0])
+    push = np.array([5.0, 0.0, 0.0])
+    eye.feel(PhoneImu(0.0, ZERO, GRAVITY * up))
+    eye.feel(PhoneImu(0.02, ZERO, GRAVITY * up + push))
+    assert np.degrees(np.arccos(eye._up_in_c @ up)) < 2.0
+    for k in range(2, 200):
+        eye.feel(PhoneImu(0.02 * k, ZERO, GRAVITY * up + push))
+    assert np.degrees(np.arccos(eye._up_in_c @ up)) > 20.0
+
+
+def test_free_fall_says_nothing_about_the_vertical():
+    eye = sight()
+    eye.feel(PhoneImu(0.0, ZERO, ZERO))
+    assert eye._up_in_c is None

@@ -1,0 +1,78 @@
+"""Status: the truth about the robot in words, and nothing that is not known."""
+
+from __future__ import annotations
+
+from math import inf, nan, radians
+
+import msgspec
+import pytest
+
+from server import status
+from server.clock import now
+from server.messages import encode_message
+from server.status import LOST_S
+from tests.server.house import control_status, house_in
+
+
+@pytest.fixture
+def hub(tmp_path):
+    with house_in(tmp_path) as house:
+        yield house.hub
+
+
+def tell(hub, **changes):
+    hub.status = control_status(**changes)
+    hub.control_meter.tick(hub.status.t, hub.status.t)
+
+
+def test_before_control_has_spoken_it_is_lost_and_nothing_is_ready(hub):
+    shown = status.build(hub)
+    assert (shown.mode, shown.ready) == ("LOST", False)
+    assert "watchdog" in shown.reason
+    assert shown.refusals == ["The control process does not answer."]
+    assert shown.position_mm is None
+
+
+def test_control_that_falls_silent_is_lost_whatever_it_said_last(hub):
+    tell(hub, t=now() - LOST_S - 0.05, mode=2, reason="Following the phone.", refusals=[])
+    shown = status.build(hub)
+    assert (shown.mode, shown.ready) == ("LOST", False)
+    assert "Following" not in shown.reason
+
+
+def test_what_control_says_is_shown_in_the_units_of_screens(hub):
+    tell(
+        hub,
+        mode=2,
+        reason="Following the phone.",
+        refusals=[],
+        p_bc_in_c=(2.5, -0.1234, 0.0),
+        error_m=0.01234,
+        error_rad=radians(2.0),
+        sigma_p=0.002,
+        saturated=True,
+    )
+    shown = status.build(hub)
+    assert (shown.mode, shown.reason, shown.ready) == ("TRACK", "Following the phone.", True)
+    assert shown.position_mm == [2500.0, -123.4, 0.0]
+    assert (shown.error_mm, shown.error_deg, shown.sigma_mm) == (12.3, 2.0, 2.0)
+    assert shown.saturated
+    assert shown.realtime == "SCHED_FIFO 50"
+    assert shown.control["missed"] == 3.0
+    assert shown.control["p99_ms"] == 0.2
+    assert shown.streams["body_imu"].rate_hz == 200.0
+
+
+def test_why_arming_is_refused_is_told(hub):
+    tell(hub, refusals=["Let go of the button before arming."])
+    shown = status.build(hub)
+    assert not shown.ready
+    assert shown.refusals == ["Let go of the button before arming."]
+
+
+@pytest.mark.parametrize("bad", [nan, inf])
+def test_it_is_json_even_if_a_number_is_none(hub, bad):
+    tell(hub, error_m=bad, body_imu_age=inf, sigma_p=bad)
+    decoded = msgspec.json.decode(encode_message(status.build(hub)))
+    assert decoded["error_mm"] is None
+    assert decoded["streams"]["body_imu"]["age_ms"] is None
