@@ -68,6 +68,8 @@ class Launcher:
     def run(self) -> int:
         """Start, announce, watch, stop; gives the exit code."""
         announced = False
+        names = ", ".join(child.name for child in self.children)
+        print(f"Starting {names}: some seconds.", flush=True)
         try:
             while not self._stopping:
                 self.revive(time.monotonic())
@@ -143,7 +145,8 @@ def announce(run: dict[str, object]) -> None:
         code.terminal(border=2, compact=True)
     print(f"\nPhone:       {invite}")
     print(f"Supervisor:  {run['http_url']}/supervisor#k={run['supervisor_token']}")
-    print("No phone at hand? Press “Start virtual phone” on the supervisor's page.")
+    if run["truth_port"]:  # the robot is a simulated one
+        print("No phone at hand? Press “Start virtual phone” on the supervisor's page.")
     print("Ctrl-C stops, robot first.", flush=True)
 
 

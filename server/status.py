@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from math import degrees
-from typing import TYPE_CHECKING, Literal, cast
+from typing import Literal, Protocol, cast
 
+from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.clock import now
 from server.control_link import ControlStatus
+from server.latest import Meter
 from server.messages import Status, Stream
-
-if TYPE_CHECKING:
-    from server.hub import Hub
+from server.operator import OperatorPhone
+from server.recorder import Recordings
 
 LOST_S = 0.3
 """A control process silent for longer is lost."""
 ModeName = Literal["DISARMED", "ARMED", "TRACK", "HOLD", "RAMP", "STOPPED", "LOST"]
 
 
-def build(hub: Hub) -> Status:
+class Known(Protocol):
+    """What a status is built from: the hub has it."""
+
+    robot: Robot
+    phone: OperatorPhone | None
+    status: ControlStatus | None
+    control_meter: Meter
+    recordings: Recordings
+
+    @property
+    def events(self) -> Sequence[str]:
+        """Newest first."""
+
+    @property
+    def supervisors(self) -> Collection[object]:
+        """Pages that watch."""
+
+
+def build(hub: Known) -> Status:
     """From what the hub knows now."""
     t, control, phone = now(), hub.status, hub.phone
     lost = control is None or hub.control_meter.age(t) > LOST_S
@@ -74,7 +94,7 @@ def _control(control: ControlStatus | None) -> dict[str, float]:
     return {**lateness, "missed": missed, "step_ms": round(control.step_ms, 3)}
 
 
-def _latency(hub: Hub) -> dict[str, float]:
+def _latency(hub: Known) -> dict[str, float]:
     stages = dict(hub.phone.latency_ms) if hub.phone is not None else {}
     if stages and hub.status is not None:
         stages["to control"] = max(0.0, hub.status.fuse_ms - sum(stages.values()))
@@ -82,7 +102,7 @@ def _latency(hub: Hub) -> dict[str, float]:
     return {name: round(max(0.0, ms), 2) for name, ms in stages.items()}
 
 
-def _streams(hub: Hub, t: float) -> dict[str, Stream]:
+def _streams(hub: Known, t: float) -> dict[str, Stream]:
     streams = {}
     if hub.phone is not None:
         streams = {name: meter.stream(t) for name, meter in hub.phone.meters.items()}

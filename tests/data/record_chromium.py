@@ -1,4 +1,4 @@
-"""Make `chromium.mcap`: a real headless Chromium on the phone page leads the robot for some seconds.
+"""Make `chromium.mcap`: a real headless Chromium leads the robot for some seconds.
 
 python -m tests.data.record_chromium [seconds]
 """

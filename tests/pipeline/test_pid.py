@@ -1,4 +1,4 @@
-"""Pose error and PID: derivatives are derivatives, the integral lives in f, wind-up is taken back."""
+"""Pose error and PID: rates are derivatives, the integral lives in f, wind-up is taken back."""
 
 from __future__ import annotations
 

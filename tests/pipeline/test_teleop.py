@@ -16,6 +16,7 @@ ROBOT = load_robot("ames").robot
 UP = np.array([0.0, 0.0, GRAVITY])
 STILL = np.zeros(3)
 P = np.array([2.5, 0.0, 0.0])
+LEFT = np.array([0.0, 1.0, 0.0])
 COVARIANCE = np.diag([1e-6, 1e-7, 1e-7, 1e-6, 1e-6, 1e-6])
 
 
@@ -77,7 +78,7 @@ def test_a_robot_that_has_drifted_is_pulled_back() -> None:
         teleop,
         1.8,
         0.5,
-        position=lambda t: P + [0.0, 0.03 * min(1.0, (t - 1.8) / 0.3), 0.0],
+        position=lambda t: P + 0.03 * min(1.0, (t - 1.8) / 0.3) * LEFT,
         held=True,
     )
     assert drifted[-1].failsafe.mode == Mode.TRACK
@@ -87,9 +88,7 @@ def test_a_robot_that_has_drifted_is_pulled_back() -> None:
 def test_a_reference_out_of_reach_ends_the_flight() -> None:
     teleop = Teleop(ROBOT, TeleopConfig())
     run(teleop, 0.0, 1.5, arm_at=1.2)
-    far = run(
-        teleop, 1.5, 3.0, position=lambda t: P + [0.0, 0.4 * max(0.0, t - 1.6), 0.0], held=True
-    )
+    far = run(teleop, 1.5, 3.0, position=lambda t: P + 0.4 * max(0.0, t - 1.6) * LEFT, held=True)
     modes = {o.failsafe.mode for o in far}
     assert Mode.RAMP in modes
     assert far[-1].failsafe.mode in (Mode.RAMP, Mode.DISARMED)
@@ -101,5 +100,5 @@ def test_thrusts_are_always_finite_and_within_limits() -> None:
     bad = run(teleop, 1.5, 0.5, held=True, body_a=np.array([np.nan, 0.0, 9.8]))
     for output in bad:
         assert np.isfinite(output.thrusts).all()
-        assert 0.0 <= output.thrusts.min()
+        assert output.thrusts.min() >= 0.0
         assert output.thrusts.max() <= ROBOT.f_max

@@ -19,6 +19,7 @@ RUN = {
     "https_url": "https://192.0.2.2:8443",
     "operator_token": "O" * 22,
     "supervisor_token": "S" * 22,
+    "truth_port": 5000,
 }
 
 
@@ -118,6 +119,12 @@ def test_the_newcomer_reads_both_addresses_and_how_to_stop(capsys):
     assert f"https://192.0.2.2:8443/#k={'O' * 22}" in said
     assert f"http://127.0.0.1:8080/supervisor#k={'S' * 22}" in said
     assert "Ctrl-C" in said
+    assert "virtual phone" in said
+
+
+def test_nobody_is_sent_to_a_virtual_phone_that_could_not_see_the_real_robot(capsys):
+    announce(RUN | {"truth_port": 0})
+    assert "virtual phone" not in capsys.readouterr().out
 
 
 def test_a_terminal_gets_the_code_to_scan_if_it_is_wide_enough(capsys, monkeypatch):

@@ -32,13 +32,19 @@ def test_what_is_encoded_is_decoded(body: wire.Body) -> None:
     assert wire.decode(wire.encode(record)) == record
 
 
-@given(st.binary(max_size=200))
-def test_any_bytes_give_a_record_or_a_named_error(data: bytes) -> None:
+def refusal_of(data: bytes) -> WireError | None:
+    """What is wrong with a record; anything but WireError would be a fault of the decoder."""
     try:
         wire.decode(data)
     except WireError as error:
-        assert error.field
-        assert error.allowed
+        return error
+    return None
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_give_a_record_or_a_named_error(data: bytes) -> None:
+    refusal = refusal_of(data)
+    assert refusal is None or (refusal.field and refusal.allowed)
 
 
 @given(st.sampled_from(BODIES), st.integers(0, 60), st.integers(0, 255))
@@ -47,10 +53,8 @@ def test_a_flipped_byte_gives_a_record_or_a_named_error(
 ) -> None:
     data = bytearray(wire.encode(Record(1, 2, body)))
     data[at % len(data)] = value
-    try:
-        wire.decode(bytes(data))
-    except WireError as error:
-        assert error.code in ("type", "size", "version", "value")
+    refusal = refusal_of(bytes(data))
+    assert refusal is None or refusal.code in ("type", "size", "version", "value")
 
 
 NAN, INF = float("nan"), float("inf")
