@@ -7,13 +7,21 @@ import numpy as np
 
 from pipeline.config import LedsConfig
 from pipeline.frames import Array
-from pipeline.signals import Frame, Image, Spots
+from pipeline.signals import Frame, Spots
 from pipeline.spot_kernels import FIELDS, WINDOW, measure
 
 MAX_CONTOURS = 150
 TOPHAT = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (13, 13))
-SIGMA_PX = 0.04
-"""Of a compact, well exposed spot."""
+SIGMA_PX = 0.025
+"""Of a compact, well exposed spot: gamma, clipping and rounding, hardly noise."""
+CODED_PX = 0.02
+"""What a video codec adds at 2 Mbit/s."""
+DIM = 80.0
+"""Grey levels; with less contrast, a room's texture and a codec's steps matter more."""
+STREAK_PX = 2.0
+"""As long seems a round spot; longer, it moved during the exposure, and not evenly: a share of the
+excess is unsure in all directions, and as much again along the streak."""
+STREAK_SHARE, ALONG_SHARE = 0.012, 0.014
 
 
 def find_spots(frame: Frame, config: LedsConfig) -> Spots:
@@ -30,7 +38,7 @@ def find_spots(frame: Frame, config: LedsConfig) -> Spots:
         threshold = min(1.4 * threshold, 250.0)  # a bright room is no reason for more work
     boxes = [cv2.boundingRect(contour) for contour in contours[:MAX_CONTOURS]]
     windows = [(2 * x + w, 2 * y + h, min(WINDOW, max(w, h) + 6)) for x, y, w, h in boxes]
-    return _measured(frame.luma, windows, contrast, config)
+    return _measured(frame, windows, contrast, config)
 
 
 def spots_near(frame: Frame, centres: Array, half_px: Array, config: LedsConfig) -> Spots:
@@ -40,7 +48,7 @@ def spots_near(frame: Frame, centres: Array, half_px: Array, config: LedsConfig)
         (round(float(u)), round(float(v)), int(half))
         for (u, v), half in zip(centres, limits, strict=True)
     ]
-    return _measured(frame.luma, windows, _contrast(frame, config), config)
+    return _measured(frame, windows, _contrast(frame, config), config)
 
 
 def _contrast(frame: Frame, config: LedsConfig) -> float:
@@ -49,12 +57,12 @@ def _contrast(frame: Frame, config: LedsConfig) -> float:
 
 
 def _measured(
-    luma: Image, windows: list[tuple[int, int, int]], contrast: float, config: LedsConfig
+    frame: Frame, windows: list[tuple[int, int, int]], contrast: float, config: LedsConfig
 ) -> Spots:
     rows: list[Array] = []
     out = np.empty(FIELDS)
     for u, v, half in windows:
-        if not measure(luma, u, v, half, out):
+        if not measure(frame.luma, u, v, half, out):
             continue
         if out[4] < contrast or not config.min_area_px <= out[3] <= config.max_area_px:
             continue
@@ -64,24 +72,27 @@ def _measured(
     table = np.array(rows[: config.max_spots]).reshape(-1, FIELDS)
     return Spots(
         pixels=table[:, :2],
-        covariances=_covariances(table),
+        covariances=_covariances(table, 0.0 if frame.full_range else CODED_PX),
         brightness=table[:, 2],
         area=table[:, 3],
     )
 
 
-def _covariances(table: Array) -> Array:
-    """Large, dim and elongated spots are less sure, along the elongation above all."""
-    moments = np.empty((len(table), 2, 2))
-    moments[:, 0, 0], moments[:, 1, 1] = table[:, 5], table[:, 7]
-    moments[:, 0, 1] = moments[:, 1, 0] = table[:, 6]
-    size2 = np.clip(np.trace(moments, axis1=1, axis2=2) / 2.0, 0.5, None)
-    dim = np.clip(80.0 / table[:, 4], 1.0, 4.0)
-    compact = (SIGMA_PX * dim) ** 2 * np.clip(size2 / 4.0, 1.0, None)
-    eigenvalues = np.linalg.eigvalsh(moments) if len(table) else np.zeros((0, 2))
-    blurred = np.clip(eigenvalues[:, 1] / np.maximum(eigenvalues[:, 0], 0.3) - 1.5, 0.0, None)
-    along = moments / size2[:, None, None]
-    identity = np.eye(2)[None]
-    shape = identity + 0.5 * blurred[:, None, None] * along
-    covariances: Array = compact[:, None, None] * shape
+def _covariances(table: Array, coded_px: float) -> Array:
+    """(n, 2, 2): noisy, dim, large and smeared spots are less sure, along the smear above all."""
+    area, contrast, noise = table[:, 3], table[:, 4], table[:, 8]
+    moments = table[:, [5, 6, 6, 7]].reshape(-1, 2, 2)
+    values, axes = np.linalg.eigh(moments)
+    dim = np.clip(DIM / contrast, 1.0, 4.0)
+    large = np.clip(values.mean(axis=1) / 6.0, 1.0, None)
+    model = (SIGMA_PX**2 + coded_px**2) * dim**2 * large
+    # a disc of so many noisy pixels; half as much again, for only what is above the ground counts
+    reach = (np.sqrt(area) + 2.0) ** 2
+    grain = 1.5 * 1.25 * noise * reach / (np.sqrt(4.0 * np.pi) * table[:, 2])
+    streak = np.sqrt(12.0 * np.clip(values[:, 1] - values[:, 0], 0.0, None)) - STREAK_PX
+    smear = np.clip(streak, 0.0, None) ** 2
+    alike = model + grain**2 + STREAK_SHARE**2 * smear
+    along = axes[:, :, 1]
+    covariances: Array = alike[:, None, None] * np.eye(2)
+    covariances += (ALONG_SHARE**2 * smear)[:, None, None] * (along[:, :, None] * along[:, None])
     return covariances

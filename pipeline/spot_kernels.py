@@ -12,8 +12,8 @@ WINDOW = 21
 """Half of the largest window's side [px]."""
 SHARE = 0.4
 """Of the contrast: what is above belongs to the spot."""
-FIELDS = 8
-"""u, v, brightness, area, contrast, and the second moments uu, uv, vv."""
+FIELDS = 9
+"""u, v, brightness, area, contrast, the second moments uu, uv, vv, and the surround's noise."""
 
 
 _LUMA = numba.types.Array(numba.uint8, 2, "A", readonly=True)
@@ -21,7 +21,8 @@ _LUMA = numba.types.Array(numba.uint8, 2, "A", readonly=True)
 
 
 @numba.njit(cache=True)
-def _border_median(luma: Image, left: int, right: int, top: int, bottom: int) -> float:
+def _surround(luma: Image, left: int, right: int, top: int, bottom: int) -> tuple[float, float]:
+    """Median of the window's border, and how far its pixels are from it on average."""
     border = np.empty(2 * (right - left + 1 + bottom - top + 1), dtype=np.float64)
     n = 0
     for u in range(left, right + 1):
@@ -30,7 +31,8 @@ def _border_median(luma: Image, left: int, right: int, top: int, bottom: int) ->
     for v in range(top, bottom + 1):
         border[n], border[n + 1] = luma[v, left], luma[v, right]
         n += 2
-    return float(np.median(border[:n]))
+    median = float(np.median(border[:n]))
+    return median, float(np.mean(np.abs(border[:n] - median)))
 
 
 @numba.njit(cache=True)
@@ -74,7 +76,7 @@ def measure(luma: Image, u0: int, v0: int, half: int, out: Array) -> bool:
     top, bottom = max(0, v0 - half), min(height - 1, v0 + half)
     if right - left < 4 or bottom - top < 4:
         return False
-    background = _border_median(luma, left, right, top, bottom)
+    background, noise = _surround(luma, left, right, top, bottom)
     peak, pu, pv = -1, u0, v0
     for v in range(top, bottom + 1):
         for u in range(left, right + 1):
@@ -104,5 +106,5 @@ def measure(luma: Image, u0: int, v0: int, half: int, out: Array) -> bool:
                     stack[count, 0], stack[count, 1] = rr, cc
                     count += 1
     _moments(luma, member, left, top, background, out)
-    out[3], out[4] = area, contrast
+    out[3], out[4], out[8] = area, contrast, noise
     return True

@@ -44,6 +44,8 @@ class Sight:
         self.luma: Image | None = None
         """The newest decoded picture; valid until the next."""
         self.undecodable = 0
+        self._next = -1
+        """Sequence number that follows without a gap."""
         self.needs_key = True
         """The stream can't be decoded before a key frame."""
 
@@ -102,6 +104,9 @@ class Sight:
         if self._decoder is None or self._decoder.codec != name:
             self._decoder = Decoder(name, self.camera.width, self.camera.height)
             self.needs_key = True
+        if frame.sequence != self._next:
+            self.needs_key = True  # a decoder hides a lost picture: LEDs would stand where they were
+        self._next = (frame.sequence + 1) & 0xFFFFFFFF
         if self.needs_key and not picture.key:
             return None
         try:

@@ -61,7 +61,7 @@ def status(server: Serving) -> dict[str, object]:
 
 
 def mode(server: Serving) -> str:
-    """Of the robot, as the server says; "" while it says nothing."""
+    """As the server says; "" while it says nothing."""
     with contextlib.suppress(urllib.error.URLError, OSError, TypeError):
         return str(status(server)["mode"])
     return ""
@@ -100,8 +100,7 @@ def flight(server: Serving) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def kill(server: Serving, name: str) -> int:
-    pid = processes(server.process.pid)[name]
-    os.kill(pid, signal.SIGKILL)
+    os.kill(pid := processes(server.process.pid)[name], signal.SIGKILL)
     return pid
 
 
@@ -126,9 +125,8 @@ def test_its_addresses_answer_and_the_certificate_holds_for_who_trusts_its_autho
 def test_what_it_leaves_on_the_disk_is_for_its_user_alone(server: Serving) -> None:
     assert server.runtime.stat().st_mode & 0o777 == 0o700
     assert (server.runtime / "lightleash-run.json").stat().st_mode & 0o777 == 0o600
-    keys = list(server.state.glob("*key*"))
-    assert keys
-    assert {path.stat().st_mode & 0o777 for path in keys} == {0o600}
+    modes = {path.stat().st_mode & 0o777 for path in server.state.glob("*key*")}
+    assert modes == {0o600}
 
 
 def test_no_secret_is_in_a_command_line(server: Serving) -> None:

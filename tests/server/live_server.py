@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 from websockets.asyncio.client import connect
@@ -31,7 +32,7 @@ def control_status(**changes: object) -> ControlStatus:
     plain = {"int": 0, "float": 0.0, "str": "", "bool": False}
     values: dict[str, object] = {}
     for name, hint in ControlStatus.__annotations__.items():
-        empty = {} if hint.startswith("dict") else [] if hint.startswith("list") else None
+        empty: object = {} if hint.startswith("dict") else [] if hint.startswith("list") else None
         values[name] = plain.get(hint, empty)
     values |= {"omega_b": (0.0, 0.0, 0.0), "thrusts": [0.0] * 8, "reason": "Not armed."}
     return msgspec.convert(values | changes, ControlStatus, strict=False)
@@ -79,8 +80,8 @@ class LiveServer:
                 tasks[1].cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
 
-    def open(self, path: str, role: str, **options: object) -> connect:
+    def open(self, path: str, role: str, **options: Any) -> connect:
         """A websocket as a Python client opens it."""
         headers = {"Authorization": f"Bearer {self.token(role)}"}
         url = f"ws://{HOST}:{self.port}{path}"
-        return connect(url, **{"additional_headers": headers, "proxy": None, **options})
+        return connect(url, additional_headers=headers, proxy=None, **options)

@@ -189,3 +189,13 @@ def test_free_fall_says_nothing_about_the_vertical():
     eye = sight()
     eye.feel(PhoneImu(0.0, ZERO, ZERO))
     assert eye._up_in_c is None
+
+
+def test_after_a_lost_picture_nothing_is_decoded_before_a_key():
+    """FFmpeg hides a missing picture: the LEDs would stand where they were, without a word."""
+    rng = np.random.default_rng(84)
+    frames, truths = zip(*shots(rng, 3), strict=True)
+    eye = sight()
+    assert look(eye, frames[:1], truths[0]).pose is not None
+    assert look(eye, frames[2:], truths[2]) is None
+    assert eye.needs_key
