@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import os
 import ssl
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,11 +25,11 @@ from server.messages import (
     decode_from_server,
     encode_message,
 )
+from server.runtime import RUN_FILE, runtime_directory
 from server.wire import VERSION, Credit, Picture, Ping, Record, WireError, decode, encode
 
 MAX_IN_FLIGHT = 3
 """Pictures sent and not yet taken by the server."""
-RUN_FILE = "lightleash-run.json"
 TIMEOUT_S = 10.0
 DEFAULT_CAMERA = VirtualCameraConfig()
 
@@ -52,12 +51,6 @@ class Access:
     """Certificate of the authority that signed the server's."""
     virtual_camera: VirtualCameraConfig = DEFAULT_CAMERA
     """How the server smooths the phone's turns: its lag is no tracking error."""
-
-
-def runtime_directory() -> Path:
-    """Where a running server leaves word of itself."""
-    own = os.environ.get("XDG_RUNTIME_DIR")
-    return Path(own) / "lightleash" if own else Path(f"/tmp/lightleash-{os.getuid()}")
 
 
 def running_server(directory: Path | None = None) -> Access:
@@ -164,15 +157,21 @@ class PhoneClient:
         await self._credit.wait()
 
     async def send(self, record: Record) -> None:
-        """Send a record: pictures on the video socket, all else on the other."""
+        """Send a record: pictures on the video socket, all else on the other.
+
+        Raises:
+            PhoneClientError: the socket is gone.
+        """
         main, video = self._sockets
+        socket = video if isinstance(record.body, Picture) else main
         if isinstance(record.body, Picture):
             self._unanswered.add(record.sequence)
             if len(self._unanswered) >= MAX_IN_FLIGHT:
                 self._credit.clear()
-            await video.send(encode(record))
-        else:
-            await main.send(encode(record))
+        try:
+            await socket.send(encode(record))
+        except WebSocketException as error:
+            raise PhoneClientError(f"{self._access.url}: {error}") from error
 
     async def wish(self, command: Command) -> None:
         """Send a wish."""

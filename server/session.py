@@ -95,6 +95,8 @@ class Session:
             raise WireError("order", "message", "hello first")
         if not isinstance(message, MESSAGES[self.role]):
             raise WireError("role", "message.type", f"not as {self.role}")
+        if message == Command("reset") and self.role != "supervisor":
+            raise WireError("role", "command.what", "arm, disarm or stop: a supervisor resets")
         return message
 
     def _greeted(self, hello: Hello) -> Hello:

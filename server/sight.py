@@ -105,7 +105,9 @@ class Sight:
             self._decoder = Decoder(name, self.camera.width, self.camera.height)
             self.needs_key = True
         if frame.sequence != self._next:
-            self.needs_key = True  # a decoder hides a lost picture: LEDs would stand where they were
+            self.needs_key = (
+                True  # a decoder hides a lost picture: LEDs would stand where they were
+            )
         self._next = (frame.sequence + 1) & 0xFFFFFFFF
         if self.needs_key and not picture.key:
             return None

@@ -7,7 +7,8 @@ import pytest
 
 from pipeline.config import VirtualCameraConfig
 from server.messages import Refused, encode_message
-from server.phone_client import RUN_FILE, Access, PhoneClient, PhoneClientError, running_server
+from server.phone_client import Access, PhoneClient, PhoneClientError, running_server
+from server.runtime import RUN_FILE
 from server.wire import Credit, Ping, Pong, Record, decode, encode
 from tests.server.page_server import WELCOME, PageServer, picture, status
 

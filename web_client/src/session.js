@@ -206,11 +206,10 @@ export function touchOf(state) {
 /**
  * What the button beside STOP does now, and whether it may.
  * @param {State} state
- * @returns {{ what: 'arm' | 'disarm' | 'reset', enabled: boolean }}
+ * @returns {{ what: 'arm' | 'disarm', enabled: boolean }}
  */
 export function wish(state) {
   const mode = shownMode(state);
-  if (mode === 'STOPPED') return { what: 'reset', enabled: !state.held };
   if (mode === 'ARMED' || mode === 'TRACK' || mode === 'HOLD') return { what: 'disarm', enabled: true };
   const ready = mode === 'DISARMED' && state.status?.ready === true;
   return { what: 'arm', enabled: ready && !state.held };

@@ -39,12 +39,12 @@
  *   | { type: 'notice', text: string, now: number } | { type: 'ping', nonce: bigint }
  *   | { type: 'tick', now: number } | { type: 'press' } | { type: 'release' }
  *   | { type: 'visibility', visible: boolean } | { type: 'stop' } | { type: 'stop_tick' }
- *   | { type: 'ask', what: 'arm' | 'disarm' | 'reset' } | { type: 'motion_silent', silent: boolean }
+ *   | { type: 'ask', what: 'arm' | 'disarm' } | { type: 'motion_silent', silent: boolean }
  *   | { type: 'health', health: Health }} Event
  */
 
 /**
- * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop' | 'reset' }
+ * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop' }
  *   | { type: 'post_stop' } | { type: 'feel', mode: ShownMode } | { type: 'close_link' }} Effect
  */
 

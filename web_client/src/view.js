@@ -7,7 +7,7 @@ import { MODE_WORDS } from './mode_words.js';
 import { attachHold } from './hold_button.js';
 import { shownMode, wish } from './session.js';
 
-const WISH_WORDS = { arm: 'Arm', disarm: 'Disarm', reset: 'Reset' };
+const WISH_WORDS = { arm: 'Arm', disarm: 'Disarm' };
 const MOST_REFUSALS = 4;
 
 /**

@@ -104,13 +104,12 @@ test('arming is offered when the server is ready and nobody holds', () => {
   assert.deepEqual(wish(after(...UP, ready, { type: 'tick', now: 9e9 }).state), { what: 'arm', enabled: false });
 });
 
-test('what is armed can be disarmed, what is stopped can be reset with free hands', () => {
+test('what is armed can be disarmed; what is stopped waits for a supervisor', () => {
   for (const mode of /** @type {const} */ (['ARMED', 'TRACK', 'HOLD'])) {
     assert.deepEqual(wish(after(...UP, status({ mode })).state), { what: 'disarm', enabled: true });
   }
   const stopped = status({ mode: 'STOPPED' });
-  assert.deepEqual(wish(after(...UP, stopped).state), { what: 'reset', enabled: true });
-  assert.deepEqual(wish(after(...UP, stopped, { type: 'press' }).state), { what: 'reset', enabled: false });
+  assert.deepEqual(wish(after(...UP, stopped).state), { what: 'arm', enabled: false });
 });
 
 test('a refusal is a passing remark, a fatal one ends or explains', () => {
