@@ -1,4 +1,4 @@
-"""What a spot claims of its place, against where the LED was: in light and dark, still and moving."""
+"""What a spot claims of its place, against where the LED was: light, dark, still, moving."""
 
 import numpy as np
 import pytest
