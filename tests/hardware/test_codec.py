@@ -63,8 +63,9 @@ def test_luma_spans_the_range_that_the_decoder_says(codec):
 
 @pytest.mark.parametrize("codec", VIDEO)
 def test_a_key_frame_comes_when_asked_and_every_two_seconds(codec):
-    encoder = Encoder(W, H, 10.0, 1_000_000, codec)
-    keys = [k for k in range(45) if encoder.encode(picture(k), key=k == 7)[1]]
+    encoder = Encoder(W // 4, H // 4, 10.0, 1_000_000, codec)
+    small = picture()[::4, ::4].copy()
+    keys = [k for k in range(45) if encoder.encode(small, key=k == 7)[1]]
     assert keys == [0, 7, 20, 40]
 
 
@@ -128,7 +129,7 @@ HEADS = {codec: stream(codec, 1)[0][0][:60] for codec in CODECS}
 
 
 @pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("size", [(640, 480), (160, 120), (240, 320), (2048, 1024)])
+@pytest.mark.parametrize("size", [(640, 480), (160, 120), (240, 320), (1024, 512)])
 def test_a_picture_of_another_size_is_refused(codec, size):
     data, _ = Encoder(*size, 30.0, 2_000_000, codec).encode(np.zeros(size[::-1], np.uint8))
     with pytest.raises(DecodeError):
