@@ -162,7 +162,7 @@ class HoldConfig:
 
 @dataclass(frozen=True, slots=True)
 class EnvelopeConfig:
-    """Beyond these the flight is over (RAMP)."""
+    """Beyond these the flight is over (RAMP); beyond the uncertainty it holds (HOLD)."""
 
     max_tilt_rad: float = 0.6
     max_error_m: float = 0.6

@@ -46,7 +46,9 @@ class Inputs:
     robot_ms: int
     """Age of the robot's last sample."""
     fault: str = ""
-    """Not healthy: why."""
+    """Not healthy: why. Ends a flight."""
+    doubt: str = ""
+    """Not sure enough to track: why. Holds a flight."""
     refusals: tuple[str, ...] = ()
     """What else speaks against arming."""
     requests: Requests = NO_REQUESTS
@@ -82,7 +84,7 @@ def ceiling(state: Failsafe, limits: Limits) -> float:
 
 
 def staleness(inputs: Inputs, limits: Limits) -> str:
-    """Which input is too old to track with, and for whom to mend; empty if none."""
+    """Which input is too old or unsure to track with, for who can mend it; empty if none."""
     if inputs.robot_ms > limits.hold:
         return "No word from the robot."
     if inputs.operator_ms > limits.hold:
@@ -91,7 +93,7 @@ def staleness(inputs: Inputs, limits: Limits) -> str:
         return "The phone's motion sensors are silent."
     if inputs.pose_ms > limits.pose_hold:
         return "The camera has lost the robot."
-    return ""
+    return inputs.doubt
 
 
 def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]:

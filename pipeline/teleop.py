@@ -166,6 +166,7 @@ class Teleop:
             phone_imu_ms=_ms(ages.phone_imu),
             robot_ms=_ms(ages.body_imu),
             fault=fault,
+            doubt=self._doubt(relative),
             refusals=inputs.refusals,
             requests=inputs.requests,
         )
@@ -177,11 +178,14 @@ class Teleop:
             return (
                 "No estimate of the robot's pose yet." if not flying else "The estimate was lost."
             )
-        if relative.sigma_p > limits.max_sigma_p_m and self._failsafe.mode != Mode.HOLD:
-            return "The estimate is too uncertain."
         if flying and error is not None:
             return _outside(limits, error, relative)
         return ""
+
+    def _doubt(self, relative: RelativeState | None) -> str:
+        """The filter's own covariance decides when it no longer knows enough."""
+        unsure = relative is not None and relative.sigma_p > self._config.envelope.max_sigma_p_m
+        return "The robot's place is too uncertain." if unsure else ""
 
     def _change_mode(
         self,

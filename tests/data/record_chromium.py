@@ -17,7 +17,7 @@ from hardware.sim.hand import make_hand
 from tests.e2e.chromium_phone import ChromiumPhone, browser
 from tests.e2e.conftest import find_chromium
 from tests.e2e.serving import serving
-from tests.e2e.test_chromium_loop import LANDSCAPE, calibrate, start
+from tests.e2e.test_chromium_loop import LANDSCAPE, calibrate, lead, start
 
 TARGET = Path(__file__).with_name("chromium.mcap")
 
@@ -41,10 +41,7 @@ def main() -> None:
                 start(phone, server)
                 server.request("POST", "/api/recording")
                 phone.play(1.0)
-                phone.page.tap("#wish")
-                phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
-                phone.play(0.7)
-                phone.hold()
+                lead(phone)
                 phone.play(seconds)
                 path = server.request("DELETE", "/api/recording")["path"]
         shutil.copy(str(path), TARGET)

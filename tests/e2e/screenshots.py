@@ -16,7 +16,7 @@ from hardware.sim.hand import make_hand
 from tests.e2e.chromium_phone import ChromiumPhone, browser
 from tests.e2e.conftest import find_chromium
 from tests.e2e.serving import serving
-from tests.e2e.test_chromium_loop import LANDSCAPE, calibrate, start
+from tests.e2e.test_chromium_loop import LANDSCAPE, calibrate, lead, start
 
 DESKTOP, PHONE = (1440, 900), (412, 915)
 
@@ -41,10 +41,7 @@ def main() -> None:
                 phone.page.wait_for_selector("#start:visible")
                 phone.page.screenshot(path=target / "phone-start.png")
                 start(phone, server)
-                phone.page.tap("#wish")
-                phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
-                phone.play(0.7)
-                phone.hold()
+                lead(phone)
                 phone.play(12.0)
                 phone.page.screenshot(path=target / "phone-landscape.png")
                 phone.let_go()

@@ -39,6 +39,23 @@ def start(phone: ChromiumPhone, server: Serving) -> None:
     phone.play_until("!document.querySelector('#wish').disabled", 25.0)
 
 
+def lead(phone: ChromiumPhone, tries: int = 3) -> None:
+    """Arm and hold; again if a busy machine starved the sensors and the robot was disarmed."""
+    for left in reversed(range(tries)):
+        try:
+            phone.play_until("!document.querySelector('#wish').disabled", 25.0)
+            phone.page.tap("#wish")
+            phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
+            phone.play(0.7)
+            phone.hold()
+            phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
+            return
+        except TimeoutError:
+            phone.let_go()
+            if not left:
+                raise
+
+
 def test_the_robot_follows_a_chromium_over_tls_and_stops_on_its_stop(
     chromium: str, tmp_path: Path
 ) -> None:
@@ -56,11 +73,7 @@ def test_the_robot_follows_a_chromium_over_tls_and_stops_on_its_stop(
         refused: list[str] = []
         phone.page.on("console", lambda message: refused.append(message.text))
         start(phone, server)
-        phone.page.tap("#wish")
-        phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
-        phone.play(0.7)
-        phone.hold()
-        phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
+        lead(phone)
         distances = phone.track(20.0)
         status = server.request("GET", "/api/status")
         assert status["mode"] == "TRACK", status["reason"]

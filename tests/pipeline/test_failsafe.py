@@ -67,6 +67,7 @@ def test_arming_is_refused_with_every_reason_in_words() -> None:
         ({"operator_ms": 151}, 5, Mode.HOLD),
         ({"phone_imu_ms": 151}, 5, Mode.HOLD),
         ({"pose_ms": 301}, 5, Mode.HOLD),
+        ({"doubt": "unsure"}, 5, Mode.HOLD),
         ({"robot_ms": 151}, 5, Mode.RAMP),
         ({"fault": "spins"}, 5, Mode.RAMP),
         ({"requests": DISARM}, 5, Mode.RAMP),
@@ -116,6 +117,7 @@ INPUTS = st.builds(
     phone_imu_ms=AGES,
     robot_ms=AGES,
     fault=st.sampled_from(("", "", "spins")),
+    doubt=st.sampled_from(("", "", "unsure")),
     refusals=st.sampled_from(((), (), ("x",))),
     requests=st.builds(
         Requests, arm=st.booleans(), disarm=st.booleans(), stop=st.booleans(), reset=st.booleans()
