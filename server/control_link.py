@@ -213,7 +213,7 @@ class Endpoint:
         for datagram in self._datagrams(limit):
             try:
                 message = _input_decoder.decode(datagram)
-            except msgspec.MsgspecError:
+            except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
                 self.dropped += 1
                 continue
             if is_believable(message):
@@ -228,7 +228,7 @@ class Endpoint:
         for datagram in self._datagrams(limit):
             try:
                 statuses.append(_status_decoder.decode(datagram))
-            except msgspec.MsgspecError:
+            except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
                 self.dropped += 1
         return statuses
 

@@ -78,7 +78,7 @@ def device_of(recording: Recording) -> str:
     """
     device = recording.metadata.get(DEVICE_KEY, "")
     for entry in () if device else recording.entries(SERVER_MESSAGES):
-        with suppress(msgspec.MsgspecError):
+        with suppress(msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
             message = decode_from_server(entry.data)
             if isinstance(message, Status) and message.operator:
                 return message.operator

@@ -89,7 +89,7 @@ def camera_only(data: bytes) -> bytes | None:
         return None
     try:
         camera = _decoder.decode(data)
-    except msgspec.MsgspecError:
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
     numbers = (*camera.wxyz, *camera.position, *camera.look_at, *camera.up_direction)
     if not all(map(isfinite, (*numbers, camera.fov, camera.near, camera.far))):

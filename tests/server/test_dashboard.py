@@ -14,6 +14,8 @@ from server import scene
 from server.control_link import ControlStatus
 from server.dashboard import Dashboard
 
+pytestmark = pytest.mark.slow  # a real viser
+
 AMES = load_robot("ames")
 angle = st.floats(-1.2, 1.2)
 attitude = st.builds(lambda *eta: R_from_rpy(np.array(eta)), angle, angle, angle)

@@ -17,6 +17,8 @@ from server import listener as impatient
 from server.wire import MAX_RECORD_BYTES
 from tests.server.house import eventually
 
+pytestmark = pytest.mark.slow  # real sockets, whose server stops by its own tick
+
 OK = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
 LAST = b"GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
 HEAD_S = 0.05

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
@@ -23,6 +24,7 @@ def test_the_robot_keeps_its_pose_to_a_hand_that_tries_to_be_still() -> None:
     assert np.sqrt(np.mean(distances**2)) < 0.015
 
 
+@pytest.mark.slow
 def test_the_same_seed_flies_the_same_flight() -> None:
     first, second = flight(3.4), flight(3.4)
     assert len(first.t) > 20

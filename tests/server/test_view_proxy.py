@@ -19,6 +19,8 @@ from websockets.exceptions import InvalidStatus
 from server.dashboard import _Viser
 from server.view_proxy import MAX_UP_BYTES, camera_only, routes
 
+pytestmark = pytest.mark.slow  # a real viser
+
 SUBPROTOCOL = f"viser-v{viser.__version__}"
 CAMERA = {
     "type": "ViewerCameraMessage",

@@ -13,6 +13,8 @@ from server.session import MAX_FAULTS
 from server.wire import MAX_RECORD_BYTES, Codec, Credit, Motion, Picture, Record, Touch, encode
 from tests.server.house import JPEG, control_status, eventually, house_in, is_request
 
+pytestmark = pytest.mark.slow  # real sockets, whose server stops by its own tick
+
 FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
 SIGNALS = (PhoneImuInput, PoseInput, OperatorInput, RequestInput)
 
