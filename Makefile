@@ -80,7 +80,9 @@ fast: dev
 	$(BIN)/pytest -m "not e2e and not bench and not slow" $(ARGS)
 
 bench: dev
-	$(BIN)/pytest -m bench -s $(ARGS)
+	$(BIN)/lightleash experiments loop
+	$(BIN)/lightleash experiments loop --live
+	for name in control ekf vision; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt
