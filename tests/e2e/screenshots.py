@@ -40,7 +40,16 @@ def main() -> None:
                 phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
                 phone.page.wait_for_selector("#start:visible")
                 phone.page.screenshot(path=target / "phone-start.png")
+                portrait = {"width": PHONE[0], "height": PHONE[1]}
+                landscape = {"width": PHONE[1], "height": PHONE[0]}
+                phone.page.set_viewport_size(portrait)
+                phone.page.screenshot(path=target / "phone-start-portrait.png")
+                phone.page.set_viewport_size(landscape)
                 start(phone, server)
+                phone.page.set_viewport_size(portrait)
+                phone.play(1.0)
+                phone.page.screenshot(path=target / "phone-portrait.png")
+                phone.page.set_viewport_size(landscape)
                 lead(phone)
                 phone.play(12.0)
                 phone.page.screenshot(path=target / "phone-landscape.png")
