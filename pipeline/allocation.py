@@ -33,6 +33,7 @@ class Allocation:
         )
         self._G = np.ascontiguousarray(weighted.T * weight)
         self._active = np.zeros(thrusters, dtype=np.int8)
+        self.thrusts(np.zeros(6))  # compiles or loads the kernel here: never inside the loop
 
     def thrusts(self, wrench_in_b: Array) -> Array:
         """Thrusts (m,) [N], each in [f_min, f_max], for a wrench (6,) [N, N m]."""

@@ -69,7 +69,7 @@ class Launcher:
         """Start, announce, watch, stop; gives the exit code."""
         announced = False
         names = ", ".join(child.name for child in self.children)
-        print(f"Starting {names}: some seconds.", flush=True)
+        print(f"Starting {names}: some seconds, half a minute the first time.", flush=True)
         try:
             while not self._stopping:
                 self.revive(time.monotonic())

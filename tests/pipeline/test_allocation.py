@@ -62,6 +62,13 @@ def test_a_feasible_wrench_is_achieved() -> None:
         np.testing.assert_allclose(robot.A @ thrusts, wrench, atol=1e-4)
 
 
+def test_nothing_is_left_to_compile_when_the_first_wrench_comes() -> None:
+    allocation = Allocation(cube_robot())
+    compiled = len(box_least_squares.signatures)
+    allocation.thrusts(np.ones(6))
+    assert len(box_least_squares.signatures) == compiled > 0
+
+
 def test_torque_is_kept_before_force_when_both_cannot_be_had() -> None:
     robot = cube_robot()
     wrench = robot.A @ np.full(8, 1.5) + np.array([40.0, 0.0, 0.0, 0.0, 0.0, 0.0])
