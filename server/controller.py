@@ -8,10 +8,11 @@ import numpy as np
 
 from hardware.follower import ThrustCommand
 from pipeline.config import TeleopConfig
-from pipeline.frames import Array, cross, wxyz_from_R
+from pipeline.frames import Array, wxyz_from_R
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose, Requests
 from pipeline.teleop import Inputs, Output, Teleop
+from pipeline.vertical import Vertical
 from server.control_link import (
     ControlStatus,
     Input,
@@ -36,10 +37,15 @@ class Controller:
         self.teleop = Teleop(robot, config)
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
-        self.up_in_b: Array | None = None
+        self._vertical = Vertical()
         self.omega_bf_in_b = np.zeros(3)
         self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
         self._fuse_ms = 0.0
+
+    @property
+    def up_in_b(self) -> Array | None:
+        """Opposite of gravity in the body (3,), for vision; None before the first sample."""
+        return self._vertical.up
 
     def tick(
         self,
@@ -58,7 +64,7 @@ class Controller:
         """
         phone, poses, operator, wishes = self._sort(messages, now)
         for sample in body:
-            self._follow_gravity(sample)
+            self._vertical.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
             self._body_samples.append(
                 (sample.t, *triple(sample.omega_m_bf_in_b), *triple(sample.a_m_bf_in_b))
             )
@@ -105,19 +111,6 @@ class Controller:
         if now - self._t_ready > SERVER_SILENT_S:
             return ("The server is silent.",)
         return (*self._refusals, *(why for why in (robot_reason, self._unfit) if why))
-
-    def _follow_gravity(self, sample: BodyImu) -> None:
-        """Low-passed direction of the specific force, turned with the gyroscope: up in b."""
-        norm = float(np.sqrt(sample.a_m_bf_in_b @ sample.a_m_bf_in_b))
-        if norm < 1.0:
-            return
-        up = sample.a_m_bf_in_b / norm
-        if self.up_in_b is None:
-            self.up_in_b = up
-            return
-        turned = self.up_in_b - 0.005 * cross(sample.omega_m_bf_in_b, self.up_in_b)
-        mixed = turned + 0.01 * (up - turned)
-        self.up_in_b = mixed / float(np.sqrt(mixed @ mixed))
 
     def status(
         self,

@@ -14,13 +14,12 @@ from pipeline.frames import Array
 from pipeline.gates import disbelief
 from pipeline.robot import Robot
 from pipeline.signals import Frame, Image, PhoneImu, Spots
+from pipeline.vertical import Vertical
 from pipeline.vision import Prior, Sighting, Vision
 from server.ingest import EncodedFrame
 from server.wire import Codec
 
 CODEC_NAMES = {Codec.JPEG: "jpeg", Codec.H264: "h264", Codec.VP8: "vp8"}
-GRAVITY_S = 0.5
-"""Time constant of the phone's vertical between samples of its gyroscope."""
 NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
 
 
@@ -39,7 +38,7 @@ class Sight:
         self._gates, self._clock = gates, clock
         self._vision = Vision(camera, robot.leds_in_b)
         self._decoder: Decoder | None = None
-        self._up_in_c: Array | None = None
+        self._vertical = Vertical()
         self._phone: PhoneImu | None = None
         self.luma: Image | None = None
         """The newest decoded picture; valid until the next."""
@@ -50,19 +49,9 @@ class Sight:
         """The stream can't be decoded before a key frame."""
 
     def feel(self, sample: PhoneImu) -> None:
-        """Follow the phone's vertical: gyroscope now, accelerometer in the long run."""
-        force, last = sample.a_m_cf_in_c, self._phone
-        norm = float(np.sqrt(force @ force))
+        """Follow the phone's motion."""
         self._phone = sample
-        if norm < 1.0:
-            return
-        if self._up_in_c is None or last is None or not 0.0 < sample.t - last.t < GRAVITY_S:
-            self._up_in_c = force / norm
-            return
-        dt = sample.t - last.t
-        turned = self._up_in_c - dt * np.cross(sample.omega_m_cf_in_c, self._up_in_c)
-        mixed = turned + dt / GRAVITY_S * (force / norm - turned)
-        self._up_in_c = mixed / float(np.sqrt(mixed @ mixed))
+        self._vertical.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
 
     def see(
         self, frames: Sequence[EncodedFrame], up_in_b: Array | None, omega_bf_in_b: Array
@@ -77,7 +66,7 @@ class Sight:
         self.luma = luma
         newest = frames[-1]
         prior = Prior(
-            self._up_in_c,
+            self._vertical.up,
             up_in_b,
             self._phone.omega_m_cf_in_c if self._phone is not None else None,
             omega_bf_in_b,

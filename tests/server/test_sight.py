@@ -171,7 +171,7 @@ def test_the_phones_vertical_follows_its_gyroscope_at_once():
     for k in range(61):
         up_in_c = exp(-omega * 0.01 * k) @ up
         eye.feel(PhoneImu(0.01 * k, omega, GRAVITY * up_in_c))
-    assert np.degrees(np.arccos(eye._up_in_c @ up_in_c)) < 0.5
+    assert np.degrees(np.arccos(eye._vertical.up @ up_in_c)) < 0.5
 
 
 def test_a_shake_hardly_tilts_the_phones_vertical_but_the_long_run_does():
@@ -179,16 +179,16 @@ def test_a_shake_hardly_tilts_the_phones_vertical_but_the_long_run_does():
     push = np.array([5.0, 0.0, 0.0])
     eye.feel(PhoneImu(0.0, ZERO, GRAVITY * up))
     eye.feel(PhoneImu(0.02, ZERO, GRAVITY * up + push))
-    assert np.degrees(np.arccos(eye._up_in_c @ up)) < 2.0
+    assert np.degrees(np.arccos(eye._vertical.up @ up)) < 2.0
     for k in range(2, 200):
         eye.feel(PhoneImu(0.02 * k, ZERO, GRAVITY * up + push))
-    assert np.degrees(np.arccos(eye._up_in_c @ up)) > 20.0
+    assert np.degrees(np.arccos(eye._vertical.up @ up)) > 20.0
 
 
 def test_free_fall_says_nothing_about_the_vertical():
     eye = sight()
     eye.feel(PhoneImu(0.0, ZERO, ZERO))
-    assert eye._up_in_c is None
+    assert eye._vertical.up is None
 
 
 def test_after_a_lost_picture_nothing_is_decoded_before_a_key():
