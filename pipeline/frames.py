@@ -176,16 +176,6 @@ def wrap(angle: Array) -> Array:
     return wrapped
 
 
-def R_fd_from_w3c(alpha_deg: float, beta_deg: float, gamma_deg: float) -> Array:
-    """Device attitude of the browser's Euler angles: R_z(α) R_x(β) R_y(γ), earth axes as f.
-
-    Singular at β = ±90° (the phone upright, this program's usual pose): turn into a rotation at
-    once and never filter the angles. https://www.w3.org/TR/orientation-event/
-    """
-    alpha, beta, gamma = np.deg2rad((alpha_deg, beta_deg, gamma_deg))
-    return rotation_about_z(alpha) @ rotation_about_x(beta) @ rotation_about_y(gamma)
-
-
 def R_fc_level_from_specific_force(f_in_c: Array) -> Array:
     """An attitude whose z agrees with the direction of a specific force measured at rest."""
     up = f_in_c / sqrt(float(f_in_c @ f_in_c))

@@ -14,8 +14,8 @@ import numpy as np
 from pipeline.robot import Robot
 from server.clock import now
 from server.control_link import ControlStatus, Input, ReadyInput, RequestInput, server_end
-from server.latest import Meter
 from server.messages import Command, Hello, Status, ToPage, encode_message
+from server.meter import Meter
 from server.operator import OperatorPhone
 from server.recorder import Recordings
 from server.status import build

@@ -13,6 +13,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from server.runtime import RUN_FILE
+
 START_S = 60.0
 EXTRA_S = 6.0
 """Of a flight, for clocks, arming and the press."""
@@ -41,7 +43,7 @@ def server(robot: str, gains: str) -> Iterator[dict[str, str]]:
             )
         try:
             end = time.monotonic() + START_S
-            while not (folder / "lightleash" / "lightleash-run.json").exists():
+            while not (folder / "lightleash" / RUN_FILE).exists():
                 if process.poll() is not None or time.monotonic() > end:
                     raise RuntimeError(f"serve did not start: {log.read_text()}")
                 time.sleep(0.1)

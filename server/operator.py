@@ -13,8 +13,8 @@ from pipeline.signals import Operator, PhoneImu
 from pipeline.vision import Sighting
 from server.control_link import Input, OperatorInput, PhoneImuInput, PoseInput
 from server.ingest import EncodedFrame, Ingest
-from server.latest import Meter
 from server.messages import Hello
+from server.meter import Meter
 from server.sight import Sight
 from server.vision import VisionThread
 from server.wire import Picture, Record, WireError

@@ -10,8 +10,8 @@ from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.clock import now
 from server.control_link import ControlStatus
-from server.latest import Meter
 from server.messages import Status, Stream
+from server.meter import Meter
 from server.operator import OperatorPhone
 from server.recorder import Recordings
 

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from websockets.asyncio.client import connect
 
+from server.runtime import RUN_FILE
 from tests.e2e.serving import serving
 
 SUPERVISORS = 4
@@ -99,7 +100,7 @@ def thread_server(folder: Path) -> Iterator[dict[str, str]]:
         env=environment,
         stderr=subprocess.DEVNULL,
     )
-    run_file = folder / "lightleash" / "lightleash-run.json"
+    run_file = folder / "lightleash" / RUN_FILE
     while not run_file.exists():
         if process.poll() is not None:
             raise RuntimeError("the server with control as a thread did not start")
@@ -167,7 +168,7 @@ def serve_with_thread(folder: Path) -> None:
 
 def as_thread(seconds: float) -> None:
     with tempfile.TemporaryDirectory() as name, thread_server(Path(name)) as environment:
-        run = json.loads((Path(name) / "lightleash" / "lightleash-run.json").read_text())
+        run = json.loads((Path(name) / "lightleash" / RUN_FILE).read_text())
         report("thread", load(run, environment, seconds))
 
 

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from server.runtime import RUN_FILE
+
 START_S = 60.0
 DEVICE = "Linux 412x915@1 / canvas camera"
 """What the phone page calls itself in the Chromium of `chromium_phone`."""
@@ -60,7 +62,7 @@ def serving(folder: Path, *arguments: str) -> Iterator[Serving]:
         [*command, *arguments], env=environment, stdout=log, stderr=subprocess.STDOUT
     )
     try:
-        run = _run_file(process, runtime / "lightleash" / "lightleash-run.json", folder)
+        run = _run_file(process, runtime / "lightleash" / RUN_FILE, folder)
         yield Serving(
             process,
             runtime / "lightleash",

@@ -12,7 +12,6 @@ from pipeline.frames import (
     R_cd_portrait,
     R_co,
     R_fc_level_from_specific_force,
-    R_fd_from_w3c,
     R_from_rpy,
     R_from_wxyz,
     S_in_a,
@@ -185,13 +184,6 @@ def test_device_axes_of_an_upright_phone_and_of_one_turned_with_its_screen():
     assert np.array_equal(y, (0.0, 0.0, 1.0))
     assert np.array_equal(z, (-1.0, 0.0, 0.0))  # out of the screen, to its holder
     assert np.abs(R_cd(90.0)[:, 0] - (0.0, 0.0, 1.0)).max() < 1e-15
-
-
-@given(st.floats(0.0, 360.0), st.floats(-180.0, 180.0), st.floats(-90.0, 90.0))
-def test_the_browsers_angles_make_a_rotation_with_beta_as_the_tilt_of_y(alpha, beta, gamma):
-    R = R_fd_from_w3c(alpha, beta, gamma)
-    assert np.abs(R @ R.T - np.eye(3)).max() < 1e-14
-    assert R[2, 1] == pytest.approx(np.sin(np.deg2rad(beta)), abs=1e-14)
 
 
 def test_the_constants_cannot_be_overwritten():

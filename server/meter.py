@@ -1,42 +1,12 @@
-"""Newest wins: a slot that counts what it drops, and a meter of how fresh a stream is."""
+"""How fresh a stream is: age, rate, losses."""
 
 from __future__ import annotations
 
-import threading
 from collections import deque
-from typing import Generic, TypeVar
 
 from server.messages import Stream
 
-T = TypeVar("T")
 WINDOW_S = 2.0
-
-
-class Latest(Generic[T]):
-    """One slot between threads: what was not taken in time is replaced and counted."""
-
-    def __init__(self) -> None:
-        """Empty."""
-        self._lock = threading.Lock()
-        self._value: T | None = None
-        self.dropped = 0
-
-    def put(self, value: T) -> None:
-        """Replace what is there."""
-        with self._lock:
-            self.dropped += self._value is not None
-            self._value = value
-
-    def take(self) -> T | None:
-        """The value, leaving the slot empty; None if it is."""
-        with self._lock:
-            value, self._value = self._value, None
-            return value
-
-    def peek(self) -> T | None:
-        """The value, leaving it there."""
-        with self._lock:
-            return self._value
 
 
 class Meter:
