@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos
 
 import numpy as np
 
@@ -103,7 +104,7 @@ class Teleop:
             view = self._virtual_camera.view(relative, R_fc, self._period)  # Eq. (21)-(24)
         error = pose_error(view, self._reference) if view and self._reference else None
         ages = self._ages(inputs.t)
-        judged = self._judge(inputs, relative, error, ages)
+        judged = self._judge(inputs, relative, view, error, ages)
         before, self._failsafe = (
             self._failsafe,
             failsafe.step(self._failsafe, judged, round(1e3 * self._period), self._limits),
@@ -154,10 +155,11 @@ class Teleop:
         self,
         inputs: Inputs,
         relative: RelativeState | None,
+        view: VirtualView | None,
         error: PoseError | None,
         ages: Ages,
     ) -> failsafe.Inputs:
-        fault = inputs.fault or self._fault(relative, error)
+        fault = inputs.fault or self._fault(relative, view, error)
         return failsafe.Inputs(
             held=self._operator.held,
             press=self._operator.press,
@@ -171,15 +173,20 @@ class Teleop:
             requests=inputs.requests,
         )
 
-    def _fault(self, relative: RelativeState | None, error: PoseError | None) -> str:
+    def _fault(
+        self,
+        relative: RelativeState | None,
+        view: VirtualView | None,
+        error: PoseError | None,
+    ) -> str:
         """What is not healthy in the estimate or in the flight."""
         limits, flying = self._config.envelope, self._failsafe.mode == Mode.TRACK
         if relative is None:
             return (
                 "No estimate of the robot's pose yet." if not flying else "The estimate was lost."
             )
-        if flying and error is not None:
-            return _outside(limits, error, relative)
+        if flying and error is not None and view is not None:
+            return _outside(limits, error, view)
         return ""
 
     def _doubt(self, relative: RelativeState | None) -> str:
@@ -230,13 +237,15 @@ class Teleop:
         return thrusts * failsafe.ceiling(self._failsafe, self._limits), saturated
 
 
-def _outside(limits: EnvelopeConfig, error: PoseError, relative: RelativeState) -> str:
+def _outside(limits: EnvelopeConfig, error: PoseError, view: VirtualView) -> str:
     if float(error.e_p_in_v @ error.e_p_in_v) > limits.max_error_m**2:
         return "Too far from where it should be."
     if float(error.e_eta_in_b @ error.e_eta_in_b) > limits.max_error_rad**2:
         return "Turned too far from where it should be."
-    if float(relative.omega_bf_in_b @ relative.omega_bf_in_b) > limits.max_body_rate**2:
+    if float(view.omega_bf_in_b @ view.omega_bf_in_b) > limits.max_body_rate**2:
         return "The robot spins too fast."
+    if float((view.R_fv @ view.R_vb)[2, 2]) < cos(limits.max_tilt_rad):
+        return "The robot is tilted too far."
     return ""
 
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from hardware.robot_file import load_robot
-from pipeline.config import TeleopConfig
-from pipeline.frames import GRAVITY
+from pipeline.config import EnvelopeConfig, TeleopConfig
+from pipeline.frames import GRAVITY, exp
 from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, RelativePose, Requests
 from pipeline.teleop import Inputs, Output, Teleop
 
 ROBOT = load_robot("ames").robot
 UP = np.array([0.0, 0.0, GRAVITY])
-STILL = np.zeros(3)
+STILL, LEVEL = np.zeros(3), np.eye(3)
 P = np.array([2.5, 0.0, 0.0])
 LEFT = np.array([0.0, 1.0, 0.0])
 COVARIANCE = np.diag([1e-6, 1e-7, 1e-7, 1e-6, 1e-6, 1e-6])
@@ -28,6 +29,7 @@ def run(
     held: bool = False,
     arm_at: float = -1.0,
     body_a: np.ndarray = UP,
+    R_cb: np.ndarray = LEVEL,
 ) -> list[Output]:
     """Everything at rest, seen perfectly, 50 ms late."""
     outputs = []
@@ -35,7 +37,7 @@ def run(
         t = 0.005 * k
         phone = (PhoneImu(t - 0.02, STILL, UP),) if k % 3 == 0 else ()
         seen = t - 0.05
-        pose = RelativePose(seen, position(seen), np.eye(3), COVARIANCE, 0.1, 5)
+        pose = RelativePose(seen, position(seen), R_cb, COVARIANCE, 0.1, 5)
         outputs.append(
             teleop.step(
                 Inputs(
@@ -92,6 +94,17 @@ def test_a_reference_out_of_reach_ends_the_flight() -> None:
     modes = {o.failsafe.mode for o in far}
     assert Mode.RAMP in modes
     assert far[-1].failsafe.mode in (Mode.RAMP, Mode.DISARMED)
+
+
+def test_a_robot_tilted_too_far_ends_the_flight() -> None:
+    limits = replace(EnvelopeConfig(), max_tilt_rad=0.2)
+    for tilt, mode in ((0.1, Mode.TRACK), (0.3, Mode.RAMP)):
+        R_cb = exp(np.array([tilt, 0.0, 0.0]))
+        teleop = Teleop(ROBOT, replace(TeleopConfig(), envelope=limits))
+        run(teleop, 0.0, 1.5, arm_at=1.2, body_a=R_cb.T @ UP, R_cb=R_cb)
+        last = run(teleop, 1.5, 0.3, held=True, body_a=R_cb.T @ UP, R_cb=R_cb)[-1]
+        assert last.failsafe.mode == mode
+    assert "tilted" in last.failsafe.reason
 
 
 def test_thrusts_are_always_finite_and_within_limits() -> None:
