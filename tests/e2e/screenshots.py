@@ -8,15 +8,10 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
-from contextlib import closing
 from pathlib import Path
 
-from hardware.robot_file import load_robot
-from hardware.sim.hand import make_hand
-from tests.e2e.chromium_phone import ChromiumPhone, browser
+from tests.e2e.chromium_rig import lead, led_server, start
 from tests.e2e.conftest import find_chromium
-from tests.e2e.serving import serving
-from tests.e2e.test_chromium_loop import LANDSCAPE, calibrate, lead, start
 
 DESKTOP, PHONE = (1440, 900), (412, 915)
 
@@ -28,49 +23,37 @@ def main() -> None:
         sys.exit("no Chromium found: apt-get install chromium")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        cameras = calibrate(folder)
-        with (
-            serving(folder, "--cameras", str(cameras)) as server,
-            browser(executable, **LANDSCAPE) as context,
-        ):
-            hand = make_hand("demo", t_start=time.monotonic() + 10.0)
-            leds_in_b = load_robot("ames").robot.leds_in_b
-            made = ChromiumPhone(context, hand, leds_in_b, server.truth_port)
-            with closing(made) as phone:
-                phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
-                phone.page.wait_for_selector("#start:visible")
-                phone.page.screenshot(path=target / "phone-start.png")
-                portrait = {"width": PHONE[0], "height": PHONE[1]}
-                landscape = {"width": PHONE[1], "height": PHONE[0]}
-                phone.page.set_viewport_size(portrait)
-                phone.page.screenshot(path=target / "phone-start-portrait.png")
-                phone.page.set_viewport_size(landscape)
-                start(phone, server)
-                phone.page.set_viewport_size(portrait)
-                phone.play(1.0)
-                phone.page.screenshot(path=target / "phone-portrait.png")
-                phone.page.set_viewport_size(landscape)
-                lead(phone)
-                phone.play(12.0)
-                phone.page.screenshot(path=target / "phone-landscape.png")
-                phone.let_go()
-                phone.page.close()
-                assert context.browser is not None
-                wide = context.browser.new_context(
-                    viewport={"width": DESKTOP[0], "height": DESKTOP[1]}
-                )
-                board = wide.new_page()
-                board.goto(f"{server.http_url}/supervisor#k={server.supervisor_token}")
-                time.sleep(3.0)  # the lease of the phone that left
-                board.click("#virtual")
-                time.sleep(35.0)  # the 3D view takes its time without a graphics card
-                board.screenshot(path=target / "supervisor.png", timeout=60_000)
-                board.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
-                print("mode:", server.request("GET", "/api/status")["mode"])
-                time.sleep(6.0)
-                board.screenshot(
-                    path=target / "supervisor-phone.png", full_page=True, timeout=60_000
-                )
+        with led_server(executable, folder, "demo", rest_s=10.0) as (server, context, phone):
+            phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+            phone.page.wait_for_selector("#start:visible")
+            phone.page.screenshot(path=target / "phone-start.png")
+            portrait = {"width": PHONE[0], "height": PHONE[1]}
+            landscape = {"width": PHONE[1], "height": PHONE[0]}
+            phone.page.set_viewport_size(portrait)
+            phone.page.screenshot(path=target / "phone-start-portrait.png")
+            phone.page.set_viewport_size(landscape)
+            start(phone, server)
+            phone.page.set_viewport_size(portrait)
+            phone.play(1.0)
+            phone.page.screenshot(path=target / "phone-portrait.png")
+            phone.page.set_viewport_size(landscape)
+            lead(phone)
+            phone.play(12.0)
+            phone.page.screenshot(path=target / "phone-landscape.png")
+            phone.let_go()
+            phone.page.close()
+            assert context.browser is not None
+            wide = context.browser.new_context(viewport={"width": DESKTOP[0], "height": DESKTOP[1]})
+            board = wide.new_page()
+            board.goto(f"{server.http_url}/supervisor#k={server.supervisor_token}")
+            time.sleep(3.0)  # the lease of the phone that left
+            board.click("#virtual")
+            time.sleep(35.0)  # the 3D view takes its time without a graphics card
+            board.screenshot(path=target / "supervisor.png", timeout=60_000)
+            board.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
+            print("mode:", server.request("GET", "/api/status")["mode"])
+            time.sleep(6.0)
+            board.screenshot(path=target / "supervisor-phone.png", full_page=True, timeout=60_000)
 
 
 if __name__ == "__main__":

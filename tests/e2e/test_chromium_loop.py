@@ -2,74 +2,26 @@
 
 from __future__ import annotations
 
-import time
-from contextlib import ExitStack, closing
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
-from tests.e2e.chromium_phone import CALIBRATION, ChromiumPhone, browser
-from tests.e2e.serving import DEVICE, Serving, serving
+from tests.e2e.chromium_phone import ChromiumPhone, browser
+from tests.e2e.chromium_rig import LANDSCAPE, lead, led_server, start
+from tests.e2e.serving import DEVICE, serving
 
 pytestmark = pytest.mark.e2e
-LANDSCAPE = {
-    "viewport": {"width": 915, "height": 412},
-    "has_touch": True,
-    "is_mobile": True,
-    "device_scale_factor": 1,
-}
 LEARNT_S = 8.0
 """Of tracking, before the integral has learnt the suspension and the figure counts."""
-
-
-def calibrate(folder: Path) -> Path:
-    """A folder with the canvas camera's calibration."""
-    cameras = folder / "cameras"
-    cameras.mkdir()
-    (cameras / "canvas.yaml").write_text(CALIBRATION.format(name=DEVICE))
-    return cameras
-
-
-def start(phone: ChromiumPhone, server: Serving) -> None:
-    """Open the page, tap Start, wait until arming would be granted."""
-    phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
-    phone.page.tap("#start")
-    phone.play_until("!document.querySelector('#wish').disabled", 25.0)
-
-
-def lead(phone: ChromiumPhone, tries: int = 3) -> None:
-    """Arm and hold; again if a busy machine starved the sensors and the robot was disarmed."""
-    for left in reversed(range(tries)):
-        try:
-            phone.play_until("!document.querySelector('#wish').disabled", 25.0)
-            phone.page.tap("#wish")
-            phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
-            phone.play(0.7)
-            phone.hold()
-            phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
-            return
-        except TimeoutError:
-            phone.let_go()
-            if not left:
-                raise
 
 
 def test_the_robot_follows_a_chromium_over_tls_and_stops_on_its_stop(
     chromium: str, tmp_path: Path
 ) -> None:
-    leds_in_b = load_robot("ames").robot.leds_in_b
-    cameras = calibrate(tmp_path)
-    with (
-        serving(tmp_path, "--cameras", str(cameras)) as server,
-        browser(chromium, **LANDSCAPE) as context,
-        ExitStack() as stack,
-    ):
-        hand = make_hand("moving", seed=2, t_start=time.monotonic() + 12.0)
-        phone = stack.enter_context(
-            closing(ChromiumPhone(context, hand, leds_in_b, server.truth_port))
-        )
+    with led_server(chromium, tmp_path, "moving", seed=2, rest_s=12.0) as (server, _, phone):
         refused: list[str] = []
         phone.page.on("console", lambda message: refused.append(message.text))
         start(phone, server)

@@ -1,0 +1,70 @@
+"""A calibrated Chromium on the phone page of a server of its own, for tests and pictures."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from playwright.sync_api import BrowserContext
+
+from hardware.robot_file import load_robot
+from hardware.sim.hand import make_hand
+from tests.e2e.chromium_phone import CALIBRATION, ChromiumPhone, browser
+from tests.e2e.serving import DEVICE, Serving, serving
+
+LANDSCAPE = {
+    "viewport": {"width": 915, "height": 412},
+    "has_touch": True,
+    "is_mobile": True,
+    "device_scale_factor": 1,
+}
+
+
+def calibrate(folder: Path) -> Path:
+    """A folder with the canvas camera's calibration."""
+    cameras = folder / "cameras"
+    cameras.mkdir()
+    (cameras / "canvas.yaml").write_text(CALIBRATION.format(name=DEVICE))
+    return cameras
+
+
+def start(phone: ChromiumPhone, server: Serving) -> None:
+    """Open the page, tap Start, wait until arming would be granted."""
+    phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+    phone.page.tap("#start")
+    phone.play_until("!document.querySelector('#wish').disabled", 25.0)
+
+
+def lead(phone: ChromiumPhone, tries: int = 3) -> None:
+    """Arm and hold; again if a busy machine starved the sensors and the robot was disarmed."""
+    for left in reversed(range(tries)):
+        try:
+            phone.play_until("!document.querySelector('#wish').disabled", 25.0)
+            phone.page.tap("#wish")
+            phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
+            phone.play(0.7)
+            phone.hold()
+            phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
+            return
+        except TimeoutError:
+            phone.let_go()
+            if not left:
+                raise
+
+
+@contextlib.contextmanager
+def led_server(
+    executable: str, folder: Path, hand: str, *, seed: int = 0, rest_s: float
+) -> Iterator[tuple[Serving, BrowserContext, ChromiumPhone]]:
+    """Server, browser and a page that films the robot; the hand moves after `rest_s`."""
+    with (
+        serving(folder, "--cameras", str(calibrate(folder))) as server,
+        browser(executable, **LANDSCAPE) as context,
+    ):
+        motion = make_hand(hand, seed=seed, t_start=time.monotonic() + rest_s)
+        leds_in_b = load_robot("ames").robot.leds_in_b
+        phone = ChromiumPhone(context, motion, leds_in_b, server.truth_port)
+        with contextlib.closing(phone):
+            yield server, context, phone
