@@ -4,8 +4,9 @@ This is the reference for a real robot's firmware; `deploy/watchdog/` is the sam
 1. A command is taken only if it is whole, of the current epoch, 1 to 200 counters ahead, echoes a
    nonce the robot sent at most 40 ms ago, and its thrusts are finite, within [0, f_max] and rise
    no faster than allowed. Everything else changes nothing.
-2. Nothing taken for 60 ms: thrust falls linearly to zero within one period of the suspension,
-   whatever arrives meanwhile; only zero thrust of the current epoch cuts it short.
+2. Nothing taken for 60 ms: thrust falls linearly to zero within one period of the suspension (or
+   the robot file's `ramp_s`), whatever arrives meanwhile; only zero thrust of the current epoch
+   cuts it short. A robot that flies must keep its attitude by itself meanwhile.
 3. After that, and after a start: no thrust until zero thrust of a *later* epoch has been taken for
    500 ms without a gap of 60 ms. So a control process begins with zero, and one that was frozen
    or replaced never comes back.
@@ -53,7 +54,7 @@ class LinkLimits:
     max_rise: float
     """How much more a thruster may be told than one command before [N]."""
     ramp_us: int
-    """From full thrust to zero in silence [µs]: one period of the suspension."""
+    """From full thrust to zero in silence [µs]: `Robot.ramp_s`."""
     silence_us: int = 60_000
     max_age_us: int = 40_000
     handshake_us: int = 500_000
@@ -68,7 +69,7 @@ class LinkLimits:
             thrusters=robot.A.shape[1],
             f_max=robot.f_max,
             max_rise=robot_file.link.max_rise,
-            ramp_us=round(1e6 * robot.suspension_period_s),
+            ramp_us=round(1e6 * robot.ramp_s),
         )
 
 

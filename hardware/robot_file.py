@@ -11,16 +11,23 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from math import pi, radians, sqrt
 from pathlib import Path
+from types import UnionType
 from typing import Any, get_args
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from hardware.robot_physics import allocation_matrix, faults
-from hardware.robot_schema import BodyImuSection, RobotSchema
-from hardware.sim.parameters import BodyImuParameters, PlantParameters
-from pipeline.config import Gains
+from hardware.robot_schema import AXES, BodyImuSection, RobotSchema, Stand, Suspension, clashes
+from hardware.sim.parameters import (
+    BodyImuParameters,
+    PlantParameters,
+    StandParameters,
+    StartParameters,
+    SuspensionParameters,
+)
 from pipeline.frames import GRAVITY
+from pipeline.gains import Gains
 from pipeline.robot import Robot
 
 ROBOTS = Path(__file__).parent / "robots"
@@ -56,6 +63,7 @@ class RobotFile:
 
     robot: Robot
     plant: PlantParameters
+    start: StartParameters
     gains: Mapping[str, Gains]
     link: LinkParameters
 
@@ -75,6 +83,8 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
         schema = RobotSchema.model_validate(table)
     except ValidationError as error:
         raise _explained(path, error) from error
+    for key, reason in clashes(schema):
+        raise RobotFileError(str(path), key, reason)
     robot_file = _converted(schema)
     for key, reason in faults(robot_file.robot, robot_file.plant):
         raise RobotFileError(str(path), key, reason)
@@ -124,21 +134,21 @@ def _keys_at(where: tuple[int | str, ...]) -> list[str]:
             section = section.model_fields[str(step)].annotation
         else:  # list[X] or dict[str, X]
             section = get_args(section)[-1]
+        if isinstance(section, UnionType):  # X | None
+            section = get_args(section)[0]
     return list(section.model_fields)
 
 
 def _converted(schema: RobotSchema) -> RobotFile:
-    body, suspension, units = schema.body, schema.suspension, schema.thrusters.units
+    body, units, start = schema.body, schema.thrusters.units, schema.start
     positions = np.array([unit.position_in_body_m for unit in units])
     directions = np.array([unit.direction_in_body for unit in units])
     torques = schema.thrusters.torque_per_thrust_m * np.array([float(u.spin) for u in units])
     plant = PlantParameters(
         mass=body.mass_kg,
         inertia=np.array(body.inertia_kg_m2),
-        cable_length=suspension.length_m,
-        cable_stiffness=suspension.stiffness_n_m,
-        cable_damping=suspension.damping_n_s_m,
-        hook_above_com=suspension.hook_above_com_m,
+        suspension=_suspension(schema.suspension),
+        stand=_stand(schema.stand),
         air_damping=schema.air.damping_n_s_m,
         air_damping_rotation=schema.air.damping_n_m_s,
         thruster_positions_in_b=positions,
@@ -155,16 +165,42 @@ def _converted(schema: RobotSchema) -> RobotFile:
         A=allocation_matrix(positions, directions, torques),
         f_min=schema.thrusters.f_min_n,
         f_max=schema.thrusters.f_max_n,
-        suspension_period_s=2.0
-        * pi
-        * sqrt((suspension.length_m + suspension.hook_above_com_m) / GRAVITY),
+        mass=body.mass_kg,
+        inertia=np.array(body.inertia_kg_m2),
+        axes=np.array([axis in schema.axes for axis in AXES]),
+        hangs=schema.suspension is not None,
+        ramp_s=_ramp_s(schema),
     )
     gains = {
         name: Gains(np.array(rows.Kp), np.array(rows.Ki), np.array(rows.Kd))
         for name, rows in schema.gains.items()
     }
     link = LinkParameters(schema.link.host, schema.link.port, schema.link.max_rise_per_command_n)
-    return RobotFile(robot, plant, gains, link)
+    return RobotFile(
+        robot, plant, StartParameters(start.distance_m, start.above_m, start.lift_m), gains, link
+    )
+
+
+def _ramp_s(schema: RobotSchema) -> float:
+    suspension = schema.suspension
+    if suspension is None:
+        assert schema.ramp_s is not None
+        return schema.ramp_s
+    return 2.0 * pi * sqrt((suspension.length_m + suspension.hook_above_com_m) / GRAVITY)
+
+
+def _suspension(section: Suspension | None) -> SuspensionParameters | None:
+    if section is None:
+        return None
+    return SuspensionParameters(
+        section.length_m, section.stiffness_n_m, section.damping_n_s_m, section.hook_above_com_m
+    )
+
+
+def _stand(section: Stand | None) -> StandParameters | None:
+    if section is None:
+        return None
+    return StandParameters(np.array(section.feet_in_body_m), section.friction)
 
 
 def _imu(section: BodyImuSection) -> BodyImuParameters:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear, nnls
 
-from hardware.sim.parameters import PlantParameters
+from hardware.robot_schema import AXES
+from hardware.sim.parameters import PlantParameters, StandParameters, SuspensionParameters
 from pipeline.frames import Array
 from pipeline.robot import Robot
 
@@ -18,6 +19,8 @@ LARGEST_ROBOT_M = 3.0
 """Anything farther from the centre of mass is a slip of the decimal point."""
 LEAST_SINGULAR_VALUE = 1e-2
 """Of A with torques divided by the thrusters' mean distance."""
+MOST_TO_HOVER = 0.85
+"""Share of a thruster's force that carrying the weight may take; the rest is to steer with."""
 
 
 def allocation_matrix(positions_in_b: Array, directions_in_b: Array, torques: Array) -> Array:
@@ -37,14 +40,46 @@ def faults(robot: Robot, plant: PlantParameters) -> Iterator[tuple[str, str]]:
     Ixx, Iyy, Izz = plant.inertia
     if max(Ixx, Iyy, Izz) > 0.5 * (Ixx + Iyy + Izz):
         yield "body.inertia_kg_m2", "no moment larger than the sum of the two others"
-    if plant.cable_rest_length <= 0.0:
-        least = plant.mass * 9.81 / plant.cable_length
-        yield "suspension.stiffness_n_m", f"above {least:.3g}: the cable must not begin below 0 m"
+    if plant.suspension is not None:
+        yield from _suspension_faults(plant.suspension, plant.mass)
+    if plant.stand is not None:
+        yield from _stand_faults(plant.stand)
     if robot.f_min >= robot.f_max:
         yield "thrusters.f_min_n", "below f_max_n"
     yield from _thruster_faults(plant)
-    yield from _wrench_faults(robot.A, plant)
+    yield from _axes_faults(robot)
+    yield from _wrench_faults(robot, plant)
     yield from _led_faults(robot.leds_in_b)
+
+
+def _suspension_faults(suspension: SuspensionParameters, mass: float) -> Iterator[tuple[str, str]]:
+    if suspension.rest_length(mass) <= 0.0:
+        least = mass * 9.81 / suspension.length
+        yield "suspension.stiffness_n_m", f"above {least:.3g}: the cable must not begin below 0 m"
+
+
+def _stand_faults(stand: StandParameters) -> Iterator[tuple[str, str]]:
+    """Feet on one level below the centre of mass, and it between them."""
+    feet = stand.feet_in_b
+    if np.ptp(feet[:, 2]) > 1e-3 or feet[:, 2].max() > 0.0:
+        yield "stand.feet_in_body_m", "all at one height below the centre of mass"
+    elif np.abs(feet).max() > LARGEST_ROBOT_M:
+        yield "stand.feet_in_body_m", f"within {LARGEST_ROBOT_M:g} m of the centre of mass"
+    elif positive_null_vector(feet[:, :2].T) is None:
+        yield "stand.feet_in_body_m", "around the centre of mass, or it tips over"
+
+
+def _axes_faults(robot: Robot) -> Iterator[tuple[str, str]]:
+    """Thrusters along one axis must be turned where they shall push."""
+    if not robot.needs_tilt:
+        return
+    directions = robot.A[:3] / np.linalg.norm(robot.A[:3], axis=0)
+    if robot.axes[3:5].any():
+        yield "axes", "x, y, z, yaw: thrusters along one axis go sideways by roll and pitch"
+    elif robot.hangs or not robot.axes[2]:
+        yield "axes", "with z, and no [suspension]: it tilts the force that carries it"
+    elif not np.allclose(directions, np.eye(3)[:, 2:], atol=1e-2):
+        yield "thrusters.units", "all with direction_in_body = [0.0, 0.0, 1.0], or along three axes"
 
 
 def _thruster_faults(plant: PlantParameters) -> Iterator[tuple[str, str]]:
@@ -57,14 +92,34 @@ def _thruster_faults(plant: PlantParameters) -> Iterator[tuple[str, str]]:
             yield f"thrusters.units.{i}.direction_in_body", "a vector of length 1"
 
 
-def _wrench_faults(A: Array, plant: PlantParameters) -> Iterator[tuple[str, str]]:
-    """Any wrench must be possible with thrusts that are all positive."""
+def _wrench_faults(robot: Robot, plant: PlantParameters) -> Iterator[tuple[str, str]]:
+    """Any small wrench on the controlled axes must be possible with thrusts that are positive."""
+    rows = robot.wrench_axes
+    words = ", ".join(axis for axis, row in zip(AXES, rows, strict=True) if row)
     arm = max(float(np.linalg.norm(plant.thruster_positions_in_b, axis=1).mean()), 1e-6)
-    scaled = A / np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
-    if np.linalg.svd(scaled, compute_uv=False)[-1] < LEAST_SINGULAR_VALUE:
-        yield "thrusters.units", "positions and directions that give force and torque on all axes"
+    scaled = (robot.A / np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None])[rows]
+    least = len(scaled) + (robot.weight_to_carry == 0.0)
+    if scaled.shape[1] < least:
+        yield "thrusters.units", f"at least {least} to push both ways on {words}"
+    elif np.linalg.svd(scaled, compute_uv=False)[-1] < LEAST_SINGULAR_VALUE:
+        yield "thrusters.units", f"positions and directions that give forces and torques on {words}"
+    elif robot.weight_to_carry > 0.0:
+        yield from _hover_faults(robot, scaled)
     elif positive_null_vector(scaled) is None:
         yield "thrusters.units", "an arrangement in which some all-positive thrusts cancel"
+
+
+def _hover_faults(robot: Robot, scaled: Array) -> Iterator[tuple[str, str]]:
+    """It must carry its weight, without turning, by thrusts with room below and above."""
+    weight = np.array([0.0, 0.0, robot.weight_to_carry, 0.0, 0.0, 0.0])[robot.wrench_axes]
+    bounds = (1.05 * robot.f_min, max(MOST_TO_HOVER * robot.f_max, 1.06 * robot.f_min + 1e-9))
+    short = float(np.abs(lsq_linear(scaled, weight, bounds).fun).max())
+    if short > 1e-3 * robot.weight_to_carry:
+        yield (
+            "thrusters.f_max_n",
+            f"such that thrusts from f_min_n to {100 * MOST_TO_HOVER:.0f} % of it carry the weight"
+            f" of {robot.weight_to_carry:.1f} N without turning it ({short:.1f} N missing)",
+        )
 
 
 def positive_null_vector(A: Array) -> Array | None:

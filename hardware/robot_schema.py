@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
+
+Axis = Literal["x", "y", "z", "roll", "pitch", "yaw"]
+AXES: tuple[Axis, ...] = get_args(Axis)
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -38,6 +42,24 @@ class Suspension(Section):
     hook_above_com_m: Annotated[float, Field(ge=0.0, le=1.0)]
 
 
+class Stand(Section):
+    """[stand]: of a robot that stands on the floor."""
+
+    feet_in_body_m: Annotated[list[Vector], Field(min_length=3, max_length=16)]
+    """Where they touch the floor."""
+    friction: Annotated[float, Field(ge=0.0, le=2.0)]
+
+
+class Start(Section):
+    """[start]: of a simulated flight."""
+
+    distance_m: Annotated[float, Field(ge=0.5, le=10.0)] = 2.5
+    above_m: Annotated[float, Field(ge=-2.0, le=3.0)] = 0.0
+    """The phone over the robot, which it looks at."""
+    lift_m: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0
+    """How far the hand rises to take off."""
+
+
 class Air(Section):
     """[air]: damping of motion through it."""
 
@@ -63,7 +85,7 @@ class Thrusters(Section):
     torque_per_thrust_m: Annotated[float, Field(ge=0.0, le=0.5)]
     lag_s: Annotated[float, Field(gt=0.0, le=1.0)]
     delay_s: Annotated[float, Field(ge=0.0, le=0.5)]
-    units: Annotated[list[Thruster], Field(min_length=7, max_length=16)]
+    units: Annotated[list[Thruster], Field(min_length=2, max_length=16)]
 
 
 class BodyImuSection(Section):
@@ -86,7 +108,7 @@ class Led(Section):
 
 
 class GainsSection(Section):
-    """[gains.NAME], over (x, y, z, roll, pitch, yaw)."""
+    """[gains.NAME], over (x, y, z, roll, pitch, yaw); of axes let alone nobody reads them."""
 
     Kp: Row
     """[N/m, N m/rad]."""
@@ -108,11 +130,33 @@ class RobotSchema(Section):
     """The file."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")]
+    axes: Annotated[list[Axis], Field(min_length=1, max_length=6)] = list(AXES)
+    """Controlled, in the body's axes; the others are let alone."""
+    ramp_s: Annotated[float, Field(ge=0.05, le=30.0)] | None = None
+    """From full thrust to zero; with a suspension its period."""
     body: Body
-    suspension: Suspension
+    suspension: Suspension | None = None
+    stand: Stand | None = None
+    start: Start = Start()
     air: Air
     thrusters: Thrusters
     body_imu: BodyImuSection
     leds: Annotated[list[Led], Field(min_length=4, max_length=16)]
     gains: Annotated[dict[str, GainsSection], Field(min_length=1)]
     link: LinkSection
+
+
+def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
+    """What does not go together: (key, what would be allowed)."""
+    if len(set(robot.axes)) < len(robot.axes):
+        yield "axes", "each word once"
+    if robot.suspension is not None:
+        if robot.stand is not None:
+            yield "stand", "only without [suspension]: a robot hangs or stands"
+        if robot.ramp_s is not None:
+            yield "ramp_s", "only without [suspension], whose period it is"
+        return
+    if robot.stand is None:
+        yield "stand", "[stand], or [suspension] for a robot that hangs"
+    if robot.ramp_s is None:
+        yield "ramp_s", "how long a ramp to zero thrust lasts [s]: there is no [suspension]"

@@ -1,8 +1,8 @@
 """The phone's own attitude from raw gyroscope and accelerometer, without a magnetometer.
 
 The yaw of f is free (nothing in the method needs north) and drifts with the gyroscope's bias,
-which costs the virtual camera millimetres; the browser's fused orientation jumps and would cost
-centimetres.
+which costs the virtual camera millimetres; the browser's fused orientation jumps when its
+magnetometer does, comes in steps of 0.1°, and would cost centimetres: it is not used at all.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from pipeline.frames import GRAVITY, Array, R_fc_level_from_specific_force, cros
 from pipeline.signals import PhoneImu
 
 GAIN = 0.15
-"""Pull towards the accelerometer's vertical [1/s]: slow, for hands accelerate all ways."""
+"""Pull towards the accelerometer's vertical [1/s]: slow, for hands accelerate all ways. At first
+it is faster: one over the time since the start, the mean of all that was felt."""
 BIAS_GAIN = 0.01
 """[1/s²]."""
 MAX_GAP_S = 0.2
@@ -27,7 +28,8 @@ class Attitude:
         """Unknown until the first sample."""
         self._R_fc: Array | None = None
         self._bias = np.zeros(3)
-        self._t = -np.inf
+        self._omega = np.zeros(3)
+        self._t = self._t_start = -np.inf
         self.resets = 0
 
     @property
@@ -50,16 +52,25 @@ class Attitude:
         dt = imu.t - self._t
         if dt <= 0.0:
             return
+        omega, self._omega = 0.5 * (self._omega + imu.omega_m_cf_in_c), imu.omega_m_cf_in_c
         self._t = imu.t
-        norm = float(np.sqrt(imu.a_m_cf_in_c @ imu.a_m_cf_in_c))
+        force = imu.a_m_cf_in_c
+        norm = float(np.sqrt(force @ force))
         if self._R_fc is None or dt > MAX_GAP_S:
             if norm > 0.5 * GRAVITY:
-                self.resets += self._R_fc is not None
-                self._R_fc = R_fc_level_from_specific_force(imu.a_m_cf_in_c)
+                self._begin(imu.t, force)
             return
-        R_fc = self._R_fc @ exp((imu.omega_m_cf_in_c - self._bias) * dt)
+        R_fc = self._R_fc @ exp((omega - self._bias) * dt)
         if 0.7 * GRAVITY < norm < 1.3 * GRAVITY:
-            tilt = cross(imu.a_m_cf_in_c / norm, R_fc[2])
-            R_fc = R_fc @ exp(GAIN * dt * tilt)
+            tilt = cross(force / norm, R_fc[2])
+            gain = max(GAIN, 1.0 / (imu.t - self._t_start + dt))
+            R_fc = R_fc @ exp(min(1.0, gain * dt) * tilt)
             self._bias = self._bias - BIAS_GAIN * dt * tilt
         self._R_fc = R_fc
+
+    def _begin(self, t: float, force_in_c: Array) -> None:
+        """Level, by one sample; the yaw of an earlier attitude is kept."""
+        R_fc = np.eye(3) if self._R_fc is None else self._R_fc
+        self.resets += self._R_fc is not None
+        self._R_fc = R_fc_level_from_specific_force(R_fc @ force_in_c) @ R_fc
+        self._t_start = t

@@ -12,6 +12,7 @@ from pipeline.frames import Array, R_co
 
 MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
 """Distortion models (the names of ROS) and how many coefficients they take."""
+SLOPE_STEP_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +53,23 @@ class Camera:
         else:
             flat = cv2.undistortPoints(points, self.K, self.distortion)
         return np.asarray(flat, dtype=np.float64).reshape(-1, 2)
+
+    def slopes(self, pixels: Array) -> Array:
+        """Derivatives (n, 2, 2) of `normalised` at pixels (n, 2) [1/px]: lens and focal length."""
+        steps = SLOPE_STEP_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+        around = self.normalised((pixels[:, None] + steps).reshape(-1, 2)).reshape(-1, 4, 2)
+        columns = (around[:, 0::2] - around[:, 1::2]) / (2.0 * SLOPE_STEP_PX)
+        return np.ascontiguousarray(columns.transpose(0, 2, 1))
+
+    def row_delays(self, rows: Array) -> Array:
+        """When rows (n,) are exposed after the picture's middle one [s]."""
+        delays: Array = (rows / (self.height - 1) - 0.5) * self.readout_s
+        return delays
+
+    @property
+    def half_field(self) -> tuple[float, float]:
+        """Tangents of half the field of view, to the side and up, without the lens's distortion."""
+        return (0.5 * self.width / float(self.K[0, 0]), 0.5 * self.height / float(self.K[1, 1]))
 
     @property
     def focal_px(self) -> float:

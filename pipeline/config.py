@@ -1,147 +1,130 @@
-"""One frozen dataclass per stage; defaults are the paper's numbers, with their units and table."""
+"""Numbers of the stages between estimate and thrust, and of the whole: one frozen dataclass each.
+
+Defaults are the paper's where it has any, with their units and table; those of vision and of the
+estimators are in `vision_config` and `estimator_config`.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
-import numpy as np
+from pipeline.estimator_config import EkfConfig, NoFilterConfig, RelativeConfig
+from pipeline.gains import PHONE, Gains
+from pipeline.vision_config import GatesConfig
 
-from pipeline.frames import Array
-
-
-def _row(*values: float) -> Array:
-    row = np.array(values, dtype=np.float64)
-    row.setflags(write=False)
-    return row
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Gains:
-    """Diagonals over (x, y, z, roll, pitch, yaw): N/m, N/(m s), N s/m; N m/rad and so on."""
-
-    Kp: Array
-    Ki: Array
-    Kd: Array
-
-
-TABLE_II_WITH_EKF = Gains(  # Table II (a)
-    Kp=_row(100.0, 100.0, 200.0, 5.0, 5.0, 5.0),
-    Ki=_row(150.0, 150.0, 300.0, 20.0, 20.0, 20.0),
-    Kd=_row(30.0, 30.0, 30.0, 1.0, 1.0, 2.0),
-)
-TABLE_II_WITHOUT_EKF = Gains(  # Table II (b)
-    Kp=_row(30.0, 50.0, 100.0, 5.0, 5.0, 2.0),
-    Ki=_row(90.0, 150.0, 200.0, 15.0, 15.0, 5.0),
-    Kd=_row(10.0, 15.0, 15.0, 0.5, 0.5, 1.0),
-)
-PHONE = Gains(  # softer: for pictures 60-120 ms old, see `lightleash experiments loop`
-    Kp=_row(80.0, 80.0, 120.0, 4.0, 4.0, 4.0),
-    Ki=_row(90.0, 90.0, 150.0, 8.0, 8.0, 8.0),
-    Kd=_row(30.0, 30.0, 30.0, 0.9, 0.9, 1.4),
-)
-
-
-@dataclass(frozen=True, slots=True)
-class LedsConfig:
-    """Detection of bright spots."""
-
-    max_spots: int = 24
-    """No more than this many candidates leave the detector."""
-    min_contrast: float = 40.0
-    """Grey levels (full range) between a spot's peak and its surround."""
-    min_area_px: int = 2
-    max_area_px: int = 4000
-
-
-@dataclass(frozen=True, slots=True)
-class IdentifyConfig:
-    """Naming of the spots."""
-
-    tolerance_px: float = 3.0
-    """Largest reprojection error of one LED."""
-    min_leds: int = 4
-    shift_px: float = 15.0
-    """How far an LED may be from where it is predicted while tracking."""
-
-
-@dataclass(frozen=True, slots=True)
-class GatesConfig:
-    """When a pose is believed (safety: two gates catch nearly all vision lies)."""
-
-    reprojection_px: float = 2.0
-    gravity_rad: float = 0.14
-    """8°: gravity carried through phone attitude and PnP against the body's accelerometer."""
-    min_range_m: float = 0.3
-    max_range_m: float = 12.0
-
-
-@dataclass(frozen=True, slots=True)
-class EkfConfig:
-    """Noise of the 30-state filter: standard deviations, and random walks per √s."""
-
-    sigma_omega_b: float = 0.01
-    """Body gyroscope [rad/s]."""
-    sigma_a_b: float = 0.15
-    """Body accelerometer [m/s²]."""
-    sigma_omega_c: float = 0.003
-    """Phone gyroscope [rad/s]."""
-    sigma_a_c: float = 0.05
-    """Phone accelerometer, its 0.1 m/s² rounding included [m/s²]."""
-    walk_omega_b: float = 0.3
-    """How fast ω_b wanders between samples [rad/s/√s]."""
-    walk_a_b: float = 3.0
-    """[m/s²/√s]."""
-    walk_a_c: float = 3.0
-    """[m/s²/√s]."""
-    walk_delta_c: float = 17.0
-    """[rad/s²/√s]."""
-    walk_v: float = 0.01
-    """Model error of the velocity [m/s/√s]."""
-    tau_delta_c: float = 0.02
-    """Fading time of δ_c [s]; inf is the paper's Eq. (11)."""
-    walk_bias_omega: float = 1e-4
-    walk_bias_a: float = 2e-3
-    initial_v: float = 0.5
-    """At a start: of the body seen from f [m/s]."""
-    initial_omega: float = 0.5
-    """Of the sample nearest to the first picture [rad/s]."""
-    initial_a: float = 3.0
-    """[m/s²]."""
-    initial_delta: float = 2.0
-    """[rad/s²]."""
-    initial_bias_omega: float = 0.03
-    initial_bias_a: float = 0.3
-    max_step_s: float = 0.005
-    """Longest step of the integration."""
-    horizon_s: float = 0.5
-    """Pictures older than this are dropped and counted."""
-    gate_chi2: float = 22.5
-    """99.9 % of χ² with 6 degrees of freedom."""
-    rejections_before_restart: int = 5
-    """So many poses in a row beyond the gate: the filter is wrong, not the pictures."""
+EstimatorName = Literal["relative", "paper", "none"]
+VirtualCameraMode = Literal["full", "selective", "off"]
+SaturationPolicy = Literal["torque_first", "scale", "clip"]
 
 
 @dataclass(frozen=True, slots=True)
 class VirtualCameraConfig:
-    """Time constants of the attitude's low pass, Eq. (21)."""
+    """How much of the hand's turns reaches the robot. Eq. (21)."""
 
     tau_1: float = 0.525
-    """[s]; with tau_2 a −3 dB cut-off of 0.28 Hz, the paper's comfortable one. 0: no filter."""
+    """First stage [s]; with tau_2 a −3 dB cut-off of 0.28 Hz, the paper's comfortable one. 0: none.
+    """
     tau_2: float = 0.16
-    """[s]."""
+    """Second stage [s]; 0: none."""
+    mode: VirtualCameraMode = "full"
+    """`selective`: turns about the line of sight pass, they don't move the robot; `off`: all do."""
+    tau_parallel: float = 0.03
+    """Of turns about the line of sight when selective [s]: what the rounding and the delay of the
+    phone's sensors do to them would make the thrusters chatter. 0: they pass at once."""
+    adaptive_beta: float = 0.0
+    """How much the cut-off rises with the speed of a turn [Hz/(rad/s)], as in a 1€ filter."""
+    max_speed_m_s: float = 1.0
+    """Turns move the reference no faster; 0: no limit."""
+    guard: bool = True
+    """Hurry after the phone when the robot nears the border of the picture."""
+    guard_start: float = 0.6
+    """Share of half the field of view at which that begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class AllocationConfig:
+    """What the thrusters do about a wrench that is too much for them."""
+
+    policy: SaturationPolicy = "torque_first"
+    """`scale` keeps the wrench's direction; `clip` is there for comparison."""
+    torque_weight: float = 10.0
+    """Torque first [1/m]: 0.1 N m counts as much as 1 N."""
+
+
+@dataclass(frozen=True, slots=True)
+class FeedForwardConfig:
+    """The hand's acceleration and turns passed on to the robot, before an error shows."""
+
+    enabled: bool = True
+    high_pass_hz: float = 0.03
+    """Keeps out the accelerometer's bias and the tilt's error."""
+    low_pass_hz: float = 3.0
+    """Of two stages behind each other: keeps out rounding and tremor."""
+    pull_hz: float = 1.5
+    """How fast a changing pull of the suspension, the air or a hand is felt and balanced."""
+    thrust_lag_s: float = 0.04
+    """From a command to its thrust, the delay included; a guess within a factor of two will do."""
+
+
+@dataclass(frozen=True, slots=True)
+class TiltConfig:
+    """Robots that lean to move."""
+
+    max_tilt_rad: float = 0.35
+    """20°: beyond it the force is cut."""
+
+
+@dataclass(frozen=True, slots=True)
+class MarginsConfig:
+    """What a loop must still bear, beyond the delays measured, for arming."""
+
+    min_delay_s: float = 0.010
+    """Further delay anywhere in the loop."""
+    min_phase_rad: float = 0.17
+    """10°."""
+    enforced: bool = True
+    """False: experiments may fly what is known to fail."""
+    frame_s: float = 1.0 / 30.0
+    """Between pictures."""
+    unfelt: float = 0.2
+    """Share of its own motion that the robot's IMU may feel wrongly, and only the camera mends."""
+    correction_p: float = 10.0
+    """How fast a filter believes the camera's place [rad/s]: 5 in depth, 14 to the sides."""
+    correction_R: float = 1.3
+    """... and attitude [rad/s]."""
+    max_latency_s: float = 0.5
+    """Older pictures no filter fuses."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComplianceConfig:
+    """How hard the robot may push against an obstacle."""
+
+    enabled: bool = True
+    limit_n: float = 3.0
+    """Beyond what has held it lately [N]."""
+    usual_s: float = 10.0
+    """How fast what holds it is learnt, while it is not pushing too hard [s]."""
+    quick_s: float = 0.05
+    """Damping of what is quicker than this is never cut [s]."""
+    ease_n_s: float = 2.0
+    """How fast the limit comes down after it was switched on, or goes up after off [N/s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class FailsafeConfig:
-    """Timers of the failsafe machine [s]; the ramp's length is the suspension's period."""
+    """Timers of the failsafe machine [s]; the ramp's length is the robot's (`Robot.ramp_s`)."""
 
     hold: float = 0.150
     """Operator, phone IMU or robot silent for longer: HOLD (robot: RAMP)."""
-    pose_hold: float = 0.300
+    pose_arm: float = 0.300
     """Since the last believed picture was *taken*: latency, a frame, as long again on the IMUs."""
+    pose_hold: float = 2.5
+    """The estimator's own doubt holds before this (`EnvelopeConfig.max_sigma_p_m`)."""
     ramp_start: float = 0.500
     """HOLD becomes RAMP when operator or phone IMU are older."""
-    pose_ramp: float = 0.800
+    pose_ramp: float = 4.0
     hold_max: float = 3.0
     recover: float = 0.500
     """All good for this long before arming or tracking."""
@@ -153,11 +136,17 @@ class HoldConfig:
     """Control without the camera: attitude by the gyroscope, the last force bleeding off."""
 
     bleed_s: float = 1.5
-    """Time constant of the force [s]."""
-    Kp: float = 2.0
-    """[N m/rad]."""
-    Kd: float = 0.5
-    """[N m s/rad]."""
+    """Time constant of the force of a robot that hangs [s]."""
+    brake_s: float = 0.6
+    """Time constant of the speed of one that does not [s]."""
+    least_share: float = 0.9
+    """Share of its weight that a flying robot is given at least, whatever tracking had learnt."""
+    learn_s: float = 2.0
+    """Smoothing of the gyroscope's bias [s]."""
+    stiffness: float = 40.0
+    """Torque per angle and moment of inertia [1/s²]."""
+    damping: float = 10.0
+    """Torque per rate and moment of inertia [1/s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +156,8 @@ class EnvelopeConfig:
     max_tilt_rad: float = 0.6
     max_error_m: float = 0.6
     max_error_rad: float = 0.8
-    max_sigma_p_m: float = 0.15
+    max_sigma_p_m: float = 0.06
+    """Reached about two seconds after the last LED was seen."""
     max_body_rate: float = 4.0
     """[rad/s]."""
 
@@ -177,8 +167,16 @@ class TeleopConfig:
     """Everything `Teleop` needs beside the robot."""
 
     gains: Gains = field(default_factory=lambda: PHONE)
+    estimator: EstimatorName = "relative"
+    relative: RelativeConfig = field(default_factory=RelativeConfig)
     ekf: EkfConfig = field(default_factory=EkfConfig)
+    no_filter: NoFilterConfig = field(default_factory=NoFilterConfig)
     virtual_camera: VirtualCameraConfig = field(default_factory=VirtualCameraConfig)
+    tilt: TiltConfig = field(default_factory=TiltConfig)
+    feedforward: FeedForwardConfig = field(default_factory=FeedForwardConfig)
+    allocation: AllocationConfig = field(default_factory=AllocationConfig)
+    compliance: ComplianceConfig = field(default_factory=ComplianceConfig)
+    margins: MarginsConfig = field(default_factory=MarginsConfig)
     gates: GatesConfig = field(default_factory=GatesConfig)
     failsafe: FailsafeConfig = field(default_factory=FailsafeConfig)
     hold: HoldConfig = field(default_factory=HoldConfig)

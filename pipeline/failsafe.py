@@ -1,9 +1,9 @@
 """The failsafe machine: a pure function over integers, so that it can be searched exhaustively.
 
-DISARMED → ARMED → TRACK ⇄ HOLD → RAMP → DISARMED, and STOPPED from anywhere. The suspension
-carries the robot, so zero thrust is the safe state; a ramp of one pendulum period leaves hardly
-any swing, a cut leaves all of it. Three layers stand behind each other: this gate, the robot's own
-watchdog, a hard-wired power cut.
+DISARMED → ARMED → TRACK ⇄ HOLD → RAMP → DISARMED, and STOPPED from anywhere. Zero thrust is the
+safe state: the suspension carries the robot (a ramp of one pendulum period leaves hardly any swing,
+a cut leaves all of it), or the floor, to which a robot that flies sinks while its thrust goes.
+Three layers stand behind each other: this gate, the robot's own watchdog, a hard-wired power cut.
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ class Limits:
     """Timers [ms] of a configuration."""
 
     hold: int
+    pose_arm: int
     pose_hold: int
     ramp_start: int
     pose_ramp: int
@@ -68,9 +69,15 @@ class Limits:
     armed_idle: int
 
     @classmethod
-    def of(cls, config: FailsafeConfig, ramp_s: float) -> Limits:
-        """Rounded to milliseconds; `ramp_s` is one period of the suspension."""
+    def of(cls, config: FailsafeConfig, ramp_s: float, coasts: bool = True) -> Limits:
+        """Rounded to milliseconds.
+
+        `ramp_s` is the robot's; an estimator that `coasts` knows how long it can
+        do without pictures, one that doesn't gets no longer than arming.
+        """
         ms = {name: round(1e3 * getattr(config, name)) for name in cls.__slots__ if name != "ramp"}
+        if not coasts:
+            ms |= {"pose_hold": ms["pose_arm"], "pose_ramp": ms["pose_arm"] + ms["ramp_start"]}
         return cls(ramp=round(1e3 * ramp_s), **ms)
 
 
@@ -106,6 +113,8 @@ def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]
     stale = staleness(inputs, limits)
     if stale or inputs.fault:
         why.append(stale or inputs.fault)
+    elif inputs.pose_ms > limits.pose_arm:
+        why.append("The camera does not see the robot.")
     elif state.good_ms < limits.recover:
         why.append("Just recovered: wait half a second.")
     if inputs.held:

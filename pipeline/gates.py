@@ -6,9 +6,9 @@ from math import acos, degrees
 
 import numpy as np
 
-from pipeline.config import GatesConfig
 from pipeline.frames import Array
 from pipeline.signals import RelativePose
+from pipeline.vision_config import GatesConfig
 
 
 def disbelief(

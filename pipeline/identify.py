@@ -9,10 +9,10 @@ import numpy as np
 
 from pipeline import pnp
 from pipeline.camera import Camera, points_of
-from pipeline.config import IdentifyConfig
 from pipeline.frames import Array, R_between, exp
 from pipeline.identify_kernels import pair_hypotheses
 from pipeline.signals import Match, Spots
+from pipeline.vision_config import IdentifyConfig
 
 BRIGHTEST = 14
 """Spots considered when starting from nothing with gravity known."""

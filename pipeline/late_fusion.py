@@ -16,7 +16,7 @@ from math import inf, nan
 
 import numpy as np
 
-from pipeline.config import EkfConfig
+from pipeline.estimator_config import EkfConfig
 from pipeline.frames import Array
 from pipeline.imu_history import ImuHistory
 from pipeline.paper_ekf_kernels import workspace

@@ -5,16 +5,19 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from pipeline.config import LedsConfig
 from pipeline.frames import Array
 from pipeline.signals import Frame, Spots
 from pipeline.spot_kernels import FIELDS, WINDOW, measure
+from pipeline.vision_config import LedsConfig
 
 MAX_CONTOURS = 150
 TOPHAT = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (13, 13))
 SIGMA_PX = 0.025
-"""Of a compact, well exposed spot: gamma, clipping and rounding, hardly noise."""
-CODED_PX = 0.02
+"""Of a well exposed spot of usual size: gamma, clipping and rounding, hardly noise."""
+USUAL_PX2 = 6.0
+"""Second moment of such a spot; with more pixels on its edge a large one is surer."""
+SMALLNESS = (0.3, 1.5)
+CODED_PX = 0.017
 """What a video codec adds at 2 Mbit/s."""
 DIM = 80.0
 """Grey levels; with less contrast, a room's texture and a codec's steps matter more."""
@@ -79,13 +82,13 @@ def _measured(
 
 
 def _covariances(table: Array, coded_px: float) -> Array:
-    """(n, 2, 2): noisy, dim, large and smeared spots are less sure, along the smear above all."""
+    """(n, 2, 2): noisy, dim, small and smeared spots are less sure, along the smear above all."""
     area, contrast, noise = table[:, 3], table[:, 4], table[:, 8]
     moments = table[:, [5, 6, 6, 7]].reshape(-1, 2, 2)
     values, axes = np.linalg.eigh(moments)
     dim = np.clip(DIM / contrast, 1.0, 4.0)
-    large = np.clip(values.mean(axis=1) / 6.0, 1.0, None)
-    model = (SIGMA_PX**2 + coded_px**2) * dim**2 * large
+    small = np.clip(USUAL_PX2 / values[:, 0], *SMALLNESS)
+    model = (SIGMA_PX**2 + coded_px**2) * dim**2 * small
     # a disc of so many noisy pixels; half as much again, for only what is above the ground counts
     reach = (np.sqrt(area) + 2.0) ** 2
     grain = 1.5 * 1.25 * noise * reach / (np.sqrt(4.0 * np.pi) * table[:, 2])

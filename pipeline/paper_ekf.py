@@ -14,42 +14,26 @@ forgets everything, counts it, and starts again at the first picture away from i
 from __future__ import annotations
 
 from collections import Counter
-from enum import Enum
 from typing import Final
 
 import numpy as np
 
-from pipeline.config import EkfConfig
-from pipeline.frames import GRAVITY, Array, cross, rpy_from_R
+from pipeline.estimator import Fusion, Health
+from pipeline.estimator_config import EkfConfig
+from pipeline.frames import Array, cross, rpy_from_R
 from pipeline.imu_history import BODY, PHONE
 from pipeline.late_fusion import LateFusion, SeenPose, initial_variances
 from pipeline.paper_ekf_kernels import MIN_COS_PITCH
-from pipeline.paper_ekf_replay import largest_sigma, seen_pose
+from pipeline.paper_ekf_replay import seen_pose
 from pipeline.relative_model import N, States, pose_covariance_in_rpy
-from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState
+from pipeline.sanity import are_finite, is_pose
+from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, Seen
+from pipeline.so3_kernels import largest_sigma
 
 MAX_SLEEP_S: Final = 2.0
 """If nobody asked for so long, what was known is forgotten."""
 START_GAP_S: Final = 0.1
 """A start needs a sample of each IMU so close to the picture."""
-
-
-class Fusion(Enum):
-    """What became of a pose. True if the estimate rests on it now."""
-
-    FUSED = "fused"
-    STARTED = "the filter began, or began again, at it"
-    GATED = "too unlikely"
-    LATE = "older than the horizon or than the last picture"
-    DUPLICATE = "the same picture twice"
-    EARLY = "from the future"
-    WAITING = "no sample of one of the IMUs near it"
-    SINGULAR = "relative pitch too near ±90°"
-    INVALID = "not a pose with a covariance"
-
-    def __bool__(self) -> bool:
-        """Whether the estimate rests on the pose now."""
-        return self in (Fusion.FUSED, Fusion.STARTED)
 
 
 class PaperEkf:
@@ -85,17 +69,25 @@ class PaperEkf:
         return self.poses.total() - self.fused
 
     @property
-    def bias_omega(self) -> Array:
-        """Bias of the body's gyroscope (3,) [rad/s], at the last `state`."""
-        return self._filter.now.x[States.bias_omega].copy()
+    def complaint(self) -> str:
+        """It has none."""
+        return ""
 
     @property
-    def bias_a(self) -> Array:
-        """Bias of the body's accelerometer (3,) [m/s²], at the last `state`."""
-        return self._filter.now.x[States.bias_a].copy()
+    def health(self) -> Health:
+        """Telemetry."""
+        x = self._filter.now.x
+        return Health(
+            fused=self.fused,
+            dropped=self.dropped,
+            late=self.poses[Fusion.LATE],
+            nis=self.nis / 6.0,
+            bias_omega_b=x[States.bias_omega].copy(),
+            bias_a_b=x[States.bias_a].copy(),
+        )
 
     @property
-    def pose_covariance(self) -> Array:
+    def covariance(self) -> Array:
         """(6, 6) of (δp in c [m], θ in b [rad]) with R = R̂ Exp(θ), at the last `state`."""
         C = np.empty((6, 6))
         seen_pose(self._filter.now.x, self._filter.now.P, np.empty((3, 3)), C)
@@ -110,12 +102,19 @@ class PaperEkf:
         self._remember(sample.t, BODY, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
 
     def _remember(self, t: float, kind: int, rate: Array, force: Array) -> None:
-        if rate.shape != (3,) or force.shape != (3,) or not _are_finite(t, rate, force):
+        if rate.shape != (3,) or force.shape != (3,) or not are_finite(t, rate, force):
             self.samples_invalid += 1
         elif self._started and t <= self._filter.checkpoint.t:
             self.samples_late += 1
         elif not self._filter.insert(t, kind, rate, force):
             self.samples_duplicate += 1
+
+    def add_seen(self, seen: Seen, now: float) -> Fusion:
+        """Fuse the pose in it, if there is one."""
+        if seen.pose is None:
+            self.poses[Fusion.BLIND] += 1
+            return Fusion.BLIND
+        return self.add_pose(seen.pose, now)
 
     def add_pose(self, pose: RelativePose, now: float) -> Fusion:
         """Fuse a pose at its capture time; says, and counts, what became of it."""
@@ -124,7 +123,7 @@ class PaperEkf:
         return fusion
 
     def _judge(self, pose: RelativePose, now: float) -> Fusion:
-        if not _is_pose(pose):
+        if not is_pose(pose):
             return Fusion.INVALID
         if pose.t > now:
             return Fusion.EARLY
@@ -217,31 +216,6 @@ class PaperEkf:
             sigma_p=largest_sigma(C, 0),
             sigma_theta=largest_sigma(C, 3),
             age=now - self._t_pose,
+            f_cf_in_c=x[States.a_cf_in_c].copy(),
+            f_bf_in_b=x[States.a_bf_in_b].copy(),
         )
-
-
-def _are_finite(*values: Array | float) -> bool:
-    return all(bool(np.isfinite(value).all()) for value in values)
-
-
-def _is_pose(pose: RelativePose) -> bool:
-    """Finite, a rotation, a symmetric positive definite covariance."""
-    p, R, C = pose.p_bc_in_c, pose.R_cb, pose.covariance
-    if (p.shape, R.shape, C.shape) != ((3,), (3, 3), (6, 6)) or not _are_finite(pose.t, p, R, C):
-        return False
-    is_rotation = np.abs(R @ R.T - np.eye(3)).max() < 1e-6 and np.linalg.det(R) > 0.0
-    is_symmetric = np.abs(C - C.T).max() <= 1e-9 * np.abs(C).max()
-    return bool(is_rotation and is_symmetric and np.linalg.eigvalsh(C)[0] > 0.0)
-
-
-def warm_up() -> None:
-    """Compile every kernel, or load it from the cache, so that nothing compiles in the loop."""
-    ekf = PaperEkf(EkfConfig())
-    up, zero = np.array([0.0, 0.0, GRAVITY]), np.zeros(3)
-    for k in range(4):
-        t = 0.01 * k
-        ekf.add_body_imu(BodyImu(t, zero, up))
-        ekf.add_phone_imu(PhoneImu(t, zero, up))
-        p = np.array([2.5, 0.0, 0.0])
-        ekf.add_pose(RelativePose(t, p, np.eye(3), 1e-4 * np.eye(6), 0.0, 5), t)
-    ekf.state(0.05)

@@ -6,7 +6,7 @@ Numba does not see that a function of another file changed: after editing `paper
 
 from __future__ import annotations
 
-from math import acos, ceil, cos, exp, pi, sin, sqrt
+from math import ceil, cos, exp, pi, sin, sqrt
 
 import numpy as np
 
@@ -211,21 +211,6 @@ def fuse_pose(x: Array, P: Array, y: Array, C: Array, gate: float, work: Array) 
             for b in range(N):
                 P[a, b] -= wa * W[i, b]
     return chi2
-
-
-@kernel
-def largest_sigma(C: Array, k: int) -> float:
-    """Square root of the largest eigenvalue of the symmetric C[k:k + 3, k:k + 3]."""
-    a, b, c = C[k, k], C[k + 1, k + 1], C[k + 2, k + 2]
-    d, e, f = C[k, k + 1], C[k + 1, k + 2], C[k, k + 2]
-    mean = (a + b + c) / 3.0
-    a, b, c = a - mean, b - mean, c - mean
-    size = sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
-    if size < 1e-12 * abs(mean):
-        return sqrt(mean)
-    determinant = a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f)
-    angle = acos(min(1.0, max(-1.0, 0.5 * determinant / size**3))) / 3.0
-    return sqrt(mean + 2.0 * size * cos(angle))
 
 
 @kernel

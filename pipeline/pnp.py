@@ -33,6 +33,12 @@ class Fit:
         """Of the distances between spots and projected LEDs."""
         return float(np.sqrt(np.mean(np.sum(self.residuals_px**2, axis=1))))
 
+    @property
+    def excess(self) -> float:
+        """By how much the spots' covariances are too small, as far as the residuals tell: ≥ 1."""
+        freedom = self.residuals_px.size - 6
+        return max(1.0, self.chi2 / freedom) if freedom > 0 else 1.0
+
 
 def refine(
     camera: Camera,
@@ -145,15 +151,12 @@ def solve(
 
 def pose_of(fit: Fit, t: float) -> RelativePose:
     """As a measurement; its covariance grows where the residuals are larger than claimed."""
-    leds = len(fit.residuals_px)
-    freedom = 2 * leds - 6
-    scale = max(1.0, fit.chi2 / freedom) if freedom > 0 else 1.0
-    covariance = scale * np.linalg.inv(fit.information)
+    covariance = fit.excess * np.linalg.inv(fit.information)
     return RelativePose(
         t=t,
         p_bc_in_c=fit.p_bc_in_c,
         R_cb=fit.R_cb,
         covariance=0.5 * (covariance + covariance.T),
         reprojection_px=fit.rms_px,
-        leds=leds,
+        leds=len(fit.residuals_px),
     )

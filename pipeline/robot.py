@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.frames import Array
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.frames import GRAVITY, Array
+
+ONE_AXIS = 1e-3
+"""Forces that share an axis but for this are all along it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,5 +26,33 @@ class Robot:
     """Least thrust of a running thruster [N]."""
     f_max: float
     """[N]."""
-    suspension_period_s: float
-    """Of the pendulum: how long a ramp to zero must last to leave no swing."""
+    mass: float
+    """[kg]."""
+    inertia: Array
+    """(3,) principal moments about the axes of b [kg m²]."""
+    axes: npt.NDArray[np.bool_]
+    """(6,) which of x, y, z, roll, pitch, yaw (in b) are controlled; the others are let alone."""
+    hangs: bool
+    """False: with its thrusters off it stands on the floor."""
+    ramp_s: float
+    """How long a ramp to zero lasts; hanging, the pendulum's period: that leaves no swing."""
+
+    @property
+    def weight_to_carry(self) -> float:
+        """What its thrusters must carry [N]; neither cable nor floor does."""
+        return self.mass * GRAVITY if self.axes[2] and not self.hangs else 0.0
+
+    @property
+    def needs_tilt(self) -> bool:
+        """Whether it can only go sideways by tilting: all its forces are along one axis of b."""
+        spread = np.linalg.svd(self.A[:3], compute_uv=False)
+        return bool(spread[1] < ONE_AXIS * spread[0] and self.axes[:2].any())
+
+    @property
+    def wrench_axes(self) -> npt.NDArray[np.bool_]:
+        """(6,) rows of A that its thrusters must be able to give both ways."""
+        if not self.needs_tilt:
+            return self.axes
+        tilting = np.array([False, False, True, True, True, False])
+        kept: npt.NDArray[np.bool_] = tilting | (self.axes & ~np.array([True, True, *4 * [False]]))
+        return kept

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from pipeline.frames import Array
 
 Image = npt.NDArray[np.uint8]
+Flags = npt.NDArray[np.int8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +101,50 @@ class RelativePose:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LedRays:
+    """Named LEDs as a picture saw them, free of the lens: what a filter needs no camera for."""
+
+    led: npt.NDArray[np.intp]
+    """(m,) index of the LED in the robot file."""
+    t: Array
+    """(m,) when its row was exposed [s]."""
+    tangents: Array
+    """(m, 2) q_y/q_x (left) and q_z/q_x (up) of the LED's place q in c."""
+    covariances: Array
+    """(m, 2, 2) of the tangents."""
+
+    def __len__(self) -> int:
+        """Count of the LEDs."""
+        return len(self.led)
+
+
+@dataclass(frozen=True, slots=True)
+class StampOffset:
+    """A picture was taken at its stamp plus this, as found by comparing it with the gyroscopes."""
+
+    value: float
+    """[s]."""
+    sigma: float
+    """[s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What a picture says of the robot, whatever of it was hidden."""
+
+    t: float
+    """Capture time of its middle row [s]."""
+    rays: LedRays
+    """Any number of LEDs, also none."""
+    pose: RelativePose | None
+    """If the LEDs give one by themselves."""
+    half_field: tuple[float, float] = (0.67, 0.38)
+    """Tangents of half the field of view, to the side and up."""
+    offset: StampOffset | None = None
+    """Coarse time offset of the stamps, once it is known."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RelativeState:
     """The estimator's view of now."""
 
@@ -126,6 +171,10 @@ class RelativeState:
     """Largest standard deviation of the attitude [rad]."""
     age: float
     """Since the last fused picture was taken [s]."""
+    f_cf_in_c: Array
+    """(3,) specific force on the phone [m/s²], +9.8 up at rest; bias removed where it is known."""
+    f_bf_in_b: Array
+    """(3,) the same on the body."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,6 +193,8 @@ class VirtualView:
     """(3,) [m/s], as seen from v."""
     omega_bf_in_b: Array
     """(3,) [rad/s]."""
+    guarding: float = 0.0
+    """0 to 1: how much v hurries after c, to keep the robot in the picture."""
 
 
 class Mode(IntEnum):

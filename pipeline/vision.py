@@ -1,4 +1,4 @@
-"""Spots → names → pose, from picture to picture: what all that looks runs."""
+"""Spots → names → pose and rays, from picture to picture: what all that looks runs."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline import identify, leds, pnp
+from pipeline import few_leds, identify, leds, pnp
 from pipeline.camera import Camera
-from pipeline.config import IdentifyConfig, LedsConfig
-from pipeline.frames import Array, exp, log
-from pipeline.signals import Frame, Match, RelativePose, Spots
-
-FORGET_MISSES = 3
-MAX_STEP_S = 0.5
-"""Longer between pictures: the last pose predicts nothing."""
+from pipeline.expected import Expected
+from pipeline.frames import Array, cross, log
+from pipeline.last_pose import LastPose, Place
+from pipeline.rays import NO_RAYS, rays_of
+from pipeline.rolling import Motion, unrolled
+from pipeline.signals import Frame, LedRays, Match, RelativePose, Seen, Spots, StampOffset
+from pipeline.vision_config import IdentifyConfig, LedsConfig
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,8 +26,10 @@ class Prior:
     """Opposite of gravity (3,)."""
     up_in_b: Array | None = None
     omega_cf_in_c: Array | None = None
-    """[rad/s]."""
+    """When the picture was taken [rad/s]."""
     omega_bf_in_b: Array | None = None
+    expected: Expected | None = None
+    """What a filter predicts for that time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,12 +38,33 @@ class Sighting:
 
     t: float
     pose: RelativePose | None
+    rays: LedRays
+    """The named LEDs, if they are believed."""
     spots: Spots
     match: Match | None
     reason: str
     """Why there is no pose; empty if there is."""
     took_s: dict[str, float] = field(default_factory=dict)
     """By stage: detect, identify+pose."""
+    unbelieved: RelativePose | None = None
+    """What the picture shows if gravity, which denies it, is left out."""
+    offset: StampOffset | None = None
+    """Coarse, of the picture's stamp, for who knows it."""
+
+    def seen(self, camera: Camera) -> Seen | None:
+        """For a filter; None if it says nothing of the robot."""
+        if self.pose is None and len(self.rays) == 0:
+            return None
+        return Seen(self.t, self.rays, self.pose, camera.half_field, self.offset)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """The spots of a picture and what they are called: all LEDs that a pose needs, or a few."""
+
+    spots: Spots
+    naming: identify.Naming | None = None
+    few: Match | None = None
 
 
 class Vision:
@@ -58,62 +81,86 @@ class Vision:
         self.camera, self._leds_in_b = camera, leds_in_b
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
-        self._last: RelativePose | None = None
-        self._rate = np.zeros(3)
-        self._misses = 0
+        self._last = LastPose()
+        self._expected: Expected | None = None
+        self._places: few_leds.Places | None = None
+        """Where a filter that is trusted expects the LEDs in this picture."""
+        self._t_search = -np.inf
+        self._area_px_m2 = np.nan
+        """Of the last named spots, times their depth squared: what an LED looks like."""
 
     def step(
         self, frame: Frame, prior: Prior, clock: Callable[[], float] = lambda: 0.0
     ) -> Sighting:
         """Look at a picture; `clock` only times the stages."""
         started = clock()
-        predicted = self._predicted(frame.t, prior)
+        predicted = self._predictions(frame.t, prior)
+        motion = self._motion(predicted, prior)
         spots = self._detect(frame, predicted)
         detected = clock()
-        naming = self._name(spots, predicted, prior)
-        if naming is None and predicted is not None:
-            spots = leds.find_spots(frame, self._leds)
-            naming = self._name(spots, predicted, prior)
+        found = _Found(spots, self._track(unrolled(self.camera, spots, motion), predicted))
+        if found.naming is None:
+            if predicted:
+                spots = leds.find_spots(frame, self._leds)
+            found = self._search(frame.t, spots, motion, predicted, prior)
         took = {"detect": detected - started, "identify": clock() - detected}
-        if naming is None:
-            self._miss()
-            return Sighting(frame.t, None, spots, None, self._excuse(spots), took)
-        pose = pnp.pose_of(naming.fit, frame.t)
-        return Sighting(frame.t, pose, spots, naming.match, "", took)
+        return self._told(frame.t, found, took)
+
+    def _told(self, t: float, found: _Found, took: dict[str, float]) -> Sighting:
+        spots, naming, few = found.spots, found.naming, found.few
+        if naming is not None:
+            depth = float(naming.fit.p_bc_in_c[0])
+            self._area_px_m2 = float(np.median(spots.area[naming.match.spot])) * depth**2
+            rays = rays_of(self.camera, spots, naming.match, t, naming.fit.excess)
+            return Sighting(t, pnp.pose_of(naming.fit, t), rays, spots, naming.match, "", took)
+        if few is not None:
+            reason = f"{len(few.led)} of {len(self._leds_in_b)} LEDs seen."
+            rays = rays_of(self.camera, spots, few, t)
+            return Sighting(t, None, rays, spots, few, reason, took)
+        self._last.miss()
+        return Sighting(t, None, NO_RAYS, spots, None, self._excuse(spots), took)
 
     def keep(self, pose: RelativePose) -> None:
-        """`pose` was believed: predict from it."""
-        last = self._last
-        if last is not None and 0.0 < pose.t - last.t < MAX_STEP_S:
-            self._rate = (pose.p_bc_in_c - last.p_bc_in_c) / (pose.t - last.t)
-        else:
-            self._rate = np.zeros(3)
-        self._last, self._misses = pose, 0
+        """`pose`, of the last picture, was believed: predict from it."""
+        self._last.keep(pose, self._expected)
 
     def forget(self) -> None:
         """The next picture is searched from nothing."""
-        self._last, self._misses = None, 0
+        self._last.forget()
 
-    def _miss(self) -> None:
-        self._misses += 1
-        if self._misses >= FORGET_MISSES:
-            self.forget()
+    def _predictions(self, t: float, prior: Prior) -> list[Place]:
+        """Where the robot may be, likeliest first: by a sure filter, by the last pose."""
+        expected = self._expected = prior.expected
+        if expected is None:
+            self._last.contradicts = False  # whoever was wrong has gone
+        self._places = None
+        places: list[Place] = []
+        if expected is not None and not self._last.contradicts:
+            config = self._identify
+            self._places = few_leds.places(self.camera, self._leds_in_b, expected, config)
+            if self._places is not None:
+                places.append((expected.p_bc_in_c, expected.R_cb))
+        own = self._last.predicted(t, prior.omega_cf_in_c, prior.omega_bf_in_b)
+        return [*places, own] if own is not None else places
 
-    def _predicted(self, t: float, prior: Prior) -> tuple[Array, Array] | None:
-        """Last pose moved on by both gyroscopes and the last velocity."""
-        last = self._last
-        if last is None or not 0.0 < t - last.t < MAX_STEP_S:
+    def _motion(self, predicted: list[Place], prior: Prior) -> Motion | None:
+        """During the readout of a picture."""
+        omega, expected = prior.omega_cf_in_c, prior.expected
+        if omega is None:
             return None
-        dt = t - last.t
-        R_cb = last.R_cb
-        if prior.omega_cf_in_c is not None and prior.omega_bf_in_b is not None:
-            R_cb = exp(-prior.omega_cf_in_c * dt) @ R_cb @ exp(prior.omega_bf_in_b * dt)
-        return last.p_bc_in_c + min(dt, 0.1) * self._rate, R_cb
+        if not predicted:
+            return Motion(omega, np.zeros(3), np.inf)
+        p_bc_in_c = predicted[0][0]
+        if self._places is not None and expected is not None:
+            u_bf_in_c = expected.u_bf_in_c
+        else:
+            u_bf_in_c = self._last.rate_in_c + cross(omega, p_bc_in_c)
+        return Motion(omega, u_bf_in_c, float(p_bc_in_c[0]))
 
-    def _detect(self, frame: Frame, predicted: tuple[Array, Array] | None) -> Spots:
-        if predicted is None:
+    def _detect(self, frame: Frame, predicted: list[Place]) -> Spots:
+        if not predicted:
             return leds.find_spots(frame, self._leds)
-        p_bc_in_c, R_cb = predicted
+        p_bc_in_c, R_cb = predicted[0]
         centres = self.camera.pixels(p_bc_in_c + self._leds_in_b @ R_cb.T)
         inside = self.camera.sees(centres, margin_px=3.0)
         gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2)
@@ -121,14 +168,45 @@ class Vision:
         half = np.minimum(0.5 * gaps.min(axis=1) + 2.0, self._identify.shift_px + 6.0)
         return leds.spots_near(frame, centres[inside], half[inside], self._leds)
 
-    def _name(
-        self, spots: Spots, predicted: tuple[Array, Array] | None, prior: Prior
-    ) -> identify.Naming | None:
+    def _track(self, spots: Spots, predicted: list[Place]) -> identify.Naming | None:
+        """Name enough for a pose by where the LEDs should be."""
         camera, robot, config = self.camera, self._leds_in_b, self._identify
-        if predicted is not None:
-            naming = identify.while_tracking(camera, robot, spots, predicted, config)
-            if naming is not None and _near(naming.fit, predicted):
+        for place in predicted:
+            naming = identify.while_tracking(camera, robot, spots, place, config)
+            if naming is not None and _near(naming.fit, place):
                 return naming
+        return None
+
+    def _search(
+        self,
+        t: float,
+        spots: Spots,
+        motion: Motion | None,
+        predicted: list[Place],
+        prior: Prior,
+    ) -> _Found:
+        """In all spots of the picture; a few LEDs do for a while, then the filter is checked."""
+        upright = unrolled(self.camera, spots, motion)
+        naming = self._track(upright, predicted)
+        if naming is not None:
+            return _Found(spots, naming)
+        few = self._few(upright, prior.expected)
+        if few is not None and 0.0 <= t - self._t_search < self._identify.search_s:
+            return _Found(spots, None, few)
+        self._t_search = t
+        return _Found(spots, self._start(upright, prior), few)
+
+    def _few(self, spots: Spots, expected: Expected | None) -> Match | None:
+        if self._places is None or expected is None:
+            return None
+        area_px = self._area_px_m2 / float(expected.p_bc_in_c[0]) ** 2
+        few = few_leds.name_few(spots, self._places, area_px)
+        if few is None or len(few.led) >= self._identify.min_leds:
+            return None  # so many would have given a pose: something is wrong with them
+        return few
+
+    def _start(self, spots: Spots, prior: Prior) -> identify.Naming | None:
+        camera, robot, config = self.camera, self._leds_in_b, self._identify
         if prior.up_in_c is not None and prior.up_in_b is not None:
             return identify.from_gravity(camera, robot, spots, prior.up_in_c, prior.up_in_b, config)
         return identify.from_nothing(camera, robot, spots, config)

@@ -12,18 +12,21 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import get_args
 
+import msgspec
 import numpy as np
 
 from hardware.control_end import ControlEnd
 from hardware.robot_file import RobotFile, load_robot
 from hardware.udp_link import UdpFollower
-from pipeline.config import TeleopConfig, VirtualCameraConfig
-from pipeline.paper_ekf import warm_up
+from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
+from pipeline.estimators import warm_up
 from pipeline.signals import BodyImu
 from server import realtime
 from server.control_link import Endpoint, control_end
 from server.controller import Controller
+from server.knobs import DEFAULT_KNOBS, Knobs
 from server.robot_link import RobotLink
 
 PERIOD_S = 0.005
@@ -42,8 +45,8 @@ class ControlOptions:
     host: str
     port: int
     gains: str
-    tau_1: float
-    tau_2: float
+    estimator: EstimatorName
+    virtual_camera: Knobs
     real: bool
     """The robot is no simulation: it is not armed while the schedule can't be kept."""
 
@@ -56,14 +59,27 @@ def parse(argv: Sequence[str] | None) -> ControlOptions:
     parser.add_argument("--host", default="127.0.0.1", help="of the robot")
     parser.add_argument("--port", type=int, required=True, help="of the robot (UDP)")
     parser.add_argument("--gains", default="phone", help="name of a gain set in the robot file")
-    virtual = VirtualCameraConfig()
-    parser.add_argument("--tau-1", type=float, default=virtual.tau_1, help="[s], 0: no filter")
-    parser.add_argument("--tau-2", type=float, default=virtual.tau_2, help="[s]")
+    parser.add_argument("--estimator", choices=get_args(EstimatorName), default="relative")
+    parser.add_argument(
+        "--virtual-camera", type=_knobs, default=DEFAULT_KNOBS, help="knobs as JSON"
+    )
     parser.add_argument("--real", action="store_true", help="the robot is no simulation")
     return ControlOptions(**vars(parser.parse_args(argv)))
 
 
-def teleop_config(robot_file: RobotFile, gains: str, tau_1: float, tau_2: float) -> TeleopConfig:
+def _knobs(text: str) -> Knobs:
+    try:
+        return msgspec.json.decode(text, type=Knobs)
+    except msgspec.MsgspecError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def teleop_config(
+    robot_file: RobotFile,
+    gains: str,
+    virtual_camera: VirtualCameraConfig,
+    estimator: EstimatorName = "relative",
+) -> TeleopConfig:
     """The default configuration with a gain set of the robot file.
 
     Raises:
@@ -71,14 +87,20 @@ def teleop_config(robot_file: RobotFile, gains: str, tau_1: float, tau_2: float)
     """
     if gains not in robot_file.gains:
         raise SystemExit(f"gains: {gains!r} is not one of {', '.join(robot_file.gains)}")
-    virtual_camera = VirtualCameraConfig(tau_1=tau_1, tau_2=tau_2)
-    return replace(TeleopConfig(), gains=robot_file.gains[gains], virtual_camera=virtual_camera)
+    return replace(
+        TeleopConfig(),
+        gains=robot_file.gains[gains],
+        virtual_camera=virtual_camera,
+        estimator=estimator,
+    )
 
 
 def run(options: ControlOptions) -> None:
     """Keep the schedule until SIGTERM or SIGINT, then stop the robot."""
     robot_file = load_robot(options.robot)
-    config = teleop_config(robot_file, options.gains, options.tau_1, options.tau_2)
+    config = teleop_config(
+        robot_file, options.gains, options.virtual_camera.config(), options.estimator
+    )
     warm_up()
     granted = realtime.claim()
     late = options.real and not granted.startswith(realtime.GRANTED)

@@ -10,25 +10,19 @@ import contextlib
 import os
 import socket
 from pathlib import Path
-from typing import Annotated
 
 import msgspec
 import numpy as np
 
-from pipeline.frames import Array
-from pipeline.signals import Operator, PhoneImu, RelativePose
+from pipeline.expected import Expected
+from pipeline.frames import R_from_wxyz
+from pipeline.signals import Operator, PhoneImu
+from server.knobs import Knobs, TuneInput
+from server.seen_input import SeenInput, Triple, triple
 
-Triple = tuple[float, float, float]
-Nine = tuple[float, float, float, float, float, float, float, float, float]
-ThirtySix = Annotated[list[float], msgspec.Meta(min_length=36, max_length=36)]
 MAX_DATAGRAM = 16_384
 LARGEST = 1e9
 """No time, sensor or pose has a number beyond it."""
-
-
-def triple(v: Array) -> Triple:
-    """Plain floats of a (3,) array."""
-    return (float(v[0]), float(v[1]), float(v[2]))
 
 
 class PhoneImuInput(msgspec.Struct, tag="imu", array_like=True, frozen=True):
@@ -46,35 +40,6 @@ class PhoneImuInput(msgspec.Struct, tag="imu", array_like=True, frozen=True):
     def sample(self) -> PhoneImu:
         """As received."""
         return PhoneImu(self.t, np.array(self.omega), np.array(self.a))
-
-
-class PoseInput(msgspec.Struct, tag="pose", array_like=True, frozen=True):
-    """One pose measured in a picture; `covariance` is the (6, 6) row by row."""
-
-    t: float
-    p: Triple
-    R: Nine
-    covariance: ThirtySix
-    reprojection_px: float
-    leds: int
-
-    @classmethod
-    def of(cls, pose: RelativePose) -> PoseInput:
-        """To be sent."""
-        covariance = pose.covariance.ravel().tolist()
-        R: Nine = tuple(pose.R_cb.ravel().tolist())  # type: ignore[assignment]
-        return cls(pose.t, triple(pose.p_bc_in_c), R, covariance, pose.reprojection_px, pose.leds)
-
-    def pose(self) -> RelativePose:
-        """As received."""
-        return RelativePose(
-            t=self.t,
-            p_bc_in_c=np.array(self.p),
-            R_cb=np.array(self.R).reshape(3, 3),
-            covariance=np.array(self.covariance).reshape(6, 6),
-            reprojection_px=self.reprojection_px,
-            leds=self.leds,
-        )
 
 
 class OperatorInput(msgspec.Struct, tag="operator", array_like=True, frozen=True):
@@ -106,7 +71,7 @@ class ReadyInput(msgspec.Struct, tag="ready", array_like=True, frozen=True):
     refusals: list[str]
 
 
-Input = PhoneImuInput | PoseInput | OperatorInput | RequestInput | ReadyInput
+Input = PhoneImuInput | SeenInput | OperatorInput | RequestInput | ReadyInput | TuneInput
 
 
 def is_believable(message: Input) -> bool:
@@ -114,9 +79,8 @@ def is_believable(message: Input) -> bool:
     match message:
         case PhoneImuInput():
             numbers: tuple[float, ...] = (message.t, *message.omega, *message.a)
-        case PoseInput():
-            measured = (*message.p, *message.R, *message.covariance)
-            numbers = (message.t, message.reprojection_px, *measured)
+        case SeenInput():
+            numbers = tuple(message.numbers())
         case OperatorInput():
             numbers = (message.t,)
         case _:
@@ -149,7 +113,13 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """R_vr."""
     error_m: float | None
     error_rad: float | None
+    u_bf_in_c: Triple | None
+    """Velocity of the body seen from f."""
     sigma_p: float | None
+    """Largest standard deviations of position [m] and attitude [rad]."""
+    sigma_theta: float | None
+    time_offset: float | None
+    """Of the pictures' stamps, if the filter knows: taken at the stamp plus this [s]."""
     thrusts: list[float]
     saturated: bool
     up_in_b: Triple | None
@@ -167,6 +137,28 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Capture of the last fused picture → fused."""
     step_ms: float
     """Median CPU time of a tick."""
+    knobs: Knobs | None = None
+    """Of the virtual camera, as they stand."""
+    guarding: float = 0.0
+    """0 to 1: how much the virtual camera hurries to keep the robot in the picture."""
+
+
+def expected_of(status: ControlStatus) -> Expected | None:
+    """Where control's filter says that the robot is, for vision; None if it doesn't."""
+    p, R_wxyz, u = status.p_bc_in_c, status.R_cb_wxyz, status.u_bf_in_c
+    if p is None or R_wxyz is None or u is None:
+        return None
+    if status.sigma_p is None or status.sigma_theta is None:
+        return None
+    return Expected(
+        t=status.t,
+        p_bc_in_c=np.array(p),
+        R_cb=R_from_wxyz(R_wxyz),
+        u_bf_in_c=np.array(u),
+        sigma_p=status.sigma_p,
+        sigma_theta=status.sigma_theta,
+        time_offset=status.time_offset or 0.0,
+    )
 
 
 _encoder = msgspec.msgpack.Encoder()

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import isfinite
 
 import numpy as np
 
 from hardware.follower import ThrustCommand
 from pipeline.config import TeleopConfig
+from pipeline.expected import Expected
 from pipeline.frames import Array, wxyz_from_R
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose, Requests
+from pipeline.signals import BodyImu, Operator, PhoneImu, Requests, Seen
 from pipeline.teleop import Inputs, Output, Teleop
 from pipeline.vertical import Vertical
 from server.control_link import (
@@ -18,11 +20,11 @@ from server.control_link import (
     Input,
     OperatorInput,
     PhoneImuInput,
-    PoseInput,
     ReadyInput,
     RequestInput,
-    triple,
 )
+from server.knobs import Knobs, TuneInput, turned
+from server.seen_input import SeenInput, triple
 
 SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
@@ -35,6 +37,7 @@ class Controller:
         """Disarmed, until somebody asks; `unfit` says why this process may never arm, if so."""
         self._unfit = unfit
         self.teleop = Teleop(robot, config)
+        self._virtual_camera = config.virtual_camera
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
         self._vertical = Vertical()
@@ -46,6 +49,12 @@ class Controller:
     def up_in_b(self) -> Array | None:
         """Opposite of gravity in the body (3,), for vision; None before the first sample."""
         return self._vertical.up
+
+    def expected(self, output: Output) -> Expected | None:
+        """Where the filter says that the robot is, for vision; None if it doesn't."""
+        if output.relative is None:
+            return None
+        return Expected.of(output.relative, self.teleop.estimator.health.time_offset)
 
     def tick(
         self,
@@ -62,7 +71,7 @@ class Controller:
             body: The robot's samples on our clock, oldest first.
             robot_reason: Why the robot itself refuses thrust; empty if it doesn't.
         """
-        phone, poses, operator, wishes = self._sort(messages, now)
+        phone, seen, operator, wishes = self._sort(messages, now)
         for sample in body:
             self._vertical.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
             self._body_samples.append(
@@ -73,7 +82,7 @@ class Controller:
                 t=now,
                 phone_imu=tuple(phone),
                 body_imu=tuple(body),
-                poses=tuple(poses),
+                seen=tuple(seen),
                 operator=operator,
                 requests=wishes,
                 refusals=self._why_not(now, robot_reason),
@@ -81,31 +90,34 @@ class Controller:
         )
         if output.relative is not None:
             self.omega_bf_in_b = output.relative.omega_bf_in_b
-        if poses:
-            self._fuse_ms = 1e3 * (now - poses[-1].t)
+        if seen:
+            self._fuse_ms = 1e3 * (now - seen[-1].t)
         return ThrustCommand(output.thrusts, output.armed), output
 
     def _sort(
         self, messages: Iterable[Input], now: float
-    ) -> tuple[list[PhoneImu], list[RelativePose], Operator | None, Requests]:
+    ) -> tuple[list[PhoneImu], list[Seen], Operator | None, Requests]:
         phone: list[PhoneImu] = []
-        poses: list[RelativePose] = []
+        seen: list[Seen] = []
         operator: Operator | None = None
         wishes: set[str] = set()
         for message in messages:
             match message:
                 case PhoneImuInput():
                     phone.append(PhoneImu(message.t, np.array(message.omega), np.array(message.a)))
-                case PoseInput():
-                    poses.append(message.pose())
+                case SeenInput():
+                    seen.append(message.seen())
                 case OperatorInput():
                     operator = message.operator()
                 case RequestInput():
                     wishes.add(message.what)
                 case ReadyInput():
                     self._refusals, self._t_ready = tuple(message.refusals), now
+                case TuneInput():
+                    self._virtual_camera = turned(self._virtual_camera, message)
+                    self.teleop.tune(self._virtual_camera)
         known = Requests.__slots__
-        return phone, poses, operator, Requests(**{w: True for w in wishes if w in known})
+        return phone, seen, operator, Requests(**{w: True for w in wishes if w in known})
 
     def _why_not(self, now: float, robot_reason: str) -> tuple[str, ...]:
         if now - self._t_ready > SERVER_SILENT_S:
@@ -124,7 +136,7 @@ class Controller:
         """All that a supervisor may want to know, and the body's samples since the last one."""
         relative, view = output.relative, output.view
         reference, error = output.reference, output.error
-        ekf = self.teleop.ekf
+        health = self.teleop.estimator.health
         samples, self._body_samples = self._body_samples, []
         return ControlStatus(
             t=output.t,
@@ -145,19 +157,24 @@ class Controller:
             reference_R_wxyz=wxyz_from_R(reference.R_vr) if reference else None,
             error_m=_norm(error.e_p_in_v) if error else None,
             error_rad=_norm(error.e_eta_in_b) if error else None,
+            u_bf_in_c=triple(relative.u_bf_in_c) if relative else None,
             sigma_p=relative.sigma_p if relative else None,
+            sigma_theta=relative.sigma_theta if relative else None,
+            time_offset=health.time_offset if isfinite(health.time_offset) else None,
             thrusts=output.thrusts.tolist(),
             saturated=output.saturated,
             up_in_b=triple(self.up_in_b) if self.up_in_b is not None else None,
             omega_b=triple(self.omega_bf_in_b),
             body_samples=samples,
-            poses_fused=ekf.fused,
-            poses_dropped=ekf.dropped,
+            poses_fused=health.fused,
+            poses_dropped=health.dropped,
             inputs_dropped=dropped,
             realtime=realtime,
             lateness_ms=lateness_ms,
             fuse_ms=self._fuse_ms,
             step_ms=step_ms,
+            knobs=Knobs.of(self._virtual_camera),
+            guarding=view.guarding if view else 0.0,
         )
 
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import rich
 import viser
 
+from hardware.sim.parameters import PlantParameters, StartParameters
 from pipeline.frames import Array
 from pipeline.robot import Robot
 from server import scene
@@ -40,21 +41,14 @@ class _Viser(viser.ViserServer):
 class Dashboard:
     """A scene that follows the status of control, for any number of browsers."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        positions_in_b: Array,
-        directions_in_b: Array,
-        hook_above_com: float = 0.03,
-        cable_length: float = 1.3,
-    ) -> None:
+    def __init__(self, robot: Robot, plant: PlantParameters, start: StartParameters) -> None:
         """Serve an empty scene on a free `port` of the loopback interface.
 
-        Thrusters are at `positions_in_b` (m, 3) [m] and push the robot along `directions_in_b`
-        (m, 3); the cable hangs from `cable_length` [m] above the hook.
+        `plant` gives the robot its looks: thrusters, cable, feet. How far below the phone the
+        floor is nobody knows: a robot that stands is taken to do so where it would `start`.
         """
         rich.get_console().quiet = True  # only viser speaks through it
-        craft = scene.Craft(robot.leds_in_b, positions_in_b, directions_in_b, hook_above_com)
+        craft = scene.Craft.of(robot, plant)
         self._viser = _Viser(host="127.0.0.1", port=0, label="Lightleash", verbose=False)
         self.port = self._viser.get_port()
         self._trail = scene.Trail()
@@ -63,10 +57,10 @@ class Dashboard:
         self._thumbnail: Thumbnail | None = None
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._dress()
+        self._dress(scene.floor_z(plant, start))
         self._add_phone()
         self._add_robot(craft)
-        self._add_lines(hook_above_com, cable_length)
+        self._add_lines(craft.cable)
         self._add_reference(craft)
 
     def start(self, latest: Latest) -> None:
@@ -133,12 +127,14 @@ class Dashboard:
 
     def _show_robot(self, status: ControlStatus, view: scene.View) -> None:
         """Cable, trail and thrusts."""
-        for node in (self._cable, self._trail_lines):
+        lines = [node for node in (self._cable, self._trail_lines) if node is not None]
+        for node in lines:
             if node.visible != (view.robot is not None):
                 node.visible = view.robot is not None
         if view.robot is None:
             return
-        self._cable.position = view.robot.position
+        if self._cable is not None:
+            self._cable.position = view.robot.position
         if self._trail.add(status.t, view.robot.position):
             self._trail_lines.points = self._trail.segments()
         thrusts = np.asarray(status.thrusts, dtype=np.float64)
@@ -154,7 +150,7 @@ class Dashboard:
             handle.color = colour if is_fresh else STALE
         self._thrusts.visible = is_fresh
 
-    def _dress(self) -> None:
+    def _dress(self, floor_z: float) -> None:
         """Dark, with a floor, and nothing but the scene."""
         self._viser.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, control_width="small"
@@ -167,7 +163,7 @@ class Dashboard:
             "/floor",
             width=12.0,
             height=12.0,
-            position=(1.25, 0.0, scene.FLOOR_Z),
+            position=(1.25, 0.0, floor_z),
             cell_color=(54, 58, 66),
             section_color=(80, 86, 98),
             section_size=2.0,
@@ -213,11 +209,12 @@ class Dashboard:
             visible=False,
         )
 
-    def _add_lines(self, hook_above_com: float, cable_length: float) -> None:
-        cable = np.array([[[0.0, 0.0, hook_above_com], [0.0, 0.0, hook_above_com + cable_length]]])
-        self._cable = self._viser.scene.add_line_segments(
-            "/f/cable", cable, CABLE, thickness=2.0, thickness_units="screen", visible=False
-        )
+    def _add_lines(self, cable: Array | None) -> None:
+        self._cable: viser.LineSegmentsHandle | None = None
+        if cable is not None:
+            self._cable = self._viser.scene.add_line_segments(
+                "/f/cable", cable, CABLE, thickness=2.0, thickness_units="screen", visible=False
+            )
         self._trail_lines = self._viser.scene.add_line_segments(
             "/f/trail",
             np.zeros((scene.Trail.SEGMENTS, 2, 3)),

@@ -9,12 +9,19 @@ from pathlib import Path
 from typing import Protocol
 
 import msgspec
-import numpy as np
+from msgspec.structs import asdict
 
 from pipeline.robot import Robot
 from server.clock import now
-from server.control_link import ControlStatus, Input, ReadyInput, RequestInput, server_end
-from server.messages import Command, Hello, Status, ToPage, encode_message
+from server.control_link import (
+    ControlStatus,
+    Input,
+    ReadyInput,
+    RequestInput,
+    server_end,
+)
+from server.knobs import TuneInput
+from server.messages import Command, Hello, Status, ToPage, Tune, encode_message
 from server.meter import Meter
 from server.operator import OperatorPhone
 from server.recorder import Recordings
@@ -92,6 +99,17 @@ class Hub:
         self.say(f"{who}: {command.what}")
         insists = INSISTS if command.what in ("stop", "disarm") else 0
         self._ask(RequestInput(command.what), insists)
+
+    def tune(self, wish: Tune) -> None:
+        """A supervisor turns knobs of the virtual camera."""
+        knobs = {name: value for name, value in asdict(wish).items() if value is not None}
+        if not knobs:
+            return
+        told = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
+        if self._control.send(TuneInput(**knobs)):
+            self.say(f"supervisor: {told}")
+        else:
+            self.say(f"{told} did not reach the control process: try again.")
 
     def _ask(self, request: RequestInput, insists: int) -> None:
         """Nobody may be there, or the queue may be full: what stops the robot is said again."""
@@ -180,9 +198,8 @@ class Hub:
             self.status = status
             self.control_meter.tick(now(), status.t)
             self.recordings.status(status, now())
-            up = np.array(status.up_in_b) if status.up_in_b is not None else None
-            if self.phone is not None and self.phone.vision is not None:
-                self.phone.vision.know(up, np.array(status.omega_b))
+            if self.phone is not None:
+                self.phone.know(status)
 
     def refusals(self) -> list[str]:
         """What the server has against arming."""

@@ -12,6 +12,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import segno
 
 from hardware.robot_file import RobotFileError, load_robot
@@ -127,7 +128,9 @@ def children_of(
         children.append(Child("robot", [*simulated, "--truth-port", str(truth_port)]))
     control = ["server.control", "--runtime", str(runtime), "--robot", settings.robot]
     control += ["--host", host, "--port", str(port), "--gains", settings.gains]
-    control += ["--tau-1", str(settings.tau_1_s), "--tau-2", str(settings.tau_2_s)]
+    control += ["--estimator", settings.estimator]
+    knobs = msgspec.json.encode(settings.virtual_camera.knobs).decode()
+    control += ["--virtual-camera", knobs]
     children.append(Child("control", control))
     descriptors = tuple(s.fileno() for s in sockets)
     server = ["server", "_server", str(runtime), str(truth_port), *map(str, descriptors)]

@@ -23,7 +23,7 @@ Summary = dict[str, float | str]
 
 
 @contextlib.contextmanager
-def server(robot: str, gains: str) -> Iterator[dict[str, str]]:
+def server(robot: str, gains: str, estimator: str = "relative") -> Iterator[dict[str, str]]:
     """Run `lightleash serve` on free ports; gives the environment in which phones find it.
 
     Raises:
@@ -33,6 +33,7 @@ def server(robot: str, gains: str) -> Iterator[dict[str, str]]:
         folder = Path(name)
         environment = {**os.environ, "XDG_RUNTIME_DIR": name, "XDG_STATE_HOME": name}
         command = [sys.executable, "-m", "server", "serve", "--robot", robot, "--gains", gains]
+        command += ["--estimator", estimator]
         log = folder / "log"
         with log.open("wb") as file:
             process = subprocess.Popen(

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import numpy.typing as npt
 
 from hardware.follower import FollowerError
 from hardware.sim.phone import Event, Stream
@@ -15,7 +16,7 @@ from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.messages import Command, Status
 from server.phone_client import Access, PhoneClient
-from server.phone_script import DEVICE, SYNCHRONISED_PONGS, TOUCH_S, PhoneScript, Score
+from server.phone_script import ALL, DEVICE, SYNCHRONISED_PONGS, TOUCH_S, PhoneScript, Score
 from server.wire import Record
 
 EXPOSED_S = 0.03
@@ -58,12 +59,21 @@ class SeenRobot:
 class LivePhone:
     """Plays a script in real time: schedules are absolute, pictures are made in another thread."""
 
-    def __init__(self, access: Access, script: PhoneScript, truth_port: int) -> None:
-        """Looks at the simulated robot whose truth is on `truth_port`; 0: one that never moves."""
+    def __init__(
+        self,
+        access: Access,
+        script: PhoneScript,
+        truth_port: int,
+        axes: npt.NDArray[np.bool_] = ALL,
+    ) -> None:
+        """Looks at the simulated robot whose truth is on `truth_port`; 0: one that never moves.
+
+        `axes` (6,) are those it is controlled on.
+        """
         self.script = script
         self._seen, self._scored = SeenRobot(truth_port), SeenRobot(truth_port)
         self.client = PhoneClient(access, self._pong, self._status)
-        self.score = Score(script.phone, access.virtual_camera)
+        self.score = Score(script.phone, access.virtual_camera, axes)
         self.skipped = self.sent = 0
         """Pictures not made for want of time or credit; pictures sent."""
         self.status: Status | None = None
@@ -112,6 +122,8 @@ class LivePhone:
 
     def _status(self, status: Status) -> Command | None:
         self.status = status
+        if status.virtual_camera is not None:
+            self.score.tune(status.virtual_camera.knobs.config())
         return self.script.operator.see(status.mode, status.ready, time.monotonic())
 
     async def _motions(self) -> None:

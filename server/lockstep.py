@@ -7,7 +7,7 @@ allows, and the same for a seed every time.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,20 +15,19 @@ from hardware.camera_file import find_camera
 from hardware.robot_file import RobotFile
 from hardware.sim.codec import Encoder
 from hardware.sim.hand import make_hand
-from hardware.sim.intent import Intent
+from hardware.sim.intent import Intent, missed_by
 from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
 from hardware.sim.truth import Truth
 from pipeline.config import TeleopConfig
-from pipeline.frames import Array, log
+from pipeline.frames import Array
 from pipeline.signals import BodyImu, Mode, Operator, PhoneImu
 from pipeline.teleop import Output
 from server.control_link import (
     Input,
     OperatorInput,
     PhoneImuInput,
-    PoseInput,
     ReadyInput,
     RequestInput,
 )
@@ -36,11 +35,12 @@ from server.controller import Controller
 from server.ingest import EncodedFrame, Ingest
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.robot_link import RobotLink
+from server.seen_input import SeenInput
 from server.sight import Sight
 from server.wire import Ping, Record, decode, encode
 
 PERIOD_S = 0.005
-EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20}
+EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}
 NETWORK_TICKS = 2
 """10 ms one way for what is small."""
 
@@ -58,6 +58,15 @@ class Scene:
     height: int = 720
     codec: str = "h264"
     bitrate_bps: int = 3_000_000
+    readout_s: float = 0.0
+    """Of the rolling shutter."""
+    hidden: tuple[tuple[float, float, tuple[int, ...]], ...] = ()
+    """From when to when [s] which LEDs can't be seen."""
+
+    def hidden_at(self, t: float) -> tuple[int, ...]:
+        """LEDs that can't be seen at `t` [s]."""
+        covered = (leds for since, until, leds in self.hidden if since <= t < until)
+        return tuple(sorted({led for leds in covered for led in leds}))
 
 
 @dataclass(slots=True)
@@ -66,7 +75,7 @@ class Trace:
 
     t: list[float] = field(default_factory=list)
     error_in_f: list[Array] = field(default_factory=list)
-    """Body minus intended place (3,) [m]."""
+    """Body minus intended place, along the controlled axes (3,) [m]."""
     turn: list[Array] = field(default_factory=list)
     """From the intended attitude (3,) [rad]."""
     estimate_error_in_c: list[Array] = field(default_factory=list)
@@ -77,6 +86,8 @@ class Trace:
     body_in_f: list[Array] = field(default_factory=list)
     pictures: int = 0
     poses: int = 0
+    leds: list[int] = field(default_factory=list)
+    """Named in each picture."""
     left: str = ""
     """Why tracking ended, if it did."""
 
@@ -89,7 +100,7 @@ class Lockstep:
         self.scene, self._config = scene, config
         self.follower = LockstepFollower(robot_file, scene.seed)
         self.controller = Controller(robot_file.robot, config)
-        self.trace = Trace()
+        self.trace, self._axes = Trace(), robot_file.robot.axes
         self.lost: set[str] = set()
         """What of the phone does not arrive now: motion, picture, touch."""
         self._script = make_script(robot_file, scene)
@@ -131,7 +142,10 @@ class Lockstep:
         self._hear_small_talk()
         inbox, self._inbox = self._inbox, []
         command, output = self.controller.tick(self.t, inbox, self._body, self._link.reason)
+        if self._ticks % EVERY_TICKS["status"] == 0:
+            self._sight.expect(self.controller.expected(output))
         self._body = self._link.exchange(command, self.t)
+        self._sight.feel_body(self._body)
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
         if wish is not None:
             self._inbox.append(RequestInput(wish.what))
@@ -188,45 +202,48 @@ class Lockstep:
         up_in_b, omega = self.controller.up_in_b, self.controller.omega_bf_in_b
         sighting = self._sight.see([frame], up_in_b, omega)
         self.trace.pictures += 1
-        if sighting is not None and sighting.pose is not None:
-            self.trace.poses += 1
-            self._inbox.append(PoseInput.of(sighting.pose))
+        self.trace.leds.append(len(sighting.rays) if sighting is not None else 0)
+        seen = sighting.seen(self._sight.camera) if sighting is not None else None
+        if seen is not None:
+            self.trace.poses += seen.pose is not None
+            self._inbox.append(SeenInput.of(seen))
 
     def _measure(self, output: Output) -> None:
         """Compare with what the hand meant, since the button was pressed."""
         plant, trace = self.follower.plant, self.trace
-        body = (plant.R_fb, plant.p_bf_in_f)
-        hand = self._script.phone.hand.pose(self.t)
+        body, hand = (plant.R_fb, plant.p_bf_in_f), self._script.phone.hand.pose(self.t)
         if output.failsafe.mode != Mode.TRACK:
             trace.left = output.failsafe.reason if self._intent is not None else ""
             return
         if self._intent is None:
             self._intent = Intent(self._config.virtual_camera, hand, body)
-        R_fr, p_rf = self._intent.step(hand, PERIOD_S)
+        intended = self._intent.step(hand, PERIOD_S)
+        offset_in_f, turn = missed_by(body, intended, self._axes)
         trace.t.append(self.t)
-        trace.error_in_f.append(body[1] - p_rf)
-        trace.turn.append(log(R_fr.T @ body[0]))
-        trace.intended_in_f.append(p_rf)
+        trace.error_in_f.append(offset_in_f)
+        trace.turn.append(turn)
+        trace.intended_in_f.append(intended[1])
         trace.body_in_f.append(body[1])
         trace.thrusts.append(output.thrusts)
         trace.saturated.append(output.saturated)
         if output.relative is not None:
-            true_p_bc_in_c = hand[0].T @ (body[1] - hand[1])
-            trace.estimate_error_in_c.append(output.relative.p_bc_in_c - true_p_bc_in_c)
+            p_bc_in_c = output.relative.p_bc_in_c
+            trace.estimate_error_in_c.append(p_bc_in_c - hand[0].T @ (body[1] - hand[1]))
 
 
 def make_script(robot_file: RobotFile, scene: Scene) -> PhoneScript:
     """The virtual phone of a scene, with its page and its holder."""
     options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
+    camera = find_camera(DEVICE, scene.width, scene.height)
     phone = VirtualPhone(
-        find_camera(DEVICE, scene.width, scene.height),
-        make_hand(scene.hand, seed=scene.seed),
+        replace(camera, readout_s=scene.readout_s),
+        make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
         robot_file.robot.leds_in_b,
         Look(),
         np.random.default_rng((scene.seed, 3)),
         options,
+        hidden=scene.hidden_at,
     )
-    encoder = Encoder(
-        scene.width, scene.height, scene.frame_rate_hz, scene.bitrate_bps, scene.codec
-    )
+    size = scene.width, scene.height
+    encoder = Encoder(*size, scene.frame_rate_hz, scene.bitrate_bps, scene.codec)
     return PhoneScript(phone, encoder, VirtualOperator())

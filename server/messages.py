@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from pipeline.config import VirtualCameraMode
+from server.knobs import AdaptiveBeta, CutoffHz, Knobs, SpeedLimit
 from server.wire import MAX_MESSAGE_BYTES, WireError
 
 Text = Annotated[str, Meta(max_length=200)]
@@ -40,6 +42,19 @@ class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=
     """
 
     what: Literal["arm", "disarm", "stop", "reset", "key_frame"]
+
+
+class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):
+    """Page → server: turn `Knobs` of the virtual camera; those left out or null stay.
+
+    `status` shows how they stand: that is the answer.
+    """
+
+    cutoff_hz: CutoffHz | None = None
+    mode: VirtualCameraMode | None = None
+    adaptive_beta: AdaptiveBeta | None = None
+    max_speed_m_s: SpeedLimit | None = None
+    guard: bool | None = None
 
 
 class Log(msgspec.Struct, tag="log", forbid_unknown_fields=True, frozen=True):
@@ -82,6 +97,17 @@ class Stream(msgspec.Struct, frozen=True):
     """Superseded, too old or refused, since the start."""
 
 
+class VirtualCamera(msgspec.Struct, frozen=True):
+    """The virtual camera in the control process."""
+
+    knobs: Knobs
+    """As they stand."""
+    lag_deg: float | None
+    """Angle from the phone to the virtual camera; None before a phone is there."""
+    guarding: float
+    """0 to 1: how much it hurries now."""
+
+
 class Status(msgspec.Struct, tag="status", frozen=True):
     """Server → page, 10 Hz: the truth about the robot, on every screen."""
 
@@ -120,9 +146,11 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms."""
     messages: list[str]
     """The newest events, newest first."""
+    virtual_camera: VirtualCamera | None = None
+    """None before the control process has told of it."""
 
 
-FromPage = Hello | Command | Log
+FromPage = Hello | Command | Tune | Log
 ToPage = Welcome | Refused | Status | Command
 
 _decoder = msgspec.json.Decoder(FromPage)

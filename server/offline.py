@@ -20,7 +20,7 @@ import csv
 import json
 import tempfile
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -38,7 +38,6 @@ from server.control_link import (
     Input,
     OperatorInput,
     PhoneImuInput,
-    PoseInput,
     ReadyInput,
     RequestInput,
 )
@@ -55,12 +54,13 @@ from server.recording import (
     RecordingError,
 )
 from server.recording_files import Entry, Recording, device_of
+from server.seen_input import SeenInput
 from server.sight import Sight
 from server.wire import Picture, Ping, WireError, decode
 
 PERIOD_S = 0.005
-READY_EVERY = 20
-"""Ticks between words of the server to control."""
+READY_EVERY, EXPECT_EVERY = 20, 4
+"""Ticks between words of the server to control, and of control to the server."""
 POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "sigma_m")
 COLUMNS = (
     *("t_s", "capture_s", "sequence", "found", "leds", "reprojection_px"),
@@ -68,13 +68,15 @@ COLUMNS = (
     *(f"fused_{name}" for name in POSE),
     "mode",
 )
+Tap = Callable[[float, Sequence[Input], Sequence[BodyImu]], None]
+"""Takes the time [s], what the server said, the robot's motion samples."""
 
 
 class Offline:
     """One recording, played once."""
 
-    def __init__(self, recording: Recording) -> None:
-        """Read what the recording says of robot and camera.
+    def __init__(self, recording: Recording, tap: Tap = lambda *heard: None) -> None:
+        """Read what it says of robot and camera; `tap` is told what control hears.
 
         Raises:
             RecordingError: damaged, or its robot or camera can't be used.
@@ -82,6 +84,7 @@ class Offline:
         self._recording = recording
         robot_file, camera = _setting(recording)
         config = TeleopConfig()
+        self.robot, self._tap = robot_file.robot, tap
         self._controller = Controller(robot_file.robot, config)
         self._new_sight = partial(Sight, camera, robot_file.robot, config.gates)
         self._nonces: deque[int] = deque()
@@ -114,6 +117,8 @@ class Offline:
             if k % READY_EVERY == 0:
                 self._inbox.append(ReadyInput([]))
             output = self._tick(now)
+            if k % EXPECT_EVERY == 0:
+                self._sight.expect(self._controller.expected(output))
             for frame, pose in self._seen:
                 yield _row(frame, pose, output, recording.t_first)
             self._seen.clear()
@@ -122,7 +127,9 @@ class Offline:
         body: list[BodyImu] = []
         while self._body and self._body[0].t <= now:
             body.append(self._body.popleft())
+        self._sight.feel_body(body)
         inbox, self._inbox = self._inbox, []
+        self._tap(now, inbox, body)
         _, output = self._controller.tick(now, inbox, body, "")
         return output
 
@@ -155,10 +162,10 @@ class Offline:
             case EncodedFrame():
                 controller = self._controller
                 sighting = self._sight.see([signal], controller.up_in_b, controller.omega_bf_in_b)
-                pose = sighting.pose if sighting is not None else None
-                self._seen.append((signal, pose))
-                if pose is not None:
-                    self._inbox.append(PoseInput.of(pose))
+                self._seen.append((signal, sighting.pose if sighting is not None else None))
+                seen = sighting.seen(self._sight.camera) if sighting is not None else None
+                if seen is not None:
+                    self._inbox.append(SeenInput.of(seen))
 
 
 def _body_samples(recording: Recording) -> list[BodyImu]:

@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from hardware.camera_file import CameraFileError, find_camera_file
-from pipeline.config import GatesConfig
+from pipeline.camera import Camera
 from pipeline.robot import Robot
-from pipeline.signals import Operator, PhoneImu
+from pipeline.signals import BodyImu, Operator, PhoneImu
 from pipeline.vision import Sighting
-from server.control_link import Input, OperatorInput, PhoneImuInput, PoseInput
+from pipeline.vision_config import GatesConfig
+from server.control_link import (
+    ControlStatus,
+    Input,
+    OperatorInput,
+    PhoneImuInput,
+    expected_of,
+)
 from server.ingest import EncodedFrame, Ingest
 from server.messages import Hello
 from server.meter import Meter
+from server.seen_input import SeenInput
+from server.sensor_check import SensorCheck
 from server.sight import Sight
 from server.vision import VisionThread
-from server.wire import Picture, Record, WireError
+from server.wire import Motion, Picture, Record, WireError
 
 STALE_S = 1.0
 """A stream silent for longer keeps the robot from being armed."""
@@ -50,6 +62,7 @@ class OperatorPhone:
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.sighting: Sighting | None = None
         self.latency_ms: dict[str, float] = {}
+        self._check = SensorCheck()
 
     def silent_for(self, now: float) -> float:
         """Since its last sign of life [s]; hello was the first."""
@@ -62,11 +75,13 @@ class OperatorPhone:
             WireError: not believable, or a picture without a calibration.
         """
         match self.ingest.record(record, now):
-            case PhoneImu() as sample:
+            case PhoneImu() as sample if isinstance(record.body, Motion):
                 self.meters["phone_imu"].tick(now, sample.t)
                 self._to_control(PhoneImuInput.of(sample))
+                self._check.feel(sample.t, record.body)
                 if self.vision is not None:
                     self.vision.feel(sample)
+                    self.vision.doubt(self._check.doubts_gravity)
             case Operator() as operator:
                 self.meters["operator"].tick(now, operator.t)
                 self._to_control(OperatorInput.of(operator))
@@ -74,6 +89,15 @@ class OperatorPhone:
                 self._see(frame, now)
             case None if isinstance(record.body, Picture):  # it can't be dated yet
                 self._on_taken(record.sequence)
+
+    def know(self, status: ControlStatus) -> None:
+        """What control says of the robot, for eyes and tests."""
+        self._check.know(status)
+        if self.vision is not None:
+            up_in_b = np.array(status.up_in_b) if status.up_in_b is not None else None
+            self.vision.know(up_in_b, np.array(status.omega_b), expected_of(status))
+            rows = np.array(status.body_samples).reshape(-1, 7)
+            self.vision.feel_body([BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows])
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)
@@ -96,13 +120,17 @@ class OperatorPhone:
             return
         self.camera_text = path.read_text(encoding="utf-8")
         sight = Sight(camera, self._robot, GatesConfig(), self._clock)
-        self.vision = VisionThread(sight, self._sighted, self._on_taken, self._on_key_wanted)
+        self.vision = VisionThread(
+            sight, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
+        )
 
-    def _sighted(self, sighting: Sighting, frame: EncodedFrame) -> None:
-        """In the vision thread: hand the pose on, remember where the time went."""
+    def _sighted(self, camera: Camera, sighting: Sighting, frame: EncodedFrame) -> None:
+        """In the vision thread: hand on what was seen, remember where the time went."""
         now = self._clock()
+        seen = sighting.seen(camera)
+        if seen is not None:
+            self._to_control(SeenInput.of(seen))
         if sighting.pose is not None:
-            self._to_control(PoseInput.of(sighting.pose))
             self.meters["pose"].tick(now, sighting.t)
         took = {name: 1e3 * s for name, s in sighting.took_s.items()}
         self.latency_ms = {
@@ -110,24 +138,31 @@ class OperatorPhone:
             "waiting": 1e3 * (now - frame.t_received) - sum(took.values()),
             **took,
         }
+        self._check.saw(sighting)
         self.sighting = sighting
 
     def refusals(self, now: float) -> list[str]:
         """What this phone still lacks, in words for the person who can mend it."""
-        if not self.ingest.clock.ready:
-            return ["The phone's clock is not known yet: wait a moment."]
-        why = []
+        clock = self.ingest.clock
+        if not clock.ready:
+            reason = clock.reason or "The phone's clock is not known yet."
+            return [f"{reason} Wait a moment."]
+        why: list[str] = []
+        faults: list[str] = []
         if not self.ingest.visible:
             why.append("The page on the phone is hidden: bring it to the front.")
         if self.meters["phone_imu"].age(now) > STALE_S:
             why.append("The phone's motion sensors are silent: allow them in the browser.")
+        else:
+            faults = self._check.faults()
+            why += faults
         if self.camera_problem:
             why.append(f"The camera is not calibrated: {self.camera_problem}.")
         elif self.meters["video"].age(now) > STALE_S:
             why.append("No pictures from the phone: allow the camera in the browser.")
         elif self.vision is not None and self.vision.failed:
             why.append(self.vision.failed)
-        elif self.meters["pose"].age(now) > STALE_S:
+        elif self.meters["pose"].age(now) > STALE_S and not faults:
             found = self.sighting.reason if self.sighting is not None else ""
             why.append(f"The robot is not seen. {found}".strip())
         return why

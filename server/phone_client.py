@@ -15,6 +15,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import WebSocketException
 
 from pipeline.config import VirtualCameraConfig
+from server.knobs import Knobs
 from server.messages import (
     Command,
     Hello,
@@ -47,6 +48,8 @@ class Access:
     token: str
     truth_port: int = 0
     """UDP port of the simulated robot's true pose; 0: not known."""
+    robot: str = "ames"
+    """Name or path of its robot file."""
     ca: Path | None = None
     """Certificate of the authority that signed the server's."""
     virtual_camera: VirtualCameraConfig = DEFAULT_CAMERA
@@ -63,18 +66,18 @@ def running_server(directory: Path | None = None) -> Access:
     try:
         run = json.loads(path.read_text())
         url = run["http_url"] or run["https_url"]
-        tau_1 = float(run.get("tau_1", DEFAULT_CAMERA.tau_1))
-        tau_2 = float(run.get("tau_2", DEFAULT_CAMERA.tau_2))
+        knobs = run.get("virtual_camera")
         return Access(
             str(url),
             str(run["operator_token"]),
             int(run.get("truth_port") or 0),
-            virtual_camera=VirtualCameraConfig(tau_1, tau_2),
+            str(run.get("robot") or "ames"),
+            virtual_camera=msgspec.convert(knobs, Knobs).config() if knobs else DEFAULT_CAMERA,
         )
     except FileNotFoundError as error:
         why = "no server is running here: start `lightleash serve`, or name one with --url"
         raise PhoneClientError(why) from error
-    except (OSError, ValueError, LookupError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, msgspec.MsgspecError) as error:
         raise PhoneClientError(f"{path}: not a run file of `lightleash serve`: {error}") from error
 
 

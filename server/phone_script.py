@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from hardware.sim.codec import Encoder
-from hardware.sim.intent import Intent
+from hardware.sim.intent import Intent, missed_by
 from hardware.sim.phone import BodyHistory, VirtualPhone
 from pipeline.config import VirtualCameraConfig
-from pipeline.frames import log
 from server.messages import Command
 from server.wire import Codec, Kind, Motion, Picture, Pong, Record, Touch
 
@@ -21,6 +21,7 @@ RELEASED_S = 0.3
 SYNCHRONISED_PONGS = 8
 """After so many answers the server can date what comes."""
 SCORE_STEP_S = 0.005
+ALL = np.ones(6, dtype=np.bool_)
 CODECS = {"jpeg": Codec.JPEG, "h264": Codec.H264, "vp8": Codec.VP8}
 
 
@@ -135,9 +136,11 @@ class PhoneScript:
 class Score:
     """How well the robot kept to what the hand meant: RMS over all the time of tracking."""
 
-    def __init__(self, phone: VirtualPhone, config: VirtualCameraConfig) -> None:
-        """`config` is the virtual camera's, whose lag is part of the intent."""
-        self._phone, self._config = phone, config
+    def __init__(
+        self, phone: VirtualPhone, config: VirtualCameraConfig, axes: npt.NDArray[np.bool_] = ALL
+    ) -> None:
+        """`config` is the virtual camera's, whose lag is part of the intent; `axes` the robot's."""
+        self._phone, self._config, self._axes = phone, config, axes
         self._intent: Intent | None = None
         self._t = -np.inf
         self._sum_m2 = self._sum_rad2 = 0.0
@@ -159,6 +162,12 @@ class Score:
         """The same of the attitude [rad]."""
         return float(np.sqrt(self._sum_rad2 / self._steps)) if self._steps else float("nan")
 
+    def tune(self, config: VirtualCameraConfig) -> None:
+        """The virtual camera is another one from now on."""
+        if config != self._config and self._intent is not None:
+            self._intent.tune(config)
+        self._config = config
+
     def start(self, t: float, robot: BodyHistory) -> None:
         """The button was pressed at `t` [s]: from here the robot is to be led."""
         self._intent = Intent(self._config, self._phone.hand.pose(t), robot(t))
@@ -168,11 +177,10 @@ class Score:
         """Follow the intent up to `t` [s]; `counted`: the robot is tracking it."""
         while self._intent is not None and self._t + SCORE_STEP_S <= t:
             self._t += SCORE_STEP_S
-            R_fr, p_rf = self._intent.step(self._phone.hand.pose(self._t), SCORE_STEP_S)
+            intended = self._intent.step(self._phone.hand.pose(self._t), SCORE_STEP_S)
             if not counted:
                 continue
-            R_fb, p_bf = robot(self._t)
-            offset, turn = p_bf - p_rf, log(R_fr.T @ R_fb)
+            offset, turn = missed_by(robot(self._t), intended, self._axes)
             distance2 = float(offset @ offset)
             self._sum_m2 += distance2
             self._sum_rad2 += float(turn @ turn)

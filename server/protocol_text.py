@@ -119,8 +119,8 @@ routes by `python -m server.wire_types`: edit those, not this.
 | `/ws/phone` | operator | `hello`, `command`, `log`; MOTION, TOUCH, PONG | `welcome`, `status`, \
 `refused`, `command` (`key_frame`); PING |
 | `/ws/video` | video | `hello`, `log`; FRAME | `welcome`, `refused`; CREDIT |
-| `/ws/supervisor` | supervisor | `hello`, `command`, `log` | `welcome`, `status`, `refused`; \
-PICTURE |
+| `/ws/supervisor` | supervisor | `hello`, `command`, `tune`, `log` | `welcome`, `status`, \
+`refused`; PICTURE |
 
 A binary websocket message is one *record*, a text message is one JSON *message*. Compression is
 off. Phones come by HTTPS; the HTTP listener is for this machine alone.

@@ -13,7 +13,9 @@ from math import atan2, cos, pi, sin, tan
 import numpy as np
 import numpy.typing as npt
 
+from hardware.sim.parameters import PlantParameters, StartParameters
 from pipeline.frames import Array, R_co, R_from_wxyz, wxyz_from_R
+from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.control_link import ControlStatus
 
@@ -22,6 +24,7 @@ Colour = tuple[int, int, int]
 Mesh = tuple[Array, npt.NDArray[np.uint32]]
 """Vertices (n, 3) [m] and faces (k, 3)."""
 
+UP = np.array([0.0, 0.0, 1.0])
 FLOOR_Z = -1.3
 """Of the grid [m]: about where the floor is under a phone held upright."""
 BACKGROUND: Colour = (20, 20, 20)
@@ -39,7 +42,8 @@ FRESH_S = 0.3
 LONG_SIDE_FOV = 1.15
 """Angle of view of a phone's main camera along the longer side of its picture [rad]."""
 ROTOR_RADIUS = 0.085
-ARROW_M_PER_N = 0.11
+FULL_ARROW_M = 0.33
+"""Of a thruster's largest force."""
 ARROW_FROM_N = 0.1
 
 
@@ -184,6 +188,13 @@ def merged(meshes: list[Mesh]) -> Mesh:
     return np.vstack([vertices for vertices, _ in meshes]), np.vstack(faces)
 
 
+def floor_z(plant: PlantParameters, start: StartParameters) -> float:
+    """Height of the floor [m] seen from the phone: under the feet of a robot that stands on it."""
+    if plant.stand is None:
+        return FLOOR_Z
+    return float(plant.stand.feet_in_b[:, 2].min()) - start.above
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Craft:
     """What a robot looks like, in b."""
@@ -194,13 +205,33 @@ class Craft:
     """(m, 3) [m] of the thrusters."""
     directions: Array
     """(m, 3): of their force on the robot, unit vectors."""
-    hook_above_com: float
+    cable: Array | None
+    """(1, 2, 3) [m] from the hook to the anchor."""
+    feet: Array | None
+    """(k, 3) [m]."""
+    f_max: float
+    """Largest thrust [N]."""
+
+    @classmethod
+    def of(cls, robot: Robot, plant: PlantParameters) -> Craft:
+        """That of a robot file."""
+        positions, directions = plant.thruster_positions_in_b, plant.thruster_directions_in_b
+        suspension, stand = plant.suspension, plant.stand
+        cable = None
+        if suspension is not None:
+            heights = suspension.hook_above_com + np.array([0.0, suspension.length])
+            cable = heights[None, :, None] * UP
+        feet = stand.feet_in_b if stand is not None else None
+        return cls(robot.leds_in_b, positions, directions, cable, feet, robot.f_max)
 
     def airframe(self) -> Mesh:
-        """Hub, mast with the hook, an arm to each thruster and its motor, a rod to each LED."""
-        up, centre = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-        parts = [prism(-0.055 * up, 0.055 * up, 0.09, 8)]
-        parts.append(prism(0.05 * up, max(self.hook_above_com, 0.08) * up, 0.012, 8))
+        """Hub, mast with the hook, arms to thrusters with their motors, legs, rods to the LEDs."""
+        centre = np.zeros(3)
+        parts = [prism(-0.055 * UP, 0.055 * UP, 0.09, 8)]
+        if self.cable is not None:
+            parts.append(prism(0.05 * UP, max(self.cable[0, 0, 2], 0.08) * UP, 0.012, 8))
+        if self.feet is not None:
+            parts += [prism(centre, foot, 0.006, 6) for foot in self.feet]
         for p, d in zip(self.positions, self.directions, strict=True):
             parts.append(prism(centre, p, 0.009, 6))
             parts.append(prism(p - 0.02 * d, p + 0.02 * d, 0.018, 10))
@@ -213,6 +244,7 @@ class Craft:
 
     def arrows(self, thrusts: Array) -> npt.NDArray[np.float32]:
         """(m, 2, 3) [m]: the force of each thruster [N], from its rotor on; idle is a speck."""
-        length = ARROW_M_PER_N * np.where(np.abs(thrusts) < ARROW_FROM_N, 1e-4, thrusts)
+        shown = np.where(np.abs(thrusts) < ARROW_FROM_N, 1e-4, thrusts)
+        length = FULL_ARROW_M / self.f_max * shown
         tips = self.positions + length[:, None] * self.directions
         return np.stack([self.positions, tips], axis=1).astype(np.float32)

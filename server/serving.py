@@ -81,14 +81,7 @@ def _hub(settings: Settings, given: Given) -> Hub:
 
 def _dashboard(settings: Settings, hub: Hub) -> Dashboard:
     robot_file = load_robot(settings.robot)
-    plant = robot_file.plant
-    dashboard = Dashboard(
-        robot_file.robot,
-        plant.thruster_positions_in_b,
-        plant.thruster_directions_in_b,
-        plant.hook_above_com,
-        plant.cable_length,
-    )
+    dashboard = Dashboard(robot_file.robot, robot_file.plant, robot_file.start)
     dashboard.start(lambda: (hub.status, hub.last_thumbnail))
     return dashboard
 
@@ -101,10 +94,15 @@ def _run(settings: Settings, given: Given, base: str, doors: Doors) -> dict[str,
         "operator_token": doors.operator_token,
         "supervisor_token": doors.supervisor_token,
         "truth_port": given.truth_port,
+        "robot": _seen_from_anywhere(settings.robot),
         "pid": os.getpid(),
-        "tau_1": settings.tau_1_s,
-        "tau_2": settings.tau_2_s,
+        "virtual_camera": settings.virtual_camera.model_dump(),
     }
+
+
+def _seen_from_anywhere(robot: str) -> str:
+    """A name as it is, a path as an absolute one."""
+    return str(Path(robot).absolute()) if robot.endswith(".toml") else robot
 
 
 async def _until_signalled(hub: Hub, app: ASGIApp, tls: Certificate, given: Given) -> None:

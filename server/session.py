@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.messages import Command, FromPage, Hello, Log, decode_message
+from server.messages import Command, FromPage, Hello, Log, Tune, decode_message
 from server.wire import VERSION, Motion, Picture, Pong, Record, Touch, WireError, decode
 
 MAX_FAULTS, FAULTS_HZ = 50, 0.5
@@ -18,7 +18,7 @@ ALLOWED: dict[str, tuple[type, ...]] = {
 MESSAGES: dict[str, tuple[type, ...]] = {
     "operator": (Command, Log),
     "video": (Log,),
-    "supervisor": (Command, Log),
+    "supervisor": (Command, Tune, Log),
 }
 
 

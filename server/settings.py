@@ -18,6 +18,16 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
+from pipeline.config import EstimatorName, VirtualCameraMode
+from server.knobs import (
+    DEFAULT_KNOBS,
+    FASTEST_HZ,
+    FASTEST_M_S,
+    MOST_ADAPTIVE,
+    SLOWEST_HZ,
+    Knobs,
+)
+
 PREFIX = "LIGHTLEASH_"
 
 
@@ -36,6 +46,43 @@ class VideoSettings(BaseModel):
     height: int = Field(default=720, ge=240, le=1080)
     frame_rate_hz: int = Field(default=30, ge=5, le=60)
     bitrate_bps: int = Field(default=3_000_000, ge=500_000, le=20_000_000)
+
+
+class VirtualCameraSettings(BaseModel):
+    """How much of the hand's turns reaches the robot; a supervisor may change it in flight."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    cutoff_hz: float = Field(
+        default=DEFAULT_KNOBS.cutoff_hz,
+        ge=SLOWEST_HZ,
+        le=FASTEST_HZ,
+        allow_inf_nan=False,
+        description="of the low pass",
+    )
+    mode: VirtualCameraMode = Field(
+        default=DEFAULT_KNOBS.mode, description="selective: turns about the line of sight pass"
+    )
+    adaptive_beta: float = Field(
+        default=DEFAULT_KNOBS.adaptive_beta,
+        ge=0.0,
+        le=MOST_ADAPTIVE,
+        allow_inf_nan=False,
+        description="rise of the cut-off with the speed of a turn",
+    )
+    max_speed_m_s: float = Field(
+        default=DEFAULT_KNOBS.max_speed_m_s,
+        ge=0.0,
+        le=FASTEST_M_S,
+        allow_inf_nan=False,
+        description="of the reference by turns; 0: no limit",
+    )
+    guard: bool = Field(default=DEFAULT_KNOBS.guard, description="keep the robot in the picture")
+
+    @property
+    def knobs(self) -> Knobs:
+        """As control takes them."""
+        return Knobs(**self.model_dump())
 
 
 class Settings(BaseSettings):
@@ -59,8 +106,9 @@ class Settings(BaseSettings):
 
     robot: str = Field("ames", description="name or path of a robot file")
     gains: str = Field("phone", description="a gain set of the robot file")
-    tau_1_s: float = Field(0.525, ge=0.0, le=60.0, description="virtual camera; 0: no filter")
-    tau_2_s: float = Field(0.16, ge=0.0, le=60.0, description="virtual camera, second stage")
+    estimator: EstimatorName = Field(
+        "relative", description="of the robot's pose; paper and none are for comparison"
+    )
     host: str = Field("0.0.0.0", description="address of the HTTPS listener")
     https_port: int = Field(8443, ge=0, le=65535, description="for phones; 0: any free one")
     http_port: int = Field(8080, ge=0, le=65535, description="this machine only; 0: any free one")
@@ -74,6 +122,7 @@ class Settings(BaseSettings):
     state: Path = Field(default_factory=state_directory, description="certificates, recordings")
     cameras: list[Path] = Field([], description="folders with calibrations of phones")
     video: VideoSettings = Field(default_factory=VideoSettings)
+    virtual_camera: VirtualCameraSettings = Field(default_factory=VirtualCameraSettings)
 
     @classmethod
     def settings_customise_sources(
@@ -88,6 +137,10 @@ class Settings(BaseSettings):
         return env_settings, init_settings
 
 
+TABLES: dict[str, type[BaseModel]] = {
+    "video": VideoSettings,
+    "virtual_camera": VirtualCameraSettings,
+}
 Settings.__doc__ = inspect.cleandoc(Settings.__doc__ or "")  # `--help` shows it as it is
 
 
@@ -127,9 +180,10 @@ def _fault(error: ErrorDetails) -> str:
 
 
 def _names() -> Iterator[str]:
-    """Of all settings; those of the picture begin with `video.`."""
-    yield from (name for name in Settings.model_fields if name != "video")
-    yield from (f"video.{name}" for name in VideoSettings.model_fields)
+    """Of all settings; those of a table begin with its name."""
+    yield from (name for name in Settings.model_fields if name not in TABLES)
+    for table, model in TABLES.items():
+        yield from (f"{table}.{name}" for name in model.model_fields)
 
 
 def _unknown(name: str, known: list[str]) -> str:
@@ -145,7 +199,7 @@ def _refuse_unknown_variables() -> None:
         SettingsError: there is one.
     """
     known = [PREFIX + name.upper().replace(".", "__") for name in _names()]
-    known.append(f"{PREFIX}VIDEO")
+    known += [PREFIX + table.upper() for table in TABLES]
     wrong = [name for name in os.environ if name.startswith(PREFIX) and name not in known]
     if wrong:
         raise SettingsError("; ".join(_unknown(name, known) for name in wrong))

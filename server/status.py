@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from math import degrees
+from math import acos, degrees
 from typing import Literal, Protocol, cast
 
 from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.clock import now
 from server.control_link import ControlStatus
-from server.messages import Status, Stream
+from server.messages import Status, Stream, VirtualCamera
 from server.meter import Meter
 from server.operator import OperatorPhone
 from server.recorder import Recordings
@@ -73,6 +73,7 @@ def build(hub: Known) -> Status:
         realtime=control.realtime if control else "",
         control=_control(control),
         messages=list(hub.events),
+        virtual_camera=_virtual_camera(control),
     )
 
 
@@ -84,6 +85,20 @@ def _reason(control: ControlStatus | None, lost: bool) -> str:
 
 def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | None:
     return None if value is None else round(scale * value, digits)
+
+
+def _virtual_camera(control: ControlStatus | None) -> VirtualCamera | None:
+    if control is None or control.knobs is None:
+        return None
+    phone, virtual = control.R_fc_wxyz, control.R_fv_wxyz
+    lag = None
+    if phone is not None and virtual is not None:
+        lag = 2.0 * acos(min(1.0, abs(sum(a * b for a, b in zip(phone, virtual, strict=True)))))
+    return VirtualCamera(
+        knobs=control.knobs,
+        lag_deg=_rounded(lag, 1, degrees(1.0)),
+        guarding=round(control.guarding, 2),
+    )
 
 
 def _control(control: ControlStatus | None) -> dict[str, float]:

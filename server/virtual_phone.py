@@ -14,10 +14,11 @@ import numpy as np
 
 from hardware.camera_file import find_camera
 from hardware.follower import FollowerError
-from hardware.robot_file import load_robot
+from hardware.robot_file import RobotFile, load_robot
 from hardware.sim.codec import Encoder
-from hardware.sim.hand import HANDS, REST_S, START_DISTANCE_M, make_hand
+from hardware.sim.hand import HANDS, REST_S, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
+from hardware.sim.phone_faults import Fault
 from hardware.sim.render import Look
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
@@ -26,23 +27,31 @@ from server.phone_client import PhoneClientError, access_of, add_access_argument
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 
 WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
+TAKE_OFF_S = 8.0
+"""Rest before a robot is lifted from the floor: the button must have been pressed by then."""
 
 
-def make_script(arguments: argparse.Namespace, truth_port: int) -> PhoneScript:
+def make_script(
+    arguments: argparse.Namespace, robot_file: RobotFile, truth_port: int
+) -> PhoneScript:
     """The phone, its page and its operator as the command line describes them."""
-    options = PhoneOptions(frame_rate_hz=arguments.fps, picture_delay_s=arguments.latency_ms)
-    start = _robot_now(truth_port) - np.array([START_DISTANCE_M, 0.0, 0.0])
+    options = PhoneOptions(
+        frame_rate_hz=arguments.fps,
+        picture_delay_s=arguments.latency_ms,
+        fault=Fault(arguments.fault),
+    )
+    rest_s = REST_S if robot_file.start.lift == 0.0 else TAKE_OFF_S
     hand = make_hand(
         arguments.hand,
         seed=arguments.seed,
-        p_start_in_f=start,
+        start=robot_file.start,
+        p_robot_in_f=_robot_now(truth_port),
         t_start=time.monotonic(),
-        rest_s=arguments.rest,
+        rest_s=rest_s if arguments.rest is None else arguments.rest,
     )
-    leds_in_b = load_robot(arguments.robot).robot.leds_in_b
     rng = np.random.default_rng(arguments.seed)
     camera = find_camera(DEVICE, WIDTH, HEIGHT)
-    phone = VirtualPhone(camera, hand, leds_in_b, Look(), rng, options)
+    phone = VirtualPhone(camera, hand, robot_file.robot.leds_in_b, Look(), rng, options)
     encoder = Encoder(WIDTH, HEIGHT, arguments.fps, BITRATE_BPS, arguments.codec)
     return PhoneScript(phone, encoder, VirtualOperator())
 
@@ -114,13 +123,15 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="lightleash phone", description=__doc__)
     add_access_arguments(parser)
     parser.add_argument("--hand", default="demo", help=f"{', '.join(HANDS)}, or a CSV file")
-    parser.add_argument("--rest", type=float, default=REST_S, help="seconds before it moves")
+    parser.add_argument("--rest", type=float, help="seconds before it moves")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="then leave politely")
     parser.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
     parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
     parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
+    faults = [fault.value for fault in Fault]
+    parser.add_argument("--fault", choices=faults, default="none", help="of its motion sensors")
     parser.add_argument("--seed", type=int, default=0, help="of hand, noise and delays")
-    parser.add_argument("--robot", default="ames", help="robot file with the LEDs")
+    parser.add_argument("--robot", help="robot file with the LEDs; default: the server's")
     parser.add_argument("--truth-port", type=int, help="UDP port of the simulated robot's truth")
     return parser
 
@@ -128,7 +139,9 @@ def _parser() -> argparse.ArgumentParser:
 async def _play(arguments: argparse.Namespace) -> LivePhone:
     access = access_of(arguments)
     port = access.truth_port if arguments.truth_port is None else arguments.truth_port
-    live = LivePhone(access, make_script(arguments, port), port)
+    robot_file = load_robot(arguments.robot or access.robot)
+    script = make_script(arguments, robot_file, port)
+    live = LivePhone(access, script, port, robot_file.robot.axes)
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, live.leave)
     await live.run(arguments.seconds, _show)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.expected import Expected
 from pipeline.frames import Array
-from pipeline.signals import Image, PhoneImu
+from pipeline.signals import BodyImu, Image, PhoneImu
 from pipeline.vision import Sighting
 from server.ingest import EncodedFrame
 from server.sight import Sight
@@ -64,9 +65,18 @@ class VisionThread:
         """The phone's motion, for the prior."""
         self._sight.feel(sample)
 
-    def know(self, up_in_b: Array | None, omega_bf_in_b: Array) -> None:
+    def know(self, up_in_b: Array | None, omega_bf_in_b: Array, expected: Expected | None) -> None:
         """What control knows of the body, for the prior."""
         self._prior = (up_in_b, omega_bf_in_b)
+        self._sight.expect(expected)
+
+    def feel_body(self, samples: Sequence[BodyImu]) -> None:
+        """The robot's motion, for the pictures' time offset."""
+        self._sight.feel_body(samples)
+
+    def doubt(self, gravity: bool) -> None:
+        """Whether the phone's gravity is yet to be tested."""
+        self._sight.doubts_gravity = gravity
 
     def offer(self, frame: EncodedFrame) -> None:
         """A picture has come."""

@@ -12,7 +12,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server.clock import now
 from server.hub import Hub
-from server.messages import Command, Hello, Log, Refused, Welcome, encode_message
+from server.messages import Command, Hello, Log, Refused, Tune, Welcome, encode_message
 from server.operator import OperatorPhone
 from server.session import Session
 from server.settings import VideoSettings
@@ -180,6 +180,8 @@ class PageServer:
                 phone.take(said, t)
             elif isinstance(said, Command):
                 self._hub.wish(said, phone.device if phone is not None else "supervisor")
+            elif isinstance(said, Tune):
+                self._hub.tune(said)
             elif isinstance(said, Log):
                 self._hub.say(f"page: {said.text}")
         except WireError as error:

@@ -21,7 +21,7 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from server import messages, wire
+from server import knobs, messages, wire
 from server.protocol_text import RECORDS, page
 from server.wire import Codec, Kind, Record, WireError
 
@@ -30,10 +30,13 @@ TYPES = {"B": "u8", "H": "u16", "h": "i16", "I": "u32", "q": "i64", "Q": "u64", 
 STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Hello,
     messages.Command,
+    messages.Tune,
     messages.Log,
     messages.Welcome,
     messages.Refused,
     messages.Stream,
+    knobs.Knobs,
+    messages.VirtualCamera,
     messages.Status,
 )
 UNIONS = {"FromPage": messages.FromPage, "ToPage": messages.ToPage}
@@ -81,9 +84,8 @@ def limits() -> dict[str, str]:
 def docs(module: types.ModuleType) -> dict[str, str]:
     """Words below each field, by `Class.field`."""
     found: dict[str, str] = {}
-    for node in ast.parse(inspect.getsource(module)).body:
-        if not isinstance(node, ast.ClassDef):
-            continue
+    body = ast.parse(inspect.getsource(module)).body
+    for node in (one for one in body if isinstance(one, ast.ClassDef)):
         for field, words in zip(node.body, node.body[1:], strict=False):
             if isinstance(field, ast.AnnAssign) and isinstance(words, ast.Expr):
                 text = ast.literal_eval(words.value)
@@ -169,6 +171,8 @@ def js_type(hint: object) -> str:
 def _limit(hint: object) -> str:
     """What `Meta` allows beyond the type."""
     metas = getattr(hint, "__metadata__", ())
+    if get_origin(hint) in (Union, types.UnionType):
+        return "".join(map(_limit, get_args(hint)))
     words = [f"at most {m.max_length} characters" for m in metas if m.max_length is not None]
     return "".join([*words, *(f"{m.ge} to {m.le}" for m in metas if m.ge is not None)])
 
@@ -177,7 +181,7 @@ def _fields(struct_: type[msgspec.Struct]) -> Iterator[tuple[str, object, str]]:
     """(name, annotation, words) of each field, as a page reads them."""
     hints = get_type_hints(struct_, include_extras=True)
     for name in struct_.__struct_fields__:
-        words = docs(messages).get(f"{struct_.__name__}.{name}", "")
+        words = docs(sys.modules[struct_.__module__]).get(f"{struct_.__name__}.{name}", "")
         yield name, hints[name], re.sub(r"\bNone\b", "null", words)
 
 

@@ -7,19 +7,20 @@ continuous, so what the sensors in the hand feel follows from formulas, not from
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from math import atan2
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
-from pipeline.frames import GRAVITY, Array, R_from_rpy, S_in_b
+from hardware.sim.hand_parts import Keyed, Part, Waves, lift
+from hardware.sim.parameters import StartParameters
+from pipeline.frames import GRAVITY, Array, R_from_rpy, S_in_b, rotation_about_z
 
 REST_S = 2.0
-FADE_S = 1.5
-"""From rest to full motion."""
-START_DISTANCE_M = 2.5
+START = StartParameters(distance=2.5, above=0.0, lift=0.0)
+"""Level with the robot, which hangs."""
 STEP_M, STEP_DEG, STEP_S = 0.03, 3.0, 0.3
 """The paper's moves of the robot arm (Sec. V-B): 3 cm or 3° in 0.3 s, velocity a triangle."""
 CORNER_S = 0.02
@@ -40,71 +41,16 @@ class Hand(Protocol):
         """What an ideal accelerometer reads, in c (3,) [m/s²]: +9.8 up at rest."""
 
 
-class Part(Protocol):
-    """One ingredient of a motion over (x, y, z [m], roll, pitch, yaw [rad])."""
-
-    def at(self, t: float) -> Array:
-        """(3, 6): value, rate and acceleration at time `t` [s] since the motion's start."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Waves:
-    """A sum of sines per axis, faded in: ∑ a sin(2π f t + φ)."""
-
-    amplitude: Array
-    """(n, 6) [m, rad]."""
-    omega: Array
-    """(n, 6) angular frequency [rad/s]."""
-    phase: Array
-    """(n, 6) [rad]."""
-    fade_s: float = FADE_S
-
-    def at(self, t: float) -> Array:
-        """(3, 6): value, rate and acceleration."""
-        w, w1, w2 = _fade(t / self.fade_s) / self.fade_s ** np.arange(3)
-        angle = self.omega * t + self.phase
-        sines, cosines = self.amplitude * np.sin(angle), self.amplitude * np.cos(angle)
-        x = sines.sum(axis=0)
-        x1 = (self.omega * cosines).sum(axis=0)
-        x2 = -(self.omega**2 * sines).sum(axis=0)
-        return np.array([w * x, w1 * x + w * x1, w2 * x + 2.0 * w1 * x1 + w * x2])
-
-
-def _fade(s: float) -> Array:
-    """(3,) quintic step from 0 to 1 over s in [0, 1], its first and second derivative."""
-    s = min(max(s, 0.0), 1.0)
-    rest = 1.0 - s
-    value, rate = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * (s * rest) ** 2
-    return np.array([value, rate, 60.0 * s * rest * (rest - s)])
-
-
-class Keyed:
-    """A spline that begins and ends at rest, and stays where it ended."""
-
-    def __init__(self, spline: BSpline) -> None:
-        """`spline` gives (6,) over time [s]; its rates and accelerations vanish at both ends."""
-        self._orders = (spline, spline.derivative(1), spline.derivative(2))
-        self._first, self._last = float(spline.t[0]), float(spline.t[-1])
-
-    def at(self, t: float) -> Array:
-        """(3, 6): value, rate and acceleration."""
-        if self._first < t < self._last:
-            return np.array([order(t) for order in self._orders])
-        rows = np.zeros((3, 6))
-        rows[0] = self._orders[0](min(max(t, self._first), self._last))
-        return rows
-
-
 class MovingHand:
-    """A start pose plus the parts of a motion; level at the start, facing along yaw."""
+    """A start pose plus the parts of a motion, along level axes that face along its yaw."""
 
     def __init__(
-        self, parts: Sequence[Part], p_start_in_f: Array, yaw_start: float, t_moves: float
+        self, parts: Sequence[Part], p_start_in_f: Array, rpy_start: Array, t_moves: float
     ) -> None:
-        """At rest at `p_start_in_f` [m] until `t_moves` [s], then moved in its own axes."""
+        """At rest at `p_start_in_f` [m], turned by `rpy_start` [rad], until `t_moves` [s]."""
         self._parts = tuple(parts)
-        self._start = np.concatenate((p_start_in_f, (0.0, 0.0, yaw_start)))
-        self._R_fs = R_from_rpy(self._start[3:])
+        self._start = np.concatenate((p_start_in_f, rpy_start))
+        self._R_fs = rotation_about_z(float(rpy_start[2]))
         self._t_moves = t_moves
 
     def _rows(self, t: float) -> Array:
@@ -215,24 +161,32 @@ def make_hand(
     kind: str,
     *,
     seed: int = 0,
-    p_start_in_f: Array | None = None,
+    start: StartParameters = START,
+    p_robot_in_f: Array | None = None,
     yaw_start: float = 0.0,
     t_start: float = 0.0,
     rest_s: float = REST_S,
 ) -> Hand:
     """The hand called `kind` (of `HANDS`, or a recorded one's path), at rest from `t_start` [s].
 
+    It begins as `start` says from a robot at `p_robot_in_f` [m] (default: 0), and looks at it.
+
     Raises:
         ValueError: an unknown kind or a file that can't be used.
     """
-    p_start = np.array([-START_DISTANCE_M, 0.0, 0.0]) if p_start_in_f is None else p_start_in_f
+    parts: tuple[Part, ...]
     if kind in HANDS:
         parts = HANDS[kind](np.random.default_rng(seed))
     elif Path(kind).is_file():
         parts = (recorded(Path(kind)),)
     else:
         raise ValueError(f"hand: {kind!r} is neither a file nor one of {', '.join(HANDS)}")
-    return MovingHand(parts, p_start, yaw_start, t_start + rest_s)
+    if start.lift > 0.0:
+        parts = (*parts, lift(start.lift))
+    behind = rotation_about_z(yaw_start) @ np.array([-start.distance, 0.0, start.above])
+    p_start = behind if p_robot_in_f is None else p_robot_in_f + behind
+    rpy_start = np.array([0.0, atan2(start.above, start.distance), yaw_start])
+    return MovingHand(parts, p_start, rpy_start, t_start + rest_s)
 
 
 HANDS: dict[str, Callable[[np.random.Generator], tuple[Part, ...]]] = {

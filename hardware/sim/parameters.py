@@ -25,22 +25,56 @@ class BodyImuParameters:
     """[m/s²]."""
 
 
+@dataclass(frozen=True, slots=True)
+class SuspensionParameters:
+    """An elastic cable from an anchor straight above."""
+
+    length: float
+    """Anchor to hook, hanging at rest [m]."""
+    stiffness: float
+    """[N/m]."""
+    damping: float
+    """[N s/m]."""
+    hook_above_com: float
+    """[m]."""
+
+    def rest_length(self, mass: float) -> float:
+        """Shorter than this with a robot of `mass` [kg], the cable is slack [m]."""
+        return self.length - mass * GRAVITY / self.stiffness
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StandParameters:
+    """What a robot stands on the floor with."""
+
+    feet_in_b: Array
+    """(k, 3) [m], where they touch."""
+    friction: float
+    """Sideways force per weight before it slides."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartParameters:
+    """How somebody with a phone begins, for simulated phones: looking at the robot."""
+
+    distance: float
+    """On the floor, behind the robot [m]."""
+    above: float
+    """The phone over the robot's centre of mass [m]."""
+    lift: float
+    """How far the hand rises to take off [m]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlantParameters:
-    """What moves the robot, for simulation."""
+    """What moves the robot, for simulation: it hangs from a suspension, or has a stand."""
 
     mass: float
     """[kg]."""
     inertia: Array
     """(3,) principal moments about the body axes [kg m²]."""
-    cable_length: float
-    """Anchor to hook, hanging at rest [m]."""
-    cable_stiffness: float
-    """[N/m]."""
-    cable_damping: float
-    """[N s/m]."""
-    hook_above_com: float
-    """[m]."""
+    suspension: SuspensionParameters | None
+    stand: StandParameters | None
     air_damping: float
     """[N s/m]."""
     air_damping_rotation: float
@@ -58,8 +92,3 @@ class PlantParameters:
     delay: float
     """From command to thruster [s]."""
     imu: BodyImuParameters
-
-    @property
-    def cable_rest_length(self) -> float:
-        """Shorter than this, the cable is slack [m]."""
-        return self.cable_length - self.mass * GRAVITY / self.cable_stiffness

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import ceil, floor, radians
@@ -10,9 +10,10 @@ from math import ceil, floor, radians
 import numpy as np
 
 from hardware.sim.hand import Hand
+from hardware.sim.phone_faults import Fault, spoilt_force, spoilt_rate
 from hardware.sim.render import Look, render
 from pipeline.camera import Camera
-from pipeline.frames import Array, R_cd, exp, log, wxyz_from_R
+from pipeline.frames import GRAVITY, Array, R_cd, exp, log, wxyz_from_R
 from pipeline.signals import Image
 
 BodyHistory = Callable[[float], tuple[Array, Array]]
@@ -58,6 +59,7 @@ class PhoneOptions:
     """[m/s²]."""
     step_angle: float = radians(0.1)
     """Of the orientation's rotation angle [rad]."""
+    fault: Fault = Fault.NONE
 
 
 PERFECT = PhoneOptions(
@@ -151,8 +153,13 @@ class VirtualPhone:
         rng: np.random.Generator,
         options: PhoneOptions = PhoneOptions(),
         clock: PhoneClock = PhoneClock(),
+        hidden: Callable[[float], Sequence[int]] = lambda t: (),
     ) -> None:
-        """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says."""
+        """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says.
+
+        `hidden` gives the LEDs that something covers at a time [s].
+        """
+        self._hidden = hidden
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
         self._leds_in_b, self._look = leds_in_b, look
         schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
@@ -180,11 +187,13 @@ class VirtualPhone:
         omega_in_d = self._R_cd.T @ self.hand.omega_in_c(t) + self._bias_omega
         a_in_d = self._R_cd.T @ self.hand.specific_force_in_c(t) + self._bias_a
         R_ed = self.hand.pose(t)[0] @ self._R_cd
+        omega_in_d = _rounded(omega_in_d + o.sigma_omega * rng.normal(0.0, 1.0, 3), o.step_omega)
+        a_in_d = _rounded(a_in_d + o.sigma_a * rng.normal(0.0, 1.0, 3), o.step_a)
         return MotionReading(
-            _rounded(omega_in_d + o.sigma_omega * rng.normal(0.0, 1.0, 3), o.step_omega),
-            _rounded(a_in_d + o.sigma_a * rng.normal(0.0, 1.0, 3), o.step_a),
+            spoilt_rate(omega_in_d, o.fault),
+            spoilt_force(a_in_d, o.fault, GRAVITY * R_ed[2]),
             wxyz_from_R(_rounded_rotation(R_ed, o.step_angle)),
-            o.screen_angle_deg,
+            0 if o.fault is Fault.SCREEN_ANGLE else o.screen_angle_deg,
         )
 
     def relative_pose(self, t: float, body: BodyHistory) -> tuple[Array, Array]:
@@ -199,7 +208,8 @@ class VirtualPhone:
         def pose(dt: float) -> tuple[Array, Array]:
             return self.relative_pose(t + dt, body)
 
-        return render(self.camera, pose, self._leds_in_b, self._look, self._picture_rng)
+        shown = np.delete(self._leds_in_b, list(self._hidden(t)), axis=0)
+        return render(self.camera, pose, shown, self._look, self._picture_rng)
 
 
 def _rounded(values: Array, step: float) -> Array:

@@ -1,7 +1,7 @@
-"""The AMES as a rigid body on an elastic cable in MuJoCo: thrusters with lag and delay, drag, IMU.
+"""A robot as a rigid body in MuJoCo: thrusters with lag and delay, drag, IMU, cable or floor.
 
-World axes f: z up, origin where the robot's centre of mass hangs at rest with zero thrust, which is
-also the start: `R_fb` = I, `p_bf_in_f` = 0. The anchor is straight above.
+World axes f: z up, origin where the robot's centre of mass is at rest with zero thrust, hanging or
+standing, which is also the start: `R_fb` = I, `p_bf_in_f` = 0. An anchor is straight above.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import mujoco
 import numpy as np
 
 from hardware.sim.parameters import BodyImuParameters, PlantParameters
-from pipeline.frames import GRAVITY, Array, R_between, R_from_wxyz, wxyz_from_R
+from hardware.sim.plant_model import STEP_MS, mjcf
+from pipeline.frames import Array, R_from_wxyz, wxyz_from_R
 
-STEP_MS = 1
-UP = np.array([0.0, 0.0, 1.0])
+SETTLE_MS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Plant:
         rng: np.random.Generator,
         options: PlantOptions | None = None,
     ) -> None:
-        """Hanging at rest, thrusters off."""
+        """Hanging or standing at rest, thrusters off."""
         self.parameters = parameters
         self._model = mujoco.MjModel.from_xml_string(mjcf(parameters))
         self._model.dof_damping[:3] = parameters.air_damping
@@ -59,7 +59,14 @@ class Plant:
         """[m/s]; acts through the drag."""
         self.thruster_health = np.ones(thrusters)
         """What each gives of what it is told: 1 all, 0 dead."""
+        if parameters.stand is not None:
+            self._settle()
         self.reset()
+
+    def _settle(self) -> None:
+        """Put the floor where the robot, which sinks into it a little, comes to rest at z = 0."""
+        mujoco.mj_step(self._model, self._data, SETTLE_MS)
+        self._model.geom("floor").pos[2] -= self._data.qpos[2]
 
     def reset(self, p_bf_in_f: Array | None = None, R_fb: Array | None = None) -> None:
         """Put the robot at rest anywhere (default: the start) with thrusters off.
@@ -98,21 +105,24 @@ class Plant:
         wrench[:3] += self.parameters.air_damping * self.wind_in_f
         if self._now_ms < self._push[0]:
             wrench += self._push[1]
-        taut = self.cable_length > self.parameters.cable_rest_length and self.cable_whole
-        self._model.tendon_damping[0] = self.parameters.cable_damping if taut else 0.0
+        suspension = self.parameters.suspension
+        if suspension is not None:
+            slack = self.cable_length <= suspension.rest_length(self.parameters.mass)
+            damps = self.cable_whole and not slack
+            self._model.tendon_damping[0] = suspension.damping if damps else 0.0
 
     def push(self, wrench_in_f: Array, duration: float) -> None:
         """Force and torque (6,) [N, N m] on the centre of mass for `duration` [s] from now."""
         self._push = (self._now_ms + round(1e3 * duration), wrench_in_f.copy())
 
     def cut_cable(self) -> None:
-        """The suspension breaks, for good."""
-        self._model.tendon_stiffness[0] = 0.0
+        """The suspension, if there is one, breaks for good."""
+        self._model.tendon_stiffness[:] = 0.0
 
     @property
     def cable_whole(self) -> bool:
-        """False after `cut_cable`."""
-        return bool(self._model.tendon_stiffness[0] > 0.0)
+        """False after `cut_cable`, and without one."""
+        return bool((self._model.tendon_stiffness > 0.0).any())
 
     @property
     def t(self) -> float:
@@ -161,8 +171,13 @@ class Plant:
 
     @property
     def cable_length(self) -> float:
-        """Anchor to hook [m]."""
+        """Anchor to hook [m]; of robots that hang."""
         return float(self._data.ten_length[0])
+
+    @property
+    def stands(self) -> bool:
+        """Whether it touches the floor."""
+        return bool(self._data.ncon > 0)
 
     def imu(self) -> tuple[Array, Array]:
         """What the body's sensors read: (ω (3,) [rad/s], specific force (3,) [m/s²]) in b.
@@ -194,55 +209,3 @@ class _Imu:
         steps = self._steps[rounded]
         reading[rounded] = steps * np.round(reading[rounded] / steps)
         return reading[:3], reading[3:]
-
-
-def mjcf(parameters: PlantParameters) -> str:
-    """The robot as a MuJoCo model."""
-    hook, anchor = parameters.hook_above_com, parameters.hook_above_com + parameters.cable_length
-    units = list(
-        zip(
-            parameters.thruster_positions_in_b,
-            parameters.thruster_directions_in_b,
-            parameters.thruster_torques,
-            strict=True,
-        )
-    )
-    sites = "".join(
-        f'<site name="thruster{i}" pos="{_text(position)}" '
-        f'quat="{_text(wxyz_from_R(R_between(UP, direction / np.linalg.norm(direction))))}"/>'
-        for i, (position, direction, _) in enumerate(units)
-    )
-    actuators = "".join(
-        f'<general site="thruster{i}" gear="0 0 1 0 0 {torque:.9g}" dyntype="filterexact" '
-        f'dynprm="{parameters.lag:.9g}" ctrllimited="true" ctrlrange="0 {parameters.f_max:.9g}"/>'
-        for i, (_, _, torque) in enumerate(units)
-    )
-    return f"""<mujoco model="suspended robot">
-      <compiler inertiafromgeom="false"/>
-      <option timestep="{1e-3 * STEP_MS}" gravity="0 0 {-GRAVITY}" integrator="implicitfast">
-        <flag contact="disable"/>
-      </option>
-      <worldbody>
-        <site name="anchor" pos="0 0 {anchor:.9g}"/>
-        <body name="b">
-          <freejoint/>
-          <inertial pos="0 0 0" mass="{parameters.mass:.9g}"
-                    diaginertia="{_text(parameters.inertia)}"/>
-          <site name="com"/>
-          <site name="hook" pos="0 0 {hook:.9g}"/>
-          {sites}
-        </body>
-      </worldbody>
-      <tendon>
-        <spatial name="cable" stiffness="{parameters.cable_stiffness:.9g}"
-                 springlength="0 {parameters.cable_rest_length:.12g}">
-          <site site="anchor"/><site site="hook"/>
-        </spatial>
-      </tendon>
-      <actuator>{actuators}</actuator>
-      <sensor><gyro site="com"/><accelerometer site="com"/></sensor>
-    </mujoco>"""
-
-
-def _text(values: Array | tuple[float, ...]) -> str:
-    return " ".join(f"{value:.12g}" for value in values)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
@@ -16,6 +16,7 @@ from pipeline.signals import Image
 RelativePoseAt = Callable[[float], tuple[Array, Array]]
 """(R_cb (3, 3), p_bc_in_c (3,) [m]) at a time [s] relative to the middle of the exposure."""
 
+ROLLING_ITERATIONS = 3
 BANK = 64
 """Extra rows and columns of the noise, from which each picture takes its own part."""
 
@@ -70,9 +71,13 @@ def _lights(
     """Patches of light with the row and column of their corner."""
     lights: list[tuple[Array, int, int]] = []
     times = (np.arange(look.sub_exposures) + 0.5) / look.sub_exposures - 0.5
-    seen = [_projected(camera, pose(t * look.exposure_s), leds_in_b, look) for t in times]
-    for led in range(len(leds_in_b)):
-        track = [(uv[led], radius[led]) for uv, radius in seen if radius[led] > 0.0]
+    pose = cache(pose)
+    delays = _row_delays(camera, pose, leds_in_b, look)
+    for led, delay in zip(leds_in_b, delays, strict=True):
+        seen = [
+            _projected(camera, pose(delay + t * look.exposure_s), led[None], look) for t in times
+        ]
+        track = [(uv[0], float(radius[0])) for uv, radius in seen if radius[0] > 0.0]
         if track:
             lights.append(_patch(track, look.led_light, look.sub_exposures, look))
     lamps = np.random.default_rng(look.distractors)
@@ -80,6 +85,16 @@ def _lights(
         place = lamps.uniform(0.02, 0.98, 2) * (camera.width, camera.height)
         lights.append(_patch([(place, lamps.uniform(1.0, 4.0))], lamps.uniform(0.5, 3.0), 1, look))
     return lights
+
+
+def _row_delays(camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: Look) -> Array:
+    """When (n,) the row that each LED falls on is exposed, after the middle one [s]."""
+    delays = np.zeros(len(leds_in_b))
+    for _ in range(ROLLING_ITERATIONS if camera.readout_s > 0.0 else 0):
+        for k, led in enumerate(leds_in_b):
+            uv, _ = _projected(camera, pose(float(delays[k])), led[None], look)
+            delays[k] = camera.row_delays(np.clip(uv[:, 1], 0.0, camera.height - 1.0))[0]
+    return delays
 
 
 def _projected(

@@ -8,9 +8,12 @@ from collections.abc import Callable
 import numpy as np
 
 from hardware.datagram import U32, triple
+from hardware.follower import FollowerState
 from hardware.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.robot_file import RobotFile
+from hardware.sim.leveller import Leveller
 from hardware.sim.plant import Plant, PlantOptions
+from pipeline.config import HoldConfig
 from pipeline.frames import Array
 
 TICK_US = 5_000
@@ -37,13 +40,16 @@ class SimulatedRobot:
         nonces: Nonces,
         options: PlantOptions | None = None,
     ) -> None:
-        """Hanging at rest, refusing thrust."""
+        """Hanging or standing at rest, refusing thrust."""
+        robot = robot_file.robot
         self.plant = Plant(robot_file.plant, np.random.default_rng(seed), options)
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id)
         self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
         self._nonces = nonces
-        self._setpoint = np.zeros(robot_file.robot.A.shape[1])
+        self._setpoint = np.zeros(robot.A.shape[1])
+        self._leveller = Leveller(robot, HoldConfig()) if robot.weight_to_carry > 0.0 else None
+        self._omega_in_b = np.zeros(3)
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
         """A datagram has come from `peer`."""
@@ -52,9 +58,18 @@ class SimulatedRobot:
     def tick(self, now_us: int) -> bytes:
         """Move on to `now_us`, one tick after the last; gives the sample to be sent."""
         self.plant.step(self._setpoint, 1e-6 * TICK_US)
-        self._setpoint = self.end.setpoint(now_us)
+        self._setpoint = self._levelled(self.end.setpoint(now_us))
         self.history.append((now_us, self.plant.wxyz_fb, self.plant.p_bf_in_f))
         return self._sample(now_us, self.plant.thrusts)
+
+    def _levelled(self, setpoint: Array) -> Array:
+        """What the link's end wants; while it ramps, what a flight controller makes of it."""
+        if self._leveller is None:
+            return setpoint
+        if self.end.state != FollowerState.RAMP:
+            self._leveller.start()
+            return setpoint
+        return self._leveller.thrusts(setpoint, self._omega_in_b, 1e-6 * TICK_US)
 
     def shut_down(self, now_us: int) -> bytes:
         """Thrusters off; gives the last sample."""
@@ -64,4 +79,5 @@ class SimulatedRobot:
 
     def _sample(self, now_us: int, thrusts: Array) -> bytes:
         omega, a = self.plant.imu()
+        self._omega_in_b = omega
         return self.end.sample(now_us, self._nonces(), triple(omega), triple(a), thrusts)

@@ -23,6 +23,7 @@ from pathlib import Path
 
 from websockets.asyncio.client import connect
 
+from pipeline.config import VirtualCameraConfig
 from server.runtime import RUN_FILE
 from tests.e2e.serving import serving
 
@@ -118,7 +119,7 @@ def serve_with_thread(folder: Path) -> None:
     from hardware.control_end import ControlEnd
     from hardware.robot_file import load_robot
     from hardware.udp_link import UdpFollower
-    from pipeline.paper_ekf import warm_up
+    from pipeline.estimators import warm_up
     from server import control
     from server import serving as server_process
     from server.control_link import control_end
@@ -141,7 +142,7 @@ def serve_with_thread(folder: Path) -> None:
         ]
     )
     robot_file = load_robot("ames")
-    config = control.teleop_config(robot_file, "phone", 0.525, 0.16)
+    config = control.teleop_config(robot_file, "phone", VirtualCameraConfig())
     warm_up()
     stopping: list[int] = []
     loop = threading.Thread(

@@ -25,10 +25,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hardware.sim.codec import Decoder, Encoder
 from hardware.sim.render import Look
-from pipeline.config import GatesConfig
 from pipeline.gates import disbelief
 from pipeline.signals import Frame
 from pipeline.vision import Vision, warm_up
+from pipeline.vision_config import GatesConfig
 from tests.pipeline.seeing import (
     CAMERA,
     LEDS_IN_B,

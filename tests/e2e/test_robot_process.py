@@ -60,13 +60,13 @@ def test_it_flies_at_two_hundred_hertz_then_ramps_by_itself_when_commands_stop(r
     assert truth.latest().p_bf_in_f[-1][2] > 0.02
     truth.close()
 
-    silent = listen(robot, 0.06 + AMES.robot.suspension_period_s + 0.3)
+    silent = listen(robot, 0.06 + AMES.robot.ramp_s + 0.3)
     changes = [b for a, b in pairwise([flown[-1], *silent]) if a.state != b.state]
     assert [s.state for s in changes] == [FollowerState.RAMP, FollowerState.REFUSING]
     waited_us = changes[0].t_us - flown[-1].t_us
     assert waited_us <= 60_000 + 3 * TICK_US
     ramp_us = changes[1].t_us - changes[0].t_us
-    assert ramp_us == pytest.approx(1e6 * AMES.robot.suspension_period_s, abs=2 * TICK_US)
+    assert ramp_us == pytest.approx(1e6 * AMES.robot.ramp_s, abs=2 * TICK_US)
     largest = [s.thrusts.max() for s in silent if s.state == FollowerState.RAMP]
     assert np.corrcoef(largest[10:], np.arange(len(largest) - 10))[0, 1] < -0.999
     assert silent[-1].thrusts.max() < 1e-3
@@ -95,7 +95,7 @@ def test_a_killed_or_frozen_control_process_makes_it_ramp_and_a_new_one_gets_it(
     assert client.stdout
     assert client.stdout.readline() == "flying\n"
     client.send_signal(death)
-    samples = FollowerContract.fly(robot, 0.0, AMES.robot.suspension_period_s + 1.2)
+    samples = FollowerContract.fly(robot, 0.0, AMES.robot.ramp_s + 1.2)
     states = [s.state for s in samples]
     order = [b for a, b in pairwise([None, *states]) if a != b]
     assert order[-3:] == [FollowerState.RAMP, FollowerState.REFUSING, FollowerState.IDLE]

@@ -29,7 +29,7 @@ def program(tmp_path_factory):
 @pytest.fixture
 def robot(program):
     port = free_port()
-    ramp_ms = round(1e3 * AMES.robot.suspension_period_s)
+    ramp_ms = round(1e3 * AMES.robot.ramp_s)
     limits = (str(AMES.robot.f_max), str(AMES.link.max_rise), str(ramp_ms))
     with priority():
         rig = RealTimeRig(start((program, str(port), "8", *limits)), port)

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from hardware.sim.hand import FADE_S, HANDS, REST_S, STEP_S, make_hand
+from hardware.sim.hand import HANDS, REST_S, STEP_S, make_hand
+from hardware.sim.hand_parts import FADE_S, LIFT_S
+from hardware.sim.parameters import StartParameters
 from pipeline.frames import GRAVITY, log, rotation_about_z, rpy_from_R
 
+HERE = StartParameters(distance=0.0, above=0.0, lift=0.0)
 MOVING = sorted(set(HANDS) - {"still"})
 
 
@@ -40,7 +43,7 @@ def test_nothing_jumps(kind):
 
 @pytest.mark.parametrize("kind", sorted(HANDS))
 def test_hand_rests_level_before_it_moves(kind):
-    hand = make_hand(kind, p_start_in_f=np.array([1.0, 2.0, 3.0]), yaw_start=0.4)
+    hand = make_hand(kind, start=HERE, p_robot_in_f=np.array([1.0, 2.0, 3.0]), yaw_start=0.4)
     for t in (0.0, 1.0, REST_S):
         R_fc, p_cf_in_f = hand.pose(t)
         assert R_fc == pytest.approx(rotation_about_z(0.4))
@@ -56,7 +59,7 @@ def test_hand_rests_level_before_it_moves(kind):
 def test_wander_has_the_promised_spread(kind, sigma_mm, sigma_deg):
     offsets, angles = [], []
     for seed in range(10):
-        hand = make_hand(kind, seed=seed, p_start_in_f=np.zeros(3))
+        hand = make_hand(kind, seed=seed, start=HERE)
         for t in np.arange(REST_S + FADE_S, 40.0, 0.5):
             R_fc, p = hand.pose(t)
             offsets.append(p)
@@ -79,7 +82,7 @@ def test_tremor_is_fast_and_small():
 
 @pytest.mark.parametrize(("kind", "axis"), [("step_x", 0), ("step_y", 1), ("step_z", 2)])
 def test_step_is_the_papers(kind, axis):
-    hand = make_hand(kind, p_start_in_f=np.zeros(3))
+    hand = make_hand(kind, start=HERE)
     expected = np.zeros(3)
     expected[axis] = 0.03
     middle = hand.pose(REST_S + 0.5 * STEP_S)[1]
@@ -94,7 +97,7 @@ def test_step_is_the_papers(kind, axis):
 
 
 def test_turn_is_three_degrees_of_yaw():
-    R_fc, p = make_hand("turn_z", p_start_in_f=np.zeros(3)).pose(10.0)
+    R_fc, p = make_hand("turn_z", start=HERE).pose(10.0)
     assert np.degrees(log(R_fc)) == pytest.approx([0.0, 0.0, 3.0])
     assert p == pytest.approx(np.zeros(3))
 
@@ -111,8 +114,28 @@ def test_a_later_start_is_the_same_motion_later():
 
 
 def test_motion_is_in_the_axes_of_the_start():
-    ahead = make_hand("step_x", p_start_in_f=np.zeros(3), yaw_start=np.pi / 2.0).pose(10.0)[1]
+    ahead = make_hand("step_x", start=HERE, yaw_start=np.pi / 2.0).pose(10.0)[1]
     assert ahead == pytest.approx([0.0, 0.03, 0.0], abs=1e-12)
+
+
+def test_it_looks_at_the_robot_from_behind_and_above():
+    start = StartParameters(distance=2.0, above=0.7, lift=0.0)
+    p_robot = np.array([3.0, -1.0, 0.5])
+    R_fc, p = make_hand("still", start=start, p_robot_in_f=p_robot, yaw_start=0.6).pose(5.0)
+    p_in_c = R_fc.T @ (p_robot - p)
+    assert p_in_c == pytest.approx([np.hypot(2.0, 0.7), 0.0, 0.0], abs=1e-12)
+    assert p[2] == pytest.approx(1.2)
+    assert R_fc[2, 1] == pytest.approx(0.0)  # its horizon is level
+
+
+def test_it_lifts_the_phone_straight_up_to_take_off():
+    start = StartParameters(distance=2.0, above=0.7, lift=0.4)
+    hand = make_hand("still", start=start)
+    heights = [hand.pose(REST_S + t)[1] for t in np.linspace(0.0, LIFT_S, 50)]
+    assert np.diff(heights, axis=0)[:, 2].min() >= 0.0
+    assert heights[-1] - heights[0] == pytest.approx([0.0, 0.0, 0.4])
+    for t in (REST_S + 0.4, REST_S + 1.7):
+        assert hand.specific_force_in_c(t) == pytest.approx(numeric_force(hand, t), abs=1e-5)
 
 
 def test_recorded_hand_passes_through_its_samples(tmp_path):
@@ -120,7 +143,7 @@ def test_recorded_hand_passes_through_its_samples(tmp_path):
     columns = [times, np.sin(times), 0 * times, times, 0 * times, 0 * times, 4.0 * np.cos(times)]
     path = tmp_path / "hand.csv"
     np.savetxt(path, np.transpose(columns), delimiter=",", header="t_s,...", comments="")
-    hand = make_hand(str(path), p_start_in_f=np.zeros(3))
+    hand = make_hand(str(path), start=HERE)
     for k in (0, 20, 60):
         R_fc, p = hand.pose(REST_S + times[k] - 5.0)
         assert p[0] == pytest.approx(np.sin(times[k]) - np.sin(5.0), abs=1e-9)

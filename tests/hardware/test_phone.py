@@ -8,8 +8,9 @@ import pytest
 from hardware.camera_file import find_camera
 from hardware.sim.hand import make_hand
 from hardware.sim.phone import PERFECT, EventKind, PhoneClock, PhoneOptions, VirtualPhone
+from hardware.sim.phone_faults import Fault
 from hardware.sim.render import Look
-from pipeline.frames import R_cd, R_from_wxyz, log
+from pipeline.frames import GRAVITY, R_cd, R_from_wxyz, log
 
 LEDS_IN_B = np.array(
     [[0.2, 0.2, 0.1], [0.2, -0.2, 0.15], [0.1, 0.1, -0.2], [0.25, -0.1, -0.1], [0.3, 0.0, 0.0]]
@@ -132,3 +133,51 @@ def test_picture_shows_the_leds_where_they_are():
     for u, v in CAMERA.pixels(LEDS_IN_B @ R_cb.T + p_bc_in_c):
         window = luma[round(v) - 4 : round(v) + 5, round(u) - 4 : round(u) + 5].astype(float)
         assert window.max() > 150
+
+
+def test_a_hidden_led_is_dark_as_long_as_it_is_hidden():
+    def hidden(t):
+        return (1, 3) if 2.0 <= t < 3.0 else ()
+
+    seen = make_phone()
+    covered = VirtualPhone(
+        CAMERA, seen.hand, LEDS_IN_B, Look(), np.random.default_rng(1), hidden=hidden
+    )
+    for t in (1.9, 2.5, 3.0):
+        R, p = seen.relative_pose(t, hanging_still)
+        luma = covered.picture(t, hanging_still)
+        places = np.round(CAMERA.pixels(p + LEDS_IN_B @ R.T)).astype(int)
+        lit = luma[places[:, 1], places[:, 0]] > 128
+        assert lit.tolist() == [led not in hidden(t) for led in range(len(LEDS_IN_B))]
+
+
+def faulty(fault):
+    """Readings at rest and on the move of a phone with and without the fault."""
+    spoilt = make_phone(options=replace(PERFECT, fault=fault))
+    return zip(
+        map(make_phone(options=PERFECT).motion, TIMES), map(spoilt.motion, TIMES), strict=True
+    )
+
+
+def test_each_fault_spoils_what_it_says_and_nothing_else():
+    def same(a, b):
+        return np.array_equal(a, b)
+
+    for good, bad in faulty(Fault.IOS_SIGN):
+        assert same(bad.a_m_in_d, -good.a_m_in_d)
+        assert same(bad.omega_m_in_d, good.omega_m_in_d)
+    for good, bad in faulty(Fault.RATE_ORDER):
+        assert same(bad.omega_m_in_d, good.omega_m_in_d[[1, 2, 0]])
+        assert same(bad.a_m_in_d, good.a_m_in_d)
+    for good, bad in faulty(Fault.SCREEN_ANGLE):
+        assert (good.screen_angle_deg, bad.screen_angle_deg) == (90, 0)
+        assert same(bad.a_m_in_d, good.a_m_in_d)
+    for good, bad in faulty(Fault.G_UNITS):
+        assert bad.a_m_in_d == pytest.approx(good.a_m_in_d / GRAVITY)
+    for good, bad in faulty(Fault.NONE):
+        assert same(bad.a_m_in_d, good.a_m_in_d)
+
+
+def test_without_gravity_rest_feels_like_nothing():
+    phone = make_phone("still", options=replace(PERFECT, fault=Fault.NO_GRAVITY))
+    assert phone.motion(1.0).a_m_in_d == pytest.approx(np.zeros(3), abs=1e-9)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hardware.sim.render import Look, render
-from pipeline.config import LedsConfig
 from pipeline.leds import find_spots
 from pipeline.signals import Frame
+from pipeline.vision_config import LedsConfig
 from tests.pipeline.seeing import CAMERA
 
 ONE = np.zeros((1, 3))

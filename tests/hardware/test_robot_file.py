@@ -1,7 +1,6 @@
 """Robot files: the default one is right, and each mistake is named with its place."""
 
 import re
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +9,20 @@ import pytest
 from hardware.robot_end import LinkLimits
 from hardware.robot_file import ROBOTS, RobotFileError, load_robot
 from hardware.robot_physics import positive_null_vector
-from pipeline import config
+from pipeline import gains as sets
 from pipeline.frames import GRAVITY
 
-AMES = load_robot("ames")
+AMES, QUADROTOR, GROUND = (load_robot(name) for name in ("ames", "quadrotor", "ground"))
 TEXT = (ROBOTS / "ames.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture
 def changed(tmp_path):
-    """Load the default robot with a part of its text replaced."""
+    """Load a robot (the default one) with a part of its text replaced."""
 
-    def load(pattern, replacement, count=1):
-        text, n = re.subn(pattern, replacement, TEXT, count=count)
+    def load(pattern, replacement, count=1, robot="ames"):
+        original = (ROBOTS / f"{robot}.toml").read_text(encoding="utf-8")
+        text, n = re.subn(pattern, replacement, original, count=count)
         assert n, pattern
         path = tmp_path / "changed.toml"
         path.write_text(text, encoding="utf-8")
@@ -33,10 +33,10 @@ def changed(tmp_path):
 
 def test_the_default_robot_has_the_identified_numbers_in_si():
     plant, robot = AMES.plant, AMES.robot
-    assert (plant.mass, plant.cable_length, plant.lag, plant.delay) == (3.5, 1.3, 0.025, 0.015)
-    assert plant.cable_rest_length == pytest.approx(1.3 - 3.5 * GRAVITY / 42.0)
+    assert (plant.mass, plant.suspension.length, plant.lag, plant.delay) == (3.5, 1.3, 0.025, 0.015)
+    assert plant.suspension.rest_length(plant.mass) == pytest.approx(1.3 - 3.5 * GRAVITY / 42.0)
     assert (robot.f_min, robot.f_max) == (0.2, 3.0)
-    assert robot.suspension_period_s == pytest.approx(2.314, abs=1e-3)
+    assert robot.ramp_s == pytest.approx(2.314, abs=1e-3)
     assert plant.imu.gyro_step == pytest.approx(np.deg2rad(1.0 / 16.4))
     assert plant.imu.acc_step == pytest.approx(GRAVITY / 512.0)
 
@@ -58,9 +58,9 @@ def test_its_allocation_matrix_is_the_balanced_octorotors():
 
 def test_its_gain_sets_are_those_of_the_configuration():
     pairs = {
-        "phone": config.PHONE,
-        "paper_with_ekf": config.TABLE_II_WITH_EKF,
-        "paper_without_ekf": config.TABLE_II_WITHOUT_EKF,
+        "phone": sets.PHONE,
+        "paper_with_ekf": sets.TABLE_II_WITH_EKF,
+        "paper_without_ekf": sets.TABLE_II_WITHOUT_EKF,
     }
     assert set(AMES.gains) == set(pairs)
     for name, gains in pairs.items():
@@ -77,24 +77,25 @@ def test_its_leds_are_on_the_cameras_side_at_arms_length_and_not_in_a_plane():
     assert np.linalg.svd(leds - leds.mean(axis=0), compute_uv=False)[-1] > 0.1
 
 
-def test_every_number_says_what_it_rests_on():
-    head = TEXT[: TEXT.index("[body_imu]")]
-    for line in head.splitlines():
-        if re.match(r"[a-z_0-9]+ = [\[\d]", line) and not line.startswith(("units", "length_m")):
+@pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground"])
+def test_every_number_says_what_it_rests_on(robot):
+    text = (ROBOTS / f"{robot}.toml").read_text(encoding="utf-8")
+    for line in text[: text.index("[body_imu]")].splitlines():
+        if re.match(r"[a-z_0-9]+ = \[*[ \d]", line) and not line.startswith(("units", "length_m")):
             assert re.search(r"# .*(known|identified|chosen)", line), line
 
 
 def test_the_links_limits_are_the_robots():
     limits = LinkLimits.of(AMES)
     assert (limits.thrusters, limits.f_max, limits.max_rise) == (8, 3.0, AMES.link.max_rise)
-    assert limits.ramp_us == pytest.approx(1e6 * AMES.robot.suspension_period_s, abs=1.0)
+    assert limits.ramp_us == pytest.approx(1e6 * AMES.robot.ramp_s, abs=1.0)
 
 
 MISTAKES = {
     "misspelt key": ("mass_kg", "mas_kg", "body.mas_kg", "did you mean 'mass_kg'"),
     "key without unit": ("lag_s", "lag", "thrusters.lag", "did you mean 'lag_s'"),
     "missing key": (r"stiffness_n_m = .*", "", "suspension.stiffness_n_m", "missing"),
-    "unknown table": (r"\[air\]", "[wind]", "wind", "allowed here: name, body"),
+    "unknown table": (r"\[air\]", "[wind]", "wind", "allowed here: name, axes"),
     "key of a led": (r"(leds\]\]\n)position", r"\1place", "leds.0.place", "position_in"),
     "text for a number": ("mass_kg = 3.5", 'mass_kg = "3.5"', "body.mass_kg", "number"),
     "true for a number": ("mass_kg = 3.5", "mass_kg = true", "body.mass_kg", "number"),
@@ -117,8 +118,99 @@ MISTAKES = {
     "f_min above f_max": ("f_min_n = 0.2", "f_min_n = 3.2", "thrusters.f_min_n", "below f_max_n"),
     "a long direction": (r"\[-0\.788675", "[-1.788675", "thrusters.units.0.direct", "length 1"),
     "centimetres": (r"\[0\.202073, 0", "[20.2073, 0", "thrusters.units.0.pos", "within 3 m"),
+    "an axis that is none": ("axes = .*", 'axes = ["x", "w"]', "axes.1", "'yaw', not 'w'"),
+    "an axis twice": ("axes = .*", 'axes = ["x", "x"]', "axes", "each word once"),
+    "no axis": ("axes = .*", "axes = []", "axes", "at least 1"),
+    "a ramp beside its suspension": ("name =", "ramp_s = 1.0\nname =", "ramp_s", "whose period"),
+    "it hangs and stands": (
+        r"\[air\]",
+        "[stand]\nfeet_in_body_m = [[0, 1, -1], [1, 0, -1], [-1, -1, -1]]\nfriction = 1.0\n[air]",
+        "stand",
+        "hangs or stands",
+    ),
+    "neither": (r"(?ms)^\[suspension\].*?\[air\]", "[air]", "stand", "or [suspension]"),
+    "too few thrusters": (r"(?m)(^    \{.*\n){2}\]", "]", "thrusters.units", "at least 7"),
     "not TOML": (r"\[body\]", "[body", "", "Expected"),
 }
+
+
+OTHERS_MISTAKES = {
+    "no ramp": ("quadrotor", "ramp_s.*", "", "ramp_s", "there is no [suspension]"),
+    "all axes with four rotors": ("quadrotor", "axes.*", "", "axes", "x, y, z, yaw"),
+    "tilt without z": ("quadrotor", '"z", ', "", "axes", "with z"),
+    "rotors that push forward": (
+        "quadrotor",
+        r"= \[0\.0, 0\.0, 1\.0\]",
+        "= [1.0, 0.0, 0.0]",
+        "thrusters.units",
+        "= [0.0, 0.0, 1.0]",
+    ),
+    "three rotors": ("quadrotor", r"(?m)^    \{.*\n", "", "thrusters.units", "at least 4"),
+    "all spin one way": ("quadrotor", "spin = -1", "spin = 1", "thrusters.units", "z, roll, pitch"),
+    "too heavy": ("quadrotor", "f_max_n = 7.0", "f_max_n = 3.2", "thrusters.f_max_n", "11.8 N"),
+    "rotors to one side": (
+        "quadrotor",
+        r"body_m = \[-0\.159",
+        "body_m = [0.05",
+        "thrusters.f_max_n",
+        "without turning",
+    ),
+    "fans that do not cancel": (
+        "ground",
+        r"(?m)^    \{ position_in_body_m = \[-0\.22.*\n",
+        "",
+        "thrusters.units",
+        "cancel",
+    ),
+    "feet on one side": (
+        "ground",
+        r"\[-0\.22, 0\.0, -0\.1\]",
+        "[0.22, 0.1, -0.1]",
+        "stand.",
+        "tips",
+    ),
+    "uneven feet": ("ground", r"0\.22, -0\.1\]", "0.22, -0.2]", "stand.feet", "at one height"),
+    "a word in the stand": ("ground", "friction =", "friktion =", "stand.frik", "mean 'friction'"),
+}
+
+
+@pytest.mark.parametrize("mistake", OTHERS_MISTAKES)
+def test_a_mistake_of_a_robot_that_stands_is_named(changed, mistake):
+    robot, pattern, replacement, key, allowed = OTHERS_MISTAKES[mistake]
+    with pytest.raises(RobotFileError) as caught:
+        changed(pattern, replacement, count=1 if "{" in pattern else 0, robot=robot)
+    assert caught.value.key.startswith(key)
+    assert allowed in caught.value.allowed
+
+
+def test_axes_make_the_mask_of_the_robot(changed):
+    assert AMES.robot.axes.all()
+    assert changed("axes = .*", "").robot.axes.all()
+    np.testing.assert_array_equal(QUADROTOR.robot.axes, [1, 1, 1, 0, 0, 1])
+    np.testing.assert_array_equal(GROUND.robot.axes, [1, 1, 0, 0, 0, 1])
+
+
+def test_a_quadrotor_tilts_to_go_sideways_and_carries_its_weight():
+    robot = QUADROTOR.robot
+    assert robot.needs_tilt
+    np.testing.assert_array_equal(robot.wrench_axes, [0, 0, 1, 1, 1, 1])
+    assert robot.weight_to_carry == pytest.approx(1.2 * GRAVITY)
+    assert (robot.hangs, robot.ramp_s) == (False, 6.0)
+
+
+def test_robots_carried_by_a_cable_or_the_floor_do_neither():
+    for robot_file in (AMES, GROUND):
+        robot = robot_file.robot
+        assert not robot.needs_tilt
+        assert robot.weight_to_carry == 0.0
+        np.testing.assert_array_equal(robot.wrench_axes, robot.axes)
+    assert GROUND.robot.ramp_s == 0.5
+
+
+def test_a_simulated_phone_begins_level_with_a_robot_that_hangs_and_above_others():
+    assert (AMES.start.distance, AMES.start.above, AMES.start.lift) == (2.5, 0.0, 0.0)
+    assert (QUADROTOR.start.above, QUADROTOR.start.lift) == (0.9, 0.4)
+    assert (GROUND.start.above, GROUND.start.lift) == (0.9, 0.0)
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
@@ -132,7 +224,7 @@ def test_a_mistake_is_named_with_file_key_and_what_is_allowed(changed, mistake):
 
 
 def test_thrusters_that_all_push_one_way_are_refused(changed):
-    with pytest.raises(RobotFileError, match=r"thrusters\.units.*all axes"):
+    with pytest.raises(RobotFileError, match=r"axes: x, y, z, yaw.*sideways by roll and pitch"):
         changed(r"direction_in_body = \[[^\]]*\]", "direction_in_body = [0.0, 0.0, 1.0]", 8)
 
 
@@ -166,4 +258,5 @@ def test_all_robots_in_the_folder_load():
     for path in Path(ROBOTS).glob("*.toml"):
         robot_file = load_robot(path.stem)
         assert robot_file.robot.name == path.stem
-        assert all(getattr(robot_file.plant, f.name) is not None for f in fields(robot_file.plant))
+        assert robot_file.robot.hangs == (robot_file.plant.suspension is not None)
+        assert robot_file.robot.hangs != (robot_file.plant.stand is not None)

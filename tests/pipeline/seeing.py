@@ -10,7 +10,7 @@ from hardware.camera_file import find_camera
 from hardware.robot_file import load_robot
 from hardware.sim.render import Look, render
 from pipeline.frames import R_from_rpy, exp, log
-from pipeline.signals import Frame
+from pipeline.signals import Frame, LedRays, RelativePose, Seen
 from pipeline.vision import Prior
 
 CAMERA = find_camera("lightleash-virtual-phone", 1280, 720)
@@ -77,6 +77,22 @@ def is_wrong(pose, truth):
     error = error_of(pose, truth)
     far = np.linalg.norm(error[:3]) > WRONG_M + WRONG_SHARE * np.linalg.norm(truth.p)
     return bool(far or np.linalg.norm(error[3:]) > WRONG_RAD)
+
+
+def rays_at(t, p, R, leds=None, sigma=1e-4, leds_in_b=LEDS_IN_B):
+    """What a perfect lens makes of LEDs of a body at `p`, `R`; `sigma` of the tangents."""
+    named = np.arange(len(leds_in_b)) if leds is None else np.array(leds, dtype=np.intp)
+    q = p + leds_in_b[named] @ R.T
+    n = len(named)
+    covariances = np.tile(sigma**2 * np.eye(2), (n, 1, 1))
+    return LedRays(named, np.full(n, t), q[:, 1:] / q[:, :1], covariances)
+
+
+def seen_at(t, p, R, covariance, leds=None, leds_in_b=LEDS_IN_B):
+    """A picture that saw all LEDs of a body at `p`, `R`, or only some: then without a pose."""
+    rays = rays_at(t, p, R, leds, leds_in_b=leds_in_b)
+    pose = RelativePose(t, p, R, covariance, 0.1, len(rays)) if leds is None else None
+    return Seen(t, rays, pose)
 
 
 def nees(pose, truth):

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.config import GatesConfig
 from pipeline.frames import exp, rotation_about_x
 from pipeline.gates import disbelief
 from pipeline.signals import RelativePose
+from pipeline.vision_config import GatesConfig
 
 UP = np.array([0.0, 0.0, 1.0])
 TRUE = RelativePose(

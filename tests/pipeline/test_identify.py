@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from pipeline import identify
-from pipeline.config import IdentifyConfig
 from pipeline.frames import exp
 from pipeline.pnp import pose_of
 from pipeline.signals import Spots
+from pipeline.vision_config import IdentifyConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, Truth, is_wrong, moved, truth_at
 
 CONFIG = IdentifyConfig()

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.config import EkfConfig
-from pipeline.paper_ekf import Fusion, PaperEkf
-from pipeline.signals import BodyImu, PhoneImu, RelativePose
-from tests.pipeline.scenario import Setup, World, events, feed, give
+from hardware.sim.world import Occlusion, Setup, World
+from hardware.sim.world_sensors import events, feed, give
+from pipeline.estimator import Fusion
+from pipeline.estimator_config import EkfConfig
+from pipeline.paper_ekf import PaperEkf
+from pipeline.signals import BodyImu, PhoneImu, Seen
 from tests.pipeline.scoring import assert_same
 
 
@@ -48,7 +50,7 @@ def test_late_fusion_is_the_same_as_fusion_in_order(world, shuffled):
     """Pictures 60-90 ms late, IMU samples up to 40 ms, in disorder when shuffled."""
     rng = np.random.default_rng(5)
     samples = [event for event in events(world) if event[1].t < 1.2]
-    wait = {PhoneImu: 0.020, BodyImu: 0.003, RelativePose: 0.060}
+    wait = {PhoneImu: 0.020, BodyImu: 0.003, Seen: 0.060}
 
     def delay(sample):
         return wait[type(sample)] + (rng.uniform(0.0, 0.03) if shuffled else 0.0)
@@ -63,7 +65,7 @@ def test_late_fusion_is_the_same_as_fusion_in_order(world, shuffled):
 def test_pictures_that_overtake_the_phone_imu_wait_for_it(world):
     """Nothing is lost when pictures take 10 ms and phone samples 40 ms."""
     samples = [event for event in events(world) if event[1].t < 1.2]
-    wait = {PhoneImu: 0.040, BodyImu: 0.003, RelativePose: 0.010}
+    wait = {PhoneImu: 0.040, BodyImu: 0.003, Seen: 0.010}
     direct, expected = run(in_order(samples), 1.4)
     late, state = run(delayed(samples, lambda sample: wait[type(sample)]), 1.4)
     assert late.samples_late == 0
@@ -96,7 +98,7 @@ def test_repeated_samples_and_pictures_change_nothing_and_are_counted(world):
 
 def test_two_seconds_without_a_picture_stay_finite_grow_uncertain_and_cost_no_more():
     """The checkpoint follows, so no replay is longer than the horizon."""
-    world = World(Setup(seed=2, duration=7.0, hidden=(4.0, 6.0)))
+    world = World(Setup(seed=2, duration=7.0, occlusions=(Occlusion(4.0, 6.0),)))
     ekf, sigma, kept = PaperEkf(EkfConfig()), {}, 0
     for now, state in feed(ekf, world):
         if state is None:

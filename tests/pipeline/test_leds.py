@@ -5,10 +5,10 @@ import pytest
 
 from hardware.sim.render import Look
 from pipeline import leds
-from pipeline.config import LedsConfig
 from pipeline.leds import find_spots, spots_near
 from pipeline.signals import Frame
 from pipeline.spot_kernels import measure
+from pipeline.vision_config import LedsConfig
 from tests.pipeline.seeing import picture, truth_at
 
 CONFIG = LedsConfig()

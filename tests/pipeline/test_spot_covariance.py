@@ -5,10 +5,10 @@ import pytest
 
 from hardware.sim.codec import Decoder, Encoder
 from hardware.sim.render import Look, render
-from pipeline.config import LedsConfig
 from pipeline.frames import exp
 from pipeline.leds import find_spots
 from pipeline.signals import Frame
+from pipeline.vision_config import LedsConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, moved, picture, truth_at
 
 LOOKS = {

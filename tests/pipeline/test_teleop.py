@@ -10,8 +10,9 @@ import numpy as np
 from hardware.robot_file import load_robot
 from pipeline.config import EnvelopeConfig, TeleopConfig
 from pipeline.frames import GRAVITY, exp
-from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, RelativePose, Requests
+from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, Requests
 from pipeline.teleop import Inputs, Output, Teleop
+from tests.pipeline.seeing import seen_at
 
 ROBOT = load_robot("ames").robot
 UP = np.array([0.0, 0.0, GRAVITY])
@@ -37,14 +38,14 @@ def run(
         t = 0.005 * k
         phone = (PhoneImu(t - 0.02, STILL, UP),) if k % 3 == 0 else ()
         seen = t - 0.05
-        pose = RelativePose(seen, position(seen), R_cb, COVARIANCE, 0.1, 5)
+        picture = seen_at(seen, position(seen), R_cb, COVARIANCE)
         outputs.append(
             teleop.step(
                 Inputs(
                     t=t,
                     phone_imu=phone,
                     body_imu=(BodyImu(t, STILL, body_a),),
-                    poses=(pose,) if k % 6 == 0 and seen > 0.0 else (),
+                    seen=(picture,) if k % 6 == 0 and seen > 0.0 else (),
                     operator=Operator(t - 0.01, held, int(held)),
                     requests=Requests(arm=abs(t - arm_at) < 1e-9),
                 )

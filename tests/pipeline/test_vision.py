@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from hardware.sim.codec import Decoder, Encoder
-from pipeline.config import GatesConfig
 from pipeline.frames import R_from_rpy
 from pipeline.gates import disbelief
 from pipeline.identify_kernels import pair_hypotheses
+from pipeline.last_pose import FORGET_MISSES
 from pipeline.signals import Frame
 from pipeline.spot_kernels import measure
-from pipeline.vision import FORGET_MISSES, Prior, Vision, warm_up
+from pipeline.vision import Prior, Vision, warm_up
+from pipeline.vision_config import GatesConfig
 from tests.pipeline.seeing import (
     CAMERA,
     LEDS_IN_B,

@@ -54,6 +54,7 @@ def control_status(**changes: object) -> ControlStatus:
         "lateness_ms": {"p50": 0.1, "p99": 0.2, "p999": 0.4, "max": 1.0, "missed": 3.0},
         "fuse_ms": 90.0,
         "step_ms": 0.7,
+        "guarding": 0.0,
     }
     return ControlStatus(**{**values, **changes})  # type: ignore[arg-type]
 

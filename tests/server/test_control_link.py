@@ -11,26 +11,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.signals import Operator, PhoneImu, RelativePose
+from pipeline.rays import NO_RAYS
+from pipeline.signals import LedRays, Operator, PhoneImu, RelativePose, Seen, StampOffset
 from server.control_link import (
     LARGEST,
     OperatorInput,
     PhoneImuInput,
-    PoseInput,
     ReadyInput,
     RequestInput,
     control_end,
     is_believable,
     server_end,
 )
+from server.seen_input import MAX_LEDS, LedFields, PoseFields, SeenInput
 from tests.server.house import control_status
 
 V = (0.1, 0.2, 0.3)
 EYE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 IMU = PhoneImuInput(1.0, V, V)
-POSE = PoseInput(1.0, V, EYE, [0.5] * 36, 0.3, 5)
+POSE = PoseFields(1.0, V, EYE, [0.5] * 36, 0.3, 5)
+LED = LedFields(3, 1.0, (0.1, 0.2), (0.1, 0.0, 0.0, 0.1))
+SEEN = SeenInput(1.0, [LED, LED], POSE, (0.6, 0.4))
+FEW = SeenInput(1.0, [LED], None, (0.6, 0.4))
 OPERATOR = OperatorInput(1.0, True, 2)
 REQUEST, READY = RequestInput("stop"), ReadyInput(["No phone."])
+replace = msgspec.structs.replace
 BAD = (nan, inf, -inf, 2.0 * LARGEST)
 
 
@@ -45,7 +50,7 @@ def ends(tmp_path):
 
 def test_what_the_server_says_arrives_in_order(ends):
     server, control = ends
-    said = [IMU, POSE, OPERATOR, REQUEST, READY]
+    said = [IMU, SEEN, FEW, OPERATOR, REQUEST, READY]
     assert all(server.send(message) for message in said)
     assert control.inputs() == said
     assert control.inputs() == []
@@ -66,11 +71,17 @@ def test_what_control_says_arrives_with_ages_that_are_for_ever(ends):
         lambda x: PhoneImuInput(x, V, V),
         lambda x: PhoneImuInput(1.0, (0.0, x, 0.0), V),
         lambda x: PhoneImuInput(1.0, V, (0.0, 0.0, x)),
-        lambda x: PoseInput(x, V, EYE, [0.5] * 36, 0.3, 5),
-        lambda x: PoseInput(1.0, (x, 0.0, 0.0), EYE, [0.5] * 36, 0.3, 5),
-        lambda x: PoseInput(1.0, V, (*EYE[:8], x), [0.5] * 36, 0.3, 5),
-        lambda x: PoseInput(1.0, V, EYE, [*[0.5] * 35, x], 0.3, 5),
-        lambda x: PoseInput(1.0, V, EYE, [0.5] * 36, x, 5),
+        lambda x: replace(SEEN, t=x),
+        lambda x: replace(SEEN, half_field=(0.6, x)),
+        lambda x: replace(SEEN, offset=(0.01, x)),
+        lambda x: replace(SEEN, leds=[LED, replace(LED, t=x)]),
+        lambda x: replace(SEEN, leds=[LED, replace(LED, tangents=(x, 0.0))]),
+        lambda x: replace(FEW, leds=[replace(LED, covariance=(0.1, 0.0, 0.0, x))]),
+        lambda x: replace(SEEN, pose=replace(POSE, t=x)),
+        lambda x: replace(SEEN, pose=replace(POSE, p=(x, 0.0, 0.0))),
+        lambda x: replace(SEEN, pose=replace(POSE, R=(*EYE[:8], x))),
+        lambda x: replace(SEEN, pose=replace(POSE, covariance=[*[0.5] * 35, x])),
+        lambda x: replace(SEEN, pose=replace(POSE, reprojection_px=x)),
         lambda x: OperatorInput(x, True, 1),
     ],
 )
@@ -85,7 +96,17 @@ def test_a_number_that_is_none_is_refused_and_counted_wherever_it_stands(ends, p
 @pytest.mark.parametrize("length", [0, 35, 37])
 def test_a_covariance_of_another_size_is_refused(ends, length):
     server, control = ends
-    server.send(PoseInput(1.0, V, EYE, [0.5] * length, 0.3, 5))
+    server.send(replace(SEEN, pose=replace(POSE, covariance=[0.5] * length)))
+    assert control.inputs() == []
+    assert control.dropped == 1
+
+
+@pytest.mark.parametrize(
+    "leds", [[replace(LED, led=MAX_LEDS)], [replace(LED, led=-1)], [LED] * (MAX_LEDS + 1)]
+)
+def test_leds_that_no_robot_has_are_refused(ends, leds):
+    server, control = ends
+    server.send(replace(SEEN, leds=leds))
     assert control.inputs() == []
     assert control.dropped == 1
 
@@ -151,9 +172,22 @@ def test_signals_survive_the_journey():
     sample = PhoneImuInput.of(PhoneImu(1.5, a, b)).sample()
     np.testing.assert_array_equal((sample.omega_m_cf_in_c, sample.a_m_cf_in_c), (a, b))
     measured = RelativePose(2.5, c, rng.normal(size=(3, 3)), rng.normal(size=(6, 6)), 0.4, 6)
-    pose = PoseInput.of(measured).pose()
-    np.testing.assert_array_equal(pose.R_cb, measured.R_cb)
-    np.testing.assert_array_equal(pose.covariance, measured.covariance)
-    assert (pose.t, pose.reprojection_px, pose.leds) == (2.5, 0.4, 6)
+    rays = LedRays(
+        np.array([4, 1]), rng.normal(size=2), rng.normal(size=(2, 2)), rng.normal(size=(2, 2, 2))
+    )
+    seen = SeenInput.of(Seen(2.5, rays, measured, (0.7, 0.4), StampOffset(0.05, 0.002))).seen()
+    assert (seen.t, seen.half_field) == (2.5, (0.7, 0.4))
+    assert seen.offset == StampOffset(0.05, 0.002)
+    for name in ("led", "t", "tangents", "covariances"):
+        np.testing.assert_array_equal(getattr(seen.rays, name), getattr(rays, name))
+    assert seen.pose is not None
+    np.testing.assert_array_equal(seen.pose.R_cb, measured.R_cb)
+    np.testing.assert_array_equal(seen.pose.covariance, measured.covariance)
+    assert (seen.pose.t, seen.pose.reprojection_px, seen.pose.leds) == (2.5, 0.4, 6)
+    nothing = SeenInput.of(Seen(2.5, NO_RAYS, None)).seen()
+    assert nothing.pose is None
+    assert nothing.offset is None
+    assert nothing.rays.tangents.shape == (0, 2)
+    assert nothing.rays.covariances.shape == (0, 2, 2)
     operator = OperatorInput.of(Operator(3.5, True, 9)).operator()
     assert (operator.t, operator.held, operator.press) == (3.5, True, 9)

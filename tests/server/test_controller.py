@@ -19,18 +19,25 @@ from server.control_link import (
     Input,
     OperatorInput,
     PhoneImuInput,
-    PoseInput,
     ReadyInput,
     RequestInput,
     control_end,
+    expected_of,
     server_end,
 )
 from server.controller import SERVER_SILENT_S, Controller
+from server.seen_input import SeenInput
+from tests.pipeline.seeing import seen_at
 
 ROBOT = load_robot("ames").robot
 UP, STILL = (0.0, 0.0, GRAVITY), (0.0, 0.0, 0.0)
-EYE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-COVARIANCE = np.diag([1e-6] * 6).ravel().tolist()
+COVARIANCE = np.diag([1e-6] * 6)
+
+
+def picture(t: float) -> SeenInput:
+    """Of a robot at rest, 2.5 m ahead."""
+    place = np.array([2.5, 0.0, 0.0])
+    return SeenInput.of(seen_at(t, place, np.eye(3), COVARIANCE, leds_in_b=ROBOT.leds_in_b))
 
 
 class Rig:
@@ -48,7 +55,7 @@ class Rig:
         if self.k % 3 == 0:
             said.append(PhoneImuInput(t - 0.02, STILL, UP))
         if self.k % 6 == 0:
-            said.append(PoseInput(t - 0.05, (2.5, 0.0, 0.0), EYE, COVARIANCE, 0.2, 5))
+            said.append(picture(t - 0.05))
         if self.ready is not None:
             said.append(ReadyInput(self.ready))
         return [*said, OperatorInput(t - 0.01, self.held, self.press)]
@@ -129,7 +136,7 @@ def test_a_silent_server_ends_a_flight_in_a_ramp():
     rig.track()
     rig.said = lambda t: []  # type: ignore[method-assign]
     limits = TeleopConfig().failsafe
-    seconds = limits.ramp_start + ROBOT.suspension_period_s + 0.2
+    seconds = limits.ramp_start + ROBOT.ramp_s + 0.2
     modes = [output.failsafe.mode for _, output in rig.run(seconds)]
     order = [mode for mode, before in zip(modes, [None, *modes], strict=False) if mode != before]
     assert order == [Mode.TRACK, Mode.HOLD, Mode.RAMP, Mode.DISARMED]
@@ -142,9 +149,13 @@ def test_what_is_no_number_never_reaches_the_state_by_a_datagram(tmp_path):
     for bad in (nan, inf, -inf, 1e300):
         server.send(PhoneImuInput(101.5, (bad, 0.0, 0.0), UP))
         server.send(PhoneImuInput(bad, STILL, UP))
-        server.send(PoseInput(101.5, (bad, 0.0, 0.0), EYE, COVARIANCE, 0.2, 5))
-        server.send(PoseInput(101.5, STILL, EYE, [bad] * 36, 0.2, 5))
-        server.send(PoseInput(101.5, STILL, EYE, [], 0.2, 5))
+        good = picture(101.5)
+        pose, led = good.pose, good.leds[0]
+        assert pose is not None
+        replace = msgspec.structs.replace
+        server.send(replace(good, pose=replace(pose, p=(bad, 0.0, 0.0))))
+        server.send(replace(good, pose=replace(pose, covariance=[bad] * 36)))
+        server.send(replace(good, pose=None, leds=[replace(led, tangents=(0.0, bad))]))
         server.send(OperatorInput(bad, True, 5))
         heard += control.inputs()
     server.close()
@@ -188,3 +199,18 @@ def test_up_in_the_body_follows_a_turn_and_ignores_free_fall():
     before = controller.up_in_b
     controller.tick(2.0, [], [BodyImu(2.0, rate, np.zeros(3))], "")
     np.testing.assert_array_equal(controller.up_in_b, before)
+
+
+def test_what_the_filter_expects_is_the_same_by_status_and_in_process():
+    rig = Rig()
+    output = rig.run(0.005)[-1][1]
+    assert rig.controller.expected(output) is None
+    assert expected_of(rig.status(output)) is None
+    output = rig.run(0.5)[-1][1]
+    here, there = rig.controller.expected(output), expected_of(rig.status(output))
+    assert here is not None
+    assert there is not None
+    np.testing.assert_allclose(here.p_bc_in_c, (2.5, 0.0, 0.0), atol=1e-2)
+    for name in ("t", "p_bc_in_c", "u_bf_in_c", "sigma_p", "sigma_theta", "time_offset"):
+        np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
+    np.testing.assert_allclose(here.R_cb, there.R_cb, atol=1e-12)

@@ -16,7 +16,7 @@ from server.dashboard import Dashboard
 
 pytestmark = pytest.mark.slow  # a real viser
 
-AMES = load_robot("ames")
+AMES, QUADROTOR, GROUND = (load_robot(name) for name in ("ames", "quadrotor", "ground"))
 angle = st.floats(-1.2, 1.2)
 attitude = st.builds(lambda *eta: R_from_rpy(np.array(eta)), angle, angle, angle)
 point = st.builds(lambda *p: np.array(p), *[st.floats(-5.0, 5.0)] * 3)
@@ -116,13 +116,26 @@ def test_the_trail_does_not_bridge_a_gap(t):
 
 
 def test_arrows_are_the_forces_on_the_body():
-    plant = AMES.plant
-    positions, directions = plant.thruster_positions_in_b, plant.thruster_directions_in_b
     thrusts = np.linspace(0.5, 3.0, 8)
-    craft = scene.Craft(AMES.robot.leds_in_b, positions, directions, plant.hook_above_com)
+    craft = scene.Craft.of(AMES.robot, AMES.plant)
     arrows = craft.arrows(thrusts)
-    force = (arrows[:, 1] - arrows[:, 0]).sum(axis=0) / scene.ARROW_M_PER_N
+    force = (arrows[:, 1] - arrows[:, 0]).sum(axis=0) * AMES.robot.f_max / scene.FULL_ARROW_M
     assert np.allclose(force, (AMES.robot.A @ thrusts)[:3], atol=1e-4)
+
+
+@pytest.mark.parametrize("robot_file", [QUADROTOR, GROUND], ids=["quadrotor", "ground"])
+def test_a_robot_that_stands_has_feet_on_the_floor_and_no_cable(robot_file):
+    craft = scene.Craft.of(robot_file.robot, robot_file.plant)
+    assert craft.cable is None
+    lowest = craft.airframe()[0][:, 2].min()
+    floor = scene.floor_z(robot_file.plant, robot_file.start) + robot_file.start.above
+    assert lowest == pytest.approx(floor, abs=0.01)
+    assert scene.floor_z(AMES.plant, AMES.start) == scene.FLOOR_Z
+
+
+def test_the_cable_goes_up_from_the_hook():
+    cable = scene.Craft.of(AMES.robot, AMES.plant).cable
+    np.testing.assert_allclose(cable, [[[0.0, 0.0, 0.03], [0.0, 0.0, 1.33]]])
 
 
 def test_meshes_are_closed():
@@ -137,8 +150,7 @@ def test_meshes_are_closed():
 
 @pytest.fixture(scope="module")
 def dashboard():
-    plant = AMES.plant
-    dashboard = Dashboard(AMES.robot, plant.thruster_positions_in_b, plant.thruster_directions_in_b)
+    dashboard = Dashboard(AMES.robot, AMES.plant, AMES.start)
     yield dashboard
     dashboard.stop()
 
@@ -154,6 +166,15 @@ def test_the_scene_follows_the_status(dashboard):
     assert not dashboard._trail_lines.visible
     assert not dashboard._reference.visible
     assert dashboard._phone.visible
+
+
+def test_a_robot_without_a_cable_is_shown_with_its_thrusts():
+    dashboard = Dashboard(QUADROTOR.robot, QUADROTOR.plant, QUADROTOR.start)
+    dashboard.show(status(thrusts=[2.0, 3.0, 4.0, 5.0]), None)
+    assert dashboard._robot.visible
+    assert dashboard._thrusts.points.shape == (4, 2, 3)
+    assert np.ptp(dashboard._thrusts.points[:, :, 2], axis=1).max() == pytest.approx(0.33 * 5 / 7)
+    dashboard.stop()
 
 
 def test_a_robot_without_news_is_grey(dashboard):
@@ -190,8 +211,7 @@ def test_an_update_is_cheap(dashboard):
 
 
 def test_nobody_looking_costs_nothing_and_the_thread_ends(dashboard, capfd):
-    plant = AMES.plant
-    idle = Dashboard(AMES.robot, plant.thruster_positions_in_b, plant.thruster_directions_in_b)
+    idle = Dashboard(AMES.robot, AMES.plant, AMES.start)
     asked = []
     idle.start(lambda: (asked.append(1), None))
     idle.stop()

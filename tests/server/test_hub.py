@@ -9,7 +9,8 @@ import pytest
 from server.clock import now
 from server.control_link import ReadyInput, RequestInput
 from server.hub import EVENTS, LEASE_S
-from server.messages import Command, Hello
+from server.knobs import TuneInput
+from server.messages import Command, Hello, Tune
 from server.wire import VERSION, Ping, decode
 from tests.server.house import control_status, house_in, is_request
 
@@ -108,6 +109,24 @@ def test_wishes_reach_control_except_those_for_phones(house):
     assert house.hub.events[0] == "somebody: reset"
 
 
+def test_a_turned_knob_reaches_control_and_is_an_event(house):
+    in_loop(lambda: house.hub.tune(Tune(cutoff_hz=0.5, guard=False)))
+    assert house.control.inputs() == [TuneInput(cutoff_hz=0.5, guard=False)]
+    assert house.hub.events[0] == "supervisor: virtual camera: cutoff_hz 0.5, guard False"
+
+
+def test_a_wish_to_turn_nothing_is_none(house):
+    in_loop(lambda: house.hub.tune(Tune()))
+    assert house.control.inputs() == []
+    assert not house.hub.events
+
+
+def test_a_knob_that_does_not_reach_control_is_told(house):
+    house.control.close()
+    in_loop(lambda: house.hub.tune(Tune(mode="off")))
+    assert "did not reach" in house.hub.events[0]
+
+
 def test_a_stop_is_said_again_until_control_can_take_it(house):
     async def scene():
         while house.hub._control.send(ReadyInput([])):
@@ -142,3 +161,35 @@ def test_a_change_of_mode_is_an_event_and_every_page_is_told(house):
     house.hub._tick()
     assert list(house.hub.events).count("STOPPED: STOP was pressed.") == 1
     assert '"mode":"STOPPED"' in watcher.data[-1]
+
+
+class Eyes:
+    """A vision thread that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.known: list[tuple[object, ...]] = []
+
+    def know(self, *what: object) -> None:
+        self.known.append(what)
+
+    def feel_body(self, samples: object) -> None: ...
+
+    def stop(self) -> None: ...
+
+
+def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
+    def scene():
+        phone = house.hub.greet(hello("first"), Paper())
+        phone.vision = eyes = Eyes()
+        sure = {"u_bf_in_c": (0.0, 0.1, 0.0), "sigma_p": 0.01, "sigma_theta": 0.02}
+        pose = {"p_bc_in_c": (2.5, 0.0, 0.0), "R_cb_wxyz": (1.0, 0.0, 0.0, 0.0)}
+        for fields in ({}, {**pose, **sure}):
+            house.control.send(control_status(**fields))
+        house.hub._hear_control()
+        (_, _, before), (_, _, after) = eyes.known
+        assert before is None
+        assert (after.sigma_p, after.sigma_theta, after.time_offset) == (0.01, 0.02, 0.0)
+        assert after.p_bc_in_c.tolist() == [2.5, 0.0, 0.0]
+        assert after.R_cb.tolist() == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
+    in_loop(scene)

@@ -129,3 +129,75 @@ def test_captures_from_the_future_and_repeated_ones_are_not_taken() -> None:
         ingest.record(Record(1, at(3.0), FLAT), 2.0)
     assert ingest.record(Record(1, at(2.0), FLAT), 2.0) is not None
     assert ingest.record(Record(1, at(2.0), FLAT), 2.0) is None
+
+
+class Phone:
+    """Another clock behind a network of 10-30 ms each way; says 60 motions a second."""
+
+    def __init__(self, ingest: Ingest, offset: float, drift: float) -> None:
+        self.ingest, self.offset, self.drift = ingest, offset, drift
+        self.rng = np.random.default_rng(0)
+        self.errors: list[float] = []
+        self.refused = 0
+
+    def reads_us(self, t: float) -> int:
+        return int(1e6 * (t * (1.0 + self.drift) + self.offset))
+
+    def run(self, t_from: float, t_to: float) -> None:
+        pings = [(t, None) for t in np.arange(t_from, t_to, 0.05)]
+        motions = [(t + 0.02, t) for t in np.arange(t_from, t_to, 1 / 60)]
+        for t, t_capture in sorted(pings + motions, key=lambda event: event[0]):
+            if t_capture is None:
+                self.answer(t)
+            else:
+                self.say(t_capture, t)
+
+    def answer(self, t: float) -> None:
+        there, back = self.rng.uniform(0.01, 0.03, 2)
+        nonce = nonce_of(self.ingest.ping(t))
+        record = Record(1, self.reads_us(t + there), Pong(nonce, int(1e6 * t)))
+        self.ingest.record(record, t + there + back)
+
+    def say(self, t_capture: float, t: float) -> None:
+        try:
+            sample = self.ingest.record(Record(1, self.reads_us(t_capture), FLAT), t)
+        except WireError:
+            self.refused += 1
+            return
+        if isinstance(sample, PhoneImu):
+            self.errors.append(sample.t - t_capture)
+
+
+def test_a_clock_an_hour_off_and_200_ppm_fast_is_followed() -> None:
+    phone = Phone(counting(), -3600.0 + 5000.0, 200e-6)
+    phone.run(0.0, 60.0)
+    assert len(phone.errors) > 3550
+    assert max(map(abs, phone.errors)) < 0.02
+    assert max(map(abs, phone.errors[1200:])) < 2e-3
+    assert phone.refused == 0
+
+
+@pytest.mark.parametrize("jump", [2.0, -2.0])
+def test_after_a_jump_of_the_clock_dates_are_right_within_a_second(jump: float) -> None:
+    phone = Phone(counting(), 5000.0, 50e-6)
+    phone.run(0.0, 5.0)
+    phone.offset += jump
+    phone.errors.clear()
+    phone.run(5.0, 6.0)
+    assert phone.ingest.clock.restarts == 1
+    assert f"jumped by {jump:+.1f}" in phone.ingest.clock.reason
+    assert phone.refused <= 4, "few enough to be no reason to part"
+    wrong = [error for error in phone.errors if abs(error) > 0.02]
+    assert len(wrong) <= 4
+    assert len(phone.errors) > 35
+
+
+def test_the_browsers_own_attitude_is_not_used() -> None:
+    north = synchronised().record(Record(1, at(1.0), FLAT), 1.0)
+    for wxyz in ((1.0, 0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8)):
+        motion = replace(FLAT, orientation_wxyz=wxyz)
+        sample = synchronised().record(Record(1, at(1.0), motion), 1.0)
+        assert isinstance(sample, PhoneImu)
+        assert isinstance(north, PhoneImu)
+        np.testing.assert_array_equal(sample.omega_m_cf_in_c, north.omega_m_cf_in_c)
+        np.testing.assert_array_equal(sample.a_m_cf_in_c, north.a_m_cf_in_c)

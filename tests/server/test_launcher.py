@@ -10,6 +10,7 @@ import pytest
 
 from hardware.robot_file import RobotFileError
 from server import launcher
+from server.control import parse
 from server.launcher import SECRET_VARIABLE, Launcher, announce, children_of, listen
 from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.settings import load
@@ -39,10 +40,12 @@ def test_the_robot_comes_first_because_it_is_stopped_first(tmp_path, sockets):
 
 
 def test_control_is_led_to_the_simulated_robot(tmp_path, sockets):
-    robot, control, server = children_of(load(["--tau-1-s", "3.18"]), ["--x"], tmp_path, sockets)
+    settings = load(["--virtual-camera.cutoff-hz", "0.05"])
+    robot, control, server = children_of(settings, ["--x"], tmp_path, sockets)
     assert option(robot, "--port") == option(control, "--port")
     assert option(control, "--host") == "127.0.0.1"
-    assert option(control, "--tau-1") == "3.18"
+    options = parse(control.arguments[1:])
+    assert options.virtual_camera == settings.virtual_camera.knobs
     assert option(robot, "--truth-port") in server.arguments
     assert server.arguments[-1] == "--x"
 

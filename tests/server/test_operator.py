@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from hardware.camera_file import CAMERAS
+from pipeline import gravity_test
+from pipeline.rays import NO_RAYS
+from pipeline.signals import LedRays, RelativePose
+from pipeline.vision import Sighting
 from server.control_link import OperatorInput, PhoneImuInput
+from server.ingest import EncodedFrame
 from server.messages import Hello
 from server.operator import STALE_S, OperatorPhone
 from server.phone_script import DEVICE
+from server.seen_input import SeenInput
+from server.sight import NO_SPOTS
 from server.wire import VERSION, Motion, Ping, Pong, Record, Touch, WireError
+from tests.pipeline.seeing import CAMERA, rays_at
 from tests.server.house import JPEG, ROBOT
 
 FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
@@ -41,11 +50,21 @@ class Rig:
 
     def synchronise(self) -> None:
         for _ in range(6):
-            ping = self.phone.ingest.ping(self.t)
-            assert isinstance(ping.body, Ping)
-            self.nonce = ping.body.nonce
-            self.say(Pong(self.nonce, ping.t_us))
+            self.synchronise_once()
             self.t += 0.05
+
+    def synchronise_once(self) -> None:
+        ping = self.phone.ingest.ping(self.t)
+        assert isinstance(ping.body, Ping)
+        self.nonce = ping.body.nonce
+        self.say(Pong(self.nonce, ping.t_us))
+
+    def settle(self) -> None:
+        """A second of motion at rest: the sensors pass what can be tested without pictures."""
+        for _ in range(60):
+            self.t += 1.0 / 60.0
+            self.synchronise_once()
+            self.say(FLAT)
 
     def why(self) -> list[str]:
         return self.phone.refusals(self.t)
@@ -59,12 +78,14 @@ def rig():
 
 
 def test_each_thing_that_lacks_is_told_to_the_person_who_can_mend_it(rig):
-    assert rig.why() == ["The phone's clock is not known yet: wait a moment."]
+    assert rig.why() == ["The phone's clock is not known yet. Wait a moment."]
     rig.synchronise()
     motion, pictures = rig.why()
     assert "motion sensors" in motion
     assert "camera" in pictures
     rig.say(FLAT)
+    assert rig.why() == [gravity_test.WAIT, pictures]
+    rig.settle()
     assert rig.why() == [pictures]
     rig.say(Touch(False, False, 0, rig.nonce))
     assert rig.why() == ["The page on the phone is hidden: bring it to the front.", pictures]
@@ -74,7 +95,7 @@ def test_each_thing_that_lacks_is_told_to_the_person_who_can_mend_it(rig):
 
 def test_a_camera_without_a_calibration_is_told_as_long_as_it_films(rig):
     rig.synchronise()
-    rig.say(FLAT)
+    rig.settle()
     for sequence in (1, 2):
         with pytest.raises(WireError) as refused:
             rig.say(JPEG, sequence)
@@ -122,7 +143,7 @@ def test_pictures_that_cannot_be_dated_are_given_back(rig):
 def test_a_calibrated_phone_has_eyes_until_it_leaves():
     rig = Rig(DEVICE)
     rig.synchronise()
-    rig.say(FLAT)
+    rig.settle()
     rig.say(JPEG)
     assert rig.phone.vision is not None
     assert rig.phone.camera_problem == ""
@@ -133,3 +154,31 @@ def test_a_calibrated_phone_has_eyes_until_it_leaves():
         rig.say(replace(JPEG, width=640, height=200))
     assert rig.phone.vision is None
     rig.phone.close()
+
+
+SHOT = EncodedFrame(49.9, 50.0, 1, JPEG)
+FEW = rays_at(49.9, np.array([2.5, 0.0, 0.0]), np.eye(3), leds=[0, 2])
+
+
+def sighting_of(pose: RelativePose | None, rays: LedRays) -> Sighting:
+    return Sighting(49.9, pose, rays, NO_SPOTS, None, "2 of 5 LEDs seen.")
+
+
+def test_a_few_leds_reach_control_without_a_pose_and_nothing_as_nothing(rig):
+    rig.phone._sighted(CAMERA, sighting_of(None, NO_RAYS), SHOT)
+    assert rig.to_control == []
+    rig.phone._sighted(CAMERA, sighting_of(None, FEW), SHOT)
+    (said,) = rig.to_control
+    assert isinstance(said, SeenInput)
+    assert said.pose is None
+    assert [led.led for led in said.leds] == [0, 2]
+    assert said.half_field == CAMERA.half_field
+
+
+def test_only_a_pose_counts_as_seeing_the_robot(rig):
+    pose = RelativePose(49.9, np.array([2.5, 0.0, 0.0]), np.eye(3), np.eye(6), 0.1, 5)
+    rig.phone._sighted(CAMERA, sighting_of(None, FEW), SHOT)
+    assert rig.phone.meters["pose"].age(rig.t) > STALE_S
+    rig.phone._sighted(CAMERA, sighting_of(pose, FEW), SHOT)
+    assert rig.phone.meters["pose"].age(rig.t) < STALE_S
+    assert rig.to_control[-1].pose.leds == 5

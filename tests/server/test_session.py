@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server import wire
-from server.messages import Command, Hello, Log, encode_message
+from server.messages import Command, Hello, Log, Tune, encode_message
 from server.session import BYTES_HZ, MAX_FAULTS, MESSAGES_HZ, RECORDS_HZ, Bucket, Session
 from server.wire import Record, WireError
 
@@ -225,3 +225,11 @@ def test_only_a_supervisor_resets_after_stop() -> None:
     reset = encode_message(Command("reset"))
     assert opened("supervisor").receive(reset, 0.1) == Command("reset")
     assert refusal(opened("operator"), reset).field == "command.what"
+
+
+def test_only_a_supervisor_turns_knobs() -> None:
+    wish = Tune(cutoff_hz=0.5)
+    assert opened("supervisor").receive(encode_message(wish), 0.0) == wish
+    for role in ("operator", "video"):
+        error = refusal(opened(role), encode_message(wish))
+        assert (error.code, error.field) == ("role", "message.type")

@@ -8,6 +8,7 @@ import tomllib
 import pytest
 
 from pipeline.config import VirtualCameraConfig
+from server.knobs import Knobs
 from server.settings import PREFIX, Settings, SettingsError, VideoSettings, load, state_directory
 
 
@@ -43,8 +44,15 @@ def test_the_picture_is_a_table_of_its_own_everywhere(tmp_path, monkeypatch):
 
 
 def test_the_virtual_camera_defaults_to_the_pipelines():
-    settings, config = load([]), VirtualCameraConfig()
-    assert (settings.tau_1_s, settings.tau_2_s) == (config.tau_1, config.tau_2)
+    assert load([]).virtual_camera.knobs == Knobs.of(VirtualCameraConfig())
+
+
+def test_the_virtual_camera_is_a_table_of_its_own(tmp_path, monkeypatch):
+    file = toml(tmp_path, '[virtual_camera]\ncutoff_hz = 0.05\nmode = "selective"')
+    monkeypatch.setenv("LIGHTLEASH_VIRTUAL_CAMERA__MAX_SPEED_M_S", "0.5")
+    knobs = load(["--virtual-camera.adaptive-beta", "0.6"], file).virtual_camera.knobs
+    assert knobs == Knobs(0.05, "selective", 0.6, 0.5, guard=True)
+    assert not load(["--no-virtual-camera.guard"]).virtual_camera.guard
 
 
 def test_lists_grow_with_each_mention():
@@ -60,9 +68,11 @@ def test_lists_grow_with_each_mention():
         ("[video]\nwidht = 640", ["video.widht", "video.width"]),
         ("qqq = 1", ["qqq", "https_port", "video.width"]),
         ("https_port = 70000", ["https_port", "65535", "70000"]),
-        ("tau_1_s = nan", ["tau_1_s"]),
-        ("tau_1_s = inf", ["tau_1_s"]),
-        ("tau_1_s = -0.1", ["tau_1_s", "-0.1"]),
+        ("[virtual_camera]\ncutoff_hz = nan", ["virtual_camera.cutoff_hz"]),
+        ("[virtual_camera]\ncutoff_hz = 9.0", ["virtual_camera.cutoff_hz", "9.0"]),
+        ("[virtual_camera]\nmax_speed_m_s = inf", ["virtual_camera.max_speed_m_s"]),
+        ('[virtual_camera]\nmode = "some"', ["virtual_camera.mode", "selective", "some"]),
+        ("[virtual_camera]\ncutof = 1.0", ["virtual_camera.cutof", "virtual_camera.cutoff_hz"]),
         ('video = "big"', ["video"]),
         ("https_port = ", ["settings.toml"]),
         ('cert = "/c.pem"', ["cert", "key"]),

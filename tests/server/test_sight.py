@@ -8,16 +8,17 @@ import pytest
 import hardware
 from hardware.robot_file import load_robot
 from hardware.sim.codec import Encoder
-from pipeline.config import GatesConfig
+from pipeline.expected import Expected
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import PhoneImu
+from pipeline.vision_config import GatesConfig
 from server.ingest import EncodedFrame
 from server.sight import Sight
 from server.wire import Codec, Picture
 from tests.pipeline.seeing import CAMERA, is_wrong, moved, picture, truth_at
 
 ROBOT = load_robot(Path(hardware.__file__).parent / "robots" / "ames.toml").robot
-ZERO = np.zeros(3)
+ZERO, UP = np.zeros(3), np.array([0.0, 0.0, 1.0])
 DT = 1.0 / 30.0
 CODECS = {"h264": Codec.H264, "vp8": Codec.VP8, "jpeg": Codec.JPEG}
 
@@ -199,3 +200,38 @@ def test_after_a_lost_picture_nothing_is_decoded_before_a_key():
     assert look(eye, frames[:1], truths[0]).pose is not None
     assert look(eye, frames[2:], truths[2]) is None
     assert eye.needs_key
+
+
+def test_a_few_leds_where_control_expects_them_are_rays_without_a_pose():
+    rng = np.random.default_rng(90)
+    eye, truth, camera_side = sight(), truth_at(rng), encoder()
+    for k in range(8):
+        for t in (k * DT - 0.01, k * DT + 0.01):
+            eye.expect(Expected(t, truth.p, truth.R, ZERO, 0.005, 0.005))
+        covered = () if k < 3 else (0, 2)
+        shot = sent(k, *camera_side.encode(picture(truth, rng, covered=covered)))
+        sighting = look(eye, [shot], truth)
+        assert (sighting.pose is None) == (k >= 3)
+    assert sorted(sighting.rays.led.tolist()) == [1, 3, 4]
+    assert sighting.reason == "3 of 5 LEDs seen."
+    eye.expect(None)
+    shot = sent(8, *camera_side.encode(picture(truth, rng, covered=(0, 2))))
+    assert len(look(eye, [shot], truth).rays) == 0
+
+
+def test_rays_of_a_pose_that_is_not_believed_are_not_handed_on():
+    rng = np.random.default_rng(91)
+    ((frame, truth),) = shots(rng, 1)
+    sighting = look(sight(max_range_m=1.0), [frame], truth)
+    assert sighting.match is not None
+    assert len(sighting.rays) == 0
+    assert sighting.seen(CAMERA) is None
+
+
+def test_the_phones_turning_is_that_of_when_the_picture_was_taken():
+    eye = sight()
+    assert eye._omega_at(0.0) is None
+    for k in range(100):
+        eye.feel(PhoneImu(0.01 * k, np.array([0.0, 0.01 * k, 1.0]), GRAVITY * UP))
+    np.testing.assert_allclose(eye._omega_at(0.905), [0.0, 0.905, 1.0])
+    np.testing.assert_allclose(eye._omega_at(2.0), [0.0, 0.99, 1.0])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from math import inf, nan, radians
+from math import cos, inf, nan, radians, sin
 
 import msgspec
 import pytest
 
 from server import status
 from server.clock import now
+from server.knobs import Knobs
 from server.messages import encode_message
 from server.status import LOST_S
 from tests.server.house import control_status, house_in
@@ -76,3 +77,19 @@ def test_it_is_json_even_if_a_number_is_none(hub, bad):
     decoded = msgspec.json.decode(encode_message(status.build(hub)))
     assert decoded["error_mm"] is None
     assert decoded["streams"]["body_imu"]["age_ms"] is None
+
+
+def test_the_knobs_are_shown_as_control_has_them_with_the_lag_they_cause(hub):
+    knobs = Knobs(0.28, "selective", 0.0, 1.0, guard=True)
+    turn = (cos(radians(5.0)), 0.0, 0.0, -sin(radians(5.0)))
+    tell(hub, knobs=knobs, guarding=0.456, R_fc_wxyz=(-1.0, 0.0, 0.0, 0.0), R_fv_wxyz=turn)
+    shown = status.build(hub).virtual_camera
+    assert (shown.knobs, shown.lag_deg, shown.guarding) == (knobs, 10.0, 0.46)
+
+
+def test_before_control_has_told_of_its_knobs_none_are_shown(hub):
+    assert status.build(hub).virtual_camera is None
+    tell(hub)
+    assert status.build(hub).virtual_camera is None
+    tell(hub, knobs=Knobs(0.28, "full", 0.0, 1.0, guard=True))
+    assert status.build(hub).virtual_camera.lag_deg is None

@@ -235,7 +235,7 @@ def test_a_phone_asked_to_leave_lets_go_first():
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--latency-ms", "5"], ["--fps", "500"], ["--codec", "gif"]],
+    [["--latency-ms", "5"], ["--fps", "500"], ["--codec", "gif"], ["--fault", "haunted"]],
 )
 def test_command_refuses_what_it_cannot_play(arguments):
     with pytest.raises(SystemExit):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from pipeline.rays import NO_RAYS
 from pipeline.signals import Match, Spots
 from pipeline.vision import Sighting
 from server.ingest import EncodedFrame
@@ -45,7 +46,7 @@ class Eyes:
         if self.needs_key and not frames[0].picture.key:
             return None
         self.needs_key = False
-        return Sighting(frames[-1].t, None, NO_SPOTS, None, "Nothing.")
+        return Sighting(frames[-1].t, None, NO_RAYS, NO_SPOTS, None, "Nothing.")
 
 
 class Rig:
@@ -150,7 +151,7 @@ def test_found_lights_and_others_are_circled_in_different_colours():
     pixels = np.array([[320.0, 360.0], [960.0, 360.0]])
     spots = Spots(pixels, np.zeros((2, 2, 2)), np.ones(2), np.ones(2))
     match = Match(np.array([0]), np.array([1]))
-    picture = draw(luma, Sighting(0.0, None, spots, match, ""))
+    picture = draw(luma, Sighting(0.0, None, NO_RAYS, spots, match, ""))
     assert picture.shape == (270, THUMBNAIL_WIDTH, 3)
     left, right = picture[:, :240].reshape(-1, 3), picture[:, 240:].reshape(-1, 3)
     assert left.sum(axis=0).argmax() == 0

@@ -7,8 +7,9 @@ import asyncio
 import pytest
 
 from server.clock import now
-from server.control_link import OperatorInput, PhoneImuInput, PoseInput, RequestInput
+from server.control_link import OperatorInput, PhoneImuInput, RequestInput
 from server.hub import Hub
+from server.seen_input import SeenInput
 from server.session import MAX_FAULTS
 from server.wire import MAX_RECORD_BYTES, Codec, Credit, Motion, Picture, Record, Touch, encode
 from tests.server.house import JPEG, control_status, eventually, house_in, is_request
@@ -16,7 +17,7 @@ from tests.server.house import JPEG, control_status, eventually, house_in, is_re
 pytestmark = pytest.mark.slow  # real sockets, whose server stops by its own tick
 
 FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
-SIGNALS = (PhoneImuInput, PoseInput, OperatorInput, RequestInput)
+SIGNALS = (PhoneImuInput, SeenInput, OperatorInput, RequestInput)
 
 
 @pytest.fixture

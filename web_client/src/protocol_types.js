@@ -23,6 +23,17 @@
  */
 
 /**
+ * Page → server: turn `Knobs` of the virtual camera; those left out or null stay. `status` shows how they stand: that is the answer.
+ * @typedef {object} Tune
+ * @property {'tune'} type
+ * @property {number | null} cutoff_hz
+ * @property {'full' | 'selective' | 'off' | null} mode
+ * @property {number | null} adaptive_beta
+ * @property {number | null} max_speed_m_s
+ * @property {boolean | null} guard
+ */
+
+/**
  * Page → server: a fault on the page that a supervisor should read.
  * @typedef {object} Log
  * @property {'log'} type
@@ -61,6 +72,24 @@
  */
 
 /**
+ * How the virtual camera smooths the turns of the phone.
+ * @typedef {object} Knobs
+ * @property {number} cutoff_hz −3 dB of the low pass [Hz].
+ * @property {'full' | 'selective' | 'off'} mode `full`: all turns are smoothed; `selective`: not those about the line of sight; `off`.
+ * @property {number} adaptive_beta How much the cut-off rises with the speed of a turn [Hz/(rad/s)].
+ * @property {number} max_speed_m_s Turns move the reference no faster [m/s]; 0: no limit.
+ * @property {boolean} guard Hurry after the phone when the robot nears the border of the picture.
+ */
+
+/**
+ * The virtual camera in the control process.
+ * @typedef {object} VirtualCamera
+ * @property {Knobs} knobs As they stand.
+ * @property {number | null} lag_deg Angle from the phone to the virtual camera; null before a phone is there.
+ * @property {number} guarding 0 to 1: how much it hurries now.
+ */
+
+/**
  * Server → page, 10 Hz: the truth about the robot, on every screen.
  * @typedef {object} Status
  * @property {'status'} type
@@ -85,9 +114,10 @@
  * @property {string} realtime Class of the control loop: what holds its schedule.
  * @property {Record<string, number>} control Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms.
  * @property {string[]} messages The newest events, newest first.
+ * @property {VirtualCamera | null} virtual_camera null before the control process has told of it.
  */
 
-/** @typedef {Hello | Command | Log} FromPage */
+/** @typedef {Hello | Command | Tune | Log} FromPage */
 /** @typedef {Welcome | Refused | Status | Command} ToPage */
 
 export {};

@@ -65,11 +65,12 @@ test('no module is left over', () => {
 test('every element the views look for is in their page', () => {
   for (const [page, ...views] of [
     ['index.html', 'src/view.js'],
-    ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/main.js'],
+    ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/knobs.js',
+      'src/dashboard/main.js'],
   ]) {
     const ids = new Set([...read(page ?? '').matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));
     for (const view of views) {
-      const wanted = [...read(view).matchAll(/(?:find|text|show|data|list|figure|graph|row)\('([a-z][\w-]*)'/g)];
+      const wanted = [...read(view).matchAll(/(?:find|text|show|data|list|figure|graph|row|listen|input|place)\('([a-z][\w-]*)'/g)];
       assert.ok(wanted.length > 0);
       for (const [, id] of wanted) assert.ok(ids.has(id), `${view} looks for #${id} in ${page}`);
     }

@@ -8,6 +8,7 @@
 import { browserOf } from '../browser.js';
 import { BoardView } from './view.js';
 import { EMPTY, reduce } from './model.js';
+import { KnobPanel } from './knobs.js';
 import { Link, socketUrl } from '../link.js';
 import { PhoneCard } from './phone_card.js';
 import { Kind, VERSION } from '../protocol.js';
@@ -49,6 +50,7 @@ const view = new BoardView(document, {
   onCode: () => card.toggle(),
   onReload: () => window.location.reload(),
 });
+const knobs = new KnobPanel(document, (tune) => void link.sendMessage(tune), () => performance.now());
 const card = new PhoneCard(document, URL, fetchInvite);
 
 /** @param {Event} event */
@@ -60,6 +62,7 @@ function dispatch(event) {
     shown = false;
     const { problem } = board;
     view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
+    knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);
     view.text('virtual', isVirtual() ? 'Stop virtual phone' : 'Start virtual phone');
   });
 }
@@ -135,7 +138,10 @@ async function arrive() {
 
 void arrive().then(() => {
   window.setInterval(() => {
-    if (board.linked) card.tick(performance.now());
+    if (board.linked) {
+      card.tick(performance.now());
+      knobs.tick();
+    }
     dispatch({ type: 'tick', now: performance.now() });
   }, TICK_MS);
   window.setInterval(() => {

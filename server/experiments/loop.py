@@ -1,4 +1,4 @@
-"""`lightleash experiments`: the loop in virtual time, measured, as a table and a picture."""
+"""`lightleash experiments loop`: the closed loop in virtual time, as a table and a picture."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from hardware.robot_file import load_robot
-from pipeline.config import TeleopConfig
+from pipeline.config import EstimatorName, TeleopConfig
+from pipeline.cutoff import cutoff_hz
 from pipeline.frames import Array
-from pipeline.virtual_camera import cutoff_hz
 from server.control import teleop_config
+from server.experiments import text
 from server.lockstep import Lockstep, Scene, Trace
 
+Hidden = tuple[float, float, tuple[int, ...]]
 SETTLE_S = 2.0
 """After the press, before tracking counts: the integral must first learn the spring."""
 
@@ -92,14 +95,9 @@ HEADINGS = (
 
 def table(results: Sequence[Result]) -> str:
     """One line a flight."""
-    widths = [len(form.format(0 if ">" in form else "")) for _, _, form in HEADINGS]
-    widths = [max(w, len(title)) for w, (_, title, _) in zip(widths, HEADINGS, strict=True)]
-    lines = ["  ".join(t.rjust(w) for w, (_, t, _) in zip(widths, HEADINGS, strict=True))]
-    for result in results:
-        cells = (form.format(getattr(result, name)) for name, _, form in HEADINGS)
-        line = "  ".join(c.rjust(w) for w, c in zip(widths, cells, strict=True))
-        lines.append(line + (f"  ended: {result.ended}" if result.ended else ""))
-    return "\n".join(lines)
+    lines = text.table(HEADINGS, results).splitlines()
+    ends = ["", *(f"  ended: {result.ended}" if result.ended else "" for result in results)]
+    return "\n".join(line + end for line, end in zip(lines, ends, strict=True))
 
 
 def draw(traces: Sequence[tuple[Result, Trace]], path: Path) -> None:
@@ -134,19 +132,22 @@ def draw(traces: Sequence[tuple[Result, Trace]], path: Path) -> None:
     pyplot.close(figure)
 
 
-def loop(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Fly each hand in virtual time through rendered, encoded pictures; print, draw, judge."""
     robot_file = load_robot(arguments.robot)
-    virtual = TeleopConfig().virtual_camera
-    config = teleop_config(robot_file, arguments.gains, virtual.tau_1, virtual.tau_2)
+    virtual_camera, estimator = TeleopConfig().virtual_camera, arguments.estimator
+    config = teleop_config(robot_file, arguments.gains, virtual_camera, estimator)
     if arguments.live:
         return live(arguments)
     low, high = arguments.latency_ms
     scene = Scene(
-        latency_s=(1e-3 * low, 1e-3 * high), frame_rate_hz=arguments.fps, codec=arguments.codec
+        latency_s=(1e-3 * low, 1e-3 * high),
+        frame_rate_hz=arguments.fps,
+        codec=arguments.codec,
+        hidden=hidden(arguments.hide, len(robot_file.robot.leds_in_b)),
     )
     print(
-        f"{arguments.robot}, gains {arguments.gains}, virtual camera "
+        f"{arguments.robot}, gains {arguments.gains}, estimator {estimator}, virtual camera "
         f"{cutoff_hz(config.virtual_camera):.2f} Hz, {scene.width}x{scene.height} at "
         f"{scene.frame_rate_hz:g} fps through {scene.codec}, {low:g}-{high:g} ms late"
     )
@@ -165,11 +166,27 @@ def loop(arguments: argparse.Namespace) -> int:
     return 0 if all(not result.ended and result.tracked_s > 0 for result, _ in flights) else 1
 
 
+def hidden(wishes: Sequence[Sequence[str]], leds: int) -> tuple[Hidden, ...]:
+    """`--hide FROM_S TO_S [LED ...]` of each wish.
+
+    Raises:
+        SystemExit: not such numbers; says what is allowed.
+    """
+    try:
+        spans = [(float(a), float(b), tuple(map(int, named))) for a, b, *named in wishes]
+    except ValueError as error:
+        raise SystemExit(f"--hide: {error}; allowed: FROM_S TO_S [LED ...]") from error
+    if any(led not in range(leds) for _, _, named in spans for led in named):
+        raise SystemExit(f"--hide: LEDs are 0 to {leds - 1}")
+    return tuple((a, b, named or tuple(range(leds))) for a, b, named in spans)
+
+
 def live(arguments: argparse.Namespace) -> int:
     """The same flights in real time, through a server of its own on this machine."""
     from server import live_loop
 
-    with live_loop.server(arguments.robot, arguments.gains) as environment:
+    robot, gains, estimator = arguments.robot, arguments.gains, arguments.estimator
+    with live_loop.server(robot, gains, estimator) as environment:
         for hand in arguments.hands:
             summary = live_loop.fly(environment, hand, arguments.seconds, arguments.seed)
             figures = "  ".join(f"{name} {value}" for name, value in summary.items())
@@ -189,22 +206,24 @@ def _fly(flight: Lockstep, seconds: float, name: str) -> Trace:
     return flight.trace
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry of `lightleash experiments`."""
-    parser = argparse.ArgumentParser(prog="lightleash experiments", description=__doc__)
-    kinds = parser.add_subparsers(required=True, metavar="EXPERIMENT")
-    one = kinds.add_parser("loop", help="tracking of the closed loop, in virtual time")
-    one.add_argument("--robot", default="ames", help="name or path of a robot file")
-    one.add_argument("--gains", default="phone", help="a gain set of the robot file")
-    one.add_argument("--hands", nargs="+", default=["steady", "moving"], metavar="HAND")
-    one.add_argument("--seconds", type=float, default=60.0)
-    one.add_argument("--seed", type=int, default=1)
-    one.add_argument("--latency-ms", nargs=2, type=float, default=(60.0, 120.0))
-    one.add_argument("--fps", type=float, default=30.0)
-    one.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
-    one.add_argument("--live", action="store_true", help="in real time, through real processes")
-    one.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")
-    one.set_defaults(run=loop)
-    arguments = parser.parse_args(argv)
-    code: int = arguments.run(arguments)
-    return code
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--robot", default="ames", help="name or path of a robot file")
+    parser.add_argument("--gains", default="phone", help="a gain set of the robot file")
+    parser.add_argument("--estimator", choices=get_args(EstimatorName), default="relative")
+    parser.add_argument("--hands", nargs="+", default=["steady", "moving"], metavar="HAND")
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--latency-ms", nargs=2, type=float, default=(60.0, 120.0))
+    parser.add_argument("--fps", type=float, default=30.0)
+    parser.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
+    parser.add_argument(
+        "--hide",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar=("FROM_S", "TO_S"),
+        help="from when to when LEDs can't be seen, and which (all, if none is named); repeatable",
+    )
+    parser.add_argument("--live", action="store_true", help="in real time, through real processes")
+    parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")

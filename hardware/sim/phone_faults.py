@@ -1,0 +1,40 @@
+"""What browsers get wrong about motion sensors, for the server's gravity test to find."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from pipeline.frames import GRAVITY, Array
+
+
+class Fault(Enum):
+    """One at a time."""
+
+    NONE = "none"
+    IOS_SIGN = "ios-sign"
+    """Accelerations point the other way."""
+    RATE_ORDER = "rate-order"
+    """Rates about x, y, z arrive as those about y, z, x."""
+    SCREEN_ANGLE = "screen-angle"
+    """The screen's angle is told as 0° whatever it is."""
+    NO_GRAVITY = "no-gravity"
+    G_UNITS = "g-units"
+
+
+def spoilt_rate(omega: Array, fault: Fault) -> Array:
+    """Rates (3,) as a browser with this fault gives them."""
+    return np.roll(omega, -1) if fault is Fault.RATE_ORDER else omega
+
+
+def spoilt_force(force: Array, fault: Fault, at_rest: Array) -> Array:
+    """Specific force (3,) [m/s²] likewise; `at_rest` is what it would be without motion."""
+    match fault:
+        case Fault.IOS_SIGN:
+            return -force
+        case Fault.NO_GRAVITY:
+            return force - at_rest
+        case Fault.G_UNITS:
+            return force / GRAVITY
+    return force

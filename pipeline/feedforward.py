@@ -1,0 +1,108 @@
+"""Feed-forward: the wrench that carries the robot along with the hand, before an error shows.
+
+The reference is rigid in v, so the phone's accelerometer and gyroscope tell how it accelerates:
+
+    a_r = a_c + R_fv (ω̇_v × p + ω_v × (ω_v × p)),   a_c = R_fc f_c + g        (p = p_rv in v)
+    F = m a_r − F_pull,   τ = J ω̇_v
+
+F_pull is what else pulls at the body (suspension, air, a push) and has changed since the start:
+what its accelerometer feels, less what its thrusters give. Without it a suspended robot is better
+off without feed-forward: below the pendulum's frequency (the AMES's is 0.43 Hz, a hand's 0.3 Hz)
+the cable wants more force than the mass, and with the opposite sign.
+
+a_r is band-passed: at the low end go the accelerometer's bias and the error of the vertical, at the
+high end its rounding and the hand's tremor. F_pull is low-passed.
+"""
+
+from __future__ import annotations
+
+from math import exp as exponential
+from math import pi
+
+import numpy as np
+
+from pipeline.config import FeedForwardConfig
+from pipeline.frames import GRAVITY, Array, cross
+from pipeline.robot import Robot
+from pipeline.signals import RelativeState, VirtualView
+
+G_IN_F = np.array([0.0, 0.0, -GRAVITY])
+G_IN_F.setflags(write=False)
+
+
+class FeedForward:
+    """Call `feel` every period, `start` when tracking starts, `wrench` while it lasts."""
+
+    def __init__(self, robot: Robot, config: FeedForwardConfig) -> None:
+        """At rest, thrusters off."""
+        self._m, self._J, self._config = robot.mass, robot.inertia, config
+        self._weight_in_f = np.array([0.0, 0.0, -robot.weight_to_carry])
+        self._thrust_in_f, self._pull_in_f = np.zeros(3), np.zeros(3)
+        self.start()
+
+    def start(self) -> None:
+        """What pulls now is left to the integral; what the hand did before is forgotten.
+
+        Of a robot that carries itself, its weight does; the floor it may still stand on does not.
+        """
+        if self._weight_in_f.any():
+            self._pull_in_f = self._weight_in_f
+        self._pull_at_start_in_f = self._pull_in_f
+        self._omega_v: Array | None = None
+        self._omega_rate_v = np.zeros(3)
+        self._a_slow_in_f: Array | None = None
+        self._a_in_f = np.zeros(3), np.zeros(3)
+
+    def feel(self, f_bf_in_b: Array, R_fb: Array, force_in_b: Array, h: float) -> None:
+        """Follow what pulls at the body.
+
+        Args:
+            f_bf_in_b: Specific force (3,) [m/s²].
+            R_fb: Attitude of the body.
+            force_in_b: Of the thrusts last commanded (3,) [N].
+            h: Since the last call [s].
+        """
+        thrust, pull = self._thrust_in_f, self._pull_in_f
+        self._thrust_in_f = thrust + _share(h / self._config.thrust_lag_s) * (
+            R_fb @ force_in_b - thrust
+        )
+        felt = self._m * (R_fb @ f_bf_in_b + G_IN_F) - self._thrust_in_f
+        self._pull_in_f = pull + _share(2.0 * pi * self._config.pull_hz * h) * (felt - pull)
+
+    def wrench(
+        self, relative: RelativeState, R_fc: Array, view: VirtualView, p_rv_in_v: Array, h: float
+    ) -> Array:
+        """Force and torque in b (6,) [N, N m] after another `h` [s].
+
+        Args:
+            relative: For the phone's specific force.
+            R_fc: Attitude of the camera.
+            view: The robot from v.
+            p_rv_in_v: Where the robot should be, constant in v [m].
+            h: Since the last call [s].
+        """
+        quick = _share(2.0 * pi * self._config.low_pass_hz * h)
+        turning_in_v = self._turning(view.omega_vf_in_v, p_rv_in_v, quick, h)
+        a_in_f = R_fc @ relative.f_cf_in_c + G_IN_F + view.R_fv @ turning_in_v
+        slow = a_in_f if self._a_slow_in_f is None else self._a_slow_in_f
+        slow = slow + _share(2.0 * pi * self._config.high_pass_hz * h) * (a_in_f - slow)
+        self._a_slow_in_f = slow
+        once, twice = self._a_in_f
+        once = once + quick * (a_in_f - slow - once)
+        self._a_in_f = once, twice + quick * (once - twice)
+        force_in_f = self._m * self._a_in_f[1] - (self._pull_in_f - self._pull_at_start_in_f)
+        force_in_b = view.R_vb.T @ (view.R_fv.T @ force_in_f)
+        return np.concatenate((force_in_b, self._J * (view.R_vb.T @ self._omega_rate_v)))
+
+    def _turning(self, omega: Array, p: Array, quick: float, h: float) -> Array:
+        """Acceleration of the reference by the turns of v, in v."""
+        before = omega if self._omega_v is None else self._omega_v
+        self._omega_v = omega
+        rate = self._omega_rate_v
+        self._omega_rate_v = rate + quick * ((omega - before) / h - rate)
+        return cross(self._omega_rate_v, p) + cross(omega, cross(omega, p))
+
+
+def _share(x: float) -> float:
+    """Of the way that a first-order low pass goes in `x` time constants."""
+    return 1.0 - exponential(-x)

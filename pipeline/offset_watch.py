@@ -1,0 +1,48 @@
+"""Is the time offset that the filter learns the true one? A wrong lock is worse than none.
+
+A tremor looks alike a ninth of a second later, and a filter sees only the valley it is in. So a
+coarse offset, found apart from it (`time_offset`), must agree; before there is one, stamps are
+taken to be nearly right.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pipeline.signals import StampOffset
+
+STRAY_S: Final = 0.02
+"""So far may the learnt offset be from the coarse one, or from none."""
+SURE: Final = 4.0
+"""Standard deviations of the coarse one that count as well."""
+PATIENCE_S: Final = 3.0
+"""Strayed again so soon after it was set right: the stamps themselves drift."""
+UNKNOWN = "The pictures' time stamps are off: move the phone a little, so that by how much is seen."
+DRIFTING = "The pictures' time stamps drift: restart the camera on the phone."
+
+
+class OffsetWatch:
+    """Compares; says when to begin again, and when nobody should fly."""
+
+    def __init__(self) -> None:
+        """No coarse offset yet."""
+        self.coarse: StampOffset | None = None
+        self.complaint = ""
+        """Why the filter's offset can't be believed; empty if it can."""
+        self._t_set_right = -float("inf")
+
+    def must_begin_again(self, value: float, t: float) -> bool:
+        """Whether the learnt `value` [s], at time `t`, is wrong and the coarse one should start."""
+        coarse = self.coarse
+        middle = coarse.value if coarse is not None else 0.0
+        reach = max(STRAY_S, SURE * coarse.sigma) if coarse is not None else STRAY_S
+        if abs(value - middle) <= reach:
+            self.complaint = ""
+            return False
+        if coarse is None:
+            self.complaint = UNKNOWN
+            return False
+        drifts = t - self._t_set_right < PATIENCE_S
+        self.complaint = DRIFTING if drifts else ""
+        self._t_set_right = t
+        return True

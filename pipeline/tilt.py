@@ -1,0 +1,58 @@
+"""Robots whose thrusters all push along one axis of b go sideways by leaning: a quadrotor.
+
+The force that is wanted says where the thrust's axis must point; roll and pitch torques turn the
+body there (Lee, Leok, McClamroch 2010, without their feed-forward terms).
+"""
+
+from __future__ import annotations
+
+from math import atan2, sqrt, tan
+
+import numpy as np
+
+from pipeline.config import TiltConfig
+from pipeline.frames import Array
+from pipeline.gains import Gains
+from pipeline.robot import Robot
+
+LEAST_LIFT = 0.2
+"""Of the weight: less thrust can't turn the body, and its direction would mean nothing."""
+
+
+class TiltToMove:
+    """A wrench that asks for any force → one that thrusters along b's z axis can give."""
+
+    def __init__(self, robot: Robot, gains: Gains, config: TiltConfig) -> None:
+        """Roll and pitch rows of `gains` are those of the attitude."""
+        self._least = max(LEAST_LIFT * robot.weight_to_carry, robot.f_min)
+        self._slope = tan(config.max_tilt_rad)
+        self._Kp, self._Kd = gains.Kp[3:5], gains.Kd[3:5]
+        self.refused_in_b = np.zeros(3)
+        """Force that the limit of the tilt cut off, at the last wrench (3,) [N]."""
+
+    def wrench(self, wrench_in_b: Array, R_fb: Array, omega_bf_in_b: Array) -> Array:
+        """(6,) thrust along z and torques for a wanted wrench (6,); its roll and pitch don't count.
+
+        The body turns until its z axis points along the wanted force, no farther than the limit.
+        """
+        wanted_in_f = R_fb @ wrench_in_b[:3]
+        force_in_f = self._within_limit(wanted_in_f)
+        force_in_b = R_fb.T @ force_in_f
+        self.refused_in_b = wrench_in_b[:3] - force_in_b
+        torque_in_b = self._Kp * _turn_of_z_to(force_in_b) - self._Kd * omega_bf_in_b[:2]
+        return np.array([0.0, 0.0, max(force_in_b[2], 0.0), *torque_in_b, wrench_in_b[5]])
+
+    def _within_limit(self, force_in_f: Array) -> Array:
+        lift = max(float(force_in_f[2]), self._least)
+        sideways = sqrt(float(force_in_f[0] ** 2 + force_in_f[1] ** 2))
+        share = min(1.0, self._slope * lift / sideways) if sideways > 0.0 else 1.0
+        return np.array([share * force_in_f[0], share * force_in_f[1], lift])
+
+
+def _turn_of_z_to(direction: Array) -> Array:
+    """(2,) rotation about x and y that brings the z axis to `direction` (3,), π at most [rad]."""
+    x, y, z = (float(v) for v in direction)
+    across = sqrt(x * x + y * y)
+    if across < 1e-12:
+        return np.zeros(2)
+    return atan2(across, z) / across * np.array([-y, x])

@@ -1,0 +1,95 @@
+"""Relative motion without gravity and without singularity: state, derivative, Jacobians.
+
+The readable form, which the compiled one in `relative_kernels` is tested against.
+
+    p = ^c(CG),  R = ^cR_b,  u = ^cR_f d^f(CG)/dt = ^c v_{b/c} + ^c ω_{c/f} × p
+    ṗ = u − ω_c × p      u̇ = R f_b − f_c − ω_c × u      Ṙ = R [ω_b]× − [ω_c]× R
+
+Deviation from Eq. (8): u in place of ^c v_{b/c}, and both *specific forces* f, in which gravity is
+the same and cancels. So δ_c, the attitude of either device and roll-pitch-yaw leave the model; the
+inputs are the IMUs' samples less their biases. Errors: R = R̂ Exp(θ), the others add.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.frames import Array, cross, exp, skew
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Relative pose and velocity."""
+
+    p: Array
+    """(3,) of b in c [m]."""
+    R: Array
+    """(3, 3) ^cR_b."""
+    u: Array
+    """(3,) [m/s], in c."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Felt:
+    """What both IMUs would say without bias and noise."""
+
+    omega_b: Array
+    """(3,) [rad/s], in b."""
+    f_b: Array
+    """(3,) [m/s²], in b."""
+    omega_c: Array
+    """(3,) [rad/s], in c."""
+    f_c: Array
+    """(3,) [m/s²], in c."""
+
+
+def derivative(x: Motion, felt: Felt) -> Motion:
+    """(ṗ, Ṙ, u̇)."""
+    return Motion(
+        p=x.u - cross(felt.omega_c, x.p),
+        R=x.R @ skew(felt.omega_b) - skew(felt.omega_c) @ x.R,
+        u=x.R @ felt.f_b - felt.f_c - cross(felt.omega_c, x.u),
+    )
+
+
+def error_jacobian(x: Motion, felt: Felt) -> tuple[Array, Array]:
+    """∂(δṗ, θ̇, δu̇) with respect to (δp, θ, δu): (9, 9), and to the four inputs: (9, 12).
+
+    The inputs' order is that of `Felt`.
+    """
+    W_c = skew(felt.omega_c)
+    F, G = np.zeros((9, 9)), np.zeros((9, 12))
+    F[0:3, 0:3], F[0:3, 6:9] = -W_c, np.eye(3)
+    F[3:6, 3:6] = -skew(felt.omega_b)
+    F[6:9, 3:6], F[6:9, 6:9] = -x.R @ skew(felt.f_b), -W_c
+    G[0:3, 6:9] = skew(x.p)
+    G[3:6, 0:3], G[3:6, 6:9] = np.eye(3), -x.R.T
+    G[6:9, 3:6], G[6:9, 6:9], G[6:9, 9:12] = x.R, skew(x.u), -np.eye(3)
+    return F, G
+
+
+def step(x: Motion, felt: Felt, h: float) -> Motion:
+    """The motion `h` seconds later, inputs constant: midpoint rule with exact rotations."""
+    E, B = exp(-0.5 * h * felt.omega_c), exp(0.5 * h * felt.omega_b)
+    a = E @ x.R @ B @ felt.f_b - felt.f_c
+    return Motion(
+        p=E @ (E @ (x.p + h * x.u) + 0.5 * h * h * a),
+        R=E @ E @ x.R @ B @ B,
+        u=E @ (E @ x.u + h * a),
+    )
+
+
+def seen_at(x: Motion, led_in_b: Array) -> Array:
+    """Tangents (2,) q_y/q_x, q_z/q_x of an LED."""
+    q = x.p + x.R @ led_in_b
+    return np.array([q[1] / q[0], q[2] / q[0]])
+
+
+def seen_jacobian(x: Motion, felt: Felt, led_in_b: Array) -> tuple[Array, Array]:
+    """∂z/∂(δp, θ) (2, 6), and ∂z/∂t (2,) for a picture taken later."""
+    q = x.p + x.R @ led_in_b
+    D = np.array([[-q[1] / q[0], 1.0, 0.0], [-q[2] / q[0], 0.0, 1.0]]) / q[0]
+    q_rate = x.u - cross(felt.omega_c, q) + x.R @ cross(felt.omega_b, led_in_b)
+    return np.hstack((D, -D @ x.R @ skew(led_in_b))), D @ q_rate

@@ -1,0 +1,48 @@
+"""`lightleash experiments`: what the project claims, measured, as tables and pictures.
+
+One file per experiment, loaded only when asked for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Final, Protocol, cast
+
+EXPERIMENTS: Final = {
+    "loop": "tracking of the closed loop, in virtual time",
+    "tremor": "what of the hand's tremor the virtual camera lets through",
+    "margins": "what delay, gain and phase the control loops can lose, axis by axis",
+    "estimators": "where the robot is now: three estimators on the same data",
+}
+"""Name of the file, what it measures."""
+
+
+class Experiment(Protocol):
+    """What such a file has."""
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the options."""
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Measure, print, draw; the exit code tells whether it went well."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry of `lightleash experiments`."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    parser = argparse.ArgumentParser(
+        prog="lightleash experiments", description="Measure, print a table, draw a picture."
+    )
+    kinds = parser.add_subparsers(required=True, metavar="EXPERIMENT")
+    for name, measures in EXPERIMENTS.items():
+        one = kinds.add_parser(name, help=measures, description=measures)
+        if words[:1] == [name]:
+            experiment = cast(Experiment, import_module(f"server.experiments.{name}"))
+            experiment.add_arguments(one)
+            one.set_defaults(run=experiment.run)
+    arguments = parser.parse_args(words)
+    code: int = arguments.run(arguments)
+    return code

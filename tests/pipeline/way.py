@@ -1,0 +1,66 @@
+"""A state and its covariance on their way through the samples of two IMUs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.estimator_config import HandConfig, RelativeConfig
+from pipeline.frames import GRAVITY, R_from_rpy
+from pipeline.relative_kernels import INPUTS, X_BIASES, N, X, apply, transit
+from pipeline.relative_track import hand_of, noise_of, walks_of
+
+HELD = replace(RelativeConfig(), hand=replace(HandConfig(), slow=0.0))
+"""The phone's last sample is held: no expectation of a hand."""
+UP = np.array([0.0, 0.0, GRAVITY])
+BIAS = np.repeat((0.02, -0.3, 0.004, 0.1), 3)
+
+
+def samples(start, stop, period, seed, phase=0.0):
+    """(times, values) of an IMU on an unquiet hand."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(start + phase, stop, period)
+    waves = np.sin(rng.uniform(2.0, 9.0, 6) * t[:, None] + rng.uniform(0.0, 6.0, 6))
+    return t, waves * np.repeat((0.6, 1.5), 3) + np.append(np.zeros(3), UP)
+
+
+BODY, PHONE = samples(0.0, 1.0, 0.005, 1), samples(0.0, 1.0, 1 / 60, 2, 0.003)
+
+
+class Way:
+    """A state with its covariance, carried along samples."""
+
+    def __init__(self, config=HELD, body=BODY, phone=PHONE):
+        self.config, self.body, self.phone = config, body, phone
+        self.x, self.R, self.R_ic = np.zeros(X), R_from_rpy(np.array([0.1, -0.2, 0.4])), np.eye(3)
+        self.x[:6] = 2.5, 0.1, -0.2, 0.3, -0.1, 0.2
+        self.x[X_BIASES : X_BIASES + INPUTS] = BIAS
+        self.P = np.diag(
+            np.repeat((1e-3, 1e-3, 3e-2, 1e-2, 1e-1, 2e-3, 3e-2, 5e-3), (3,) * 7 + (1,)) ** 2
+        )
+        self.F, self.G, self.Q = np.empty((9, 9)), np.empty((9, 12)), np.empty((9, 9))
+
+    def go(self, start, stop):
+        """The count of steps."""
+        steps = transit(
+            self.x,
+            self.R,
+            self.R_ic,
+            self.F,
+            self.G,
+            self.Q,
+            (start, stop),
+            *self.body,
+            *self.phone,
+            noise_of(self.config),
+            hand_of(self.config.hand),
+            np.empty((13, 3, 3)),
+        )
+        apply(
+            self.P, self.F, self.G, self.Q, walks_of(self.config), stop - start, np.empty((2, 9, N))
+        )
+        return steps
+
+    def sigma(self, k):
+        return np.sqrt(np.diag(self.P)[k : k + 3].max())

@@ -1,0 +1,41 @@
+"""`lightleash experiments margins`: a row an axis, what arming says, a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from server.experiments import main
+
+
+def test_it_prints_every_axis_and_what_arming_says(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["margins", "--gains", "phone", "--latency-ms", "120"]) == 0
+    told = capsys.readouterr().out
+    rows = [line.split() for line in told.splitlines() if line.split()[:1] == ["phone"]]
+    assert [row[2] for row in rows] == 2 * ["x", "y", "z", "roll", "pitch", "yaw"]
+    assert all("unstable" in row for row in rows[6:])
+    assert not any("unstable" in row for row in rows[:6])
+    assert "arming with phone, relative: yes" in told
+    assert "arming with phone, none: Pictures are 120 ms old" in told
+
+
+def test_only_controlled_axes_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["margins", "ground", "--estimator", "paper"]) == 0
+    told = capsys.readouterr().out
+    axes = [line.split()[2] for line in told.splitlines() if line.split()[:1] == ["phone"]]
+    assert axes == ["x", "y", "yaw"]
+
+
+def test_an_unknown_gain_set_is_refused_with_those_there_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["margins", "--gains", "sport"]) == 1
+    assert "paper_with_ekf" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_it_draws(tmp_path: Path) -> None:
+    arguments = ["margins", "ground", "--gains", "phone", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    assert (tmp_path / "margins.png").stat().st_size > 10_000
