@@ -252,7 +252,9 @@ class RelativeFilter:
         return replace(
             known,
             time_offset=float(newest.x[X_OFFSET]),
-            time_offset_sigma=float(np.sqrt(newest.P[OFFSET, OFFSET])),
+            time_offset_sigma=np.inf
+            if self.complaint
+            else float(np.sqrt(newest.P[OFFSET, OFFSET])),
             bias_omega_b=biases[0],
             bias_a_b=biases[1],
             bias_omega_c=biases[2],

@@ -11,6 +11,7 @@ import signal
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import get_args
 
@@ -18,14 +19,16 @@ import msgspec
 import numpy as np
 
 from hardware.control_end import ControlEnd
+from hardware.dynamics import dynamics_of
 from hardware.robot_file import RobotFile, load_robot
 from hardware.udp_link import UdpFollower
 from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.estimators import warm_up
+from pipeline.latency_guard import LatencyGuard
 from pipeline.signals import BodyImu
 from server import realtime
 from server.control_link import Endpoint, control_end
-from server.controller import Controller
+from server.controller import Controller, TooLate
 from server.knobs import DEFAULT_KNOBS, Knobs
 from server.robot_link import RobotLink
 
@@ -95,6 +98,15 @@ def teleop_config(
     )
 
 
+def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate:
+    """Why not to arm with pictures and body samples of an age, by the margins of the loop."""
+    robot, plant = robot_file.robot, robot_file.plant
+    guard = LatencyGuard(
+        dynamics_of(robot, plant), robot.axes | robot.wrench_axes, robot_file.gains, config
+    )
+    return partial(guard.refusal, gains, config.estimator)
+
+
 def run(options: ControlOptions) -> None:
     """Keep the schedule until SIGTERM or SIGINT, then stop the robot."""
     robot_file = load_robot(options.robot)
@@ -105,7 +117,10 @@ def run(options: ControlOptions) -> None:
     granted = realtime.claim()
     late = options.real and not granted.startswith(realtime.GRANTED)
     controller = Controller(
-        robot_file.robot, config, f"No real robot with {granted}." if late else ""
+        robot_file.robot,
+        config,
+        f"No real robot with {granted}." if late else "",
+        too_late(robot_file, options.gains, config),
     )
     follower = UdpFollower(options.host, options.port, ControlEnd.of(robot_file))
     endpoint = control_end(options.runtime)

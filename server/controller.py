@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
 
 import numpy as np
@@ -30,12 +30,47 @@ SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
 
 
+TooLate = Callable[[float, float], str]
+
+
+def never_too_late(picture_age: float, body_age: float) -> str:
+    """Nobody knows the margins."""
+    return ""
+
+
+LATELY = 50
+
+
+class Mean:
+    """Of some dozens of values lately; 0 before the first."""
+
+    def __init__(self) -> None:
+        self.value = 0.0
+        self._count = 0
+
+    def add(self, value: float) -> None:
+        """Take another."""
+        self._count = min(self._count + 1, LATELY)
+        self.value += (value - self.value) / self._count
+
+
 class Controller:
     """One robot's control; everything it is told comes with a time."""
 
-    def __init__(self, robot: Robot, config: TeleopConfig, unfit: str = "") -> None:
-        """Disarmed, until somebody asks; `unfit` says why this process may never arm, if so."""
-        self._unfit = unfit
+    def __init__(
+        self,
+        robot: Robot,
+        config: TeleopConfig,
+        unfit: str = "",
+        too_late: TooLate = never_too_late,
+    ) -> None:
+        """Disarmed, until somebody asks.
+
+        `unfit` says why this process may never arm, if so; `too_late` why not with pictures and
+        body samples so old [s].
+        """
+        self._unfit, self._too_late = unfit, too_late
+        self._picture_age, self._body_age = Mean(), Mean()
         self.teleop = Teleop(robot, config)
         self._virtual_camera = config.virtual_camera
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
@@ -90,8 +125,11 @@ class Controller:
         )
         if output.relative is not None:
             self.omega_bf_in_b = output.relative.omega_bf_in_b
-        if seen:
-            self._fuse_ms = 1e3 * (now - seen[-1].t)
+        for one in seen:
+            self._fuse_ms = 1e3 * (now - one.t)
+            self._picture_age.add(now - one.t)
+        if body:
+            self._body_age.add(now - body[-1].t)
         return ThrustCommand(output.thrusts, output.armed), output
 
     def _sort(
@@ -122,7 +160,8 @@ class Controller:
     def _why_not(self, now: float, robot_reason: str) -> tuple[str, ...]:
         if now - self._t_ready > SERVER_SILENT_S:
             return ("The server is silent.",)
-        return (*self._refusals, *(why for why in (robot_reason, self._unfit) if why))
+        late = self._too_late(self._picture_age.value, self._body_age.value)
+        return (*self._refusals, *(why for why in (robot_reason, self._unfit, late) if why))
 
     def status(
         self,

@@ -24,6 +24,7 @@ from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, Mode, Operator, PhoneImu
 from pipeline.teleop import Output
+from server.control import too_late
 from server.control_link import (
     Input,
     OperatorInput,
@@ -31,7 +32,7 @@ from server.control_link import (
     ReadyInput,
     RequestInput,
 )
-from server.controller import Controller
+from server.controller import Controller, never_too_late
 from server.ingest import EncodedFrame, Ingest
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.robot_link import RobotLink
@@ -56,6 +57,8 @@ class Scene:
     frame_rate_hz: float = 30.0
     width: int = 1280
     height: int = 720
+    gains: str = ""
+    """Name of the gain set, if arming is to be refused where its margins say so."""
     codec: str = "h264"
     bitrate_bps: int = 3_000_000
     readout_s: float = 0.0
@@ -99,7 +102,8 @@ class Lockstep:
         """Everything at rest at time 0."""
         self.scene, self._config = scene, config
         self.follower = LockstepFollower(robot_file, scene.seed)
-        self.controller = Controller(robot_file.robot, config)
+        late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
+        self.controller = Controller(robot_file.robot, config, too_late=late)
         self.trace, self._axes = Trace(), robot_file.robot.axes
         self.lost: set[str] = set()
         """What of the phone does not arrive now: motion, picture, touch."""

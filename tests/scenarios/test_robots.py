@@ -39,7 +39,7 @@ def rms(rows: list[Array]) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("hand", "bound_mm"), [("moving", (25.0, 25.0, 12.0)), ("demo", (14.0, 14.0, 12.0))]
+    ("hand", "bound_mm"), [("moving", (20.0, 20.0, 13.0)), ("demo", (12.0, 12.0, 13.0))]
 )
 def test_the_quadrotor_takes_off_and_follows_in_x_y_z_and_yaw(
     hand: str, bound_mm: tuple[float, ...]
@@ -58,7 +58,7 @@ def test_the_quadrotor_takes_off_and_follows_in_x_y_z_and_yaw(
     assert np.mean(trace.saturated) < 0.01
 
 
-@pytest.mark.parametrize(("hand", "bound_mm"), [("moving", 15.0), ("demo", 12.0)])
+@pytest.mark.parametrize(("hand", "bound_mm"), [("moving", 9.0), ("demo", 7.0)])
 def test_the_ground_robot_follows_in_x_y_and_yaw_and_lets_the_rest_alone(
     hand: str, bound_mm: float
 ) -> None:
