@@ -8,7 +8,8 @@ from math import cos
 from pipeline import failsafe
 from pipeline.config import EnvelopeConfig
 from pipeline.pid import PoseError
-from pipeline.signals import RelativeState, VirtualView
+from pipeline.signals import VirtualView
+from pipeline.tracking import Situation
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,21 +34,20 @@ class Ages:
 def fault(
     limits: EnvelopeConfig,
     is_tracking: bool,
-    relative: RelativeState | None,
-    view: VirtualView | None,
+    known: Situation | None,
     error: PoseError | None,
 ) -> str:
     """What is not healthy in the estimate or in the flight; ends a flight."""
-    if relative is None:
+    if known is None:
         return "The estimate was lost." if is_tracking else "No estimate of the robot's pose yet."
-    if is_tracking and error is not None and view is not None:
-        return _outside(limits, error, view)
+    if is_tracking and error is not None:
+        return _outside(limits, error, known.view)
     return ""
 
 
-def doubt(limits: EnvelopeConfig, relative: RelativeState | None, complaint: str) -> str:
+def doubt(limits: EnvelopeConfig, known: Situation | None, complaint: str) -> str:
     """What holds a flight: the estimator's own covariance, or what it has against its inputs."""
-    if relative is not None and relative.sigma_p > limits.max_sigma_p_m:
+    if known is not None and known.relative.sigma_p > limits.max_sigma_p_m:
         return "The robot's place is too uncertain."
     return complaint
 

@@ -237,13 +237,13 @@ class RelativeFilter:
     def health(self) -> Health:
         """Telemetry."""
         fused = sum(count for fusion, count in self.pictures.items() if fusion)
-        chi2, freedom = np.sum(self._nis, axis=0) if self._nis else (np.nan, 1)
+        freedom = sum(dof for _, dof in self._nis)
         known = Health(
             fused=fused,
             dropped=self.pictures.total() - fused,
             late=self.pictures[Fusion.LATE],
             leds_rejected=self.leds_rejected,
-            nis=float(chi2 / freedom),
+            nis=sum(chi2 for chi2, _ in self._nis) / freedom if freedom else np.nan,
         )
         if not self._started:
             return known

@@ -11,11 +11,10 @@ from pipeline.actuation import Actuation
 from pipeline.attitude import Attitude
 from pipeline.config import TeleopConfig, VirtualCameraConfig
 from pipeline.estimators import make_estimator
-from pipeline.feedforward import FeedForward
 from pipeline.frames import Array
 from pipeline.hold import Hold
 from pipeline.judgement import Ages
-from pipeline.pid import Pid, PoseError, Reference, pose_error
+from pipeline.pid import PoseError, Reference, pose_error
 from pipeline.robot import Robot
 from pipeline.signals import (
     BodyImu,
@@ -27,6 +26,7 @@ from pipeline.signals import (
     Seen,
     VirtualView,
 )
+from pipeline.tracking import Situation, Tracking
 from pipeline.virtual_camera import VirtualCamera
 
 
@@ -78,9 +78,7 @@ class Teleop:
             config.failsafe, robot.ramp_s, coasts=config.estimator != "none"
         )
         self._virtual_camera = VirtualCamera(config.virtual_camera)
-        self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
-        self._feedforward = FeedForward(robot, config.feedforward)
-        self._hold = Hold(config.hold, robot)
+        self._tracking, self._hold = Tracking(robot, config, period), Hold(config.hold, robot)
         self._actuation = Actuation(robot, config)
         self._failsafe = failsafe.Failsafe()
         self._operator = Operator(-np.inf, held=False, press=0)
@@ -99,23 +97,24 @@ class Teleop:
         self._fuse(inputs)
         relative = self.estimator.state(inputs.t)  # Eq. (5)-(13)
         R_fc = self._R_fc_now(relative)
-        view = self._view(relative, R_fc)  # Eq. (21)-(24)
-        self._feel(relative, view)
-        error = self._error(view)  # Eq. (14)-(19)
+        known = self._look(relative, R_fc)  # Eq. (21)-(24)
+        if known is not None:
+            self._tracking.feel(known, self._given_in_b)
+        error = self._error(known)  # Eq. (14)-(19)
         ages = Ages(
             inputs.t - self._operator.t,
             inputs.t - self._t_seen,
             inputs.t - self._t_phone,
             inputs.t - self._body.t,
         )
-        judged = self._judge(inputs, relative, view, error, ages)
+        judged = self._judge(inputs, known, error, ages)
         before = self._failsafe.mode
         self._failsafe = failsafe.step(
             self._failsafe, judged, round(1e3 * self._period), self._limits
         )
         if self._failsafe.mode != before:
-            view, error = self._change_mode(before, relative, R_fc, view)
-        thrusts, saturated = self._act(relative, R_fc, view, error)
+            known, error = self._change_mode(before, known)
+        thrusts, saturated = self._act(known, error)
         self._given_in_b = self._robot.A[:3] @ thrusts
         return Output(
             t=inputs.t,
@@ -125,7 +124,7 @@ class Teleop:
             refusals=failsafe.refusals(self._failsafe, judged, self._limits),
             relative=relative,
             R_fc=R_fc,
-            view=view,
+            view=known.view if known is not None else None,
             reference=self._reference,
             error=error,
             saturated=saturated,
@@ -154,103 +153,71 @@ class Teleop:
             return self.attitude.R_fc
         return self.attitude.R_fc @ relative.R_ic
 
-    def _view(self, relative: RelativeState | None, R_fc: Array | None) -> VirtualView | None:
+    def _look(self, relative: RelativeState | None, R_fc: Array | None) -> Situation | None:
         """The robot from the virtual camera, a period later."""
         if relative is None or R_fc is None:
             return None
         p_ref_in_v = self._reference.p_rv_in_v if self._reference is not None else None
-        return self._virtual_camera.view(relative, R_fc, self._period, p_ref_in_v, self._half_field)
+        view = self._virtual_camera.view(relative, R_fc, self._period, p_ref_in_v, self._half_field)
+        return Situation(relative, R_fc, view)
 
-    def _feel(self, relative: RelativeState | None, view: VirtualView | None) -> None:
-        """Let the feed-forward follow what else pulls at the body, also before tracking."""
-        if relative is not None and view is not None:
-            R_fb = view.R_fv @ view.R_vb
-            self._feedforward.feel(relative.f_bf_in_b, R_fb, self._given_in_b, self._period)
-
-    def _error(self, view: VirtualView | None) -> PoseError | None:
-        if view is None or self._reference is None:
+    def _error(self, known: Situation | None) -> PoseError | None:
+        if known is None or self._reference is None:
             return None
-        return pose_error(view, self._reference, self._robot.axes)
+        return pose_error(known.view, self._reference, self._robot.axes)
 
     def _judge(
-        self,
-        inputs: Inputs,
-        relative: RelativeState | None,
-        view: VirtualView | None,
-        error: PoseError | None,
-        ages: Ages,
+        self, inputs: Inputs, known: Situation | None, error: PoseError | None, ages: Ages
     ) -> failsafe.Inputs:
         limits, is_tracking = self._config.envelope, self._failsafe.mode == Mode.TRACK
         return failsafe.Inputs(
             held=self._operator.held,
             press=self._operator.press,
-            fault=inputs.fault or judgement.fault(limits, is_tracking, relative, view, error),
-            doubt=judgement.doubt(limits, relative, self.estimator.complaint),
+            fault=inputs.fault or judgement.fault(limits, is_tracking, known, error),
+            doubt=judgement.doubt(limits, known, self.estimator.complaint),
             refusals=inputs.refusals,
             requests=inputs.requests,
             **ages.in_ms(),
         )
 
     def _change_mode(
-        self,
-        before: Mode,
-        relative: RelativeState | None,
-        R_fc: Array | None,
-        view: VirtualView | None,
-    ) -> tuple[VirtualView | None, PoseError | None]:
+        self, before: Mode, known: Situation | None
+    ) -> tuple[Situation | None, PoseError | None]:
         """Bumpless: tracking starts where the robot is, holding starts from what tracking did."""
         mode = self._failsafe.mode
-        if mode == Mode.TRACK and relative is not None and R_fc is not None:
+        if mode == Mode.TRACK and known is not None:
             self._reference = None
             self._virtual_camera.reset()
-            view = self._virtual_camera.view(relative, R_fc, self._period)
-            self._reference = Reference.here(view)
-            self._feedforward.start()
-            if before == Mode.HOLD:
-                self._pid.take_over(view.R_fv @ view.R_vb @ self._force_in_b)
-            return view, self._error(view)
-        if before == Mode.TRACK and view is not None and relative is not None and R_fc is not None:
-            u_in_f, learnt_in_f = R_fc @ relative.u_bf_in_c, self._pid.constant_force_in_f
-            self._hold.start(self._force_in_b, view.R_fv @ view.R_vb, u_in_f, learnt_in_f)
+            known = self._look(known.relative, known.R_fc) or known
+            self._reference = Reference.here(known.view)
+            held_in_f = known.view.R_fv @ known.view.R_vb @ self._force_in_b
+            self._tracking.start(held_in_f if before == Mode.HOLD else None)
+            return known, self._error(known)
+        if before == Mode.TRACK and known is not None:
+            R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
+            self._hold.start(self._force_in_b, R_fb, u_in_f, self._tracking.constant_force_in_f)
         if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
-            self._pid.reset()
+            self._tracking.reset()
         self._reference = None
-        return view, None
+        return known, None
 
-    def _act(
-        self,
-        relative: RelativeState | None,
-        R_fc: Array | None,
-        view: VirtualView | None,
-        error: PoseError | None,
-    ) -> tuple[Array, bool]:
+    def _act(self, known: Situation | None, error: PoseError | None) -> tuple[Array, bool]:
         """Wrench of the mode, given by the thrusters, under the failsafe's ceiling."""
-        if self._failsafe.mode == Mode.TRACK and view is not None and error is not None:
-            R_fb, omega_bf_in_b = view.R_fv @ view.R_vb, view.omega_bf_in_b
-            wrench_in_b = self._pid.wrench(error, view) + self._ahead(relative, R_fc, view)
-            self._hold.learn(self._body.omega_m_bf_in_b - omega_bf_in_b, self._period)
-        elif self._failsafe.mode in (Mode.HOLD, Mode.RAMP):
-            wrench_in_b = self._hold.wrench(self._body.omega_m_bf_in_b, self._period)
-            R_fb, omega_bf_in_b = self._hold.R_fb, self._body.omega_m_bf_in_b
+        mode, reference = self._failsafe.mode, self._reference
+        omega_m_bf_in_b = self._body.omega_m_bf_in_b
+        if mode == Mode.TRACK and known and reference and error:
+            R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
+            wrench_in_b = self._tracking.wrench(known, reference, error)  # Eq. (20)
+            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._period)
+        elif mode in (Mode.HOLD, Mode.RAMP):
+            wrench_in_b = self._hold.wrench(omega_m_bf_in_b, self._period)
+            R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
         else:
             return np.zeros(self._robot.A.shape[1]), False
         given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
         self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
-        if error is not None and view is not None:
-            self._pid.integrate(error, view, given.missing_in_b, self._period)
+        if error is not None and known is not None:
+            self._tracking.learn(error, known.view, given.missing_in_b)
         if not np.isfinite(given.thrusts).all():
             return np.zeros_like(given.thrusts), True
         return given.thrusts * failsafe.ceiling(self._failsafe, self._limits), given.saturated
-
-    def _ahead(
-        self, relative: RelativeState | None, R_fc: Array | None, view: VirtualView
-    ) -> Array:
-        """Feed-forward of the hand's motion (6,), if it is wanted."""
-        reference = self._reference
-        if reference is None or relative is None or R_fc is None:
-            return np.zeros(6)
-        if not self._config.feedforward.enabled:
-            return np.zeros(6)
-        p_rv_in_v = reference.p_rv_in_v
-        wrench_in_b = self._feedforward.wrench(relative, R_fc, view, p_rv_in_v, self._period)
-        return wrench_in_b if self._robot.needs_tilt else wrench_in_b * self._robot.axes

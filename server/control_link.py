@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.expected import Expected
 from pipeline.frames import R_from_wxyz
 from pipeline.signals import Operator, PhoneImu
+from server.estimate import EstimateFields
 from server.knobs import Knobs, TuneInput
 from server.seen_input import SeenInput, Triple, triple
 
@@ -141,6 +142,7 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Of the virtual camera, as they stand."""
     guarding: float = 0.0
     """0 to 1: how much the virtual camera hurries to keep the robot in the picture."""
+    estimate: EstimateFields | None = None
 
 
 def expected_of(status: ControlStatus) -> Expected | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from math import isfinite
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from server.control_link import (
     ReadyInput,
     RequestInput,
 )
+from server.estimate import EstimateFields, finite
 from server.knobs import Knobs, TuneInput, turned
 from server.seen_input import SeenInput, triple
 
@@ -73,6 +73,7 @@ class Controller:
         self._picture_age, self._body_age = Mean(), Mean()
         self.teleop = Teleop(robot, config)
         self._virtual_camera = config.virtual_camera
+        self._estimator_name = config.estimator
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
         self._vertical = Vertical()
@@ -175,7 +176,8 @@ class Controller:
         """All that a supervisor may want to know, and the body's samples since the last one."""
         relative, view = output.relative, output.view
         reference, error = output.reference, output.error
-        health = self.teleop.estimator.health
+        estimator = self.teleop.estimator
+        health = estimator.health
         samples, self._body_samples = self._body_samples, []
         return ControlStatus(
             t=output.t,
@@ -199,7 +201,7 @@ class Controller:
             u_bf_in_c=triple(relative.u_bf_in_c) if relative else None,
             sigma_p=relative.sigma_p if relative else None,
             sigma_theta=relative.sigma_theta if relative else None,
-            time_offset=health.time_offset if isfinite(health.time_offset) else None,
+            time_offset=finite(health.time_offset),
             thrusts=output.thrusts.tolist(),
             saturated=output.saturated,
             up_in_b=triple(self.up_in_b) if self.up_in_b is not None else None,
@@ -214,6 +216,7 @@ class Controller:
             step_ms=step_ms,
             knobs=Knobs.of(self._virtual_camera),
             guarding=view.guarding if view else 0.0,
+            estimate=EstimateFields.of(self._estimator_name, estimator, health, relative),
         )
 
 

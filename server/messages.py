@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from pipeline.config import VirtualCameraMode
+from pipeline.config import EstimatorName, VirtualCameraMode
 from server.knobs import AdaptiveBeta, CutoffHz, Knobs, SpeedLimit
 from server.wire import MAX_MESSAGE_BYTES, WireError
 
@@ -108,6 +108,43 @@ class VirtualCamera(msgspec.Struct, frozen=True):
     """0 to 1: how much it hurries now."""
 
 
+class Estimate(msgspec.Struct, frozen=True):
+    """What the estimator of the relative motion says of itself; counts are since the start.
+
+    The standard deviation of the position is `sigma_mm` of the status.
+    """
+
+    name: EstimatorName
+    complaint: str
+    """Why nobody should fly on the estimate, or ""."""
+    nis: float | None
+    """Normalised innovation squared per degree of freedom, lately: 1 is honest, 0.5 to 2 fine."""
+    age_ms: float | None
+    """Of the last picture that was fused; None while nothing is known."""
+    fused: int
+    """Pictures the estimate rested on."""
+    dropped: int
+    """The other pictures."""
+    late: int
+    """Of these, older than the horizon."""
+    leds_rejected: int
+    """Single LEDs beyond their gate."""
+    time_offset_ms: float | None
+    """A picture was taken at its stamp plus this."""
+    time_offset_sigma_ms: float | None
+    """Standard deviation; None while it can't be believed."""
+    sigma_deg: float | None
+    """Largest standard deviation of the attitude."""
+    bias_body_deg_s: list[float] | None
+    """Of the body's gyroscope, in the body's axes."""
+    bias_body_m_s2: list[float] | None
+    """Of the body's accelerometer."""
+    bias_phone_deg_s: list[float] | None
+    """Of the phone's gyroscope, in the camera's axes."""
+    bias_phone_m_s2: list[float] | None
+    """Of the phone's accelerometer."""
+
+
 class Status(msgspec.Struct, tag="status", frozen=True):
     """Server → page, 10 Hz: the truth about the robot, on every screen."""
 
@@ -147,6 +184,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     messages: list[str]
     """The newest events, newest first."""
     virtual_camera: VirtualCamera | None = None
+    """None before the control process has told of it."""
+    estimate: Estimate | None = None
     """None before the control process has told of it."""
 
 

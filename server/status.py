@@ -10,7 +10,7 @@ from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.clock import now
 from server.control_link import ControlStatus
-from server.messages import Status, Stream, VirtualCamera
+from server.messages import Estimate, Status, Stream, VirtualCamera
 from server.meter import Meter
 from server.operator import OperatorPhone
 from server.recorder import Recordings
@@ -74,6 +74,7 @@ def build(hub: Known) -> Status:
         control=_control(control),
         messages=list(hub.events),
         virtual_camera=_virtual_camera(control),
+        estimate=_estimate(control),
     )
 
 
@@ -99,6 +100,33 @@ def _virtual_camera(control: ControlStatus | None) -> VirtualCamera | None:
         lag_deg=_rounded(lag, 1, degrees(1.0)),
         guarding=round(control.guarding, 2),
     )
+
+
+def _estimate(control: ControlStatus | None) -> Estimate | None:
+    if control is None or control.estimate is None:
+        return None
+    told, deg = control.estimate, degrees(1.0)
+    return Estimate(
+        name=told.name,
+        complaint=told.complaint,
+        nis=_rounded(told.nis, 2),
+        age_ms=_rounded(told.age, 1, 1e3),
+        fused=control.poses_fused,
+        dropped=control.poses_dropped,
+        late=told.late,
+        leds_rejected=told.leds_rejected,
+        time_offset_ms=_rounded(control.time_offset, 2, 1e3),
+        time_offset_sigma_ms=_rounded(told.time_offset_sigma, 2, 1e3),
+        sigma_deg=_rounded(control.sigma_theta, 2, deg),
+        bias_body_deg_s=_each(told.bias_omega_b, 2, deg),
+        bias_body_m_s2=_each(told.bias_a_b, 3),
+        bias_phone_deg_s=_each(told.bias_omega_c, 2, deg),
+        bias_phone_m_s2=_each(told.bias_a_c, 3),
+    )
+
+
+def _each(values: Sequence[float] | None, digits: int, scale: float = 1.0) -> list[float] | None:
+    return None if values is None else [round(scale * value, digits) for value in values]
 
 
 def _control(control: ControlStatus | None) -> dict[str, float]:

@@ -37,6 +37,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Stream,
     knobs.Knobs,
     messages.VirtualCamera,
+    messages.Estimate,
     messages.Status,
 )
 UNIONS = {"FromPage": messages.FromPage, "ToPage": messages.ToPage}

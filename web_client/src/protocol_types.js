@@ -90,6 +90,26 @@
  */
 
 /**
+ * What the estimator of the relative motion says of itself; counts are since the start. The standard deviation of the position is `sigma_mm` of the status.
+ * @typedef {object} Estimate
+ * @property {'relative' | 'paper' | 'none'} name
+ * @property {string} complaint Why nobody should fly on the estimate, or "".
+ * @property {number | null} nis Normalised innovation squared per degree of freedom, lately: 1 is honest, 0.5 to 2 fine.
+ * @property {number | null} age_ms Of the last picture that was fused; null while nothing is known.
+ * @property {number} fused Pictures the estimate rested on.
+ * @property {number} dropped The other pictures.
+ * @property {number} late Of these, older than the horizon.
+ * @property {number} leds_rejected Single LEDs beyond their gate.
+ * @property {number | null} time_offset_ms A picture was taken at its stamp plus this.
+ * @property {number | null} time_offset_sigma_ms Standard deviation; null while it can't be believed.
+ * @property {number | null} sigma_deg Largest standard deviation of the attitude.
+ * @property {number[] | null} bias_body_deg_s Of the body's gyroscope, in the body's axes.
+ * @property {number[] | null} bias_body_m_s2 Of the body's accelerometer.
+ * @property {number[] | null} bias_phone_deg_s Of the phone's gyroscope, in the camera's axes.
+ * @property {number[] | null} bias_phone_m_s2 Of the phone's accelerometer.
+ */
+
+/**
  * Server → page, 10 Hz: the truth about the robot, on every screen.
  * @typedef {object} Status
  * @property {'status'} type
@@ -115,6 +135,7 @@
  * @property {Record<string, number>} control Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms.
  * @property {string[]} messages The newest events, newest first.
  * @property {VirtualCamera | null} virtual_camera null before the control process has told of it.
+ * @property {Estimate | null} estimate null before the control process has told of it.
  */
 
 /** @typedef {Hello | Command | Tune | Log} FromPage */

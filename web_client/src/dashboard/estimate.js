@@ -1,0 +1,103 @@
+/** What the estimator says of itself: numbers, and in words what of it should worry. */
+
+/** @import {Estimate} from '../protocol_types.js' */
+/** @import {Board, Sample} from './model.js' */
+
+import { Elements, write } from './elements.js';
+import { age, number, signed } from './format.js';
+
+/** NIS per degree of freedom beyond which the estimate is surer, or less sure, than it should be. */
+const HONEST = { least: 0.5, most: 2 };
+/** Samples of the history over which rejected LEDs are counted: two seconds. */
+const LATELY = 20;
+/** So many of them lately are more than chance: of good ones, the gate refuses one in a thousand. */
+const RISING = 5;
+
+/** @typedef {'nis' | 'rejected' | 'complaint'} Worry */
+
+/**
+ * LEDs rejected lately; 0 if the count began anew.
+ * @param {readonly Sample[]} history
+ */
+export function rejectedLately(history) {
+  const counts = history.slice(-LATELY - 1).map((sample) => sample.rejected);
+  return Math.max(0, (counts.at(-1) ?? 0) - (counts.find((count) => count !== null) ?? 0));
+}
+
+/**
+ * What should worry, in words, the worst first.
+ * @param {Estimate} estimate
+ * @param {readonly Sample[]} history
+ * @returns {Map<Worry, string>}
+ */
+export function worries({ complaint, nis }, history) {
+  /** @type {Map<Worry, string>} */
+  const found = new Map();
+  if (complaint !== '') found.set('complaint', complaint);
+  if (nis !== null && nis > HONEST.most) found.set('nis', 'Pictures surprise it: it knows less than it says.');
+  if (nis !== null && nis < HONEST.least) found.set('nis', 'Pictures fit too well: it knows more than it says.');
+  const rejected = rejectedLately(history);
+  if (rejected >= RISING) found.set('rejected', `${rejected} lights rejected within 2 s.`);
+  return found;
+}
+
+export class EstimatePanel extends Elements {
+  /** @param {Board} board */
+  render({ heard, status, history }) {
+    const estimate = heard ? status?.estimate ?? null : null;
+    const worry = estimate === null ? new Map() : worries(estimate, history);
+    this.text('estimator', estimate?.name ?? '–');
+    this.text('worry', estimate === null ? '' : [...worry.values()].join(' ') || 'All as expected');
+    this.find('worry').className = worry.size > 0 ? 'worry' : 'worry fine';
+    this.figure('NIS / dof', number(estimate?.nis, 2), '', worry.has('nis'));
+    this.figure('Picture age', age(estimate?.age_ms ?? null), '');
+    this.figure('Rejected', number(estimate?.leds_rejected), '', worry.has('rejected'));
+    this.figure('Fused', number(estimate?.fused), '');
+    this.figure('Dropped', number(estimate?.dropped), '');
+    this.figure('Late', number(estimate?.late), '');
+    this.figure('Offset', signed(estimate?.time_offset_ms, 1), 'ms', worry.has('complaint'));
+    this.figure('σ offset', number(estimate?.time_offset_sigma_ms, 2), 'ms');
+    this.figure('σ place', number(estimate && status?.sigma_mm, 1), 'mm');
+    this.figure('σ attitude', number(estimate?.sigma_deg, 2), '°');
+    this.bias('Robot gyro', estimate?.bias_body_deg_s, '°/s', 2);
+    this.bias('Robot accel.', estimate?.bias_body_m_s2, 'm/s²', 3);
+    this.bias('Phone gyro', estimate?.bias_phone_deg_s, '°/s', 2);
+    this.bias('Phone accel.', estimate?.bias_phone_m_s2, 'm/s²', 3);
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} value
+   * @param {string} unit
+   * @param {boolean} worrying
+   */
+  figure(name, value, unit, worrying = false) {
+    this.put('estimate', name, value, unit).classList.toggle('worrying', worrying);
+  }
+
+  /**
+   * @param {string} name
+   * @param {number[] | null | undefined} xyz
+   * @param {string} unit
+   * @param {number} decimals
+   */
+  bias(name, xyz, unit, decimals) {
+    this.put('biases', name, xyz ? xyz.map((value) => signed(value, decimals)).join('  ') : '–', unit);
+  }
+
+  /**
+   * @param {string} list
+   * @param {string} name
+   * @param {string} value
+   * @param {string} unit
+   */
+  put(list, name, value, unit) {
+    const row = this.row(list, name, 'div', () => {
+      const figure = this.make('dd', '');
+      figure.append(this.make('span', ''), this.make('small', unit));
+      return [this.make('dt', name), figure];
+    });
+    write(row.lastElementChild?.firstElementChild, value);
+    return row;
+  }
+}
