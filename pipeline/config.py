@@ -101,7 +101,7 @@ class MarginsConfig:
 class ComplianceConfig:
     """How hard the robot may push against an obstacle."""
 
-    enabled: bool = True
+    enabled: bool = False
     limit_n: float = 3.0
     """Beyond what has held it lately [N]."""
     usual_s: float = 10.0

@@ -119,7 +119,7 @@ class RelativeConfig:
     initial_f_b: float = 0.3
     initial_omega_c: float = 0.005
     initial_f_c: float = 0.1
-    initial_offset: float = 0.04
+    initial_offset: float = 0.02
     """Of the pictures' stamps [s]."""
     start_doubt: float = 2.0
     """So many times its own sigmas a starting pose may be wrong."""

@@ -26,6 +26,8 @@ MAX_STEP_S = 0.01
 DOUBT_STEPS = 4
 LASTING = 1.2
 """Of d/dt (∫ σ dt)²: 2 for an error that keeps its sign; a tremor's does so for half a period."""
+LASTING = 1.2
+"""Of d/dt (∫ σ dt)²: 2 for an error that keeps its sign; a tremor's does so for half a period."""
 
 
 @kernel
@@ -168,9 +170,9 @@ def transit(
                     taps = learn(t_c, v_c, x[X_BIASES + 6 : X_BIASES + 9], hand, L, alpha)
                     doubt = 0.0 if t <= t_c[last] else _doubt(t_c, taps, t, hand, L, alpha, turn_c)
                 sigma = foresee(t_c, taps, middle, hand, L, alpha, inputs[6:9])
-                for k in range(6, 9):  # not drift, but d/dt of (∫ σ dt)²: an error that lasts
+                for k in range(6, 9):  # in place of the drift
                     s[k] -= (noise[1, 2, 0] * beyond) ** 2 * beyond
-                    s[k] += 2.0 * sigma * (doubt + 0.5 * h * sigma)
+                    s[k] += LASTING * sigma * (doubt + 0.5 * h * sigma)
                 doubt += h * sigma
             step(x, R, inputs, h, w, f, g)
             gather(F, G, Q, f, g, s, h, scratch)

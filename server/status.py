@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from math import acos, degrees
+from math import acos, degrees, isfinite
 from typing import Literal, Protocol, cast
 
 from pipeline.robot import Robot
@@ -85,7 +85,7 @@ def _reason(control: ControlStatus | None, lost: bool) -> str:
 
 
 def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | None:
-    return None if value is None else round(scale * value, digits)
+    return None if value is None or not isfinite(value) else round(scale * value, digits)
 
 
 def _virtual_camera(control: ControlStatus | None) -> VirtualCamera | None:

@@ -46,7 +46,8 @@ def test_a_turned_hand_swings_it_about_the_camera_after_the_low_pass():
 
 
 def test_without_a_low_pass_it_is_rigid_with_the_hand():
-    intent, hand = Intent(replace(VirtualCameraConfig(), mode="off", max_speed_m_s=0.0), HAND, BODY), turned(0.1)
+    free = replace(VirtualCameraConfig(), mode="off", max_speed_m_s=0.0)
+    intent, hand = Intent(free, HAND, BODY), turned(0.1)
     R_fr, p_rf_in_f = intent.step(hand, H)
     np.testing.assert_allclose(R_fr, hand[0] @ BODY[0], atol=1e-9)
     np.testing.assert_allclose(p_rf_in_f, HAND[1] + hand[0] @ (BODY[1] - HAND[1]), atol=1e-9)

@@ -1,6 +1,6 @@
 /** Stand-ins for what a browser gives: a clock with timers, a websocket, a server. */
 
-/** @import {Status} from '../src/protocol_types.js' */
+/** @import {Estimate, Status} from '../src/protocol_types.js' */
 
 /** A clock that moves only when told, and its timers. */
 export class FakeTime {
@@ -103,8 +103,20 @@ export function statusOf(parts = {}) {
   return {
     type: 'status', mode: 'DISARMED', reason: '', ready: false, refusals: [], robot: 'ames', operator: '',
     streams: {}, latency_ms: {}, leds: 0, reprojection_px: null, position_mm: null, error_mm: null,
-    error_deg: null, sigma_mm: null, saturated: false, virtual_camera: null, recording: '', phones: 0, supervisors: 0, realtime: '',
+    error_deg: null, sigma_mm: null, saturated: false, virtual_camera: null, estimate: null, recording: '', phones: 0, supervisors: 0, realtime: '',
     control: {}, messages: [], ...parts,
+  };
+}
+
+/**
+ * @param {Partial<Estimate>} parts
+ * @returns {Estimate}
+ */
+export function estimateOf(parts = {}) {
+  return {
+    name: 'relative', complaint: '', nis: 1, age_ms: 90, fused: 100, dropped: 2, late: 1, leds_rejected: 0,
+    time_offset_ms: 0, time_offset_sigma_ms: 0.3, sigma_deg: 0.2, bias_body_deg_s: [0, 0, 0], bias_body_m_s2: [0, 0, 0],
+    bias_phone_deg_s: [0, 0, 0], bias_phone_m_s2: [0, 0, 0], ...parts,
   };
 }
 

@@ -34,6 +34,23 @@ export class Elements {
   }
 
   /**
+   * A number with its name and unit.
+   * @param {string} list
+   * @param {string} name
+   * @param {string} value
+   * @param {string} unit
+   */
+  figure(list, name, value, unit) {
+    const row = this.row(list, name, 'div', () => {
+      const figure = this.make('dd', '');
+      figure.append(this.make('span', ''), this.make('small', unit));
+      return [this.make('dt', name), figure];
+    });
+    write(row.lastElementChild?.firstElementChild, value);
+    return row;
+  }
+
+  /**
    * @param {string} tag
    * @param {string} text
    */

@@ -3,8 +3,8 @@
 /** @import {Estimate} from '../protocol_types.js' */
 /** @import {Board, Sample} from './model.js' */
 
-import { Elements, write } from './elements.js';
-import { age, number, signed } from './format.js';
+import { Elements } from './elements.js';
+import { number, signed } from './format.js';
 
 /** NIS per degree of freedom beyond which the estimate is surer, or less sure, than it should be. */
 const HONEST = { least: 0.5, most: 2 };
@@ -47,18 +47,18 @@ export class EstimatePanel extends Elements {
     const estimate = heard ? status?.estimate ?? null : null;
     const worry = estimate === null ? new Map() : worries(estimate, history);
     this.text('estimator', estimate?.name ?? '–');
-    this.text('worry', estimate === null ? '' : [...worry.values()].join(' ') || 'All as expected');
+    this.text('worry', estimate === null ? '' : [...worry.values()].join(' ') || 'All as expected.');
     this.find('worry').className = worry.size > 0 ? 'worry' : 'worry fine';
-    this.figure('NIS / dof', number(estimate?.nis, 2), '', worry.has('nis'));
-    this.figure('Picture age', age(estimate?.age_ms ?? null), '');
-    this.figure('Rejected', number(estimate?.leds_rejected), '', worry.has('rejected'));
-    this.figure('Fused', number(estimate?.fused), '');
-    this.figure('Dropped', number(estimate?.dropped), '');
-    this.figure('Late', number(estimate?.late), '');
-    this.figure('Offset', signed(estimate?.time_offset_ms, 1), 'ms', worry.has('complaint'));
-    this.figure('σ offset', number(estimate?.time_offset_sigma_ms, 2), 'ms');
-    this.figure('σ place', number(estimate && status?.sigma_mm, 1), 'mm');
-    this.figure('σ attitude', number(estimate?.sigma_deg, 2), '°');
+    this.put('NIS / dof', number(estimate?.nis, 2), '', worry.has('nis'));
+    this.put('Picture age', number(estimate?.age_ms), 'ms');
+    this.put('Rejected', number(estimate?.leds_rejected), '', worry.has('rejected'));
+    this.put('Fused', number(estimate?.fused), '');
+    this.put('Dropped', number(estimate?.dropped), '');
+    this.put('Late', number(estimate?.late), '');
+    this.put('Offset', signed(estimate?.time_offset_ms, 1), 'ms', worry.has('complaint'));
+    this.put('σ offset', number(estimate?.time_offset_sigma_ms, 2), 'ms');
+    this.put('σ position', number(estimate && status?.sigma_mm, 1), 'mm');
+    this.put('σ attitude', number(estimate?.sigma_deg, 2), '°');
     this.bias('Robot gyro', estimate?.bias_body_deg_s, '°/s', 2);
     this.bias('Robot accel.', estimate?.bias_body_m_s2, 'm/s²', 3);
     this.bias('Phone gyro', estimate?.bias_phone_deg_s, '°/s', 2);
@@ -71,8 +71,8 @@ export class EstimatePanel extends Elements {
    * @param {string} unit
    * @param {boolean} worrying
    */
-  figure(name, value, unit, worrying = false) {
-    this.put('estimate', name, value, unit).classList.toggle('worrying', worrying);
+  put(name, value, unit, worrying = false) {
+    this.figure('estimate', name, value, unit).classList.toggle('worrying', worrying);
   }
 
   /**
@@ -82,22 +82,6 @@ export class EstimatePanel extends Elements {
    * @param {number} decimals
    */
   bias(name, xyz, unit, decimals) {
-    this.put('biases', name, xyz ? xyz.map((value) => signed(value, decimals)).join('  ') : '–', unit);
-  }
-
-  /**
-   * @param {string} list
-   * @param {string} name
-   * @param {string} value
-   * @param {string} unit
-   */
-  put(list, name, value, unit) {
-    const row = this.row(list, name, 'div', () => {
-      const figure = this.make('dd', '');
-      figure.append(this.make('span', ''), this.make('small', unit));
-      return [this.make('dt', name), figure];
-    });
-    write(row.lastElementChild?.firstElementChild, value);
-    return row;
+    this.figure('biases', name, xyz ? xyz.map((value) => signed(value, decimals)).join(' ') : '–', unit);
   }
 }

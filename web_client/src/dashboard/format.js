@@ -9,6 +9,17 @@ export function number(value, decimals = 0) {
 }
 
 /**
+ * A number that may be on either side of zero, with a sign as wide as the other.
+ * @param {number | null | undefined} value
+ * @param {number} decimals
+ */
+export function signed(value, decimals = 0) {
+  const text = number(value, decimals);
+  if (text === '–') return text;
+  return text.startsWith('-') ? text.replace('-', '−') : `+${text}`;
+}
+
+/**
  * A span of time in the unit that reads best.
  * @param {number | null} ms
  */

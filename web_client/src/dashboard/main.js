@@ -7,6 +7,7 @@
 
 import { browserOf } from '../browser.js';
 import { BoardView } from './view.js';
+import { EstimatePanel } from './estimate.js';
 import { EMPTY, reduce } from './model.js';
 import { KnobPanel } from './knobs.js';
 import { Link, socketUrl } from '../link.js';
@@ -51,6 +52,7 @@ const view = new BoardView(document, {
   onReload: () => window.location.reload(),
 });
 const knobs = new KnobPanel(document, (tune) => void link.sendMessage(tune), () => performance.now());
+const estimate = new EstimatePanel(document);
 const card = new PhoneCard(document, URL, fetchInvite);
 
 /** @param {Event} event */
@@ -62,6 +64,7 @@ function dispatch(event) {
     shown = false;
     const { problem } = board;
     view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
+    estimate.render(board);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);
     view.text('virtual', isVirtual() ? 'Stop virtual phone' : 'Start virtual phone');
   });

@@ -10,7 +10,10 @@ import { STATUS_LIFE_MS } from '../session.js';
 export const REMEMBERED = 200;
 const NOTICE_MS = 5000;
 
-/** @typedef {{ errorMm: number | null, errorDeg: number | null, sigmaMm: number | null }} Sample */
+/**
+ * @typedef {{ errorMm: number | null, errorDeg: number | null, sigmaMm: number | null,
+ *   rejected: number | null }} Sample
+ */
 
 /**
  * @typedef {object} Board
@@ -75,7 +78,12 @@ export function reduce(board, event) {
  * @returns {Board}
  */
 function heardFrom(board, status, now) {
-  const sample = { errorMm: status.error_mm, errorDeg: status.error_deg, sigmaMm: status.sigma_mm };
+  const sample = {
+    errorMm: status.error_mm,
+    errorDeg: status.error_deg,
+    sigmaMm: status.sigma_mm,
+    rejected: status.estimate?.leds_rejected ?? null,
+  };
   return {
     ...board,
     status,

@@ -169,19 +169,4 @@ export class BoardView extends Elements {
     this.figure('control', 'p99.9', number(control.p999_ms, 2), 'ms');
     this.figure('control', 'Missed', number(control.missed), '');
   }
-
-  /**
-   * @param {string} list
-   * @param {string} name
-   * @param {string} value
-   * @param {string} unit
-   */
-  figure(list, name, value, unit) {
-    const row = this.row(list, name, 'div', () => {
-      const figure = this.make('dd', '');
-      figure.append(this.make('span', ''), this.make('small', unit));
-      return [this.make('dt', name), figure];
-    });
-    write(row.lastElementChild?.firstElementChild, value);
-  }
 }
