@@ -17,6 +17,7 @@ from hardware.robot_file import load_robot
 from server.app import Api, make_app
 from server.clock import now
 from server.control_link import ControlStatus, Input, RequestInput, control_end
+from server.estimate import EstimateFields
 from server.hub import Hub
 from server.listener import listener
 from server.phone_script import DEVICE
@@ -57,6 +58,22 @@ def control_status(**changes: object) -> ControlStatus:
         "guarding": 0.0,
     }
     return ControlStatus(**{**values, **changes})  # type: ignore[arg-type]
+
+
+def estimate_fields(**changes: object) -> EstimateFields:
+    """What an estimator that flies says of itself."""
+    values: dict[str, object] = {
+        "name": "relative",
+        "complaint": "",
+        "late": 3,
+        "leds_rejected": 7,
+        "nis": 1.25,
+        "age": 0.0871,
+        "time_offset_sigma": 0.0004,
+        **dict.fromkeys(("bias_omega_b", "bias_omega_c"), (0.01, 0.0, -0.02)),
+        **dict.fromkeys(("bias_a_b", "bias_a_c"), (0.1, 0.0, -0.2)),
+    }
+    return EstimateFields(**{**values, **changes})  # type: ignore[arg-type]
 
 
 class Talker:

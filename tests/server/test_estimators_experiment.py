@@ -22,6 +22,7 @@ from server.seen_input import SeenInput
 DATA = Path(__file__).parents[1] / "data"
 
 
+@pytest.mark.slow
 def test_simulated_all_three_are_measured_against_the_bound(tmp_path, capsys):
     words = ["estimators", "--seeds", "1", "--seconds", "3", "--fps", "20", "--out", str(tmp_path)]
     assert main(words) == 0
@@ -35,6 +36,7 @@ def test_simulated_all_three_are_measured_against_the_bound(tmp_path, capsys):
     assert (tmp_path / "estimators.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_recording_is_played_to_all_three(tmp_path, capsys):
     words = ["estimators", "--recording", str(DATA / "virtual_phone.mcap"), "--out", str(tmp_path)]
     assert main(words) == 0

@@ -7,7 +7,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from pipeline.signals import Mode
 from server.metrics import exposition
-from tests.server.house import control_status, house_in
+from tests.server.house import control_status, estimate_fields, house_in
 
 
 @pytest.fixture
@@ -57,3 +57,34 @@ def test_what_is_not_known_is_left_out(hub):
     found = samples(hub)
     assert ("lightleash_error_metres",) not in found
     assert ("lightleash_stream_age_seconds", "body_imu") not in found
+
+
+def test_the_estimators_telemetry_is_told_in_si_units(hub):
+    tell(
+        hub,
+        estimate=estimate_fields(complaint="Restart the camera.", bias_omega_c=(0.0, -0.02, 0.0)),
+        poses_fused=90,
+        poses_dropped=4,
+        time_offset=-0.012,
+        sigma_p=0.003,
+    )
+    found = samples(hub)
+    assert found["lightleash_estimator_complains", "relative"] == 1.0
+    assert found[("lightleash_estimate_nis",)] == 1.25
+    assert found[("lightleash_estimate_age_seconds",)] == pytest.approx(0.0871)
+    assert found[("lightleash_estimate_leds_rejected",)] == 7.0
+    assert found[("lightleash_estimate_time_offset_seconds",)] == pytest.approx(-0.012)
+    assert found[("lightleash_estimate_sigma_metres",)] == pytest.approx(0.003)
+    for fate, count in {"fused": 90.0, "dropped": 4.0, "late": 3.0}.items():
+        assert found["lightleash_estimate_pictures", fate] == count
+    told = found["lightleash_estimate_bias", "y", "phone_gyroscope"]
+    assert told == pytest.approx(-0.02, abs=1e-4)
+
+
+def test_of_an_estimator_that_knows_little_the_rest_is_left_out(hub):
+    tell(hub, estimate=estimate_fields(name="none", nis=None, age=None, bias_a_b=None))
+    found = samples(hub)
+    assert found["lightleash_estimator_complains", "none"] == 0.0
+    assert ("lightleash_estimate_nis",) not in found
+    assert ("lightleash_estimate_age_seconds",) not in found
+    assert ("lightleash_estimate_bias", "x", "body_accelerometer") not in found

@@ -12,7 +12,7 @@ from server.clock import now
 from server.knobs import Knobs
 from server.messages import encode_message
 from server.status import LOST_S
-from tests.server.house import control_status, house_in
+from tests.server.house import control_status, estimate_fields, house_in
 
 
 @pytest.fixture
@@ -93,3 +93,36 @@ def test_before_control_has_told_of_its_knobs_none_are_shown(hub):
     assert status.build(hub).virtual_camera is None
     tell(hub, knobs=Knobs(0.28, "full", 0.0, 1.0, guard=True))
     assert status.build(hub).virtual_camera.lag_deg is None
+
+
+def test_what_the_estimator_says_of_itself_is_shown_in_the_units_of_screens(hub):
+    turning = (radians(0.5), 0.0, radians(-1.0))
+    tell(
+        hub,
+        estimate=estimate_fields(complaint="Restart the camera.", bias_omega_b=turning),
+        poses_fused=90,
+        poses_dropped=4,
+        time_offset=-0.0123,
+        sigma_theta=radians(0.25),
+    )
+    shown = status.build(hub).estimate
+    assert (shown.name, shown.complaint, shown.nis) == ("relative", "Restart the camera.", 1.25)
+    assert (shown.fused, shown.dropped, shown.late, shown.leds_rejected) == (90, 4, 3, 7)
+    assert (shown.age_ms, shown.time_offset_ms, shown.time_offset_sigma_ms) == (87.1, -12.3, 0.4)
+    assert shown.sigma_deg == 0.25
+    assert shown.bias_body_deg_s == [0.5, 0.0, -1.0]
+    assert shown.bias_phone_m_s2 == [0.1, 0.0, -0.2]
+
+
+def test_what_an_estimator_does_not_know_is_null(hub):
+    unknown = dict.fromkeys(("nis", "age", "time_offset_sigma", "bias_a_b", "bias_omega_c"))
+    tell(hub, estimate=estimate_fields(name="none", **unknown), sigma_theta=inf, time_offset=None)
+    told = msgspec.json.decode(encode_message(status.build(hub)))["estimate"]
+    names = ("nis", "age_ms", "time_offset_ms", "time_offset_sigma_ms", "sigma_deg")
+    assert all(told[name] is None for name in (*names, "bias_body_m_s2", "bias_phone_deg_s"))
+    assert told["bias_body_deg_s"] is not None
+
+
+def test_before_control_has_told_of_its_estimator_nothing_is_shown(hub):
+    tell(hub)
+    assert status.build(hub).estimate is None

@@ -37,7 +37,7 @@ export function worries({ complaint, nis }, history) {
   if (nis !== null && nis > HONEST.most) found.set('nis', 'Pictures surprise it: it knows less than it says.');
   if (nis !== null && nis < HONEST.least) found.set('nis', 'Pictures fit too well: it knows more than it says.');
   const rejected = rejectedLately(history);
-  if (rejected >= RISING) found.set('rejected', `${rejected} lights rejected within 2 s.`);
+  if (rejected >= RISING) found.set('rejected', `${rejected} lights rejected in 2\u00a0s.`);
   return found;
 }
 
@@ -50,19 +50,19 @@ export class EstimatePanel extends Elements {
     this.text('worry', estimate === null ? '' : [...worry.values()].join(' ') || 'All as expected.');
     this.find('worry').className = worry.size > 0 ? 'worry' : 'worry fine';
     this.put('NIS / dof', number(estimate?.nis, 2), '', worry.has('nis'));
-    this.put('Picture age', number(estimate?.age_ms), 'ms');
+    this.put('Age', number(estimate?.age_ms), 'ms');
     this.put('Rejected', number(estimate?.leds_rejected), '', worry.has('rejected'));
     this.put('Fused', number(estimate?.fused), '');
     this.put('Dropped', number(estimate?.dropped), '');
     this.put('Late', number(estimate?.late), '');
     this.put('Offset', signed(estimate?.time_offset_ms, 1), 'ms', worry.has('complaint'));
     this.put('σ offset', number(estimate?.time_offset_sigma_ms, 2), 'ms');
-    this.put('σ position', number(estimate && status?.sigma_mm, 1), 'mm');
-    this.put('σ attitude', number(estimate?.sigma_deg, 2), '°');
-    this.bias('Robot gyro', estimate?.bias_body_deg_s, '°/s', 2);
-    this.bias('Robot accel.', estimate?.bias_body_m_s2, 'm/s²', 3);
-    this.bias('Phone gyro', estimate?.bias_phone_deg_s, '°/s', 2);
-    this.bias('Phone accel.', estimate?.bias_phone_m_s2, 'm/s²', 3);
+    this.put('σ pos.', number(estimate && status?.sigma_mm, 1), 'mm');
+    this.put('σ att.', number(estimate?.sigma_deg, 2), '°');
+    this.bias('Robot gyro [°/s]', estimate?.bias_body_deg_s);
+    this.bias('Robot accel. [m/s²]', estimate?.bias_body_m_s2);
+    this.bias('Phone gyro [°/s]', estimate?.bias_phone_deg_s);
+    this.bias('Phone accel. [m/s²]', estimate?.bias_phone_m_s2);
   }
 
   /**
@@ -78,10 +78,8 @@ export class EstimatePanel extends Elements {
   /**
    * @param {string} name
    * @param {number[] | null | undefined} xyz
-   * @param {string} unit
-   * @param {number} decimals
    */
-  bias(name, xyz, unit, decimals) {
-    this.figure('biases', name, xyz ? xyz.map((value) => signed(value, decimals)).join(' ') : '–', unit);
+  bias(name, xyz) {
+    this.figure('biases', name, xyz ? xyz.map((value) => signed(value, 2)).join(' ') : '–', '');
   }
 }
