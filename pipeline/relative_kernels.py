@@ -26,8 +26,6 @@ MAX_STEP_S = 0.01
 DOUBT_STEPS = 4
 LASTING = 1.2
 """Of d/dt (∫ σ dt)²: 2 for an error that keeps its sign; a tremor's does so for half a period."""
-LASTING = 1.2
-"""Of d/dt (∫ σ dt)²: 2 for an error that keeps its sign; a tremor's does so for half a period."""
 
 
 @kernel

@@ -26,6 +26,8 @@ from pipeline.signals import Flags, Seen
 
 KEPT: Final = TAPS
 """Samples up to the base that are still interpolated and extrapolated from."""
+BENT: Final = 2
+"""Samples before a new one from which on the curve through them changes."""
 
 
 @dataclass(slots=True, eq=False)
@@ -94,10 +96,8 @@ class RelativeTrack:
 
     def insert(self, history: ImuHistory, t: float, rate: Array, force: Array) -> bool:
         """Remember a sample of `body` or `phone`; False: it was there already."""
-        before = history.newest[0]
-        if t < before:
-            i = int(np.searchsorted(history.times, t))
-            before = float(history.times[i - 1]) if i > 0 else -inf
+        i = int(np.searchsorted(history.times, t)) - BENT
+        before = float(history.times[i]) if i >= 0 else -inf
         if not history.insert(t, 0, rate, force):
             return False
         self._spoilt_from = min(self._spoilt_from, before)

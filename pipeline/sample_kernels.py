@@ -22,10 +22,28 @@ def sample_at(times: Array, values: Array, i: int, t: float, out: Array) -> floa
         share = (t - times[i]) / (times[i + 1] - times[i])
         for k in range(6):
             out[k] = values[i, k] + share * (values[i + 1, k] - values[i, k])
+        if i >= 1 and i + 2 < n and times[i + 2] - times[i - 1] < MAX_GAP_S:
+            _bend(times, values, i, t, out)
         return 0.0
     for k in range(6):
         out[k] = values[i, k]
     return float(t - times[i])
+
+
+@kernel
+def _bend(times: Array, values: Array, i: int, t: float, out: Array) -> None:
+    """Make the line between samples i and i + 1 the cubic through their neighbours as well.
+
+    At 60 Hz a line cuts a tenth off a 10 Hz tremor, the cubic a fiftieth. In Newton's form.
+    """
+    t0, t1, t2, t3 = times[i], times[i + 1], times[i - 1], times[i + 2]
+    square = (t - t0) * (t - t1)
+    for k in range(6):
+        d01 = (values[i + 1, k] - values[i, k]) / (t1 - t0)
+        d12 = (values[i - 1, k] - values[i + 1, k]) / (t2 - t1)
+        d23 = (values[i + 2, k] - values[i - 1, k]) / (t3 - t2)
+        d012, d123 = (d12 - d01) / (t2 - t0), (d23 - d12) / (t3 - t1)
+        out[k] += square * (d012 + (t - t2) * (d123 - d012) / (t3 - t0))
 
 
 @kernel

@@ -19,12 +19,37 @@ from pipeline.relative_kernels import (
     inputs_at,
 )
 from pipeline.relative_track import hand_of
+from pipeline.sample_kernels import sample_at
 from pipeline.u_form import Felt, Motion
 from tests.pipeline.way import BIAS, BODY, HELD, PHONE, UP, Way, samples
 
 
 def interpolated(of, t):
-    return np.array([np.interp(t, of[0], column) for column in of[1].T])
+    """The cubic through the four samples about `t`; a line at either end."""
+    times, values = of
+    i = int(np.searchsorted(times, t, side="right")) - 1
+    if 1 <= i < len(times) - 2:
+        near = slice(i - 1, i + 3)
+        return lagrange_weights(times[near], t) @ values[near]
+    return np.array([np.interp(t, times, column) for column in values.T])
+
+
+def lagrange_weights(times, t):
+    others = [np.delete(times, k) for k in range(len(times))]
+    return np.array([np.prod((t - o) / (own - o)) for own, o in zip(times, others, strict=True)])
+
+
+def test_a_tremor_is_followed_between_the_samples_of_a_browser():
+    """A line would cut off a tenth of it."""
+    times = np.arange(60) / 60.0
+    wave = np.tile(np.sin(2.0 * np.pi * 10.0 * times)[:, None], (1, 6))
+    out, worst = np.zeros(6), 0.0
+    for t in np.linspace(0.1, 0.8, 400):
+        sample_at(times, wave, int(np.searchsorted(times, t, side="right")) - 1, t, out)
+        worst = max(worst, abs(out[0] - np.sin(2.0 * np.pi * 10.0 * t)))
+    assert worst < 0.03
+    line = np.interp(np.linspace(0.1, 0.8, 400), times, wave[:, 0])
+    assert np.abs(line - np.sin(2.0 * np.pi * 10.0 * np.linspace(0.1, 0.8, 400))).max() > 0.1
 
 
 def test_gathering_is_the_product_of_the_steps():
