@@ -24,6 +24,8 @@ BACKLOG = 128
 MAX_DEATHS = 4
 """Of one process before anything worked: better end, with the reason on the screen."""
 POLL_S = 0.05
+REMIND_S = 15.0
+"""People wait longer for what still speaks."""
 SECRET_VARIABLE = "_LIGHTLEASH_SECRET"
 
 
@@ -68,9 +70,9 @@ class Launcher:
 
     def run(self) -> int:
         """Start, announce, watch, stop; gives the exit code."""
-        announced = False
+        announced, said = False, time.monotonic()
         names = ", ".join(child.name for child in self.children)
-        print(f"Starting {names}: some seconds, half a minute the first time.", flush=True)
+        print(f"Starting {names}: some seconds, about a minute the first time.", flush=True)
         try:
             while not self._stopping:
                 self.revive(time.monotonic())
@@ -79,6 +81,9 @@ class Launcher:
                     announce(json.loads(self._run_file.read_text()))
                 if not announced and self._is_hopeless():
                     return 1
+                if not announced and time.monotonic() - said > REMIND_S:
+                    said = time.monotonic()
+                    print("Still starting: what computes fast is compiled first, once.", flush=True)
                 time.sleep(POLL_S)
         finally:
             print("\nStopping: robot first.", flush=True)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from server.runtime import RUN_FILE
 
-START_S = 60.0
+START_S = 180.0
 EXTRA_S = 6.0
 """Of a flight, for clocks, arming and the press."""
 

@@ -140,6 +140,7 @@ class Score:
         self, phone: VirtualPhone, config: VirtualCameraConfig, axes: npt.NDArray[np.bool_] = ALL
     ) -> None:
         """`config` is the virtual camera's, whose lag is part of the intent; `axes` the robot's."""
+        Intent.warm_up()
         self._phone, self._config, self._axes = phone, config, axes
         self._intent: Intent | None = None
         self._t = -np.inf

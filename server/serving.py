@@ -30,6 +30,7 @@ from server.view_proxy import routes as view_routes
 from server.websocket import PageServer
 
 ANY_ADDRESS = ("0.0.0.0", "::")
+POLL_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +63,22 @@ async def serve(settings: Settings, given: Given) -> None:
     guarded = Guard(app, doors, [*own_names(), *settings.names])
     if settings.record:
         hub.start_recording()
-    write_private(given.runtime / RUN_FILE, json.dumps(_run(settings, given, base, doors)))
+    run = json.dumps(_run(settings, given, base, doors))
+    telling = asyncio.create_task(_tell_when_ready(hub, given.runtime / RUN_FILE, run))
     try:
         await _until_signalled(hub, guarded, tls, given)
     finally:
+        telling.cancel()
         (given.runtime / RUN_FILE).unlink(missing_ok=True)
         api.phone.stop()
         dashboard.stop()
+
+
+async def _tell_when_ready(hub: Hub, run_file: Path, run: str) -> None:
+    """The run file says that a robot can be led: the control process compiles for a while first."""
+    while hub.status is None:
+        await asyncio.sleep(POLL_S)
+    write_private(run_file, run)
 
 
 def _hub(settings: Settings, given: Given) -> Hub:

@@ -41,15 +41,15 @@ class Known(Protocol):
 def build(hub: Known) -> Status:
     """From what the hub knows now."""
     t, control, phone = now(), hub.status, hub.phone
-    lost = control is None or hub.control_meter.age(t) > LOST_S
-    refusals = (
-        ["The control process does not answer."] if lost or control is None else control.refusals
-    )
+    silence = _silence(control, hub.control_meter.age(t))
+    refusals = [f"{silence}."] if control is None or silence else control.refusals
     sighting = phone.sighting if phone is not None else None
     found = sighting is not None and sighting.pose is not None
     return Status(
-        mode="LOST" if lost or control is None else cast(ModeName, Mode(control.mode).name),
-        reason=_reason(control, lost),
+        mode="LOST" if control is None or silence else cast(ModeName, Mode(control.mode).name),
+        reason=f"{silence}; the robot stops by its own watchdog."
+        if control is None or silence
+        else control.reason,
         ready=not refusals,
         refusals=list(refusals),
         robot=hub.robot.name,
@@ -78,10 +78,10 @@ def build(hub: Known) -> Status:
     )
 
 
-def _reason(control: ControlStatus | None, lost: bool) -> str:
-    if lost or control is None:
-        return "The control process does not answer; the robot stops by its own watchdog."
-    return control.reason
+def _silence(control: ControlStatus | None, age: float) -> str:
+    if control is None:
+        return "The control process is starting, about a minute the first time"
+    return "The control process does not answer" if age > LOST_S else ""
 
 
 def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | None:

@@ -36,6 +36,12 @@ class Intent:
         self._p_rv_in_v = self._R_fv.T @ (body[1] - hand[1])
         self.step(hand, 1.0)
 
+    @staticmethod
+    def warm_up() -> None:
+        """Load what is compiled before somebody flies: at the press the phone would fall silent."""
+        rest = np.eye(3), np.zeros(3)
+        Intent(VirtualCameraConfig(), rest, rest)
+
     def tune(self, config: VirtualCameraConfig) -> None:
         """The knobs were turned in flight."""
         self._virtual_camera.tune(config)

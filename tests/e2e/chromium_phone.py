@@ -10,8 +10,8 @@ import numpy as np
 from playwright.sync_api import BrowserContext, CDPSession, Page, sync_playwright
 
 from hardware.sim.hand import Hand
-from hardware.sim.intent import Intent
-from hardware.sim.truth import TruthClient
+from hardware.sim.intent import Intent, Pose
+from hardware.sim.truth import Truth, TruthClient
 from pipeline.camera import Camera
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd
@@ -30,6 +30,8 @@ FLAGS = [
     "--disable-backgrounding-occluded-windows",
 ]
 LENS = "canvas camera"
+AHEAD_S = 0.02
+"""So far each picture is foretold."""
 CAMERA = Camera(
     1280,
     720,
@@ -48,7 +50,14 @@ CANVAS = """
 (() => {
   const canvas = Object.assign(document.createElement('canvas'), {width: 1280, height: 720});
   const paint = canvas.getContext('2d', {alpha: false});
-  window.drawSpots = (spots) => {
+  // A frame shows the lights where they are when it is painted, from what was told of two moments.
+  let told = null;
+  window.tellSpots = (t, t_ahead, spots, ahead) => { told = {t, t_ahead, spots, ahead}; };
+  const between = ({t, t_ahead, spots, ahead}) => {
+    const share = Math.min(2, (performance.now() - t) / (t_ahead - t));
+    return spots.map((spot, i) => spot.map((now, k) => now + share * (ahead[i][k] - now)));
+  };
+  const draw = (spots) => {
     paint.fillStyle = '#1c1c1c';
     paint.fillRect(0, 0, 1280, 720);
     for (const [u, v, r] of spots) {
@@ -62,7 +71,11 @@ CANVAS = """
       paint.fill();
     }
   };
-  window.drawSpots([]);
+  const onFrame = () => {
+    draw(told ? between(told) : []);
+    requestAnimationFrame(onFrame);
+  };
+  onFrame();
   navigator.mediaDevices.getUserMedia = async () => {
     const stream = canvas.captureStream(30);
     const [track] = stream.getVideoTracks();
@@ -102,6 +115,9 @@ class ChromiumPhone:
         self._hand, self._leds_in_b = hand, leds_in_b
         self._truth = TruthClient(truth_port, timeout=1.0)
         self._R_dc = R_cd(90.0).T  # a phone emulated in landscape: screen.orientation.angle = 90
+        self._stepped = time.monotonic()
+        self._page_shown, self._epoch = "", 0.0
+        Intent.warm_up()
         for kind in ("accelerometer", "gyroscope", "linear-acceleration"):
             self._override(kind, (0.0, 0.0, 0.0), enable=True)
 
@@ -123,20 +139,41 @@ class ChromiumPhone:
         truth = self._truth.latest()
         t = float(truth.t[-1])
         body, hand = truth.at(t), self._hand.pose(t)
-        R_fc, p_cf = hand
-        q = (body[1] - p_cf + self._leds_in_b @ body[0].T) @ R_fc
-        pixels = CAMERA.pixels(q)
-        spots = [
-            [float(u), float(v), 930.0 * 0.008 / float(x)]
-            for (u, v), x in zip(pixels, q[:, 0], strict=True)
-        ]
-        self.page.evaluate("spots => drawSpots(spots)", spots)
-        force_in_d = self._R_dc @ self._hand.specific_force_in_c(t)
-        up_in_d = self._R_dc @ R_fc[2] * GRAVITY
+        self._show(t, hand, body, (self._hand.pose(t + AHEAD_S), _onwards(truth, AHEAD_S)))
+        now = time.monotonic()
+        t_felt, self._stepped = now + 0.5 * (now - self._stepped), now  # what is set is read on
+        force_in_d = self._R_dc @ self._hand.specific_force_in_c(t_felt)
+        up_in_d = self._R_dc @ self._hand.pose(t_felt)[0][2] * GRAVITY
         self._override("accelerometer", _triple(force_in_d))
         self._override("linear-acceleration", _triple(force_in_d - up_in_d))
-        self._override("gyroscope", _triple(self._R_dc @ self._hand.omega_in_c(t)))
+        self._override("gyroscope", _triple(self._R_dc @ self._hand.omega_in_c(t_felt)))
         return hand, body
+
+    def _show(self, t: float, hand: Pose, body: Pose, ahead: tuple[Pose, Pose]) -> None:
+        t_page = 1e3 * (t - self._page_epoch())
+        self.page.evaluate(
+            "told => tellSpots(...told)",
+            [t_page, t_page + 1e3 * AHEAD_S, self._spots(hand, body), self._spots(*ahead)],
+        )
+
+    def _spots(self, hand: Pose, body: Pose) -> list[list[float]]:
+        """(u, v, radius) [px] of each LED."""
+        q = (body[1] - hand[1] + self._leds_in_b @ body[0].T) @ hand[0]
+        radius = 930.0 * 0.008 / q[:, :1]
+        spots: list[list[float]] = np.hstack((CAMERA.pixels(q), radius)).tolist()
+        return spots
+
+    def _page_epoch(self) -> float:
+        """When the page's clock began [s]; from the quickest of some questions."""
+        if self._page_shown != self.page.url:
+            self._page_shown, answers = self.page.url, []
+            for _ in range(10):
+                asked = time.monotonic()
+                elapsed = 1e-3 * float(self.page.evaluate("performance.now()"))
+                answered = time.monotonic()
+                answers.append((answered - asked, 0.5 * (asked + answered) - elapsed))
+            self._epoch = min(answers)[1]
+        return self._epoch
 
     def play(self, seconds: float) -> None:
         """Play without measuring."""
@@ -190,6 +227,13 @@ class ChromiumPhone:
         """RMS of what came after the first seconds [mm]."""
         kept = [distance for t, distance in distances if t >= after_s]
         return 1e3 * float(np.sqrt(np.mean(np.square(kept))))
+
+
+def _onwards(truth: Truth, seconds: float) -> Pose:
+    """Of the body after the last known moment, if it goes on as it did."""
+    t = float(truth.t[-1])
+    (R_before, p_before), (R, p) = truth.at(t - seconds), truth.at(t)
+    return R @ R_before.T @ R, 2.0 * p - p_before
 
 
 def _triple(v: np.ndarray) -> tuple[float, float, float]:

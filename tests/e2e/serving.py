@@ -16,7 +16,8 @@ from pathlib import Path
 
 from server.runtime import RUN_FILE
 
-START_S = 60.0
+START_S = 180.0
+"""The kernels may have to be compiled first, on a busy machine."""
 DEVICE = "Linux 412x915@1 / canvas camera"
 """What the phone page calls itself in the Chromium of `chromium_phone`."""
 

@@ -189,3 +189,17 @@ def test_a_busy_directory_or_port_ends_serve_with_one_line(monkeypatch, tmp_path
         busy = load(["--https-port", "0", "--http-port", str(taken.getsockname()[1])])
         assert launcher.main(busy, []) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_who_waits_long_is_told_what_for(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(launcher, "REMIND_S", 0.1)
+    one = Launcher([fake("control", [])], tmp_path / RUN_FILE)
+    said = []
+
+    def stop_when_reminded(now):
+        said.append(capsys.readouterr().out)
+        if "Still starting" in "".join(said):
+            one.stop()
+
+    one.revive = stop_when_reminded
+    assert one.run() == 0

@@ -240,12 +240,13 @@ def test_the_page_that_watches_is_told_who_leads_what_lacks_and_that_control_is_
         async with server.supervisor() as watcher:
             status = await watcher.until("status")
             assert status["mode"] == "LOST"
-            assert "does not answer" in str(status["reason"])
+            assert "is starting" in str(status["reason"])
             server.control.send(control_status(t=now(), reason="Not armed.", refusals=["No phone"]))
             status = await watcher.until("status", mode="DISARMED")
             assert status["refusals"] == ["No phone"]
             assert not status["ready"]
-            await watcher.until("status", mode="LOST")
+            status = await watcher.until("status", mode="LOST")
+            assert "does not answer" in str(status["reason"])
             async with server.operator("one\x1b[31m phone"):
                 status = await watcher.until("status", phones=1)
                 assert "one·[31m phone leads." in status["messages"]
