@@ -73,16 +73,18 @@ web: dev
 	@if [ -e $(WEB) ]; then cd web_client && npm run check && npm test; \
 	else echo "!!! SKIPPED: types and tests of the web client (npm is missing)" >&2; fi
 
+# Real processes, and what is measured, have the machine to themselves.
 pytest: dev
-	$(BIN)/pytest $(ARGS)
+	$(BIN)/pytest -n auto -m "not e2e and not bench" $(ARGS)
+	$(BIN)/pytest -m "e2e or bench" $(ARGS)
 
 fast: dev
-	$(BIN)/pytest -m "not e2e and not bench and not slow" $(ARGS)
+	$(BIN)/pytest -n auto -m "not e2e and not bench and not slow" $(ARGS)
 
 bench: dev
 	$(BIN)/lightleash experiments loop
 	$(BIN)/lightleash experiments loop --live
-	for name in control ekf vision; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
+	for name in control control_law ekf estimators relative virtual_camera vision; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt
