@@ -54,6 +54,23 @@ def lead(phone: ChromiumPhone, tries: int = 3) -> None:
                 raise
 
 
+def flight(
+    phone: ChromiumPhone, server: Serving, seconds: float, tries: int = 3
+) -> tuple[list[tuple[float, float]], dict[str, object]]:
+    """Lead for so long: distances as `ChromiumPhone.track` gives them, and the status at the end.
+
+    Once more if the robot was ramped down because a busy machine starved the sensors: as it should.
+    """
+    for left in reversed(range(tries)):
+        lead(phone)
+        distances = phone.track(seconds)
+        status = server.request("GET", "/api/status")
+        if status["mode"] == "TRACK" or "silent" not in str(status["reason"]) or not left:
+            break
+        phone.let_go()
+    return distances, status
+
+
 @contextlib.contextmanager
 def led_server(
     executable: str, folder: Path, hand: str, *, seed: int = 0, rest_s: float

@@ -10,7 +10,7 @@ import pytest
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from tests.e2e.chromium_phone import ChromiumPhone, browser
-from tests.e2e.chromium_rig import LANDSCAPE, lead, led_server, start
+from tests.e2e.chromium_rig import LANDSCAPE, flight, led_server, start
 from tests.e2e.serving import DEVICE, serving
 
 pytestmark = pytest.mark.e2e
@@ -25,9 +25,7 @@ def test_the_robot_follows_a_chromium_over_tls_and_stops_on_its_stop(
         refused: list[str] = []
         phone.page.on("console", lambda message: refused.append(message.text))
         start(phone, server)
-        lead(phone)
-        distances = phone.track(20.0)
-        status = server.request("GET", "/api/status")
+        distances, status = flight(phone, server, 20.0)
         assert status["mode"] == "TRACK", status["reason"]
         assert phone.rms_mm(distances, LEARNT_S) <= 40.0
         streams = status["streams"]
