@@ -21,6 +21,9 @@ LANDSCAPE = {
     "device_scale_factor": 1,
 }
 
+STARVED = ("are silent", "No word from the phone")
+"""How the robot says that a machine was too busy to let the page's sensors or its finger speak."""
+
 
 def calibrate(folder: Path) -> Path:
     """A folder with the canvas camera's calibration."""
@@ -65,7 +68,8 @@ def flight(
         lead(phone)
         distances = phone.track(seconds)
         status = server.request("GET", "/api/status")
-        if status["mode"] == "TRACK" or "silent" not in str(status["reason"]) or not left:
+        starved = any(words in str(status["reason"]) for words in STARVED)
+        if status["mode"] == "TRACK" or not starved or not left:
             break
         phone.let_go()
     return distances, status
