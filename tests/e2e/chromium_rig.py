@@ -21,8 +21,8 @@ LANDSCAPE = {
     "device_scale_factor": 1,
 }
 
-STARVED = ("are silent", "No word from the phone")
-"""How the robot says that a machine was too busy to let the page's sensors or its finger speak."""
+STARVED = ("are silent", "No word from the phone", "time stamps are off")
+"""How the robot says that a machine was too busy for the page's sensors, finger or pictures."""
 
 
 def calibrate(folder: Path) -> Path:
