@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -16,6 +17,9 @@ from pipeline.frames import Array
 CAMERAS = Path(__file__).parent / "cameras"
 KALIBR_MODELS = {"radtan": "plumb_bob", "equidistant": "equidistant"}
 SIZES_PX = (16, 8192)
+READOUTS_S = (-0.1, 0.1)
+"""Negative: the picture stands on its head on the sensor, its last row is exposed first."""
+SCREEN_ANGLES_DEG = (0, 90, 180, 270)
 
 
 class CameraFileError(ValueError):
@@ -38,14 +42,25 @@ def load_camera(path: Path) -> tuple[str, Camera]:
     Raises:
         CameraFileError: names file, key and what is allowed.
     """
+    name, camera, _ = _read(path)
+    return name, camera
+
+
+def _read(path: Path) -> tuple[str, Camera, int | None]:
+    """Name, camera and, if the file tells it, the screen's angle [°]."""
     try:
         table = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise CameraFileError(str(path), "", str(error)) from error
+    except OSError as error:
+        raise CameraFileError(str(path), "", error.strerror or str(error)) from error
+    except UnicodeDecodeError as error:
+        raise CameraFileError(str(path), "", "not a text file in UTF-8") from error
+    except yaml.YAMLError as error:
+        raise CameraFileError(str(path), "", " ".join(str(error).split())) from error
     if not isinstance(table, dict):
         raise CameraFileError(str(path), "", "a YAML mapping: camera_info or a Kalibr camchain")
     reader = _Reader(str(path), table)
-    return reader.kalibr("cam0") if "cam0" in table else reader.camera_info()
+    name, camera = reader.kalibr("cam0") if "cam0" in table else reader.camera_info()
+    return name, camera, reader.screen_angle_deg()
 
 
 def find_camera(
@@ -56,22 +71,33 @@ def find_camera(
 
 
 def find_camera_file(
-    device: str, width: int, height: int, folders: Sequence[Path] = (CAMERAS,)
+    device: str,
+    width: int,
+    height: int,
+    folders: Sequence[Path] = (CAMERAS,),
+    screen_angle_deg: int | None = None,
 ) -> tuple[Path, Camera]:
     """The file and the calibrated camera of `device` for pictures of that size.
 
     A file belongs to a device when its camera_name, in lower case and with everything but letters
-    and digits turned into dashes, is the device's.
+    and digits turned into dashes, is the device's. One that says how the screen was turned
+    (screen_angle_deg) fits no other angle, and comes before one that doesn't say.
 
     Raises:
         CameraFileError: no calibration; says which there are.
     """
     known: list[str] = []
+    fitting: list[tuple[bool, Path, Camera]] = []
     for path in sorted(p for folder in folders for p in folder.glob("*.yaml")):
-        name, camera = load_camera(path)
-        if slug(name) == slug(device) and (camera.width, camera.height) == (width, height):
-            return path, camera
-        known.append(f"{name} {camera.width}x{camera.height}")
+        name, camera, angle = _read(path)
+        is_it = slug(name) == slug(device) and (camera.width, camera.height) == (width, height)
+        if is_it and (angle is None or screen_angle_deg in (None, angle)):
+            fitting.append((angle is None, path, camera))
+        turned = f" at {angle}°" if angle is not None else ""
+        known.append(f"{name} {camera.width}x{camera.height}{turned}")
+    if fitting:
+        _, path, camera = min(fitting, key=lambda one: one[0])
+        return path, camera
     raise CameraFileError(
         f"camera {device!r} at {width}x{height}",
         "",
@@ -94,11 +120,6 @@ class _Reader:
         table = self._table
         model = str(self._get(table, "distortion_model"))
         K = self._numbers(table, "camera_matrix", 9).reshape(3, 3)
-        readout = float(
-            self._number(
-                table.get("rolling_shutter_readout_s", 0.0), "rolling_shutter_readout_s", 0.0, 0.1
-            )
-        )
         distortion = self._numbers(table, "distortion_coefficients", None)
         camera = self._camera(
             self._size(self._get(table, "image_width"), "image_width"),
@@ -106,7 +127,7 @@ class _Reader:
             K,
             model,
             distortion,
-            readout,
+            self._readout_s(),
         )
         return str(table.get("camera_name", Path(self._file).stem)), camera
 
@@ -114,6 +135,8 @@ class _Reader:
         table = self._table[name]
         if not isinstance(table, dict):
             self._refuse(name, "a mapping")
+        if table.get("camera_model", "pinhole") != "pinhole":
+            self._refuse(f"{name}.camera_model", "pinhole")
         model = KALIBR_MODELS.get(str(self._get(table, "distortion_model")))
         if model is None:
             self._refuse(f"{name}.distortion_model", ", ".join(KALIBR_MODELS))
@@ -121,7 +144,29 @@ class _Reader:
         width, height = (self._size(n, "resolution") for n in self._numbers(table, "resolution", 2))
         K = np.array([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]])
         distortion = self._numbers(table, "distortion_coeffs", 4)
-        return Path(self._file).stem, self._camera(width, height, K, str(model), distortion, 0.0)
+        return Path(self._file).stem, self._camera(
+            width, height, K, str(model), distortion, self._line_readout_s(name, height)
+        )
+
+    def screen_angle_deg(self) -> int | None:
+        angle = self._table.get("screen_angle_deg")
+        if angle is not None and (isinstance(angle, bool) or angle not in SCREEN_ANGLES_DEG):
+            self._refuse("screen_angle_deg", ", ".join(map(str, SCREEN_ANGLES_DEG)))
+        return None if angle is None else int(angle)
+
+    def _readout_s(self) -> float:
+        key = "rolling_shutter_readout_s"
+        return self._number(self._table.get(key, 0.0), key, *READOUTS_S)
+
+    def _line_readout_s(self, name: str, height: int) -> float:
+        """Of a camchain: our own key beside the cameras, else Kalibr's time between two rows."""
+        table = self._table[name]
+        if "line_delay" not in table:
+            return self._readout_s()
+        if "rolling_shutter_readout_s" in self._table:
+            self._refuse("rolling_shutter_readout_s", f"not beside {name}.line_delay")
+        low, high = (readout / height for readout in READOUTS_S)
+        return height * self._number(table["line_delay"], f"{name}.line_delay", low, high)
 
     def _camera(
         self, width: int, height: int, K: Array, model: str, distortion: Array, readout_s: float
@@ -153,6 +198,9 @@ class _Reader:
         return int(size)
 
     def _number(self, value: object, key: str, low: float, high: float) -> float:
+        if isinstance(value, str):  # YAML's 2e-2 is a word: it wants 2.0e-2
+            with suppress(ValueError):
+                value = float(value)
         if (
             isinstance(value, bool)
             or not isinstance(value, (int, float))

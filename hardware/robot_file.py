@@ -74,7 +74,7 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
     Raises:
         RobotFileError: names file, key and what is allowed.
     """
-    path = _find(name_or_path)
+    path = robot_path(name_or_path)
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -91,7 +91,12 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
     return robot_file
 
 
-def _find(name_or_path: str | Path) -> Path:
+def robot_path(name_or_path: str | Path) -> Path:
+    """The file of the robot called so, or that path if it ends in `.toml`.
+
+    Raises:
+        RobotFileError: no such robot; says which there are.
+    """
     path = Path(name_or_path)
     if path.suffix == ".toml":
         return path

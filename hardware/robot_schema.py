@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Axis = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 AXES: tuple[Axis, ...] = get_args(Axis)
@@ -102,9 +102,22 @@ class BodyImuSection(Section):
 
 
 class Led(Section):
-    """[[leds]]."""
+    """[[leds]]; at most one of the three reaches, which `robot leds --improve` may use."""
 
     position_in_body_m: Vector
+    reach_m: Positive | None = None
+    """It may be moved so far."""
+    reach_box_m: Annotated[list[Vector], Field(min_length=2, max_length=2)] | None = None
+    """It may be anywhere between these two corners in the body's axes."""
+    reach_segment_m: Annotated[list[Vector], Field(min_length=2, max_length=2)] | None = None
+    """It may be anywhere on the straight arm between these two places in the body's axes."""
+
+    @model_validator(mode="after")
+    def _one_reach(self) -> Led:
+        said = [self.reach_m, self.reach_box_m, self.reach_segment_m]
+        if sum(reach is not None for reach in said) > 1:
+            raise ValueError("at most one of reach_m, reach_box_m, reach_segment_m")
+        return self
 
 
 class GainsSection(Section):

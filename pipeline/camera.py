@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.frames import Array, R_co
+from pipeline.camera_kernels import LENS, put_normalised, put_pixels, put_slopes
+from pipeline.frames import Array
 
 MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
 """Distortion models (the names of ROS) and how many coefficients they take."""
-SLOPE_STEP_PX = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,42 +27,42 @@ class Camera:
     distortion: Array
     """(k,)."""
     readout_s: float = 0.0
-    """Rolling shutter: from the first row's exposure to the last one's [s]."""
+    """Rolling shutter: how much later a row below the last would be exposed than the first one [s];
+    negative if the last row is read first."""
+
+    lens: Array = field(init=False, repr=False)
+    """The same numbers for `camera_kernels`."""
+
+    def __post_init__(self) -> None:
+        """Gather the lens."""
+        lens = np.zeros(LENS)
+        lens[0] = float(self.model == "equidistant")
+        lens[1:5] = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
+        lens[5 : 5 + len(self.distortion)] = self.distortion
+        lens.setflags(write=False)
+        object.__setattr__(self, "lens", lens)
 
     def pixels(self, points_in_c: Array) -> Array:
         """Pixels (n, 2) of points (n, 3) in front of the camera."""
-        if len(points_in_c) == 0:
-            return np.zeros((0, 2))  # OpenCV refuses
-        points_in_o = np.ascontiguousarray(points_in_c @ R_co)  # = (R_oc @ p) for each row
-        zero = np.zeros(3)
-        if self.model == "equidistant":
-            rays = points_in_o.reshape(-1, 1, 3)
-            pixels, _ = cv2.fisheye.projectPoints(rays, zero, zero, self.K, self.distortion)
-        else:
-            pixels, _ = cv2.projectPoints(points_in_o, zero, zero, self.K, self.distortion)
-        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        pixels = np.empty((len(points_in_c), 2))
+        put_pixels(self.lens, np.asarray(points_in_c, dtype=np.float64), pixels)
+        return pixels
 
     def normalised(self, pixels: Array) -> Array:
         """Undistorted image coordinates (n, 2) on the plane one metre ahead: right, down [m]."""
-        if len(pixels) == 0:
-            return np.zeros((0, 2))
-        points = np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2)
-        if self.model == "equidistant":
-            flat = cv2.fisheye.undistortPoints(points, self.K, self.distortion)
-        else:
-            flat = cv2.undistortPoints(points, self.K, self.distortion)
-        return np.asarray(flat, dtype=np.float64).reshape(-1, 2)
+        flat = np.empty((len(pixels), 2))
+        put_normalised(self.lens, np.asarray(pixels, dtype=np.float64), flat)
+        return flat
 
     def slopes(self, pixels: Array) -> Array:
         """Derivatives (n, 2, 2) of `normalised` at pixels (n, 2) [1/px]: lens and focal length."""
-        steps = SLOPE_STEP_PX * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-        around = self.normalised((pixels[:, None] + steps).reshape(-1, 2)).reshape(-1, 4, 2)
-        columns = (around[:, 0::2] - around[:, 1::2]) / (2.0 * SLOPE_STEP_PX)
-        return np.ascontiguousarray(columns.transpose(0, 2, 1))
+        slopes = np.empty((len(pixels), 2, 2))
+        put_slopes(self.lens, np.asarray(pixels, dtype=np.float64), slopes)
+        return slopes
 
     def row_delays(self, rows: Array) -> Array:
         """When rows (n,) are exposed after the picture's middle one [s]."""
-        delays: Array = (rows / (self.height - 1) - 0.5) * self.readout_s
+        delays: Array = (rows / self.height - 0.5) * self.readout_s
         return delays
 
     @property

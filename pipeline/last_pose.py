@@ -14,54 +14,107 @@ MAX_STEP_S = 0.5
 CONTRADICTION_SIGMAS, CONTRADICTION_M, CONTRADICTION_RAD = 5.0, 0.03, 0.05
 """A believed pose farther than this from where a filter expected it: the filter is wrong."""
 
+MEMORY_RAD, GYRO_RAD_S, BLIND_RAD_S, MEMORY_MOST_RAD = 0.2, 0.03, 1.5, 0.6
+"""How far a remembered attitude may be off: at first, growing by the second with and without
+gyroscopes; farther, it says nothing."""
+
 Place = tuple[Array, Array]
 """p_bc_in_c (3,) [m] and R_cb (3, 3)."""
 
 
 class LastPose:
-    """Kept from picture to picture, forgotten after three in a row without a pose."""
+    """Kept from picture to picture; its place is forgotten soon, its attitude later.
+
+    Both gyroscopes carry the attitude on: that names LEDs when the robot comes back into sight.
+    """
 
     def __init__(self) -> None:
         """Nothing seen yet."""
         self._pose: RelativePose | None = None
-        self.rate_in_c = np.zeros(3)
-        """Of p_bc_in_c between the last two poses [m/s]."""
+        self._R_cb: Array | None = None
+        """Carried to the newest picture."""
+        self._t, self._t_seen = -np.inf, -np.inf
+        """Of the newest picture; of the last believed pose."""
+        self._sure = False
+        """Gyroscopes alone have carried the attitude since then."""
+        self._since_kept = np.zeros(3)
+        """How c turned since then [rad], in c."""
+        self._omega: tuple[Array, Array] | None = None
+        """At the newest picture: of c, of b."""
+        self.turned: Array | None = None
+        """(2, 3) how c and b turned between the last two pictures [rad]; None if unknown."""
+        self.u_in_c = np.zeros(3)
+        """Velocity in c with the camera's turning taken out, between the last two poses [m/s]."""
+        self.omega_in_b = np.zeros(3)
+        """How b turned in c between them [rad/s]; only without gyroscopes, else 0."""
         self._misses = 0
         self.contradicts = False
         """It was not where a filter expected it: until they agree, the filter is not asked."""
 
+    def advance(self, t: float, omega_cf_in_c: Array | None, omega_bf_in_b: Array | None) -> None:
+        """A picture of time `t` is to be looked at."""
+        dt, before = t - self._t, self._omega
+        self._omega = (
+            (omega_cf_in_c, omega_bf_in_b)
+            if omega_cf_in_c is not None and omega_bf_in_b is not None
+            else None
+        )
+        self._t = t
+        self.turned = None
+        if not 0.0 < dt < MAX_STEP_S:
+            self.forget()
+            return
+        if self._omega is None:
+            self._sure = False
+            if self._R_cb is not None and self._pose is not None:
+                self._R_cb = self._R_cb @ exp(dt * self.omega_in_b)
+            return
+        first = before if before is not None else self._omega
+        self.turned = 0.5 * dt * (np.array(first) + np.array(self._omega))
+        self._since_kept = self._since_kept + self.turned[0]
+        if self._R_cb is not None:
+            self._R_cb = exp(-self.turned[0]) @ self._R_cb @ exp(self.turned[1])
+
     def keep(self, pose: RelativePose, expected: Expected | None) -> None:
         """`pose` was believed, where a filter had `expected` the robot."""
-        last = self._pose
+        last, back = self._pose, exp(self._since_kept)
+        self.u_in_c, self.omega_in_b = np.zeros(3), np.zeros(3)
         if last is not None and 0.0 < pose.t - last.t < MAX_STEP_S:
-            self.rate_in_c = (pose.p_bc_in_c - last.p_bc_in_c) / (pose.t - last.t)
-        else:
-            self.rate_in_c = np.zeros(3)
-        self._pose, self._misses = pose, 0
+            shift = back @ pose.p_bc_in_c - last.p_bc_in_c
+            self.u_in_c = back.T @ shift / (pose.t - last.t)
+            if self._omega is None:
+                self.omega_in_b = log(last.R_cb.T @ pose.R_cb) / (pose.t - last.t)
+        self._pose, self._R_cb, self._misses = pose, pose.R_cb, 0
+        self._t = self._t_seen = pose.t
+        self._sure, self._since_kept = True, np.zeros(3)
         self.contradicts = expected is not None and _contradict(pose, expected)
 
     def forget(self) -> None:
-        """Predict nothing."""
-        self._pose, self._misses = None, 0
+        """Predict nothing, not even the attitude."""
+        self._pose, self._R_cb, self._misses = None, None, 0
 
     def miss(self) -> None:
         """A picture gave nothing."""
         self._misses += 1
         if self._misses >= FORGET_MISSES:
-            self.forget()
+            self._pose = None
 
-    def predicted(
-        self, t: float, omega_cf_in_c: Array | None, omega_bf_in_b: Array | None
-    ) -> Place | None:
-        """Moved on to `t` by both gyroscopes and the last velocity."""
-        last = self._pose
-        if last is None or not 0.0 < t - last.t < MAX_STEP_S:
+    def predicted(self) -> Place | None:
+        """For the newest picture: moved on by both gyroscopes and the last velocity."""
+        last, R_cb = self._pose, self._R_cb
+        if last is None or R_cb is None or not 0.0 < self._t - last.t < MAX_STEP_S:
             return None
-        dt = t - last.t
-        R_cb = last.R_cb
-        if omega_cf_in_c is not None and omega_bf_in_b is not None:
-            R_cb = exp(-omega_cf_in_c * dt) @ R_cb @ exp(omega_bf_in_b * dt)
-        return last.p_bc_in_c + min(dt, 0.1) * self.rate_in_c, R_cb
+        dt = min(self._t - last.t, 0.1)
+        ahead = exp(-self._since_kept)
+        return ahead @ last.p_bc_in_c + dt * (ahead @ self.u_in_c), R_cb
+
+    def attitude(self) -> tuple[Array, float] | None:
+        """For the newest picture, R_cb and how far that may be off [rad]; None if it is too far."""
+        if self._R_cb is None:
+            return None
+        drift = GYRO_RAD_S if self._sure else BLIND_RAD_S
+        off = MEMORY_RAD + drift * (self._t - self._t_seen)
+        return (self._R_cb, off) if off < MEMORY_MOST_RAD else None
 
 
 def _contradict(pose: RelativePose, expected: Expected) -> bool:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import cv2
 import numpy as np
 
+from pipeline import pnp_kernels
 from pipeline.camera import Camera
-from pipeline.frames import Array, R_co, exp, skew
+from pipeline.claim_kernels import put_covariance
+from pipeline.frames import Array, R_co, exp
 from pipeline.signals import Match, RelativePose, Spots
 
-ITERATIONS = 8
-CONVERGED = 1e-10
+BELIEF = 4.0
+"""Residuals that it takes to outweigh what was claimed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,17 +30,31 @@ class Fit:
     residuals_px: Array
     """(m, 2)."""
     chi2: float
+    shared: Array | None = None
+    """(6, 6) covariance by errors that all spots share: they leave no residual; None for 0."""
 
     @property
     def rms_px(self) -> float:
         """Of the distances between spots and projected LEDs."""
-        return float(np.sqrt(np.mean(np.sum(self.residuals_px**2, axis=1))))
+        flat = self.residuals_px.ravel()
+        return sqrt(2.0 * float(flat @ flat) / len(flat))
 
     @property
     def excess(self) -> float:
-        """By how much the spots' covariances are too small, as far as the residuals tell: ≥ 1."""
+        """By how much the spots' covariances are too small, as far as the residuals tell: ≥ 1.
+
+        A few residuals tell little: they are weighed against as much belief in the covariances.
+        """
         freedom = self.residuals_px.size - 6
-        return max(1.0, self.chi2 / freedom) if freedom > 0 else 1.0
+        return max(1.0, (BELIEF + self.chi2) / (BELIEF + freedom))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Naming:
+    """Spots with names, and the pose that gives them."""
+
+    match: Match
+    fit: Fit
 
 
 def refine(
@@ -58,44 +75,14 @@ def refine(
         p_bc_in_c: Start (3,).
         R_cb: Start (3, 3).
     """
-    f = camera.focal_px
-    for _ in range(ITERATIONS):
-        linear = _linearised(leds_in_b, normalised, f, p_bc_in_c, R_cb)
-        if linear is None:
-            return None
-        residuals, J = linear
-        JW = np.einsum("mij,mik->mjk", J, weights)
-        information = np.einsum("mij,mjk->ik", JW, J)
-        try:
-            step = np.linalg.solve(information, np.einsum("mij,mj->i", JW, residuals))
-        except np.linalg.LinAlgError:  # LEDs in one place or one line say too little
-            return None
-        p_bc_in_c, R_cb = p_bc_in_c + step[:3], R_cb @ exp(step[3:])
-        if float(step @ step) < CONVERGED:
-            break
-    linear = _linearised(leds_in_b, normalised, f, p_bc_in_c, R_cb)
-    if linear is None or not np.isfinite(p_bc_in_c).all():
-        return None
-    residuals = linear[0]
-    chi2 = float(np.einsum("mi,mij,mj->", residuals, weights, residuals))
-    return Fit(p_bc_in_c, R_cb, information, residuals, chi2)
-
-
-def _linearised(
-    leds_in_b: Array, normalised: Array, f: float, p_bc_in_c: Array, R_cb: Array
-) -> tuple[Array, Array] | None:
-    """Residuals (m, 2) [px] and their Jacobian (m, 2, 6) with respect to (δp in c, θ in b)."""
-    q = p_bc_in_c + leds_in_b @ R_cb.T
-    if q[:, 0].min() < 0.05:
-        return None
-    x, y, z = q[:, 0], q[:, 1], q[:, 2]
-    residuals = f * (normalised - np.column_stack((-y / x, -z / x)))
-    dz_dq = np.zeros((len(q), 2, 3))
-    dz_dq[:, 0, 0], dz_dq[:, 0, 1] = f * y / x**2, -f / x
-    dz_dq[:, 1, 0], dz_dq[:, 1, 2] = f * z / x**2, -f / x
-    turns = np.array([-R_cb @ skew(led) for led in leds_in_b])
-    J = np.concatenate((dz_dq, dz_dq @ turns), axis=2)
-    return residuals, J
+    m = len(leds_in_b)
+    p, R = np.array(p_bc_in_c, dtype=np.float64), np.array(R_cb, dtype=np.float64, order="C")
+    information, residuals = np.empty((6, 6)), np.empty((m, 2))
+    still, f = np.zeros((m, 3)), camera.focal_px
+    chi2 = pnp_kernels.refine(
+        leds_in_b, normalised, still, weights, f, p, R, information, residuals
+    )
+    return Fit(p, R, information, residuals, chi2) if chi2 >= 0.0 else None
 
 
 def starts(leds_in_b: Array, normalised: Array) -> list[tuple[Array, Array]]:
@@ -151,12 +138,15 @@ def solve(
 
 def pose_of(fit: Fit, t: float) -> RelativePose:
     """As a measurement; its covariance grows where the residuals are larger than claimed."""
-    covariance = fit.excess * np.linalg.inv(fit.information)
+    C = np.empty((6, 6))
+    shared = np.zeros((6, 6)) if fit.shared is None else fit.shared
+    if not put_covariance(fit.information, fit.excess, shared, C):
+        C[:] = np.inf  # LEDs in one line or one place
     return RelativePose(
         t=t,
         p_bc_in_c=fit.p_bc_in_c,
         R_cb=fit.R_cb,
-        covariance=0.5 * (covariance + covariance.T),
+        covariance=C,
         reprojection_px=fit.rms_px,
         leds=len(fit.residuals_px),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.camera import Camera
+from pipeline.camera_kernels import put_tangents
 from pipeline.signals import LedRays, Match, Spots
 
 NO_RAYS = LedRays(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)))
@@ -21,11 +22,6 @@ def rays_of(camera: Camera, spots: Spots, match: Match, t: float, scale: float =
         scale: By how much the spots' covariances are too small.
     """
     pixels = spots.pixels[match.spot]
-    slopes = camera.slopes(pixels)
-    covariances = scale * slopes @ spots.covariances[match.spot] @ slopes.transpose(0, 2, 1)
-    return LedRays(
-        led=match.led,
-        t=t + camera.row_delays(pixels[:, 1]),
-        tangents=-camera.normalised(pixels),  # right, down → left, up
-        covariances=0.5 * (covariances + covariances.transpose(0, 2, 1)),
-    )
+    tangents, claimed = np.empty((len(pixels), 2)), np.empty((len(pixels), 2, 2))
+    put_tangents(camera.lens, pixels, spots.covariances[match.spot], scale, tangents, claimed)
+    return LedRays(match.led, t + camera.row_delays(pixels[:, 1]), tangents, claimed)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from pipeline.camera import Camera, points_of
 from pipeline.frames import Array, skew
@@ -11,7 +13,7 @@ from pipeline.signals import Spots
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """How the robot's place in c changes; its own turning is left out."""
+    """How the robot's place in c changes."""
 
     omega_cf_in_c: Array
     """(3,) [rad/s]."""
@@ -19,6 +21,10 @@ class Motion:
     """(3,) [m/s]: velocity of the body seen from f."""
     depth_m: float
     """How far ahead the robot is; infinite if unknown: then only the camera's turning counts."""
+    omega_bf_in_b: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) [rad/s]: of no use before the spots have names."""
+    sigma_u: float = 0.015
+    """How well an LED's velocity in c is known by all this [m/s]."""
 
 
 def unrolled(camera: Camera, spots: Spots, motion: Motion | None) -> Spots:

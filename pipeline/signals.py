@@ -66,6 +66,8 @@ class Spots:
     """(n,) integrated contrast, for ranking only."""
     area: Array
     """(n,) pixels above the threshold."""
+    bounded: bool = False
+    """There were more bright places than were looked at."""
 
     def __len__(self) -> int:
         """Count of the spots."""

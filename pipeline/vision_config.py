@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class LedsConfig:
     """Detection of bright spots."""
 
-    max_spots: int = 24
+    max_spots: int = 64
     """No more than this many candidates leave the detector."""
     min_contrast: float = 40.0
     """Grey levels (full range) between a spot's peak and its surround."""
@@ -32,8 +32,8 @@ class IdentifyConfig:
     """An expectation that allows more than this names nothing by itself."""
     spot_px: float = 1.0
     """Of a single LED about where a perfect expectation puts it: calibration, spot, timing."""
-    search_s: float = 0.5
-    """While fewer LEDs than for a pose are named, the picture is searched anew so often."""
+    start_rms_px: float = 1.2
+    """What starts from nothing must fit this well; a wrong name seldom does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,8 @@ class GatesConfig:
     """When a pose is believed (safety: two gates catch nearly all vision lies)."""
 
     reprojection_px: float = 2.0
-    gravity_rad: float = 0.14
-    """8°: gravity carried through phone attitude and PnP against the body's accelerometer."""
+    gravity_rad: float = 0.2
+    """11°: gravity carried through phone attitude and PnP against the body's accelerometer, which
+    may have a bias of 40 mg on each axis."""
     min_range_m: float = 0.3
     max_range_m: float = 12.0

@@ -165,6 +165,7 @@ def make_app(api: Api, pages: PageServer, view: Sequence[BaseRoute]) -> Starlett
         routes=[
             Route("/", _file("index.html")),
             Route("/supervisor", _file("supervisor.html")),
+            Route("/board", _file("board.html")),
             *api.routes(),
             WebSocketRoute("/ws/phone", pages.phone),
             WebSocketRoute("/ws/video", pages.video),

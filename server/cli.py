@@ -17,7 +17,12 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   serve        server, control and simulated robot; prints the addresses of the pages
   phone        a virtual phone that films the simulated robot and leads it
   replay       push a recorded phone through a server, or through the pipeline alone
+  locate       where the robot was in each picture of a folder or film, with its uncertainty
   experiments  measure the loop, as tables and pictures
+  bench        how well it sees: right, exact, honest, fast; against stated goals
+  calibrate    a camera: lens, readout time and motion sensors, from a film of a board
+  robot        robot leds: can a robot's LEDs be told apart, and would others be better
+  survey       where the LEDs are, from a film of the robot at rest
   doctor       what this machine can do: real time, certificates, ports, codecs
 """
 
@@ -78,8 +83,38 @@ def _replay(argv: Sequence[str]) -> int:
     return main(list(argv))
 
 
+def _locate(argv: Sequence[str]) -> int:
+    from server.locate import main
+
+    return main(list(argv))
+
+
 def _experiments(argv: Sequence[str]) -> int:
     from server.experiments import main
+
+    return main(list(argv))
+
+
+def _bench(argv: Sequence[str]) -> int:
+    from server.bench import main
+
+    return main(list(argv))
+
+
+def _calibrate(argv: Sequence[str]) -> int:
+    from server.calibrate.command import main
+
+    return main(list(argv))
+
+
+def _robot(argv: Sequence[str]) -> int:
+    from server.robot_leds import main
+
+    return main(list(argv))
+
+
+def _survey(argv: Sequence[str]) -> int:
+    from server.survey.command import main
 
     return main(list(argv))
 
@@ -94,7 +129,12 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "serve": _serve,
     "phone": _phone,
     "replay": _replay,
+    "locate": _locate,
     "experiments": _experiments,
+    "bench": _bench,
+    "calibrate": _calibrate,
+    "robot": _robot,
+    "survey": _survey,
     "doctor": _doctor,
     "_server": _server,
 }

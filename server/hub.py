@@ -6,12 +6,13 @@ import asyncio
 import logging
 from collections import deque
 from pathlib import Path
-from typing import Protocol
 
 import msgspec
 from msgspec.structs import asdict
 
 from pipeline.robot import Robot
+from server.calibrate.desk import Desk
+from server.calibration_messages import Calibrate
 from server.clock import now
 from server.control_link import (
     ControlStatus,
@@ -24,6 +25,7 @@ from server.knobs import TuneInput
 from server.messages import Command, Hello, Status, ToPage, Tune, encode_message
 from server.meter import Meter
 from server.operator import OperatorPhone
+from server.page import Page
 from server.recorder import Recordings
 from server.status import build
 from server.vision import Picture, jpeg
@@ -39,22 +41,21 @@ EVENTS = 12
 TICK_S = 0.1
 
 
-class Page(Protocol):
-    """A connection that things can be sent to, from the event loop; never blocks."""
-
-    def push(self, data: str | bytes) -> None:
-        """Send when possible; the newest wins."""
-
-
 class Hub:
     """One robot, at most one operator, any number of supervisors."""
 
     def __init__(
-        self, runtime: Path, robot: Robot, cameras: list[Path], recordings: Recordings
+        self,
+        runtime: Path,
+        robot: Robot,
+        cameras: list[Path],
+        recordings: Recordings,
+        profiles: Path | None = None,
     ) -> None:
-        """Listens to control in `runtime`."""
+        """Listens to control in `runtime`; `profiles` is where new calibrations go."""
         self.robot, self.recordings = robot, recordings
-        self._cameras = cameras
+        self._cameras, self._profiles = cameras, profiles
+        self._desk = Desk(lambda text: self._push("operator", text))
         self._control = server_end(runtime)
         self.phone: OperatorPhone | None = None
         self._phone_pages: dict[str, Page] = {}
@@ -97,8 +98,7 @@ class Hub:
         if command.what == "key_frame":
             return
         self.say(f"{who}: {command.what}")
-        insists = INSISTS if command.what in ("stop", "disarm") else 0
-        self._ask(RequestInput(command.what), insists)
+        self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
 
     def tune(self, wish: Tune) -> None:
         """A supervisor turns knobs of the virtual camera."""
@@ -110,6 +110,12 @@ class Hub:
             self.say(f"supervisor: {told}")
         else:
             self.say(f"{told} did not reach the control process: try again.")
+
+    def calibrate(self, wish: Calibrate) -> None:
+        """The operator's phone begins to calibrate its camera, or leaves it; see `Desk.wish`."""
+        if (phone := self.phone) is not None:
+            self._desk.wish(phone, wish, self.status)
+            self.say(f"{phone.device}: calibration, {wish.what}")
 
     def _ask(self, request: RequestInput, insists: int) -> None:
         """Nobody may be there, or the queue may be full: what stops the robot is said again."""
@@ -140,6 +146,7 @@ class Hub:
             now,
             on_taken=lambda n: soon(encode(Record(n, int(1e6 * now()), Credit(n))), "video"),
             on_key_wanted=lambda: soon(encode_message(Command("key_frame")), "operator"),
+            profiles=self._profiles,
         )
         self._phone_pages = {"operator": page}
         self.recordings.message("phone", encode_message(hello), now())
@@ -216,6 +223,7 @@ class Hub:
         self._shown = status
         self.broadcast(status)
         self._show_picture()
+        self._desk.tell(self.phone, self.status)
 
     def broadcast(self, message: ToPage) -> None:
         """To every page."""

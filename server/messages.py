@@ -11,6 +11,8 @@ import msgspec
 from msgspec import Meta
 
 from pipeline.config import EstimatorName, VirtualCameraMode
+from server.calibration_messages import Calibrate, Calibration
+from server.camera_messages import CameraHealth
 from server.knobs import AdaptiveBeta, CutoffHz, Knobs, SpeedLimit
 from server.wire import MAX_MESSAGE_BYTES, WireError
 
@@ -187,10 +189,12 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """None before the control process has told of it."""
     estimate: Estimate | None = None
     """None before the control process has told of it."""
+    camera: CameraHealth | None = None
+    """Of the operator's phone; None while nobody looks through it."""
 
 
-FromPage = Hello | Command | Tune | Log
-ToPage = Welcome | Refused | Status | Command
+FromPage = Hello | Command | Tune | Calibrate | Log
+ToPage = Welcome | Refused | Status | Command | Calibration
 
 _decoder = msgspec.json.Decoder(FromPage)
 _to_page_decoder = msgspec.json.Decoder(ToPage)

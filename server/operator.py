@@ -15,6 +15,8 @@ from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Operator, PhoneImu
 from pipeline.vision import Sighting
 from pipeline.vision_config import GatesConfig
+from server.calibrate.wizard import Wizard
+from server.calibration_messages import Calibrate, Calibration
 from server.control_link import (
     ControlStatus,
     Input,
@@ -31,6 +33,8 @@ from server.sight import Sight
 from server.vision import VisionThread
 from server.wire import Motion, Picture, Record, WireError
 
+Shape = tuple[int, int, int]
+"""Of pictures: width, height [px], angle of the screen [°]."""
 STALE_S = 1.0
 """A stream silent for longer keeps the robot from being armed."""
 
@@ -47,8 +51,9 @@ class OperatorPhone:
         clock: Callable[[], float],
         on_taken: Callable[[int], None],
         on_key_wanted: Callable[[], None],
+        profiles: Path | None = None,
     ) -> None:
-        """`to_control` may be called from the vision thread as well."""
+        """`to_control` may be called from the vision thread too; calibrations go to `profiles`."""
         self.id = secrets.token_urlsafe(12)
         self.device, self.hello = hello.device or "a phone", hello
         self.ingest = Ingest(lambda: 1 + secrets.randbits(63))
@@ -57,7 +62,10 @@ class OperatorPhone:
         self._greeted = clock()
         self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
         self.vision: VisionThread | None = None
-        self._size: tuple[int, int] | None = None
+        self._shape: Shape | None = None
+        self._profiles = profiles
+        self.wizard: Wizard | None = None
+        """The camera's calibration, while one is under way."""
         self.camera_problem = self.camera_text = ""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.sighting: Sighting | None = None
@@ -79,6 +87,8 @@ class OperatorPhone:
                 self.meters["phone_imu"].tick(now, sample.t)
                 self._to_control(PhoneImuInput.of(sample))
                 self._check.feel(sample.t, record.body)
+                if self.wizard is not None:
+                    self.wizard.feel(sample)
                 if self.vision is not None:
                     self.vision.feel(sample)
                     self.vision.doubt(self._check.doubts_gravity)
@@ -101,20 +111,29 @@ class OperatorPhone:
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)
-        size = (frame.picture.width, frame.picture.height)
-        if size != self._size:
-            self._open_eyes(size)
+        picture = frame.picture
+        shape = (picture.width, picture.height, picture.screen_angle_deg)
+        if shape != self._shape:
+            self._open_eyes(shape)
+        if self.wizard is not None:
+            self.wizard.offer(frame)
+            return
         if self.vision is None:
             self._on_taken(frame.sequence)
             raise WireError("calibration", "frame", self.camera_problem)
         self.vision.offer(frame)
 
-    def _open_eyes(self, size: tuple[int, int]) -> None:
-        """Begin to look, or begin again at another picture size: that is another camera."""
+    def _open_eyes(self, shape: Shape) -> None:
+        """Begin to look, or begin again at another size or angle: that is another camera."""
+        is_calibrating = self.wizard is not None and self.wizard.stored is None
         self.close()
-        self._size, self.camera_problem = size, ""
+        self._shape, self.camera_problem = shape, ""
+        if is_calibrating:
+            self._calibrate(shape)
+            return
+        width, height, angle = shape
         try:
-            path, camera = find_camera_file(self.device, *size, self._cameras)
+            path, camera = find_camera_file(self.device, width, height, self._cameras, angle)
         except CameraFileError as error:
             self.camera_problem = str(error)
             return
@@ -156,7 +175,9 @@ class OperatorPhone:
         else:
             faults = self._check.faults()
             why += faults
-        if self.camera_problem:
+        if self.wizard is not None:
+            why.append("The camera is being calibrated.")
+        elif self.camera_problem:
             why.append(f"The camera is not calibrated: {self.camera_problem}.")
         elif self.meters["video"].age(now) > STALE_S:
             why.append("No pictures from the phone: allow the camera in the browser.")
@@ -165,10 +186,42 @@ class OperatorPhone:
         elif self.meters["pose"].age(now) > STALE_S and not faults:
             found = self.sighting.reason if self.sighting is not None else ""
             why.append(f"The robot is not seen. {found}".strip())
+        if not faults and self.vision is not None and self.vision.looking.watch.complaint:
+            why.append(self.vision.looking.watch.complaint)
         return why
+
+    def calibrate(self, wish: Calibrate) -> None:
+        """Begin to calibrate the camera that films now, or leave that and look again.
+
+        Raises:
+            WireError: there is no picture yet.
+        """
+        if wish.what == "start" and (self._shape is None or self._profiles is None):
+            raise WireError("order", "calibrate.what", "when pictures come")
+        self.close()
+        if wish.what == "start" and self._shape is not None:
+            self._calibrate(self._shape)
+        else:
+            self._shape = None  # the next picture opens eyes, with what may have been stored
+
+    def _calibrate(self, shape: Shape) -> None:
+        """Begin, or begin again in another orientation."""
+        assert self._profiles is not None
+        self.wizard = Wizard(
+            self.device, shape, self._profiles, self._on_taken, self._on_key_wanted
+        )
+
+    def calibration(self) -> Calibration:
+        """What the page should know of it."""
+        if self.wizard is not None:
+            return self.wizard.state()
+        return Calibration("needed" if self.camera_problem else "off")
 
     def close(self) -> None:
         """Stop looking."""
+        if self.wizard is not None:
+            self.wizard.stop()
+            self.wizard = None
         if self.vision is not None:
             self.vision.stop()
             self.vision = None

@@ -52,7 +52,7 @@ CODES = {
     "size": "too short or too long",
     "version": "another version of the protocol",
     "value": "out of its range, not finite, or a field nobody knows",
-    "order": "before `hello`, or `hello` twice",
+    "order": "before `hello`, `hello` twice, or not now",
     "rate": "too much a second",
     "role": "not as this role, or somebody else has the place",
     "calibration": "no calibration of this camera at this picture size",
@@ -116,8 +116,8 @@ routes by `python -m server.wire_types`: edit those, not this.
 
 | websocket | role | page → server | server → page |
 |---|---|---|---|
-| `/ws/phone` | operator | `hello`, `command`, `log`; MOTION, TOUCH, PONG | `welcome`, `status`, \
-`refused`, `command` (`key_frame`); PING |
+| `/ws/phone` | operator | `hello`, `command`, `calibrate`, `log`; MOTION, TOUCH, PONG | \
+`welcome`, `status`, `refused`, `calibration`, `command` (`key_frame`); PING |
 | `/ws/video` | video | `hello`, `log`; FRAME | `welcome`, `refused`; CREDIT |
 | `/ws/supervisor` | supervisor | `hello`, `command`, `tune`, `log` | `welcome`, `status`, \
 `refused`; PICTURE |
@@ -150,8 +150,8 @@ come from the server's own pages (403): `Origin` is the server's, and requests c
 
 {requests()}
 
-Bodies up to {MAX_BODY} bytes. Pages (`/`, `/supervisor`) and their files need no role. Refusals
-are JSON, as below: `code`, `field`, `allowed`.
+Bodies up to {MAX_BODY} bytes. Pages (`/`, `/supervisor`, `/board`) and their files need no role.
+Refusals are JSON, as below: `code`, `field`, `allowed`.
 
 ## Records
 

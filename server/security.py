@@ -16,7 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 Role = Literal["operator", "supervisor"]
 COOKIE = "lightleash"
 PUBLIC_FILES = (".js", ".css", ".svg")
-PUBLIC_PATHS = {"/", "/supervisor", "/api/pair", "/healthz", "/ca.crt"}
+PUBLIC_PATHS = {"/", "/supervisor", "/board", "/api/pair", "/healthz", "/ca.crt"}
 OPERATOR_PATHS = {"/api/whoami", "/api/stop", "/ws/phone", "/ws/video"}
 """What an operator may reach; everything else is the supervisor's."""
 PAIR_TRIES, PAIR_WINDOW_S = 10, 60.0

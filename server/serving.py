@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 import socket
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +16,9 @@ from starlette.types import ASGIApp
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
+from pipeline.looking import warm_up
 from server.app import Api, make_app
+from server.calibrate.camera_yaml import PROFILES
 from server.dashboard import Dashboard
 from server.hub import Hub
 from server.listener import Listener, listener
@@ -86,7 +89,12 @@ def _hub(settings: Settings, given: Given) -> Hub:
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
     robot = load_robot(settings.robot).robot
-    return Hub(given.runtime, robot, [*settings.cameras, CAMERAS], recordings)
+    # what the first picture needs compiled is compiled beside the start
+    threading.Thread(target=warm_up, name="warm-up", daemon=True).start()
+    profiles = settings.state / PROFILES
+    profiles.mkdir(parents=True, exist_ok=True)
+    cameras = [*settings.cameras, profiles, CAMERAS]
+    return Hub(given.runtime, robot, cameras, recordings, profiles)
 
 
 def _dashboard(settings: Settings, hub: Hub) -> Dashboard:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from server.calibration_messages import Calibrate
 from server.messages import Command, FromPage, Hello, Log, Tune, decode_message
 from server.wire import VERSION, Motion, Picture, Pong, Record, Touch, WireError, decode
 
@@ -16,7 +17,7 @@ ALLOWED: dict[str, tuple[type, ...]] = {
 }
 """Kinds of record by role."""
 MESSAGES: dict[str, tuple[type, ...]] = {
-    "operator": (Command, Log),
+    "operator": (Command, Calibrate, Log),
     "video": (Log,),
     "supervisor": (Command, Tune, Log),
 }

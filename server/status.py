@@ -8,6 +8,7 @@ from typing import Literal, Protocol, cast
 
 from pipeline.robot import Robot
 from pipeline.signals import Mode
+from server.camera_health import health
 from server.clock import now
 from server.control_link import ControlStatus
 from server.messages import Estimate, Status, Stream, VirtualCamera
@@ -75,6 +76,9 @@ def build(hub: Known) -> Status:
         messages=list(hub.events),
         virtual_camera=_virtual_camera(control),
         estimate=_estimate(control),
+        camera=health(phone.vision.looking)
+        if phone is not None and phone.vision is not None
+        else None,
     )
 
 

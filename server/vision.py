@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 
 import cv2
@@ -13,20 +11,20 @@ import numpy.typing as npt
 
 from pipeline.expected import Expected
 from pipeline.frames import Array
+from pipeline.looking import Looking
 from pipeline.signals import BodyImu, Image, PhoneImu
 from pipeline.vision import Sighting
+from server.frame_thread import FrameThread
 from server.ingest import EncodedFrame
 from server.sight import Sight
 
-MAX_WAITING = 8
-"""Encoded pictures; more, and the stream starts anew at a key frame."""
 THUMBNAIL_WIDTH = 480
 THUMBNAIL_S = 0.1
 
 Picture = npt.NDArray[np.uint8]
 
 
-class VisionThread:
+class VisionThread(FrameThread):
     """Owns one phone's `Sight`: pictures go in, sightings come out, nothing queues up between."""
 
     def __init__(
@@ -37,29 +35,26 @@ class VisionThread:
         on_key_wanted: Callable[[], None],
     ) -> None:
         """Callbacks run in this thread."""
+        super().__init__("vision", on_taken)
         self._sight = sight
-        self._on_sighting, self._on_taken = on_sighting, on_taken
-        self._on_key_wanted = on_key_wanted
-        self._waiting: deque[EncodedFrame] = deque()
-        self._condition = threading.Condition()
-        self._running = True
-        self._has_gap = False
+        self._on_sighting, self._on_key_wanted = on_sighting, on_key_wanted
         self._prior: tuple[Array | None, Array] = (None, np.zeros(3))
         self._t_thumbnail = 0.0
         self.watched = False
         """Whether anyone wants thumbnails."""
         self.thumbnail: Picture | None = None
         """(h, w, 3) RGB, with what was found."""
-        self.dropped = 0
-        self.failed = ""
-        """Why the thread died, if it did."""
-        self._thread = threading.Thread(target=self._run, name="vision", daemon=True)
-        self._thread.start()
+        self.start()
 
     @property
     def undecodable(self) -> int:
         """Pictures that were garbage or needed a lost one."""
         return self._sight.undecodable
+
+    @property
+    def looking(self) -> Looking:
+        """What it learnt of the camera; to be read."""
+        return self._sight.looking
 
     def feel(self, sample: PhoneImu) -> None:
         """The phone's motion, for the prior."""
@@ -76,45 +71,11 @@ class VisionThread:
 
     def doubt(self, gravity: bool) -> None:
         """Whether the phone's gravity is yet to be tested."""
-        self._sight.doubts_gravity = gravity
+        self._sight.doubt(gravity)
 
-    def offer(self, frame: EncodedFrame) -> None:
-        """A picture has come."""
-        with self._condition:
-            if len(self._waiting) >= MAX_WAITING:
-                self.dropped += len(self._waiting)
-                self._waiting.clear()
-                self._has_gap = True
-            self._waiting.append(frame)
-            self._condition.notify()
-
-    def stop(self) -> None:
-        """End the thread."""
-        with self._condition:
-            self._running = False
-            self._condition.notify()
-        self._thread.join(timeout=2.0)
-
-    def _run(self) -> None:
-        try:
-            while self._running:
-                self._turn()
-        except Exception as error:  # the server must say so, not fall silent
-            self.failed = f"vision failed: {error!r}"
-            raise
-
-    def _turn(self) -> None:
-        with self._condition:
-            self._condition.wait_for(lambda: self._waiting or not self._running)
-            frames, has_gap = list(self._waiting), self._has_gap
-            self._waiting.clear()
-            self._has_gap = False
-        if not frames:
-            return
+    def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
         if has_gap:
             self._sight.needs_key = True
-        self._on_taken(frames[-1].sequence)
-        self.dropped += len(frames) - 1
         sighting = self._sight.see(frames, *self._prior)
         if sighting is None:
             self._on_key_wanted()

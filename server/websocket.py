@@ -10,6 +10,7 @@ from collections.abc import Awaitable
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
+from server.calibration_messages import Calibrate
 from server.clock import now
 from server.hub import Hub
 from server.messages import Command, Hello, Log, Refused, Tune, Welcome, encode_message
@@ -180,6 +181,8 @@ class PageServer:
                 phone.take(said, t)
             elif isinstance(said, Command):
                 self._hub.wish(said, phone.device if phone is not None else "supervisor")
+            elif isinstance(said, Calibrate) and phone is not None:
+                self._hub.calibrate(said)
             elif isinstance(said, Tune):
                 self._hub.tune(said)
             elif isinstance(said, Log):

@@ -21,7 +21,7 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from server import knobs, messages, wire
+from server import calibration_messages, camera_messages, knobs, messages, wire
 from server.protocol_text import RECORDS, page
 from server.wire import Codec, Kind, Record, WireError
 
@@ -31,13 +31,16 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Hello,
     messages.Command,
     messages.Tune,
+    calibration_messages.Calibrate,
     messages.Log,
     messages.Welcome,
     messages.Refused,
+    calibration_messages.Calibration,
     messages.Stream,
     knobs.Knobs,
     messages.VirtualCamera,
     messages.Estimate,
+    camera_messages.CameraHealth,
     messages.Status,
 )
 UNIONS = {"FromPage": messages.FromPage, "ToPage": messages.ToPage}

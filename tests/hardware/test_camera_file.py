@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 import yaml
 
-from hardware.camera_file import CAMERAS, CameraFileError, find_camera, load_camera, slug
+from hardware.camera_file import (
+    CAMERAS,
+    CameraFileError,
+    find_camera,
+    find_camera_file,
+    load_camera,
+    slug,
+)
 
 INFO = yaml.safe_load((CAMERAS / "virtual_phone.yaml").read_text())
 KALIBR = {
@@ -25,7 +32,7 @@ def changed(table, path, value):
     for parent in parents:
         at = at[parent]
     if value is None:
-        del at[key]
+        at.pop(key, None)
     else:
         at[key] = value
     return table
@@ -68,6 +75,35 @@ def test_kalibrs_fisheye_is_equidistant(tmp_path):
     assert load_camera(written(tmp_path, table))[1].model == "equidistant"
 
 
+def test_a_camchains_line_delay_is_its_readout(tmp_path):
+    table = changed(KALIBR, ["cam0", "line_delay"], 25e-6)
+    assert load_camera(written(tmp_path, table))[1].readout_s == pytest.approx(0.018)
+
+
+def test_a_camchain_may_have_our_key_for_it_but_not_both(tmp_path):
+    table = changed(KALIBR, ["rolling_shutter_readout_s"], 0.018)
+    assert load_camera(written(tmp_path, table))[1].readout_s == 0.018
+    both = changed(table, ["cam0", "line_delay"], 25e-6)
+    with pytest.raises(CameraFileError, match=r"not beside cam0\.line_delay"):
+        load_camera(written(tmp_path, both))
+
+
+def test_what_kalibr_says_of_motion_sensors_is_not_read(tmp_path):
+    table = changed(KALIBR, ["cam0", "T_cam_imu"], [[1, 0, 0, 0]] * 4)
+    assert load_camera(written(tmp_path, table))[1].readout_s == 0.0
+
+
+def test_a_picture_that_stands_on_its_head_is_read_out_from_below(tmp_path):
+    table = changed(INFO, ["rolling_shutter_readout_s"], -0.02)
+    camera = load_camera(written(tmp_path, table))[1]
+    np.testing.assert_allclose(camera.row_delays(np.array([0.0, 720.0])), [0.01, -0.01])
+
+
+def test_a_number_that_yaml_takes_for_a_word_is_a_number(tmp_path):
+    text = (CAMERAS / "virtual_phone.yaml").read_text().replace("readout_s: 0.0", "readout_s: 2e-2")
+    assert load_camera(written(tmp_path, text))[1].readout_s == 0.02
+
+
 K = ["camera_matrix", "data"]
 FAULTS = [
     (["distortion_model"], "banana", "distortion_model", "plumb_bob, rational_polynomial"),
@@ -90,8 +126,10 @@ FAULTS = [
     (["image_width"], True, "image_width", "a number from 16 to 8192"),
     (["image_height"], 720.5, "image_height", "a whole number"),
     (["image_height"], 10**9, "image_height", "a number from 16 to 8192"),
-    (["rolling_shutter_readout_s"], 16.0, "rolling_shutter_readout_s", "from 0 to 0.1"),
-    (["rolling_shutter_readout_s"], float("nan"), "rolling_shutter_readout_s", "from 0 to 0.1"),
+    (["screen_angle_deg"], 45, "screen_angle_deg", "0, 90, 180, 270"),
+    (["screen_angle_deg"], True, "screen_angle_deg", "0, 90, 180, 270"),
+    (["rolling_shutter_readout_s"], 16.0, "rolling_shutter_readout_s", "from -0.1 to 0.1"),
+    (["rolling_shutter_readout_s"], float("nan"), "rolling_shutter_readout_s", "from -0.1 to 0.1"),
 ]
 
 
@@ -115,6 +153,8 @@ KALIBR_FAULTS = [
     (["cam0", "resolution"], [-1280, 720], "resolution", "a number from 16 to 8192"),
     (["cam0", "resolution"], [1280.5, 720], "resolution", "a whole number"),
     (["cam0", "resolution"], None, "resolution", "must be there"),
+    (["cam0", "camera_model"], "omni", "cam0.camera_model", "pinhole"),
+    (["cam0", "line_delay"], 25_000.0, "cam0.line_delay", "a number from -0.000138889 to 0.000138"),
 ]
 
 
@@ -146,6 +186,30 @@ def test_a_camera_is_found_by_device_and_size_whatever_its_spelling(tmp_path):
     written(tmp_path, changed(INFO, ["camera_name"], "Pixel 7 (back)"), "a.yaml")
     assert find_camera("pixel-7-back", 1280, 720, (CAMERAS, tmp_path)).width == 1280
     assert slug("  Pixel 7 (Back)") == "pixel-7-back"
+
+
+def turned(tmp_path, angle, fu):
+    table = changed(changed(INFO, ["screen_angle_deg"], angle), ["camera_name"], "pixel 7")
+    table["camera_matrix"]["data"][0] = fu
+    written(tmp_path, table, f"{fu}.yaml")
+
+
+def test_a_calibration_of_another_screen_angle_does_not_fit(tmp_path):
+    turned(tmp_path, 90, 900.0)
+    turned(tmp_path, 270, 800.0)
+    for angle, fu in ((90, 900.0), (270, 800.0)):
+        path, camera = find_camera_file("pixel-7", 1280, 720, [tmp_path], angle)
+        assert camera.K[0, 0] == fu
+        assert path == tmp_path / f"{fu}.yaml"
+    with pytest.raises(CameraFileError, match="pixel 7 1280x720 at 270°"):
+        find_camera_file("pixel-7", 1280, 720, [tmp_path], 0)
+
+
+def test_a_calibration_that_does_not_tell_its_angle_fits_any_but_comes_second(tmp_path):
+    turned(tmp_path, None, 700.0)
+    turned(tmp_path, 90, 900.0)
+    assert find_camera_file("pixel-7", 1280, 720, [tmp_path], 0)[1].K[0, 0] == 700.0
+    assert find_camera_file("pixel-7", 1280, 720, [tmp_path], 90)[1].K[0, 0] == 900.0
 
 
 @pytest.mark.parametrize("wanted", [("pixel-7", 1280, 720), ("lightleash-virtual-phone", 640, 480)])

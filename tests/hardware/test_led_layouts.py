@@ -5,9 +5,10 @@ import pytest
 
 from hardware.camera_file import find_camera
 from hardware.robot_file import load_robot
-from pipeline import identify
 from pipeline.frames import R_from_rpy, exp
+from pipeline.search import Hints
 from pipeline.signals import Spots
+from pipeline.starting import Starting
 from pipeline.vision_config import IdentifyConfig
 
 CAMERA = find_camera("lightleash-virtual-phone", 1280, 720)
@@ -52,9 +53,8 @@ def test_no_led_is_taken_for_another_or_a_lamp(name):
         spots = spots_of(rng, leds_px)
         off = rng.normal(0.0, 1.0, 3)
         up_in_c = exp(GRAVITY_RAD * off / np.linalg.norm(off)) @ R_fc.T @ UP
-        naming = identify.from_gravity(
-            CAMERA, leds_in_b, spots, up_in_c, R_fb.T @ UP, IdentifyConfig()
-        )
+        starting = Starting(CAMERA, leds_in_b, IdentifyConfig())
+        naming = starting.step(0.0, spots, Hints(up_in_c, R_fb.T @ UP), None)
         if naming is not None:
             found += 1
             apart = spots.pixels[naming.match.spot] - leds_px[naming.match.led]

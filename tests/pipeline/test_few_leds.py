@@ -158,7 +158,7 @@ def looked(eye, frame, truth, expected, sensors=True):
     return sighting
 
 
-@pytest.mark.parametrize("covered", [(0, 1, 2, 3), (1, 2, 4), (0, 4)])
+@pytest.mark.parametrize("covered", [(0, 1, 2, 3), (1, 2, 4), (0, 3, 4)])
 def test_vision_hands_on_the_rays_of_a_few(covered):
     rng = np.random.default_rng(120)
     eye, truth = Vision(CAMERA, LEDS_IN_B), truth_at(rng)
@@ -180,12 +180,26 @@ def test_vision_hands_on_the_rays_of_a_few(covered):
     assert told.half_field == CAMERA.half_field
 
 
+def test_three_are_a_pose_for_a_while_after_four_were():
+    rng = np.random.default_rng(127)
+    eye, truth = Vision(CAMERA, LEDS_IN_B), truth_at(rng)
+    looked(eye, frame_at(0.0, truth, rng), truth, None)
+    poses = []
+    for k in range(1, 31):
+        truth = moved(truth, rng)
+        sighting = looked(eye, frame_at(k * DT, truth, rng, covered=(0, 4)), truth, None)
+        assert sighting.pose is None or not is_wrong(sighting.pose, truth)
+        poses.append(sighting.pose is not None)
+    assert all(poses[:3])
+    assert not any(poses[-3:])
+
+
 def test_without_an_expectation_a_few_are_nothing():
     rng = np.random.default_rng(121)
     eye, truth = Vision(CAMERA, LEDS_IN_B), truth_at(rng)
     looked(eye, frame_at(0.0, truth, rng), truth, None)
-    sighting = looked(eye, frame_at(DT, truth, rng, covered=(0, 1)), truth, None)
-    assert sighting.reason == "3 of 5 LEDs seen: 4 are needed."
+    sighting = looked(eye, frame_at(DT, truth, rng, covered=(0, 1, 3)), truth, None)
+    assert sighting.reason == "2 of 5 LEDs seen: 4 are needed."
     assert sighting.seen(CAMERA) is None
 
 
@@ -218,7 +232,7 @@ def with_lamp(frame, place):
 
 
 def test_a_wrong_filter_does_not_confirm_itself_by_a_lamp_for_ever():
-    """The robot comes into sight while the filter follows a lamp: half a second, and it's known."""
+    """The robot comes into sight while the filter follows a lamp: it is known at once."""
     rng = np.random.default_rng(124)
     eye, truth = Vision(CAMERA, LEDS_IN_B), truth_at(rng)
     lie = elsewhere(truth)
@@ -230,7 +244,7 @@ def test_a_wrong_filter_does_not_confirm_itself_by_a_lamp_for_ever():
         found.append(looked(eye, frame, truth, replace(lie, t=k * DT)))
     assert len(found[1].rays) == 1  # deceived
     first = next(k for k, sighting in enumerate(found) if sighting.pose is not None)
-    assert first <= 3 + CONFIG.search_s / DT + 1
+    assert first == 3
     for sighting in found[first:]:
         assert not is_wrong(sighting.pose, truth)
 

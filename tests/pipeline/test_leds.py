@@ -114,21 +114,30 @@ def test_elongated_and_dim_spots_claim_less():
     assert covariance(spot_at(100, 80, peak=45.0))[0, 0] > covariance(spot_at(100, 80))[0, 0]
 
 
-def test_a_room_full_of_lamps_is_bounded_work(monkeypatch):
+def test_a_room_full_of_lamps_is_bounded_work_and_says_so(monkeypatch):
     rng = np.random.default_rng(21)
-    measured = []
+    windows = []
 
-    def counting(*arguments):
-        measured.append(1)
-        return measure(*arguments)
+    def counting(luma, light, slope, places, *arguments):
+        windows.append(len(places))
+        return measure(luma, light, slope, places, *arguments)
 
     monkeypatch.setattr(leds, "measure", counting)
     lamps = picture(truth_at(rng), rng, Look(distractors=400))
     static = rng.integers(0, 256, (720, 1280), dtype=np.uint8)
     for luma in (lamps, static):
-        measured.clear()
-        assert len(find_spots(Frame(0.0, luma), CONFIG)) <= CONFIG.max_spots
-        assert len(measured) <= leds.MAX_CONTOURS
+        spots = find_spots(Frame(0.0, luma), CONFIG)
+        assert len(spots) <= CONFIG.max_spots
+        assert spots.bounded
+        assert windows.pop() <= leds.MAX_PLACES
+    assert not find_spots(Frame(0.0, picture(truth_at(rng), rng)), CONFIG).bounded
+
+
+def test_leds_are_found_in_a_picture_full_of_noise():
+    rng = np.random.default_rng(24)
+    luma = np.clip(spot_at(250.0, 200.0, peak=200.0) + rng.normal(0.0, 10.0, (240, 320)), 0, 255)
+    spots = find_spots(Frame(0.0, luma.astype(np.uint8)), CONFIG)
+    assert nearest_distance(np.array([[250.0, 200.0]]), spots)[0] < 0.2
 
 
 def test_max_spots_keeps_the_brightest():

@@ -66,7 +66,7 @@ def test_names_are_kept_and_doubt_multiplies_the_covariance():
 
 def test_each_led_is_dated_by_its_row():
     camera = replace(CAMERA, readout_s=0.02)
-    pixels = np.array([[5.0, 0.0], [5.0, 359.5], [5.0, 719.0]])
+    pixels = np.array([[5.0, 0.0], [5.0, 360.0], [5.0, 720.0]])
     rays = rays_of(camera, spots_of(pixels, np.eye(2)), all_of(3), 7.0)
     np.testing.assert_allclose(rays.t, [6.99, 7.0, 7.01])
 

@@ -15,7 +15,7 @@ LOOKS = {
     "clean": Look(),
     "ordinary room": Look(room=0.06, noise=0.004, exposure_s=0.008),
     "low light": Look(led_light=0.6, room=0.01, noise=0.012),
-    "trembling through a long exposure": Look(exposure_s=0.033, sub_exposures=8),
+    "trembling": Look(exposure_s=0.008, sub_exposures=8),
 }
 TREMOR_RAD, TREMOR_HZ, HAND_RAD_S = 0.0005, 9.0, 0.1
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hardware.camera_file import CAMERAS
-from pipeline import gravity_test
+from pipeline import camera_verdict, gravity_test
 from pipeline.rays import NO_RAYS
-from pipeline.signals import LedRays, RelativePose
+from pipeline.signals import LedRays, RelativePose, Spots
 from pipeline.vision import Sighting
 from server.control_link import OperatorInput, PhoneImuInput
 from server.ingest import EncodedFrame
@@ -18,10 +18,11 @@ from server.messages import Hello
 from server.operator import STALE_S, OperatorPhone
 from server.phone_script import DEVICE
 from server.seen_input import SeenInput
-from server.sight import NO_SPOTS
 from server.wire import VERSION, Motion, Ping, Pong, Record, Touch, WireError
 from tests.pipeline.seeing import CAMERA, rays_at
 from tests.server.house import JPEG, ROBOT
+
+NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
 
 FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
 
@@ -182,3 +183,16 @@ def test_only_a_pose_counts_as_seeing_the_robot(rig):
     rig.phone._sighted(CAMERA, sighting_of(pose, FEW), SHOT)
     assert rig.phone.meters["pose"].age(rig.t) < STALE_S
     assert rig.to_control[-1].pose.leds == 5
+
+
+def test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed():
+    rig = Rig(DEVICE)
+    try:
+        rig.settle()
+        rig.say(JPEG)
+        assert rig.phone.vision is not None
+        assert not [why for why in rig.why() if "stabilisation" in why]
+        rig.phone.vision.looking.watch.complaint = camera_verdict.STABILISED
+        assert rig.why()[-1] == camera_verdict.STABILISED
+    finally:
+        rig.phone.close()

@@ -18,7 +18,9 @@ BASE = "http://127.0.0.1:8080"
 WS = "ws://127.0.0.1:8080"
 OWN = {"Origin": BASE, "X-Lightleash": "1"}
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS")
-FILES = {"/style.css", "/phone.css", "/supervisor.css", "/icon.svg", "/lead.svg"}
+STYLES = ("style", "phone", "supervisor", "calibration", "lens", "board")
+PICTURES = ("icon", "lead", "board")
+FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICTURES)}
 
 
 @pytest.fixture
@@ -61,7 +63,7 @@ def test_nothing_but_pages_their_files_and_pairing_opens_without_a_role(rig):
         for method in METHODS
         if rig.client.request(method, path, headers=OWN).status_code not in (401, 403, 404, 405)
     }
-    public = {"/", "/supervisor", "/healthz", *FILES}
+    public = {"/", "/supervisor", "/board", "/healthz", *FILES}
     readable = {(method, path) for path in public for method in ("GET", "HEAD")}
     assert opened == readable | {("POST", "/api/pair")}  # which answers 400: no token
 

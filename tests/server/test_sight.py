@@ -163,33 +163,7 @@ def test_the_stages_are_timed():
     ticks = count()
     eye = Sight(CAMERA, ROBOT, GatesConfig(), lambda: next(ticks))
     ((frame, truth),) = shots(rng, 1)
-    assert set(look(eye, [frame], truth).took_s) == {"decode", "detect", "identify"}
-
-
-def test_the_phones_vertical_follows_its_gyroscope_at_once():
-    eye, up = sight(), np.array([0.0, 0.0, 1.0])
-    omega = np.array([0.0, 0.8, 0.0])
-    for k in range(61):
-        up_in_c = exp(-omega * 0.01 * k) @ up
-        eye.feel(PhoneImu(0.01 * k, omega, GRAVITY * up_in_c))
-    assert np.degrees(np.arccos(eye._vertical.up @ up_in_c)) < 0.5
-
-
-def test_a_shake_hardly_tilts_the_phones_vertical_but_the_long_run_does():
-    eye, up = sight(), np.array([0.0, 0.0, 1.0])
-    push = np.array([5.0, 0.0, 0.0])
-    eye.feel(PhoneImu(0.0, ZERO, GRAVITY * up))
-    eye.feel(PhoneImu(0.02, ZERO, GRAVITY * up + push))
-    assert np.degrees(np.arccos(eye._vertical.up @ up)) < 2.0
-    for k in range(2, 200):
-        eye.feel(PhoneImu(0.02 * k, ZERO, GRAVITY * up + push))
-    assert np.degrees(np.arccos(eye._vertical.up @ up)) > 20.0
-
-
-def test_free_fall_says_nothing_about_the_vertical():
-    eye = sight()
-    eye.feel(PhoneImu(0.0, ZERO, ZERO))
-    assert eye._vertical.up is None
+    assert set(look(eye, [frame], truth).took_s) == {"decode", "detect", "identify", "pose"}
 
 
 def test_after_a_lost_picture_nothing_is_decoded_before_a_key():
@@ -208,14 +182,14 @@ def test_a_few_leds_where_control_expects_them_are_rays_without_a_pose():
     for k in range(8):
         for t in (k * DT - 0.01, k * DT + 0.01):
             eye.expect(Expected(t, truth.p, truth.R, ZERO, 0.005, 0.005))
-        covered = () if k < 3 else (0, 2)
+        covered = () if k < 3 else (0, 2, 4)
         shot = sent(k, *camera_side.encode(picture(truth, rng, covered=covered)))
         sighting = look(eye, [shot], truth)
         assert (sighting.pose is None) == (k >= 3)
-    assert sorted(sighting.rays.led.tolist()) == [1, 3, 4]
-    assert sighting.reason == "3 of 5 LEDs seen."
+    assert sorted(sighting.rays.led.tolist()) == [1, 3]
+    assert sighting.reason == "2 of 5 LEDs seen."
     eye.expect(None)
-    shot = sent(8, *camera_side.encode(picture(truth, rng, covered=(0, 2))))
+    shot = sent(8, *camera_side.encode(picture(truth, rng, covered=(0, 2, 4))))
     assert len(look(eye, [shot], truth).rays) == 0
 
 
@@ -226,12 +200,3 @@ def test_rays_of_a_pose_that_is_not_believed_are_not_handed_on():
     assert sighting.match is not None
     assert len(sighting.rays) == 0
     assert sighting.seen(CAMERA) is None
-
-
-def test_the_phones_turning_is_that_of_when_the_picture_was_taken():
-    eye = sight()
-    assert eye._omega_at(0.0) is None
-    for k in range(100):
-        eye.feel(PhoneImu(0.01 * k, np.array([0.0, 0.01 * k, 1.0]), GRAVITY * UP))
-    np.testing.assert_allclose(eye._omega_at(0.905), [0.0, 0.905, 1.0])
-    np.testing.assert_allclose(eye._omega_at(2.0), [0.0, 0.99, 1.0])

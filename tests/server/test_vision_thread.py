@@ -12,10 +12,12 @@ import pytest
 from pipeline.rays import NO_RAYS
 from pipeline.signals import Match, Spots
 from pipeline.vision import Sighting
+from server.frame_thread import MAX_WAITING
 from server.ingest import EncodedFrame
-from server.sight import NO_SPOTS
-from server.vision import MAX_WAITING, THUMBNAIL_WIDTH, VisionThread, draw, jpeg
+from server.vision import THUMBNAIL_WIDTH, VisionThread, draw, jpeg
 from server.wire import Codec, Picture
+
+NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
 
 
 def frame(sequence: int, key: bool = False) -> EncodedFrame:

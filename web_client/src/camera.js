@@ -1,4 +1,4 @@
-/** The rear camera: opened, held to the wanted picture, and told to leave its lens alone. */
+/** The rear camera: opened, and held to the wanted picture. */
 
 import { Problem } from './problems.js';
 
@@ -11,9 +11,6 @@ import { Problem } from './problems.js';
 
 /** Asked for before the server has said what it wants. */
 export const USUAL = Object.freeze({ width: 1280, height: 720, frame_rate_hz: 30 });
-
-/** Where a lens that stays still is set: sharp from arm's length to the far wall [m]. */
-const FOCUS_M = 2;
 
 /**
  * @param {Wanted} wanted
@@ -58,45 +55,27 @@ export function cameraProblem(error) {
 }
 
 /**
- * Holds an open camera to the picture the server wants, and its lens to one focus where the phone allows
- * that: a moving lens changes the focal length.
+ * Holds an open camera to the picture the server wants.
  * @param {MediaStreamTrack} track
  * @param {Wanted} wanted
- * @returns {Promise<string>} What the camera settled on, in words.
  */
 export async function settleCamera(track, wanted) {
+  if (isSettled(track.getSettings(), wanted)) return; // asking again would undo what the lens was told
   try {
     await track.applyConstraints(cameraConstraints(wanted, 'exact'));
   } catch {
     await track.applyConstraints(cameraConstraints(wanted, 'ideal')).catch(() => {});
   }
-  await fixFocus(track).catch(() => {}); // a wish: autofocus works, only less steadily
-  return cameraWords(track);
-}
-
-/** @param {MediaStreamTrack} track */
-async function fixFocus(track) {
-  /** @type {Record<string, any>} */
-  const able = track.getCapabilities?.() ?? {};
-  const distance = able.focusDistance;
-  if (!able.focusMode?.includes('manual') || !(distance?.max > distance?.min)) return;
-  const focusDistance = Math.min(Math.max(FOCUS_M, distance.min), distance.max);
-  const focus = /** @type {MediaTrackConstraintSet} */ ({ focusMode: 'manual', focusDistance });
-  await track.applyConstraints({ ...track.getConstraints(), advanced: [focus] });
 }
 
 /**
- * @param {MediaStreamTrack} track
- * @returns {string}
+ * @param {MediaTrackSettings} is
+ * @param {Wanted} wanted
  */
-export function cameraWords(track) {
-  /** @type {Record<string, any>} */
-  const is = track.getSettings();
-  const words = [`${is.width}x${is.height}`, `${Math.round(is.frameRate ?? 0)} fps`];
-  if (is.facingMode) words.push(String(is.facingMode));
-  if (is.focusMode) words.push(`focus ${is.focusMode}`);
-  if (is.zoom && is.zoom !== 1) words.push(`zoom ${is.zoom}`);
-  return words.join(', ');
+function isSettled(is, wanted) {
+  const isSize = (is.width === wanted.width && is.height === wanted.height)
+    || (is.width === wanted.height && is.height === wanted.width); // held upright
+  return isSize && Math.abs((is.frameRate ?? 0) - wanted.frame_rate_hz) < 1;
 }
 
 /**

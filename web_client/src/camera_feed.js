@@ -4,7 +4,9 @@
 /** @import {ScreenAngle} from './protocol.js' */
 /** @import {Wanted} from './camera.js' */
 
+import { Lens } from './lens.js';
 import { openCamera, settleCamera } from './camera.js';
+import { settingsWords } from './lens_words.js';
 import { startFrames } from './frame_source.js';
 
 /**
@@ -26,6 +28,8 @@ export class CameraFeed {
     this.surroundings = surroundings;
     /** @type {MediaStreamTrack | null} */
     this.track = null;
+    /** Settings of the open camera. @type {Lens | null} */
+    this.settings = null;
     /** @type {Source | null} */
     this.source = null;
     /** @type {Wanted | null} */
@@ -47,6 +51,7 @@ export class CameraFeed {
     const track = stream.getVideoTracks()[0];
     if (track === undefined) return;
     this.track = track;
+    this.settings = new Lens(track);
     track.addEventListener('ended', () => this.surroundings.onLost('The camera was taken away'));
     this.surroundings.preview(stream);
   }
@@ -58,12 +63,13 @@ export class CameraFeed {
    */
   async settle(wanted) {
     this.wanted = wanted;
-    const { track } = this;
-    if (track === null) return 'no camera';
+    const { track, settings } = this;
+    if (track === null || settings === null) return 'no camera';
     this.source?.stop();
-    const words = await settleCamera(track, wanted);
+    await settleCamera(track, wanted);
+    await settings.steady();
     this.source = await startFrames({ ...this.surroundings, track });
-    return `${words}, through the ${this.source.name}`;
+    return `${settingsWords(track.getSettings())}, through the ${this.source.name}`;
   }
 
   /** Opens it again if it was lost; resolves with its words, or "" if nothing was to be done. */

@@ -6,6 +6,7 @@
 import { browserOf } from './browser.js';
 import { CameraFeed } from './camera_feed.js';
 import { Feedback } from './feedback.js';
+import { LensPanel } from './lens_panel.js';
 import { Imu, requestMotionPermission } from './imu.js';
 import { Phone } from './phone.js';
 import { Problem, adviceFor, problemOf } from './problems.js';
@@ -16,7 +17,7 @@ import { USUAL, deviceName } from './camera.js';
 import { VideoSender } from './video.js';
 import { View } from './view.js';
 import { INITIAL, reduce, touchOf, wish } from './session.js';
-import { becomeKnown, tokenOf, whoAmI } from './pairing.js';
+import { becomeKnown, isStranger, tokenOf } from './pairing.js';
 
 const TICK_MS = 33;
 const STOP_TICK_MS = 50;
@@ -48,6 +49,7 @@ const view = new View(document, window, {
   onPress: () => dispatch({ type: 'press' }),
   onRelease: () => dispatch({ type: 'release' }),
   onStop: () => dispatch({ type: 'stop' }),
+  onCalibrate: (what) => dispatch({ type: 'calibrate', what }),
   onWish: () => dispatch({ type: 'ask', what: wish(state).what }),
   onSound: () => {
     feedback.unlock();
@@ -96,6 +98,8 @@ const imu = new Imu({
   phone.sendMotion(tUs, motion);
 });
 
+const lensPanel = new LensPanel(document, platform, performance, camera, (text) => phone.log(text));
+
 /** @param {Event} event */
 function dispatch(event) {
   const outcome = reduce(state, event);
@@ -111,6 +115,7 @@ function show() {
   shown = false;
   const { problem } = state;
   view.render(state, problem === null ? null : adviceFor(problem, platform, window.location.port));
+  lensPanel.render(state);
 }
 
 /** @param {Effect} effect */
@@ -127,6 +132,9 @@ function perform(effect) {
       break;
     case 'feel':
       feedback.signal(effect.mode);
+      break;
+    case 'calibrate':
+      phone.calibrate(effect.what);
       break;
     case 'close_link':
       phone.close();
@@ -167,12 +175,7 @@ async function begin() {
 
 /** The server hung up before welcoming us: perhaps it does not know this phone any more. */
 async function checkPairing() {
-  try {
-    if ((await whoAmI(fetchHere)) !== null) return;
-    dispatch({ type: 'problem', problem: new Problem('not_paired') });
-  } catch {
-    // Not to be reached: the link tries again by itself.
-  }
+  if (await isStranger(fetchHere)) dispatch({ type: 'problem', problem: new Problem('not_paired') });
 }
 
 /** @param {Welcome} welcome */
@@ -198,15 +201,7 @@ async function comeBack() {
 
 function reportHealth() {
   const now = performance.now();
-  dispatch({
-    type: 'health',
-    health: {
-      fps: video.frames.perSecond(now),
-      rttMs: video.credits.roundTripMs,
-      imuHz: motionRate.perSecond(now),
-      kbps: video.bytes.perSecond(now) * 0.008,
-    },
-  });
+  dispatch({ type: 'health', health: { ...video.health(now), imuHz: motionRate.perSecond(now) } });
   const silent = now - startedAtMs > SILENT_MOTION_MS && motionRate.perSecond(now) === 0;
   if (silent !== state.motionSilent) dispatch({ type: 'motion_silent', silent });
 }
@@ -227,7 +222,7 @@ async function arrive() {
     return;
   }
   const token = tokenOf(window.location.hash);
-  if (token === '' && (await whoAmI(fetchHere).catch(() => 'operator')) === null) {
+  if (token === '' && (await isStranger(fetchHere))) {
     dispatch({ type: 'problem', problem: new Problem('not_paired') });
     return;
   }

@@ -30,6 +30,14 @@ export async function whoAmI(fetch) {
 }
 
 /**
+ * The server answers, and does not know this browser.
+ * @param {Fetch} fetch
+ */
+export async function isStranger(fetch) {
+  return (await whoAmI(fetch).catch(() => 'not to be reached')) === null;
+}
+
+/**
  * Exchanges a token for a cookie.
  * @param {Fetch} fetch
  * @param {string} token

@@ -1,6 +1,6 @@
 /** The phone's two links and what travels on them: who we are, motion, touch, pictures, wishes. */
 
-/** @import {Command, Hello, ToPage, Welcome} from './protocol_types.js' */
+/** @import {Calibrate, Command, Hello, ToPage, Welcome} from './protocol_types.js' */
 /** @import {Motion, Received, Touch} from './protocol.js' */
 /** @import {Surroundings as LinkSurroundings} from './link.js' */
 /** @import {Event} from './session_types.js' */
@@ -92,6 +92,9 @@ export class Phone {
       case 'refused':
         dispatch({ type: 'refused', refused: message, now });
         break;
+      case 'calibration':
+        dispatch({ type: 'calibration', calibration: message });
+        break;
       case 'command':
         if (message.what === 'key_frame') this.video?.requestKey();
     }
@@ -146,6 +149,11 @@ export class Phone {
   /** @param {Command['what']} what */
   command(what) {
     return this.link.sendMessage({ type: 'command', what });
+  }
+
+  /** @param {Calibrate['what']} what */
+  calibrate(what) {
+    return this.link.sendMessage({ type: 'calibrate', what });
   }
 
   /** @param {string} text For the supervisor to read; a flood of them is cut. */

@@ -34,6 +34,13 @@
  */
 
 /**
+ * Page → server: begin to calibrate the phone's camera, or leave it. Only an operator may, and only while the robot is not armed. `calibration` is the answer.
+ * @typedef {object} Calibrate
+ * @property {'calibrate'} type
+ * @property {'start' | 'stop'} what
+ */
+
+/**
  * Page → server: a fault on the page that a supervisor should read.
  * @typedef {object} Log
  * @property {'log'} type
@@ -61,6 +68,26 @@
  * @property {string} field
  * @property {string} allowed
  * @property {boolean} fatal True: the server closes the connection after this.
+ */
+
+/**
+ * Server → page, the operator's: how its camera's calibration stands, when that is news.
+ * @typedef {object} Calibration
+ * @property {'calibration'} type
+ * @property {'needed' | 'filming' | 'solving' | 'done' | 'refused' | 'off'} phase needed: this camera has none; off: left, and none is needed.
+ * @property {string} hint What the person should do now.
+ * @property {number} progress 0 to 1, of the filming.
+ * @property {Record<string, number>} tasks 0 to 1 each, by what it is called.
+ * @property {number} width Of the pictures [px].
+ * @property {number} height
+ * @property {number} columns Of the coverage map.
+ * @property {number[]} cells Row by row, 0 to 3: how often the board was seen in that part of the picture.
+ * @property {number[]} outline u, v of up to four corners of the board in the newest picture, 0 to 1.
+ * @property {boolean} blurred
+ * @property {'' | 'good' | 'usable' | 'refused'} verdict
+ * @property {string[]} figures What was found, in words.
+ * @property {string[]} reasons What is not good about it.
+ * @property {string[]} advice What to film better.
  */
 
 /**
@@ -110,6 +137,24 @@
  */
 
 /**
+ * Is it the camera that was calibrated, and is it set well for LEDs?
+ * @typedef {object} CameraHealth
+ * @property {string} complaint Why nobody should fly with it, or "".
+ * @property {'' | 'too_bright' | 'out_of_focus' | 'blurred' | 'too_dim'} hint What its settings lack for LEDs.
+ * @property {string} advice The hint in words.
+ * @property {number | null} exposure_ms By how LEDs smear when the phone turns; null before it has turned.
+ * @property {number} readout_ms Of the rolling shutter, as the model uses it.
+ * @property {boolean} readout_learnt False: it is the one of the calibration.
+ * @property {number | null} readout_sigma_ms Standard deviation of what was learnt; this and all below: null before a phone moved.
+ * @property {number | null} time_offset_ms A picture was taken at its stamp plus this, by LEDs and both gyroscopes.
+ * @property {number | null} time_offset_sigma_ms
+ * @property {number | null} larger_percent Things look so much larger than calibrated.
+ * @property {number | null} larger_sigma_percent
+ * @property {number | null} held_percent Share of the phone's turning that the picture hides: stabilisation.
+ * @property {number | null} held_sigma_percent
+ */
+
+/**
  * Server → page, 10 Hz: the truth about the robot, on every screen.
  * @typedef {object} Status
  * @property {'status'} type
@@ -136,9 +181,10 @@
  * @property {string[]} messages The newest events, newest first.
  * @property {VirtualCamera | null} virtual_camera null before the control process has told of it.
  * @property {Estimate | null} estimate null before the control process has told of it.
+ * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
  */
 
-/** @typedef {Hello | Command | Tune | Log} FromPage */
-/** @typedef {Welcome | Refused | Status | Command} ToPage */
+/** @typedef {Hello | Command | Tune | Calibrate | Log} FromPage */
+/** @typedef {Welcome | Refused | Status | Command | Calibration} ToPage */
 
 export {};

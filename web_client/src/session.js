@@ -30,6 +30,7 @@ export const INITIAL = Object.freeze({
   stopping: false,
   motionSilent: false,
   health: { fps: 0, rttMs: null, imuHz: 0, kbps: 0 },
+  calibration: null,
 });
 
 /**
@@ -65,7 +66,7 @@ function transition(state, event) {
     case 'welcomed':
       return to({ ...state, linked: true, problem: null }, { type: 'touch' });
     case 'disconnected':
-      return to({ ...state, linked: false, heard: false, held: false, nonce: 0n });
+      return to({ ...state, linked: false, heard: false, held: false, nonce: 0n, calibration: null });
     case 'status':
       return heardFrom(state, event.status, event.now);
     case 'refused':
@@ -92,6 +93,10 @@ function transition(state, event) {
       return to({ ...state, motionSilent: event.silent });
     case 'health':
       return to({ ...state, health: event.health });
+    case 'calibration':
+      return to({ ...state, calibration: event.calibration.phase === 'off' ? null : event.calibration });
+    case 'calibrate':
+      return to(state, { type: 'calibrate', what: event.what });
   }
 }
 
@@ -114,7 +119,7 @@ function to(state, ...effects) {
  */
 function blocked(state, problem) {
   /** @type {State} */
-  const back = { ...state, phase: 'welcome', step: '', problem, linked: false, heard: false, held: false };
+  const back = { ...state, phase: 'welcome', step: '', problem, linked: false, heard: false, held: false, calibration: null };
   return to(back, { type: 'close_link' });
 }
 
@@ -139,6 +144,7 @@ function refused(state, refusal, now) {
   if (refusal.fatal && refusal.code === 'role') {
     return to({ ...state, problem: new Problem('taken', words) });
   }
+  if (refusal.code === 'calibration') return to(state); // each picture is; the status says it once
   return to(noticed(state, `Not taken: ${words}`, now));
 }
 

@@ -1,6 +1,6 @@
 /** What the phone page knows, what can happen to it, and what it then does. */
 
-/** @import {Refused, Status} from './protocol_types.js' */
+/** @import {Calibrate, Calibration, Refused, Status} from './protocol_types.js' */
 /** @import {Problem} from './problems.js' */
 
 /** @typedef {Status['mode'] | 'NO_LINK' | 'NO_WORD'} ShownMode */
@@ -30,6 +30,7 @@
  * @property {boolean} stopping STOP was asked for and not yet confirmed.
  * @property {boolean} motionSilent No motion sensor has answered.
  * @property {Health} health
+ * @property {Calibration | null} calibration Of the camera, while there is something to tell.
  */
 
 /**
@@ -40,12 +41,14 @@
  *   | { type: 'tick', now: number } | { type: 'press' } | { type: 'release' }
  *   | { type: 'visibility', visible: boolean } | { type: 'stop' } | { type: 'stop_tick' }
  *   | { type: 'ask', what: 'arm' | 'disarm' } | { type: 'motion_silent', silent: boolean }
- *   | { type: 'health', health: Health }} Event
+ *   | { type: 'health', health: Health } | { type: 'calibration', calibration: Calibration }
+ *   | { type: 'calibrate', what: Calibrate['what'] }} Event
  */
 
 /**
  * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop' }
- *   | { type: 'post_stop' } | { type: 'feel', mode: ShownMode } | { type: 'close_link' }} Effect
+ *   | { type: 'post_stop' } | { type: 'feel', mode: ShownMode } | { type: 'close_link' }
+ *   | { type: 'calibrate', what: Calibrate['what'] }} Effect
  */
 
 /** @typedef {{ state: State, effects: Effect[] }} Outcome */

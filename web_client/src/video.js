@@ -124,4 +124,13 @@ export class VideoSender {
     this.credits.encoding = 0;
     this.encoder = this.encoder instanceof JpegEncoder ? null : this.jpegEncoder();
   }
+
+  /** @param {number} now [ms] */
+  health(now) {
+    return {
+      fps: this.frames.perSecond(now),
+      rttMs: this.credits.roundTripMs,
+      kbps: this.bytes.perSecond(now) * 0.008,
+    };
+  }
 }

@@ -2,8 +2,10 @@
 
 /** @import {State, ShownMode} from './session_types.js' */
 /** @import {Advice} from './problems.js' */
+/** @import {Calibrate} from './protocol_types.js' */
 
 import { MODE_WORDS } from './mode_words.js';
+import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
 import { shownMode, wish } from './session.js';
 
@@ -18,6 +20,7 @@ const MOST_REFUSALS = 4;
  * @property {() => void} onRelease
  * @property {() => void} onStop
  * @property {() => void} onWish
+ * @property {(what: Calibrate['what']) => void} onCalibrate
  * @property {() => void} onSound
  * @property {(() => void) | null} onFull Null where the page can't fill the screen.
  */
@@ -50,6 +53,7 @@ export class View {
     if (onFull !== null) find('full').addEventListener('click', onFull);
     attachHold(find('hold'), { window, document }, wishes);
     this.text('host', window.location.host);
+    this.calibration = new CalibrationView(document, find, window.location.origin, wishes.onCalibrate);
   }
 
   /** @param {MediaStream} stream */
@@ -113,6 +117,7 @@ export class View {
     this.wish.disabled = !enabled;
     this.find('stop').classList.toggle('asked', state.stopping);
     this.hold(state, mode);
+    this.calibration.render(state.calibration, mode === 'DISARMED' || mode === 'STOPPED');
   }
 
   /**

@@ -50,3 +50,12 @@ test('a control process started anew counts from zero, and one not heard yet cou
 test('signs are as wide as each other', () => {
   assert.deepEqual([signed(1.26, 1), signed(-1.26, 1), signed(null)], ['+1.3', '−1.3', '–']);
 });
+
+test('a camera that is not the calibrated one comes first of all, its settings are advised on', () => {
+  /** @type {any} */
+  const camera = { complaint: 'The picture is 10 % larger.', advice: 'Expose shorter.', hint: 'blurred' };
+  const found = worries(estimateOf({ complaint: 'Restart.' }), [], camera);
+  assert.deepEqual([...found], [['camera', 'The picture is 10 % larger.'], ['complaint', 'Restart.']]);
+  assert.equal(worries(estimateOf(), [], { ...camera, complaint: '' }).get('camera'), 'Expose shorter.');
+  assert.equal(worries(estimateOf(), [], { ...camera, complaint: '', advice: '' }).size, 0);
+});

@@ -103,7 +103,8 @@ export function statusOf(parts = {}) {
   return {
     type: 'status', mode: 'DISARMED', reason: '', ready: false, refusals: [], robot: 'ames', operator: '',
     streams: {}, latency_ms: {}, leds: 0, reprojection_px: null, position_mm: null, error_mm: null,
-    error_deg: null, sigma_mm: null, saturated: false, virtual_camera: null, estimate: null, recording: '', phones: 0, supervisors: 0, realtime: '',
+    error_deg: null, sigma_mm: null, saturated: false, virtual_camera: null, estimate: null, camera: null,
+    recording: '', phones: 0, supervisors: 0, realtime: '',
     control: {}, messages: [], ...parts,
   };
 }

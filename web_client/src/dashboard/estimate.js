@@ -1,6 +1,6 @@
-/** What the estimator says of itself: numbers, and in words what of it should worry. */
+/** What the estimator and the phone's camera say of themselves: numbers, and in words what should worry. */
 
-/** @import {Estimate} from '../protocol_types.js' */
+/** @import {CameraHealth, Estimate} from '../protocol_types.js' */
 /** @import {Board, Sample} from './model.js' */
 
 import { Elements } from './elements.js';
@@ -13,7 +13,7 @@ const LATELY = 20;
 /** So many of them lately are more than chance: of good ones, the gate refuses one in a thousand. */
 const RISING = 5;
 
-/** @typedef {'nis' | 'rejected' | 'complaint'} Worry */
+/** @typedef {'camera' | 'nis' | 'rejected' | 'complaint'} Worry */
 
 /**
  * LEDs rejected lately; 0 if the count began anew.
@@ -28,11 +28,14 @@ export function rejectedLately(history) {
  * What should worry, in words, the worst first.
  * @param {Estimate} estimate
  * @param {readonly Sample[]} history
+ * @param {CameraHealth | null} camera
  * @returns {Map<Worry, string>}
  */
-export function worries({ complaint, nis }, history) {
+export function worries({ complaint, nis }, history, camera = null) {
   /** @type {Map<Worry, string>} */
   const found = new Map();
+  if (camera?.complaint) found.set('camera', camera.complaint);
+  else if (camera?.advice) found.set('camera', camera.advice);
   if (complaint !== '') found.set('complaint', complaint);
   if (nis !== null && nis > HONEST.most) found.set('nis', 'Pictures surprise it: it knows less than it says.');
   if (nis !== null && nis < HONEST.least) found.set('nis', 'Pictures fit too well: it knows more than it says.');
@@ -45,7 +48,7 @@ export class EstimatePanel extends Elements {
   /** @param {Board} board */
   render({ heard, status, history }) {
     const estimate = heard ? status?.estimate ?? null : null;
-    const worry = estimate === null ? new Map() : worries(estimate, history);
+    const worry = estimate === null ? new Map() : worries(estimate, history, status?.camera ?? null);
     this.text('estimator', estimate?.name ?? '–');
     this.text('worry', estimate === null ? '' : [...worry.values()].join(' ') || 'All as expected.');
     this.find('worry').className = worry.size > 0 ? 'worry' : 'worry fine';
@@ -59,10 +62,21 @@ export class EstimatePanel extends Elements {
     this.put('σ offset', number(estimate?.time_offset_sigma_ms, 2), 'ms');
     this.put('σ pos.', number(estimate && status?.sigma_mm, 1), 'mm');
     this.put('σ att.', number(estimate?.sigma_deg, 2), '°');
+    this.camera(heard ? status?.camera ?? null : null);
     this.bias('Robot gyro [°/s]', estimate?.bias_body_deg_s);
     this.bias('Robot accel. [m/s²]', estimate?.bias_body_m_s2);
     this.bias('Phone gyro [°/s]', estimate?.bias_phone_deg_s);
     this.bias('Phone accel. [m/s²]', estimate?.bias_phone_m_s2);
+  }
+
+  /** @param {CameraHealth | null} camera */
+  camera(camera) {
+    const worry = camera !== null && camera.complaint !== '';
+    this.put('Readout', number(camera?.readout_ms, 1), 'ms');
+    this.put('σ readout', number(camera?.readout_sigma_ms, 1), 'ms');
+    this.put('Larger', signed(camera?.larger_percent, 1), '%', worry);
+    this.put('Held', signed(camera?.held_percent, 0), '%', worry);
+    this.put('Exposed', number(camera?.exposure_ms, 1), 'ms', camera?.hint === 'blurred');
   }
 
   /**

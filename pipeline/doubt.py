@@ -1,0 +1,30 @@
+"""How sure spots are, learnt from how well they fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+PRIOR_FREEDOMS, FADE = 20.0, 0.95
+LEAST_DOUBT, MOST_DOUBT, OUTLYING = 0.25, 25.0, 9.0
+
+
+@dataclass(slots=True)
+class Doubt:
+    """By how much the residuals say that covariances are too small: learnt, and slowly forgotten.
+
+    What no picture tells of itself, a codec's bit rate above all, shows in how well LEDs fit.
+    """
+
+    chi2: float = PRIOR_FREEDOMS
+    freedoms: float = PRIOR_FREEDOMS
+
+    @property
+    def factor(self) -> float:
+        """Of covariances."""
+        return min(max(self.chi2 / self.freedoms, LEAST_DOUBT), MOST_DOUBT)
+
+    def learn(self, chi2: float, freedoms: int) -> None:
+        """From χ² by the covariances as they were measured."""
+        chi2 = min(chi2, OUTLYING * freedoms * self.factor)
+        self.chi2 = FADE * self.chi2 + chi2
+        self.freedoms = FADE * self.freedoms + freedoms

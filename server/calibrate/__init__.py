@@ -1,0 +1,1 @@
+"""`lightleash calibrate`: a camera's lens, its readout time, and how its motion sensors sit."""

@@ -1,0 +1,12 @@
+"""What the hub needs of a connection."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Page(Protocol):
+    """A connection that things can be sent to, from the event loop; never blocks."""
+
+    def push(self, data: str | bytes) -> None:
+        """Send when possible; the newest wins."""

@@ -1,0 +1,1 @@
+"""`lightleash survey`: where a robot's LEDs are, from a film of it at rest."""

@@ -1,0 +1,72 @@
+"""Spots of all frames of a film, and one of its pictures."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.camera import Camera
+from pipeline.leds import find_spots
+from pipeline.signals import Frame, Image, Spots
+from pipeline.vision_config import LedsConfig
+from server.locate.frames import open_frames
+from server.locate.progress import Progress
+from server.survey.errors import SurveyError
+from server.survey.sightings import Seen
+
+MOST_SPOTS = 24
+MOST_FRAMES = 3000
+
+
+def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Seen]:
+    """Spots of every so many frames.
+
+    Raises:
+        LocateError: the film can't be read.
+        SurveyError: its pictures are not the camera's, or it is too long.
+    """
+    frames = open_frames(path, fps)
+    progress = Progress(frames.count, sys.stderr)
+    film: list[Seen] = []
+    for k, shot in enumerate(frames):
+        progress.advance("spots")
+        if k % every or shot.luma is None:
+            continue
+        if shot.luma.shape != (camera.height, camera.width):
+            tall, wide = shot.luma.shape
+            raise SurveyError(
+                f"{path}: {shot.name} is {wide} x {tall}, the camera was calibrated at"
+                f" {camera.width} x {camera.height}"
+            )
+        if len(film) == MOST_FRAMES:
+            raise SurveyError(f"{path}: more than {MOST_FRAMES} frames; take --every {every + 1}")
+        spots = find_spots(Frame(shot.t, shot.luma, shot.full_range), LedsConfig())
+        film.append(Seen(shot.name, shot.t, _brightest(spots)))
+    progress.close()
+    for note in frames.notes:
+        print(f"{path}: {note}", file=sys.stderr)
+    return film
+
+
+def _brightest(spots: Spots) -> Spots:
+    """A bounded number of them: what they are paired by takes its time."""
+    kept = np.sort(np.argsort(-spots.brightness)[:MOST_SPOTS])
+    return Spots(
+        spots.pixels[kept], spots.covariances[kept], spots.brightness[kept], spots.area[kept]
+    )
+
+
+def picture(path: Path, fps: float | None, name: str) -> Image | None:
+    """One frame again."""
+    for shot in open_frames(path, fps):
+        if shot.name == name and shot.luma is not None:
+            return shot.luma.copy()
+    return None
+
+
+def times(film: Sequence[Seen]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """(f,) [s]."""
+    return np.array([seen.t for seen in film])

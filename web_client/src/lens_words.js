@@ -1,0 +1,87 @@
+/** What the page says of its camera's settings. */
+
+/** @import {CameraHealth} from './protocol_types.js' */
+/** @import {Lack, Settings} from './lens_wish.js' */
+/** @import {Platform} from './problems.js' */
+/** @import {ShownMode} from './session_types.js' */
+
+/** @typedef {'adjust' | 'automatic'} Deed */
+/** @typedef {{ tone: 'fault' | 'hint' | 'note', text: string, deeds: { deed: Deed, label: string }[] }} LensWords */
+
+/**
+ * What the holder can do about what can't be set.
+ * @param {Lack[]} lacks
+ * @param {Platform} platform
+ * @returns {string[]}
+ */
+export function lackWords(lacks, platform) {
+  return [...new Set(lacks)].map((lack) => LACKS[lack](platform));
+}
+
+/** @type {Record<Lack, (platform: Platform) => string>} */
+const LACKS = {
+  exposure: (platform) => ({
+    ios: 'Safari can’t fix the exposure: light the room well, so that pictures are exposed shortly.',
+    'firefox-android': 'Firefox can’t fix the exposure: use Chrome, or light the room well.',
+    android: 'This phone can’t fix the exposure: light the room well, so that pictures are exposed shortly.',
+    desktop: 'This browser can’t fix the exposure: light the room well.',
+  })[platform],
+  focus: (platform) => ({
+    ios: 'Safari can’t fix the focus: keep the robot between 1 and 4 m away, as when calibrating.',
+    'firefox-android': 'Firefox can’t fix the focus: use Chrome, or keep the robot 1 to 4 m away.',
+    android: 'This phone can’t fix the focus: keep the robot between 1 and 4 m away.',
+    desktop: 'This browser can’t fix the focus.',
+  })[platform],
+  zoom: () => 'The camera is zoomed: choose 1× or another lens.',
+  torch: () => 'The phone’s light is on: switch it off.',
+};
+
+/** @type {Record<Exclude<CameraHealth['hint'], ''>, string>} */
+const ADJUST = { too_bright: 'Darker', too_dim: 'Brighter', blurred: 'Shorter', out_of_focus: 'Focus on robot' };
+
+/**
+ * The one thing to say of the camera; null: nothing.
+ * @param {{ camera: CameraHealth | null, mode: ShownMode, lacks: string[], steps: boolean, manual: boolean, leds: number }} seen
+ * @returns {LensWords | null}
+ */
+export function lensWords({ camera, mode, lacks, steps, manual, leds }) {
+  const waiting = mode === 'DISARMED' || mode === 'STOPPED';
+  if (camera?.complaint && !waiting) return { tone: 'fault', text: camera.complaint, deeds: [] };
+  if (camera !== null && camera.hint !== '') {
+    /** @type {{ deed: Deed, label: string }[]} */
+    const deeds = steps ? [{ deed: 'adjust', label: ADJUST[camera.hint] }] : [];
+    if (manual && camera.hint === 'too_dim' && !steps) deeds.push({ deed: 'automatic', label: 'Automatic exposure' });
+    return { tone: 'hint', text: camera.advice, deeds };
+  }
+  if (waiting && manual && leds === 0) {
+    const text = 'No LED found. Is the picture too dark? The page has set a short exposure.';
+    return { tone: 'note', text, deeds: [{ deed: 'automatic', label: 'Automatic exposure' }] };
+  }
+  return waiting && lacks.length > 0 ? { tone: 'note', text: lacks.join(' '), deeds: [] } : null;
+}
+
+/**
+ * What was really set, in words.
+ * @param {Settings} is
+ * @returns {string}
+ */
+export function settingsWords(is) {
+  const words = [`${is.width}x${is.height}`, `${Math.round(is.frameRate ?? 0)} fps`];
+  if (is.facingMode) words.push(String(is.facingMode));
+  if (is.exposureMode) words.push(exposureWords(is));
+  if (is.focusMode) words.push(`focus ${is.focusMode}${is.focusDistance > 0 ? ` ${round(is.focusDistance)} m` : ''}`);
+  if (is.zoom && is.zoom !== 1) words.push(`zoom ${is.zoom}`);
+  if (is.torch) words.push('torch on');
+  return words.join(', ');
+}
+
+/** @param {Settings} is */
+function exposureWords(is) {
+  const time = is.exposureTime > 0 ? ` ${round(0.1 * is.exposureTime)} ms` : '';
+  return `exposure ${is.exposureMode}${time}${is.iso > 0 ? ` ISO ${Math.round(is.iso)}` : ''}`;
+}
+
+/** @param {number} value */
+function round(value) {
+  return Math.round(10 * value) / 10;
+}

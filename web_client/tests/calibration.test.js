@@ -1,0 +1,37 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { squareMm } from '../src/board_size.js';
+import { INITIAL, reduce } from '../src/session.js';
+
+/** @import {Calibration} from '../src/protocol_types.js' */
+
+/** @param {Partial<Calibration>} parts @returns {Calibration} */
+const calibrationOf = (parts) => ({
+  type: 'calibration', phase: 'filming', hint: '', progress: 0, tasks: {}, width: 0, height: 0, columns: 0,
+  cells: [], outline: [], blurred: false, verdict: '', figures: [], reasons: [], advice: [], ...parts,
+});
+
+test('what the server tells of a calibration stays until it is off, or the link is lost', () => {
+  const { state } = reduce(INITIAL, { type: 'calibration', calibration: calibrationOf({}) });
+  assert.equal(state.calibration?.phase, 'filming');
+  const off = reduce(state, { type: 'calibration', calibration: calibrationOf({ phase: 'off' }) });
+  assert.equal(off.state.calibration, null);
+  assert.equal(reduce(state, { type: 'disconnected' }).state.calibration, null);
+});
+
+test('a wish to calibrate goes to the server', () => {
+  const { effects } = reduce(INITIAL, { type: 'calibrate', what: 'start' });
+  assert.deepEqual(effects, [{ type: 'calibrate', what: 'start' }]);
+});
+
+test('pictures refused for want of a calibration are no notice each', () => {
+  const refused = { type: /** @type {const} */ ('refused'), code: 'calibration', field: 'frame', allowed: 'none', fatal: false };
+  assert.equal(reduce(INITIAL, { type: 'refused', refused, now: 0 }).state.notice, null);
+});
+
+test('a bar measured on the screen gives the size of a square', () => {
+  assert.equal(squareMm('50', 200, 1000), 25);
+  assert.equal(squareMm(' 50,0 ', 200, 1000), 25);
+  for (const wrong of ['', 'abc', '-3', '0', '99999']) assert.equal(squareMm(wrong, 200, 1000), null);
+});
