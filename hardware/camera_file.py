@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 import yaml
 
-from pipeline.camera import MODELS, Camera
+from pipeline.camera.lens import MODELS, Camera
 from pipeline.frames import Array
 
 CAMERAS = Path(__file__).parent / "cameras"

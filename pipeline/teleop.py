@@ -6,15 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline import failsafe, judgement
-from pipeline.actuation import Actuation
-from pipeline.attitude import Attitude
 from pipeline.config import TeleopConfig, VirtualCameraConfig
-from pipeline.estimators import make_estimator
+from pipeline.control import failsafe, judgement
+from pipeline.control.actuation import Actuation
+from pipeline.control.hold import Hold
+from pipeline.control.judgement import Ages
+from pipeline.control.pid import PoseError, Reference, pose_error
+from pipeline.control.tracking import Situation, Tracking
+from pipeline.control.virtual_camera import VirtualCamera
+from pipeline.estimation.attitude import Attitude
+from pipeline.estimation.estimators import make_estimator
 from pipeline.frames import Array
-from pipeline.hold import Hold
-from pipeline.judgement import Ages
-from pipeline.pid import PoseError, Reference, pose_error
 from pipeline.robot import Robot
 from pipeline.signals import (
     BodyImu,
@@ -26,8 +28,6 @@ from pipeline.signals import (
     Seen,
     VirtualView,
 )
-from pipeline.tracking import Situation, Tracking
-from pipeline.virtual_camera import VirtualCamera
 
 
 @dataclass(frozen=True, slots=True, eq=False)

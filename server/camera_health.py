@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.exposure import ADVICE
-from pipeline.looking import Looking
+from pipeline.camera.exposure import ADVICE
+from pipeline.vision.looking import Looking
 from server.camera_messages import CameraHealth
 
 

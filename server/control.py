@@ -23,8 +23,8 @@ from hardware.dynamics import dynamics_of
 from hardware.robot_file import RobotFile, load_robot
 from hardware.udp_link import UdpFollower
 from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
-from pipeline.estimators import warm_up
-from pipeline.latency_guard import LatencyGuard
+from pipeline.control.latency_guard import LatencyGuard
+from pipeline.estimation.estimators import warm_up
 from pipeline.signals import BodyImu
 from server import realtime
 from server.control_link import Endpoint, control_end

@@ -8,12 +8,12 @@ import numpy as np
 
 from hardware.follower import ThrustCommand
 from pipeline.config import TeleopConfig
+from pipeline.estimation.vertical import Vertical
 from pipeline.expected import Expected
 from pipeline.frames import Array, wxyz_from_R
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Operator, PhoneImu, Requests, Seen
 from pipeline.teleop import Inputs, Output, Teleop
-from pipeline.vertical import Vertical
 from server.control_link import (
     ControlStatus,
     Input,

@@ -7,7 +7,7 @@ from math import isfinite
 import msgspec
 
 from pipeline.config import EstimatorName
-from pipeline.estimator import Estimator, Health
+from pipeline.estimation.estimator import Estimator, Health
 from pipeline.frames import Array
 from pipeline.signals import RelativeState
 from server.seen_input import Triple, triple

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.clock_offset import ClockOffset
 from pipeline.frames import R_cd
 from pipeline.signals import Operator, PhoneImu
+from pipeline.timing.clock_offset import ClockOffset
 from server.wire import Motion, Picture, Ping, Pong, Record, Touch, WireError
 
 REMEMBERED_NONCES = 64

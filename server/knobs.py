@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Meta
 
 from pipeline.config import VirtualCameraConfig, VirtualCameraMode
-from pipeline.cutoff import cutoff_hz, time_constants
+from pipeline.control.cutoff import cutoff_hz, time_constants
 
 SLOWEST_HZ, FASTEST_HZ = 0.03, 3.0
 MOST_ADAPTIVE: Final = 10.0

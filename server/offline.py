@@ -29,7 +29,7 @@ import numpy as np
 
 from hardware.camera_file import CAMERAS, CameraFileError, find_camera
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array, wxyz_from_R
 from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose

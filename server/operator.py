@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from hardware.camera_file import CameraFileError, find_camera_file
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Operator, PhoneImu
-from pipeline.vision import Sighting
+from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
 from server.calibrate.wizard import Wizard
 from server.calibration_messages import Calibrate, Calibration

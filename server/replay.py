@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import monotonic as now
 
-from pipeline.clock_offset import ClockOffset
+from pipeline.timing.clock_offset import ClockOffset
 from server.messages import Command, Status
 from server.offline import run_offline
 from server.phone_client import (

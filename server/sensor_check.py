@@ -6,10 +6,10 @@ from collections import deque
 
 import numpy as np
 
+from pipeline.estimation.gravity_test import GravityTest
 from pipeline.estimator_config import GravityTestConfig
 from pipeline.frames import Array
-from pipeline.gravity_test import GravityTest
-from pipeline.vision import Sighting
+from pipeline.vision.sighting import Sighting
 from server.control_link import ControlStatus
 from server.wire import Motion
 

@@ -16,7 +16,7 @@ from starlette.types import ASGIApp
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
-from pipeline.looking import warm_up
+from pipeline.vision.looking import warm_up
 from server.app import Api, make_app
 from server.calibrate.camera_yaml import PROFILES
 from server.dashboard import Dashboard

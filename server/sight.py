@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.expected import Expected
 from pipeline.frames import Array
-from pipeline.looking import Looking
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Frame, PhoneImu
-from pipeline.vision import Sighting
+from pipeline.vision.looking import Looking
+from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
 from server.frame_decoder import FrameDecoder
 from server.ingest import EncodedFrame

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from pipeline.expected import Expected
 from pipeline.frames import Array
-from pipeline.looking import Looking
 from pipeline.signals import BodyImu, Image, PhoneImu
-from pipeline.vision import Sighting
+from pipeline.vision.looking import Looking
+from pipeline.vision.sighting import Sighting
 from server.frame_thread import FrameThread
 from server.ingest import EncodedFrame
 from server.sight import Sight

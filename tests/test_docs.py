@@ -29,7 +29,7 @@ def docstrings(path: Path) -> str:
 def test_the_equation_map_and_the_docstrings_agree() -> None:
     cited = {
         (number, path.name)
-        for path in (ROOT / "pipeline").glob("*.py")
+        for path in (ROOT / "pipeline").rglob("*.py")
         for number in equations(docstrings(path))
         if path.name not in ("teleop.py", "config.py")  # the composition names them all
     }
@@ -42,7 +42,7 @@ def test_the_equation_map_and_the_docstrings_agree() -> None:
         (number, name)
         for first, last, files in rows
         for number in range(int(first), int(last or first) + 1)
-        for name in re.findall(r"`pipeline/([a-z_]+\.py)`", files)
+        for name in re.findall(r"`pipeline/(?:[a-z_]+/)?([a-z_0-9]+\.py)`", files)
     }
     assert cited == mapped
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.config import VirtualCameraConfig
+from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import Array, log
-from pipeline.virtual_camera import VirtualCamera
 
 Pose = tuple[Array, Array]
 """(R (3, 3), p (3,) [m]) in f."""

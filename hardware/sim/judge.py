@@ -11,7 +11,7 @@ import numpy as np
 from hardware.sim.rotations import log_each
 from hardware.sim.world import World
 from hardware.sim.world_sensors import Sample, feed
-from pipeline.estimator import Estimator, Fusion
+from pipeline.estimation.estimator import Estimator, Fusion
 from pipeline.frames import Array
 from pipeline.signals import PhoneImu, RelativeState, Seen
 

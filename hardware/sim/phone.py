@@ -12,7 +12,7 @@ import numpy as np
 from hardware.sim.hand import Hand
 from hardware.sim.phone_faults import Fault, spoilt_force, spoilt_rate
 from hardware.sim.render import Look, render
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import GRAVITY, Array, R_cd, exp, log, wxyz_from_R
 from pipeline.signals import Image
 

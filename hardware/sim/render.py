@@ -9,7 +9,7 @@ from functools import cache, lru_cache
 import cv2
 import numpy as np
 
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import Image
 

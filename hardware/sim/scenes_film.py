@@ -15,7 +15,7 @@ from hardware.sim.scenes_motion import FLAT_LEDS, START_S, Sensors, movers, with
 from hardware.sim.scenes_optics import BANK, Optics, Sensor
 from hardware.sim.scenes_room import Room, bar_before, lights_around, mirror_near
 from hardware.sim.scenes_stage import Drawn, Stage
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rotation_about_x
 from pipeline.signals import BodyImu, Image, PhoneImu
 

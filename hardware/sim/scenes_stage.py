@@ -11,7 +11,7 @@ from hardware.sim.scenes_bound import is_merged, place_information
 from hardware.sim.scenes_motion import Movers
 from hardware.sim.scenes_optics import Lamp, Pane, Sensor
 from hardware.sim.scenes_room import Bar, Lights, Mirror, Room
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rpy_from_R
 from pipeline.signals import Image
 

@@ -15,10 +15,10 @@ import numpy as np
 
 from hardware.sim.rotations import exp_each, skew_each
 from hardware.sim.world import LEDS_IN_B, Flags, Indices, World
-from pipeline.estimator import Estimator, Fusion
+from pipeline.estimation.estimator import Estimator, Fusion
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, LedRays, PhoneImu, RelativePose, RelativeState, Seen
-from pipeline.stamp_search import StampOffsetSearch
+from pipeline.timing.stamp_search import StampOffsetSearch
 
 Sample = PhoneImu | BodyImu | Seen
 Event = tuple[float, Sample]

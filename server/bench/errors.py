@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hardware.sim.scenes_film import Shot
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array, exp, log
 from pipeline.signals import RelativePose
 

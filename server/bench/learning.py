@@ -8,9 +8,9 @@ import numpy as np
 
 from hardware.sim.scenes import HD, LEARNING
 from hardware.sim.scenes_film import RATE_HZ, Film
-from pipeline.felt import Felt
-from pipeline.looking import Looking
 from pipeline.signals import Frame
+from pipeline.vision.felt import Felt
+from pipeline.vision.looking import Looking
 from pipeline.vision_config import GatesConfig
 
 LEARN_S = 20.0

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from hardware.sim.scenes_film import Shot
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, exp
 from pipeline.signals import Image, RelativePose
 

@@ -31,7 +31,7 @@ from hardware.sim.scenes import (
     at_reference,
 )
 from hardware.sim.scenes_film import Film
-from pipeline.looking import warm_up
+from pipeline.vision.looking import warm_up
 from server.bench.channel import DEFAULT_CODECS, WITHOUT_IMU, Channel, channel
 from server.bench.learning import Learnt, learn
 from server.bench.rows import Row, plain_values, row, text

@@ -8,10 +8,10 @@ from time import thread_time
 
 from hardware.sim.scenes import Picture, Scene, Size
 from hardware.sim.scenes_film import Film, Shot
-from pipeline.felt import Felt
-from pipeline.looking import Looking
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
-from pipeline.vision import Sighting
+from pipeline.vision.felt import Felt
+from pipeline.vision.looking import Looking
+from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
 from server.bench.channel import Channel, Wire
 from server.bench.errors import Error, is_wrong, measured

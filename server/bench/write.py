@@ -10,7 +10,7 @@ import cv2
 import yaml
 
 from hardware.sim.scenes_film import Film, Shot
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, wxyz_from_R
 
 IMU_HEADING = ("t_s", "gx", "gy", "gz", "ax", "ay", "az")

@@ -23,8 +23,8 @@ from hardware.sim.judge import Track
 from hardware.sim.scores import Score
 from hardware.sim.world import LEDS_IN_B, Setup, World
 from pipeline.config import EstimatorName, TeleopConfig
-from pipeline.estimator import Estimator
-from pipeline.estimators import make_estimator
+from pipeline.estimation.estimator import Estimator
+from pipeline.estimation.estimators import make_estimator
 from pipeline.frames import Array
 from server.experiments import text
 from server.experiments.estimators_picture import draw

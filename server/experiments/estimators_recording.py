@@ -16,7 +16,7 @@ import numpy as np
 from hardware.sim.judge import Errors, Track
 from hardware.sim.world_sensors import Event, Sample, play
 from pipeline.config import EstimatorName
-from pipeline.estimator import Estimator, Fusion
+from pipeline.estimation.estimator import Estimator, Fusion
 from pipeline.frames import Array, exp, log
 from pipeline.signals import BodyImu, RelativePose, RelativeState
 from server.control_link import Input, PhoneImuInput

@@ -15,7 +15,7 @@ import numpy as np
 
 from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, TeleopConfig
-from pipeline.cutoff import cutoff_hz
+from pipeline.control.cutoff import cutoff_hz
 from pipeline.frames import Array
 from server.control import teleop_config
 from server.experiments import text

@@ -14,8 +14,8 @@ from hardware.dynamics import dynamics_of
 from hardware.robot_file import RobotFile, load_robot
 from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
-from pipeline.latency_guard import LatencyGuard
-from pipeline.margins import OMEGA, Complex, Loop, Sensing, axis_margins
+from pipeline.control.latency_guard import LatencyGuard
+from pipeline.control.margins import OMEGA, Complex, Loop, Sensing, axis_margins
 from server.experiments import text
 
 ESTIMATORS = ("relative", "paper", "none")

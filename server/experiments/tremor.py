@@ -16,9 +16,9 @@ import numpy as np
 from scipy.signal import welch
 
 from pipeline.config import VirtualCameraConfig
-from pipeline.cutoff import time_constants
+from pipeline.control.cutoff import time_constants
+from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import Array, log, rotation_about_z
-from pipeline.virtual_camera import VirtualCamera
 from server.experiments.text import Column, table
 from server.experiments.tremor_hand import (
     PERIOD_S,

@@ -14,8 +14,8 @@ import numpy as np
 from hardware.sim.hand import Hand, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
-from pipeline.attitude import Attitude
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
+from pipeline.estimation.attitude import Attitude
 from pipeline.frames import Array, R_cd, exp
 from pipeline.signals import PhoneImu
 from server.ingest import Ingest

@@ -15,9 +15,9 @@ import cv2
 from hardware.camera_file import CameraFileError, load_camera
 from hardware.led_file import load_leds
 from hardware.robot_file import RobotFileError
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from pipeline.looking import warm_up
+from pipeline.vision.looking import warm_up
 from server.locate import overlay, plot
 from server.locate.errors import LocateError
 from server.locate.frames import Frames, open_frames

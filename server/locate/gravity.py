@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.frames import Array, R_cd, R_co
-from pipeline.gates import angle_between
+from pipeline.vision.gates import angle_between
 from server.locate.work import Located
 
 ENOUGH: Final = 5

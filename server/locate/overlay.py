@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import Image, RelativePose
 from server.locate.work import Located

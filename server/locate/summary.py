@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from pipeline.looking import Looking
+from pipeline.vision.looking import Looking
 from server.locate.history import History
 
 LABEL = 15

@@ -8,12 +8,12 @@ from time import thread_time
 
 import numpy as np
 
-from pipeline.camera import Camera
-from pipeline.felt import Feeling, Felt
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from pipeline.looking import Looking
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
-from pipeline.vision import Sighting
+from pipeline.vision.felt import Feeling, Felt
+from pipeline.vision.looking import Looking
+from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
 from server.locate.errors import LocateError
 from server.locate.frames import Frames, Shot

@@ -14,7 +14,7 @@ import numpy as np
 from hardware.camera_file import CameraFileError, load_camera
 from hardware.led_file import load_leds
 from hardware.robot_file import RobotFileError
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from server.locate.errors import LocateError
 from server.locate.tables import load_imu

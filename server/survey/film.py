@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.camera import Camera
-from pipeline.leds import find_spots
+from pipeline.camera.lens import Camera
 from pipeline.signals import Frame, Image, Spots
+from pipeline.spots.leds import find_spots
 from pipeline.vision_config import LedsConfig
 from server.locate.frames import open_frames
 from server.locate.progress import Progress

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.camera import Camera, points_of
+from pipeline.camera.lens import Camera, points_of
 from pipeline.frames import Array, R_co, exp
 from server.survey.errors import SurveyError
 

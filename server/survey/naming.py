@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from server.survey.bundle import Observations, Scene
 from server.survey.errors import SurveyError

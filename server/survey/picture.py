@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.signals import Image
 from server.survey.naming import projected
 from server.survey.report import Survey

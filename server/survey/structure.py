@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from server.survey.bundle import (
     HUBER,

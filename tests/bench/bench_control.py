@@ -119,7 +119,7 @@ def serve_with_thread(folder: Path) -> None:
     from hardware.control_end import ControlEnd
     from hardware.robot_file import load_robot
     from hardware.udp_link import UdpFollower
-    from pipeline.estimators import warm_up
+    from pipeline.estimation.estimators import warm_up
     from server import control
     from server import serving as server_process
     from server.control_link import control_end

@@ -14,12 +14,12 @@ from scipy.optimize import lsq_linear
 
 from hardware.dynamics import dynamics_of
 from hardware.robot_file import load_robot
-from pipeline.allocation import LEAST_THRUST_WEIGHT, Allocation
-from pipeline.compliance import Compliance
 from pipeline.config import AllocationConfig, ComplianceConfig, FeedForwardConfig, TeleopConfig
-from pipeline.feedforward import FeedForward
-from pipeline.latency_guard import LatencyGuard
-from pipeline.pid import Pid, Reference, pose_error
+from pipeline.control.allocation import LEAST_THRUST_WEIGHT, Allocation
+from pipeline.control.compliance import Compliance
+from pipeline.control.feedforward import FeedForward
+from pipeline.control.latency_guard import LatencyGuard
+from pipeline.control.pid import Pid, Reference, pose_error
 from pipeline.signals import RelativeState, VirtualView
 
 H = 0.005

@@ -24,14 +24,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from hardware.sim import judge, scores
 from hardware.sim.world import Occlusion, Setup, World
 from hardware.sim.world_sensors import feed
-from pipeline import paper_ekf_replay as compiled
+from pipeline.estimation import paper_ekf_replay as compiled
+from pipeline.estimation.estimators import warm_up
+from pipeline.estimation.imu_history import BODY, PHONE
+from pipeline.estimation.late_fusion import imu_variances, walk_densities
+from pipeline.estimation.paper_ekf import PaperEkf
+from pipeline.estimation.paper_ekf_kernels import workspace
+from pipeline.estimation.relative_model import H_BODY, H_PHONE, H_POSE
 from pipeline.estimator_config import EkfConfig
-from pipeline.estimators import warm_up
-from pipeline.imu_history import BODY, PHONE
-from pipeline.late_fusion import imu_variances, walk_densities
-from pipeline.paper_ekf import PaperEkf
-from pipeline.paper_ekf_kernels import workspace
-from pipeline.relative_model import H_BODY, H_PHONE, H_POSE
 from tests.pipeline import dense_filter
 
 CONFIG = EkfConfig()
@@ -41,7 +41,7 @@ FIRST_HELD_OUT_SEED = 1000
 COLD = """
 from time import process_time as t
 a = t(); import numpy; b = t(); import numba; c = t()
-from pipeline.estimators import warm_up
+from pipeline.estimation.estimators import warm_up
 d = t(); warm_up(); e = t()
 print(f"numpy {b - a:.2f} s, numba {c - b:.2f} s, pipeline {d - c:.2f} s, warm_up {e - d:.2f} s")
 """

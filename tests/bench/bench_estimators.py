@@ -25,7 +25,7 @@ from hardware.sim import judge, scores
 from hardware.sim.bound import bound, rms
 from hardware.sim.world import LEDS_IN_B, Occlusion, Setup, World
 from pipeline.config import TeleopConfig
-from pipeline.estimators import make_estimator
+from pipeline.estimation.estimators import make_estimator
 
 FIRST_SEED = 1000
 FADING = 0.2

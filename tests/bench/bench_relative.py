@@ -20,10 +20,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hardware.sim.world import LEDS_IN_B, Occlusion, Setup, World
 from hardware.sim.world_sensors import events, give
-from pipeline import u_form
+from pipeline.estimation import u_form
+from pipeline.estimation.estimators import warm_up
+from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
-from pipeline.estimators import warm_up
-from pipeline.relative_filter import RelativeFilter
 from pipeline.signals import Seen
 
 WARM_UP_TICKS = 200

@@ -20,10 +20,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from pipeline.config import VirtualCameraConfig
-from pipeline.cutoff import time_constants
+from pipeline.control.cutoff import time_constants
+from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import Array, exp, log
 from pipeline.signals import RelativeState
-from pipeline.virtual_camera import VirtualCamera
 from tests.pipeline.turning import DISTANCE_M, Follower, H, minimum_jerk, relative
 
 P_REF = np.array([DISTANCE_M, 0.0, 0.0])

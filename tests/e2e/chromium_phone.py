@@ -12,7 +12,7 @@ from playwright.sync_api import BrowserContext, CDPSession, Page, sync_playwrigh
 from hardware.sim.hand import Hand
 from hardware.sim.intent import Intent, Pose
 from hardware.sim.truth import Truth, TruthClient
-from pipeline.camera import Camera
+from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd
 

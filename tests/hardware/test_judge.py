@@ -8,7 +8,7 @@ import pytest
 from hardware.sim import judge, scores
 from hardware.sim.rotations import exp_each, log_each
 from hardware.sim.world import Occlusion, Setup, World
-from pipeline.estimator import Fusion, Health
+from pipeline.estimation.estimator import Fusion, Health
 from pipeline.signals import RelativeState
 
 SETUP = Setup(seed=2, duration=4.0)

@@ -133,8 +133,8 @@ def test_a_flat_layout_has_a_second_pose_and_is_thin():
 
 
 def test_sigmas_are_the_scatter_of_poses():
-    from pipeline.camera import Camera
-    from pipeline.pnp import refine
+    from pipeline.camera.lens import Camera
+    from pipeline.identification.pnp import refine
 
     looks, rng = few(1), np.random.default_rng(0)
     R = attitude(looks.directions_in_b[0])

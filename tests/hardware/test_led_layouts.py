@@ -6,9 +6,9 @@ import pytest
 from hardware.camera_file import find_camera
 from hardware.robot_file import load_robot
 from pipeline.frames import R_from_rpy, exp
-from pipeline.search import Hints
+from pipeline.identification.search import Hints
+from pipeline.identification.starting import Starting
 from pipeline.signals import Spots
-from pipeline.starting import Starting
 from pipeline.vision_config import IdentifyConfig
 
 CAMERA = find_camera("lightleash-virtual-phone", 1280, 720)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hardware.sim.render import Look, render
-from pipeline.leds import find_spots
 from pipeline.signals import Frame
+from pipeline.spots.leds import find_spots
 from pipeline.vision_config import LedsConfig
 from tests.pipeline.seeing import CAMERA
 

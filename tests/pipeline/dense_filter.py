@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pipeline.estimation.relative_model import H_POSE, N, States, rk4_step, transition
 from pipeline.frames import wrap
-from pipeline.relative_model import H_POSE, N, States, rk4_step, transition
 
 
 def predict(x, P, h, walk, tau_delta):

@@ -9,9 +9,9 @@ from scipy.signal import lfilter
 from hardware.sim.rotations import exp_each, rpy_each, skew_each
 from hardware.sim.world import GRID_S, LEDS_IN_B
 from hardware.sim.world_sensors import body_samples, phone_samples, tangents_by_place
-from pipeline.camera import Camera
-from pipeline.camera_watch import CameraWatch
-from pipeline.pictures_block import Look
+from pipeline.camera.block import Look
+from pipeline.camera.lens import Camera
+from pipeline.camera.watch import CameraWatch
 from pipeline.signals import StampOffset
 
 FOCAL = 900.0

@@ -8,8 +8,8 @@ import numpy as np
 
 from hardware.sim.world import LEDS_IN_B
 from hardware.sim.world_sensors import give
+from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
-from pipeline.relative_filter import RelativeFilter
 from pipeline.signals import Seen
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from pipeline.config import VirtualCameraConfig
+from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import exp, log, rotation_about_z
 from pipeline.signals import RelativeState
-from pipeline.virtual_camera import VirtualCamera
 
 H = 0.005
 DISTANCE_M = 2.5

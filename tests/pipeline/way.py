@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.estimation.relative_kernels import INPUTS, X_BIASES, N, X, apply, transit
+from pipeline.estimation.relative_track import hand_of, noise_of, walks_of
 from pipeline.estimator_config import HandConfig, RelativeConfig
 from pipeline.frames import GRAVITY, R_from_rpy
-from pipeline.relative_kernels import INPUTS, X_BIASES, N, X, apply, transit
-from pipeline.relative_track import hand_of, noise_of, walks_of
 
 HELD = replace(RelativeConfig(), hand=replace(HandConfig(), slow=0.0))
 """The phone's last sample is held: no expectation of a hand."""

@@ -11,9 +11,9 @@ import pytest
 from hardware.sim import judge, scores
 from hardware.sim.bound import bound, rms
 from hardware.sim.world import LEDS_IN_B, Occlusion, Setup, World
+from pipeline.estimation.no_filter import NoFilter
+from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import NoFilterConfig, RelativeConfig
-from pipeline.no_filter import NoFilter
-from pipeline.relative_filter import RelativeFilter
 
 pytestmark = pytest.mark.slow
 SEEDS = (2000, 2001, 2002)

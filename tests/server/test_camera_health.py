@@ -5,9 +5,9 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from pipeline.camera_fit import CameraFacts
-from pipeline.exposure import ADVICE, Hint
-from pipeline.looking import Looking, warm_up
+from pipeline.camera.exposure import ADVICE, Hint
+from pipeline.camera.fit import CameraFacts
+from pipeline.vision.looking import Looking, warm_up
 from pipeline.vision_config import GatesConfig
 from server.camera_health import health
 from server.camera_messages import CameraHealth
@@ -50,8 +50,8 @@ def test_pictures_are_looked_at_as_of_when_they_were_taken():
 
 
 def test_warming_up_leaves_nothing_to_compile():
-    from pipeline.camera_block_kernels import put_sums
-    from pipeline.exposure_kernels import put_exposures
+    from pipeline.camera.block_kernels import put_sums
+    from pipeline.camera.exposure_kernels import put_exposures
 
     warm_up()
     assert put_sums.nopython_signatures

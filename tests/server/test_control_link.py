@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.rays import NO_RAYS
 from pipeline.signals import LedRays, Operator, PhoneImu, RelativePose, Seen, StampOffset
+from pipeline.vision.rays import NO_RAYS
 from server.control_link import (
     LARGEST,
     OperatorInput,

@@ -11,7 +11,7 @@ import pytest
 
 from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, TeleopConfig
-from pipeline.estimator import Health
+from pipeline.estimation.estimator import Health
 from pipeline.signals import BodyImu
 from server.control_link import ControlStatus, ReadyInput
 from server.controller import Controller

@@ -10,10 +10,10 @@ import yaml
 from hardware.sim.codec import Encoder
 from hardware.sim.scenes import SCENES, VGA
 from hardware.sim.scenes_film import Film
-from pipeline.felt import STALE_S, Felt
 from pipeline.frames import R_co, R_from_wxyz, log
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, PhoneImu
+from pipeline.vision.felt import STALE_S, Felt
 from pipeline.vision_config import GatesConfig
 from server.bench.write import write_film
 from server.cli import main

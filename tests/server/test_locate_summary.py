@@ -2,8 +2,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pipeline.camera import Camera
-from pipeline.camera_fit import CameraFacts
+from pipeline.camera.fit import CameraFacts
+from pipeline.camera.lens import Camera
 from pipeline.signals import RelativePose
 from server.locate.frames import Shot
 from server.locate.history import History

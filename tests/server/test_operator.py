@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from hardware.camera_file import CAMERAS
-from pipeline import camera_verdict, gravity_test
-from pipeline.rays import NO_RAYS
+from pipeline.camera import verdict as camera_verdict
+from pipeline.estimation import gravity_test
 from pipeline.signals import LedRays, RelativePose, Spots
-from pipeline.vision import Sighting
+from pipeline.vision.rays import NO_RAYS
+from pipeline.vision.sighting import Sighting
 from server.control_link import OperatorInput, PhoneImuInput
 from server.ingest import EncodedFrame
 from server.messages import Hello

@@ -16,8 +16,8 @@ from hardware.sim.hand import MovingHand, Waves, make_hand
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.phone_faults import Fault
 from hardware.sim.render import Look
-from pipeline import gravity_test
-from pipeline.attitude import Attitude
+from pipeline.estimation import gravity_test
+from pipeline.estimation.attitude import Attitude
 from pipeline.frames import R_cd, R_from_wxyz, exp, log, wxyz_from_R
 from server.control_link import PhoneImuInput
 from server.messages import Hello

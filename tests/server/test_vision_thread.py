@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from pipeline.rays import NO_RAYS
 from pipeline.signals import Match, Spots
-from pipeline.vision import Sighting
+from pipeline.vision.rays import NO_RAYS
+from pipeline.vision.sighting import Sighting
 from server.frame_thread import MAX_WAITING
 from server.ingest import EncodedFrame
 from server.vision import THUMBNAIL_WIDTH, VisionThread, draw, jpeg

@@ -1,0 +1,1 @@
+"""A camera: its lens, its rows, its exposure; and whether it still is the one calibrated."""

@@ -1,0 +1,88 @@
+"""Camera: points in camera axes to pixels and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.camera.lens_kernels import LENS, put_normalised, put_pixels, put_slopes
+from pipeline.frames import Array
+
+MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
+"""Distortion models (the names of ROS) and how many coefficients they take."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Intrinsics of one lens at one picture size; pixel centres at integers."""
+
+    width: int
+    height: int
+    K: Array
+    """(3, 3) [px]."""
+    model: str
+    """One of `MODELS`."""
+    distortion: Array
+    """(k,)."""
+    readout_s: float = 0.0
+    """Rolling shutter: how much later a row below the last would be exposed than the first one [s];
+    negative if the last row is read first."""
+
+    lens: Array = field(init=False, repr=False)
+    """The same numbers for `camera_kernels`."""
+
+    def __post_init__(self) -> None:
+        """Gather the lens."""
+        lens = np.zeros(LENS)
+        lens[0] = float(self.model == "equidistant")
+        lens[1:5] = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
+        lens[5 : 5 + len(self.distortion)] = self.distortion
+        lens.setflags(write=False)
+        object.__setattr__(self, "lens", lens)
+
+    def pixels(self, points_in_c: Array) -> Array:
+        """Pixels (n, 2) of points (n, 3) in front of the camera."""
+        pixels = np.empty((len(points_in_c), 2))
+        put_pixels(self.lens, np.asarray(points_in_c, dtype=np.float64), pixels)
+        return pixels
+
+    def normalised(self, pixels: Array) -> Array:
+        """Undistorted image coordinates (n, 2) on the plane one metre ahead: right, down [m]."""
+        flat = np.empty((len(pixels), 2))
+        put_normalised(self.lens, np.asarray(pixels, dtype=np.float64), flat)
+        return flat
+
+    def slopes(self, pixels: Array) -> Array:
+        """Derivatives (n, 2, 2) of `normalised` at pixels (n, 2) [1/px]: lens and focal length."""
+        slopes = np.empty((len(pixels), 2, 2))
+        put_slopes(self.lens, np.asarray(pixels, dtype=np.float64), slopes)
+        return slopes
+
+    def row_delays(self, rows: Array) -> Array:
+        """When rows (n,) are exposed after the picture's middle one [s]."""
+        delays: Array = (rows / self.height - 0.5) * self.readout_s
+        return delays
+
+    @property
+    def half_field(self) -> tuple[float, float]:
+        """Tangents of half the field of view, to the side and up, without the lens's distortion."""
+        return (0.5 * self.width / float(self.K[0, 0]), 0.5 * self.height / float(self.K[1, 1]))
+
+    @property
+    def focal_px(self) -> float:
+        """Mean focal length [px]."""
+        return 0.5 * float(self.K[0, 0] + self.K[1, 1])
+
+    def sees(self, pixels: Array, margin_px: float = 0.0) -> npt.NDArray[np.bool_]:
+        """(n,) whether pixels lie inside the picture, `margin_px` from its border."""
+        size = np.array([self.width, self.height])
+        low, high = margin_px - 0.5, size - 0.5 - margin_px
+        inside = (pixels > low) & (pixels < high)
+        return np.asarray(inside.all(axis=1))
+
+
+def points_of(normalised: Array) -> Array:
+    """Points (n, 3) in c, one metre ahead, of normalised image coordinates (n, 2)."""
+    return np.column_stack((np.ones(len(normalised)), -normalised[:, 0], -normalised[:, 1]))

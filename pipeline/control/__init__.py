@@ -1,0 +1,1 @@
+"""Estimate → virtual camera, pose error, PID, thrusts, and whether to fly at all. Eq. (14)-(24)."""

@@ -1,0 +1,195 @@
+"""How much delay, gain and phase the control loop can lose before it goes unstable, axis by axis.
+
+Open loop at the thrusts' command, by frequency response: thruster delay and lag, the 200 Hz hold,
+the axis' mass, damping and stiffness, PID on a measurement M(s), and feed-forward's felt pull.
+
+M(s) by estimator, T the picture's age when it arrives, F the time between pictures, t the age of
+the body's IMU:
+
+    none             P, I: the picture held, e^{-sT} hold_F(s); D: its difference, low-passed
+    paper, relative  e^{-st} (1 − ε H) + ε H e^{-sT} hold_F(s)
+
+A picture is fused when it was taken and the IMUs are replayed since, so the robot's own motion
+comes through as fresh as its IMU, at any T. Assumed: a share ε of it is felt wrongly (scale, lever
+arm, alignment), and that is mended by the late camera with the filter's bandwidth, H(s).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import inf, pi, sqrt
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.config import EstimatorName, FeedForwardConfig, MarginsConfig
+from pipeline.control.dynamics import Dynamics
+from pipeline.estimator_config import NoFilterConfig
+from pipeline.gains import Gains
+
+Complex = npt.NDArray[np.complex128]
+
+PERIOD_S: Final = 0.005
+OMEGA: Final = np.geomspace(0.03, 1500.0, 1200)
+"""[rad/s]; up to five times the hold's first zero."""
+OMEGA.setflags(write=False)
+S: Final = 1j * OMEGA
+LEAST_DAMPING: Final = 0.01
+"""Share of the critical one: without any, a pendulum's pole lies on the axis of the response."""
+TILT_AXIS: Final = {0: 4, 1: 3}
+"""x is pushed along by pitch, y by roll."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensing:
+    """How the robot's motion is known."""
+
+    estimator: EstimatorName
+    latency: float
+    """Of a picture, from capture to fusion [s]."""
+    body_age: float = 0.005
+    """Of the body's IMU sample [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class AxisMargins:
+    """Of one axis; what is infinite is `inf`."""
+
+    stable: bool
+    delay: float
+    """Further delay anywhere in the loop before it is unstable [s]; 0 if it is."""
+    phase: float
+    """[rad]."""
+    gain_up: float
+    """All gains times this: unstable."""
+    gain_down: float
+    """All gains times this: unstable; 0: never."""
+    crossover: float
+    """Highest frequency at which the loop still acts [rad/s]."""
+
+
+UNSTABLE: Final = AxisMargins(False, 0.0, 0.0, 1.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """Everything of the loop but how the motion is known."""
+
+    dynamics: Dynamics
+    gains: Gains
+    config: MarginsConfig
+    no_filter: NoFilterConfig
+    feedforward: FeedForwardConfig | None = None
+    """None: off."""
+
+    def open_loop(self, axis: int, sensing: Sensing) -> tuple[Complex, int]:
+        """L(jω) over `OMEGA`, and how many of its poles are at the origin."""
+        held, rated = self._measured(axis, sensing)
+        gains, actuator = self.gains, self._actuator(axis, sensing)
+        tilting = self.dynamics.needs_tilt
+        Ki = 0.0 if tilting and axis in TILT_AXIS.values() else float(gains.Ki[axis])
+        control = (gains.Kp[axis] + Ki / S) * held + gains.Kd[axis] * S * rated
+        poles = int(Ki > 0.0)
+        if self.feedforward is not None and axis < 3:
+            control, poles = self._feeling(axis, control, sensing, self.feedforward), poles + 1
+        d = self.dynamics
+        m, k = float(d.inertia[axis]), float(d.stiffness[axis])
+        c = max(float(d.damping[axis]), LEAST_DAMPING * 2.0 * sqrt(k * m))
+        if k == 0.0:
+            poles += 1 if c > 0.0 else 2
+        return control * actuator / ((m * S + c) * S + k), poles
+
+    def _measured(self, axis: int, sensing: Sensing) -> tuple[Complex, Complex]:
+        """M(s) of place and of speed."""
+        frame = self.config.frame_s
+        seen: Complex = np.exp(-S * sensing.latency) * _hold(frame)
+        if sensing.estimator == "none":
+            rated: Complex = seen * _hold(frame) / (1.0 + self.no_filter.tau * S)
+            return seen, rated
+        felt: Complex = np.exp(-S * sensing.body_age)
+        share = self.config.unfelt * self._correction(axis)
+        known: Complex = felt * (1.0 - share) + share * seen
+        return known, known
+
+    def _correction(self, axis: int) -> Complex:
+        """H(s) of the filter: of second order for places, of first for attitudes."""
+        if axis < 3:
+            w = self.config.correction_p
+            return np.asarray((1.4 * w * S + w * w) / (S * S + 1.4 * w * S + w * w))
+        w = self.config.correction_R
+        return np.asarray(w / (S + w))
+
+    def _actuator(self, axis: int, sensing: Sensing) -> Complex:
+        """From the command of a force or torque to it."""
+        d = self.dynamics
+        thrusters: Complex = np.exp(-S * d.delay) / (1.0 + d.lag * S) * _hold(PERIOD_S)
+        if not d.needs_tilt or axis not in TILT_AXIS:
+            return thrusters
+        turn = TILT_AXIS[axis]
+        known, _ = self._measured(turn, sensing)
+        Kp, Kd = self.gains.Kp[turn], self.gains.Kd[turn]
+        turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn]))
+        return np.asarray(Kp * turned / (1.0 + (Kp + Kd * S) * known * turned))
+
+    def _feeling(
+        self, axis: int, control: Complex, sensing: Sensing, config: FeedForwardConfig
+    ) -> Complex:
+        """Control with the pull balanced that accelerometer and thrust model tell apart."""
+        passed = 1.0 / (1.0 + S / (2.0 * pi * config.pull_hz))
+        modelled = 1.0 / (1.0 + config.thrust_lag_s * S)
+        if self.dynamics.needs_tilt and axis in TILT_AXIS:
+            modelled = self._actuator(axis, sensing)  # it knows where the thrust points
+        force = self.dynamics.inertia[axis] * S * S * np.exp(-S * sensing.body_age)
+        return np.asarray((control + passed * force) / (1.0 - passed * modelled))
+
+
+def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
+    """Margins of one of x, y, z, roll, pitch, yaw (0 to 5)."""
+    tilting = loop.dynamics.needs_tilt and axis in TILT_AXIS
+    if tilting and not axis_margins(loop, TILT_AXIS[axis], sensing).stable:
+        return UNSTABLE
+    L, poles = loop.open_loop(axis, sensing)
+    turned = np.unwrap(np.angle(1.0 + L))
+    if round((poles - 2.0 * (turned[-1] - turned[0]) / pi) / 2.0) != 0:
+        return UNSTABLE
+    crossings = list(_gain_crossings(L))
+    factors = list(_critical_factors(L))
+    return AxisMargins(
+        stable=True,
+        delay=delay_margin(L),
+        phase=min((min(phase, 2.0 * pi - phase) for _, phase in crossings), default=pi),
+        gain_up=min((k for k in factors if k > 1.0), default=inf),
+        gain_down=max((k for k in factors if k < 1.0), default=0.0),
+        crossover=max((omega for omega, _ in crossings), default=0.0),
+    )
+
+
+def delay_margin(late: Complex, fresh: Complex | float = 0.0) -> float:
+    """How much later the part `late` of a stable open loop may act [s], the part `fresh` as now."""
+    crossings = _gain_crossings(np.asarray(late / (1.0 + fresh)))
+    return min((phase / omega for omega, phase in crossings), default=inf)
+
+
+def _gain_crossings(L: Complex) -> Iterator[tuple[float, float]]:
+    """(ω, phase above −180° in [0, 2π)) where |L| = 1."""
+    size = np.log(np.abs(L))
+    for i in np.flatnonzero(size[:-1] * size[1:] < 0.0):
+        share = size[i] / (size[i] - size[i + 1])
+        omega = float(OMEGA[i] * (OMEGA[i + 1] / OMEGA[i]) ** share)
+        turn = float(np.angle(L[i + 1] / L[i]))
+        yield omega, float((np.angle(L[i]) + share * turn + pi) % (2.0 * pi))
+
+
+def _critical_factors(L: Complex) -> Iterator[float]:
+    """1/|L| where L is negative."""
+    across = (L.imag[:-1] * L.imag[1:] < 0.0) & (L.real[:-1] < 0.0) & (L.real[1:] < 0.0)
+    for i in np.flatnonzero(across):
+        share = L.imag[i] / (L.imag[i] - L.imag[i + 1])
+        yield float(-1.0 / (L.real[i] + share * (L.real[i + 1] - L.real[i])))
+
+
+def _hold(period: float) -> Complex:
+    """Of a value held for `period` [s]."""
+    return np.asarray((1.0 - np.exp(-S * period)) / (S * period))

@@ -1,0 +1,86 @@
+"""Keeping the body at its reference: PID, what is known ahead, softness in contact. Fig. 4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.config import TeleopConfig
+from pipeline.control.compliance import Compliance
+from pipeline.control.feedforward import FeedForward
+from pipeline.control.pid import Pid, PoseError, Reference
+from pipeline.frames import Array
+from pipeline.robot import Robot
+from pipeline.signals import RelativeState, VirtualView
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Situation:
+    """Everything known of robot and phone at this tick."""
+
+    relative: RelativeState
+    R_fc: Array
+    view: VirtualView
+
+
+class Tracking:
+    """Sibling of `Hold`: what is done while the button is held and all is well."""
+
+    def __init__(self, robot: Robot, config: TeleopConfig, period: float) -> None:
+        """For one robot; `period` [s] is that of the calls."""
+        self._robot, self._period = robot, period
+        self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
+        self._looks_ahead = config.feedforward.enabled
+        self._ahead = FeedForward(robot, config.feedforward)
+        self._compliance = Compliance(config.compliance)
+        self._yielded_in_b = np.zeros(3)
+
+    @property
+    def constant_force_in_f(self) -> Array:
+        """(3,) [N]: what it has found to need without any error."""
+        return self._pid.constant_force_in_f
+
+    def reset(self) -> None:
+        """Forget what was learnt: the robot is at rest without thrust."""
+        self._pid.reset()
+
+    def start(self, held_force_in_f: Array | None) -> None:
+        """Begin, from rest or from the force (3,) [N] that another controller has held."""
+        if held_force_in_f is not None:
+            self._pid.take_over(held_force_in_f)
+        self._ahead.start()
+        self._compliance.start(self._pid.constant_force_in_f)
+
+    def feel(self, now: Situation, given_force_in_b: Array) -> None:
+        """Every period, whatever is done: what else than the thrusters (3,) [N] pulls at it."""
+        R_fb = now.view.R_fv @ now.view.R_vb
+        self._ahead.feel(now.relative.f_bf_in_b, R_fb, given_force_in_b, self._period)
+
+    def wrench(self, now: Situation, reference: Reference, error: PoseError) -> Array:
+        """Force and torque in b (6,) [N, N m]. Eq. (20)."""
+        wrench_in_b = self._pid.wrench(error, now.view)
+        if self._looks_ahead:
+            ahead_in_b = self._ahead.wrench(
+                now.relative, now.R_fc, now.view, reference.p_rv_in_v, self._period
+            )
+            wrench_in_b = wrench_in_b + (
+                ahead_in_b if self._robot.needs_tilt else ahead_in_b * self._robot.axes
+            )
+        return self._softened(wrench_in_b, now.view, error)
+
+    def _softened(self, wrench_in_b: Array, view: VirtualView, error: PoseError) -> Array:
+        """Yield where the force would be more than an obstacle is to bear."""
+        R_fb = view.R_fv @ view.R_vb
+        soft_in_f = self._compliance.force(
+            R_fb @ wrench_in_b[:3], R_fb @ self._pid.damping_in_b(error, view), self._period
+        )
+        soft_in_b = R_fb.T @ soft_in_f
+        self._yielded_in_b = wrench_in_b[:3] - soft_in_b
+        return np.concatenate((soft_in_b, wrench_in_b[3:]))
+
+    def learn(self, error: PoseError, view: VirtualView, missing_in_b: Array) -> None:
+        """Carry the integrals on; `missing_in_b` (6,) of the last wrench could not be given."""
+        not_given = missing_in_b.copy()
+        not_given[:3] += self._yielded_in_b
+        self._pid.integrate(error, view, not_given, self._period)

@@ -1,0 +1,164 @@
+"""LEDs as a picture saw them, compiled: gate each one, fuse those that pass. `u_form.seen_at`."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_OFFSET, N
+from pipeline.frames import Array
+from pipeline.signals import Flags
+from pipeline.so3_kernels import kernel, put_exp
+
+NEAREST_M = 0.1
+"""Nearer than this to the picture's plane an LED has no place in the picture."""
+TOUCHED = np.array([0, 1, 2, 3, 4, 5, OFFSET])
+"""Error states that a picture depends on: δp, θ, and its time."""
+
+
+@kernel
+def _expect(
+    x: Array, R: Array, felt: Array, led: Array, ahead: float, expected: Array, H: Array
+) -> bool:
+    """Tangents (2,) of an LED `ahead` seconds later, H (2, 7) by `TOUCHED`; False: not in front."""
+    arm, w = R @ led, felt[6:9]
+    q0, q1, q2 = x[0] + arm[0], x[1] + arm[1], x[2] + arm[2]
+    if not q0 > NEAREST_M:
+        return False
+    b = felt[0:3]
+    by_body = R @ np.array(
+        [
+            b[1] * led[2] - b[2] * led[1],
+            b[2] * led[0] - b[0] * led[2],
+            b[0] * led[1] - b[1] * led[0],
+        ]
+    )
+    v0 = x[3] - w[1] * q2 + w[2] * q1 + by_body[0]
+    v1 = x[4] - w[2] * q0 + w[0] * q2 + by_body[1]
+    v2 = x[5] - w[0] * q1 + w[1] * q0 + by_body[2]
+    for row in range(2):
+        tangent, rate = (q1 / q0, v1) if row == 0 else (q2 / q0, v2)
+        H[row, 0], H[row, 1], H[row, 2] = -tangent / q0, 0.0, 0.0
+        H[row, 1 + row] = 1.0 / q0
+        for j in range(3):  # −D R [led]×
+            k, m = (j + 1) % 3, (j + 2) % 3
+            d_k = H[row, 0] * R[0, k] + H[row, 1] * R[1, k] + H[row, 2] * R[2, k]
+            d_m = H[row, 0] * R[0, m] + H[row, 1] * R[1, m] + H[row, 2] * R[2, m]
+            H[row, 3 + j] = d_m * led[k] - d_k * led[m]
+        H[row, 6] = (rate - tangent * v0) / q0
+        expected[row] = tangent + H[row, 6] * ahead
+    return True
+
+
+@kernel
+def _unlikelihood(P: Array, H: Array, C: Array, miss: Array) -> float:
+    """missᵀ (H P Hᵀ + C)⁻¹ miss."""
+    s00, s01, s11 = C[0, 0], C[0, 1], C[1, 1]
+    for i in range(7):
+        h0, h1 = 0.0, 0.0
+        for j in range(7):
+            c = P[TOUCHED[i], TOUCHED[j]]
+            h0 += c * H[0, j]
+            h1 += c * H[1, j]
+        s00 += H[0, i] * h0
+        s01 += H[0, i] * h1
+        s11 += H[1, i] * h1
+    det = s00 * s11 - s01 * s01
+    if not det > 0.0:
+        return np.inf
+    square = s11 * miss[0] * miss[0] - 2.0 * s01 * miss[0] * miss[1] + s00 * miss[1] * miss[1]
+    return float(square / det)
+
+
+@kernel
+def _fuse_scalar(P: Array, dx: Array, h: Array, miss: float, v: Array) -> float:
+    """Fuse miss = h · (error) + unit noise into dx (22,) and P; gives the normalised square."""
+    s, r = 1.0, miss
+    for k in range(N):
+        v[k] = 0.0
+    for i in range(7):
+        hi, row = h[i], TOUCHED[i]
+        r -= hi * dx[row]
+        for k in range(N):
+            v[k] += hi * P[row, k]
+    for i in range(7):
+        s += h[i] * v[TOUCHED[i]]
+    gain, scale = r / s, 1.0 / sqrt(s)
+    for k in range(N):
+        dx[k] += gain * v[k]
+        v[k] *= scale
+    for i in range(N):
+        vi = v[i]
+        for j in range(N):
+            P[i, j] -= vi * v[j]
+    return r * r / s
+
+
+@kernel
+def fuse_rays(
+    x: Array,
+    R: Array,
+    P: Array,
+    felt: Array,
+    leds_in_b: Array,
+    ahead: Array,
+    tangents: Array,
+    covariances: Array,
+    gate: float,
+    use: Flags,
+) -> float:
+    """Fuse the rays of a picture (m,), each `ahead` seconds after x, R, P.
+
+    `use` (m,): −1 is decided here, against the state before the picture, 0 is left out, 1 is fused.
+    Gives χ² of the fused ones, two degrees of freedom each; NaN: P can't be believed.
+    """
+    m = len(use)
+    H, miss, expected = np.zeros((m, 2, 7)), np.zeros((m, 2)), np.zeros(2)
+    for i in range(m):
+        if not _expect(x, R, felt, leds_in_b[i], ahead[i], expected, H[i]):
+            use[i] = 0
+            continue
+        miss[i] = tangents[i] - expected
+        if use[i] < 0:
+            use[i] = 1 if _unlikelihood(P, H[i], covariances[i], miss[i]) <= gate else 0
+    chi2, dx, v = 0.0, np.zeros(N), np.empty(N)
+    for i in range(m):
+        if use[i] != 1:
+            continue
+        a = sqrt(covariances[i, 0, 0])
+        b = covariances[i, 1, 0] / a
+        c = sqrt(covariances[i, 1, 1] - b * b)
+        H[i, 0] /= a
+        miss[i, 0] /= a
+        H[i, 1] = (H[i, 1] - b * H[i, 0]) / c
+        miss[i, 1] = (miss[i, 1] - b * miss[i, 0]) / c
+        chi2 += _fuse_scalar(P, dx, H[i, 0], miss[i, 0], v)
+        chi2 += _fuse_scalar(P, dx, H[i, 1], miss[i, 1], v)
+    correct(x, R, dx)
+    return chi2
+
+
+@kernel
+def correct(x: Array, R: Array, dx: Array) -> None:
+    """Add an error (22,) to the state."""
+    for i in range(3):
+        x[i] += dx[i]
+        x[3 + i] += dx[6 + i]
+    for k in range(BIASES, N):
+        x[X_OFFSET - OFFSET + k] += dx[k]
+    turned = np.empty((3, 3))
+    put_exp(dx[3], dx[4], dx[5], turned)
+    R[:] = R @ turned
+
+
+@kernel
+def is_sound(x: Array, R: Array, P: Array) -> bool:
+    """Finite, variances not negative: comparisons are false for NaN."""
+    for value in x:
+        if not abs(value) < 1e6:
+            return False
+    for i in range(N):
+        if not 0.0 <= P[i, i] < 1e9:
+            return False
+    return bool(abs(R[0, 0]) <= 1.001)

@@ -1,0 +1,262 @@
+"""The default estimator: LED rays and two IMUs in an error-state filter on SO(3), 22 states.
+
+`u_form` says what moves, `relative_track` when each picture is fused, this file what to believe:
+where to start, which pictures to refuse, when to begin again, and how much is known.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pipeline.estimation.estimator import Fusion, Health
+from pipeline.estimation.imu_history import ImuHistory
+from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
+from pipeline.estimation.relative_start import Learnt, can_start, first_anchor, has_samples_near
+from pipeline.estimation.relative_track import RelativeTrack
+from pipeline.estimation.sanity import is_believable, is_felt
+from pipeline.estimator_config import RelativeConfig
+from pipeline.frames import Array
+from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
+from pipeline.so3_kernels import largest_sigma
+from pipeline.timing.offset_watch import OffsetWatch
+
+MAX_SLEEP_S: Final = 2.0
+"""If nobody asked for so long, what was known is forgotten; no sample comes from so far ahead."""
+LOST: Final = 0.1
+"""Doubt of the place, by its distance, or of the attitude [rad], beyond which a picture's own pose
+is the better start: what the LEDs say of an error so large isn't linear in it."""
+FRESH_S: Final = 2.0
+"""A restart so soon after the last one: what was kept of the sensors is wrong as well."""
+NIS_PICTURES: Final = 30
+
+
+class RelativeFilter:
+    """Relative pose and motion at any time from LED rays and two IMUs."""
+
+    def __init__(self, config: RelativeConfig, leds_in_b: Array) -> None:
+        """Knows nothing until the first picture with a pose and samples of both IMUs near it."""
+        self._config, self._leds = config, len(leds_in_b)
+        self._track = RelativeTrack(config, leds_in_b)
+        self.pictures: Counter[Fusion] = Counter()
+        """What became of them."""
+        self.leds_rejected = 0
+        self.samples_late = self.samples_duplicate = self.samples_invalid = 0
+        """IMU samples not used: from before the horizon, there already, nonsense or from the
+        future."""
+        self.failures = 0
+        """Times the estimate was thrown away: not finite, or asleep for too long."""
+        self._learnt: Learnt | None = None
+        self._now = np.inf
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything but the counts."""
+        self._started = False
+        self._learnt = None
+        self._recent: deque[float] = deque(maxlen=64)
+        self._misses, self._t_seen, self._t_start = 0, -np.inf, -np.inf
+        self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
+        self._offset = OffsetWatch()
+
+    def add_phone_imu(self, sample: PhoneImu) -> None:
+        """Remember a sample of the phone, in any order; what can't be used is counted."""
+        rate, force = sample.omega_m_cf_in_c, sample.a_m_cf_in_c
+        self._remember(self._track.phone, sample.t, rate, force)
+
+    def add_body_imu(self, sample: BodyImu) -> None:
+        """Remember a sample of the robot, in any order; what can't be used is counted."""
+        rate, force = sample.omega_m_bf_in_b, sample.a_m_bf_in_b
+        self._remember(self._track.body, sample.t, rate, force)
+
+    def _remember(self, history: ImuHistory, t: float, rate: Array, force: Array) -> None:
+        if not is_felt(t, rate, force) or t > self._now + MAX_SLEEP_S:
+            self.samples_invalid += 1
+        elif self._started and t <= self._track.anchors[0].t:
+            self.samples_late += 1
+        elif not self._track.insert(history, t, rate, force):
+            self.samples_duplicate += 1
+
+    def add_seen(self, seen: Seen, now: float) -> Fusion:
+        """Fuse the LEDs of a picture when it was taken; tells, and counts, what became of it."""
+        fusion = self._judge(seen, now)
+        self.pictures[fusion] += 1
+        return fusion
+
+    def _judge(self, seen: Seen, now: float) -> Fusion:
+        if not is_believable(seen, self._leds):
+            return Fusion.INVALID
+        if len(seen.rays) == 0:
+            return Fusion.BLIND
+        if seen.t > now:
+            return Fusion.EARLY
+        if seen.t in self._recent:
+            return Fusion.DUPLICATE
+        if now - seen.t > self._config.horizon_s:
+            return Fusion.LATE
+        self._keep_up(now)
+        if seen.offset is not None:
+            self._offset.coarse = seen.offset
+        if not self._started:
+            return self._start(seen, now)
+        t = seen.t + float(self._track.newest.x[X_OFFSET])
+        if t <= self._track.anchors[0].t:
+            return Fusion.LATE
+        if self._is_lost(seen, min(t, now)) and self._start(seen, now):
+            return Fusion.STARTED
+        return self._fuse(seen, min(t, now), now)
+
+    def _is_lost(self, seen: Seen, t: float) -> bool:
+        """So little was known before this picture that it had better be a start."""
+        if seen.pose is None or not can_start(seen, self._config):
+            return False
+        P = self._track.expected(t).P
+        C = np.array(seen.pose.covariance, dtype=np.float64, order="C")
+        worse, near = 2.0 * self._config.start_doubt, LOST * float(seen.pose.p_bc_in_c[0])
+        return any(
+            largest_sigma(P, k) > max(enough, worse * largest_sigma(C, k))
+            for k, enough in ((0, near), (3, LOST))
+        )
+
+    def _fuse(self, seen: Seen, t: float, now: float) -> Fusion:
+        """Fuse, or begin again when too many pictures in a row didn't fit."""
+        anchor, chi2 = self._track.fuse(t, seen)
+        self._recent.append(seen.t)
+        used = int((anchor.use == 1).sum()) if anchor.use is not None else 0
+        self.leds_rejected += len(seen.rays) - used
+        if not np.isfinite(chi2):
+            self._give_up()
+            return self._start(seen, now)
+        if used:
+            self._nis.append((chi2, 2 * used))
+        if 2 * used > len(seen.rays):
+            self._misses = 0
+        else:
+            self._misses += 1
+            hopeless = self._misses >= self._config.misses_before_restart
+            if hopeless and can_start(seen, self._config):
+                return self._start(seen, now)
+        if used:
+            self._t_seen = max(self._t_seen, seen.t)
+        if self._offset.must_begin_again(float(self._track.newest.x[X_OFFSET]), seen.t):
+            self._t_start = seen.t  # nothing learnt at a wrong time is worth keeping
+            return self._start(seen, now)
+        return Fusion.FUSED if used else Fusion.GATED
+
+    def _start(self, seen: Seen, now: float) -> Fusion:
+        """Begin at a pose, the body at rest in f; what was learnt of the sensors stays."""
+        if not can_start(seen, self._config):
+            return Fusion.BLIND
+        if not has_samples_near(self._track, seen.t):
+            return Fusion.WAITING
+        if self._started:
+            self._keep_learnt(seen.t)
+        self._track.begin(first_anchor(seen, self._learnt, now, self._config))
+        self._started, self._misses = True, 0
+        self._t_seen = self._t_start = seen.t
+        self._recent.append(seen.t)
+        return Fusion.STARTED
+
+    def _keep_learnt(self, t: float) -> None:
+        if abs(t - self._t_start) < FRESH_S:
+            self._learnt = None
+            return
+        newest = self._track.newest
+        self._learnt = newest.x[X_BIASES:].copy(), newest.P[BIASES:, BIASES:].copy()
+
+    def _give_up(self) -> None:
+        """Throw the estimate away, keep the samples for the next start."""
+        self.failures += 1
+        self._started, self._learnt = False, None
+
+    def _keep_up(self, now: float) -> None:
+        self._now = now
+        if not self._started:
+            return
+        if now - self._track.anchors[0].t > MAX_SLEEP_S:
+            self._give_up()
+        else:
+            self._track.settle(now - self._config.horizon_s)
+
+    def state(self, now: float) -> RelativeState | None:
+        """The estimate at time `now` [s]; None while nothing is known.
+
+        Raises:
+            ValueError: `now` is not a number, or before the last picture.
+        """
+        if not self._started:
+            self._now = now
+            return None
+        if not now >= self._track.newest.t:
+            raise ValueError(f"state at {now} s: time can't go back before {self._track.newest.t}")
+        self._keep_up(now)
+        if self._started and not self._track.to_now(now):
+            self._give_up()
+        return self._seen_now(now) if self._started else None
+
+    def _seen_now(self, t: float) -> RelativeState:
+        track, here = self._track, self._track.now
+        inputs = track.inputs_now()
+        return RelativeState(
+            t=t,
+            p_bc_in_c=here.x[0:3].copy(),
+            R_cb=here.R.copy(),
+            u_bf_in_c=here.x[3:6].copy(),
+            omega_bf_in_b=inputs[0:3],
+            omega_cf_in_c=inputs[6:9],
+            R_ic=here.R_ic.copy(),
+            sigma_p=largest_sigma(here.P, 0),
+            sigma_theta=largest_sigma(here.P, 3),
+            age=t - self._t_seen,
+            f_cf_in_c=inputs[9:12],
+            f_bf_in_b=inputs[3:6],
+        )
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6) of (δp in c [m], θ in b [rad]) with R = R̂ Exp(θ), at the last `state`."""
+        P: Array = self._track.now.P[:6, :6].copy() if self._started else np.diag([np.inf] * 6)
+        return P
+
+    def last_fused(self) -> tuple[float, Array, Array, Array] | None:
+        """(t, p, R, covariance (6, 6)) right after the newest picture; None before the first."""
+        if not self._started:
+            return None
+        newest = self._track.newest
+        return newest.t, newest.x[0:3].copy(), newest.R.copy(), newest.P[:6, :6].copy()
+
+    @property
+    def complaint(self) -> str:
+        """The time offset that it learns can't be believed."""
+        return self._offset.complaint
+
+    @property
+    def health(self) -> Health:
+        """Telemetry."""
+        fused = sum(count for fusion, count in self.pictures.items() if fusion)
+        freedom = sum(dof for _, dof in self._nis)
+        known = Health(
+            fused=fused,
+            dropped=self.pictures.total() - fused,
+            late=self.pictures[Fusion.LATE],
+            leds_rejected=self.leds_rejected,
+            nis=sum(chi2 for chi2, _ in self._nis) / freedom if freedom else np.nan,
+        )
+        if not self._started:
+            return known
+        newest = self._track.newest
+        biases = newest.x[X_BIASES:X_OFFSET].reshape(4, 3).copy()
+        return replace(
+            known,
+            time_offset=float(newest.x[X_OFFSET]),
+            time_offset_sigma=np.inf
+            if self.complaint
+            else float(np.sqrt(newest.P[OFFSET, OFFSET])),
+            bias_omega_b=biases[0],
+            bias_a_b=biases[1],
+            bias_omega_c=biases[2],
+            bias_a_c=biases[3],
+        )

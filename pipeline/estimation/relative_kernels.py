@@ -1,0 +1,216 @@
+"""The compiled arithmetic of `relative_filter`.
+
+State: x (19,) = p, u, four biases in the order of the inputs (ω_b, f_b, ω_c, f_c), time offset;
+R (3, 3) beside it. Error state (22): δp, θ, δu, the biases, the offset. Between two pictures only
+the moving part changes, so F (9, 9), G (9, 12) and the noise Q (9, 9) are gathered step by step
+and the covariance is touched once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.estimation.hand_kernels import TAPS, foresee, learn
+from pipeline.estimation.sample_kernels import put_noise, sample_at
+from pipeline.estimation.u_form_kernels import step
+from pipeline.frames import Array
+from pipeline.so3_kernels import kernel, put_exp
+
+N, MOVING, INPUTS = 22, 9, 12
+"""Error states; those that move; inputs."""
+BIASES, OFFSET = 9, 21
+"""First error state of the biases; of the time offset."""
+X, X_BIASES, X_OFFSET = 19, 6, 18
+"""Length of x, and where the same stand there."""
+MAX_STEP_S = 0.01
+DOUBT_STEPS = 4
+LASTING = 1.2
+"""Of d/dt (∫ σ dt)²: 2 for an error that keeps its sign; a tremor's does so for half a period."""
+
+
+@kernel
+def gather(F: Array, G: Array, Q: Array, f: Array, g: Array, s: Array, h: float, w: Array) -> None:
+    """Put a step (f, g) behind F, G, Q; s (12,) are the noise densities of its inputs [unit²/Hz].
+
+    f is zero but for (p: p θ u), (θ: θ), (u: θ u); w (9, 12) is scratch memory.
+    """
+    for A, n in ((F, MOVING), (G, INPUTS)):
+        _times_step(f, A, n, w)
+        for i in range(MOVING):
+            for j in range(n):
+                A[i, j] = w[i, j]
+    for i in range(MOVING):
+        for j in range(INPUTS):
+            G[i, j] += g[i, j]
+    _times_step(f, Q, MOVING, w)
+    for i in range(MOVING):
+        for j in range(i + 1):
+            q = 0.0
+            if j < 3:
+                for k in range(MOVING):
+                    q += w[i, k] * f[j, k]
+            elif j < 6:
+                for k in range(3, 6):
+                    q += w[i, k] * f[j, k]
+            else:
+                for k in range(3, MOVING):
+                    q += w[i, k] * f[j, k]
+            for k in range(INPUTS):
+                q += g[i, k] * g[j, k] * (s[k] / h)
+            Q[i, j] = q
+    for i in range(MOVING):
+        for j in range(i):
+            Q[j, i] = Q[i, j]
+
+
+@kernel
+def _times_step(f: Array, A: Array, n: int, w: Array) -> None:
+    """w = f A over n columns."""
+    for i in range(MOVING):
+        first, last = (0, 9) if i < 3 else (3, 6) if i < 6 else (3, 9)
+        for j in range(n):
+            w[i, j] = 0.0
+        for k in range(first, last):
+            fik = f[i, k]
+            if fik != 0.0:
+                for j in range(n):
+                    w[i, j] += fik * A[k, j]
+
+
+@kernel
+def apply(P: Array, F: Array, G: Array, Q: Array, walks: Array, span: float, w: Array) -> None:
+    """P (22, 22) after a transition; walks (13,) densities of biases and offset [unit²/s].
+
+    Inputs are samples *less* biases, so biases act with −G; w (2, 9, 22) is scratch memory.
+    """
+    U, V = w[0], w[1]
+    for i in range(MOVING):  # U = [F −G] P
+        for j in range(N):
+            U[i, j] = 0.0
+        for k in range(MOVING):
+            fik = F[i, k]
+            for j in range(N):
+                U[i, j] += fik * P[k, j]
+        for k in range(INPUTS):
+            gik = G[i, k]
+            for j in range(N):
+                U[i, j] -= gik * P[BIASES + k, j]
+    for i in range(MOVING):
+        for j in range(i + 1):
+            v = Q[i, j]
+            for k in range(MOVING):
+                v += U[i, k] * F[j, k]
+            for k in range(INPUTS):
+                v -= U[i, BIASES + k] * G[j, k]
+            V[i, j] = v
+    for i in range(MOVING):
+        for j in range(i + 1):
+            P[i, j] = P[j, i] = V[i, j]
+        for j in range(BIASES, N):
+            P[i, j] = P[j, i] = U[i, j]
+    for k in range(N - BIASES):
+        P[BIASES + k, BIASES + k] += walks[k] * span
+
+
+@kernel
+def transit(
+    x: Array,
+    R: Array,
+    R_ic: Array,
+    F: Array,
+    G: Array,
+    Q: Array,
+    span: tuple[float, float],
+    t_b: Array,
+    v_b: Array,
+    t_c: Array,
+    v_c: Array,
+    noise: Array,
+    hand: Array,
+    w: Array,
+) -> int:
+    """Carry x, R from span[0] to span[1] through both IMUs' samples; gather F, G, Q from nothing.
+
+    `noise` (2, 3, 2) by (body, phone) and (gyroscope, accelerometer): standard deviation of a
+    sample, density by which the truth wanders between and after samples, its drift after the last
+    one. `hand` (6,): see `hand_kernels`. R_ic (3, 3) goes on gathering the camera's rotation since
+    the phone's last sample. Gives the count of steps.
+    """
+    F[:], G[:], Q[:] = 0.0, 0.0, 0.0
+    for k in range(MOVING):
+        F[k, k] = 1.0
+    s, turn_c = np.empty(INPUTS), np.empty((3, 3))
+    inputs, f, g, scratch = np.empty(INPUTS), np.empty((9, 9)), np.empty((9, 12)), np.empty((9, 12))
+    L, alpha = np.empty((TAPS + 1, TAPS)), np.empty((TAPS, 3))
+    taps, doubt = 0, 0.0
+    t, t_end = span
+    b = int(np.searchsorted(t_b, t, side="right")) - 1
+    c = int(np.searchsorted(t_c, t, side="right")) - 1
+    last, steps = t_c.shape[0] - 1, 0
+    if c < last:
+        R_ic[:] = np.eye(3)
+    while t < t_end:
+        until = min(t_end, t + MAX_STEP_S)
+        if b + 1 < t_b.shape[0]:
+            until = min(until, t_b[b + 1])
+        if c < last:
+            until = min(until, t_c[c + 1])
+        h, middle = until - t, 0.5 * (t + until)
+        if h > 0.0:
+            beyond = sample_at(t_b, v_b, b, middle, inputs[0:6])
+            put_noise(t_b, b, middle, beyond, noise[0], h, s[0:6])
+            beyond = sample_at(t_c, v_c, c, middle, inputs[6:12])
+            put_noise(t_c, c, middle, beyond, noise[1], h, s[6:12])
+            for k in range(INPUTS):
+                inputs[k] -= x[X_BIASES + k]
+            if c == last and hand[0] > 0.0:
+                if taps == 0:
+                    taps = learn(t_c, v_c, x[X_BIASES + 6 : X_BIASES + 9], hand, L, alpha)
+                    doubt = 0.0 if t <= t_c[last] else _doubt(t_c, taps, t, hand, L, alpha, turn_c)
+                sigma = foresee(t_c, taps, middle, hand, L, alpha, inputs[6:9])
+                for k in range(6, 9):  # in place of the drift
+                    s[k] -= (noise[1, 2, 0] * beyond) ** 2 * beyond
+                    s[k] += LASTING * sigma * (doubt + 0.5 * h * sigma)
+                doubt += h * sigma
+            step(x, R, inputs, h, w, f, g)
+            gather(F, G, Q, f, g, s, h, scratch)
+            if c == last:
+                put_exp(h * inputs[6], h * inputs[7], h * inputs[8], turn_c)
+                R_ic[:] = R_ic @ turn_c
+            steps += 1
+        t = until
+        while b + 1 < t_b.shape[0] and t_b[b + 1] <= t:
+            b += 1
+        while c < last and t_c[c + 1] <= t:
+            c += 1
+    return steps
+
+
+@kernel
+def _doubt(
+    t_c: Array, taps: int, t: float, hand: Array, L: Array, alpha: Array, out: Array
+) -> float:
+    """∫ σ dt from the last sample to `t`, of a transit that begins beyond it."""
+    h, doubt = (t - t_c[-1]) / DOUBT_STEPS, 0.0
+    for k in range(DOUBT_STEPS):
+        doubt += h * foresee(t_c, taps, t_c[-1] + (k + 0.5) * h, hand, L, alpha, out[0])
+    return doubt
+
+
+@kernel
+def inputs_at(
+    t: float, x: Array, t_b: Array, v_b: Array, t_c: Array, v_c: Array, hand: Array
+) -> Array:
+    """The inputs (12,) at time `t`, biases removed."""
+    inputs = np.empty(INPUTS)
+    b = int(np.searchsorted(t_b, t, side="right")) - 1
+    c = int(np.searchsorted(t_c, t, side="right")) - 1
+    sample_at(t_b, v_b, b, t, inputs[0:6])
+    sample_at(t_c, v_c, c, t, inputs[6:12])
+    for k in range(INPUTS):
+        inputs[k] -= x[X_BIASES + k]
+    if c == t_c.shape[0] - 1 and hand[0] > 0.0:
+        L, alpha = np.empty((TAPS + 1, TAPS)), np.empty((TAPS, 3))
+        taps = learn(t_c, v_c, x[X_BIASES + 6 : X_BIASES + 9], hand, L, alpha)
+        foresee(t_c, taps, t, hand, L, alpha, inputs[6:9])
+    return inputs

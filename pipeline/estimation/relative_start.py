@@ -1,0 +1,66 @@
+"""Where the relative filter begins: at a picture that gives a pose by itself."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from pipeline.estimation.ray_kernels import NEAREST_M
+from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
+from pipeline.estimation.relative_track import Anchor, RelativeTrack
+from pipeline.estimator_config import RelativeConfig
+from pipeline.frames import Array
+from pipeline.signals import Seen
+
+START_GAP_S: Final = 0.1
+"""A start needs samples of both IMUs so close to the picture."""
+Learnt = tuple[Array, Array]
+"""Biases and time offset (13,), and their covariance (13, 13)."""
+
+
+def can_start(seen: Seen, config: RelativeConfig) -> bool:
+    """Whether the picture has a pose, before the camera, that fits its LEDs well."""
+    pose = seen.pose
+    if pose is None or not pose.p_bc_in_c[0] > NEAREST_M:
+        return False
+    return pose.reprojection_px <= config.start_reprojection_px
+
+
+def has_samples_near(track: RelativeTrack, t: float) -> bool:
+    """Whether both IMUs were heard about `t` [s]."""
+    for history in (track.body, track.phone):
+        near = history.nearest(t, 0)
+        if near < 0 or abs(history.times[near] - t) > START_GAP_S:
+            return False
+    return True
+
+
+def first_anchor(seen: Seen, learnt: Learnt | None, now: float, config: RelativeConfig) -> Anchor:
+    """The body at rest in f at the pose of `seen`; what was `learnt` of the sensors stays.
+
+    Raises:
+        ValueError: `seen` has no pose.
+    """
+    if seen.pose is None:
+        raise ValueError("a start needs a pose")
+    anchor = Anchor.empty()
+    if learnt is not None:
+        anchor.x[X_BIASES:], anchor.P[BIASES:, BIASES:] = learnt
+    else:
+        anchor.P[BIASES:, BIASES:] = np.diag(_initial_variances(config))
+        if seen.offset is not None:
+            anchor.x[X_OFFSET] = seen.offset.value
+            anchor.P[OFFSET, OFFSET] = seen.offset.sigma**2
+    anchor.t = min(seen.t + float(anchor.x[X_OFFSET]), now)
+    anchor.x[0:3], anchor.R[:] = seen.pose.p_bc_in_c, seen.pose.R_cb
+    anchor.P[:6, :6] = config.start_doubt**2 * seen.pose.covariance
+    anchor.P[6:9, 6:9] = config.initial_u**2 * np.eye(3)
+    return anchor
+
+
+def _initial_variances(c: RelativeConfig) -> Array:
+    """(13,) of biases and time offset."""
+    sigmas = (c.initial_omega_b, c.initial_f_b, c.initial_omega_c, c.initial_f_c)
+    variances: Array = np.square(np.append(np.repeat(sigmas, 3), c.initial_offset))
+    return variances

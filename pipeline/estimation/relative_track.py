@@ -1,0 +1,255 @@
+"""The relative filter on the time axis: each picture is fused at the moment it was taken.
+
+    base ── picture ── picture ── … ── frontier ── now
+
+An `Anchor` is the filter right after a picture. What arrives late (a picture between two others, an
+IMU sample that was held or interpolated over) spoils the anchors after it; they are made anew from
+the last good one, with the decisions on outliers they were made with. The *frontier* is as far as
+both IMUs' samples reach; from there to now the newest samples are held, with growing doubt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Final
+
+import numpy as np
+
+from pipeline.estimation.hand_kernels import TAPS
+from pipeline.estimation.imu_history import ImuHistory
+from pipeline.estimation.ray_kernels import fuse_rays, is_sound
+from pipeline.estimation.relative_kernels import (
+    INPUTS,
+    MOVING,
+    X_OFFSET,
+    N,
+    X,
+    apply,
+    inputs_at,
+    transit,
+)
+from pipeline.estimator_config import HandConfig, RelativeConfig
+from pipeline.frames import Array
+from pipeline.signals import Flags, Seen
+
+KEPT: Final = TAPS
+"""Samples up to the base that are still interpolated and extrapolated from."""
+BENT: Final = 2
+"""Samples before a new one from which on the curve through them changes."""
+
+
+@dataclass(slots=True, eq=False)
+class Anchor:
+    """The filter at one time."""
+
+    t: float
+    x: Array
+    """(19,)."""
+    R: Array
+    """(3, 3)."""
+    P: Array
+    """(22, 22)."""
+    R_ic: Array
+    """(3, 3) rotation of the camera since the phone's last sample."""
+    seen: Seen | None = None
+    """The picture that was fused here."""
+    use: Flags | None = None
+    """(m,) which of its LEDs were."""
+
+    @staticmethod
+    def empty() -> Anchor:
+        """Of no meaning yet."""
+        return Anchor(-inf, np.zeros(X), np.eye(3), np.zeros((N, N)), np.eye(3))
+
+    def copy(self, other: Anchor) -> None:
+        """Become like `other`, its picture aside."""
+        self.t = other.t
+        self.x[:], self.R[:], self.P[:] = other.x, other.R, other.P
+        self.R_ic[:] = other.R_ic
+
+
+class RelativeTrack:
+    """State and covariance at any time between the base and now."""
+
+    def __init__(self, config: RelativeConfig, leds_in_b: Array) -> None:
+        """Empty: `begin` before anything but `insert`."""
+        self._leds_in_b = np.ascontiguousarray(leds_in_b)
+        self.body, self.phone = ImuHistory(), ImuHistory()
+        self.anchors: list[Anchor] = []
+        self.now = Anchor.empty()
+        self._frontier = Anchor.empty()
+        self._spoilt_from = -inf
+        """Anchors and frontier after this time must be made anew; inf: none."""
+        self._noise, self._walks = noise_of(config), walks_of(config)
+        self._hand = hand_of(config.hand)
+        self._gate = config.gate_chi2
+        self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
+        self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
+        self._products = np.zeros((2, MOVING, N))
+
+    @property
+    def newest(self) -> Anchor:
+        """Of the last picture, or the base."""
+        return self.anchors[-1]
+
+    @property
+    def complete(self) -> float:
+        """Both IMUs' samples have come up to this time [s]."""
+        return min(self.body.newest[0], self.phone.newest[0])
+
+    def begin(self, anchor: Anchor) -> None:
+        """Start from `anchor`."""
+        self.anchors = [anchor]
+        self._spoilt_from = -inf
+
+    def insert(self, history: ImuHistory, t: float, rate: Array, force: Array) -> bool:
+        """Remember a sample of `body` or `phone`; False: it was there already."""
+        i = int(np.searchsorted(history.times, t)) - BENT
+        before = float(history.times[i]) if i >= 0 else -inf
+        if not history.insert(t, 0, rate, force):
+            return False
+        self._spoilt_from = min(self._spoilt_from, before)
+        return True
+
+    def expected(self, t: float) -> Anchor:
+        """The filter at time `t` [s] if no picture were to come; for now, a scratch copy."""
+        self._repair()
+        anchor = Anchor.empty()
+        anchor.copy(next(a for a in reversed(self.anchors) if a.t <= t))
+        self._advance(anchor, t)
+        return anchor
+
+    def fuse(self, t: float, seen: Seen) -> tuple[Anchor, float]:
+        """Fuse the rays of `seen`, taken at `t` [s] later than the base.
+
+        Gives its anchor and χ² (two degrees of freedom for each LED used); NaN: the filter can't
+        be believed.
+        """
+        self._repair()
+        k = len(self.anchors)
+        while self.anchors[k - 1].t > t:
+            k -= 1
+        anchor = Anchor.empty()
+        anchor.seen, anchor.use = seen, np.full(len(seen.rays), -1, dtype=np.int8)
+        self.anchors.insert(k, anchor)
+        anchor.t = t
+        chi2 = self._remake(k)
+        self._spoilt_from = t
+        self._repair()
+        return anchor, chi2
+
+    def _remake(self, k: int) -> float:
+        """Anchor k from the one before it."""
+        anchor = self.anchors[k]
+        t, seen, use = anchor.t, anchor.seen, anchor.use
+        anchor.copy(self.anchors[k - 1])
+        self._advance(anchor, t)
+        if seen is None or use is None:
+            return 0.0
+        rays = seen.rays
+        felt = self._inputs(anchor)
+        return float(
+            fuse_rays(
+                anchor.x,
+                anchor.R,
+                anchor.P,
+                felt,
+                self._leds_in_b[rays.led],
+                rays.t + (anchor.x[X_OFFSET] - t),
+                np.array(rays.tangents, dtype=np.float64, order="C"),  # compiled for such alone
+                np.array(rays.covariances, dtype=np.float64, order="C"),
+                self._gate,
+                use,
+            )
+        )
+
+    def _repair(self) -> None:
+        """Make anew what was spoilt; the base can't be."""
+        if self._spoilt_from == inf:
+            return
+        for k in range(1, len(self.anchors)):
+            if self.anchors[k].t > self._spoilt_from:
+                self._remake(k)
+        if self._frontier.t > self._spoilt_from or self._frontier.t <= self.newest.t:
+            self._frontier.copy(self.newest)
+        self._spoilt_from = inf
+
+    def settle(self, oldest: float) -> None:
+        """Let the base follow at time `oldest` [s]: nothing from before it will be made anew."""
+        self._repair()
+        while len(self.anchors) > 1 and self.anchors[1].t <= oldest:
+            self.anchors.pop(0)
+        if len(self.anchors) == 1 and self.anchors[0].t < oldest:
+            self._advance(self.anchors[0], oldest)
+            self.anchors[0].seen = self.anchors[0].use = None
+        if self._frontier.t < self.newest.t:
+            self._frontier.copy(self.newest)
+        for history in (self.body, self.phone):
+            kept = int(np.searchsorted(history.times, self.anchors[0].t, side="right")) - KEPT
+            if kept > 0:
+                history.forget_until(float(history.times[kept - 1]))
+
+    def to_now(self, t: float) -> bool:
+        """Bring `now` to time `t` [s]; False: the filter can't be believed."""
+        self._repair()
+        if self._frontier.t > t:
+            self._frontier.copy(self.newest)
+        complete = min(self.complete, t)
+        if complete > self._frontier.t:
+            self._advance(self._frontier, complete)
+        self.now.copy(self._frontier)
+        self._advance(self.now, t)
+        return bool(is_sound(self.now.x, self.now.R, self.now.P))
+
+    def inputs_now(self) -> Array:
+        """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
+        return self._inputs(self.now)
+
+    def _inputs(self, anchor: Anchor) -> Array:
+        body, phone = self.body, self.phone
+        return np.asarray(
+            inputs_at(
+                anchor.t, anchor.x, body.times, body.values, phone.times, phone.values, self._hand
+            )
+        )
+
+    def _advance(self, anchor: Anchor, t: float) -> None:
+        body, phone = self.body, self.phone
+        transit(
+            anchor.x,
+            anchor.R,
+            anchor.R_ic,
+            self._F,
+            self._G,
+            self._Q,
+            (anchor.t, t),
+            body.times,
+            body.values,
+            phone.times,
+            phone.values,
+            self._noise,
+            self._hand,
+            self._steps,
+        )
+        apply(anchor.P, self._F, self._G, self._Q, self._walks, t - anchor.t, self._products)
+        anchor.t = t
+
+
+def noise_of(c: RelativeConfig) -> Array:
+    """(2, 3, 2), see `relative_kernels.transit`."""
+    body = ((c.sigma_omega_b, c.sigma_f_b), (0.0, c.rough_f_b), (c.drift_omega_b, c.drift_f_b))
+    phone = ((c.sigma_omega_c, c.sigma_f_c), (0.0, c.rough_f_c), (c.drift_omega_c, c.drift_f_c))
+    return np.array((body, phone))
+
+
+def hand_of(c: HandConfig) -> Array:
+    """(6,), see `hand_kernels.covariance`."""
+    return np.array((c.slow, c.length_s, c.tremor, c.tremor_hz, c.coherence_s, c.noise))
+
+
+def walks_of(c: RelativeConfig) -> Array:
+    """(13,) densities of the biases' and the offset's random walks [unit²/s]."""
+    walks = (c.walk_omega_b, c.walk_f_b, c.walk_omega_c, c.walk_f_c)
+    densities: Array = np.square(np.append(np.repeat(walks, 3), c.walk_offset))
+    return densities

@@ -1,0 +1,158 @@
+"""Compiled: the pose that fits named spots, for the many hypotheses of a search."""
+
+from __future__ import annotations
+
+from math import acos, cos, sqrt
+
+import numpy as np
+
+from pipeline.frames import Array
+from pipeline.identification.naming_kernels import NEAR_M, Integers, Lights, place
+from pipeline.so3_kernels import kernel, multiply, put_exp
+
+ITERATIONS = 6
+CONVERGED = 1e-12
+LEAP2 = 4.0
+"""A step longer than 2 (m, rad) leads nowhere."""
+
+
+@kernel
+def _solve6(A: Array, b: Array) -> bool:
+    """Overwrite b (6,) by A⁻¹ b for a symmetric positive A; False if it is not."""
+    for j in range(6):
+        d = A[j, j]
+        for k in range(j):
+            d -= A[j, k] * A[j, k]
+        if not d > 1e-12 * (1.0 + abs(A[j, j])):
+            return False
+        A[j, j] = sqrt(d)
+        for i in range(j + 1, 6):
+            s = A[i, j]
+            for k in range(j):
+                s -= A[i, k] * A[j, k]
+            A[i, j] = s / A[j, j]
+    for i in range(6):
+        for k in range(i):
+            b[i] -= A[i, k] * b[k]
+        b[i] /= A[i, i]
+    for i in range(5, -1, -1):
+        for k in range(i + 1, 6):
+            b[i] -= A[k, i] * b[k]
+        b[i] /= A[i, i]
+    return True
+
+
+@kernel
+def _add(
+    R: Array, leds: Array, k: int, at: tuple[float, float, float], row: Array, A: Array
+) -> None:
+    """Rows (2, 6) of the Jacobian [1/f] with respect to (δp in c, θ in b), and their squares."""
+    x, y, z = at
+    for r in range(2):
+        w = y if r == 0 else z
+        row[r, 0], row[r, 1], row[r, 2] = -w / x, 0.0, 0.0
+        row[r, r + 1] = 1.0 / x
+        m0 = (R[r + 1, 0] - w * R[0, 0]) / x
+        m1 = (R[r + 1, 1] - w * R[0, 1]) / x
+        m2 = (R[r + 1, 2] - w * R[0, 2]) / x
+        row[r, 3] = m2 * leds[k, 1] - m1 * leds[k, 2]
+        row[r, 4] = m0 * leds[k, 2] - m2 * leds[k, 0]
+        row[r, 5] = m1 * leds[k, 0] - m0 * leds[k, 1]
+        for i in range(6):
+            for j in range(i + 1):
+                A[i, j] += row[r, i] * row[r, j]
+
+
+@kernel
+def _linearised(
+    p: Array,
+    R: Array,
+    leds: Array,
+    names: Integers,
+    without: int,
+    lights: Lights,
+    A: Array,
+    b: Array,
+    row: Array,
+) -> float:
+    """Normal equations A (6, 6), b (6,); squared residuals (tangents), < 0 behind the camera."""
+    total = 0.0
+    A[:], b[:] = 0.0, 0.0
+    for k in range(leds.shape[0]):
+        if names[k] < 0 or k == without:
+            continue
+        at = place(p, R, leds, k)
+        if at[0] < NEAR_M:
+            return -1.0
+        _add(R, leds, k, at, row, A)
+        for r in range(2):
+            residual = lights.tangents[names[k], r] - at[r + 1]
+            total += residual * residual
+            for i in range(6):
+                b[i] += row[r, i] * residual
+    return total
+
+
+@kernel
+def fit(p: Array, R: Array, leds: Array, names: Integers, without: int, lights: Lights) -> float:
+    """Gauss-Newton of p and R to the named spots but LED `without`.
+
+    Returns:
+        Sum of the squared residuals, in tangents; negative if there is no fit.
+    """
+    A, b, row = np.empty((6, 6)), np.empty(6), np.empty((2, 6))
+    T, U = np.empty((3, 3)), np.empty((3, 3))
+    for _ in range(ITERATIONS):
+        total = _linearised(p, R, leds, names, without, lights, A, b, row)
+        if total < 0.0:
+            return -1.0
+        for i in range(6):
+            A[i, i] *= 1.0 + 1e-9
+        if not _solve6(A, b):
+            return -1.0
+        step2 = 0.0
+        for i in range(6):
+            step2 += b[i] * b[i]
+        if not step2 < LEAP2:
+            return -1.0
+        for i in range(3):
+            p[i] += b[i]
+        put_exp(b[3], b[4], b[5], T)
+        multiply(R, T, U)
+        R[:] = U
+        if step2 < CONVERGED:
+            break
+    return _linearised(p, R, leds, names, without, lights, A, b, row)
+
+
+@kernel
+def worst(p: Array, R: Array, leds: Array, names: Integers, lights: Lights) -> float:
+    """The largest residual, in tangents."""
+    most = 0.0
+    for k in range(leds.shape[0]):
+        if names[k] >= 0:
+            _, y, z = place(p, R, leds, k)
+            dy, dz = lights.tangents[names[k], 0] - y, lights.tangents[names[k], 1] - z
+            most = max(most, dy * dy + dz * dz)
+    return sqrt(most)
+
+
+@kernel
+def angle_to(R: Array, up_in_b: Array, up_in_c: Array) -> float:
+    """Angle between R up_in_b and up_in_c, two unit vectors [rad]."""
+    cosine = 0.0
+    for i in range(3):
+        turned = R[i, 0] * up_in_b[0] + R[i, 1] * up_in_b[1] + R[i, 2] * up_in_b[2]
+        cosine += turned * up_in_c[i]
+    return acos(max(-1.0, min(1.0, cosine)))
+
+
+@kernel
+def is_turned_less(R: Array, Q: Array, most: float) -> bool:
+    """Whether a turn of less than `most` [rad] leads from one to the other."""
+    trace = 0.0
+    for i in range(3):
+        for j in range(3):
+            trace += R[i, j] * Q[i, j]
+    less: bool = trace > 1.0 + 2.0 * cos(most)
+    return less

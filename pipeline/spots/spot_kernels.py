@@ -1,0 +1,171 @@
+"""Compiled: the bright spots in windows of a picture."""
+
+from __future__ import annotations
+
+from math import ceil
+
+import numba
+import numpy as np
+
+from pipeline.camera.lens_kernels import OUT_2, VECTOR
+from pipeline.frames import Array
+from pipeline.signals import Image
+from pipeline.so3_kernels import kernel
+from pipeline.spots.centroid_kernels import (
+    AREA,
+    CONTRAST,
+    FIELDS,
+    RING,
+    Box,
+    U,
+    V,
+    centre,
+)
+from pipeline.spots.flood_kernels import Pixels, border, bright, flood, moments
+
+WINDOW = 21
+"""Half of a window's side [px], at most, when it is asked for."""
+LARGEST = 45
+"""The same after it has grown about a spot that did not fit."""
+SHARE = 0.4
+"""Of the contrast: what is above belongs to the spot."""
+ROUNDS, OF_ONE_WINDOW = 6, 4
+"""Peaks looked at, and spots taken, of one window."""
+SAME_PX = 1.5
+CUT = 2
+"""Spots whose light goes on within so many pixels of the picture's border are cut by it."""
+
+WINDOWS = numba.types.Array(numba.int64, 2, "A", readonly=True)
+LUMA = numba.types.Array(numba.uint8, 2, "A", readonly=True)
+"""Read-only and of any layout: a decoder's rows have gaps, and no picture may compile anew."""
+
+
+@kernel
+def _is_new(table: Array, n: int, spot: Array) -> bool:
+    for i in range(n):
+        if (table[i, U] - spot[U]) ** 2 + (table[i, V] - spot[V]) ** 2 < SAME_PX * SAME_PX:
+            return False
+    return True
+
+
+@kernel
+def _spot_at(
+    luma: Image,
+    light: Array,
+    slope_of: Array,
+    box: Box,
+    extent: Box,
+    mark: int,
+    coded_px: float,
+    seen: Image,
+    work: Array,
+    spot: Array,
+) -> bool:
+    """Measure the spot whose members are marked; False if the picture's border cuts it."""
+    height, width = luma.shape
+    ring = np.empty(4, dtype=np.int64)
+    ring[0], ring[1] = box[0] + extent[0] - RING, box[1] + extent[1] - RING
+    ring[2], ring[3] = box[0] + extent[2] + RING, box[1] + extent[3] + RING
+    if ring[0] < CUT - RING or ring[1] < CUT - RING:
+        return False
+    if ring[2] > width - 1 - CUT + RING or ring[3] > height - 1 - CUT + RING:
+        return False
+    ring[0], ring[1] = max(0, ring[0]), max(0, ring[1])
+    ring[2], ring[3] = min(width - 1, ring[2]), min(height - 1, ring[3])
+    moments(luma, light, box, extent, mark, seen, spot)
+    return centre(luma, light, slope_of, ring, coded_px, spot, work)
+
+
+@kernel
+def _in_window(
+    luma: Image,
+    light: Array,
+    slope_of: Array,
+    window: Box,
+    limits: Array,
+    seen: Image,
+    stack: Pixels,
+    work: Array,
+    table: Array,
+    n: int,
+    wide: Box,
+) -> int:
+    """Add the spots of a window (u, v, half its side) to table[:n]; gives their count.
+
+    `wide` (3,): the middle of one that does not fit, and whether there is one.
+    """
+    height, width = luma.shape
+    u0, v0, half = window[0], window[1], window[2]
+    box = np.empty(4, dtype=np.int64)
+    box[0], box[2] = max(0, u0 - half), min(width - 1, u0 + half)
+    box[1], box[3] = max(0, v0 - half), min(height - 1, v0 + half)
+    if box[2] - box[0] < 4 or box[3] - box[1] < 4:
+        return n
+    columns, rows = box[2] - box[0] + 1, box[3] - box[1] + 1
+    ground = border(luma, box)
+    seen[:rows, :columns] = 0
+    spot, extent, taken = np.empty(FIELDS), np.empty(4, dtype=np.int64), 0
+    count = bright(luma, box, ceil(ground + limits[0]), stack)
+    for mark in range(1, ROUNDS + 1):
+        peak, pu, pv = -1, 0, 0
+        for k in range(len(stack) - count, len(stack)):
+            v, u = box[1] + stack[k, 0], box[0] + stack[k, 1]
+            if luma[v, u] > peak and seen[v - box[1], u - box[0]] == 0:
+                peak, pu, pv = int(luma[v, u]), u, v
+        if peak < 0:
+            break
+        threshold = ground + SHARE * (peak - ground)
+        area = flood(luma, box, pu, pv, threshold, mark, seen, stack, extent)
+        if extent[0] < 1 or extent[1] < 1 or extent[2] > columns - 2 or extent[3] > rows - 2:
+            if wide[2] == 0:
+                wide[0] = box[0] + (extent[0] + extent[2]) // 2
+                wide[1] = box[1] + (extent[1] + extent[3]) // 2
+                wide[2] = 1
+            continue
+        if not limits[1] <= area <= limits[2]:
+            continue
+        spot[AREA], spot[CONTRAST] = area, peak - ground
+        if not _spot_at(luma, light, slope_of, box, extent, mark, limits[4], seen, work, spot):
+            continue
+        if n < len(table) and _is_new(table, n, spot):
+            table[n] = spot
+            n += 1
+        taken += 1
+        if taken == OF_ONE_WINDOW:
+            break
+    return n
+
+
+@numba.njit((LUMA, VECTOR, VECTOR, WINDOWS, VECTOR, OUT_2), cache=True, error_model="numpy")
+def measure(
+    luma: Image, light: Array, slope_of: Array, windows: Box, limits: Array, table: Array
+) -> int:
+    """Measure the spots in square windows; gives their count.
+
+    A window grows once about a spot that does not fit; what still reaches its border is none.
+
+    Args:
+        luma: The picture.
+        light: (256,) about linear light of each grey level.
+        slope_of: (256,) its slope; 0 where it is clipped.
+        windows: (w, 3) middle and half the side [px].
+        limits: (5,) least contrast in grey levels, least and most pixels, most windows that grow,
+            and what a codec adds to a place [px].
+        table: (n, FIELDS) written, until it is full.
+    """
+    seen = np.empty((2 * LARGEST + 1, 2 * LARGEST + 1), dtype=np.uint8)
+    stack = np.empty((2 * (2 * LARGEST + 1) ** 2, 2), dtype=np.int16)
+    work = np.empty(8 * LARGEST + 8)
+    wide, larger = np.zeros(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    n, grown = 0, 0.0
+    for w in range(len(windows)):
+        window = windows[w]
+        if not (0 < window[2] <= LARGEST):
+            continue
+        wide[2] = 0
+        n = _in_window(luma, light, slope_of, window, limits, seen, stack, work, table, n, wide)
+        if wide[2] == 1 and window[2] < LARGEST and grown < limits[3]:
+            grown += 1.0
+            larger[0], larger[1], larger[2] = wide[0], wide[1], LARGEST
+            n = _in_window(luma, light, slope_of, larger, limits, seen, stack, work, table, n, wide)
+    return n

@@ -1,0 +1,1 @@
+"""When a thing happened: other machines' clocks, and pictures against motion samples."""

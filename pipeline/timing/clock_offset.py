@@ -1,0 +1,214 @@
+"""Where another machine's clock stands and how fast it drifts, from questions and answers.
+
+An answer proves that the other clock read `t_remote` somewhen between question and answer: it
+bounds the offset from both sides. The offset is a straight line over the last seconds; of all lines
+that keep every bound, the one with the most room on both sides is believed, and how far the others
+may be from it is the error nobody can argue with (asymmetric delays included).
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import deque
+from math import isfinite
+from typing import Final
+
+from pipeline.timing.clock_line import MAX_DRIFT, Bound, Bucket, Line, fit
+
+WINDOW_S: Final = 60.0
+"""How long a bound counts: quartz keeps its rate over it."""
+BUCKET_S: Final = 1.0
+"""Of each such span only its tightest bounds are kept."""
+NEEDED: Final = 5
+"""Answers before anything is dated."""
+CONTRADICTIONS: Final = 3
+"""So many in a row: the clock jumped. Meanwhile nothing is dated."""
+TOLERANCE_S: Final = 5e-4
+"""A contradiction by less is noise of the stamps."""
+SLEW_S, MAX_SLEW = 0.5, 0.02
+"""What was learnt reaches `local` within this time, time never running faster or slower by more."""
+
+
+class ClockOffset:
+    """Remote clock minus our clock."""
+
+    def __init__(self, needed: int = NEEDED) -> None:
+        """Be ready after `needed` answers, at a start as after a jump."""
+        self._needed = needed
+        self._buckets: deque[Bucket] = deque()
+        self._contradictions: list[tuple[float, float, float]] = []
+        self._answers = 0
+        self._trips: deque[tuple[float, float]] = deque()
+        self._line: Line | None = None
+        self._mapping = Mapping()
+        self.restarts = 0
+        """Times the clock had jumped."""
+        self.reason = ""
+        """Of the last restart, in words."""
+
+    def add(self, t_asked: float, t_remote: float, t_answered: float) -> None:
+        """Take an answer: asked and answered on our clock [s], stamped `t_remote` on theirs [s]."""
+        if not (isfinite(t_asked + t_remote + t_answered) and t_asked <= t_answered):
+            return
+        jump = self._contradiction(t_asked, t_remote, t_answered)
+        if jump == 0.0:
+            self._contradictions.clear()
+            self._take(t_asked, t_remote, t_answered)
+            return
+        self._contradictions.append((t_asked, t_remote, t_answered))
+        if len(self._contradictions) >= CONTRADICTIONS:
+            self._restart(f"The phone's clock jumped by {jump:+.2f} s.")
+
+    @property
+    def ready(self) -> bool:
+        """Enough answers to trust it, and the last one doesn't contradict them."""
+        return self._answers >= self._needed and not self._contradictions
+
+    @property
+    def offset(self) -> float:
+        """Remote minus ours as `local` has it at the last answer [s].
+
+        Raises:
+            ValueError: before the first answer.
+        """
+        line = self._known()
+        return self._mapping.offset(line.t)
+
+    @property
+    def drift(self) -> float:
+        """How much faster the remote clock runs [s/s]. Raises ValueError before the first."""
+        return self._known().drift
+
+    @property
+    def error(self) -> float:
+        """Bound of the error of `offset` and of `local` at the last answer [s].
+
+        By and large half the quickest round trip, for delays there and back may differ; as long
+        as they don't, the error is a tenth of that. Raises ValueError before the first answer.
+        """
+        line = self._known()
+        return line.error + abs(line.offset - self._mapping.offset(line.t))
+
+    @property
+    def round_trip(self) -> float:
+        """The shortest of the window [s]."""
+        self._known()
+        return min(trip for _, trip in self._trips)
+
+    def local(self, t_remote: float) -> float:
+        """Our time at the remote time `t_remote` [s]: later for later, without steps."""
+        self._known()
+        return self._mapping.local(t_remote)
+
+    def _known(self) -> Line:
+        if self._line is None:
+            raise ValueError("no answer yet")
+        return self._line
+
+    def _contradiction(self, t_asked: float, t_remote: float, t_answered: float) -> float:
+        """By how much the clock jumped if this answer is true [s]; 0: it agrees."""
+        if self._line is None:
+            return 0.0
+        error = self._line.error + MAX_DRIFT * (t_answered - self._line.t) + TOLERANCE_S
+        above = t_remote - t_answered - self._line.at(t_answered)
+        below = t_remote - t_asked - self._line.at(t_asked)
+        return 0.5 * (above + below) if above > error or below < -error else 0.0
+
+    def _restart(self, reason: str) -> None:
+        answers, self._contradictions = self._contradictions, []
+        self._buckets.clear()
+        self._trips.clear()
+        self._answers, self._line = 0, None
+        self.restarts += 1
+        self.reason = reason
+        for answer in answers:
+            self._take(*answer)
+
+    def _take(self, t_asked: float, t_remote: float, t_answered: float) -> None:
+        drift = self._line.drift if self._line is not None else 0.0
+        lower = Bound(t_answered, t_remote - t_answered)
+        upper = Bound(t_asked, t_remote - t_asked)
+        is_news = self._remember(lower, upper, drift)
+        self._answers += 1
+        self._trips.append((t_answered, t_answered - t_asked))
+        while self._trips[0][0] < t_answered - WINDOW_S:
+            self._trips.popleft()
+        if is_news:
+            self._line = self._refit(t_answered)
+            self._mapping.steer(self._line, settled=self._answers > self._needed)
+
+    def _refit(self, t: float) -> Line:
+        """The line through what still agrees; a rate that has changed costs the older half."""
+        line = fit(self._buckets, t)
+        while len(self._buckets) > 1 and self._has_changed(line, t):
+            for _ in range(len(self._buckets) // 2):
+                self._buckets.popleft()
+            line = fit(self._buckets, t)
+        return line
+
+    def _has_changed(self, line: Line, t: float) -> bool:
+        """The newest bounds leave much more room than all together: they follow another line."""
+        if line.room < -TOLERANCE_S:
+            return True
+        if len(self._buckets) < 8 or t != self._buckets[-1].t:  # once a bucket is enough
+            return False
+        recent = fit(list(self._buckets)[-len(self._buckets) // 4 :], t).room
+        return line.room < recent / 3.0 and line.room < recent - TOLERANCE_S
+
+    def _remember(self, lower: Bound, upper: Bound, drift: float) -> bool:
+        """Into the newest bucket, if tighter than what is there; old buckets go."""
+        t = lower.t
+        while self._buckets and self._buckets[0].t < t - WINDOW_S:
+            self._buckets.popleft()
+        if not self._buckets or t >= self._buckets[-1].t + BUCKET_S:
+            self._buckets.append(Bucket(t, lower, upper))
+            return True
+        bucket = self._buckets[-1]
+        is_higher = lower.offset - bucket.lower.offset > drift * (lower.t - bucket.lower.t)
+        is_lower = upper.offset - bucket.upper.offset < drift * (upper.t - bucket.upper.t)
+        if is_higher:
+            bucket.lower = lower
+        if is_lower:
+            bucket.upper = upper
+        return is_higher or is_lower
+
+
+class Mapping:
+    """Remote time to ours: continuous, strictly increasing, and never changed for the past."""
+
+    def __init__(self) -> None:
+        """Nothing known."""
+        self._t: list[float] = []
+        """Knots on our clock [s], ascending; the last two are a plan that may change."""
+        self._remote: list[float] = []
+        self._drift = 0.0
+
+    def steer(self, line: Line, settled: bool) -> None:
+        """From `line.t` on, approach `line` smoothly; at once if not yet `settled`."""
+        offset = self.offset(line.t) if settled and self._t else line.offset
+        keep = bisect_right(self._t, line.t - 1e-9) if settled else 0
+        keep_from = max(0, keep - 64)
+        self._t, self._remote = self._t[keep_from:keep], self._remote[keep_from:keep]
+        takes = max(SLEW_S, abs(offset - line.offset) / MAX_SLEW)
+        for t, theirs in ((line.t, offset), (line.t + takes, line.at(line.t + takes))):
+            self._t.append(t)
+            self._remote.append(t + theirs)
+        self._drift = line.drift
+
+    def offset(self, t: float) -> float:
+        """Remote minus ours at our time `t` [s]."""
+        return _interpolated(self._t, self._remote, t, 1.0 + self._drift) - t
+
+    def local(self, t_remote: float) -> float:
+        """Our time at `t_remote` [s]."""
+        return _interpolated(self._remote, self._t, t_remote, 1.0 / (1.0 + self._drift))
+
+
+def _interpolated(x: list[float], y: list[float], at: float, slope: float) -> float:
+    """Straight between knots; `slope` before the first and beyond the last."""
+    i = bisect_right(x, at)
+    if i == 0:
+        return y[0] + slope * (at - x[0])
+    if i == len(x):
+        return y[-1] + slope * (at - x[-1])
+    return y[i - 1] + (y[i] - y[i - 1]) * (at - x[i - 1]) / (x[i] - x[i - 1])

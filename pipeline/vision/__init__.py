@@ -1,0 +1,1 @@
+"""Picture after picture → named LEDs and a judged pose: what a live phone and a folder share."""

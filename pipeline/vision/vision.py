@@ -1,0 +1,228 @@
+"""Spots → names → pose and rays, from picture to picture: what all that looks runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.camera.lens import Camera
+from pipeline.camera.rolling import Motion, unrolled
+from pipeline.frames import Array
+from pipeline.identification import pnp
+from pipeline.identification.leaning import Leaning
+from pipeline.identification.pnp import Naming
+from pipeline.identification.search import Hints
+from pipeline.identification.starting import Starting
+from pipeline.signals import Frame, Match, RelativePose, Spots
+from pipeline.spots import leds
+from pipeline.vision import few_leds
+from pipeline.vision.follow import Follower
+from pipeline.vision.last_pose import LastPose, Place
+from pipeline.vision.rays import NO_RAYS, rays_of
+from pipeline.vision.sighting import Prior, Sighting
+from pipeline.vision_config import IdentifyConfig, LedsConfig
+
+__all__ = ["Prior", "Sighting", "Vision", "warm_up"]
+
+Clock = Callable[[], float]
+STAGES = ("detect", "identify", "pose")
+UNTIMED = np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """The spots of a picture and what they are called: all LEDs that a pose needs, or a few."""
+
+    spots: Spots
+    naming: Naming | None = None
+    few: Match | None = None
+    bounded: bool = False
+    """Not all was tried."""
+
+
+class Vision:
+    """Follows one robot through one camera's pictures."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        leds_in_b: Array,
+        leds_config: LedsConfig | None = None,
+        identify_config: IdentifyConfig | None = None,
+    ) -> None:
+        """Nothing seen yet."""
+        self.camera, self._leds_in_b = camera, leds_in_b
+        self._leds = leds_config or LedsConfig()
+        self._identify = identify_config or IdentifyConfig()
+        self._last, self._leaning = LastPose(), Leaning()
+        self._prior = Prior()
+        """Of the newest picture."""
+        self._places: few_leds.Places | None = None
+        """Where a filter that is trusted expects the LEDs in this picture."""
+        self._follower = Follower(camera, leds_in_b, self._leds, self._identify)
+        self._starting = Starting(camera, leds_in_b, self._identify)
+        self._area_px_m2 = 0.0
+        """Of the last named spots, times their depth squared: what an LED looks like."""
+
+    def step(self, frame: Frame, prior: Prior, clock: Clock = lambda: 0.0) -> Sighting:
+        """Look at a picture; `clock` only times the stages."""
+        self._last.advance(frame.t, prior.omega_cf_in_c, prior.omega_bf_in_b)
+        self._prior = prior
+        predicted = self._predictions(prior)
+        motion = self._motion(predicted, prior)
+        found, took_s = None, UNTIMED
+        if predicted:
+            followed = self._follower.look(frame, predicted[0], motion, clock)
+            took_s = took_s + followed.took_s
+            if followed.naming is not None:
+                found = _Found(followed.spots, followed.naming)
+        if found is None:
+            found, searched_s = self._search(frame, motion, predicted, clock)
+            took_s = took_s + searched_s
+        else:
+            self._starting.forget()
+        started = clock()
+        sighting = self._told(frame.t, found)
+        took_s[2] += clock() - started
+        return replace(sighting, took_s=dict(zip(STAGES, took_s.tolist(), strict=True)))
+
+    def _told(self, t: float, found: _Found) -> Sighting:
+        spots, naming, few = found.spots, found.naming, found.few
+        if naming is not None:
+            depth = float(naming.fit.p_bc_in_c[0])
+            areas = sorted(spots.area[naming.match.spot].tolist())
+            self._area_px_m2 = areas[len(areas) // 2] * depth**2
+            rays = rays_of(self.camera, spots, naming.match, t, naming.fit.excess)
+            return Sighting(t, pnp.pose_of(naming.fit, t), rays, spots, naming.match, "")
+        if few is not None:
+            reason = f"{len(few.led)} of {len(self._leds_in_b)} LEDs seen."
+            rays = rays_of(self.camera, spots, few, t)
+            return Sighting(t, None, rays, spots, few, reason, bounded=found.bounded)
+        self._last.miss()
+        excuse = self._excuse(spots)
+        return Sighting(t, None, NO_RAYS, spots, None, excuse, bounded=found.bounded)
+
+    def keep(self, pose: RelativePose) -> None:
+        """`pose`, of the last picture, was believed: predict from it."""
+        self._last.keep(pose, self._prior.expected)
+        self._leaning.learn(self._prior.up_in_c, self._prior.up_in_b, pose.R_cb)
+
+    def roll(self, readout_s: float) -> None:
+        """From the next picture on, the camera's rows are read in so long [s]."""
+        self.camera = self._follower.camera = replace(self.camera, readout_s=readout_s)
+
+    def forget(self) -> None:
+        """The next picture is searched from nothing."""
+        self._last.forget()
+        self._starting.forget()
+        self._follower.forget()
+        self._leaning = Leaning()
+
+    def _predictions(self, prior: Prior) -> list[Place]:
+        """Where the robot may be, likeliest first: by a sure filter, by the last pose."""
+        expected = prior.expected
+        if expected is None:
+            self._last.contradicts = False  # whoever was wrong has gone
+        self._places = None
+        places: list[Place] = []
+        if expected is not None and not self._last.contradicts:
+            config = self._identify
+            self._places = few_leds.places(self.camera, self._leds_in_b, expected, config)
+            if self._places is not None:
+                places.append((expected.p_bc_in_c, expected.R_cb))
+        own = self._last.predicted()
+        return [*places, own] if own is not None else places
+
+    def _motion(self, predicted: list[Place], prior: Prior) -> Motion | None:
+        """During the readout of a picture; without gyroscopes as it was between the last poses."""
+        omega_c, omega_b, expected = prior.omega_cf_in_c, prior.omega_bf_in_b, prior.expected
+        if not predicted:
+            return None if omega_c is None else Motion(omega_c, np.zeros(3), np.inf)
+        depth, u_in_c = float(predicted[0][0][0]), self._last.u_in_c
+        if self._places is not None and expected is not None:
+            u_in_c = expected.u_bf_in_c
+        if omega_c is None:
+            return Motion(np.zeros(3), u_in_c, depth, self._last.omega_in_b)
+        return Motion(omega_c, u_in_c, depth, np.zeros(3) if omega_b is None else omega_b)
+
+    def _search(
+        self, frame: Frame, motion: Motion | None, predicted: list[Place], clock: Clock
+    ) -> tuple[_Found, Array]:
+        """In the whole picture; and how long that took, by stage [s]."""
+        started = clock()
+        spots = leds.find_spots(frame, self._leds)
+        detected = clock()
+        found = self._named(frame.t, spots, motion, predicted)
+        return found, np.array([detected - started, clock() - detected, 0.0])
+
+    def _named(
+        self, t: float, spots: Spots, motion: Motion | None, predicted: list[Place]
+    ) -> _Found:
+        for place in predicted:
+            naming = self._follower.name(spots, place, motion)
+            if naming is not None:
+                self._starting.forget()
+                return _Found(spots, naming)
+        upright = unrolled(self.camera, spots, motion)
+        naming = self._starting.step(t, upright, self._hints(), self._last.turned)
+        bounded = self._starting.bounded or spots.bounded
+        if naming is not None:
+            return _Found(spots, self._exactly(naming, spots), bounded=bounded)
+        return _Found(spots, few=self._few(upright), bounded=bounded)
+
+    def _exactly(self, naming: Naming, spots: Spots) -> Naming:
+        """With each LED's own motion during the readout, now that it has a name."""
+        place = naming.fit.p_bc_in_c, naming.fit.R_cb
+        again = self._follower.name(spots, place, self._motion([place], self._prior))
+        if again is None or len(again.match.led) < len(naming.match.led):
+            return naming
+        return again
+
+    def _hints(self) -> Hints:
+        """For a search from nothing: the verticals, and what is remembered."""
+        up_in_c, up_in_b = self._prior.up_in_c, self._leaning.corrected(self._prior.up_in_b)
+        memory = self._last.attitude()
+        if memory is None:
+            return Hints(up_in_c, up_in_b)
+        return Hints(up_in_c, up_in_b, *memory, self._area_px_m2)
+
+    def _few(self, spots: Spots) -> Match | None:
+        """A few LEDs, where a filter expects them."""
+        if self._places is None or self._prior.expected is None:
+            return None
+        area_px = self._area_px_m2 / float(self._prior.expected.p_bc_in_c[0]) ** 2
+        few = few_leds.name_few(spots, self._places, area_px if area_px > 0.0 else np.nan)
+        if few is None or len(few.led) >= self._identify.min_leds:
+            return None  # so many would have given a pose: something is wrong with them
+        return few
+
+    def _excuse(self, spots: Spots) -> str:
+        n, needed = len(spots), self._identify.min_leds
+        if n == 0:
+            return "No light in the picture is bright enough."
+        if n < needed:
+            return f"{n} of {len(self._leds_in_b)} LEDs seen: {needed} are needed."
+        if self._starting.ambiguous:
+            return f"{n} lights seen, and more than one way to see the robot in them."
+        return f"{n} lights seen, but they do not look like the robot."
+
+
+def warm_up() -> None:
+    """Look at pictures in every way there is, so that whatever is compiled once is so before."""
+    K = np.array([[400.0, 0.0, 160.0], [0.0, 400.0, 120.0], [0.0, 0.0, 1.0]])
+    camera = Camera(320, 240, K, "plumb_bob", np.zeros(5), 0.01)
+    x, y, z = (0.1, 0.0, -0.1, 0.2, -0.2), (0.3, -0.3, 0.2, -0.1, 0.0), (0.2, 0.1, -0.3, -0.2, 0.3)
+    robot, place = np.column_stack((x, y, z)), np.array([2.5, 0.0, 0.0])
+    up, still = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    luma = np.zeros((240, 320), dtype=np.uint8)
+    for u, v in np.round(camera.pixels(robot + place)).astype(int):
+        luma[v - 1 : v + 2, u - 1 : u + 2] = 255
+    dark = np.zeros_like(luma)
+    for prior in (Prior(up, up, still, still), Prior()):
+        vision = Vision(camera, robot)
+        for k, picture in enumerate((luma, luma, dark, luma)):
+            sighting = vision.step(Frame(0.03 * k, picture), prior)
+            if sighting.pose is not None:
+                vision.keep(sighting.pose)

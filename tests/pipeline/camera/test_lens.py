@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from pipeline.camera.lens import Camera, points_of
+
+K = np.array([[930.0, 0.0, 646.0], [0.0, 931.5, 354.0], [0.0, 0.0, 1.0]])
+LENSES = {
+    "plumb_bob": (0.06, -0.11, 0.0006, -0.0004, 0.01),
+    "rational_polynomial": (0.5, 0.1, 0.0005, -0.0003, 0.02, 0.45, 0.15, 0.03),
+    "equidistant": (-0.02, 0.01, -0.004, 0.001),
+}
+
+
+def camera(model="plumb_bob", distortion=None):
+    return Camera(1280, 720, K, model, np.array(distortion or LENSES[model]))
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_a_projected_point_is_found_on_its_ray_again(model):
+    u, v = np.meshgrid(np.linspace(-0.55, 0.55, 9), np.linspace(-0.3, 0.3, 7))
+    normalised = np.column_stack((u.ravel(), v.ravel()))
+    points = points_of(normalised) * np.linspace(0.5, 9.0, len(normalised))[:, None]
+    back = camera(model).normalised(camera(model).pixels(points))
+    np.testing.assert_allclose(back, normalised, atol=2e-5)
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_distortion_moves_the_corners_and_leaves_the_middle(model):
+    none = camera(model, (0.0,) * len(LENSES[model]))
+    points = np.array([[1.0, 0.0, 0.0], [1.0, 0.5, 0.3]])
+    shift = np.linalg.norm(camera(model).pixels(points) - none.pixels(points), axis=1)
+    assert shift[0] < 1e-6 < 1.0 < shift[1]
+
+
+def test_left_is_left_and_up_is_up_in_the_picture():
+    ahead, left, above = camera().pixels(np.array([[2.0, 0, 0], [2.0, 0.1, 0], [2.0, 0, 0.1]]))
+    np.testing.assert_allclose(ahead, K[:2, 2], atol=1e-9)
+    assert left[0] < ahead[0]
+    assert above[1] < ahead[1]
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_one_point_is_one_row_and_no_point_is_none(model):
+    lens = camera(model)
+    for n in (0, 1):
+        assert lens.pixels(np.full((n, 3), 0.5)).shape == (n, 2)
+        assert lens.normalised(np.full((n, 2), 300.0)).shape == (n, 2)
+
+
+def test_the_picture_ends_half_a_pixel_beyond_its_last_pixels():
+    corners = np.array([[-0.4, -0.4], [1279.4, 719.4], [-0.6, 10.0], [10.0, 719.6]])
+    assert camera().sees(corners).tolist() == [True, True, False, False]
+    assert camera().sees(np.array([[9.0, 300.0], [10.0, 300.0]]), 10.0).tolist() == [False, True]
+
+
+def test_the_mean_focal_length_counts():
+    assert camera().focal_px == pytest.approx(930.75)

@@ -1,0 +1,127 @@
+"""Compliance: no more force than allowed, no bouncing, no jump on, off, or when the wall goes."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from pipeline.config import ComplianceConfig
+from pipeline.control.compliance import Compliance
+from pipeline.control.pid import Pid, Reference, pose_error
+from pipeline.gains import PHONE
+from pipeline.signals import VirtualView
+
+H, LIMIT = 0.005, 3.0
+ON = ComplianceConfig(enabled=True, limit_n=LIMIT)
+MASS, AIR = 3.5, 1.5
+WALL = 0.1
+ALONG = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Flight:
+    t: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    command: np.ndarray
+    contact: np.ndarray
+    lost: int
+
+
+def fly(
+    config: ComplianceConfig = ON,
+    seconds: float = 14.0,
+    speed: float = 0.1,
+    behind: float = 0.2,
+    wall: Callable[[float], bool] = lambda t: t < 9.0,
+    switch: Callable[[float], bool] | None = None,
+    stiffness: float = 1e4,
+    pull: float = 0.0,
+) -> Flight:
+    """Along one axis after a reference that goes on `behind` a stiff wall; thrusters as the AMES'.
+
+    Contact is lost when the body is more than half a millimetre off the wall it has touched.
+    """
+    pid, soft = Pid(PHONE), Compliance(config)
+    pid.take_over(-pull * ALONG)
+    soft.start(-pull * ALONG)
+    waiting = deque([-pull] * 3)
+    x = v = 0.0
+    force, touching, lost, rows = -pull, False, 0, []
+    damping = 0.4 * np.sqrt(stiffness * MASS)
+    for k in range(round(seconds / H)):
+        t = k * H
+        target = min(max(t - 1.0, 0.0) * speed, WALL + behind)
+        moving = speed if 0.0 < target < WALL + behind else 0.0
+        view = VirtualView(np.eye(3), np.zeros(3), x * ALONG, np.eye(3), (v - moving) * ALONG, ZERO)
+        error = pose_error(view, Reference(target * ALONG, np.eye(3)))
+        wrench = pid.wrench(error, view)
+        if switch is not None:
+            soft.on = switch(t)
+        given = np.clip(soft.force(wrench[:3], pid.damping_in_b(error, view), H), -6.0, 6.0)
+        pid.integrate(error, view, wrench - np.append(given, ZERO), H)
+        waiting.append(given[0])
+        command, felt = waiting.popleft(), 0.0
+        for _ in range(20):
+            force += 2.5e-4 / 0.025 * (command - force)
+            depth = x - WALL
+            push = max(0.0, stiffness * depth + damping * v) if depth > 0.0 and wall(t) else 0.0
+            v += 2.5e-4 * (force + pull - AIR * v - push) / MASS
+            x += 2.5e-4 * v
+            felt += push / 20
+            touches = wall(t) and (depth > 0.0 or (touching and depth > -5e-4))
+            lost += touching and not touches and wall(t)
+            touching = touches
+        rows.append((t, x, v, given[0], felt))
+    return Flight(*np.array(rows).T, lost=int(lost))
+
+
+ZERO = np.zeros(3)
+
+
+@pytest.mark.parametrize(("speed", "pull"), [(0.05, 0.0), (0.1, 0.0), (0.1, -1.5)])
+def test_the_push_settles_at_the_limit_and_does_not_bounce(speed: float, pull: float) -> None:
+    flight = fly(speed=speed, pull=pull, seconds=4.0 + 0.3 / speed, wall=lambda t: True)
+    pressing = flight.t > 2.5 + 0.3 / speed
+    assert np.abs(flight.contact[pressing] - LIMIT).max() < 0.2 * LIMIT
+    assert flight.lost <= 1
+
+
+def test_without_compliance_the_push_is_all_the_thrusters_have() -> None:
+    flight = fly(ComplianceConfig(enabled=False), 9.0)
+    pressing = (flight.t > 7.0) & (flight.t < 9.0)
+    assert flight.contact[pressing].min() > 5.5
+
+
+def test_when_the_wall_goes_it_returns_to_the_reference_without_a_jump() -> None:
+    flight = fly()
+    after = flight.t >= 9.0
+    assert np.abs(np.diff(flight.command[after])).max() < 0.15
+    assert flight.x[after].max() < 1.05 * (WALL + 0.2)
+    assert flight.v[after].max() < 0.3
+    assert flight.x[-1] == pytest.approx(WALL + 0.2, abs=0.005)
+
+
+def test_in_the_free_it_changes_nothing() -> None:
+    free = {on: fly(replace(ON, enabled=on), 6.0, wall=lambda t: False) for on in (True, False)}
+    np.testing.assert_array_equal(free[True].x, free[False].x)
+
+
+def test_a_reference_just_behind_the_wall_is_no_harder_push_in_the_end() -> None:
+    flight = fly(behind=0.01, seconds=16.0, wall=lambda t: True)
+    assert flight.contact[flight.t > 3.0].max() < 1.2 * LIMIT
+
+
+def test_switched_on_while_pushing_it_eases_and_switched_off_it_does_not_jump() -> None:
+    flight = fly(wall=lambda t: True, seconds=13.0, switch=lambda t: 6.0 <= t < 10.0)
+    on, off = (flight.t >= 5.9) & (flight.t < 9.9), (flight.t >= 9.9) & (flight.t < 10.5)
+    steps = np.abs(np.diff(flight.command[on]))
+    assert flight.contact[(flight.t > 5.0) & (flight.t < 6.0)].min() > 5.5
+    assert steps.max() < 0.1
+    assert flight.contact[(flight.t > 9.0) & (flight.t < 9.9)].max() < 1.2 * LIMIT
+    assert np.abs(np.diff(flight.command[off])).max() < 0.1
+    assert flight.contact[-50:].min() > 5.5

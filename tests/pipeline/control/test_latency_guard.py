@@ -1,0 +1,91 @@
+"""Arming refused when the loop bears too little, with what would do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hardware.dynamics import dynamics_of
+from hardware.robot_file import load_robot
+from pipeline.config import MarginsConfig, TeleopConfig
+from pipeline.control.latency_guard import LatencyGuard
+from pipeline.control.margins import Loop, Sensing, axis_margins
+
+
+def guard(robot: str = "ames", config: TeleopConfig | None = None) -> LatencyGuard:
+    robot_file = load_robot(robot)
+    axes = robot_file.robot.axes | robot_file.robot.wrench_axes
+    dynamics = dynamics_of(robot_file.robot, robot_file.plant)
+    return LatencyGuard(dynamics, axes, robot_file.gains, config or TeleopConfig())
+
+
+@pytest.fixture(scope="module")
+def ames() -> LatencyGuard:
+    return guard()
+
+
+@pytest.mark.parametrize("latency", [0.0, 0.06, 0.12, 0.2])
+def test_a_filter_makes_old_pictures_bearable(ames: LatencyGuard, latency: float) -> None:
+    for gains in ("phone", "paper_with_ekf", "paper_without_ekf"):
+        for estimator in ("relative", "paper"):
+            assert ames.refusal(gains, estimator, latency, 0.005) == ""
+
+
+def test_without_a_filter_they_are_not_and_the_filter_is_named(ames: LatencyGuard) -> None:
+    why = ames.refusal("phone", "none", 0.09, 0.005)
+    assert "90 ms old" in why
+    assert "estimator 'relative'" in why
+
+
+def test_late_body_samples_are_refused_and_the_gain_set_that_bears_them_is_named(
+    ames: LatencyGuard,
+) -> None:
+    why = ames.refusal("paper_with_ekf", "relative", 0.09, 0.020)
+    assert "20 ms late" in why
+    assert "Would do: gains 'phone'" in why
+    assert ames.refusal("phone", "relative", 0.09, 0.020) == ""
+
+
+def test_when_nothing_would_do_it_says_so(ames: LatencyGuard) -> None:
+    assert "none of the gain sets" in ames.refusal("phone", "relative", 0.09, 0.2)
+    assert "none of the gain sets" in ames.refusal("phone", "relative", 0.9, 0.005)
+
+
+def test_slower_robots_bear_some_delay_without_a_filter() -> None:
+    ground = guard("ground")
+    assert ground.refusal("phone", "none", 0.02, 0.005) == ""
+    assert ground.refusal("phone", "none", 0.08, 0.005) != ""
+
+
+def test_what_is_allowed_leaves_the_stated_margin_and_no_more_is_allowed() -> None:
+    robot_file, config = load_robot("ground"), TeleopConfig()
+    allowed = guard("ground").bearable["phone", "none"].latency(0.005)
+    dynamics = dynamics_of(robot_file.robot, robot_file.plant)
+    ahead = config.feedforward if config.feedforward.enabled else None
+    loop = Loop(dynamics, robot_file.gains["phone"], config.margins, config.no_filter, ahead)
+
+    def is_sound(latency: float) -> bool:
+        found = [axis_margins(loop, axis, Sensing("none", latency)) for axis in (0, 1, 5)]
+        delay, phase = min(m.delay for m in found), min(m.phase for m in found)
+        return delay >= config.margins.min_delay_s and phase >= config.margins.min_phase_rad
+
+    assert is_sound(allowed)
+    assert not is_sound(allowed + 0.003)
+
+
+def test_what_nobody_measured_yet_is_refused(ames: LatencyGuard) -> None:
+    assert ames.refusal("phone", "relative", np.inf, 0.005) != ""
+    assert ames.refusal("phone", "relative", np.nan, 0.005) != ""
+    assert ames.refusal("phone", "relative", 0.09, np.nan) != ""
+
+
+def test_experiments_may_fly_what_fails() -> None:
+    config = replace(TeleopConfig(), margins=MarginsConfig(enforced=False))
+    assert guard(config=config).refusal("phone", "none", 0.09, 0.005) == ""
+
+
+def test_an_unknown_gain_set_is_an_error(ames: LatencyGuard) -> None:
+    with pytest.raises(KeyError):
+        ames.refusal("sport", "relative", 0.09, 0.005)

@@ -1,0 +1,109 @@
+"""When things reach the default estimator, and when it is asked."""
+
+import numpy as np
+import pytest
+
+from hardware.sim.world import Setup, World
+from hardware.sim.world_sensors import events, feed, give
+from pipeline.estimation.estimator import Fusion
+from pipeline.signals import Seen
+from tests.pipeline.flight import Flight, new, shifted
+from tests.pipeline.scoring import assert_same
+
+
+@pytest.fixture(scope="module")
+def world():
+    return World(Setup(seed=11, duration=4.0))
+
+
+@pytest.fixture(scope="module")
+def arriving(world):
+    return events(world)
+
+
+def test_what_arrives_late_twice_or_too_early_is_counted(world, arriving):
+    flight = Flight(world, arriving)
+    flight.to(2.0)
+    estimator, counted = flight.filter, flight.filter.pictures.copy()
+    newest = flight.told[-1][0]
+    assert flight.give(newest) is Fusion.DUPLICATE
+    assert flight.give(shifted(newest, dt=-0.61)) is Fusion.LATE
+    assert flight.give(shifted(newest, dt=0.2)) is Fusion.EARLY
+    assert estimator.pictures - counted == {
+        kind: 1 for kind in (Fusion.DUPLICATE, Fusion.LATE, Fusion.EARLY)
+    }
+    health = estimator.health
+    assert health.fused + health.dropped == estimator.pictures.total() == len(flight.told)
+    assert health.late == 1
+    for _, sample in arriving[:40]:
+        if not isinstance(sample, Seen):
+            flight.give(sample)
+    assert estimator.samples_late > 20
+    recent = [s for _, s in arriving if not isinstance(s, Seen) and 1.8 < s.t < 1.9]
+    for sample in recent:
+        flight.give(sample)
+    assert estimator.samples_duplicate == len(recent)
+    assert_same(estimator.state(flight.now), Flight(world, arriving).to(2.0), tolerance=1e-12)
+
+
+def test_the_same_inputs_give_the_same_bits(world, arriving):
+    a, b = (Flight(world, arriving).to(1.5) for _ in range(2))
+    assert np.array_equal(a.p_bc_in_c, b.p_bc_in_c)
+    assert np.array_equal(a.R_cb, b.R_cb)
+    assert (a.sigma_p, a.sigma_theta) == (b.sigma_p, b.sigma_theta)
+
+
+def test_asking_more_or_less_often_changes_nothing(world, arriving):
+    seldom = Flight(world, arriving)
+    seldom.to(1.5, ask=False)
+    assert_same(seldom.filter.state(1.5), Flight(world, arriving).to(1.5))
+
+
+def test_lost_repeated_and_delayed_messages():
+    """A tenth of each: 100 ms late, twice, never."""
+    world, estimator = (
+        World(Setup(seed=8, duration=4.0, lost=0.1, repeated=0.1, delayed=0.1)),
+        new(),
+    )
+    for now, state in feed(estimator, world):
+        if now > 2.0:
+            error = state.p_bc_in_c - world.p[world.index(now)]
+            assert np.sqrt(error @ error) < 0.03 + 5.0 * state.sigma_p
+    assert estimator.samples_duplicate > 50
+    assert estimator.pictures[Fusion.DUPLICATE] > 5
+    assert estimator.pictures[Fusion.STARTED] == 1
+
+
+def test_time_can_not_go_back_before_the_last_picture(world, arriving):
+    flight = Flight(world, arriving)
+    state = flight.to(2.0)
+    newest = flight.filter.last_fused()[0]
+    for t in (newest - 1e-6, -np.inf, np.nan):
+        with pytest.raises(ValueError, match="time can't go back"):
+            flight.filter.state(t)
+    assert flight.filter.state(newest).t == newest
+    assert_same(flight.filter.state(2.0), state)
+
+
+def test_a_start_is_never_in_the_future():
+    """Pictures 10 ms old and taken, as was learnt, 20 ms after their stamps."""
+    setup = Setup(seed=5, duration=5.0, time_offset=0.02, picture_delay=(0.022, 0.024))
+    world = World(setup)
+    flight = Flight(world, events(world))
+    flight.to(4.0)
+    assert flight.filter.health.time_offset == pytest.approx(0.02, abs=2e-3)
+    flight.to(4.5, lambda s: shifted(s, (0.5, 0.2), dt=0.03) if isinstance(s, Seen) else s)
+    assert flight.filter.pictures[Fusion.STARTED] > 1
+
+
+def test_whoever_sleeps_forgets(world, arriving):
+    flight = Flight(world, arriving)
+    flight.to(1.0)
+    sensors = [e for e in arriving if e[0] > 1.0]
+    assert flight.filter.state(3.4) is None
+    assert flight.filter.failures == 1
+    assert flight.filter.last_fused() is None
+    for arrival, sample in sensors:
+        if arrival <= 3.5:
+            give(flight.filter, sample, 3.5)
+    assert flight.error(flight.filter.state(3.5)) < 0.05

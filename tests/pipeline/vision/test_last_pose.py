@@ -1,0 +1,104 @@
+"""A pose is carried on by gyroscopes and velocity; its attitude outlives its place."""
+
+import numpy as np
+import pytest
+
+from pipeline.frames import exp, log
+from pipeline.signals import RelativePose
+from pipeline.vision.last_pose import FORGET_MISSES, MEMORY_MOST_RAD, LastPose
+
+DT = 1.0 / 30.0
+STILL = np.zeros(3)
+
+
+def pose_at(t, p, R=None):
+    R = np.eye(3) if R is None else R
+    return RelativePose(t, np.asarray(p, dtype=float), R, 1e-6 * np.eye(6), 0.1, 5)
+
+
+def kept(p=(2.5, 0.2, 0.1), R=None, omega_c=STILL, omega_b=STILL):
+    last = LastPose()
+    last.advance(0.0, omega_c, omega_b)
+    last.keep(pose_at(0.0, p, R), None)
+    return last
+
+
+def test_both_gyroscopes_carry_the_attitude():
+    rng = np.random.default_rng(70)
+    for _ in range(10):
+        omega_c, omega_b = rng.normal(0.0, 1.0, (2, 3))
+        R = exp(rng.normal(0.0, 1.0, 3))
+        last = kept(R=R, omega_c=omega_c, omega_b=omega_b)
+        for k in range(1, 4):
+            last.advance(k * DT, omega_c, omega_b)
+        truth = exp(-omega_c * 3 * DT) @ R @ exp(omega_b * 3 * DT)
+        np.testing.assert_allclose(last.predicted()[1], truth, atol=1e-12)
+        np.testing.assert_allclose(last.attitude()[0], truth, atol=1e-12)
+
+
+def test_a_point_that_stands_still_goes_round_as_the_camera_turns():
+    omega_c, p = np.array([0.1, -0.5, 1.0]), np.array([2.5, 0.2, 0.1])
+    last = kept(p, omega_c=omega_c)
+    last.advance(DT, omega_c, STILL)
+    there = exp(-omega_c * DT) @ p
+    np.testing.assert_allclose(last.predicted()[0], there, atol=1e-12)
+    last.keep(pose_at(DT, there, last.predicted()[1]), None)
+    np.testing.assert_allclose(last.u_in_c, 0.0, atol=1e-12)
+
+
+def test_without_gyroscopes_the_place_goes_on_as_it_went():
+    last = LastPose()
+    for k in range(3):
+        last.advance(k * DT, None, None)
+        if k == 2:
+            np.testing.assert_allclose(last.predicted()[0], [2.5, 0.02, 0.0], atol=1e-12)
+        last.keep(pose_at(k * DT, (2.5, 0.01 * k, 0.0)), None)
+
+
+def test_the_place_is_forgotten_soon_and_the_attitude_later():
+    last = kept()
+    for k in range(1, FORGET_MISSES + 1):
+        last.advance(k * DT, STILL, STILL)
+        assert last.predicted() is not None
+        last.miss()
+    last.advance(4 * DT, STILL, STILL)
+    assert last.predicted() is None
+    assert last.attitude() is not None
+
+
+@pytest.mark.parametrize(("omega", "least_s", "most_s"), [(STILL, 5.0, 20.0), (None, 0.1, 0.5)])
+def test_an_attitude_grows_unsure_and_is_forgotten(omega, least_s, most_s):
+    last, off = kept(), []
+    for k in range(1, 1000):
+        last.advance(k * DT, omega, omega)
+        if last.attitude() is None:
+            break
+        off.append(last.attitude()[1])
+    assert least_s < k * DT < most_s
+    assert (np.diff(off) > 0.0).all()
+    assert off[-1] < MEMORY_MOST_RAD
+
+
+@pytest.mark.parametrize("t", [-1.0, 0.0, 10.0])
+def test_another_time_is_another_life(t):
+    last = kept()
+    last.advance(t, STILL, STILL)
+    assert last.predicted() is None
+    assert last.attitude() is None
+
+
+def test_forgetting_is_complete():
+    last = kept()
+    last.forget()
+    last.advance(DT, STILL, STILL)
+    assert last.predicted() is None
+    assert last.attitude() is None
+
+
+def test_turns_between_pictures_are_told():
+    last = LastPose()
+    last.advance(0.0, np.array([1.0, 0.0, 0.0]), STILL)
+    assert last.turned is None
+    last.advance(DT, np.array([3.0, 0.0, 0.0]), STILL)
+    np.testing.assert_allclose(last.turned, [[2.0 * DT, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert log(exp(last.turned[0]))[0] == pytest.approx(2.0 * DT)
