@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 PRIOR_FREEDOMS, FADE = 20.0, 0.95
-LEAST_DOUBT, MOST_DOUBT, OUTLYING = 0.25, 25.0, 9.0
+LEAST_DOUBT, MOST_DOUBT, OUTLYING = 0.25, 25.0, 3.0
+COMMON = 2.0
 
 
 @dataclass(slots=True)
@@ -22,6 +23,15 @@ class Doubt:
     def factor(self) -> float:
         """Of covariances."""
         return min(max(self.chi2 / self.freedoms, LEAST_DOUBT), MOST_DOUBT)
+
+    @property
+    def common(self) -> float:
+        """What share of its own error each spot has once more, the same for all.
+
+        A codec that moves a picture's blocks by whole pixels moves neighbours together: that part
+        leaves no residual, but where there is the one, there is the other.
+        """
+        return COMMON * max(0.0, 1.0 - 1.0 / self.factor)
 
     def learn(self, chi2: float, freedoms: int) -> None:
         """From χ² by the covariances as they were measured."""

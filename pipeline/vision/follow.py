@@ -184,7 +184,7 @@ class Follower:
         pose, residuals = np.empty(12), np.empty((n, 2))
         information, shared = np.empty((6, 6)), np.empty((6, 6))
         pose[:3], pose[3:] = place[0], place[1].ravel()
-        limits = np.array([*self._limits, sigma_u, UNEVEN_PX_S2])
+        limits = np.array([*self._limits, sigma_u, UNEVEN_PX_S2, self.doubt.common])
         left, chi2 = identify(
             self.camera.lens, self._size, self._leds_in_b, table, covariances, row, limits,
             self._expected, led, spot, pose, information, residuals, shared,

@@ -163,8 +163,9 @@ def identify(
         table: (m, FIELDS) spots as they stand in the picture.
         covariances: (m, 2, 2) of each one's own error [px²].
         motion: (16,).
-        limits: (5,) reach of `name_by_shift` and largest residual [px], LEDs of which none is left
-            out, how well an LED's velocity is known [m/s], and accelerations that are not [px/s²].
+        limits: (6,) reach of `name_by_shift` and largest residual [px], LEDs of which none is left
+            out, how well an LED's velocity is known [m/s], accelerations that are not [px/s²], and
+            what share of their own error all LEDs have once more in common.
         expected: (n, 2) written: where LEDs were foreseen.
         led: (n,) written: those that the pose rests on.
         spot: (n,) written: their spots.
@@ -192,18 +193,20 @@ def identify(
         leds, flat, shifts, weights, f, limits[1], int(limits[2]), used[:m], pose, information,
         residuals,
     )  # fmt: skip
-    k, of_named, smear = 0, 0, np.zeros((2, 2))
+    k, of_named, smear, common = 0, 0, np.zeros((2, 2)), 0.0
     for i in range(n):
         if names[i] < 0:
             continue
         if k < left and used[k] == of_named:
             led[k], spot[k] = i, names[i]
             _add_smear(table[names[i]], 1.0 / left, smear)
+            own = covariances[names[i], 0, 0] + covariances[names[i], 1, 1]
+            common += 0.5 * own * limits[5] / left
             k += 1
         of_named += 1
-    uneven = (limits[4] * size[3] * size[3] / 24.0) ** 2
-    smear[0, 0] += uneven
-    smear[1, 1] += uneven
+    common += (limits[4] * size[3] * size[3] / 24.0) ** 2
+    smear[0, 0] += common
+    smear[1, 1] += common
     put_shared(
         leds, flat, shifts, weights, delays, f, used[:k], pose, information, smear, limits[3],
         shared,
