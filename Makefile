@@ -84,7 +84,8 @@ fast: dev
 bench: dev
 	$(BIN)/lightleash experiments loop
 	$(BIN)/lightleash experiments loop --live
-	for name in control control_law ekf estimators relative virtual_camera vision; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
+	$(BIN)/lightleash bench vision --jobs 2 --learn 5
+	for name in control control_law ekf estimators relative virtual_camera; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt
