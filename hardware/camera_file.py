@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -12,6 +13,7 @@ import numpy as np
 import yaml
 
 from pipeline.camera.lens import MODELS, Camera
+from pipeline.camera.mounting import SQUARE, Mounting
 from pipeline.frames import Array
 
 CAMERAS = Path(__file__).parent / "cameras"
@@ -20,6 +22,11 @@ SIZES_PX = (16, 8192)
 READOUTS_S = (-0.1, 0.1)
 """Negative: the picture stands on its head on the sensor, its last row is exposed first."""
 SCREEN_ANGLES_DEG = (0, 90, 180, 270)
+TIME_OFFSETS_S = (-0.5, 0.5)
+SKEW = 1e-3
+"""What rounding may take from a rotation."""
+MOST_TURNED_RAD = np.deg2rad(30.0)
+"""A camera further beside its motion sensors is a mistake about their axes."""
 
 
 class CameraFileError(ValueError):
@@ -129,6 +136,7 @@ class _Reader:
             distortion,
             self._readout_s(),
         )
+        camera = replace(camera, mounting=self._mounting())
         return str(table.get("camera_name", Path(self._file).stem)), camera
 
     def kalibr(self, name: str) -> tuple[str, Camera]:
@@ -157,6 +165,24 @@ class _Reader:
     def _readout_s(self) -> float:
         key = "rolling_shutter_readout_s"
         return self._number(self._table.get(key, 0.0), key, *READOUTS_S)
+
+    def _mounting(self) -> Mounting:
+        """How the camera sits beside the motion sensors; the key may be missing."""
+        table = self._table.get("camera_imu")
+        if table is None:
+            return SQUARE
+        if not isinstance(table, dict):
+            self._refuse("camera_imu", "a mapping with rotation and time_offset_s")
+        key = "camera_imu.rotation"
+        R_ci = self._numbers({key: table.get("rotation")}, key, 9).reshape(3, 3)
+        is_rotation = np.allclose(R_ci @ R_ci.T, np.eye(3), atol=SKEW) and np.linalg.det(R_ci) > 0.0
+        if not is_rotation or 1.0 + 2.0 * np.cos(MOST_TURNED_RAD) > np.trace(R_ci):
+            most = np.rad2deg(MOST_TURNED_RAD)
+            self._refuse(key, f"a rotation (row by row) by at most {most:.0f}°")
+        key = "camera_imu.time_offset_s"
+        offset_s = self._number(table.get("time_offset_s", 0.0), key, *TIME_OFFSETS_S)
+        U, _, Vt = np.linalg.svd(R_ci)
+        return Mounting(U @ Vt, offset_s)
 
     def _line_readout_s(self, name: str, height: int) -> float:
         """Of a camchain: our own key beside the cameras, else Kalibr's time between two rows."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.camera.mounting import SQUARE
 from pipeline.frames import R_cd
 from pipeline.signals import Operator, PhoneImu
 from pipeline.timing.clock_offset import ClockOffset
@@ -43,6 +44,8 @@ class Ingest:
         self._last_motion_t = -np.inf
         self._pings = 0
         self.clock = ClockOffset()
+        self.mounting = SQUARE
+        """Of the camera that films, once it is known: motion comes out in its axes."""
         self.visible = True
         self.unsynchronised = 0
         """Records dropped because the phone's clock wasn't known yet."""
@@ -102,7 +105,8 @@ class Ingest:
             return None
         self._last_motion_t = t
         R = R_cd(motion.screen_angle_deg)
-        return PhoneImu(t, R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration))
+        rate, force = R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration)
+        return self.mounting.felt(PhoneImu(t, rate, force))
 
     def _dated(self, record: Record, field: str, now: float) -> float | None:
         if not self.clock.ready:

@@ -20,6 +20,7 @@ from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
 from hardware.sim.truth import Truth
+from pipeline.camera.mounting import SQUARE, Mounting
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, Mode, Operator, PhoneImu
@@ -63,6 +64,10 @@ class Scene:
     bitrate_bps: int = 3_000_000
     readout_s: float = 0.0
     """Of the rolling shutter."""
+    mounting: Mounting = SQUARE
+    """How the camera sits beside the phone's motion sensors ..."""
+    knows_mounting: bool = True
+    """... and whether the camera's file says it."""
     hidden: tuple[tuple[float, float, tuple[int, ...]], ...] = ()
     """From when to when [s] which LEDs can't be seen."""
 
@@ -111,6 +116,8 @@ class Lockstep:
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
         camera = self._script.phone.camera
+        camera = camera if scene.knows_mounting else replace(camera, mounting=SQUARE)
+        self._ingest.mounting = camera.mounting
         self._sight = Sight(camera, robot_file.robot, config.gates)
         self._link = RobotLink(self.follower)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
@@ -240,7 +247,7 @@ def make_script(robot_file: RobotFile, scene: Scene) -> PhoneScript:
     options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
     camera = find_camera(DEVICE, scene.width, scene.height)
     phone = VirtualPhone(
-        replace(camera, readout_s=scene.readout_s),
+        replace(camera, readout_s=scene.readout_s, mounting=scene.mounting),
         make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
         robot_file.robot.leds_in_b,
         Look(),

@@ -98,6 +98,7 @@ class Offline:
     def _greet(self) -> None:
         """A phone has come: nothing is known of its clock and its pictures."""
         self._ingest, self._sight = Ingest(self._nonces.popleft), self._new_sight()
+        self._ingest.mounting = self._sight.camera.mounting
 
     def rows(self) -> Iterator[dict[str, str]]:
         """One row per picture.

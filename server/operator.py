@@ -11,6 +11,7 @@ import numpy as np
 
 from hardware.camera_file import CameraFileError, find_camera_file
 from pipeline.camera.lens import Camera
+from pipeline.camera.mounting import SQUARE
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Operator, PhoneImu
 from pipeline.vision.sighting import Sighting
@@ -138,6 +139,7 @@ class OperatorPhone:
             self.camera_problem = str(error)
             return
         self.camera_text = path.read_text(encoding="utf-8")
+        self.ingest.mounting = camera.mounting
         sight = Sight(camera, self._robot, GatesConfig(), self._clock)
         self.vision = VisionThread(
             sight, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
@@ -153,7 +155,7 @@ class OperatorPhone:
             self.meters["pose"].tick(now, sighting.t)
         took = {name: 1e3 * s for name, s in sighting.took_s.items()}
         self.latency_ms = {
-            "capture to arrival": 1e3 * (frame.t_received - frame.t),
+            "capture to arrival": 1e3 * (frame.t_received - sighting.t),
             "waiting": 1e3 * (now - frame.t_received) - sum(took.values()),
             **took,
         }
@@ -218,7 +220,8 @@ class OperatorPhone:
         return Calibration("needed" if self.camera_problem else "off")
 
     def close(self) -> None:
-        """Stop looking."""
+        """Stop looking; who calibrates wants motion as it comes."""
+        self.ingest.mounting = SQUARE
         if self.wizard is not None:
             self.wizard.stop()
             self.wizard = None

@@ -114,7 +114,7 @@ class PhoneScript:
         camera, angle = self.phone.camera, self.phone.options.screen_angle_deg
         codec = CODECS[self._encoder.codec]
         body = Picture(codec, key, camera.width, camera.height, angle, data)
-        return self._record(Kind.FRAME, t, body)
+        return self._record(Kind.FRAME, t - camera.mounting.time_offset_s, body)
 
     def touch(self, t: float) -> Record:
         """TOUCH at `t` [s]; call it every `TOUCH_S`."""

@@ -58,7 +58,8 @@ class Sight(FrameDecoder):
             luma = self.decoded(frame)
         if luma is None:
             return None
-        picture = Frame(frames[-1].t, luma, self.full_range)
+        t = frames[-1].t + self.camera.mounting.time_offset_s
+        picture = Frame(t, luma, self.full_range)
         decoded = self._clock()
         sighting = self.looking.look(picture, up_in_b, omega_bf_in_b)
         return replace(sighting, took_s={"decode": decoded - started, **sighting.took_s})

@@ -157,6 +157,7 @@ class VirtualPhone:
     ) -> None:
         """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says.
 
+        The camera's mounting is the truth, whatever a calibration knows of it.
         `hidden` gives the LEDs that something covers at a time [s].
         """
         self._hidden = hidden
@@ -165,7 +166,8 @@ class VirtualPhone:
         schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
         self._bias_omega = schedule.normal(0.0, 1.0, 3) * options.bias_omega
         self._bias_a = schedule.normal(0.0, 1.0, 3) * options.bias_a
-        self._R_cd = R_cd(options.screen_angle_deg)
+        # the sensors are taken to be the device, and the camera to sit beside its place
+        self._R_cd = camera.mounting.R_ci @ R_cd(options.screen_angle_deg)
         self.motions = Stream(
             EventKind.MOTION, options.motion_rate_hz, options.motion_delay_s, schedule
         )

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens_kernels import LENS, put_normalised, put_pixels, put_slopes
+from pipeline.camera.mounting import SQUARE, Mounting
 from pipeline.frames import Array
 
 MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
@@ -29,6 +30,8 @@ class Camera:
     readout_s: float = 0.0
     """Rolling shutter: how much later a row below the last would be exposed than the first one [s];
     negative if the last row is read first."""
+    mounting: Mounting = SQUARE
+    """Beside the phone's motion sensors."""
 
     lens: Array = field(init=False, repr=False)
     """The same numbers for `camera_kernels`."""

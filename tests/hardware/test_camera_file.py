@@ -12,6 +12,7 @@ from hardware.camera_file import (
     load_camera,
     slug,
 )
+from pipeline.frames import exp
 
 INFO = yaml.safe_load((CAMERAS / "virtual_phone.yaml").read_text())
 KALIBR = {
@@ -104,6 +105,19 @@ def test_a_number_that_yaml_takes_for_a_word_is_a_number(tmp_path):
     assert load_camera(written(tmp_path, text))[1].readout_s == 0.02
 
 
+def test_how_the_camera_sits_beside_its_motion_sensors_is_read(tmp_path):
+    R_ci = exp(np.array([0.02, -0.03, 0.01]))
+    table = {"rotation": np.round(R_ci, 6).ravel().tolist(), "time_offset_s": -0.012}
+    mounting = load_camera(written(tmp_path, changed(INFO, ["camera_imu"], table)))[1].mounting
+    assert mounting.R_ci == pytest.approx(R_ci, abs=1e-5)
+    assert mounting.R_ci @ mounting.R_ci.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert mounting.time_offset_s == -0.012
+    square = load_camera(written(tmp_path, INFO))[1].mounting
+    assert (square.R_ci == np.eye(3)).all()
+    assert square.time_offset_s == 0.0
+
+
+SQUARE = {"rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1]}
 K = ["camera_matrix", "data"]
 FAULTS = [
     (["distortion_model"], "banana", "distortion_model", "plumb_bob, rational_polynomial"),
@@ -130,6 +144,12 @@ FAULTS = [
     (["screen_angle_deg"], True, "screen_angle_deg", "0, 90, 180, 270"),
     (["rolling_shutter_readout_s"], 16.0, "rolling_shutter_readout_s", "from -0.1 to 0.1"),
     (["rolling_shutter_readout_s"], float("nan"), "rolling_shutter_readout_s", "from -0.1 to 0.1"),
+    (["camera_imu"], [1, 2], "camera_imu", "a mapping with rotation"),
+    (["camera_imu"], {"time_offset_s": 0.0}, "camera_imu.rotation", "9 finite numbers"),
+    (["camera_imu"], {"rotation": [1.0] * 9}, "camera_imu.rotation", "a rotation"),
+    (["camera_imu"], {"rotation": [0, -1, 0, 1, 0, 0, 0, 0, 1]}, "camera_imu.rotation", "30°"),
+    (["camera_imu"], {"rotation": [-1, 0, 0, 0, -1, 0, 0, 0, -1]}, "camera_imu.rotation", "30°"),
+    (["camera_imu"], {**SQUARE, "time_offset_s": 3.0}, "camera_imu.time_offset_s", "-0.5 to 0.5"),
 ]
 
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.frames import GRAVITY
+from pipeline.camera.mounting import Mounting
+from pipeline.frames import GRAVITY, exp
 from pipeline.signals import Operator, PhoneImu
 from server.ingest import EncodedFrame, Ingest
 from server.wire import Codec, Motion, Picture, Ping, Pong, Record, Touch, WireError
@@ -79,6 +80,19 @@ def test_looking_along_the_back_of_the_phone_is_forward() -> None:
     sample = synchronised().record(Record(1, at(1.0), spin), 1.0)
     assert isinstance(sample, PhoneImu)
     np.testing.assert_allclose(sample.omega_m_cf_in_c, [1.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_motion_comes_out_in_the_axes_of_a_camera_that_sits_askew() -> None:
+    ingest, R_ci = synchronised(), exp(np.array([0.05, -0.04, 0.03]))
+    ingest.mounting = Mounting(R_ci)
+    motion = replace(FLAT, rotation_rate=(0.1, -0.2, 0.3))
+    sample, plain = (
+        one.record(Record(1, at(1.0), motion), 1.0) for one in (ingest, synchronised())
+    )
+    assert isinstance(sample, PhoneImu)
+    assert isinstance(plain, PhoneImu)
+    np.testing.assert_allclose(sample.omega_m_cf_in_c, R_ci @ plain.omega_m_cf_in_c)
+    np.testing.assert_allclose(sample.a_m_cf_in_c, R_ci @ plain.a_m_cf_in_c)
 
 
 def test_the_operator_is_as_old_as_the_nonce_it_echoes() -> None:

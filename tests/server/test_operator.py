@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from hardware.camera_file import CAMERAS
 from pipeline.camera import verdict as camera_verdict
 from pipeline.estimation import gravity_test
+from pipeline.frames import exp
 from pipeline.signals import LedRays, RelativePose, Spots
 from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.sighting import Sighting
@@ -31,7 +34,7 @@ FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
 class Rig:
     """A phone in virtual time; its clock is ours."""
 
-    def __init__(self, device: str) -> None:
+    def __init__(self, device: str, cameras: Path = CAMERAS) -> None:
         self.t = 50.0
         self.to_control: list[object] = []
         self.taken: list[int] = []
@@ -39,7 +42,7 @@ class Rig:
         self.phone = OperatorPhone(
             hello,
             ROBOT,
-            [CAMERAS],
+            [cameras],
             self.to_control.append,
             lambda: self.t,
             self.taken.append,
@@ -156,6 +159,25 @@ def test_a_calibrated_phone_has_eyes_until_it_leaves():
         rig.say(replace(JPEG, width=640, height=200))
     assert rig.phone.vision is None
     rig.phone.close()
+
+
+def test_the_profile_of_a_camera_turns_the_motion_as_long_as_it_films(tmp_path):
+    R_ci = exp(np.array([0.03, 0.02, -0.04]))
+    table = yaml.safe_load((CAMERAS / "virtual_phone.yaml").read_text())
+    table["camera_imu"] = {"rotation": R_ci.ravel().tolist(), "time_offset_s": 0.0}
+    (tmp_path / "phone.yaml").write_text(yaml.safe_dump(table))
+    rig = Rig(DEVICE, tmp_path)
+    rig.settle()
+    plain = rig.to_control[-1]
+    rig.say(JPEG)
+    rig.t += 0.01
+    rig.say(FLAT)
+    turned = rig.to_control[-1]
+    assert isinstance(plain, PhoneImuInput)
+    assert isinstance(turned, PhoneImuInput)
+    np.testing.assert_allclose(turned.a, R_ci @ plain.a)
+    rig.phone.close()
+    assert (rig.phone.ingest.mounting.R_ci == np.eye(3)).all()
 
 
 SHOT = EncodedFrame(49.9, 50.0, 1, JPEG)

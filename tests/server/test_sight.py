@@ -8,6 +8,7 @@ import pytest
 import hardware
 from hardware.robot_file import load_robot
 from hardware.sim.codec import Encoder
+from pipeline.camera.mounting import Mounting
 from pipeline.expected import Expected
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import PhoneImu
@@ -68,6 +69,14 @@ def test_encoded_pictures_become_poses(codec):
     assert not eye.needs_key
     assert eye.undecodable == 0
     assert eye.luma.shape == (CAMERA.height, CAMERA.width)
+
+
+def test_pictures_are_dated_as_the_profile_of_the_camera_says():
+    rng = np.random.default_rng(80)
+    camera = replace(CAMERA, mounting=Mounting(np.eye(3), time_offset_s=-0.02))
+    eye = Sight(camera, ROBOT, GatesConfig())
+    frame, truth = next(iter(shots(rng, 1)))
+    assert look(eye, [frame], truth).t == pytest.approx(frame.t - 0.02)
 
 
 def test_of_several_pictures_all_are_decoded_and_the_newest_is_looked_at():

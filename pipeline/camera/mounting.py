@@ -1,0 +1,29 @@
+"""How a camera sits beside its motion sensors, and how far its clock is off theirs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.frames import Array
+from pipeline.signals import PhoneImu
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mounting:
+    """As calibrated; the default is what a phone is built like."""
+
+    R_ci: Array = field(default_factory=lambda: np.eye(3))
+    """(3, 3) turns the axes of the sensors, which are meant to be those of c, into c's."""
+    time_offset_s: float = 0.0
+    """A picture was taken at its stamp plus this, on the sensors' clock."""
+
+    def felt(self, sample: PhoneImu) -> PhoneImu:
+        """What the sensors said, in the camera's axes."""
+        R = self.R_ci
+        return PhoneImu(sample.t, R @ sample.omega_m_cf_in_c, R @ sample.a_m_cf_in_c)
+
+
+SQUARE = Mounting()
+"""Nothing is known better."""

@@ -1,0 +1,36 @@
+"""A phone whose motion sensors sit askew beside its camera, in virtual time."""
+
+import numpy as np
+import pytest
+
+from hardware.robot_file import load_robot
+from pipeline.camera.mounting import Mounting
+from pipeline.config import TeleopConfig
+from pipeline.frames import exp
+from server.lockstep import Lockstep, Scene
+
+pytestmark = pytest.mark.slow
+ASKEW = Mounting(exp(np.deg2rad([2.0, -3.0, 2.5])), time_offset_s=0.015)
+"""4.4°, and pictures stamped too early."""
+
+
+def flown(**more: object) -> tuple[float, int, str]:
+    """Error of the estimate (RMS, mm), ticks of tracking, why it ended."""
+    scene = Scene(hand="moving", seed=8, codec="jpeg", **more)  # type: ignore[arg-type]
+    trace = Lockstep(load_robot("ames"), TeleopConfig(), scene).run(8.0)
+    errors = np.array(trace.estimate_error_in_c)
+    return 1e3 * float(np.sqrt((errors**2).sum(axis=1).mean())), len(trace.t), trace.left
+
+
+def test_with_its_profile_it_flies_as_a_phone_whose_sensors_sit_square() -> None:
+    known_mm, ticks, left = flown(mounting=ASKEW)
+    square_mm, square_ticks, _ = flown()
+    assert left == ""
+    assert ticks == square_ticks
+    assert known_mm < 1.15 * square_mm
+
+
+def test_without_it_knows_less_of_where_the_robot_is() -> None:
+    known_mm, ticks, _ = flown(mounting=ASKEW)
+    unknown_mm, few, _ = flown(mounting=ASKEW, knows_mounting=False)
+    assert few < ticks or unknown_mm > 1.3 * known_mm
