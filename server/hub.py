@@ -179,6 +179,7 @@ class Hub:
             return self.recordings.start()
         name = self.recordings.start(phone.device, phone.camera_text)
         self.recordings.message("phone", encode_message(phone.hello), now())
+        phone.want_key()  # what follows can't be decoded without one
         return name
 
     def record(self, data: str | bytes, t: float) -> None:

@@ -101,6 +101,10 @@ class OperatorPhone:
             case None if isinstance(record.body, Picture):  # it can't be dated yet
                 self._on_taken(record.sequence)
 
+    def want_key(self) -> None:
+        """Ask for a picture that can be decoded alone."""
+        self._on_key_wanted()
+
     def know(self, status: ControlStatus) -> None:
         """What control says of the robot, for eyes and tests."""
         self._check.know(status)

@@ -10,7 +10,7 @@ from server.clock import now
 from server.control_link import ReadyInput, RequestInput
 from server.hub import EVENTS, LEASE_S
 from server.knobs import TuneInput
-from server.messages import Command, Hello, Tune
+from server.messages import Command, Hello, Tune, encode_message
 from server.wire import VERSION, Ping, decode
 from tests.server.house import control_status, house_in, is_request
 
@@ -29,6 +29,18 @@ class Paper:
 def house(tmp_path):
     with house_in(tmp_path) as made:
         yield made
+
+
+def test_a_recording_begins_with_a_picture_that_can_be_decoded(house):
+    async def scene():
+        page = Paper()
+        house.hub.greet(hello("first"), page)
+        house.hub.start_recording()
+        await asyncio.sleep(0)
+        house.hub.recordings.stop()
+        return page.data
+
+    assert encode_message(Command("key_frame")) in asyncio.run(scene())
 
 
 def hello(device: str) -> Hello:
