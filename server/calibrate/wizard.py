@@ -119,7 +119,9 @@ class Wizard(FrameThread):
         is_filming = phase == "filming"
         return Calibration(
             phase="filming" if is_filming else "solving",
-            hint=guide.hint if is_filming else "Enough filmed: computing, about half a minute.",
+            hint=guide.hint
+            if is_filming
+            else "Enough filmed. Put the phone down: computing takes half a minute.",
             progress=round(now.share, 3),
             tasks={
                 "Whole picture": round(now.covered, 3),

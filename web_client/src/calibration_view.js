@@ -27,10 +27,13 @@ export class CalibrationView {
     /** @type {Calibration | null} */
     this.shown = null;
     this.allowed = false;
+    this.doubted = false;
     this.map = find('calibration-map');
     find('board-url').textContent = `${origin}/board`;
     find('calibrate').addEventListener('click', () => onCalibrate('start'));
-    find('calibration-leave').addEventListener('click', () => onCalibrate('stop'));
+    find('calibration-leave').addEventListener('click', () => {
+      onCalibrate(this.shown?.phase === 'done' ? 'start' : 'stop');
+    });
     find('calibration-go').addEventListener('click', () => {
       onCalibrate(this.shown?.phase === 'refused' ? 'start' : 'stop');
     });
@@ -39,19 +42,21 @@ export class CalibrationView {
   /**
    * @param {Calibration | null} calibration
    * @param {boolean} allowed Whether the robot is disarmed.
+   * @param {boolean} doubted Whether it is not the camera that was calibrated.
    */
-  render(calibration, allowed) {
-    if (calibration === this.shown && allowed === this.allowed) return;
-    this.shown = calibration;
-    this.allowed = allowed;
+  render(calibration, allowed, doubted) {
+    if (calibration === this.shown && allowed === this.allowed && doubted === this.doubted) return;
+    Object.assign(this, { shown: calibration, allowed, doubted });
     const phase = calibration?.phase ?? 'off';
     const open = phase !== 'off' && phase !== 'needed';
     const over = phase === 'done' || phase === 'refused';
     this.find('operate').classList.toggle('calibrating', open);
-    this.find('calibrate').hidden = phase !== 'needed' || !allowed;
+    this.find('calibrate').hidden = open || !allowed || (phase === 'off' && !doubted);
     this.find('calibration').hidden = !open;
     this.map.toggleAttribute('hidden', phase !== 'filming');
-    this.find('calibration-leave').hidden = !open || phase === 'done';
+    const good = phase === 'done' && calibration?.verdict === 'good';
+    this.find('calibration-leave').hidden = !open || good;
+    this.find('calibration-leave').textContent = phase === 'done' ? 'Film again' : 'Cancel';
     this.find('calibration-go').hidden = !over;
     if (calibration !== null && open) this.open(calibration);
   }
@@ -61,6 +66,7 @@ export class CalibrationView {
     const { phase, hint, verdict } = calibration;
     const filming = phase === 'filming';
     this.find('calibration').dataset.verdict = verdict;
+    this.find('calibration').classList.toggle('busy', phase === 'solving');
     this.find('calibration-title').textContent = TITLES[phase];
     this.find('calibration-hint').textContent = phase === 'done' ? verdictWords(verdict) : hint;
     this.find('calibration-hint').classList.toggle('warning', calibration.blurred);

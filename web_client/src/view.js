@@ -117,7 +117,8 @@ export class View {
     this.wish.disabled = !enabled;
     this.find('stop').classList.toggle('asked', state.stopping);
     this.hold(state, mode);
-    this.calibration.render(state.calibration, mode === 'DISARMED' || mode === 'STOPPED');
+    const calm = mode === 'DISARMED' || mode === 'STOPPED';
+    this.calibration.render(state.calibration, calm, Boolean(state.status?.camera?.complaint));
   }
 
   /**
