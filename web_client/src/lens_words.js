@@ -39,6 +39,14 @@ const LACKS = {
 /** @type {Record<Exclude<CameraHealth['hint'], ''>, string>} */
 const ADJUST = { too_bright: 'Darker', too_dim: 'Brighter', blurred: 'Shorter', out_of_focus: 'Focus on robot' };
 
+/** What a person can do where the page can’t set it, or has no step left. */
+const BY_HAND = {
+  too_bright: 'The LEDs are too bright, and the page can’t expose shorter: dim them, or light the room so that the phone does.',
+  too_dim: 'The LEDs are dim, and the page can’t expose longer: come nearer, or brighten them.',
+  blurred: 'The picture smears when the phone moves, and the page can’t expose shorter: light the room, and move more slowly.',
+  out_of_focus: 'The LEDs are out of focus, and the page can’t set it: hold the robot in the middle until the phone has focused, 1 to 4 m away.',
+};
+
 /**
  * The one thing to say of the camera; null: nothing.
  * @param {{ camera: CameraHealth | null, mode: ShownMode, lacks: string[], steps: boolean, manual: boolean, leds: number }} seen
@@ -51,7 +59,7 @@ export function lensWords({ camera, mode, lacks, steps, manual, leds }) {
     /** @type {{ deed: Deed, label: string }[]} */
     const deeds = steps ? [{ deed: 'adjust', label: ADJUST[camera.hint] }] : [];
     if (manual && camera.hint === 'too_dim' && !steps) deeds.push({ deed: 'automatic', label: 'Automatic exposure' });
-    return { tone: 'hint', text: camera.advice, deeds };
+    return { tone: 'hint', text: steps ? camera.advice : BY_HAND[camera.hint], deeds };
   }
   if (waiting && manual && leds === 0) {
     const text = 'No LED found. Is the picture too dark? The page has set a short exposure.';

@@ -110,11 +110,11 @@ test('the focus is never changed without a tap: it changes the focal length', ()
   assert.deepEqual(camera.settings.deeds, []);
 });
 
-test('a camera that can’t be stepped gets advice without a button', () => {
+test('who holds a camera that can’t be stepped hears what else helps', () => {
   const { elements, camera, render } = rig();
   camera.settings.able = {};
   render({ camera: BRIGHT });
-  assert.equal(elements['lens-text'].textContent, BRIGHT.advice);
+  assert.match(elements['lens-text'].textContent, /can’t expose shorter: dim them/);
   assert.ok(elements['lens-0'].hidden);
 });
 
