@@ -84,8 +84,9 @@ fast: dev
 bench: dev
 	$(BIN)/lightleash experiments loop
 	$(BIN)/lightleash experiments loop --live
-	$(BIN)/lightleash bench vision --jobs 2 --learn 5
+	-$(BIN)/lightleash bench vision --jobs 2 --learn 5
 	for name in control control_law ekf estimators relative virtual_camera; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
+	-$(BIN)/python -m tests.bench.bench_browser
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from playwright.sync_api import BrowserContext, CDPSession, Page, sync_playwright
@@ -87,10 +88,16 @@ CANVAS = """
 
 
 @contextlib.contextmanager
-def browser(executable: str, **options: object) -> Iterator[BrowserContext]:
-    """A context with everything granted that the phone page asks for."""
+def browser(
+    executable: str, camera_file: Path | None = None, **options: object
+) -> Iterator[BrowserContext]:
+    """A context with everything granted that the phone page asks for.
+
+    The camera plays `camera_file` (y4m) round and round, or else a pattern of Chromium's own.
+    """
+    played = [f"--use-file-for-fake-video-capture={camera_file}"] if camera_file else []
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=executable, args=FLAGS)
+        chromium = playwright.chromium.launch(executable_path=executable, args=FLAGS + played)
         context = chromium.new_context(
             ignore_https_errors=True,
             permissions=["camera", "accelerometer", "gyroscope", "magnetometer"],
