@@ -25,8 +25,6 @@ SCREEN_ANGLES_DEG = (0, 90, 180, 270)
 TIME_OFFSETS_S = (-0.5, 0.5)
 SKEW = 1e-3
 """What rounding may take from a rotation."""
-MOST_TURNED_RAD = np.deg2rad(30.0)
-"""A camera further beside its motion sensors is a mistake about their axes."""
 
 
 class CameraFileError(ValueError):
@@ -176,9 +174,8 @@ class _Reader:
         key = "camera_imu.rotation"
         R_ci = self._numbers({key: table.get("rotation")}, key, 9).reshape(3, 3)
         is_rotation = np.allclose(R_ci @ R_ci.T, np.eye(3), atol=SKEW) and np.linalg.det(R_ci) > 0.0
-        if not is_rotation or 1.0 + 2.0 * np.cos(MOST_TURNED_RAD) > np.trace(R_ci):
-            most = np.rad2deg(MOST_TURNED_RAD)
-            self._refuse(key, f"a rotation (row by row) by at most {most:.0f}°")
+        if not is_rotation:
+            self._refuse(key, "a rotation, row by row")
         key = "camera_imu.time_offset_s"
         offset_s = self._number(table.get("time_offset_s", 0.0), key, *TIME_OFFSETS_S)
         U, _, Vt = np.linalg.svd(R_ci)

@@ -25,7 +25,8 @@ class CameraHealth(msgspec.Struct, frozen=True):
     readout_sigma_ms: float | None = None
     """Standard deviation of what was learnt; this and all below: null before a phone moved."""
     time_offset_ms: float | None = None
-    """A picture was taken at its stamp plus this, by LEDs and both gyroscopes."""
+    """Beyond what its calibration says, by LEDs and both gyroscopes: a picture was taken so much
+    after its stamp."""
     time_offset_sigma_ms: float | None = None
     larger_percent: float | None = None
     """Things look so much larger than calibrated."""

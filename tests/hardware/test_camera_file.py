@@ -147,8 +147,12 @@ FAULTS = [
     (["camera_imu"], [1, 2], "camera_imu", "a mapping with rotation"),
     (["camera_imu"], {"time_offset_s": 0.0}, "camera_imu.rotation", "9 finite numbers"),
     (["camera_imu"], {"rotation": [1.0] * 9}, "camera_imu.rotation", "a rotation"),
-    (["camera_imu"], {"rotation": [0, -1, 0, 1, 0, 0, 0, 0, 1]}, "camera_imu.rotation", "30°"),
-    (["camera_imu"], {"rotation": [-1, 0, 0, 0, -1, 0, 0, 0, -1]}, "camera_imu.rotation", "30°"),
+    (
+        ["camera_imu"],
+        {"rotation": [-1, 0, 0, 0, 1, 0, 0, 0, 1]},
+        "camera_imu.rotation",
+        "a rotation",
+    ),
     (["camera_imu"], {**SQUARE, "time_offset_s": 3.0}, "camera_imu.time_offset_s", "-0.5 to 0.5"),
 ]
 

@@ -146,7 +146,7 @@
  * @property {number} readout_ms Of the rolling shutter, as the model uses it.
  * @property {boolean} readout_learnt False: it is the one of the calibration.
  * @property {number | null} readout_sigma_ms Standard deviation of what was learnt; this and all below: null before a phone moved.
- * @property {number | null} time_offset_ms A picture was taken at its stamp plus this, by LEDs and both gyroscopes.
+ * @property {number | null} time_offset_ms Beyond what its calibration says, by LEDs and both gyroscopes: a picture was taken so much after its stamp.
  * @property {number | null} time_offset_sigma_ms
  * @property {number | null} larger_percent Things look so much larger than calibrated.
  * @property {number | null} larger_sigma_percent
