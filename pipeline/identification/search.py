@@ -38,6 +38,9 @@ quick search and at the second (pairs may magnify it); and how far gravity itsel
 TIGHT, LOOSE = 120_000, 60_000
 ALL, FEWER = 65_000, 30_000
 """Work of one picture, in looks at a hypothesis (0.1 µs)."""
+FEW_LEDS, LEAST_LEDS = 8, 6
+"""Of a robot with more than the former half are looked for, but no fewer than the latter: others
+may be hidden, and chance explains no six."""
 MANY = 14
 """Spots; among more, chance explains all LEDs but one as well if the attitude is unknown."""
 LEAST_SHARE = 1e-4
@@ -74,7 +77,10 @@ class Search:
         self._camera, self._config = camera, config
         self._leds = np.ascontiguousarray(leds_in_b, dtype=np.float64)
         self._radius_m = float(np.sqrt((leds_in_b**2).sum(axis=1).max()))
-        self._triples = _triples(self._leds)
+        self._has_many = len(self._leds) > FEW_LEDS
+        self._triples = (_spread_triples if self._has_many else _triples)(self._leds)
+        self._next = 0
+        """Which of the triples comes next, of many LEDs."""
         self._turn = 0
         """Which of the less likely candidates are tried."""
         self._at: dict[tuple[int, int], int] = {}
@@ -154,9 +160,12 @@ class Search:
             upright(level, reach_m, self.looked + budget, wanted, lights, self._work)
 
     def _any_way(self, lights: Lights, hints: Hints) -> None:
-        """All LEDs, and, unless they are found, all but one."""
+        """All LEDs, and, unless they are found, all but one; of many LEDs half."""
         m = len(self._leds)
         self._work.table[:] = 0
+        if self._has_many:
+            self._half(self._wanted(max(LEAST_LEDS, (m + 1) // 2), hints), lights)
+            return
         self._try(0, self._wanted(m, hints), lights, ALL)
         many = len(lights.tangents) > MANY
         if self._work.counters[FOUND] or many or m - 1 < self._config.min_leds:
@@ -164,6 +173,15 @@ class Search:
         wanted = self._wanted(m - 1, hints)
         for number in range(len(self._triples)):
             self._try(number, wanted, lights, FEWER // len(self._triples))
+
+    def _half(self, wanted: Wanted, lights: Lights) -> None:
+        """Triple after triple of LEDs, until one of those seen explains enough."""
+        end = self.looked + ALL
+        for _ in range(len(self._triples)):
+            self._try(self._next, wanted, lights, end - self.looked)
+            if self._work.counters[FOUND] or self._work.counters[BOUNDED]:
+                return
+            self._next = (self._next + 1) % len(self._triples)
 
     def _try(self, number: int, wanted: Wanted, lights: Lights, budget: int) -> None:
         """From where it was left in the last picture."""
@@ -180,13 +198,8 @@ class Search:
 
 def _triples(leds_in_b: Array) -> Integers:
     """Large triangles of LEDs, such that without any one LED there still is one."""
-
-    def area(triple: tuple[int, ...]) -> float:
-        a, b, c = leds_in_b[list(triple)]
-        normal = cross(b - a, c - a)
-        return float(normal @ normal)
-
-    order = sorted(combinations(range(len(leds_in_b)), 3), key=area, reverse=True)
+    each = combinations(range(len(leds_in_b)), 3)
+    order = sorted(each, key=lambda triple: _area2(leds_in_b, triple), reverse=True)
     chosen, missing = [], set(range(len(leds_in_b)))
     while missing:
         best = max(order, key=lambda triple: len(missing - set(triple)))
@@ -195,3 +208,23 @@ def _triples(leds_in_b: Array) -> Integers:
             break  # of three LEDs there is only one
         missing &= set(best)
     return np.array(chosen, dtype=np.int64)
+
+
+def _spread_triples(leds_in_b: Array) -> Integers:
+    """Of each LED and its nearer half the largest triangle: seen whole where others are hidden."""
+    half, chosen = (len(leds_in_b) + 1) // 2, set()
+    for led in leds_in_b:
+        near = np.argsort(((leds_in_b - led) ** 2).sum(axis=1), kind="stable")[:half]
+        itself, others = int(near[0]), combinations(near[1:].tolist(), 2)
+        triples = [(itself, int(a), int(b)) for a, b in others]
+        a, b, c = sorted(triples[int(np.argmax([_area2(leds_in_b, three) for three in triples]))])
+        chosen.add((a, b, c))
+    order = sorted(chosen, key=lambda three: (-_area2(leds_in_b, three), three))
+    return np.array(order, dtype=np.int64)
+
+
+def _area2(leds_in_b: Array, triple: tuple[int, ...]) -> float:
+    """Square of twice the area [m⁴]."""
+    a, b, c = leds_in_b[list(triple)]
+    normal = cross(b - a, c - a)
+    return float(normal @ normal)

@@ -19,7 +19,7 @@ TABLE = 4096
 """Of namings already tried."""
 FOUND, LOOKED, FITTED, BOUNDED = 0, 1, 2, 3
 """Counters: explanations, hypotheses, fits, whether work was left undone."""
-MOST_LEDS = 16
+MOST_LEDS = 32
 COUNT, SUM, TILT, CHANCE, PLACE, TURN, NAMES = 0, 1, 2, 3, 4, 7, 16
 """Columns of an explanation: count of LEDs, squared residuals [px²], angle between the verticals,
 the logarithm of how many as good ones chance would give, place, attitude by rows, spots by LED."""

@@ -119,3 +119,41 @@ def test_against_a_remembered_attitude_only_the_surest_is_told():
     assert starting().step(0.0, seen(truth, rng), hints, STILL) is not None
     four = seen(truth, rng, range(4), lamps=10)
     assert starting().step(0.0, four, hints, STILL) is None
+
+
+def ball_of(count, rng):
+    """(count, 3) LEDs about a robot, none near another."""
+    leds = []
+    while len(leds) < count:
+        way = rng.normal(size=3)
+        led = way * rng.uniform(0.25, 0.35) / np.linalg.norm(way)
+        if all(np.linalg.norm(led - other) > 0.07 for other in leds):
+            leds.append(led)
+    return np.array(leds)
+
+
+def test_of_thirty_two_leds_the_near_half_is_enough_without_gravity():
+    for seed in (0, 1):
+        rng = np.random.default_rng(seed)
+        leds_in_b, truth = ball_of(32, rng), truth_at(rng)
+        leds_in_c = truth.p + leds_in_b @ truth.R.T
+        near = np.flatnonzero(leds_in_c[:, 0] <= np.median(leds_in_c[:, 0]))
+        shown, eye, naming, k = CAMERA.pixels(leds_in_c), starting(leds_in_b), None, 0
+        while naming is None and k < 60:
+            pixels = np.vstack((shown[near], lamps_beside(shown, 3, rng)))
+            pixels += rng.normal(0.0, NOISE_PX, pixels.shape)
+            spots = spots_of(pixels, brightness=rng.uniform(1.0, 2.0, len(pixels)))
+            naming, k = eye.step(k * DT, spots, Hints(), None), k + 1
+        assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+        assert set(naming.match.led) == set(near)
+
+
+def test_all_of_thirty_two_leds_are_named():
+    rng = np.random.default_rng(2)
+    leds_in_b, truth = ball_of(32, rng), truth_at(rng)
+    pixels = CAMERA.pixels(truth.p + leds_in_b @ truth.R.T)
+    apart = np.linalg.norm(pixels[:, None] - pixels, axis=2) + np.eye(32) * 99.0
+    assert apart.min() > 1.0
+    naming = starting(leds_in_b).step(0.0, spots_of(pixels), hints_of(truth), None)
+    assert len(naming.match.led) == 32
+    assert not is_wrong(pose_of(naming.fit, 0.0), truth)
