@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import NoReturn
+
+from server.one_line import Parser
 
 PURPOSE = (
     "Where was the robot in each frame, and how sure is that? Runs the live pipeline on files."
@@ -31,15 +32,9 @@ files:
 """
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """One line is enough."""
-        self.exit(2, f"{self.prog}: {message} (--help tells more)\n")
-
-
 def parser() -> argparse.ArgumentParser:
     """Of the words behind `lightleash locate`."""
-    words = _Parser(
+    words = Parser(
         prog="lightleash locate",
         description=PURPOSE,
         epilog=FORMATS,

@@ -1,0 +1,14 @@
+"""A command line that says in one line what is wrong with it."""
+
+from __future__ import annotations
+
+import argparse
+from typing import NoReturn
+
+
+class Parser(argparse.ArgumentParser):
+    """Without the usage, which `--help` tells."""
+
+    def error(self, message: str) -> NoReturn:
+        """One line is enough."""
+        self.exit(2, f"{self.prog}: {message} (--help tells more)\n")
