@@ -1,9 +1,9 @@
 """A better LED layout within reach: simulated annealing from several starts.
 
 What counts is the smallest margin of a wrong naming of four LEDs with gravity or the attitude known
-and of all LEDs with nothing known; once that is `enough`, how well a pose can be known. A search
-over few views finds the gaps between them: after each stage the worst view of all is looked for,
-and asked from then on.
+and of all LEDs with nothing known; once that is `enough`, how well a pose can be known, which
+should not become worse in any case. A search over few views finds the gaps between them: after each
+stage the worst view of all is looked for, and asked from then on.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ LONG, SHORT = 0.3, 0.01
 STAGES = 4
 SURE_PX, TIE_PX = 1.0, 0.05
 """What a logarithm of the pose's uncertainty counts, once margins are enough, and before."""
+WORSE_PX = 15.0
+"""What it costs to be less sure of a pose than now, by the logarithm: no margin is worth it."""
 SWAP = np.sqrt(0.5)
 """RMS of two spots of four exchanged, of their distance: no margin can be larger."""
 HOT = 16
@@ -69,21 +71,25 @@ def apart_px(leds_in_b: Array, looks: Looks) -> float:
 class _Judge:
     """Scores layouts by views that it learns."""
 
-    def __init__(self, looks: Looks, enough_px: float) -> None:
+    def __init__(self, looks: Looks, enough_px: float, now: Array) -> None:
         self._looks, self._enough_px = looks, enough_px
         chosen = np.linspace(0, len(looks.angles) - 1, min(FEW, len(looks.angles))).astype(int)
+        self._some = replace(looks, angles=looks.angles[chosen])
         self._angles = list(looks.angles[chosen])
+        self._now = self._unsure(now)
         self._hot: dict[tuple[int, int], list[int]] = {}
 
     def score(self, leds_in_b: Array, at_least: float = -np.inf) -> float:
         """Larger is better; −inf when below `at_least`."""
-        unsure = self._unsure(leds_in_b)
-        bonus = -TIE_PX * unsure
+        parts = self._unsure(leds_in_b)
+        unsure = float(parts.mean())
+        worse = WORSE_PX * float(np.clip(parts - self._now, 0.0, None).max())
+        bonus = -TIE_PX * unsure - worse
         margin = min(self._enough_px, SWAP * apart_px(leds_in_b, self._looks))
         if margin + bonus >= at_least:
             margin = self._margin(leds_in_b, margin, at_least - bonus)
         if margin >= self._enough_px:
-            return self._enough_px - SURE_PX * unsure
+            return self._enough_px - SURE_PX * unsure - worse
         return margin + bonus if margin + bonus >= at_least else -np.inf
 
     def learn(self, leds_in_b: Array) -> float:
@@ -130,12 +136,10 @@ class _Judge:
                 del lately[HOT:]
         return above
 
-    def _unsure(self, leds_in_b: Array) -> float:
-        """Logarithm of the pose's uncertainty, over position across and along and rotation."""
-        some = replace(self._looks, angles=np.array(self._angles[:FEW]))
-        bound = sigmas(leds_in_b, some, 1.0)
-        parts = (bound.lateral, bound.depth, bound.rotation)
-        return float(np.mean([np.log(part.max()) for part in parts]))
+    def _unsure(self, leds_in_b: Array) -> Array:
+        """Logarithms (3,) of the pose's worst uncertainty: across, along, rotation."""
+        bound = sigmas(leds_in_b, self._some, 1.0)
+        return np.log([part.max() for part in (bound.lateral, bound.depth, bound.rotation)])
 
 
 def improve(
@@ -165,7 +169,7 @@ def improve(
         if progress is not None:
             progress(_counted(ticks, lambda: all(run.done() for run in runs)))
         found = [run.result() for run in runs]
-    judge = _Judge(looks, search.enough_px)
+    judge = _Judge(looks, search.enough_px, leds_in_b)
     for layout in (leds_in_b, *found):  # all by the same views, the worst of each among them
         judge.learn(layout)
     return max((leds_in_b, *found), key=judge.score)
@@ -190,7 +194,7 @@ def _anneal(
     ticks: list[None],
     start: int,
 ) -> Array:
-    rng, judge = np.random.default_rng([search.seed, start]), _Judge(looks, search.enough_px)
+    rng, judge = np.random.default_rng([search.seed, start]), _Judge(looks, search.enough_px, now)
     leds = now if start == 0 else np.array([reach.anywhere(rng) for reach in reaches])
     best = leds
     for turn in range(search.turns):

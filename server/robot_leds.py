@@ -20,7 +20,8 @@ from hardware.led_reach import Ball, Reach
 from hardware.robot_file import RobotFileError
 from pipeline.frames import Array
 from server.locate.progress import Progress as Progressing
-from server.robot_leds_files import changes, figures, toml, write
+from server.one_line import Parser
+from server.robot_leds_files import OutError, changes, figures, make_folder, toml, write
 from server.robot_leds_report import Judged, judged, lines
 
 SEARCH_VIEWS = 100
@@ -28,14 +29,14 @@ SEARCH_VIEWS = 100
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash robot`; 1 when the layout (the better one, if asked for) is bad."""
-    parser = argparse.ArgumentParser(prog="lightleash robot", description="Examine a robot file.")
+    parser = Parser(prog="lightleash robot", description="Examine a robot file.")
     kinds = parser.add_subparsers(required=True, metavar="WHAT")
     leds = kinds.add_parser("leds", help=_LEDS, description=_LEDS)
     _add_arguments(leds)
     arguments = parser.parse_args(argv)
     try:
         return _run(arguments)
-    except (RobotFileError, LedLayoutError) as error:
+    except (RobotFileError, LedLayoutError, OutError) as error:
         print(f"lightleash robot leds: {error}", file=sys.stderr)
         return 2
 
@@ -72,7 +73,7 @@ def _distances(text: str) -> list[float]:
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("robot", metavar="ROBOT", help="a robot's name, or a .toml with [[leds]]")
-    add("--out", type=Path, metavar="DIR", help="write leds.png and leds.json there")
+    add("--out", type=Path, metavar="DIR", help="write leds.png, leds.json there")
     add("--json", action="store_true", help="print figures as JSON in place of the report")
     views = parser.add_argument_group("views")
     add = views.add_argument
@@ -100,6 +101,8 @@ _REACH = "how far each LED may move where the file has no reach_m, reach_box_m, 
 
 def _run(arguments: argparse.Namespace) -> int:
     layout = load_layout(arguments.robot)
+    if arguments.out is not None:
+        make_folder(arguments.out)
     looks, usual = _looks(arguments, layout)
     layouts = [_judge(layout.name, layout.leds_in_b, looks, usual, arguments)]
     if arguments.improve:

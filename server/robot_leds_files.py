@@ -17,6 +17,22 @@ from server.robot_leds_picture import draw
 from server.robot_leds_report import Judged
 
 
+class OutError(ValueError):
+    """A folder that can't be written to; says why."""
+
+
+def make_folder(folder: Path) -> None:
+    """Before long work, so that its results have a place.
+
+    Raises:
+        OutError: it can't be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutError(f"--out: {folder}: no folder can be made: {error.strerror}") from error
+
+
 @dataclass(frozen=True, slots=True)
 class Change:
     """A figure before and after."""
@@ -79,12 +95,18 @@ def figures(it: Judged) -> dict[str, object]:
 
 
 def write(layouts: list[Judged], folder: Path) -> None:
-    """Picture, figures and, when there is a better layout, [[leds]] to paste."""
-    folder.mkdir(parents=True, exist_ok=True)
-    draw(layouts, folder / "leds.png")
-    text = json.dumps([figures(it) for it in layouts], indent=1)
-    (folder / "leds.json").write_text(text + "\n", encoding="utf-8")
+    """Picture, figures and, when there is a better layout, [[leds]] to paste.
+
+    Raises:
+        OutError: the disk refuses.
+    """
+    files = {"leds.json": json.dumps([figures(it) for it in layouts], indent=1)}
     if len(layouts) > 1:
-        better = "\n".join(toml(layouts[-1].leds_in_b))
-        (folder / "leds_improved.toml").write_text(better + "\n", encoding="utf-8")
-    print(f"wrote {folder / 'leds.png'} and {folder / 'leds.json'}", file=sys.stderr)
+        files["leds_improved.toml"] = "\n".join(toml(layouts[-1].leds_in_b))
+    try:
+        draw(layouts, folder / "leds.png")
+        for name, text in files.items():
+            (folder / name).write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutError(f"--out: {folder}: {error.strerror}") from error
+    print(f"wrote {', '.join(('leds.png', *files))} in {folder}", file=sys.stderr)

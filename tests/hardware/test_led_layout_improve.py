@@ -6,9 +6,12 @@ import pytest
 from hardware.led_layout import margins
 from hardware.led_layout_file import load_layout
 from hardware.led_layout_improve import Search, apart_px, improve
-from hardware.led_looks import looks_about
+from hardware.led_layout_sigma import sigmas
+from hardware.led_looks import attitude, direction, looks_about, seen
 from hardware.led_reach import Ball, Box, Segment
 from hardware.robot_file import RobotFileError, load_robot
+from pipeline.camera.lens import Camera
+from pipeline.identification.pnp import refine
 
 LEDS = load_robot("quadrotor").robot.leds_in_b
 LOOKS = looks_about((0.0, 0.35), (0.6, 0.35), 5, np.array([2.5]), 914.0)
@@ -35,12 +38,27 @@ def smallest(leds):
     return min(wrong[:, 0, 1:].min(), wrong[:, 1, 0].min())
 
 
+def scatter(leds, angles):
+    """Standard deviation [m] of the depth of poses solved from noisy spots of 0.1 px."""
+    rng, R, f = np.random.default_rng(0), attitude(direction(angles)), LOOKS.focal_px
+    px, p = seen(leds, R, 2.5, f), np.array([2.5, 0.0, 0.0])
+    camera = Camera(1280, 720, np.diag([f, f, 1.0]), "plumb_bob", np.zeros(5))
+    weights = np.tile(100.0 * np.eye(2), (len(leds), 1, 1))
+    noisy = [(px + rng.normal(0.0, 0.1, px.shape)) / f for _ in range(300)]
+    return np.std([refine(camera, leds, px, weights, p, R).p_bc_in_c[0] for px in noisy])
+
+
 @pytest.mark.slow
 def test_a_search_finds_more_margin_within_reach():
     reaches = [Ball(led, 0.05) for led in LEDS]
     better = improve(LEDS, reaches, LOOKS, Search(turns=60, starts=2))
     assert smallest(better) > 1.2 * smallest(LEDS)
     assert np.linalg.norm(better - LEDS, axis=1).max() < 0.05 + 1e-9
+    before, after = sigmas(LEDS, LOOKS, 0.1), sigmas(better, LOOKS, 0.1)
+    for part in ("lateral", "depth", "rotation"):
+        assert getattr(after, part).max() < 1.1 * getattr(before, part).max()
+    for k in range(len(LOOKS.angles)):
+        assert scatter(better, LOOKS.angles[k]) == pytest.approx(after.depth[k, 0], rel=0.15)
 
 
 @pytest.mark.slow
