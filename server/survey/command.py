@@ -18,13 +18,14 @@ from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from server.locate.errors import LocateError
 from server.locate.tables import load_imu
+from server.one_line import Parser
 from server.survey import options
 from server.survey.bundle import Tape
 from server.survey.errors import SurveyError
 from server.survey.film import picture, read, times
 from server.survey.gyro import Gyro
 from server.survey.picture import draw
-from server.survey.place import fitted, levelled, matched
+from server.survey.place import fitted, levelled, matched, on_a_line
 from server.survey.report import Survey, figures, lines, toml
 from server.survey.sightings import Seen
 from server.survey.structure import COUNTS, Structure, measured, shape
@@ -48,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="lightleash survey",
         description="Where the LEDs are, from a film of the robot at rest.",
         epilog=HOW,
@@ -91,8 +92,6 @@ def _run(arguments: argparse.Namespace) -> int:
     film = read(arguments.film, camera, arguments.fps, arguments.every)
     gyro = None
     if arguments.imu is not None:
-        if not film:
-            raise SurveyError(f"{arguments.film}: no frames")
         gyro = Gyro(load_imu(arguments.imu), times(film))
     survey = _surveyed(arguments, camera, film, design, gyro)
     print(json.dumps(figures(survey), indent=1) if arguments.json else "\n".join(lines(survey)))
@@ -116,6 +115,10 @@ def _check(arguments: argparse.Namespace) -> None:
         raise SurveyError("--every: from 1; --fps: from 0.01 to 10000")
     if arguments.known and len({known.led for known in arguments.known}) < 3:
         raise SurveyError("--known: at least three different LEDs")
+    if arguments.known and on_a_line(np.array([known.place for known in arguments.known])):
+        raise SurveyError("--known: not all on one line: a turn about it would be open")
+    if arguments.out.suffix != ".toml" or arguments.out.is_dir():
+        raise SurveyError(f"--out: a file ending in .toml, not {arguments.out}")
     if not arguments.out.parent.is_dir():
         raise SurveyError(f"--out: there is no folder {arguments.out.parent}")
 
@@ -194,9 +197,12 @@ def _write(
     arguments: argparse.Namespace, camera: Camera, film: Sequence[Seen], survey: Survey
 ) -> None:
     out: Path = arguments.out
-    out.write_text("\n".join(toml(survey)) + "\n", encoding="utf-8")
-    text = json.dumps(figures(survey), indent=1) + "\n"
-    out.with_suffix(".json").write_text(text, encoding="utf-8")
     luma = picture(arguments.film, arguments.fps, film[survey.structure.frames[0]].name)
-    draw(survey, camera, luma, out.with_suffix(".png"))
+    text = json.dumps(figures(survey), indent=1) + "\n"
+    try:
+        out.write_text("\n".join(toml(survey)) + "\n", encoding="utf-8")
+        out.with_suffix(".json").write_text(text, encoding="utf-8")
+        draw(survey, camera, luma, out.with_suffix(".png"))
+    except OSError as error:
+        raise SurveyError(f"--out: {error.filename}: {error.strerror}") from error
     print(f"wrote {out}, {out.with_suffix('.json')}, {out.with_suffix('.png')}", file=sys.stderr)

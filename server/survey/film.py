@@ -46,6 +46,8 @@ def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Seen
         spots = find_spots(Frame(shot.t, shot.luma, shot.full_range), LedsConfig())
         film.append(Seen(shot.name, shot.t, _brightest(spots)))
     progress.close()
+    if not film:
+        raise SurveyError(f"{path}: none of its frames can be read")
     for note in frames.notes:
         print(f"{path}: {note}", file=sys.stderr)
     return film

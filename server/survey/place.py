@@ -12,6 +12,17 @@ from server.survey.errors import SurveyError
 TOLD = 1.5
 """A design whose second best naming fits hardly worse than this does not tell the LEDs apart."""
 
+UNLIKE = 0.3
+"""RMS difference from a design, of its size, beyond which the film shows something else."""
+WIDTH_M = 0.005
+"""Points that are nearer to one line are on it."""
+
+
+def on_a_line(places: Array) -> bool:
+    """Whether all places (n, 3) [m] are on one line."""
+    spread = np.linalg.svd(places - places.mean(axis=0), compute_uv=False)
+    return bool(spread[1] < WIDTH_M)
+
 
 def fitted(points: Array, onto: Array, scale: bool = False) -> tuple[Array, Array, Array, float]:
     """Points (n, 3) turned and moved (and scaled) onto others: places, R, t, scale."""
@@ -28,7 +39,7 @@ def matched(points: Array, design: Array) -> tuple[int, ...]:
     """For each LED of a design, which point it is, whatever the scale.
 
     Raises:
-        SurveyError: counts differ, or two namings fit about equally.
+        SurveyError: counts differ, none fits, or two namings fit about equally.
     """
     count = len(points)
     if len(design) != count:
@@ -41,6 +52,12 @@ def matched(points: Array, design: Array) -> tuple[int, ...]:
     total_a, total_b = float((a[0] ** 2).sum()), float((b**2).sum())
     left = total_b - s.sum(axis=1) ** 2 / total_a
     best, second = np.argsort(left)[:2]
+    if left[best] > UNLIKE**2 * total_b:
+        raise SurveyError(
+            "--design: the film's LEDs are laid out otherwise, off by"
+            f" {100.0 * np.sqrt(left[best] / total_b):.0f} % of its size at the least: another"
+            " robot, or mirrored pictures, as of a front camera?"
+        )
     if left[second] < TOLD**2 * max(float(left[best]), 1e-6 * total_b):
         raise SurveyError(
             "--design: its LEDs can be matched to those of the film in two ways that fit about"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -96,11 +97,34 @@ def _table(it: Survey) -> Iterator[str]:
 
 def _tape_lines(it: Survey) -> Iterator[str]:
     for tape in it.tapes:
-        found = float(np.linalg.norm(it.leds_in_b[tape.a] - it.leds_in_b[tape.b]))
+        found, _ = apart(it, tape.a, tape.b)
         yield (
             f"LEDs {tape.a + 1} and {tape.b + 1}: measured {1e3 * tape.metres:.2f}"
             f" ± {1e3 * tape.sigma_m:.2f} mm, found {1e3 * found:.2f} mm"
         )
+    a, b = _unmeasured(it)
+    found, sigma = apart(it, a, b)
+    yield (
+        f"LEDs {a + 1} and {b + 1}: found {1e3 * found:.2f} ± {1e3 * sigma:.2f} mm;"
+        " measure it too: if it differs, --distance named other LEDs"
+    )
+
+
+def apart(it: Survey, a: int, b: int) -> tuple[float, float]:
+    """Distance of two LEDs and its standard deviation [m]."""
+    arm = it.leds_in_b[a] - it.leds_in_b[b]
+    length = float(np.linalg.norm(arm))
+    row = np.zeros(it.leds_in_b.shape)
+    row[a], row[b] = arm / length, -arm / length
+    return length, float(np.sqrt(row.ravel() @ it.covariance @ row.ravel()))
+
+
+def _unmeasured(it: Survey) -> tuple[int, int]:
+    """The two LEDs farthest apart whose distance was not given."""
+    given = {frozenset((tape.a, tape.b)) for tape in it.tapes}
+    pairs = combinations(range(len(it.leds_in_b)), 2)
+    rest = [pair for pair in pairs if frozenset(pair) not in given]
+    return max(rest or [(0, 1)], key=lambda pair: apart(it, *pair)[0])
 
 
 def verdict(it: Survey) -> Iterator[str]:
@@ -120,7 +144,7 @@ def verdict(it: Survey) -> Iterator[str]:
     if worst > 1e3 * GOOD_SIGMA_M:
         yield "- Walk further about the robot, come nearer, or measure the distance better."
     for tape in it.tapes:
-        found = float(np.linalg.norm(it.leds_in_b[tape.a] - it.leds_in_b[tape.b]))
+        found, _ = apart(it, tape.a, tape.b)
         if abs(found - tape.metres) > 3.0 * tape.sigma_m:
             yield f"- The distance of LEDs {tape.a + 1} and {tape.b + 1} disagrees with the others."
     yield from _design_words(it)
@@ -136,9 +160,9 @@ def _design_words(it: Survey) -> Iterator[str]:
     off = it.leds_in_b - it.design
     yield f"- From the design: {1e3 * float(np.sqrt((off**2).sum(axis=1).mean())):.2f} mm RMS."
     for k, (away, sigma) in enumerate(zip(off, it.sigmas, strict=True)):
-        apart = float(np.linalg.norm(away))
-        if apart > max(APART_M, APART_SIGMAS * float(np.linalg.norm(sigma))):
-            yield f"- LED {k + 1} is {1e3 * apart:.1f} mm from where the design has it."
+        far = float(np.linalg.norm(away))
+        if far > max(APART_M, APART_SIGMAS * float(np.linalg.norm(sigma))):
+            yield f"- LED {k + 1} is {1e3 * far:.1f} mm from where the design has it."
 
 
 def toml(it: Survey) -> Iterator[str]:
