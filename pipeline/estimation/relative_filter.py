@@ -18,6 +18,7 @@ from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFF
 from pipeline.estimation.relative_start import Learnt, can_start, first_anchor, has_samples_near
 from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_felt
+from pipeline.estimation.sensor_doubt import SensorDoubt
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
@@ -29,6 +30,8 @@ MAX_SLEEP_S: Final = 2.0
 LOST: Final = 0.1
 """Doubt of the place, by its distance, or of the attitude [rad], beyond which a picture's own pose
 is the better start: what the LEDs say of an error so large isn't linear in it."""
+DATED_S: Final = 0.005
+"""While the pictures' time is known worse [s], a miss tells of it, not of the motion samples."""
 FRESH_S: Final = 2.0
 """A restart so soon after the last one: what was kept of the sensors is wrong as well."""
 NIS_PICTURES: Final = 30
@@ -61,6 +64,7 @@ class RelativeFilter:
         self._misses, self._t_seen, self._t_start = 0, -np.inf, -np.inf
         self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
         self._offset = OffsetWatch()
+        self._doubt = SensorDoubt()
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
@@ -121,9 +125,18 @@ class RelativeFilter:
             for k, enough in ((0, near), (3, LOST))
         )
 
+    def _doubted(self, seen: Seen, t: float) -> float:
+        """How far what is foretold must be stretched for this picture; learns of the sensors."""
+        dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
+        if seen.pose is None or not dated or not can_start(seen, self._config):
+            return 1.0
+        stretch = self._doubt.judge(*self._track.foretold(t), seen.pose)
+        self._track.doubt_phone(self._doubt.factor)
+        return stretch
+
     def _fuse(self, seen: Seen, t: float, now: float) -> Fusion:
         """Fuse, or begin again when too many pictures in a row didn't fit."""
-        anchor, chi2 = self._track.fuse(t, seen)
+        anchor, chi2 = self._track.fuse(t, seen, self._doubted(seen, t))
         self._recent.append(seen.t)
         used = int((anchor.use == 1).sum()) if anchor.use is not None else 0
         self.leds_rejected += len(seen.rays) - used

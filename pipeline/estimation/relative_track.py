@@ -11,14 +11,14 @@ both IMUs' samples reach; from there to now the newest samples are held, with gr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, sqrt
 from typing import Final
 
 import numpy as np
 
 from pipeline.estimation.hand_kernels import TAPS
 from pipeline.estimation.imu_history import ImuHistory
-from pipeline.estimation.ray_kernels import fuse_rays, is_sound
+from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound
 from pipeline.estimation.relative_kernels import (
     INPUTS,
     MOVING,
@@ -56,6 +56,8 @@ class Anchor:
     """The picture that was fused here."""
     use: Flags | None = None
     """(m,) which of its LEDs were."""
+    stretch: float = 1.0
+    """Factor of the variances of place, velocity and attitude that were foretold for it."""
 
     @staticmethod
     def empty() -> Anchor:
@@ -81,12 +83,18 @@ class RelativeTrack:
         self._frontier = Anchor.empty()
         self._spoilt_from = -inf
         """Anchors and frontier after this time must be made anew; inf: none."""
-        self._noise, self._walks = noise_of(config), walks_of(config)
-        self._hand = hand_of(config.hand)
+        self._config, self._walks = config, walks_of(config)
+        self.doubt_phone(1.0)
         self._gate = config.gate_chi2
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
         self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
         self._products = np.zeros((2, MOVING, N))
+
+    def doubt_phone(self, factor: float) -> None:
+        """From now on the variances of the phone's samples are so many times the configured."""
+        self._noise, self._hand = noise_of(self._config), hand_of(self._config.hand)
+        self._noise[1] *= sqrt(factor)
+        self._hand[-1] *= sqrt(factor)
 
     @property
     def newest(self) -> Anchor:
@@ -120,8 +128,21 @@ class RelativeTrack:
         self._advance(anchor, t)
         return anchor
 
-    def fuse(self, t: float, seen: Seen) -> tuple[Anchor, float]:
-        """Fuse the rays of `seen`, taken at `t` [s] later than the base.
+    def foretold(self, t: float) -> tuple[Array, Array, Array]:
+        """(p, R, P (6, 6)) of the pose in a picture stamped for `t` [s]: P knows that t is doubted.
+
+        The pose passes at ṗ = u − ω_c × p, Ṙ = R [ω_b − Rᵀ ω_c]×.
+        """
+        here = self.expected(t)
+        felt, p = self._inputs(here), here.x[0:3]
+        passing = np.eye(7, 6).T
+        passing[0:3, 6] = here.x[3:6] - np.cross(felt[6:9], p)
+        passing[3:6, 6] = felt[0:3] - here.R.T @ felt[6:9]
+        P: Array = passing @ here.P[np.ix_(TOUCHED, TOUCHED)] @ passing.T
+        return p, here.R, P
+
+    def fuse(self, t: float, seen: Seen, stretch: float = 1.0) -> tuple[Anchor, float]:
+        """Fuse the rays of `seen`, taken at `t` [s] later than the base; `stretch` as in `Anchor`.
 
         Gives its anchor and χ² (two degrees of freedom for each LED used); NaN: the filter can't
         be believed.
@@ -133,7 +154,7 @@ class RelativeTrack:
         anchor = Anchor.empty()
         anchor.seen, anchor.use = seen, np.full(len(seen.rays), -1, dtype=np.int8)
         self.anchors.insert(k, anchor)
-        anchor.t = t
+        anchor.t, anchor.stretch = t, stretch
         chi2 = self._remake(k)
         self._spoilt_from = t
         self._repair()
@@ -147,6 +168,8 @@ class RelativeTrack:
         self._advance(anchor, t)
         if seen is None or use is None:
             return 0.0
+        anchor.P[:MOVING] *= sqrt(anchor.stretch)
+        anchor.P[:, :MOVING] *= sqrt(anchor.stretch)
         rays = seen.rays
         felt = self._inputs(anchor)
         return float(

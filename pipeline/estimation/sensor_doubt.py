@@ -1,0 +1,74 @@
+"""How far the phone's motion samples can be trusted, learnt from the pictures that they foretell.
+
+A browser hands samples on late, rounds their times or skips some, and dates pictures by its own
+clock: what both say of a hand's tremor can differ by ten times the sensors' noise. A filter that
+believes the noise alone takes pictures for outliers, and loses the robot. So each picture's own
+pose is compared with the one foretold for it: misfit eᵀ S⁻¹ e / 6, with S = P + C.
+
+* Misfits above what is tolerated: the samples' variances grow until there are none, and fade again
+  (covariance matching; Mehra, IEEE Trans. Automatic Control 17 (1972) 693).
+* One picture far off, by no more than bad samples explain: what was foretold of it is doubted at
+  once, as far as it missed (strong tracking; Zhou & Frank, Int. J. Control 65 (1996) 295).
+
+Gyroscope and accelerometer are doubted alike: seen from the camera, a turn moves the robot aside as
+a step does, and late samples are late for both.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from pipeline.frames import Array, log
+from pipeline.signals import RelativePose
+
+GAIN: Final = 0.1
+"""Of the factor's logarithm, for each picture whose misfit is one above the tolerated."""
+TOLERATED: Final = 1.3
+"""1 is expected of a perfect model; six errors scatter, and covariances err."""
+SURPRISE: Final = 8.0
+"""A greater misfit counts as this."""
+FAR: Final = 3.75
+"""Misfit that a picture has once in a thousand: 99.9 % of χ² with six degrees, by six."""
+MOST: Final = 1e4
+"""Factor of a variance that bad samples explain. Beyond, it is no fault of theirs, and the gates of
+the LEDs decide."""
+
+
+class SensorDoubt:
+    """By what factor the variances of the phone's samples are greater than their data sheet's."""
+
+    def __init__(self) -> None:
+        """By none."""
+        self._log = 0.0
+
+    @property
+    def factor(self) -> float:
+        """From 1 to `MOST`."""
+        return math.exp(self._log)
+
+    def judge(self, p_bc_in_c: Array, R_cb: Array, P: Array, pose: RelativePose) -> float:
+        """Learn from a picture's own `pose` and the one foretold for it, P (6, 6) in (δp, θ).
+
+        Gives the factor, 1 as a rule, by which P must be stretched for this picture.
+        """
+        e = np.concatenate((pose.p_bc_in_c - p_bc_in_c, log(R_cb.T @ pose.R_cb)))
+        S = P + pose.covariance
+        misfit = _misfit(e, S)
+        share = float(np.trace(np.linalg.solve(S, P))) / 6.0
+        step = GAIN * share * (min(misfit, SURPRISE) - TOLERATED)
+        self._log = min(max(self._log + step, 0.0), math.log(MOST))
+        if misfit <= FAR:
+            return 1.0
+        stretch = 2.0
+        while stretch * self.factor <= MOST:
+            if _misfit(e, stretch * P + pose.covariance) <= 1.0:
+                return stretch
+            stretch *= 2.0
+        return 1.0
+
+
+def _misfit(e: Array, S: Array) -> float:
+    return float(e @ np.linalg.solve(S, e)) / len(e)
