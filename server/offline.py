@@ -1,17 +1,7 @@
 """A recorded phone through ingest, vision and control in virtual time: the same bytes each time.
 
 The robot does not follow: its recorded motion samples are used, and what is compared are the
-estimates. The CSV has one row per picture:
-
-| column | what |
-|---|---|
-| t_s | arrival of the picture, since the recording's first item |
-| capture_s | its capture time, likewise |
-| sequence | its number, as the phone counted |
-| found, leds, reprojection_px | was the robot found, on how many LEDs, RMS residual |
-| x_m, y_m, z_m, qw, qx, qy, qz, sigma_m | pose of the body in camera axes, measured in it |
-| fused_x_m … fused_qz, fused_sigma_m | the filter's estimate at the next control period |
-| mode | of the failsafe machine, with the recorded button and wishes |
+estimates, as rows of `offline_table`.
 """
 
 from __future__ import annotations
@@ -31,7 +21,6 @@ from hardware.camera_file import CAMERAS, CameraFileError, find_camera
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.camera.lens import Camera
 from pipeline.config import TeleopConfig
-from pipeline.frames import Array, wxyz_from_R
 from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose
 from pipeline.teleop import Output
 from server.control_link import (
@@ -44,6 +33,7 @@ from server.control_link import (
 from server.controller import Controller
 from server.ingest import EncodedFrame, Ingest
 from server.messages import Command, Hello, decode_message
+from server.offline_table import COLUMNS, row_of
 from server.recording import (
     CAMERA_KEY,
     PHONE_MESSAGES,
@@ -61,13 +51,6 @@ from server.wire import Picture, Ping, WireError, decode
 PERIOD_S = 0.005
 READY_EVERY, EXPECT_EVERY = 20, 4
 """Ticks between words of the server to control, and of control to the server."""
-POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "sigma_m")
-COLUMNS = (
-    *("t_s", "capture_s", "sequence", "found", "leds", "reprojection_px"),
-    *POSE,
-    *(f"fused_{name}" for name in POSE),
-    "mode",
-)
 Tap = Callable[[float, Sequence[Input], Sequence[BodyImu]], None]
 """Takes the time [s], what the server said, the robot's motion samples."""
 
@@ -99,6 +82,7 @@ class Offline:
         """A phone has come: nothing is known of its clock and its pictures."""
         self._ingest, self._sight = Ingest(self._nonces.popleft), self._new_sight()
         self._ingest.mounting = self._sight.camera.mounting
+        self._undated: list[EncodedFrame] = []
 
     def rows(self) -> Iterator[dict[str, str]]:
         """One row per picture.
@@ -121,7 +105,7 @@ class Offline:
             if k % EXPECT_EVERY == 0:
                 self._sight.expect(self._controller.expected(output))
             for frame, pose in self._seen:
-                yield _row(frame, pose, output, recording.t_first)
+                yield row_of(frame, pose, output, recording.t_first)
             self._seen.clear()
 
     def _tick(self, now: float) -> Output:
@@ -149,9 +133,18 @@ class Offline:
                 self._nonces.append(record.body.nonce)
                 self._ingest.ping(entry.t)
             elif entry.topic == PHONE_RECORDS:
-                self._take(self._ingest.record(record, entry.t))
+                signal = self._ingest.record(record, entry.t)
+                if signal is None and isinstance(record.body, Picture):
+                    self._keep_undated(EncodedFrame(entry.t, entry.t, record.sequence, record.body))
+                self._take(signal)
         except WireError:
             self.refused += 1
+
+    def _keep_undated(self, frame: EncodedFrame) -> None:
+        """From before the phone's clock is known: later pictures can't be decoded without it."""
+        if frame.picture.key:
+            self._undated.clear()
+        self._undated.append(frame)
 
     def _take(self, signal: PhoneImu | Operator | EncodedFrame | None) -> None:
         match signal:
@@ -162,7 +155,8 @@ class Offline:
                 self._inbox.append(OperatorInput.of(signal))
             case EncodedFrame():
                 controller = self._controller
-                sighting = self._sight.see([signal], controller.up_in_b, controller.omega_bf_in_b)
+                frames, self._undated = [*self._undated, signal], []
+                sighting = self._sight.see(frames, controller.up_in_b, controller.omega_bf_in_b)
                 self._seen.append((signal, sighting.pose if sighting is not None else None))
                 seen = sighting.seen(self._sight.camera) if sighting is not None else None
                 if seen is not None:
@@ -208,28 +202,6 @@ def _picture_size(recording: Recording) -> tuple[int, int]:
             if isinstance(body, Picture):
                 return body.width, body.height
     raise RecordingError(recording.path, "holds no picture", "name another recording")
-
-
-def _row(
-    frame: EncodedFrame, pose: RelativePose | None, output: Output, t_first: float
-) -> dict[str, str]:
-    row = dict.fromkeys(COLUMNS, "")
-    row["t_s"], row["capture_s"] = f"{frame.t_received - t_first:.6f}", f"{frame.t - t_first:.6f}"
-    row["sequence"], row["found"] = str(frame.sequence), str(int(pose is not None))
-    row["mode"] = output.failsafe.mode.name
-    if pose is not None:
-        row["leds"], row["reprojection_px"] = str(pose.leds), f"{pose.reprojection_px:.3f}"
-        sigma = float(np.sqrt(np.diag(pose.covariance)[:3].max()))
-        row |= _pose_cells("", pose.p_bc_in_c, pose.R_cb, sigma)
-    relative = output.relative
-    if relative is not None:
-        row |= _pose_cells("fused_", relative.p_bc_in_c, relative.R_cb, relative.sigma_p)
-    return row
-
-
-def _pose_cells(prefix: str, p: Array, R: Array, sigma: float) -> dict[str, str]:
-    values = (*p.tolist(), *wxyz_from_R(R), sigma)
-    return {f"{prefix}{name}": f"{v:.6f}" for name, v in zip(POSE, values, strict=True)}
 
 
 def run_offline(recording: Recording, out: Path) -> str:

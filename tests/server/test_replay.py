@@ -14,9 +14,10 @@ from pipeline.signals import Operator, PhoneImu
 from server import replay
 from server.ingest import EncodedFrame, Ingest
 from server.messages import encode_message
-from server.offline import COLUMNS, run_offline
-from server.recording import STATUS, Recorder, RecordingError
-from server.recording_files import device_of, read
+from server.offline import Offline, run_offline
+from server.offline_table import COLUMNS
+from server.recording import PHONE_RECORDS, STATUS, Recorder, RecordingError
+from server.recording_files import Recording, device_of, read
 from server.replay import Replay, play, timed
 from server.wire import Motion, Ping, Pong, Record, Touch, decode, encode
 from tests.server.page_server import WELCOME, PageServer, status
@@ -131,6 +132,24 @@ def test_offline_estimates_are_those_of_the_flight(flight, offline_rows):
     assert len(errors) > 30
     assert np.median(errors) < 0.003
     assert np.max(errors) < 0.02
+
+
+class Unanswered(Recording):
+    """The phone says nothing of its clock in the first half second."""
+
+    def entries(self, *topics):
+        for entry in super().entries(*topics):
+            is_record = entry.topic == PHONE_RECORDS and entry.t < self.t_first + 0.5
+            if not (is_record and isinstance(decode(entry.data).body, Pong)):
+                yield entry
+
+
+def test_offline_the_key_picture_may_come_before_the_phones_clock_is_known(flight, offline_rows):
+    rows = list(
+        Offline(Unanswered(flight.path, flight.metadata, flight.t_first, flight.t_last)).rows()
+    )
+    assert len(rows) < len(offline_rows[0])
+    assert {row["found"] for row in rows} == {"1"}
 
 
 def test_offline_without_a_known_camera_says_so(tmp_path):
