@@ -15,8 +15,14 @@ import numpy as np
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.imu_history import ImuHistory
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
-from pipeline.estimation.relative_start import Learnt, can_start, first_anchor, has_samples_near
-from pipeline.estimation.relative_track import RelativeTrack
+from pipeline.estimation.relative_start import (
+    Learnt,
+    can_start,
+    first_anchor,
+    has_samples_near,
+    is_better_start,
+)
+from pipeline.estimation.relative_track import Anchor, RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_felt
 from pipeline.estimation.sensor_doubt import SensorDoubt
 from pipeline.estimator_config import RelativeConfig
@@ -27,9 +33,6 @@ from pipeline.timing.offset_watch import OffsetWatch
 
 MAX_SLEEP_S: Final = 2.0
 """If nobody asked for so long, what was known is forgotten; no sample comes from so far ahead."""
-LOST: Final = 0.1
-"""Doubt of the place, by its distance, or of the attitude [rad], beyond which a picture's own pose
-is the better start: what the LEDs say of an error so large isn't linear in it."""
 DATED_S: Final = 0.005
 """While the pictures' time is known worse [s], a miss tells of it, not of the motion samples."""
 FRESH_S: Final = 2.0
@@ -109,34 +112,24 @@ class RelativeFilter:
         t = seen.t + float(self._track.newest.x[X_OFFSET])
         if t <= self._track.anchors[0].t:
             return Fusion.LATE
-        if self._is_lost(seen, min(t, now)) and self._start(seen, now):
+        foretold = self._track.foretold(min(t, now))
+        if is_better_start(seen, foretold.P, self._config) and self._start(seen, now):
             return Fusion.STARTED
-        return self._fuse(seen, min(t, now), now)
+        return self._fuse(seen, foretold, now)
 
-    def _is_lost(self, seen: Seen, t: float) -> bool:
-        """So little was known before this picture that it had better be a start."""
-        if seen.pose is None or not can_start(seen, self._config):
-            return False
-        P = self._track.expected(t).P
-        C = np.array(seen.pose.covariance, dtype=np.float64, order="C")
-        worse, near = 2.0 * self._config.start_doubt, LOST * float(seen.pose.p_bc_in_c[0])
-        return any(
-            largest_sigma(P, k) > max(enough, worse * largest_sigma(C, k))
-            for k, enough in ((0, near), (3, LOST))
-        )
-
-    def _doubted(self, seen: Seen, t: float) -> float:
+    def _doubted(self, seen: Seen, foretold: Anchor) -> float:
         """How far what is foretold must be stretched for this picture; learns of the sensors."""
         dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
             return 1.0
-        stretch = self._doubt.judge(*self._track.foretold(t), seen.pose)
+        P = self._track.in_picture(foretold)
+        stretch = self._doubt.judge(foretold.x[0:3], foretold.R, P, seen.pose)
         self._track.doubt_phone(self._doubt.factor)
         return stretch
 
-    def _fuse(self, seen: Seen, t: float, now: float) -> Fusion:
+    def _fuse(self, seen: Seen, anchor: Anchor, now: float) -> Fusion:
         """Fuse, or begin again when too many pictures in a row didn't fit."""
-        anchor, chi2 = self._track.fuse(t, seen, self._doubted(seen, t))
+        chi2 = self._track.fuse(anchor, seen, self._doubted(seen, anchor))
         self._recent.append(seen.t)
         used = int((anchor.use == 1).sum()) if anchor.use is not None else 0
         self.leds_rejected += len(seen.rays) - used

@@ -12,9 +12,13 @@ from pipeline.estimation.relative_track import Anchor, RelativeTrack
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 from pipeline.signals import Seen
+from pipeline.so3_kernels import largest_sigma
 
 START_GAP_S: Final = 0.1
 """A start needs samples of both IMUs so close to the picture."""
+LOST: Final = 0.1
+"""Doubt of the place, by its distance, or of the attitude [rad], beyond which a picture's own pose
+is the better start: what the LEDs say of an error so large isn't linear in it."""
 Learnt = tuple[Array, Array]
 """Biases and time offset (13,), and their covariance (13, 13)."""
 
@@ -25,6 +29,18 @@ def can_start(seen: Seen, config: RelativeConfig) -> bool:
     if pose is None or not pose.p_bc_in_c[0] > NEAREST_M:
         return False
     return pose.reprojection_px <= config.start_reprojection_px
+
+
+def is_better_start(seen: Seen, P: Array, config: RelativeConfig) -> bool:
+    """So little was known before the picture, P (22, 22), that it had better be a start."""
+    if seen.pose is None or not can_start(seen, config):
+        return False
+    C = np.array(seen.pose.covariance, dtype=np.float64, order="C")
+    worse, near = 2.0 * config.start_doubt, LOST * float(seen.pose.p_bc_in_c[0])
+    return any(
+        largest_sigma(P, k) > max(enough, worse * largest_sigma(C, k))
+        for k, enough in ((0, near), (3, LOST))
+    )
 
 
 def has_samples_near(track: RelativeTrack, t: float) -> bool:

@@ -29,8 +29,9 @@ from pipeline.estimation.relative_kernels import (
     inputs_at,
     transit,
 )
-from pipeline.estimator_config import HandConfig, RelativeConfig
-from pipeline.frames import Array
+from pipeline.estimation.relative_noise import hand_of, noise_of, walks_of
+from pipeline.estimator_config import RelativeConfig
+from pipeline.frames import Array, cross
 from pipeline.signals import Flags, Seen
 
 KEPT: Final = TAPS
@@ -84,6 +85,7 @@ class RelativeTrack:
         self._spoilt_from = -inf
         """Anchors and frontier after this time must be made anew; inf: none."""
         self._config, self._walks = config, walks_of(config)
+        self._phone_factor = 0.0
         self.doubt_phone(1.0)
         self._gate = config.gate_chi2
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
@@ -92,6 +94,9 @@ class RelativeTrack:
 
     def doubt_phone(self, factor: float) -> None:
         """From now on the variances of the phone's samples are so many times the configured."""
+        if factor == self._phone_factor:
+            return
+        self._phone_factor = factor
         self._noise, self._hand = noise_of(self._config), hand_of(self._config.hand)
         self._noise[1] *= sqrt(factor)
         self._hand[-1] *= sqrt(factor)
@@ -120,54 +125,52 @@ class RelativeTrack:
         self._spoilt_from = min(self._spoilt_from, before)
         return True
 
-    def expected(self, t: float) -> Anchor:
-        """The filter at time `t` [s] if no picture were to come; for now, a scratch copy."""
+    def foretold(self, t: float) -> Anchor:
+        """The filter at time `t` [s], later than the base, as if no picture had come then."""
         self._repair()
         anchor = Anchor.empty()
         anchor.copy(next(a for a in reversed(self.anchors) if a.t <= t))
         self._advance(anchor, t)
         return anchor
 
-    def foretold(self, t: float) -> tuple[Array, Array, Array]:
-        """(p, R, P (6, 6)) of the pose in a picture stamped for `t` [s]: P knows that t is doubted.
+    def in_picture(self, anchor: Anchor) -> Array:
+        """P (6, 6) of the pose in a picture stamped for the time of `anchor`: that is doubted too.
 
         The pose passes at ṗ = u − ω_c × p, Ṙ = R [ω_b − Rᵀ ω_c]×.
         """
-        here = self.expected(t)
-        felt, p = self._inputs(here), here.x[0:3]
-        passing = np.eye(7, 6).T
-        passing[0:3, 6] = here.x[3:6] - np.cross(felt[6:9], p)
-        passing[3:6, 6] = felt[0:3] - here.R.T @ felt[6:9]
-        P: Array = passing @ here.P[np.ix_(TOUCHED, TOUCHED)] @ passing.T
-        return p, here.R, P
+        felt, p = self._inputs(anchor), anchor.x[0:3]
+        passing = np.eye(6, 7)
+        passing[0:3, 6] = anchor.x[3:6] - cross(felt[6:9], p)
+        passing[3:6, 6] = felt[0:3] - anchor.R.T @ felt[6:9]
+        P: Array = passing @ anchor.P[TOUCHED[:, None], TOUCHED] @ passing.T
+        return P
 
-    def fuse(self, t: float, seen: Seen, stretch: float = 1.0) -> tuple[Anchor, float]:
-        """Fuse the rays of `seen`, taken at `t` [s] later than the base; `stretch` as in `Anchor`.
+    def fuse(self, anchor: Anchor, seen: Seen, stretch: float = 1.0) -> float:
+        """Fuse the rays of `seen` into what was `foretold` of its time; `stretch` as in `Anchor`.
 
-        Gives its anchor and χ² (two degrees of freedom for each LED used); NaN: the filter can't
-        be believed.
+        Gives χ² (two degrees of freedom for each LED used); NaN: the filter can't be believed.
         """
-        self._repair()
         k = len(self.anchors)
-        while self.anchors[k - 1].t > t:
+        while self.anchors[k - 1].t > anchor.t:
             k -= 1
-        anchor = Anchor.empty()
-        anchor.seen, anchor.use = seen, np.full(len(seen.rays), -1, dtype=np.int8)
         self.anchors.insert(k, anchor)
-        anchor.t, anchor.stretch = t, stretch
-        chi2 = self._remake(k)
-        self._spoilt_from = t
+        anchor.seen, anchor.use = seen, np.full(len(seen.rays), -1, dtype=np.int8)
+        anchor.stretch = stretch
+        chi2 = self._look(anchor, seen, anchor.use)
+        self._spoilt_from = anchor.t
         self._repair()
-        return anchor, chi2
+        return chi2
 
-    def _remake(self, k: int) -> float:
+    def _remake(self, k: int) -> None:
         """Anchor k from the one before it."""
         anchor = self.anchors[k]
-        t, seen, use = anchor.t, anchor.seen, anchor.use
+        t = anchor.t
         anchor.copy(self.anchors[k - 1])
         self._advance(anchor, t)
-        if seen is None or use is None:
-            return 0.0
+        if anchor.seen is not None and anchor.use is not None:
+            self._look(anchor, anchor.seen, anchor.use)
+
+    def _look(self, anchor: Anchor, seen: Seen, use: Flags) -> float:
         anchor.P[:MOVING] *= sqrt(anchor.stretch)
         anchor.P[:, :MOVING] *= sqrt(anchor.stretch)
         rays = seen.rays
@@ -179,7 +182,7 @@ class RelativeTrack:
                 anchor.P,
                 felt,
                 self._leds_in_b[rays.led],
-                rays.t + (anchor.x[X_OFFSET] - t),
+                rays.t + (anchor.x[X_OFFSET] - anchor.t),
                 np.array(rays.tangents, dtype=np.float64, order="C"),  # compiled for such alone
                 np.array(rays.covariances, dtype=np.float64, order="C"),
                 self._gate,
@@ -257,22 +260,3 @@ class RelativeTrack:
         )
         apply(anchor.P, self._F, self._G, self._Q, self._walks, t - anchor.t, self._products)
         anchor.t = t
-
-
-def noise_of(c: RelativeConfig) -> Array:
-    """(2, 3, 2), see `relative_kernels.transit`."""
-    body = ((c.sigma_omega_b, c.sigma_f_b), (0.0, c.rough_f_b), (c.drift_omega_b, c.drift_f_b))
-    phone = ((c.sigma_omega_c, c.sigma_f_c), (0.0, c.rough_f_c), (c.drift_omega_c, c.drift_f_c))
-    return np.array((body, phone))
-
-
-def hand_of(c: HandConfig) -> Array:
-    """(6,), see `hand_kernels.covariance`."""
-    return np.array((c.slow, c.length_s, c.tremor, c.tremor_hz, c.coherence_s, c.noise))
-
-
-def walks_of(c: RelativeConfig) -> Array:
-    """(13,) densities of the biases' and the offset's random walks [unit²/s]."""
-    walks = (c.walk_omega_b, c.walk_f_b, c.walk_omega_c, c.walk_f_c)
-    densities: Array = np.square(np.append(np.repeat(walks, 3), c.walk_offset))
-    return densities

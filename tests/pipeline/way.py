@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.estimation.relative_kernels import INPUTS, X_BIASES, N, X, apply, transit
-from pipeline.estimation.relative_track import hand_of, noise_of, walks_of
+from pipeline.estimation.relative_noise import hand_of, noise_of, walks_of
 from pipeline.estimator_config import HandConfig, RelativeConfig
 from pipeline.frames import GRAVITY, R_from_rpy
 

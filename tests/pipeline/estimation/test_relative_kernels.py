@@ -16,7 +16,7 @@ from pipeline.estimation.relative_kernels import (
     gather,
     inputs_at,
 )
-from pipeline.estimation.relative_track import hand_of
+from pipeline.estimation.relative_noise import hand_of
 from pipeline.estimation.sample_kernels import sample_at
 from pipeline.estimation.u_form import Felt, Motion
 from pipeline.estimator_config import RelativeConfig

@@ -48,7 +48,7 @@ def take(track, s):
     """As the filter does: nothing from before the base."""
     if not isinstance(s, Seen):
         return insert(track, s)
-    return track.fuse(s.t, s)[1] if s.t > track.anchors[0].t else None
+    return track.fuse(track.foretold(s.t), s) if s.t > track.anchors[0].t else None
 
 
 def run(samples, until=END_S + 0.02, ask=(), settle=None):
@@ -168,7 +168,7 @@ def test_without_pictures_the_base_and_the_frontier_keep_up(samples):
 
 def test_what_to_expect_of_a_picture_changes_nothing(samples):
     track, untouched = run(samples), run(samples)
-    expected = track.expected(END_S)
+    expected = track.foretold(END_S)
     track.to_now(END_S)
     assert np.abs(expected.x - track.now.x).max() < 1e-9
     assert np.abs(expected.P - track.now.P).max() < 1e-9
