@@ -8,6 +8,7 @@ import numpy as np
 
 from hardware.led_layout_p3p import kernel
 from pipeline.frames import Array
+from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import multiply, put_exp
 
 FREE, TILT, TURN = 0, 1, 2
@@ -99,27 +100,12 @@ def _put_normal(
 @kernel
 def _solve(H: Array, g: Array, damping: float, L: Array, step: Array) -> bool:
     """H step = g by Cholesky with a share of the diagonal added."""
+    L[:], step[:] = H, g
     for i in range(6):
-        for j in range(i + 1):
-            total = H[i, j] * (1.0 + damping) if i == j else H[i, j]
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            if i == j:
-                if not total > 1e-12 * H[i, i]:
-                    return False
-                L[i, i] = sqrt(total)
-            else:
-                L[i, j] = total / L[j, j]
-    for i in range(6):
-        total = g[i]
-        for k in range(i):
-            total -= L[i, k] * step[k]
-        step[i] = total / L[i, i]
-    for i in range(5, -1, -1):
-        total = step[i]
-        for k in range(i + 1, 6):
-            total -= L[k, i] * step[k]
-        step[i] = total / L[i, i]
+        L[i, i] *= 1.0 + damping
+    if not cholesky(L, 0.0):
+        return False
+    solve_by(L, step)
     return True
 
 

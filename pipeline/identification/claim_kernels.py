@@ -8,7 +8,8 @@ import numpy.typing as npt
 
 from pipeline.camera.lens_kernels import OUT_2, TABLE
 from pipeline.frames import Array
-from pipeline.identification.pnp_kernels import cholesky, put_residual, solve_by
+from pipeline.identification.pnp_kernels import put_residual
+from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel
 
 
@@ -62,7 +63,7 @@ def put_shared(
     """
     C[:] = 0.0
     L, r, J = information.copy(), np.empty(2), np.empty((2, 6))
-    if not cholesky(L):
+    if not cholesky(L, 0.0):
         return
     R, by_shift, by_speed = np.empty((3, 3)), np.zeros((6, 2)), np.zeros((6, 3))
     for i in range(9):
@@ -84,7 +85,7 @@ def put_shared(
 def put_covariance(information: Array, excess: float, shared: Array, C: Array) -> bool:
     """C (6, 6) = excess · information⁻¹ + shared; False if the information has no inverse."""
     L, column = information.copy(), np.empty(6)
-    if not cholesky(L):
+    if not cholesky(L, 0.0):
         return False
     for k in range(6):
         column[:] = 0.0

@@ -8,38 +8,13 @@ import numpy as np
 
 from pipeline.frames import Array
 from pipeline.identification.naming_kernels import NEAR_M, Integers, Lights, place
+from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel, multiply, put_exp
 
 ITERATIONS = 6
 CONVERGED = 1e-12
 LEAP2 = 4.0
 """A step longer than 2 (m, rad) leads nowhere."""
-
-
-@kernel
-def _solve6(A: Array, b: Array) -> bool:
-    """Overwrite b (6,) by A⁻¹ b for a symmetric positive A; False if it is not."""
-    for j in range(6):
-        d = A[j, j]
-        for k in range(j):
-            d -= A[j, k] * A[j, k]
-        if not d > 1e-12 * (1.0 + abs(A[j, j])):
-            return False
-        A[j, j] = sqrt(d)
-        for i in range(j + 1, 6):
-            s = A[i, j]
-            for k in range(j):
-                s -= A[i, k] * A[j, k]
-            A[i, j] = s / A[j, j]
-    for i in range(6):
-        for k in range(i):
-            b[i] -= A[i, k] * b[k]
-        b[i] /= A[i, i]
-    for i in range(5, -1, -1):
-        for k in range(i + 1, 6):
-            b[i] -= A[k, i] * b[k]
-        b[i] /= A[i, i]
-    return True
 
 
 @kernel
@@ -108,8 +83,9 @@ def fit(p: Array, R: Array, leds: Array, names: Integers, without: int, lights: 
             return -1.0
         for i in range(6):
             A[i, i] *= 1.0 + 1e-9
-        if not _solve6(A, b):
+        if not cholesky(A, 1.0):
             return -1.0
+        solve_by(A, b)
         step2 = 0.0
         for i in range(6):
             step2 += b[i] * b[i]

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE
 from pipeline.frames import Array
+from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel, multiply, put_exp
 
 ITERATIONS = 10
@@ -44,40 +45,6 @@ def put_residual(
             d_n = J[k, 0] * R[0, n] + J[k, 1] * R[1, n] + J[k, 2] * R[2, n]
             J[k, 3 + j] = d_n * led[m] - d_m * led[n]
     return True
-
-
-@kernel
-def cholesky(A: Array) -> bool:
-    """A (n, n) becomes its lower factor; False if it is not positive definite."""
-    n = len(A)
-    for i in range(n):
-        for j in range(i + 1):
-            s = A[i, j]
-            for k in range(j):
-                s -= A[i, k] * A[j, k]
-            if i == j:
-                if not s > 1e-12 * A[i, i]:
-                    return False
-                A[i, i] = sqrt(s)
-            else:
-                A[i, j] = s / A[j, j]
-    return True
-
-
-@kernel
-def solve_by(L: Array, b: Array) -> None:
-    """b becomes the solution of L Lᵀ x = b."""
-    n = len(b)
-    for i in range(n):
-        s = b[i]
-        for k in range(i):
-            s -= L[i, k] * b[k]
-        b[i] = s / L[i, i]
-    for i in range(n - 1, -1, -1):
-        s = b[i]
-        for k in range(i + 1, n):
-            s -= L[k, i] * b[k]
-        b[i] = s / L[i, i]
 
 
 @kernel
@@ -149,7 +116,7 @@ def refine(
         if not _gather(leds, flat, shifts, weights, f, p, R, information, step, residuals) >= 0.0:
             return np.nan
         L[:] = information
-        if not cholesky(L):
+        if not cholesky(L, 0.0):
             return np.nan
         solve_by(L, step)
         size = sqrt((step * step).sum())

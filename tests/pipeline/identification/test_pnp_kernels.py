@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipeline.frames import exp
-from pipeline.identification.pnp_kernels import cholesky, put_residual, refine, solve_by
+from pipeline.identification.pnp_kernels import put_residual, refine
 from tests.pipeline.seeing import LEDS_IN_B, truth_at
 
 F = 900.0
@@ -36,20 +36,6 @@ def test_what_is_not_in_front_has_no_residual():
     r, J = np.empty(2), np.empty((2, 6))
     args = np.zeros(3), np.zeros(2), np.zeros(3), F
     assert not put_residual(*args, np.array([-1.0, 0.0, 0.0]), np.eye(3), r, J)
-
-
-def test_cholesky_and_solve_are_those_of_numpy():
-    rng = np.random.default_rng(4)
-    for n in (2, 6):
-        A = rng.normal(0.0, 1.0, (n, n + 2))
-        A, b = A @ A.T, rng.normal(0.0, 1.0, n)
-        L, x = A.copy(), b.copy()
-        assert cholesky(L)
-        np.testing.assert_allclose(np.tril(L), np.linalg.cholesky(A), atol=1e-12)
-        solve_by(L, x)
-        np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=1e-9)
-    assert not cholesky(np.diag([1.0, 0.0]))
-    assert not cholesky(np.diag([1.0, np.nan]))
 
 
 def test_the_answer_minimises_chi2_and_its_information_is_the_curvature():
