@@ -5,12 +5,14 @@ from __future__ import annotations
 from math import acos, sqrt
 
 import numpy as np
+from numba import njit
 
-from hardware.led_layout_p3p import kernel
 from pipeline.frames import Array
 from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import multiply, put_exp
 
+kernel = njit(cache=True, nogil=True, error_model="numpy")
+"""Compiled at the first call, then cached; threads run it side by side."""
 FREE, TILT, TURN = 0, 1, 2
 """What is known of the attitude: nothing; the body's z to a limit; the whole of it to a limit."""
 ITERATIONS = 12

@@ -7,15 +7,15 @@ from math import pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from hardware.led_layout_fit import FREE, NEAREST_M, SCRATCH, TILT, TURN, beyond, refine
-from hardware.led_layout_p3p import kernel, put_poses
+from hardware.led_layout_fit import FREE, NEAREST_M, SCRATCH, TILT, TURN, beyond, kernel, refine
 from pipeline.frames import Array
+from pipeline.identification.p3p_kernels import p3p, put_triad
 from pipeline.so3_kernels import multiply, put_exp
 
 YAWS = 8
 """From how many yaws a fit starts when only the tilt is known."""
 Indices = npt.NDArray[np.int64]
-ALL_SCRATCH = 268
+ALL_SCRATCH = 226
 """Numbers: the first `SCRATCH` are the fit's."""
 OTHER_RAD = 0.09
 """Two poses that differ by more than 5° are two."""
@@ -100,7 +100,7 @@ def _pull(R: Array, R_true: Array, known: int, limit: float) -> bool:
 def _put_starts(
     leds: Array, px: Array, f: float, triple: Indices, work: Array, Rs: Array, ps: Array
 ) -> int:
-    """Poses that three of the spots allow; how many."""
+    """Poses that three of the spots allow, or nearly: where to start from; how many."""
     points = work[SCRATCH : SCRATCH + 9].reshape(3, 3)
     rays = work[SCRATCH + 9 : SCRATCH + 18].reshape(3, 3)
     for k in range(3):
@@ -108,7 +108,15 @@ def _put_starts(
         size = sqrt(f * f + px[t, 0] ** 2 + px[t, 1] ** 2)
         rays[k, 0], rays[k, 1], rays[k, 2] = f / size, -px[t, 0] / size, -px[t, 1] / size
         points[k] = leds[t]
-    return put_poses(points, rays, work[SCRATCH + 18 : SCRATCH + 57].reshape(13, 3), Rs, ps)
+    triad = work[SCRATCH + 18 : SCRATCH + 27].reshape(3, 3)
+    put_triad(points[0], points[1], points[2], triad)
+    count = 0
+    for k in range(p3p(rays, points, triad, np.inf, ps, Rs)):
+        if count > 0 and (ps[k] == ps[count - 1]).all():  # the real part of a pair, twice
+            continue
+        ps[count], Rs[count] = ps[k], Rs[k]
+        count += 1
+    return count
 
 
 @kernel
@@ -136,7 +144,7 @@ def _fit_named(
         best = min(best, refine(leds, px, f, R, p, R_true, known, limit, best, work))
     if known == FREE:
         return best
-    yaws, costs = YAWS if known == TILT else 1, work[260 : 260 + YAWS]
+    yaws, costs = YAWS if known == TILT else 1, work[218 : 218 + YAWS]
     for k in range(yaws):
         _turn_by(R_true, 2.0 * pi * k / yaws, Rs[0], R)
         costs[k] = _misfit(leds, px, f, R, p) if _put_place(leds, px, f, R, p) else np.inf

@@ -28,6 +28,8 @@ TRIPLE_PX = 8.0
 """How far LEDs may be from where three others put them: noise, magnified."""
 P3P_COST = 10
 """Of four poses, in looks."""
+SPLIT = 0.02
+"""How far noise may split a pair of poses that are one."""
 TRIPLE_RATIO = 12.0
 """So different may the areas of three LEDs' spots be, near or far."""
 
@@ -88,7 +90,7 @@ def _try_triple(
         corners.rays[k, 0], corners.rays[k, 1], corners.rays[k, 2] = 1.0 / size, y / size, z / size
     leds, reach, c = wanted.leds, TRIPLE_PX / wanted.f, corners
     names = np.empty(leds.shape[0], dtype=np.int64)
-    for root in range(p3p(c.rays, c.points, c.triad, c.ps, c.Rs)):
+    for root in range(p3p(c.rays, c.points, c.triad, SPLIT, c.ps, c.Rs)):
         p, R = c.ps[root], c.Rs[root]
         if not NEAREST_M < p[0] < FARTHEST_M:
             continue

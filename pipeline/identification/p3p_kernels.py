@@ -27,10 +27,11 @@ def _cubic_root(b: float, c: float, d: float) -> float:
 
 
 @kernel
-def quartic_roots(a: Array, roots: Array) -> int:
+def quartic_roots(a: Array, split: float, roots: Array) -> int:
     """Real roots of a₄x⁴ + a₃x³ + … + a₀ by Ferrari; how many.
 
-    Complex pairs that nearly are real count as one: what is measured is never exact.
+    What is measured is never exact: of a complex pair, the real part counts twice, unless the
+    pair's discriminant is below −`split` times its terms (0: of no pair, inf: of every pair).
     """
     if abs(a[4]) < 1e-14:
         return 0
@@ -48,7 +49,7 @@ def quartic_roots(a: Array, roots: Array) -> int:
             rest = 0.5 * p + sign * 0.5 * sqrt(max(p * p - 4.0 * r, 0.0))
         # y² − sign m y + rest
         under = m2 - 4.0 * rest
-        if under < -0.02 * (m2 + 4.0 * abs(rest)):
+        if under < -split * (m2 + 4.0 * abs(rest)):
             continue
         spread = sqrt(max(under, 0.0))
         roots[count] = 0.5 * (sign * m + spread) - 0.25 * b
@@ -102,7 +103,7 @@ def _quartic(rays: Array, points: Array, A: Array) -> tuple[float, float, float]
 
 
 @kernel
-def p3p(rays: Array, points: Array, triad: Array, ps: Array, Rs: Array) -> int:
+def p3p(rays: Array, points: Array, triad: Array, split: float, ps: Array, Rs: Array) -> int:
     """Poses (ps (4, 3), Rs (4, 3, 3)) of three points in b seen along unit rays in c; how many.
 
     Grunert's quartic (Haralick et al. 1994) in the ratio v of the third distance to the first; u is
@@ -112,6 +113,7 @@ def p3p(rays: Array, points: Array, triad: Array, ps: Array, Rs: Array) -> int:
         rays: (3, 3) unit vectors by rows.
         points: (3, 3) in b, by rows.
         triad: `put_triad` of the points.
+        split: How far noise may have split a pair of roots, as `quartic_roots` takes it.
         ps: Places, written.
         Rs: Attitudes, written.
     """
@@ -119,7 +121,7 @@ def p3p(rays: Array, points: Array, triad: Array, ps: Array, Rs: Array) -> int:
     k, b2, cb = _quartic(rays, points, A)
     ca, cg = _dot(rays[1], rays[2]), _dot(rays[0], rays[1])
     count = 0
-    for root in range(quartic_roots(A, roots)):
+    for root in range(quartic_roots(A, split, roots)):
         v = roots[root]
         below = 2.0 * (cg - v * ca)
         if not v > 0.0 or abs(below) < 1e-12:
@@ -137,6 +139,8 @@ def p3p(rays: Array, points: Array, triad: Array, ps: Array, Rs: Array) -> int:
             for j in range(3):
                 Rs[count, i, j] = _dot(seen[i], triad[j])
         for i in range(3):
-            ps[count, i] = corners[0, i] - _dot(Rs[count, i], points[0])
+            ps[count, i] = 0.0
+            for m in range(3):  # of a split pair, no place fits all three: the mean does best
+                ps[count, i] += (corners[m, i] - _dot(Rs[count, i], points[m])) / 3.0
         count += 1
     return count
