@@ -30,6 +30,7 @@ from server import realtime
 from server.control_link import Endpoint, control_end
 from server.controller import Controller, TooLate
 from server.knobs import DEFAULT_KNOBS, Knobs
+from server.one_line import Parser
 from server.robot_link import RobotLink
 
 PERIOD_S = 0.005
@@ -56,7 +57,7 @@ class ControlOptions:
 
 def parse(argv: Sequence[str] | None) -> ControlOptions:
     """Options from the command line."""
-    parser = argparse.ArgumentParser(prog="control", description=__doc__)
+    parser = Parser(prog="control", description=__doc__)
     parser.add_argument("--runtime", type=Path, required=True, help="directory of the sockets")
     parser.add_argument("--robot", default="ames", help="name or path of a robot file")
     parser.add_argument("--host", default="127.0.0.1", help="of the robot")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import multiprocessing
 import os
 import queue
@@ -11,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from server.one_line import Parser
 from server.settings import state_directory
 
 GOOD, POOR, BAD = "ok", "!!", "XX"
@@ -136,7 +136,7 @@ def cameras() -> Iterator[Finding]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash doctor`: 0 if nothing is broken."""
-    parser = argparse.ArgumentParser(prog="lightleash doctor", description=__doc__)
+    parser = Parser(prog="lightleash doctor", description=__doc__)
     parser.add_argument("--seconds", type=float, default=3.0, help="of the 200 Hz test")
     seconds = float(parser.parse_args(argv).seconds)
     checks: list[Callable[[], Iterator[Finding]]] = [

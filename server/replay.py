@@ -14,6 +14,7 @@ from time import monotonic as now
 from pipeline.timing.clock_offset import ClockOffset
 from server.messages import Command, Status
 from server.offline import run_offline
+from server.one_line import Parser
 from server.phone_client import (
     Access,
     PhoneClient,
@@ -176,7 +177,7 @@ def _speed(text: str) -> float:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="lightleash replay", description=__doc__)
+    parser = Parser(prog="lightleash replay", description=__doc__)
     parser.add_argument("recording", type=Path)
     parser.add_argument("--speed", type=_speed, default=1.0, help="times as fast as recorded")
     parser.add_argument("--offline", action="store_true", help="through the pipeline, no server")

@@ -23,6 +23,7 @@ from hardware.sim.render import Look
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.live_phone import EXPOSED_S, LivePhone
+from server.one_line import Parser
 from server.phone_client import PhoneClientError, access_of, add_access_arguments
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 
@@ -120,7 +121,7 @@ def _rate(text: str) -> float:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="lightleash phone", description=__doc__)
+    parser = Parser(prog="lightleash phone", description=__doc__)
     add_access_arguments(parser)
     parser.add_argument("--hand", default="demo", help=f"{', '.join(HANDS)}, or a CSV file")
     parser.add_argument("--rest", type=float, help="seconds before it moves")

@@ -6,7 +6,6 @@ may be is what the decoder says when it refuses one.
 
 from __future__ import annotations
 
-import argparse
 import ast
 import inspect
 import re
@@ -22,6 +21,7 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 import msgspec
 
 from server import calibration_messages, camera_messages, knobs, messages, wire
+from server.one_line import Parser
 from server.protocol_text import RECORDS, page
 from server.wire import Codec, Kind, Record, WireError
 
@@ -236,7 +236,7 @@ def outputs() -> dict[Path, str]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Write them; with `--check` only tell which are out of step."""
-    parser = argparse.ArgumentParser(prog="python -m server.wire_types", description=__doc__)
+    parser = Parser(prog="python -m server.wire_types", description=__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing, fail if out of step")
     check = bool(parser.parse_args(argv).check)
     stale = False

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
+
+from server.one_line import Parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash bench`."""
     words = list(sys.argv[1:] if argv is None else argv)
-    parser = argparse.ArgumentParser(prog="lightleash bench", description=__doc__)
+    parser = Parser(prog="lightleash bench", description=__doc__)
     kinds = parser.add_subparsers(required=True, metavar="BENCH")
     measures = "seeing: poses from rendered pictures, right or wrong, how exact, how fast"
     one = kinds.add_parser("vision", help=measures, description=measures)

@@ -22,6 +22,7 @@ from server.calibrate.solve import Solution, solve
 from server.calibrate.verdict import Verdict, judge, judge_views
 from server.locate.errors import LocateError
 from server.locate.tables import IMU_HEADER, load_imu
+from server.one_line import Parser
 from server.settings import state_directory
 
 BAR = 30
@@ -40,7 +41,7 @@ clock is off."""
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="lightleash calibrate",
         description=ABOUT,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -84,18 +85,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             write_board(board, arguments.write_board)
             print(f"{arguments.write_board}: a board of {arguments.board} squares")
         if arguments.film is None:
-            return 0 if arguments.write_board is not None else _usage(parser)
+            if arguments.write_board is None:
+                parser.error("wants FRAMES_OR_VIDEO or --write-board")
+            return 0
         if arguments.store and not arguments.name:
             parser.error("--store needs --name")
         return _calibrate(arguments, board)
     except (BoardError, FilmError, ImuError, LocateError, OSError) as error:
         print(f"lightleash calibrate: {error}", file=sys.stderr)
         return 2
-
-
-def _usage(parser: argparse.ArgumentParser) -> int:
-    parser.print_help(sys.stderr)
-    return 2
 
 
 def _calibrate(arguments: argparse.Namespace, board: Board) -> int:

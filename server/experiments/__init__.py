@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Final, Protocol, cast
 
+from server.one_line import Parser
+
 EXPERIMENTS: Final = {
     "loop": "tracking of the closed loop, in virtual time",
     "tremor": "what of the hand's tremor the virtual camera lets through",
@@ -33,7 +35,7 @@ class Experiment(Protocol):
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash experiments`."""
     words = list(sys.argv[1:] if argv is None else argv)
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="lightleash experiments", description="Measure, print a table, draw a picture."
     )
     kinds = parser.add_subparsers(required=True, metavar="EXPERIMENT")

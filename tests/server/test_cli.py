@@ -49,6 +49,35 @@ def test_each_command_gets_its_own_words(name, monkeypatch):
     assert heard == [["--seconds", "3"]]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["phone", "--fps", "500"],
+        ["replay"],
+        ["locate"],
+        ["experiments", "fly"],
+        ["experiments", "tremor", "--cutoff-hz", "9"],
+        ["bench"],
+        ["bench", "vision", "--frames", "many"],
+        ["calibrate"],
+        ["calibrate", "film.mp4", "--store"],
+        ["calibrate", "--model", "pinhole"],
+        ["robot"],
+        ["survey"],
+        ["doctor", "--seconds", "few"],
+    ],
+    ids=" ".join,
+)
+def test_a_wrong_command_line_is_told_in_a_line(words, capsys):
+    with pytest.raises(SystemExit) as ending:
+        cli.main(words)
+    assert ending.value.code == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"lightleash {words[0]}")
+    assert told.endswith("(--help tells more)\n")
+    assert told.count("\n") == 1
+
+
 def test_a_command_ended_by_hand_says_so_with_its_code(monkeypatch):
     def interrupted(words):
         raise KeyboardInterrupt
