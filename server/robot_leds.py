@@ -19,7 +19,7 @@ from hardware.led_looks import LedLayoutError, Looks, looks_about
 from hardware.led_reach import Ball, Reach
 from hardware.robot_file import RobotFileError
 from pipeline.frames import Array
-from server.locate.progress import Progress as Progressing
+from server.films.progress import Progress as Progressing
 from server.one_line import Parser
 from server.robot_leds_files import OutError, changes, figures, make_folder, toml, write
 from server.robot_leds_report import Judged, judged, lines

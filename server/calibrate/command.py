@@ -20,8 +20,8 @@ from server.calibrate.lens import COEFFICIENTS
 from server.calibrate.report import draw
 from server.calibrate.solve import Solution, solve
 from server.calibrate.verdict import Verdict, judge, judge_views
-from server.locate.errors import LocateError
-from server.locate.tables import IMU_HEADER, load_imu
+from server.films.errors import InputError
+from server.films.tables import IMU_HEADER, load_imu
 from server.one_line import Parser
 from server.settings import state_directory
 
@@ -91,7 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.store and not arguments.name:
             parser.error("--store needs --name")
         return _calibrate(arguments, board)
-    except (BoardError, FilmError, ImuError, LocateError, OSError) as error:
+    except (BoardError, FilmError, ImuError, InputError, OSError) as error:
         print(f"lightleash calibrate: {error}", file=sys.stderr)
         return 2
 

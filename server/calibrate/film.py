@@ -8,7 +8,7 @@ from pathlib import Path
 
 from server.calibrate.board import Board, Detector
 from server.calibrate.views import View, look
-from server.locate.frames import TIMES, open_frames
+from server.films.frames import TIMES, open_frames
 
 MOST_PICTURES = 1500
 """Of a longer film whole runs are left out."""
@@ -40,7 +40,7 @@ def watch(
 
     Raises:
         FilmError: pictures of different sizes, or none.
-        LocateError: what can't be read at all.
+        InputError: what can't be read at all.
     """
     source, detector = open_frames(path, fps), Detector(board)
     every = -(-source.count // MOST_PICTURES) if source.count else 1

@@ -18,16 +18,16 @@ from hardware.robot_file import RobotFileError
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.vision.looking import warm_up
+from server.films.errors import InputError
+from server.films.frames import Frames, open_frames
+from server.films.progress import Progress
+from server.films.tables import load_imu
 from server.locate import overlay, plot
-from server.locate.errors import LocateError
-from server.locate.frames import Frames, open_frames
 from server.locate.history import History
 from server.locate.optical import COLUMNS, row
 from server.locate.options import outputs_of, parser
 from server.locate.outputs import check_places, whole_file, whole_folder
-from server.locate.progress import Progress
 from server.locate.summary import camera_lines, summary
-from server.locate.tables import load_imu
 from server.locate.work import Located, Locator, Motion
 
 COMPILING_S = 4.0
@@ -123,7 +123,7 @@ def _check_clock(file: Path | None, table: Array | None, frames: Frames) -> None
         return
     (first, last), (begin, end) = frames.span, (float(table[0, 0]), float(table[-1, 0]))
     if end < first or begin > last:
-        raise LocateError(
+        raise InputError(
             file,
             "t_s",
             f"{begin:.3f} to {end:.3f} s, but the frames are from {first:.3f} to {last:.3f} s:"
@@ -167,7 +167,7 @@ def main(argv: Sequence[str]) -> int:
     cv2.setNumThreads(1)  # so that the CPU time of this thread is that of all the work
     try:
         _run(given)
-    except (LocateError, CameraFileError, RobotFileError) as error:
+    except (InputError, CameraFileError, RobotFileError) as error:
         print(f"lightleash locate: {error}", file=sys.stderr)
         return 2
     return 0

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from server.locate.errors import LocateError
+from server.films.errors import InputError
 
 
 @contextmanager
@@ -16,14 +16,14 @@ def whole_file(path: Path) -> Iterator[Path]:
     """A path to write to; what is there at the end is put in place of `path`.
 
     Raises:
-        LocateError: it can't be written.
+        InputError: it can't be written.
     """
     part = path.with_name(f"{path.name}.part")
     try:
         yield part
         part.replace(path)
     except OSError as error:
-        raise LocateError(path, "", f"can't be written: {error.strerror or error}") from error
+        raise InputError(path, "", f"can't be written: {error.strerror or error}") from error
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
@@ -34,7 +34,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """A folder to write to; its files are moved to `path` at the end, over those of that name.
 
     Raises:
-        LocateError: it can't be written.
+        InputError: it can't be written.
     """
     part: Path | None = None
     try:
@@ -45,7 +45,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
         for file in part.iterdir():
             file.replace(path / file.name)
     except OSError as error:
-        raise LocateError(path, "", f"can't be written: {error.strerror or error}") from error
+        raise InputError(path, "", f"can't be written: {error.strerror or error}") from error
     finally:
         if part is not None:
             shutil.rmtree(part, ignore_errors=True)
@@ -55,18 +55,18 @@ def check_places(outputs: Sequence[tuple[str, Path]], inputs: Sequence[Path], fr
     """See that outputs (option, path) can be written, and overwrite nothing that is read.
 
     Raises:
-        LocateError: names the option.
+        InputError: names the option.
     """
     taken = {path.resolve() for path in inputs}
     for option, path in outputs:
         place = path.resolve()
         if not place.parent.is_dir():
-            raise LocateError(option, "", f"there is no folder {path.parent}")
+            raise InputError(option, "", f"there is no folder {path.parent}")
         if place in taken:
-            raise LocateError(option, "", f"{path} is already read or written")
+            raise InputError(option, "", f"{path} is already read or written")
         if frames.is_dir() and (place == frames.resolve() or place.parent == frames.resolve()):
-            raise LocateError(option, "", f"{path} would lie among the frames: name another place")
+            raise InputError(option, "", f"{path} would lie among the frames: name another place")
         if (option == "--overlay") == place.is_file() and place.exists():
             wanted = "a folder" if option == "--overlay" else "a file"
-            raise LocateError(option, "", f"{path} must be {wanted}")
+            raise InputError(option, "", f"{path} must be {wanted}")
         taken.add(place)

@@ -15,8 +15,8 @@ from pipeline.vision.felt import Feeling, Felt
 from pipeline.vision.looking import Looking
 from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
-from server.locate.errors import LocateError
-from server.locate.frames import Frames, Shot
+from server.films.errors import InputError
+from server.films.frames import Frames, Shot
 
 AHEAD_S = 0.2
 """So much later than a frame, motion samples are known when it is looked at: as live ones are."""
@@ -84,7 +84,7 @@ class Locator:
         """One after the other.
 
         Raises:
-            LocateError: a frame of another size, or what `frames` raises.
+            InputError: a frame of another size, or what `frames` raises.
         """
         started = thread_time()
         for shot in frames:
@@ -116,7 +116,7 @@ class Locator:
     def _check_size(self, name: str, shape: tuple[int, ...]) -> None:
         camera = self.camera
         if shape != (camera.height, camera.width):
-            raise LocateError(
+            raise InputError(
                 name,
                 "",
                 f"is {shape[1]}x{shape[0]}, but the camera file is for"

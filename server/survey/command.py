@@ -16,8 +16,8 @@ from hardware.led_file import load_leds
 from hardware.robot_file import RobotFileError
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from server.locate.errors import LocateError
-from server.locate.tables import load_imu
+from server.films.errors import InputError
+from server.films.tables import load_imu
 from server.one_line import Parser
 from server.survey import options
 from server.survey.bundle import Tape
@@ -43,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     try:
         return _run(arguments)
-    except (SurveyError, LocateError, CameraFileError, RobotFileError) as error:
+    except (SurveyError, InputError, CameraFileError, RobotFileError) as error:
         print(f"lightleash survey: {error}", file=sys.stderr)
         return 2
 

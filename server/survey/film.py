@@ -12,8 +12,8 @@ from pipeline.camera.lens import Camera
 from pipeline.signals import Frame, Image, Spots
 from pipeline.spots.leds import find_spots
 from pipeline.vision_config import LedsConfig
-from server.locate.frames import open_frames
-from server.locate.progress import Progress
+from server.films.frames import open_frames
+from server.films.progress import Progress
 from server.survey.errors import SurveyError
 from server.survey.sightings import Seen
 
@@ -25,7 +25,7 @@ def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Seen
     """Spots of every so many frames.
 
     Raises:
-        LocateError: the film can't be read.
+        InputError: the film can't be read.
         SurveyError: its pictures are not the camera's, or it is too long.
     """
     frames = open_frames(path, fps)

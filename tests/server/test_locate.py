@@ -17,9 +17,9 @@ from pipeline.vision.felt import STALE_S, Felt
 from pipeline.vision_config import GatesConfig
 from server.bench.write import write_film
 from server.cli import main
+from server.films.tables import load_imu
 from server.ingest import EncodedFrame
 from server.locate.optical import COLUMNS, SIGMAS, optical
-from server.locate.tables import load_imu
 from server.locate.work import AHEAD_S
 from server.sight import Sight
 from server.wire import Codec, Picture

@@ -5,8 +5,8 @@ import cv2
 import numpy as np
 import pytest
 
-from server.locate.errors import LocateError
-from server.locate.frames import open_frames
+from server.films.errors import InputError
+from server.films.frames import open_frames
 
 SIZE = (48, 64)
 
@@ -58,7 +58,7 @@ TIMES = [
 
 @pytest.mark.parametrize(("times", "where", "allowed"), TIMES)
 def test_times_that_do_not_fit_the_frames_are_refused(tmp_path, times, where, allowed):
-    with pytest.raises(LocateError) as raised:
+    with pytest.raises(InputError) as raised:
         open_frames(folder(tmp_path, times=times))
     assert (raised.value.file, raised.value.where) == (str(tmp_path / "times.csv"), where)
     assert allowed in raised.value.allowed
@@ -93,9 +93,9 @@ def test_an_unreadable_frame_is_there_without_a_picture(tmp_path, data):
 
 def test_a_folder_without_frames_is_refused_and_so_is_nothing(tmp_path):
     (tmp_path / "._a.png").write_bytes(b"what another system leaves")
-    with pytest.raises(LocateError, match=r"holds no frames \(\.png, \.jpg, \.jpeg\)"):
+    with pytest.raises(InputError, match=r"holds no frames \(\.png, \.jpg, \.jpeg\)"):
         open_frames(tmp_path)
-    with pytest.raises(LocateError, match="no such folder or film"):
+    with pytest.raises(InputError, match="no such folder or film"):
         open_frames(tmp_path / "missing")
 
 
@@ -157,7 +157,7 @@ def test_a_films_grey_levels_and_their_range_are_known(tmp_path, codec, pix_fmt,
 def test_what_is_no_film_is_refused(tmp_path):
     path = tmp_path / "a.mp4"
     path.write_bytes(b"words" * 100)
-    with pytest.raises(LocateError, match="neither a folder nor a film"):
+    with pytest.raises(InputError, match="neither a folder nor a film"):
         open_frames(path)
 
 
@@ -197,5 +197,5 @@ def test_where_frames_are_reordered_lost_ones_are_counted_and_nothing_after_them
 
 
 def test_one_picture_is_no_film(tmp_path):
-    with pytest.raises(LocateError, match="name the folder of all"):
+    with pytest.raises(InputError, match="name the folder of all"):
         open_frames(folder(tmp_path) / "a.png")

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 
 from pipeline.signals import Image
-from server.locate.errors import LocateError
-from server.locate.tables import load_times
+from server.films.errors import InputError
+from server.films.tables import load_times
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 TIMES = "times.csv"
@@ -64,15 +64,15 @@ def open_frames(path: Path, fps: float | None = None) -> Frames:
         fps: Frames per second where nothing else dates them; of a film: in place of its own times.
 
     Raises:
-        LocateError: there is nothing to read, or its times can't be used.
+        InputError: there is nothing to read, or its times can't be used.
     """
     if path.is_dir():
         return Folder(path, fps)
     if not path.exists():
-        raise LocateError(path, "", "no such folder or film")
+        raise InputError(path, "", "no such folder or film")
     if path.suffix.lower() in SUFFIXES:
-        raise LocateError(path, "", "is one picture: name the folder of all")
-    from server.locate.film import Film
+        raise InputError(path, "", "is one picture: name the folder of all")
+    from server.films.film import Film
 
     return Film(path, fps)
 
@@ -84,7 +84,7 @@ class Folder:
         """Read which there are, and their times.
 
         Raises:
-            LocateError: no frames, or their times can't be used.
+            InputError: no frames, or their times can't be used.
         """
         self._path = path
         files = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES]
@@ -92,7 +92,7 @@ class Folder:
         self.notes: list[str] = []
         self._deepest = 0
         if not self._files:
-            raise LocateError(path, "", f"holds no frames ({', '.join(SUFFIXES)})")
+            raise InputError(path, "", f"holds no frames ({', '.join(SUFFIXES)})")
         self._times = self._dated(fps)
 
     @property
@@ -129,10 +129,10 @@ class Folder:
         known = set(names)
         for name, (line, _) in table.items():
             if name not in known:
-                raise LocateError(file, f"line {line}", f"there is no frame {name!r} in the folder")
+                raise InputError(file, f"line {line}", f"there is no frame {name!r} in the folder")
         undated = [name for name in names if name not in table]
         if undated:
-            raise LocateError(file, "", f"{len(undated)} frames have no time, first {undated[0]!r}")
+            raise InputError(file, "", f"{len(undated)} frames have no time, first {undated[0]!r}")
         self._check_order(file, list(table.items()), names)
         return [table[name][1] for name in names]
 
@@ -142,7 +142,7 @@ class Folder:
         """Frames are looked at in the order of their names: it must be that of time."""
         for (name, (line, _)), wanted in zip(rows, names, strict=True):
             if name != wanted:
-                raise LocateError(
+                raise InputError(
                     file,
                     f"line {line}",
                     f"{name!r} where {wanted!r} comes by name: the order of names must be that of"

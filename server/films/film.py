@@ -15,8 +15,8 @@ from av.video.reformatter import ColorRange
 from av.video.stream import VideoStream
 
 from pipeline.signals import Image
-from server.locate.errors import LocateError
-from server.locate.frames import Shot
+from server.films.errors import InputError
+from server.films.frames import Shot
 
 LUMA_FIRST = ("yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12", "gray")
 """Formats whose first plane is 8 bit luma."""
@@ -30,7 +30,7 @@ class Film:
         """See that it is one.
 
         Raises:
-            LocateError: it can't be read as a film.
+            InputError: it can't be read as a film.
         """
         self._path, self._fps = path, fps
         self.notes: list[str] = []
@@ -42,7 +42,7 @@ class Film:
                 start = 0.0 if base is None else float((stream.start_time or 0) * base)
                 length = None if base is None or ticks is None else float(ticks * base)
         except (av.error.FFmpegError, OSError) as error:
-            raise LocateError(path, "", f"neither a folder nor a film: {error.strerror}") from error
+            raise InputError(path, "", f"neither a folder nor a film: {error.strerror}") from error
         self.count: int | None = frames or None
         self.span: tuple[float, float] | None = None
         if fps is None and length is not None:
@@ -50,14 +50,14 @@ class Film:
 
     def _stream(self, container: InputContainer) -> VideoStream:
         if not container.streams.video:
-            raise LocateError(self._path, "", "holds no video")
+            raise InputError(self._path, "", "holds no video")
         return container.streams.video[0]
 
     def __iter__(self) -> Iterator[Shot]:
         """As decoded.
 
         Raises:
-            LocateError: it can't be decoded, or its times do not ascend.
+            InputError: it can't be decoded, or its times do not ascend.
         """
         number, last, damage, undated = 0, -np.inf, _Damage(), 0
         with av.open(str(self._path)) as container:
@@ -70,7 +70,7 @@ class Film:
                     continue
                 name, t = f"{number:06d}", self._time(item, number)
                 if t <= last:
-                    raise LocateError(
+                    raise InputError(
                         self._path,
                         f"frame {name}",
                         f"{t:.6f} s comes after {last:.6f} s: try --fps",
@@ -83,7 +83,7 @@ class Film:
         if undated:
             self.notes.append(f"{undated} packets can't be decoded: their frames have no row")
         if number == 0:
-            raise LocateError(self._path, "", "not one frame of it can be decoded")
+            raise InputError(self._path, "", "not one frame of it can be decoded")
 
     def _decoded(
         self, container: InputContainer, stream: VideoStream
@@ -105,7 +105,7 @@ class Film:
         if self._fps is not None:
             return number / self._fps
         if item.pts is None or item.time_base is None:
-            raise LocateError(self._path, f"frame {number:06d}", "has no time: give --fps")
+            raise InputError(self._path, f"frame {number:06d}", "has no time: give --fps")
         return float(item.pts * item.time_base)
 
 

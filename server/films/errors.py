@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 
-class LocateError(ValueError):
+class InputError(ValueError):
     """An input that can't be used, or a place that can't be written to.
 
     Attributes:

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from server.locate.errors import LocateError
-from server.locate.tables import load_imu, load_times
+from server.films.errors import InputError
+from server.films.tables import load_imu, load_times
 
 IMU = "t_s,gx,gy,gz,ax,ay,az"
 REST = "0,0,0,0.1,0.2,9.8"
@@ -57,7 +57,7 @@ FAULTS = [
 @pytest.mark.parametrize(("lines", "where", "allowed"), FAULTS)
 def test_each_fault_names_file_line_and_what_is_allowed(tmp_path, lines, where, allowed):
     path = written(tmp_path, *lines)
-    with pytest.raises(LocateError) as raised:
+    with pytest.raises(InputError) as raised:
         load_imu(path)
     assert (raised.value.file, raised.value.where) == (str(path), where)
     assert allowed in raised.value.allowed
@@ -74,15 +74,15 @@ TIME_FAULTS = [
 
 @pytest.mark.parametrize(("lines", "where", "allowed"), TIME_FAULTS)
 def test_each_fault_of_the_times_too(tmp_path, lines, where, allowed):
-    with pytest.raises(LocateError) as raised:
+    with pytest.raises(InputError) as raised:
         load_times(written(tmp_path, *lines))
     assert raised.value.where == where
     assert allowed in raised.value.allowed
 
 
 def test_unreadable_files_are_refused(tmp_path):
-    with pytest.raises(LocateError, match="No such file"):
+    with pytest.raises(InputError, match="No such file"):
         load_imu(tmp_path / "missing.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(LocateError, match="UTF-8"):
+    with pytest.raises(InputError, match="UTF-8"):
         load_imu(tmp_path / "binary.csv")

@@ -1,6 +1,6 @@
 import io
 
-from server.locate.progress import Progress
+from server.films.progress import Progress
 
 
 class Terminal(io.StringIO):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.frames import Array
-from server.locate.errors import LocateError
+from server.films.errors import InputError
 
 TIMES_HEADER = ("frame", "t_s")
 IMU_HEADER = ("t_s", "gx", "gy", "gz", "ax", "ay", "az")
@@ -26,7 +26,7 @@ def load_times(path: Path) -> dict[str, tuple[int, float]]:
     """Line and time [s] of each frame of a times.csv, in its order: times ascend.
 
     Raises:
-        LocateError: names file, line and what is allowed.
+        InputError: names file, line and what is allowed.
     """
     times: dict[str, tuple[int, float]] = {}
     last = -np.inf
@@ -34,7 +34,7 @@ def load_times(path: Path) -> dict[str, tuple[int, float]]:
         t = _number(path, line, "t_s", word)
         _check_time(path, line, t, last)
         if name in times:
-            raise LocateError(path, f"line {line}", f"{name} is there since line {times[name][0]}")
+            raise InputError(path, f"line {line}", f"{name} is there since line {times[name][0]}")
         times[name] = (line, t)
         last = t
     return times
@@ -44,7 +44,7 @@ def load_imu(path: Path) -> Array:
     """Samples (n, 7): t [s], angular rate [rad/s], specific force [m/s²]; times ascend.
 
     Raises:
-        LocateError: names file, line and what is allowed.
+        InputError: names file, line and what is allowed.
     """
     samples: list[list[float]] = []
     last = -np.inf
@@ -55,7 +55,7 @@ def load_imu(path: Path) -> Array:
         samples.append(row)
         last = row[0]
     if len(samples) < MIN_SAMPLES:
-        raise LocateError(path, "", f"{len(samples)} samples: at least {MIN_SAMPLES} are needed")
+        raise InputError(path, "", f"{len(samples)} samples: at least {MIN_SAMPLES} are needed")
     table = np.array(samples)
     _check_units(path, table)
     return table
@@ -70,10 +70,10 @@ def _rows(path: Path, header: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
             first = [cell.strip() for cell in next(reader, [])]
             if first != list(header):
                 found = ",".join(first)[:80]
-                raise LocateError(path, "line 1", f"the header must be {wanted}, not {found!r}")
+                raise InputError(path, "line 1", f"the header must be {wanted}, not {found!r}")
             for cells in reader:
                 if len(cells) not in (0, len(header)):
-                    raise LocateError(
+                    raise InputError(
                         path,
                         f"line {reader.line_num}",
                         f"{len(header)} cells ({wanted}), not {len(cells)}",
@@ -81,11 +81,11 @@ def _rows(path: Path, header: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
                 if cells:
                     yield reader.line_num, [cell.strip() for cell in cells]
     except OSError as error:
-        raise LocateError(path, "", error.strerror or str(error)) from error
+        raise InputError(path, "", error.strerror or str(error)) from error
     except UnicodeDecodeError as error:
-        raise LocateError(path, "", "not a text file in UTF-8") from error
+        raise InputError(path, "", "not a text file in UTF-8") from error
     except csv.Error as error:
-        raise LocateError(path, f"line {reader.line_num}", f"not CSV: {error}") from error
+        raise InputError(path, f"line {reader.line_num}", f"not CSV: {error}") from error
 
 
 def _number(path: Path, line: int, column: str, word: str) -> float:
@@ -94,15 +94,15 @@ def _number(path: Path, line: int, column: str, word: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise LocateError(path, f"line {line}", f"{column} must be a finite number, not {word!r}")
+        raise InputError(path, f"line {line}", f"{column} must be a finite number, not {word!r}")
     return value
 
 
 def _check_time(path: Path, line: int, t: float, last: float) -> None:
     if abs(t) > MAX_TIME_S:
-        raise LocateError(path, f"line {line}", f"t_s must be in seconds, not {t:g}")
+        raise InputError(path, f"line {line}", f"t_s must be in seconds, not {t:g}")
     if t <= last:
-        raise LocateError(
+        raise InputError(
             path, f"line {line}", f"times must ascend: {t:.9g} s comes after {last:.9g} s"
         )
 
@@ -111,7 +111,7 @@ def _check_reach(path: Path, line: int, row: Sequence[float]) -> None:
     for name, value in zip(IMU_HEADER[1:], row[1:], strict=True):
         limit, unit = (MAX_RATE, "rad/s") if name[0] == "g" else (MAX_FORCE, "m/s²")
         if abs(value) > limit:
-            raise LocateError(
+            raise InputError(
                 path, f"line {line}", f"{name} must be from -{limit:g} to {limit:g} {unit}"
             )
 
@@ -122,12 +122,12 @@ def _check_units(path: Path, table: Array) -> None:
         float(np.median(np.linalg.norm(part, axis=1))) for part in (table[:, 1:4], table[:, 4:])
     )
     if rate > USUAL_RATE:
-        raise LocateError(
+        raise InputError(
             path, "gx,gy,gz", f"must be in rad/s, but half of them exceed {rate:.1f}: °/s?"
         )
     low, high = USUAL_FORCE
     if not low <= force <= high:
-        raise LocateError(
+        raise InputError(
             path,
             "ax,ay,az",
             f"must be in m/s², gravity included (9.8 at rest), but are {force:.3g} in the median",
