@@ -208,7 +208,8 @@ class OperatorPhone:
         if wish.what == "start" and self._shape is not None:
             self._calibrate(self._shape)
         else:
-            self._shape = None  # the next picture opens eyes, with what may have been stored
+            # the next picture opens eyes, with what may have been stored, or says what is wrong
+            self._shape, self.camera_problem = None, ""
 
     def _calibrate(self, shape: Shape) -> None:
         """Begin, or begin again in another orientation."""

@@ -40,4 +40,5 @@ def test_the_page_guides_through_a_calibration_and_goes_on_with_it(
         assert camera.focal_px == pytest.approx(sum(PHONE.lens[:2]) / 2, rel=0.01)
         phone.page.tap("#calibration-go")
         phone.play_until("#hold", 5.0)
-        assert not phone.page.locator("#calibrate").is_visible()
+        words = phone.page.locator("body").inner_text()
+        assert not phone.page.locator("#calibrate").is_visible(), words

@@ -16,6 +16,7 @@ from pipeline.frames import exp
 from pipeline.signals import LedRays, RelativePose, Spots
 from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.sighting import Sighting
+from server.calibration_messages import Calibrate
 from server.control_link import OperatorInput, PhoneImuInput
 from server.ingest import EncodedFrame
 from server.messages import Hello
@@ -109,6 +110,19 @@ def test_a_camera_without_a_calibration_is_told_as_long_as_it_films(rig):
     assert rig.taken == [1, 2]
     (why,) = rig.why()
     assert why.startswith("The camera is not calibrated: ")
+
+
+def test_after_a_calibration_nothing_is_said_of_the_camera_before_the_next_picture(rig):
+    rig.synchronise()
+    rig.settle()
+    with pytest.raises(WireError):
+        rig.say(JPEG, 1)
+    assert rig.phone.calibration().phase == "needed"
+    rig.phone.calibrate(Calibrate("stop"))
+    assert rig.phone.calibration().phase == "off"
+    with pytest.raises(WireError):
+        rig.say(JPEG, 2)
+    assert rig.phone.calibration().phase == "needed"
 
 
 def test_motion_and_touch_reach_control_at_their_own_times(rig):
