@@ -94,15 +94,15 @@ class Api:
     async def _pair(self, request: Request) -> Response:
         address = request.client.host if request.client is not None else ""
         if not self._doors.may_try(address, now()):
-            return _refusal(429, "token", f"{PAIR_TRIES} tries a minute")
+            return refusal(429, "token", f"{PAIR_TRIES} tries a minute")
         try:
-            pairing = _pairing.decode(await _body(request))
+            pairing = _pairing.decode(await body_of(request))
         except msgspec.DecodeError:
-            return _refusal(400, "token", 'JSON: {"token": "…"}')
+            return refusal(400, "token", 'JSON: {"token": "…"}')
         paired = self._doors.pair(pairing.token)
         if paired is None:
             log.warning("pairing refused for %s", address)
-            return _refusal(401, "token", "the link of this run: scan the QR code again")
+            return refusal(401, "token", "the link of this run: scan the QR code again")
         role, session = paired
         secure = request.url.scheme == "https"
         response = JSONResponse({"role": role})
@@ -133,7 +133,7 @@ class Api:
         try:
             name = self._hub.start_recording()
         except RecordingError as error:
-            return _refusal(507, "recording", str(error))
+            return refusal(507, "recording", str(error))
         self._hub.say(f"Recording {name}.")
         return JSONResponse({"name": name}, 202)
 
@@ -149,7 +149,7 @@ class Api:
 
     async def _certificate(self, _request: Request) -> Response:
         if self._authority is None:
-            return _refusal(404, "ca.crt", "this server has a certificate of its owner's")
+            return refusal(404, "ca.crt", "this server has a certificate of its owner's")
         return FileResponse(self._authority, media_type="application/x-x509-ca-cert")
 
     async def _health(self, _request: Request) -> Response:
@@ -184,18 +184,19 @@ def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
     return file
 
 
-async def _body(request: Request) -> bytes:
-    """The body; empty if it is longer than anything we take, or too long in coming."""
+async def body_of(request: Request, longest: int = MAX_BODY) -> bytes:
+    """The body; empty if it is longer than what we take, or too long in coming."""
     body = b""
     with contextlib.suppress(TimeoutError, ClientDisconnect):
         async with asyncio.timeout(BODY_S):
             async for part in request.stream():
                 body += part
-                if len(body) > MAX_BODY:
+                if len(body) > longest:
                     return b""
             return body
     return b""
 
 
-def _refusal(status: int, field: str, allowed: str) -> Response:
+def refusal(status: int, field: str, allowed: str) -> Response:
+    """The answer to a request that can't be taken."""
     return JSONResponse({"code": "refused", "field": field, "allowed": allowed}, status)

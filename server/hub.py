@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -14,22 +16,17 @@ from pipeline.robot import Robot
 from server.calibrate.desk import Desk
 from server.calibration_messages import Calibrate
 from server.clock import now
-from server.control_link import (
-    ControlStatus,
-    Input,
-    ReadyInput,
-    RequestInput,
-    server_end,
-)
+from server.control_link import ControlStatus, Input, ReadyInput, RequestInput, server_end
 from server.knobs import TuneInput
 from server.messages import Command, Hello, Status, ToPage, Tune, encode_message
 from server.meter import Meter
 from server.operator import OperatorPhone
 from server.page import Page
+from server.paths import FastPath, PhonePaths
 from server.recorder import Recordings
 from server.status import build
 from server.vision import Picture, jpeg
-from server.wire import Credit, Record, Thumbnail, encode
+from server.wire import Record, Thumbnail, encode
 
 log = logging.getLogger("lightleash")
 
@@ -55,10 +52,10 @@ class Hub:
         """Listens to control in `runtime`; `profiles` is where new calibrations go."""
         self.robot, self.recordings = robot, recordings
         self._cameras, self._profiles = cameras, profiles
-        self._desk = Desk(lambda text: self._push("operator", text))
+        self.paths = PhonePaths(lambda data: recordings.record("server", data, now()))
+        self._desk = Desk(self.paths.tell)
         self._control = server_end(runtime)
         self.phone: OperatorPhone | None = None
-        self._phone_pages: dict[str, Page] = {}
         self.supervisors: set[Page] = set()
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
@@ -135,8 +132,8 @@ class Hub:
             self.part(current)
         loop = asyncio.get_running_loop()
 
-        def soon(data: str | bytes, name: str) -> None:
-            loop.call_soon_threadsafe(self._push, name, data)
+        def soon(do: Callable[..., None], *what: int) -> None:
+            loop.call_soon_threadsafe(do, *what)
 
         self.phone = OperatorPhone(
             hello,
@@ -144,11 +141,11 @@ class Hub:
             self._cameras,
             self.to_control,
             now,
-            on_taken=lambda n: soon(encode(Record(n, int(1e6 * now()), Credit(n))), "video"),
-            on_key_wanted=lambda: soon(encode_message(Command("key_frame")), "operator"),
+            on_taken=partial(soon, self.paths.taken),
+            on_key_wanted=partial(soon, self.paths.want_key),
             profiles=self._profiles,
         )
-        self._phone_pages = {"operator": page}
+        self.paths.begin(page)
         self.recordings.message("phone", encode_message(hello), now())
         self.to_control(RequestInput("disarm"))  # never go on with another hand
         self.say(f"{self.phone.device} leads.")
@@ -156,15 +153,24 @@ class Hub:
 
     def join_video(self, session: str, page: Page) -> OperatorPhone | None:
         """The video socket of the phone that has the lease; None for anyone else."""
-        if self.phone is None or self.phone.id != session:
-            return None
-        self._phone_pages["video"] = page
-        return self.phone
+        if (phone := self._leading(session)) is not None:
+            self.paths.join_video(page)
+        return phone
+
+    def join_fast(self, session: str, fast: FastPath) -> OperatorPhone | None:
+        """A fast path of the phone that has the lease; None for anyone else."""
+        if (phone := self._leading(session)) is not None:
+            self.paths.use(fast)
+        return phone
+
+    def _leading(self, session: str) -> OperatorPhone | None:
+        return self.phone if self.phone is not None and self.phone.id == session else None
 
     def part(self, phone: OperatorPhone) -> None:
         """A phone has gone."""
         if self.phone is phone:
-            self.phone, self._phone_pages = None, {}
+            self.phone = None
+            self.paths.close()
             self.say(f"{phone.device} has left.")
             phone.close()
 
@@ -189,17 +195,10 @@ class Hub:
         else:
             self.recordings.message("phone", data, t)
 
-    def _push(self, name: str, data: str | bytes) -> None:
-        page = self._phone_pages.get(name)
-        if page is not None:
-            page.push(data)
-            if isinstance(data, bytes):
-                self.recordings.record("server", data, now())
-
     def ping(self) -> None:
         """Ask the phone for a sign of life; called 20 times a second."""
         if self.phone is not None:
-            self._push("operator", encode(self.phone.ingest.ping(now())))
+            self.paths.ping(encode(self.phone.ingest.ping(now())))
 
     def _hear_control(self) -> None:
         for status in self._control.statuses():
@@ -230,9 +229,9 @@ class Hub:
         """To every page."""
         text = encode_message(message)
         self.recordings.message("server", text, now())
-        for page in (*self.supervisors, self._phone_pages.get("operator")):
-            if page is not None:
-                page.push(text)
+        for page in self.supervisors:
+            page.push(text)
+        self.paths.tell(text)
 
     def _show_picture(self) -> None:
         vision = self.phone.vision if self.phone is not None else None

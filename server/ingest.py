@@ -17,6 +17,9 @@ from server.wire import Motion, Picture, Ping, Pong, Record, Touch, WireError
 REMEMBERED_NONCES = 64
 FUTURE_S = 0.05
 """A capture later than this after its arrival is a broken clock."""
+ARRIVAL_S = 0.05
+"""How far the date of a picture may be off that is dated by its arrival: capture, encoding and way
+of the quickest took an unknown time, the same throughout."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +45,7 @@ class Ingest:
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._answered: set[int] = set()
         self._last_motion_t = -np.inf
+        self._last_touch = -1
         self._pings = 0
         self.clock = ClockOffset()
         self.mounting = SQUARE
@@ -75,7 +79,7 @@ class Ingest:
                 self._pong(record, record.body, now)
                 return None
             case Touch():
-                return self._touch(record.body)
+                return self._touch(record.sequence, record.body)
             case Motion():
                 return self._motion(record, record.body, now)
             case Picture():
@@ -90,13 +94,15 @@ class Ingest:
         self._answered.add(pong.nonce)
         self.clock.add(asked, record.t_us * 1e-6, now)
 
-    def _touch(self, touch: Touch) -> Operator | None:
-        self.visible = touch.visible
+    def _touch(self, sequence: int, touch: Touch) -> Operator | None:
+        if sequence <= self._last_touch:  # overtaken, or heard already: it comes by two ways
+            return None
         asked = self._asked.get(touch.nonce)
-        if asked is None:
-            if touch.nonce == 0:  # before the first PING reached the page
-                return None
+        if asked is None and touch.nonce != 0:
             raise WireError("value", "touch.nonce", "the nonce of a PING of the last 3 s")
+        self._last_touch, self.visible = sequence, touch.visible
+        if asked is None:  # before the first PING reached the page
+            return None
         return Operator(asked, touch.held and touch.visible, self._press_base + touch.press)
 
     def _motion(self, record: Record, motion: Motion, now: float) -> PhoneImu | None:

@@ -19,6 +19,10 @@ from server.phone_client import Access, PhoneClient
 from server.phone_script import ALL, DEVICE, SYNCHRONISED_PONGS, TOUCH_S, PhoneScript, Score
 from server.wire import Record
 
+MakeClient = Callable[
+    [Access, Callable[[int, int], Record], Callable[[Status], Command | None]], PhoneClient
+]
+"""By websockets or by WebRTC."""
 EXPOSED_S = 0.03
 """After the middle row's exposure all rows are exposed, and their truth has arrived."""
 LATE_S = 0.1
@@ -65,6 +69,7 @@ class LivePhone:
         script: PhoneScript,
         truth_port: int,
         axes: npt.NDArray[np.bool_] = ALL,
+        make_client: MakeClient = PhoneClient,
     ) -> None:
         """Looks at the simulated robot whose truth is on `truth_port`; 0: one that never moves.
 
@@ -72,7 +77,7 @@ class LivePhone:
         """
         self.script = script
         self._seen, self._scored = SeenRobot(truth_port), SeenRobot(truth_port)
-        self.client = PhoneClient(access, self._pong, self._status)
+        self.client = make_client(access, self._pong, self._status)
         self.score = Score(script.phone, access.virtual_camera, axes)
         self.skipped = self.sent = 0
         """Pictures not made for want of time or credit; pictures sent."""

@@ -161,6 +161,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     robot: str
     operator: str
     """The device of the operator, or ""."""
+    video_path: str
+    """How the operator's pictures come and what dates them, in words, or ""."""
     streams: dict[str, Stream]
     """By name: operator, phone_imu, video, pose, body_imu, control."""
     latency_ms: dict[str, float]

@@ -67,6 +67,8 @@ class OperatorPhone:
         self._profiles = profiles
         self.wizard: Wizard | None = None
         """The camera's calibration, while one is under way."""
+        self.video_path = ""
+        """How the pictures come, in words."""
         self.camera_problem = self.camera_text = ""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.sighting: Sighting | None = None

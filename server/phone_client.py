@@ -131,20 +131,32 @@ class PhoneClient:
         """
         try:
             async with asyncio.timeout(TIMEOUT_S):
-                hello = Hello(VERSION, "operator", device, sensors="simulated", video="simulated")
-                main = await self._socket("/ws/phone", hello)
-                welcome = _welcome(await main.recv())
-                hello = Hello(VERSION, "video", device, session=welcome.session)
-                await self._socket("/ws/video", hello)
+                welcome = await self._greet(device)
+                await self._open_video(device, welcome)
         except (OSError, WebSocketException) as error:  # TimeoutError is an OSError
             why = str(error) or "it does not answer"
             raise PhoneClientError(f"{self._access.url}: {why}") from error
         return welcome
 
+    async def _greet(self, device: str) -> Welcome:
+        """Say hello on the control socket."""
+        hello = Hello(VERSION, "operator", device, sensors="simulated", video="simulated")
+        main = await self._socket("/ws/phone", hello)
+        return _welcome(await main.recv())
+
+    async def _open_video(self, device: str, welcome: Welcome) -> None:
+        """Open the way for pictures."""
+        hello = Hello(VERSION, "video", device, session=welcome.session)
+        await self._socket("/ws/video", hello)
+
+    def _tls(self) -> ssl.SSLContext | None:
+        secure = self._access.url.startswith("https")
+        return ssl.create_default_context(cafile=self._access.ca) if secure else None
+
     async def _socket(self, path: str, hello: Hello) -> ClientConnection:
         url = self._access.url.rstrip("/").replace("http", "ws", 1) + path
         token = {"Authorization": f"Bearer {self._access.token}"}
-        tls = ssl.create_default_context(cafile=self._access.ca) if url[:3] == "wss" else None
+        tls = self._tls()
         socket = await connect(url, additional_headers=token, compression=None, proxy=None, ssl=tls)
         self._sockets.append(socket)
         await socket.send(encode_message(hello))
@@ -165,8 +177,7 @@ class PhoneClient:
         Raises:
             PhoneClientError: the socket is gone.
         """
-        main, video = self._sockets
-        socket = video if isinstance(record.body, Picture) else main
+        socket = self._sockets[-1 if isinstance(record.body, Picture) else 0]
         if isinstance(record.body, Picture):
             self._unanswered.add(record.sequence)
             if len(self._unanswered) >= MAX_IN_FLIGHT:

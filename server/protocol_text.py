@@ -11,6 +11,8 @@ from server import ingest, session, wire
 from server.app import MAX_BODY, Api
 from server.hub import LEASE_S, TICK_S
 from server.phone_client import MAX_IN_FLIGHT
+from server.rtc import answer, link, trailer
+from server.rtc.desk import OFFERS_HZ, RtcDesk
 from server.security import COOKIE, OPERATOR_PATHS, PAIR_TRIES, PAIR_WINDOW_S, PUBLIC_PATHS
 from server.view_proxy import routes as view_routes
 from server.websocket import HELLO_S, PING_S
@@ -41,6 +43,7 @@ RECORDS: dict[Kind, Layout] = {
         (("held", 1), ("visible", 1), ("", 1), ("press", 1), ("nonce", 1)),
     ),
     Kind.PONG: (wire.Pong, wire.PONG, (("nonce", 1), ("server_time_us", 1))),
+    Kind.STAMP: (wire.Stamp, wire.STAMP, (("rtp_timestamp", 1),)),
     Kind.PING: (wire.Ping, wire.PING, (("nonce", 1),)),
     Kind.CREDIT: (wire.Credit, wire.CREDIT, (("sequence", 1),)),
     Kind.PICTURE: (wire.Thumbnail, None, ()),
@@ -72,6 +75,8 @@ REQUESTS = {
     "GET /ca.crt": "the authority to install on phones",
     "GET /healthz": "whether the server lives",
     "GET /metrics": "Prometheus",
+    "POST /api/rtc": 'WebRTC, body `{"session": "…"}`; answers `{"id", "sdp", "ice_servers"}`',
+    "POST /api/rtc/answer": 'body `{"id": "…", "sdp": "…"}`: the page\'s answer to that offer',
     "GET /view": "the 3D view's page",
     "GET /view/": "the same",
     "socket /view": "the 3D view's socket (viser's protocol); only a viewpoint may go up",
@@ -93,8 +98,8 @@ def requests() -> str:
         KeyError: a route has no words.
     """
     lines = ["| request | role | |", "|---|---|---|"]
-    api = Api.__new__(Api)  # only asked for its routes
-    for route in (*api.routes(), *view_routes(lambda: 0)):
+    api, desk = Api.__new__(Api), RtcDesk.__new__(RtcDesk)  # only asked for their routes
+    for route in (*api.routes(), *desk.routes(), *view_routes(lambda: 0)):
         assert isinstance(route, (Route, WebSocketRoute))
         methods = ["socket"] if isinstance(route, WebSocketRoute) else sorted(route.methods or ())
         for method in methods:
@@ -150,8 +155,9 @@ come from the server's own pages (403): `Origin` is the server's, and requests c
 
 {requests()}
 
-Bodies up to {MAX_BODY} bytes. Pages (`/`, `/supervisor`, `/board`) and their files need no role.
-Refusals are JSON, as below: `code`, `field`, `allowed`.
+Bodies up to {MAX_BODY} bytes (an answer's session description: {answer.MAX_BYTES}). Pages (`/`,
+`/supervisor`, `/board`) and their files need no role. Refusals are JSON, as below: `code`, `field`,
+`allowed`.
 
 ## Records
 
@@ -187,6 +193,32 @@ At most {MAX_IN_FLIGHT} FRAMEs may be under way. The server answers each it has 
 replaced by a newer one with the CREDIT of the newest number: that one and all before it are done.
 Frames without credit are dropped on the phone, newest wins. `command` `key_frame` from the server
 asks for a FRAME that can be decoded alone.
+
+## WebRTC
+
+Faster than the websockets, and beside `/ws/phone`, which stays open for all that must not be lost.
+The server offers: `POST /api/rtc` with the `session` of the `welcome`, at most
+{60.0 * OFFERS_HZ:g} a minute; a new offer ends the connection before. The page's answer goes to
+`POST /api/rtc/answer` within {link.CONNECT_S:g} s: `video` sendonly (H264 or VP8) and the data
+channel, at most {answer.MAX_CANDIDATES} candidates; anything else is refused. Without a relay
+(`rtc.turn_url`) both ends have their own addresses only, and nobody else is asked for them.
+
+The data channel (unordered, never sent again) carries MOTION, TOUCH, PONG and STAMP to the server
+and PING to the page. What can't leave at once is dropped. PINGs and TOUCHes go by both ways at
+once, so that no sign of life is missed when one of them ends: the page answers the first PING of a
+number, TOUCHes that were overtaken or heard are ignored. MOTION goes by the data channel while the
+page has heard the server there within 200 ms, else by the websocket.
+
+Each encoded picture has its record behind it: {trailer.TRAILER_BYTES} bytes, each with its highest
+bit set so that no start code appears. In groups of {trailer.GROUP}, each followed by a byte whose
+bits 0 to {trailer.GROUP - 1} are the group's highest bits, little-endian: sequence u32, time i64
+[µs of the page's clock], flags u8 (bits 0 and 1: screen angle / 90°, bit 2: there is an
+orientation), orientation w, x, y, z as 4 × i16 (32767 is 1), CRC-16 (polynomial 0x1021, from 0) of
+these {trailer.FIELDS.size} bytes; then the bytes {trailer.MARK.hex(" ")}. Where a picture can't be
+appended to, STAMP says when it was taken; without either it is dated by its arrival, up to
+{1e3 * ingest.ARRIVAL_S:g} ms wrong. There are no CREDITs: a key frame is asked for by
+RTCP. Of pictures that come by both ways those of one count; the other one takes over with a key
+picture that was taken after all of them. What else comes by `/ws/video` is given back unseen.
 
 ## Clocks and signs of life
 

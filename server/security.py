@@ -17,7 +17,10 @@ Role = Literal["operator", "supervisor"]
 COOKIE = "lightleash"
 PUBLIC_FILES = (".js", ".css", ".svg")
 PUBLIC_PATHS = {"/", "/supervisor", "/board", "/api/pair", "/healthz", "/ca.crt"}
-OPERATOR_PATHS = {"/api/whoami", "/api/stop", "/ws/phone", "/ws/video"}
+OPERATOR_PATHS = {
+    *("/api/whoami", "/api/stop", "/api/rtc", "/api/rtc/answer"),
+    *("/ws/phone", "/ws/video"),
+}
 """What an operator may reach; everything else is the supervisor's."""
 PAIR_TRIES, PAIR_WINDOW_S = 10, 60.0
 PORT = re.compile(r":\d{1,5}$")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from server.calibration_messages import Calibrate
 from server.messages import Command, FromPage, Hello, Log, Tune, decode_message
-from server.wire import VERSION, Motion, Picture, Pong, Record, Touch, WireError, decode
+from server.wire import VERSION, Motion, Picture, Pong, Record, Stamp, Touch, WireError, decode
 
 MAX_FAULTS, FAULTS_HZ = 50, 0.5
 """So many faults at once, so many a second; more, and the connection is closed."""
@@ -12,12 +12,14 @@ RECORDS_HZ, BYTES_HZ, MESSAGES_HZ = 300.0, 4e6, 40.0
 """A connection may say so much a second; of records and messages twice that at once."""
 ALLOWED: dict[str, tuple[type, ...]] = {
     "operator": (Motion, Touch, Pong),
+    "rtc": (Motion, Touch, Pong, Stamp),
     "video": (Picture,),
     "supervisor": (),
 }
 """Kinds of record by role."""
 MESSAGES: dict[str, tuple[type, ...]] = {
     "operator": (Command, Calibrate, Log),
+    "rtc": (),
     "video": (Log,),
     "supervisor": (Command, Tune, Log),
 }
@@ -45,7 +47,7 @@ class Session:
     """State of one connection: waiting for hello, then open as a role."""
 
     def __init__(self, path_role: str) -> None:
-        """`path_role` is what the address says: operator, video or supervisor."""
+        """`path_role` is what the path says: operator, video, supervisor; rtc: a data channel."""
         self.role = path_role
         self.hello: Hello | None = None
         self.hopeless = False

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_settings import (
     BaseSettings,
@@ -46,6 +46,36 @@ class VideoSettings(BaseModel):
     height: int = Field(default=720, ge=240, le=1080)
     frame_rate_hz: int = Field(default=30, ge=5, le=60)
     bitrate_bps: int = Field(default=3_000_000, ge=500_000, le=20_000_000)
+
+
+TURN_URL = r"^(turns?:[^\s?]{1,200}(\?transport=(udp|tcp))?)?$"
+
+
+class RtcSettings(BaseModel):
+    """WebRTC, the fast path of a phone's pictures and motion."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    enabled: bool = Field(default=True, description="offer it; without it, websockets alone")
+    turn_url: str = Field(
+        default="", pattern=TURN_URL, description="of a relay, as in turn:relay.example.org:3478"
+    )
+    turn_username: str = Field(default="", max_length=200, description="at the relay")
+    turn_password: SecretStr = Field(
+        default=SecretStr(""), max_length=200, description="at the relay"
+    )
+
+    def ice_servers(self) -> list[dict[str, str]]:
+        """For both ends; none by default: phone and server meet on their own addresses."""
+        if not self.turn_url:
+            return []
+        return [
+            {
+                "urls": self.turn_url,
+                "username": self.turn_username,
+                "credential": self.turn_password.get_secret_value(),
+            }
+        ]
 
 
 class VirtualCameraSettings(BaseModel):
@@ -122,6 +152,7 @@ class Settings(BaseSettings):
     state: Path = Field(default_factory=state_directory, description="certificates, recordings")
     cameras: list[Path] = Field([], description="folders with calibrations of phones")
     video: VideoSettings = Field(default_factory=VideoSettings)
+    rtc: RtcSettings = Field(default_factory=RtcSettings)
     virtual_camera: VirtualCameraSettings = Field(default_factory=VirtualCameraSettings)
 
     @classmethod
@@ -139,6 +170,7 @@ class Settings(BaseSettings):
 
 TABLES: dict[str, type[BaseModel]] = {
     "video": VideoSettings,
+    "rtc": RtcSettings,
     "virtual_camera": VirtualCameraSettings,
 }
 Settings.__doc__ = inspect.cleandoc(Settings.__doc__ or "")  # `--help` shows it as it is

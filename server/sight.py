@@ -9,12 +9,12 @@ from pipeline.camera.lens import Camera
 from pipeline.expected import Expected
 from pipeline.frames import Array
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, Frame, PhoneImu
+from pipeline.signals import BodyImu, Frame, PhoneImu, StampOffset
 from pipeline.vision.looking import Looking
 from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
 from server.frame_decoder import FrameDecoder
-from server.ingest import EncodedFrame
+from server.ingest import ARRIVAL_S, EncodedFrame
 
 
 class Sight(FrameDecoder):
@@ -62,4 +62,6 @@ class Sight(FrameDecoder):
         picture = Frame(t, luma, self.full_range)
         decoded = self._clock()
         sighting = self.looking.look(picture, up_in_b, omega_bf_in_b)
+        if sighting.offset is None and frames[-1].picture.by_arrival:
+            sighting = replace(sighting, offset=StampOffset(0.0, ARRIVAL_S))
         return replace(sighting, took_s={"decode": decoded - started, **sighting.took_s})

@@ -55,6 +55,7 @@ def build(hub: Known) -> Status:
         refusals=list(refusals),
         robot=hub.robot.name,
         operator=phone.device if phone is not None else "",
+        video_path=phone.video_path if phone is not None else "",
         streams=_streams(hub, t),
         latency_ms=_latency(hub),
         leds=len(sighting.match.led) if sighting is not None and sighting.match else 0,

@@ -1,4 +1,4 @@
-"""`lightleash phone`: a phone nobody holds, on the real websockets of a running server."""
+"""`lightleash phone`: a phone nobody holds, on the real sockets of a running server."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 import signal
 import sys
 import time
+from functools import partial
 from math import degrees
 
 import numpy as np
@@ -22,9 +23,9 @@ from hardware.sim.phone_faults import Fault
 from hardware.sim.render import Look
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
-from server.live_phone import EXPOSED_S, LivePhone
+from server.live_phone import EXPOSED_S, LivePhone, MakeClient
 from server.one_line import Parser
-from server.phone_client import PhoneClientError, access_of, add_access_arguments
+from server.phone_client import PhoneClient, PhoneClientError, access_of, add_access_arguments
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 
 WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
@@ -126,7 +127,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--hand", default="demo", help=f"{', '.join(HANDS)}, or a CSV file")
     parser.add_argument("--rest", type=float, help="seconds before it moves")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="then leave politely")
-    parser.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
+    parser.add_argument("--codec", choices=("h264", "vp8", "jpeg"), default="h264")
+    parser.add_argument("--transport", choices=("websocket", "rtc"), default="websocket")
+    parser.add_argument(
+        "--dated-by",
+        choices=("record", "pair", "arrival"),
+        default="record",
+        help="with rtc: how the server learns when a picture was taken",
+    )
     parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
     parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
     faults = [fault.value for fault in Fault]
@@ -137,12 +145,27 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _client_of(arguments: argparse.Namespace) -> MakeClient:
+    """The page's way to the server.
+
+    Raises:
+        ValueError: a codec that WebRTC hasn't got.
+    """
+    if arguments.transport == "websocket":
+        return PhoneClient
+    if arguments.codec == "jpeg":
+        raise ValueError("--codec jpeg: allowed with --transport rtc: h264, vp8")
+    from server.rtc.client import RtcPhoneClient  # takes a while to import
+
+    return partial(RtcPhoneClient, codec=arguments.codec, dated_by=arguments.dated_by)
+
+
 async def _play(arguments: argparse.Namespace) -> LivePhone:
     access = access_of(arguments)
     port = access.truth_port if arguments.truth_port is None else arguments.truth_port
     robot_file = load_robot(arguments.robot or access.robot)
     script = make_script(arguments, robot_file, port)
-    live = LivePhone(access, script, port, robot_file.robot.axes)
+    live = LivePhone(access, script, port, robot_file.robot.axes, _client_of(arguments))
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, live.leave)
     await live.run(arguments.seconds, _show)

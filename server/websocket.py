@@ -13,11 +13,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from server.calibration_messages import Calibrate
 from server.clock import now
 from server.hub import Hub
-from server.messages import Command, Hello, Log, Refused, Tune, Welcome, encode_message
+from server.messages import Command, FromPage, Hello, Log, Refused, Tune, Welcome, encode_message
 from server.operator import OperatorPhone
 from server.session import Session
 from server.settings import VideoSettings
-from server.wire import VERSION, Record, WireError
+from server.wire import VERSION, Picture, Record, WireError
 
 log = logging.getLogger("lightleash")
 
@@ -175,6 +175,8 @@ class PageServer:
             raise BUSY
         try:
             said = session.receive(data, t)
+            if phone is not None and self._is_straggler(said):
+                return
             if phone is not None:
                 self._hub.record(data, t)
             if isinstance(said, Record) and phone is not None:
@@ -189,6 +191,16 @@ class PageServer:
                 self._hub.say(f"page: {said.text}")
         except WireError as error:
             page.refuse(error, fatal=session.hopeless)
+
+    def _is_straggler(self, said: FromPage | Record) -> bool:
+        """A picture that was on its way when the phone went over to its fast path."""
+        if not isinstance(said, Record) or not isinstance(said.body, Picture):
+            return False
+        if not self._hub.paths.takes_from_socket(said.t_us, said.sequence, said.body.key):
+            return True
+        if self._hub.phone is not None:
+            self._hub.phone.video_path = f"websocket, {said.body.codec.name}"
+        return False
 
     async def _ping(self, phone: OperatorPhone | None) -> None:
         while phone is not None and self._hub.phone is phone:

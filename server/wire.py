@@ -46,6 +46,7 @@ class Kind(IntEnum):
     FRAME = 2
     TOUCH = 3
     PONG = 4
+    STAMP = 5
     PING = 129
     CREDIT = 130
     PICTURE = 131
@@ -85,6 +86,8 @@ class Picture:
     screen_angle_deg: int
     data: bytes
     """A JPEG file, an H.264 access unit (Annex B) or a VP8 frame."""
+    by_arrival: bool = False
+    """Its time is a guess by its arrival (flag bit 3); pages know better and don't say so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +112,14 @@ class Pong:
 
 
 @dataclass(frozen=True, slots=True)
+class Stamp:
+    """STAMP: by WebRTC, where pictures can't carry their records: when one of them was taken."""
+
+    rtp_timestamp: int
+    """Of the picture that was taken at the record's time."""
+
+
+@dataclass(frozen=True, slots=True)
 class Ping:
     """PING: asks for a sign of life and for the phone's clock, at 20 Hz."""
 
@@ -129,12 +140,13 @@ class Thumbnail:
     data: bytes
 
 
-Body = Motion | Picture | Touch | Pong | Ping | Credit | Thumbnail
+Body = Motion | Picture | Touch | Pong | Stamp | Ping | Credit | Thumbnail
 
 MOTION = struct.Struct("<10fhH")
 FRAME = struct.Struct("<BBHHh")
 TOUCH = struct.Struct("<BBHIQ")
 PONG = struct.Struct("<Qq")
+STAMP = struct.Struct("<I")
 PING = struct.Struct("<Q")
 CREDIT = struct.Struct("<I")
 
@@ -159,7 +171,7 @@ def encode(record: Record) -> bytes:
                 *body.rotation_rate, *body.acceleration, *orientation, body.screen_angle_deg, 0
             )
         case Picture():
-            kind, flags = Kind.FRAME, int(body.key)
+            kind, flags = Kind.FRAME, body.key | body.by_arrival << 3
             head = FRAME.pack(body.codec, 0, body.width, body.height, body.screen_angle_deg)
             payload = head + body.data
         case Touch():
@@ -167,6 +179,8 @@ def encode(record: Record) -> bytes:
             payload = TOUCH.pack(body.held, body.visible, 0, body.press, body.nonce)
         case Pong():
             kind, payload = Kind.PONG, PONG.pack(body.nonce, body.server_time_us)
+        case Stamp():
+            kind, payload = Kind.STAMP, STAMP.pack(body.rtp_timestamp)
         case Ping():
             kind, payload = Kind.PING, PING.pack(body.nonce)
         case Credit():
@@ -240,7 +254,8 @@ def _frame(payload: bytes, flags: int) -> Picture:
     if codec == Codec.JPEG and data[:2] != b"\xff\xd8":
         raise WireError("value", "frame.data", "a JPEG, beginning with FF D8")
     angle = _angle(angle, "frame.screen_angle_deg")
-    return Picture(Codec(codec), bool(flags & 1), width, height, angle, data)
+    is_key, by_arrival = bool(flags & 1), bool(flags & 8)
+    return Picture(Codec(codec), is_key, width, height, angle, data, by_arrival=by_arrival)
 
 
 def _touch(payload: bytes, _flags: int) -> Touch:
@@ -253,6 +268,10 @@ def _touch(payload: bytes, _flags: int) -> Touch:
 def _pong(payload: bytes, _flags: int) -> Pong:
     nonce, server_time_us = _unpack(PONG, payload, "pong")
     return Pong(int(nonce), int(server_time_us))
+
+
+def _stamp(payload: bytes, _flags: int) -> Stamp:
+    return Stamp(int(_unpack(STAMP, payload, "stamp")[0]))
 
 
 def _ping(payload: bytes, _flags: int) -> Ping:
@@ -272,6 +291,7 @@ _DECODERS: dict[int, Callable[[bytes, int], Body]] = {
     Kind.FRAME: _frame,
     Kind.TOUCH: _touch,
     Kind.PONG: _pong,
+    Kind.STAMP: _stamp,
     Kind.PING: _ping,
     Kind.CREDIT: _credit,
     Kind.PICTURE: _thumbnail,

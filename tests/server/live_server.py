@@ -19,8 +19,9 @@ from server.hub import Hub
 from server.launcher import listen
 from server.listener import listener
 from server.recorder import Recordings
+from server.rtc.desk import RtcDesk
 from server.security import Doors, Guard
-from server.settings import VideoSettings
+from server.settings import RtcSettings, VideoSettings
 from server.view_proxy import routes as view_routes
 from server.websocket import PageServer
 
@@ -50,7 +51,8 @@ class LiveServer:
         self.doors = Doors()
         self.api = Api(self.hub, self.doors, "https://robot.lan:8443/#k=x", None)
         pages = PageServer(self.hub, VideoSettings())
-        self.app = make_app(self.api, pages, view_routes(lambda: 1))
+        desk = RtcDesk(self.hub, RtcSettings(), 3_000_000)
+        self.app = make_app(self.api, pages, [*view_routes(lambda: 1), *desk.routes()])
         self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"])
 
     def close(self) -> None:

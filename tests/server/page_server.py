@@ -15,7 +15,9 @@ JPEG = b"\xff\xd8" + bytes(30)
 def status(mode):
     fields = {name: None for name in Status.__struct_fields__}
     numbers = dict.fromkeys(("leds", "phones", "supervisors"), 0)
-    texts = dict.fromkeys(("robot", "operator", "recording", "realtime", "reason"), "")
+    texts = dict.fromkeys(
+        ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""
+    )
     flags = {"ready": True, "saturated": False}
     tables = {"streams": {}, "latency_ms": {}, "control": {}, "refusals": [], "messages": []}
     return Status(**fields | numbers | texts | flags | tables | {"mode": mode})

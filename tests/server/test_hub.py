@@ -103,6 +103,66 @@ def test_only_the_session_that_leads_may_send_pictures(house):
     in_loop(scene)
 
 
+class Fast:
+    """A fast path that keeps what it is told."""
+
+    def __init__(self):
+        self.data, self.keys, self.closed, self.has_video = [], 0, False, True
+
+    def push(self, data):
+        self.data.append(data)
+
+    def request_key(self):
+        self.keys += 1
+
+    def close(self):
+        self.closed = True
+
+
+def test_pings_take_all_ways_that_are_open(house):
+    def scene():
+        page, fast = Paper(), Fast()
+        phone = house.hub.greet(hello("first"), page)
+        assert house.hub.join_fast("guess", fast) is None
+        house.hub.ping()
+        assert house.hub.join_fast(phone.id, fast) is phone
+        house.hub.ping()
+        assert len(fast.data) == 1
+        assert page.data[1:] == fast.data
+        house.hub.paths.leave(fast)
+        house.hub.ping()
+        assert (len(fast.data), len(page.data)) == (1, 3)
+
+    in_loop(scene)
+
+
+def test_a_phone_has_one_fast_path_which_goes_with_it(house):
+    def scene():
+        phone = house.hub.greet(hello("first"), Paper())
+        former, fast = Fast(), Fast()
+        house.hub.join_fast(phone.id, former)
+        house.hub.join_fast(phone.id, fast)
+        assert (former.closed, fast.closed) == (True, False)
+        house.hub.paths.leave(former)  # late news
+        house.hub.ping()
+        assert len(fast.data) == 1
+        house.hub.part(phone)
+        assert fast.closed
+
+    in_loop(scene)
+
+
+def test_a_recording_begins_with_a_key_picture(house):
+    def scene():
+        fast = Fast()
+        phone = house.hub.greet(hello("first"), Paper())
+        house.hub.join_fast(phone.id, fast)
+        house.hub.start_recording()
+        assert fast.keys == 1
+
+    in_loop(scene)
+
+
 def test_what_the_server_lacks_reaches_control_with_every_tick(house):
     house.hub._tick()
     (ready,) = house.control.inputs()

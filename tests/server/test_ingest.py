@@ -103,6 +103,17 @@ def test_the_operator_is_as_old_as_the_nonce_it_echoes() -> None:
     assert (said.t, said.held, said.press & 0xFFFFFFFF) == (2.0, True, 4)
 
 
+def test_a_touch_that_was_overtaken_says_nothing() -> None:
+    ingest = synchronised()
+    nonce = nonce_of(ingest.ping(2.0))
+    released = Record(8, 1, Touch(False, True, 4, nonce))
+    assert ingest.record(released, 2.1) is not None
+    for sequence in (7, 8):  # late, and by the other way
+        assert ingest.record(Record(sequence, 1, Touch(True, True, 4, nonce)), 2.2) is None
+    assert ingest.record(Record(5, 1, Touch(True, True, 4, nonce=77)), 2.2) is None  # no fault
+    assert ingest.record(Record(9, 1, Touch(True, True, 5, nonce)), 2.3) is not None
+
+
 def test_the_first_press_of_another_phone_is_another_press() -> None:
     presses = []
     for first in (1, 2):

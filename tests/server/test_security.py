@@ -192,7 +192,7 @@ def test_a_body_that_never_comes_does_not_hold_its_connection(monkeypatch):
         await asyncio.Event().wait()
 
     request = Request({"type": "http", "method": "POST", "headers": []}, receive=never)
-    assert asyncio.run(app._body(request)) == b""
+    assert asyncio.run(app.body_of(request)) == b""
 
 
 def test_a_token_of_half_a_character_is_simply_wrong(rig):

@@ -11,9 +11,9 @@ from hardware.sim.codec import Encoder
 from pipeline.camera.mounting import Mounting
 from pipeline.expected import Expected
 from pipeline.frames import GRAVITY, exp
-from pipeline.signals import PhoneImu
+from pipeline.signals import PhoneImu, StampOffset
 from pipeline.vision_config import GatesConfig
-from server.ingest import EncodedFrame
+from server.ingest import ARRIVAL_S, EncodedFrame
 from server.sight import Sight
 from server.wire import Codec, Picture
 from tests.pipeline.seeing import CAMERA, is_wrong, moved, picture, truth_at
@@ -209,3 +209,14 @@ def test_rays_of_a_pose_that_is_not_believed_are_not_handed_on():
     assert sighting.match is not None
     assert len(sighting.rays) == 0
     assert sighting.seen(CAMERA) is None
+
+
+@pytest.mark.parametrize(
+    ("by_arrival", "offset"), [(True, StampOffset(0.0, ARRIVAL_S)), (False, None)]
+)
+def test_of_pictures_dated_by_their_arrival_the_filter_is_told_by_how_much(by_arrival, offset):
+    eye = sight()
+    for frame, truth in shots(np.random.default_rng(83), 3):
+        guessed = replace(frame.picture, by_arrival=by_arrival)
+        sighting = look(eye, [replace(frame, picture=guessed)], truth)
+    assert sighting.seen(CAMERA).offset == offset

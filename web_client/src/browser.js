@@ -22,6 +22,7 @@ export function browserOf(window) {
   };
   const canWork = scope.VideoFrame !== undefined && scope.Worker !== undefined;
   const frameWorker = new URL('./frame_worker.js', import.meta.url);
+  const rtcWorker = new URL('./rtc_worker.js', import.meta.url);
   return {
     scope,
     fetchHere,
@@ -29,6 +30,7 @@ export function browserOf(window) {
     links,
     platform: platformOf(window.navigator),
     screenAngle: () => screenAngleOf(window.screen, scope.orientation),
+    startRtcWorker: scope.Worker !== undefined ? () => new Worker(rtcWorker, { type: 'module' }) : undefined,
     startWorker: canWork ? () => new Worker(frameWorker, { type: 'module' }) : undefined,
   };
 }

@@ -14,6 +14,7 @@ import { Rate } from './clock.js';
 import { stayAwake, toggleFullScreen } from './display.js';
 import { StopPost } from './stop.js';
 import { USUAL, deviceName } from './camera.js';
+import { joinPaths } from './join_paths.js';
 import { VideoSender } from './video.js';
 import { View } from './view.js';
 import { INITIAL, reduce, touchOf, wish } from './session.js';
@@ -24,7 +25,8 @@ const STOP_TICK_MS = 50;
 const HEALTH_MS = 500;
 const SILENT_MOTION_MS = 3000;
 
-const { scope, platform, fetchHere, links, screenAngle, startWorker, later } = browserOf(window);
+const here = browserOf(window);
+const { scope, platform, fetchHere, links, screenAngle, startWorker, later } = here;
 const stopPost = new StopPost(fetchHere);
 const feedback = new Feedback(navigator, window.AudioContext, platform !== 'android');
 const motionRate = new Rate();
@@ -50,6 +52,7 @@ const view = new View(document, window, {
   onRelease: () => dispatch({ type: 'release' }),
   onStop: () => dispatch({ type: 'stop' }),
   onCalibrate: (what) => dispatch({ type: 'calibrate', what }),
+  onPath: (wished) => paths.choose(wished),
   onWish: () => dispatch({ type: 'ask', what: wish(state).what }),
   onSound: () => {
     feedback.unlock();
@@ -68,6 +71,8 @@ const video = new VideoSender({
 });
 phone.video = video;
 
+const { rtc, paths } = joinPaths({ ...here, performance, phone, video, track: () => camera.track });
+
 const camera = new CameraFeed({
   mediaDevices: navigator.mediaDevices,
   performance,
@@ -76,10 +81,7 @@ const camera = new CameraFeed({
   Processor: scope.MediaStreamTrackProcessor,
   startWorker,
   screenAngle,
-  onFrame: (frame) => {
-    if (phone.videoLink.isOpen) video.offer(frame);
-    else frame.close();
-  },
+  onFrame: (frame) => paths.offer(frame),
   onLost: (text) => {
     notice(text);
     phone.log(text);
@@ -96,6 +98,7 @@ const imu = new Imu({
 }, (tUs, motion) => {
   motionRate.add(performance.now());
   phone.sendMotion(tUs, motion);
+  rtc.pictures.turned(motion.orientation_wxyz);
 });
 
 const lensPanel = new LensPanel(document, platform, performance, camera, (text) => phone.log(text));
@@ -105,6 +108,7 @@ function dispatch(event) {
   const outcome = reduce(state, event);
   state = outcome.state;
   outcome.effects.forEach(perform);
+  if (event.type === 'disconnected') paths.end();
   if (!shown) {
     shown = true;
     requestAnimationFrame(show);
@@ -138,6 +142,7 @@ function perform(effect) {
       break;
     case 'close_link':
       phone.close();
+      paths.end();
   }
 }
 
@@ -182,8 +187,9 @@ async function checkPairing() {
 async function welcomed(welcome) {
   try {
     const words = await camera.settle(welcome);
-    identity.video = await video.prepare(welcome);
+    identity.video = await video.prepare(welcome, paths.wish === 'JPEG');
     phone.log(`${identity.device}: ${words}, ${identity.video}`);
+    paths.begin(welcome);
   } catch (error) {
     phone.log(`camera: ${error}`);
   }
@@ -193,7 +199,9 @@ async function comeBack() {
   void stayAwake(navigator);
   try {
     const words = await camera.revive();
-    if (words !== '') phone.log(`camera again: ${words}`);
+    if (words === '') return;
+    phone.log(`camera again: ${words}`);
+    if (camera.track !== null) await rtc.pictures.replaceTrack(camera.track);
   } catch (error) {
     notice(`The camera does not come back: ${problemOf(error).message}`);
   }
@@ -201,7 +209,8 @@ async function comeBack() {
 
 function reportHealth() {
   const now = performance.now();
-  dispatch({ type: 'health', health: { ...video.health(now), imuHz: motionRate.perSecond(now) } });
+  paths.look((state.heard && state.status?.streams['video']?.age_ms) || null);
+  dispatch({ type: 'health', health: { ...paths.health(now), imuHz: motionRate.perSecond(now) } });
   const silent = now - startedAtMs > SILENT_MOTION_MS && motionRate.perSecond(now) === 0;
   if (silent !== state.motionSilent) dispatch({ type: 'motion_silent', silent });
 }

@@ -6,6 +6,11 @@
 /** @import {Event} from './session_types.js' */
 /** @import {VideoSender} from './video.js' */
 
+/**
+ * A faster way for records that may be lost.
+ * @typedef {{ readonly isHeard: boolean, send(record: ArrayBuffer): void }} FastRecords
+ */
+
 import { nowUs } from './clock.js';
 import { Link, socketUrl } from './link.js';
 import { Kind, MAX_RECORD_BYTES, VERSION, encodeMotion, encodePong, encodeTouch } from './protocol.js';
@@ -31,20 +36,22 @@ export class Phone {
     this.surroundings = surroundings;
     this.session = '';
     this.loggedMs = -Infinity;
-    this.sequences = { motion: 0, touch: 0, pong: 0 };
+    this.sequences = { motion: 0, touch: 0, pong: 0, ping: 0 };
     /** @type {VideoSender | null} */
     this.video = null;
+    /** @type {FastRecords | null} */
+    this.fast = null;
     const { base, links } = surroundings;
     this.link = new Link(socketUrl('ws/phone', base), {
       onOpen: () => this.hello('operator'),
       onMessage: (message) => this.take(message),
-      onRecord: (record) => this.record(record),
+      onRecord: (record) => this.record(record, (answer) => this.link.sendRecord(answer)),
       onClose: (wasWelcome) => this.closed(wasWelcome),
     }, links);
     this.videoLink = new Link(socketUrl('ws/video', base), {
       onOpen: () => this.videoOpened(),
       onMessage: (message) => this.take(message),
-      onRecord: (record) => this.record(record),
+      onRecord: (record) => this.record(record, () => {}),
       onClose: () => {},
     }, links, { silenceMs: 0 });
   }
@@ -104,23 +111,34 @@ export class Phone {
   welcomed(welcome) {
     if (welcome.session === this.session && this.videoLink.isOpen) return; // said again, on the video link
     this.session = welcome.session;
-    this.sequences = { motion: 0, touch: 0, pong: 0 };
+    this.sequences = { motion: 0, touch: 0, pong: 0, ping: 0 };
     this.videoLink.failures = 0;
     this.videoLink.open();
     this.surroundings.dispatch({ type: 'welcomed' });
     this.surroundings.onWelcome(welcome);
   }
 
-  /** @param {Received} record */
-  record(record) {
-    if (record.kind === Kind.PING) {
-      this.sequences.pong += 1;
-      const now = nowUs(this.surroundings.performance);
-      this.link.sendRecord(encodePong(this.sequences.pong, now, record));
-      this.surroundings.dispatch({ type: 'ping', nonce: record.nonce });
-    } else if (record.kind === Kind.CREDIT) {
-      this.video?.credit(record.taken);
-    }
+  /**
+   * @param {Received} record
+   * @param {(record: ArrayBuffer) => void} answer By the way that it came.
+   */
+  record(record, answer) {
+    if (record.kind === Kind.PING) this.pinged(record, answer);
+    else if (record.kind === Kind.CREDIT) this.video?.credit(record.taken);
+  }
+
+  /**
+   * Each PING comes by all ways: the first one is answered.
+   * @param {{ sequence: number, tUs: number, nonce: bigint }} ping
+   * @param {(record: ArrayBuffer) => void} answer
+   */
+  pinged(ping, answer) {
+    const { performance, dispatch } = this.surroundings;
+    if (ping.sequence <= this.sequences.ping) return;
+    this.sequences.ping = ping.sequence;
+    this.sequences.pong += 1;
+    answer(encodePong(this.sequences.pong, nowUs(performance), ping));
+    dispatch({ type: 'ping', nonce: ping.nonce });
   }
 
   /**
@@ -130,15 +148,18 @@ export class Phone {
   sendMotion(tUs, motion) {
     if (this.session === '') return;
     this.sequences.motion += 1;
-    this.link.sendRecord(encodeMotion(this.sequences.motion, tUs, motion));
+    const record = encodeMotion(this.sequences.motion, tUs, motion);
+    if (this.fast?.isHeard) this.fast.send(record);
+    else this.link.sendRecord(record);
   }
 
-  /** @param {Touch} touch */
+  /** @param {Touch} touch By all ways at once: whatever becomes of one, the server knows of the finger. */
   sendTouch(touch) {
     this.sequences.touch += 1;
+    const record = encodeTouch(this.sequences.touch, nowUs(this.surroundings.performance), touch);
+    this.fast?.send(record);
     // Never dropped: a release must get through, and an old one says nothing that a newer one does not.
-    const now = nowUs(this.surroundings.performance);
-    this.link.sendRecord(encodeTouch(this.sequences.touch, now, touch), Infinity);
+    this.link.sendRecord(record, Infinity);
   }
 
   /** @param {ArrayBuffer} record */

@@ -12,7 +12,7 @@ const HEADER_BYTES = 16;
 const FRAME_HEAD_BYTES = 8;
 
 export const Kind = Object.freeze({
-  MOTION: 1, FRAME: 2, TOUCH: 3, PONG: 4, PING: 129, CREDIT: 130, PICTURE: 131,
+  MOTION: 1, FRAME: 2, TOUCH: 3, PONG: 4, STAMP: 5, PING: 129, CREDIT: 130, PICTURE: 131,
 });
 
 export const Codec = Object.freeze({ JPEG: 1, H264: 2, VP8: 3 });
@@ -132,6 +132,17 @@ export function encodePong(sequence, tUs, ping) {
   const view = begin(Kind.PONG, 0, sequence, tUs, 16);
   view.setBigUint64(HEADER_BYTES, ping.nonce, true);
   view.setBigInt64(HEADER_BYTES + 8, BigInt(ping.tUs), true);
+  return view.buffer;
+}
+
+/**
+ * @param {number} sequence
+ * @param {number} tUs When the picture was taken [µs].
+ * @param {number} rtpTimestamp Of the picture, which can't say so itself.
+ */
+export function encodeStamp(sequence, tUs, rtpTimestamp) {
+  const view = begin(Kind.STAMP, 0, sequence, tUs, 4);
+  view.setUint32(HEADER_BYTES, rtpTimestamp, true);
   return view.buffer;
 }
 

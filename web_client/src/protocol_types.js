@@ -164,6 +164,7 @@
  * @property {string[]} refusals What keeps it from being granted, each in words.
  * @property {string} robot
  * @property {string} operator The device of the operator, or "".
+ * @property {string} video_path How the operator's pictures come and what dates them, in words, or "".
  * @property {Record<string, Stream>} streams By name: operator, phone_imu, video, pose, body_imu, control.
  * @property {Record<string, number>} latency_ms By stage, in order: capture to arrival, waiting, decode, detect, …, to control, control.
  * @property {number} leds LEDs in the last picture.

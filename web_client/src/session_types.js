@@ -7,6 +7,7 @@
 
 /**
  * @typedef {object} Health
+ * @property {import('./video_paths.js').PathName} path The way pictures go.
  * @property {number} fps Frames sent per second.
  * @property {number | null} rttMs Quickest way there and back of the last frames.
  * @property {number} imuHz

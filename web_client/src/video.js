@@ -28,18 +28,28 @@ export class VideoSender {
     /** @type {Encoder | null} */
     this.encoder = null;
     this.dropped = 0;
+    /** What the last pictures took from the camera out of the encoder. @type {number[]} */
+    this.encodedMs = [];
+  }
+
+  /** What a picture takes from the camera out of the encoder: median [ms], or null. */
+  get encodeMs() {
+    const sorted = [...this.encodedMs].sort((a, b) => a - b);
+    return sorted[sorted.length >> 1] ?? null;
   }
 
   /**
    * Chooses the encoder for a stream; resolves with its name.
    * @param {Stream} stream
+   * @param {boolean} [wantsJpeg] Whatever else this browser can.
    * @returns {Promise<string>}
    */
-  async prepare(stream) {
+  async prepare(stream, wantsJpeg = false) {
     const { VideoEncoder: Encoders } = this.surroundings;
-    const config = await supportedH264(Encoders, stream);
+    const config = wantsJpeg ? null : await supportedH264(Encoders, stream);
     this.encoder?.close();
     this.credits.encoding = 0;
+    this.encodedMs = [];
     this.encoder = config !== null && Encoders !== undefined
       ? new H264Encoder(Encoders, config, this.outlet())
       : this.jpegEncoder();
@@ -100,6 +110,7 @@ export class VideoSender {
     const now = this.surroundings.performance.now();
     const sequence = (this.sequence + 1) >>> 0;
     const { width, height, screenAngle } = about;
+    this.encodedMs = [...this.encodedMs.slice(-29), now - about.captureUs / 1000];
     const record = encodeFrame(
       sequence, about.captureUs, { ...picture, width, height, screen_angle_deg: screenAngle },
     );

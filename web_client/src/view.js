@@ -3,6 +3,7 @@
 /** @import {State, ShownMode} from './session_types.js' */
 /** @import {Advice} from './problems.js' */
 /** @import {Calibrate} from './protocol_types.js' */
+/** @import {PathWish} from './video_paths.js' */
 
 import { MODE_WORDS } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
@@ -21,6 +22,7 @@ const MOST_REFUSALS = 4;
  * @property {() => void} onStop
  * @property {() => void} onWish
  * @property {(what: Calibrate['what']) => void} onCalibrate
+ * @property {(wished: PathWish) => void} onPath
  * @property {() => void} onSound
  * @property {(() => void) | null} onFull Null where the page can't fill the screen.
  */
@@ -48,6 +50,8 @@ export class View {
     this.wish.addEventListener('click', wishes.onWish);
     find('sound').addEventListener('click', wishes.onSound);
     for (const type of ['pointerdown', 'click']) find('stop').addEventListener(type, wishes.onStop);
+    const path = /** @type {HTMLSelectElement} */ (find('path-wish'));
+    path.addEventListener('change', () => wishes.onPath(/** @type {PathWish} */ (path.value)));
     const { onFull } = wishes;
     find('full').hidden = onFull === null;
     if (onFull !== null) find('full').addEventListener('click', onFull);
@@ -143,6 +147,7 @@ export class View {
   /** @param {State} state */
   health({ health, status, heard }) {
     this.text('h-leds', heard && status ? String(status.leds) : '–');
+    this.text('h-path', health.path);
     this.text('h-fps', `${Math.round(health.fps)} fps`);
     this.text('h-rtt', health.rttMs === null ? '–' : `${Math.round(health.rttMs)} ms`);
     this.text('h-imu', `${Math.round(health.imuHz)} Hz`);

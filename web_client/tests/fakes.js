@@ -101,7 +101,7 @@ export function fakeWebSocket() {
  */
 export function statusOf(parts = {}) {
   return {
-    type: 'status', mode: 'DISARMED', reason: '', ready: false, refusals: [], robot: 'ames', operator: '',
+    type: 'status', mode: 'DISARMED', reason: '', ready: false, refusals: [], robot: 'ames', operator: '', video_path: '',
     streams: {}, latency_ms: {}, leds: 0, reprojection_px: null, position_mm: null, error_mm: null,
     error_deg: null, sigma_mm: null, saturated: false, virtual_camera: null, estimate: null, camera: null,
     recording: '', phones: 0, supervisors: 0, realtime: '',
@@ -121,10 +121,11 @@ export function estimateOf(parts = {}) {
   };
 }
 
-/** A PING as the server writes it. @param {bigint} nonce @param {number} tUs */
-export function pingOf(nonce, tUs) {
+/** A PING as the server writes it. @param {bigint} nonce @param {number} tUs @param {number} sequence */
+export function pingOf(nonce, tUs, sequence = 1) {
   const view = new DataView(new ArrayBuffer(24));
   [0x4c, 1, 129, 0].forEach((byte, i) => view.setUint8(i, byte));
+  view.setUint32(4, sequence, true);
   view.setBigInt64(8, BigInt(tUs), true);
   view.setBigUint64(16, nonce, true);
   return view.buffer;

@@ -127,3 +127,59 @@ test('a flood of faults on the page does not become a flood on the wire', () => 
   assert.equal(main?.sent.length, 2);
   assert.equal(JSON.parse(String(main?.sent[1])).text.length, 200);
 });
+
+/** A fast way, and the kinds of records that went it. */
+function fastWay() {
+  const kinds = /** @type {number[]} */ ([]);
+  return { isHeard: true, kinds, send: (/** @type {ArrayBuffer} */ one) => kinds.push(new Uint8Array(one)[2] ?? 0) };
+}
+
+const STILL = /** @type {import('../src/protocol.js').Motion} */ ({
+  rotation_rate: [0, 0, 0], acceleration: [0, 0, 9.8], orientation_wxyz: null, screen_angle_deg: 0,
+});
+
+test('motion goes the fast way while the server is heard there, and by websocket otherwise', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  const way = fastWay();
+  phone.fast = way;
+  const before = Number(main?.sent.length);
+  phone.sendMotion(1, STILL);
+  assert.deepEqual([way.kinds, main?.sent.length], [[1], before]);
+  way.isHeard = false;
+  phone.sendMotion(2, STILL);
+  assert.deepEqual([way.kinds, main?.sent.length], [[1], before + 1]);
+});
+
+test('a finger is told of by both ways, heard or not', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  const way = fastWay();
+  phone.fast = way;
+  const before = Number(main?.sent.length);
+  for (const isHeard of [true, false]) {
+    way.isHeard = isHeard;
+    phone.sendTouch({ held: isHeard, visible: true, press: 1, nonce: 1n });
+  }
+  assert.deepEqual([way.kinds, main?.sent.length], [[3, 3], before + 2]);
+});
+
+test('a PING that comes by both ways is answered once, by the first; a new session counts anew', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  /** @type {string[]} */
+  const answers = [];
+  const ping = (/** @type {number} */ sequence, /** @type {string} */ way) => phone.record(
+    { kind: 129, sequence, tUs: 5, nonce: BigInt(sequence) }, () => answers.push(`${sequence} ${way}`),
+  );
+  ping(1, 'fast');
+  ping(1, 'slow');
+  ping(2, 'slow');
+  ping(2, 'fast');
+  main?.says({ ...WELCOME, session: 's2' });
+  ping(1, 'fast');
+  assert.deepEqual(answers, ['1 fast', '2 slow', '1 fast']);
+});

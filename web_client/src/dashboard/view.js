@@ -83,7 +83,8 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  phone({ operator, phones, supervisors, recording }) {
+  phone({ operator, phones, supervisors, recording, video_path: path }) {
+    this.text('video-path', path && `video by ${path}`);
     this.text('operator', operator || 'none');
     this.find('operator').title = operator;
     this.text('crowd', `phones ${phones} · supervisors ${supervisors}`);

@@ -1,0 +1,1 @@
+"""The fast path: pictures and motion by WebRTC. Nothing else imports aiortc."""

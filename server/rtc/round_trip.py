@@ -1,0 +1,31 @@
+"""How long a packet and its answer take now, for knowing when a lost one can be back. Sans-I/O."""
+
+from __future__ import annotations
+
+from collections import deque
+
+REMEMBERED = 20
+"""Answers, a second of them: a line that gets worse is noticed, one slow answer is not believed."""
+SHARE = 0.75
+"""Of the answers that were quicker."""
+LONGEST_S = 2.0
+
+
+class RoundTrip:
+    """The upper quartile of the last answers; the least of all would be of a line that was."""
+
+    def __init__(self) -> None:
+        """Nothing known."""
+        self._last: deque[float] = deque(maxlen=REMEMBERED)
+
+    def add(self, t_asked: float, t_answered: float) -> None:
+        """An answer [s]; one that can't be is not believed: its times come from outside."""
+        if 0.0 <= t_answered - t_asked <= LONGEST_S:
+            self._last.append(t_answered - t_asked)
+
+    @property
+    def seconds(self) -> float | None:
+        """Of the line, at present [s]; None before the first answer."""
+        if not self._last:
+            return None
+        return sorted(self._last)[int(SHARE * len(self._last))]

@@ -1,0 +1,66 @@
+/** Worker between encoder and network: lets each encoded picture carry its record. */
+
+/** @import {Quaternion} from './protocol.js' */
+/** @import {Capture} from './rtc_matcher.js' */
+
+import { CaptureMatcher } from './rtc_matcher.js';
+import { withTrailer } from './rtc_trailer.js';
+
+/**
+ * From the page.
+ * @typedef {{ type: 'origin', timeOrigin: number } | { type: 'capture', capture: Capture }
+ *   | { type: 'attitude', orientation: Quaternion | null }
+ *   | { type: 'streams', readable: ReadableStream, writable: WritableStream }} ToWorker
+ */
+
+/**
+ * To the page, for each picture. `pair`: it could not be appended to.
+ * @typedef {{ bytes: number, pair: { rtpTimestamp: number, captureUs: number } | null }} FromWorker
+ */
+
+const worker = /** @type {any} */ (globalThis);
+let matcher = new CaptureMatcher();
+let pageOrigin = performance.timeOrigin;
+let sequence = 0;
+/** @type {Quaternion | null} */
+let orientation = null;
+
+/** @param {{ data: ToWorker }} event */
+worker.onmessage = ({ data }) => {
+  if (data.type === 'origin') {
+    pageOrigin = data.timeOrigin;
+    matcher = new CaptureMatcher();
+  } else if (data.type === 'capture') matcher.captured(data.capture);
+  else if (data.type === 'streams') join(data);
+  else orientation = data.orientation;
+};
+
+/** @param {{ data: ArrayBuffer, timestamp: number, getMetadata(): { rtpTimestamp?: number } }} frame */
+function send(frame) {
+  const nowUs = 1000 * (performance.timeOrigin - pageOrigin + performance.now());
+  const rtpTimestamp = frame.getMetadata().rtpTimestamp ?? frame.timestamp;
+  const { captureUs, screenAngle } = matcher.match(rtpTimestamp, nowUs);
+  sequence = (sequence + 1) >>> 0;
+  /** @type {FromWorker} */
+  const told = { bytes: frame.data.byteLength, pair: null };
+  try {
+    frame.data = withTrailer(frame.data, { sequence, captureUs, screenAngle, orientation });
+  } catch {
+    told.pair = { rtpTimestamp, captureUs };
+  }
+  worker.postMessage(told);
+}
+
+/** @param {{ readable: ReadableStream, writable: WritableStream }} streams Of the encoder and of the network. */
+function join({ readable, writable }) {
+  const records = new TransformStream({
+    transform(frame, controller) {
+      if (frame.data.byteLength > 0) send(frame);
+      controller.enqueue(frame);
+    },
+  });
+  void readable.pipeThrough(records).pipeTo(writable).catch(() => {}); // the connection was closed
+}
+
+/** @param {{ transformer: { readable: ReadableStream, writable: WritableStream } }} event */
+worker.onrtctransform = ({ transformer }) => join(transformer);

@@ -1,0 +1,239 @@
+/** The ways of a picture to the server, best first: WebRTC, H.264 by websocket, JPEG by websocket. */
+
+/** @import {Frame} from './frame_source.js' */
+/** @import {Welcome} from './protocol_types.js' */
+/** @import {RtcPath} from './rtc.js' */
+/** @import {VideoSender} from './video.js' */
+
+import { RtcRefused } from './rtc.js';
+import { Staleness } from './staleness.js';
+
+/** Between a way that was left and another try of it [ms]; the last one stays. */
+export const RETRY_MS = Object.freeze([2000, 10_000, 30_000]);
+/** A way that lasted so long was a good one: the next try comes soon again [ms]. */
+export const GOOD_MS = 20_000;
+/** A fast path that was silent for longer, or has no picture after so long, is given up [ms]. */
+export const SILENT_MS = 1500;
+export const FIRST_PICTURE_MS = 4000;
+/** Pictures older than this at the server, for so long, are reason to try the next way [ms]. */
+export const OLD_MS = 400;
+export const OLD_FOR_MS = 1500;
+/** The same of what the page's own encoder takes. */
+export const SLOW_ENCODER_MS = 200;
+export const SLOW_FOR_MS = 3000;
+
+/** @typedef {'WebRTC' | 'WebSocket' | 'JPEG' | '–'} PathName */
+/** What a person wants. @typedef {'auto' | 'WebRTC' | 'WebSocket' | 'JPEG'} PathWish */
+
+/**
+ * @typedef {object} Surroundings
+ * @property {{ now(): number }} performance
+ * @property {(callback: () => void, ms: number) => any} setTimeout
+ * @property {(id: any) => void} clearTimeout
+ * @property {RtcPath} rtc
+ * @property {VideoSender} video
+ * @property {() => boolean} socketIsOpen
+ * @property {() => { session: string, track: MediaStreamTrack | null }} place
+ * @property {(text: string) => void} say To the supervisor.
+ */
+
+/** Waits longer from failure to failure, and begins anew after a good while. */
+class Retry {
+  /** @param {Surroundings} surroundings */
+  constructor(surroundings) {
+    this.surroundings = surroundings;
+    this.failures = 0;
+    this.goodSinceMs = Infinity;
+    /** @type {any} */
+    this.timer = null;
+  }
+
+  succeeded() {
+    this.goodSinceMs = this.surroundings.performance.now();
+  }
+
+  /** @param {() => void} again */
+  failed(again) {
+    const { performance, setTimeout } = this.surroundings;
+    if (performance.now() - this.goodSinceMs > GOOD_MS) this.failures = 0;
+    this.goodSinceMs = Infinity;
+    const waitMs = RETRY_MS[Math.min(this.failures, RETRY_MS.length - 1)] ?? 0;
+    this.failures += 1;
+    this.stop();
+    this.timer = setTimeout(again, waitMs);
+  }
+
+  stop() {
+    this.surroundings.clearTimeout(this.timer);
+  }
+
+  reset() {
+    this.stop();
+    this.failures = 0;
+    this.goodSinceMs = Infinity;
+  }
+}
+
+export class VideoPaths {
+  /** @param {Surroundings} surroundings */
+  constructor(surroundings) {
+    this.surroundings = surroundings;
+    /** @type {Welcome | null} */
+    this.welcome = null;
+    /** @type {PathWish} */
+    this.wish = 'auto';
+    this.isConnecting = false;
+    this.fastTries = new Retry(surroundings);
+    this.encoderTries = new Retry(surroundings);
+    this.old = new Staleness(OLD_MS, OLD_FOR_MS);
+    this.slow = new Staleness(SLOW_ENCODER_MS, SLOW_FOR_MS);
+  }
+
+  /** The way pictures go now. @returns {PathName} */
+  get name() {
+    const { rtc, video, socketIsOpen } = this.surroundings;
+    if (rtc.isFlowing) return 'WebRTC';
+    if (!socketIsOpen() || video.encoder === null) return '–';
+    return video.encoder.name === 'JPEG' ? 'JPEG' : 'WebSocket';
+  }
+
+  /**
+   * The server has welcomed us, and the camera is settled: begin with the websocket, look for better.
+   * @param {Welcome} welcome
+   */
+  begin(welcome) {
+    this.end();
+    this.welcome = welcome;
+    this.seek();
+  }
+
+  /** The server has gone. */
+  end() {
+    this.welcome = null;
+    this.fastTries.reset();
+    this.encoderTries.reset();
+    this.surroundings.rtc.close();
+  }
+
+  /** @param {PathWish} wish A person's. */
+  choose(wish) {
+    const { rtc, video, say } = this.surroundings;
+    const { welcome } = this;
+    this.wish = wish;
+    if (welcome === null) return;
+    say(`pictures: ${wish} was chosen`);
+    this.fastTries.reset();
+    this.encoderTries.reset();
+    if (wish === 'WebSocket' || wish === 'JPEG') rtc.close();
+    void video.prepare(welcome, wish === 'JPEG').then(() => video.requestKey());
+    this.seek();
+  }
+
+  /** Connects, if the fast path is wanted and not there. */
+  seek() {
+    const { rtc, say } = this.surroundings;
+    if (this.wish === 'WebSocket' || this.wish === 'JPEG' || rtc.isOpen) return;
+    if (rtc.isAble && (this.wish === 'WebRTC' || rtc.pictures.haveRecords)) void this.connect();
+    else say('no WebRTC with records in this browser: pictures go by websocket');
+  }
+
+  /**
+   * Takes a frame over.
+   * @param {Frame} frame
+   */
+  offer(frame) {
+    const { rtc, video, socketIsOpen } = this.surroundings;
+    if (rtc.isOpen || this.isConnecting) rtc.pictures.captured(frame);
+    if (!rtc.isFlowing && socketIsOpen()) video.offer(frame);
+    else frame.close();
+  }
+
+  /**
+   * What the screen shows of it.
+   * @param {number} now [ms]
+   */
+  health(now) {
+    const { rtc, video } = this.surroundings;
+    const { frames, bytes } = rtc.isFlowing ? rtc.pictures : video;
+    return {
+      path: this.name,
+      fps: frames.perSecond(now),
+      rttMs: rtc.isFlowing ? null : video.credits.roundTripMs,
+      kbps: bytes.perSecond(now) * 0.008,
+    };
+  }
+
+  /**
+   * To be called now and then: leaves a way that is no good.
+   * @param {number | null} ageMs Of the pictures, as the server says.
+   */
+  look(ageMs) {
+    const { rtc, video, performance } = this.surroundings;
+    const now = performance.now();
+    if (rtc.isOpen) {
+      const why = this.complaint(now, ageMs);
+      if (why === '') return;
+      rtc.close();
+      this.lost(why);
+    } else if (this.wish === 'auto' && this.slow.isStale(now, video.encodeMs) && this.name === 'WebSocket') {
+      this.slow.reset();
+      void this.encodeLess();
+    }
+  }
+
+  /**
+   * What is wrong with the fast path that is open; "" if nothing is.
+   * @param {number} now [ms]
+   * @param {number | null} ageMs
+   */
+  complaint(now, ageMs) {
+    const { rtc } = this.surroundings;
+    if (now - rtc.heardMs > SILENT_MS) return 'silent';
+    if (!rtc.isFlowing) return now - this.fastTries.goodSinceMs > FIRST_PICTURE_MS ? 'no picture' : '';
+    return this.old.isStale(now, ageMs) ? `pictures are ${ageMs} ms old` : '';
+  }
+
+  async connect() {
+    const { rtc, place, say } = this.surroundings;
+    const { session, track } = place();
+    const { welcome } = this;
+    if (welcome === null || this.isConnecting || track === null) return;
+    this.isConnecting = true;
+    try {
+      await rtc.open(session, track, welcome);
+      this.old.reset();
+      this.fastTries.succeeded();
+      say('pictures go by WebRTC');
+    } catch (error) {
+      rtc.close();
+      const why = error instanceof Error ? error.message : String(error);
+      if (error instanceof RtcRefused) say(`no WebRTC: ${why}`);
+      else if (welcome === this.welcome) this.lost(why);
+    } finally {
+      this.isConnecting = false;
+      if (welcome !== this.welcome) void this.connect(); // welcomed anew meanwhile
+    }
+  }
+
+  /** @param {string} why The fast path has ended: the websocket takes over, with a key; later, another try. */
+  lost(why) {
+    const { video, say } = this.surroundings;
+    if (this.welcome === null || this.wish === 'WebSocket' || this.wish === 'JPEG') return;
+    video.requestKey();
+    say(`WebRTC: ${why}; pictures go by websocket`);
+    this.fastTries.failed(() => void this.connect());
+  }
+
+  /** The encoder is too slow: JPEG for a while. */
+  async encodeLess() {
+    const { video, say } = this.surroundings;
+    const { welcome } = this;
+    if (welcome === null) return;
+    say(`${video.encoder?.name} takes ${Math.round(video.encodeMs ?? 0)} ms a picture: JPEG`);
+    await video.prepare(welcome, true);
+    this.encoderTries.failed(() => {
+      this.encoderTries.succeeded();
+      if (welcome === this.welcome && this.wish === 'auto') void video.prepare(welcome);
+    });
+  }
+}
