@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.camera_file import CameraFileError, find_camera_file
+from hardware.camera_file import CameraFileError
 from pipeline.camera.lens import Camera
 from pipeline.camera.mounting import SQUARE
 from pipeline.robot import Robot
@@ -30,12 +30,11 @@ from server.messages import Hello
 from server.meter import Meter
 from server.seen_input import SeenInput
 from server.sensor_check import SensorCheck
+from server.shape import Shape
 from server.sight import Sight
 from server.vision import VisionThread
 from server.wire import Motion, Picture, Record, WireError
 
-Shape = tuple[int, int, int]
-"""Of pictures: width, height [px], angle of the screen [°]."""
 STALE_S = 1.0
 """A stream silent for longer keeps the robot from being armed."""
 
@@ -118,8 +117,7 @@ class OperatorPhone:
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)
-        picture = frame.picture
-        shape = (picture.width, picture.height, picture.screen_angle_deg)
+        shape = Shape.of(frame.picture)
         if shape != self._shape:
             self._open_eyes(shape)
         if self.wizard is not None:
@@ -135,12 +133,11 @@ class OperatorPhone:
         is_calibrating = self.wizard is not None and self.wizard.stored is None
         self.close()
         self._shape, self.camera_problem = shape, ""
-        if is_calibrating:
+        if is_calibrating and not shape.shrunk:
             self._calibrate(shape)
             return
-        width, height, angle = shape
         try:
-            path, camera = find_camera_file(self.device, width, height, self._cameras, angle)
+            path, camera = shape.camera(self.device, self._cameras)
         except CameraFileError as error:
             self.camera_problem = str(error)
             return
@@ -206,6 +203,8 @@ class OperatorPhone:
         """
         if wish.what == "start" and (self._shape is None or self._profiles is None):
             raise WireError("order", "calibrate.what", "when pictures come")
+        if wish.what == "start" and self._shape is not None and self._shape.shrunk:
+            raise WireError("order", "calibrate.what", "when pictures have the camera's own size")
         self.close()
         if wish.what == "start" and self._shape is not None:
             self._calibrate(self._shape)
@@ -216,9 +215,8 @@ class OperatorPhone:
     def _calibrate(self, shape: Shape) -> None:
         """Begin, or begin again in another orientation."""
         assert self._profiles is not None
-        self.wizard = Wizard(
-            self.device, shape, self._profiles, self._on_taken, self._on_key_wanted
-        )
+        size = (shape.width, shape.height, shape.screen_angle_deg)
+        self.wizard = Wizard(self.device, size, self._profiles, self._on_taken, self._on_key_wanted)
 
     def calibration(self) -> Calibration:
         """What the page should know of it."""

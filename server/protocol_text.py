@@ -35,7 +35,7 @@ RECORDS: dict[Kind, Layout] = {
     Kind.FRAME: (
         wire.Picture,
         wire.FRAME,
-        (("codec", 1), ("", 1), ("width", 1), ("height", 1), ("screen_angle_deg", 1)),
+        (("codec", 1), ("shrunk", 1), ("width", 1), ("height", 1), ("screen_angle_deg", 1)),
     ),
     Kind.TOUCH: (
         wire.Touch,
@@ -213,12 +213,13 @@ Each encoded picture has its record behind it: {trailer.TRAILER_BYTES} bytes, ea
 bit set so that no start code appears. In groups of {trailer.GROUP}, each followed by a byte whose
 bits 0 to {trailer.GROUP - 1} are the group's highest bits, little-endian: sequence u32, time i64
 [µs of the page's clock], flags u8 (bits 0 and 1: screen angle / 90°, bit 2: there is an
-orientation), orientation w, x, y, z as 4 × i16 (32767 is 1), CRC-16 (polynomial 0x1021, from 0) of
-these {trailer.FIELDS.size} bytes; then the bytes {trailer.MARK.hex(" ")}. Where a picture can't be
-appended to, STAMP says when it was taken; without either it is dated by its arrival, up to
-{1e3 * ingest.ARRIVAL_S:g} ms wrong. There are no CREDITs: a key frame is asked for by
-RTCP. Of pictures that come by both ways those of one count; the other one takes over with a key
-picture that was taken after all of them. What else comes by `/ws/video` is given back unseen.
+orientation, bits 3 and 4: `shrunk` of FRAME), orientation w, x, y, z as 4 × i16 (32767 is 1),
+CRC-16 (polynomial 0x1021, from 0) of these {trailer.FIELDS.size} bytes; then the bytes
+{trailer.MARK.hex(" ")}. Where a picture can't be appended to, STAMP says when it was taken; without
+either it is dated by its arrival, up to {1e3 * ingest.ARRIVAL_S:g} ms wrong. There are
+no CREDITs: a key frame is asked for by RTCP. Of pictures that come by both ways those of one count;
+the other one takes over with a key picture that was taken after all of them. What else comes by
+`/ws/video` is given back unseen.
 
 ## Clocks and signs of life
 

@@ -20,9 +20,13 @@ MAGIC = 0x4C
 HEADER = struct.Struct("<BBBBIq")
 """magic u8, version u8, kind u8, flags u8, sequence u32, time i64 [µs of the sender's clock]."""
 
+KEY_FLAG = 1
+"""Of FRAME."""
 MAX_RECORD_BYTES = 262_144
 MAX_MESSAGE_BYTES = 4_096
 MAX_PIXELS = 2_100_000
+QUARTERS, MOST_SHRUNK = 4, 2
+"""A page makes its pictures smaller by quarters, at most by two."""
 
 
 class WireError(ValueError):
@@ -86,6 +90,8 @@ class Picture:
     screen_angle_deg: int
     data: bytes
     """A JPEG file, an H.264 access unit (Annex B) or a VP8 frame."""
+    shrunk: int = 0
+    """By so many quarters the page has made it smaller than the camera's picture."""
     by_arrival: bool = False
     """Its time is a guess by its arrival (flag bit 3); pages know better and don't say so."""
 
@@ -171,8 +177,9 @@ def encode(record: Record) -> bytes:
                 *body.rotation_rate, *body.acceleration, *orientation, body.screen_angle_deg, 0
             )
         case Picture():
-            kind, flags = Kind.FRAME, body.key | body.by_arrival << 3
-            head = FRAME.pack(body.codec, 0, body.width, body.height, body.screen_angle_deg)
+            kind, flags = Kind.FRAME, KEY_FLAG * body.key | body.by_arrival << 3
+            size = (body.width, body.height)
+            head = FRAME.pack(body.codec, body.shrunk, *size, body.screen_angle_deg)
             payload = head + body.data
         case Touch():
             kind = Kind.TOUCH
@@ -245,17 +252,19 @@ def _motion(payload: bytes, flags: int) -> Motion:
 def _frame(payload: bytes, flags: int) -> Picture:
     if len(payload) <= FRAME.size:
         raise WireError("size", "frame", f"more than {FRAME.size} bytes of payload")
-    codec, _, width, height, angle = FRAME.unpack_from(payload)
+    codec, shrunk, width, height, angle = FRAME.unpack_from(payload)
     if codec not in Codec.__members__.values():
         raise WireError("value", "frame.codec", ", ".join(f"{int(c)} {c.name}" for c in Codec))
     if width < 16 or height < 16 or width * height > MAX_PIXELS:
         raise WireError("value", "frame.size", f"16×16 up to {MAX_PIXELS} pixels")
+    if shrunk > MOST_SHRUNK:
+        raise WireError("value", "frame.shrunk", f"0 to {MOST_SHRUNK}")
     data = payload[FRAME.size :]
     if codec == Codec.JPEG and data[:2] != b"\xff\xd8":
         raise WireError("value", "frame.data", "a JPEG, beginning with FF D8")
     angle = _angle(angle, "frame.screen_angle_deg")
-    is_key, by_arrival = bool(flags & 1), bool(flags & 8)
-    return Picture(Codec(codec), is_key, width, height, angle, data, by_arrival=by_arrival)
+    key, by_arrival = bool(flags & KEY_FLAG), bool(flags & 8)
+    return Picture(Codec(codec), key, width, height, angle, data, shrunk, by_arrival)
 
 
 def _touch(payload: bytes, _flags: int) -> Touch:

@@ -63,6 +63,7 @@ BROKEN: tuple[wire.Body, ...] = (
     replace(MOTION, screen_angle_deg=45),
     replace(PICTURE, codec=0),  # type: ignore[arg-type]
     replace(PICTURE, width=1),
+    replace(PICTURE, shrunk=3),
     replace(PICTURE, data=b"GIF"),
     replace(PICTURE, screen_angle_deg=45),
     replace(TOUCH, held=2),  # type: ignore[arg-type]

@@ -68,6 +68,16 @@ class Camera:
         delays: Array = (rows / self.height - 0.5) * self.readout_s
         return delays
 
+    def resized(self, width: int, height: int) -> Camera:
+        """The camera whose picture is this one's whole, made larger or smaller to another size."""
+        if (width, height) == (self.width, self.height):
+            return self
+        sx, sy = width / self.width, height / self.height
+        # edges of the picture stay edges, and a pixel's centre is half a pixel from its edge
+        u, v = 0.5 * (sx - 1.0), 0.5 * (sy - 1.0)
+        K = np.array([[sx, 0.0, u], [0.0, sy, v], [0.0, 0.0, 1.0]]) @ self.K
+        return Camera(width, height, K, self.model, self.distortion, self.readout_s)
+
     @property
     def half_field(self) -> tuple[float, float]:
         """Tangents of half the field of view, to the side and up, without the lens's distortion."""

@@ -122,9 +122,8 @@ class RtcPhoneClient(PhoneClient):
     async def _send_picture(self, record: Record, picture: Picture) -> None:
         data = picture.data
         if self._dated_by == "record":
-            said = FrameRecord(
-                record.sequence, record.t_us, picture.screen_angle_deg, self._attitude
-            )
+            angle, shrunk = picture.screen_angle_deg, picture.shrunk
+            said = FrameRecord(record.sequence, record.t_us, angle, self._attitude, shrunk)
             data = append(data, said)
         packet = av.Packet(data)
         packet.pts, packet.time_base = record.t_us * RTP_HZ // 1_000_000, Fraction(1, RTP_HZ)

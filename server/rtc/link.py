@@ -159,8 +159,9 @@ class RtcLink:
         angle = said.screen_angle_deg if said is not None else self._screen_angle_deg
         sequence = said.sequence if said is not None else frame.number
         self._phone.video_path = f"WebRTC, {codec.name}, dated by {date.source}"
+        shrunk = said.shrunk if said is not None else 0
         by_arrival = date.source == "arrival"
-        picture = Picture(codec, frame.key, *self._size, angle, data, by_arrival=by_arrival)
+        picture = Picture(codec, frame.key, *self._size, angle, data, shrunk, by_arrival)
         return Record(sequence, date.t_us, picture)
 
     def _refuse(self, error: WireError, session: Session) -> None:

@@ -12,7 +12,7 @@ from binascii import crc_hqx
 from dataclasses import dataclass
 from math import sqrt
 
-from server.wire import WireError
+from server.wire import MOST_SHRUNK, WireError
 
 FIELDS = struct.Struct("<IqBhhhh")
 """sequence u32, time i64 [µs of the phone's clock], flags u8, orientation w x y z 4 × i16."""
@@ -23,6 +23,8 @@ TRAILER_BYTES = RAW_BYTES + -(-RAW_BYTES // GROUP) + len(MARK)
 ONE = 32767.0
 HAS_ORIENTATION = 4
 """Flag; the two bits below are the screen's angle in quarter turns."""
+SHRUNK = 3
+"""The two bits from here on say by how many quarters the page has shrunk the picture."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +39,15 @@ class FrameRecord:
     """0, 90, 180 or 270."""
     orientation_wxyz: tuple[float, float, float, float] | None
     """Device to earth, of the newest motion reading."""
+    shrunk: int = 0
+    """By so many quarters the page has made it smaller than the camera's picture."""
 
 
 def append(data: bytes, record: FrameRecord) -> bytes:
     """An encoded picture with its record behind it."""
     orientation = record.orientation_wxyz
     flags = record.screen_angle_deg // 90 | (HAS_ORIENTATION if orientation is not None else 0)
+    flags |= record.shrunk << SHRUNK
     numbers = [round(ONE * q) for q in orientation or (1.0, 0.0, 0.0, 0.0)]
     fields = FIELDS.pack(record.sequence, record.t_us, flags, *numbers)
     return data + _escaped(fields + crc_hqx(fields, 0).to_bytes(2, "little")) + MARK
@@ -67,8 +72,9 @@ def _record(fields: bytes) -> FrameRecord:
     sequence, t_us, flags, *numbers = FIELDS.unpack(fields)
     if not 0 <= t_us < 1 << 60:
         raise WireError("value", "trailer.time", "0 to 2^60 µs")
-    if flags & ~(HAS_ORIENTATION | 3):
-        raise WireError("value", "trailer.flags", "0 to 7")
+    shrunk = flags >> SHRUNK
+    if shrunk > MOST_SHRUNK:
+        raise WireError("value", "trailer.flags", f"0 to {(MOST_SHRUNK + 1 << SHRUNK) - 1}")
     orientation = None
     if flags & HAS_ORIENTATION:
         length = sqrt(sum(n * n for n in numbers))
@@ -76,7 +82,7 @@ def _record(fields: bytes) -> FrameRecord:
             raise WireError("value", "trailer.orientation_wxyz", "a unit quaternion")
         w, x, y, z = (n / length for n in numbers)
         orientation = (w, x, y, z)
-    return FrameRecord(sequence, t_us, 90 * (flags & 3), orientation)
+    return FrameRecord(sequence, t_us, 90 * (flags & 3), orientation, shrunk)
 
 
 def _escaped(raw: bytes) -> bytes:

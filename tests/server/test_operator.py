@@ -233,3 +233,42 @@ def test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed():
         assert rig.why()[-1] == camera_verdict.STABILISED
     finally:
         rig.phone.close()
+
+
+SMALL = replace(JPEG, width=960, height=540, shrunk=1)
+
+
+def test_pictures_that_the_page_made_smaller_are_those_of_the_same_camera():
+    rig = Rig(DEVICE)
+    try:
+        rig.synchronise()
+        rig.say(JPEG)
+        full = rig.phone.vision._sight.camera
+        rig.say(SMALL, 2)
+        small = rig.phone.vision._sight.camera
+        assert (small.width, small.height) == (960, 540)
+        points = np.array([[1.0, 0.2, -0.1], [2.0, -0.5, 0.3]])
+        np.testing.assert_allclose(
+            small.pixels(points) + 0.5, 0.75 * (full.pixels(points) + 0.5), rtol=1e-12
+        )
+    finally:
+        rig.phone.close()
+
+
+@pytest.mark.parametrize("size", [{"shrunk": 0}, {"shrunk": 2}, {"height": 528}])
+def test_pictures_of_a_size_nobody_calibrated_are_refused_until_the_size_is_right_again(size):
+    rig = Rig(DEVICE)
+    try:
+        rig.synchronise()
+        rig.say(JPEG)
+        for sequence in (2, 3):
+            with pytest.raises(WireError, match="no calibration") as refused:
+                rig.say(replace(SMALL, **size), sequence)
+            assert refused.value.code == "calibration"
+            assert rig.phone.vision is None
+        assert any("The camera is not calibrated" in why for why in rig.why())
+        rig.say(JPEG, 4)
+        assert rig.phone.vision is not None
+        assert not any("not calibrated" in why for why in rig.why())
+    finally:
+        rig.phone.close()

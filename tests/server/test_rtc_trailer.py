@@ -20,6 +20,7 @@ records = st.builds(
     st.integers(0, 2**60 - 1),
     st.sampled_from([0, 90, 180, 270]),
     st.sampled_from([None, HALF, (1.0, 0.0, 0.0, 0.0), (0.0, 0.6, 0.0, -0.8)]),
+    st.integers(0, 2),
 )
 
 
@@ -30,8 +31,8 @@ def test_what_was_appended_is_taken_off_again(data, record):
     assert min(whole[-TRAILER_BYTES:]) >= 0x80  # no zero, so no start code and no emulation of one
     plain, said = split(whole)
     assert plain == data
-    assert (said.sequence, said.t_us, said.screen_angle_deg) == (
-        record.sequence, record.t_us, record.screen_angle_deg,
+    assert (said.sequence, said.t_us, said.screen_angle_deg, said.shrunk) == (
+        record.sequence, record.t_us, record.screen_angle_deg, record.shrunk,
     )  # fmt: skip
     if record.orientation_wxyz is None:
         assert said.orientation_wxyz is None
@@ -53,7 +54,7 @@ def test_a_damaged_record_is_none():
 
 @pytest.mark.parametrize(
     ("change", "field"),
-    [((8, b"\xff" * 4), "time"), ((12, b"\xf0"), "flags"), ((13, bytes(8)), "orientation")],
+    [((8, b"\xff" * 4), "time"), ((12, b"\x18"), "flags"), ((13, bytes(8)), "orientation")],
 )
 def test_values_that_cannot_be_are_refused(change, field):
     from binascii import crc_hqx

@@ -19,6 +19,7 @@ BODIES = [
     replace(MOTION, orientation_wxyz=None, rotation_rate=(0.5,) * 3, acceleration=(0.5,) * 3),
     PICTURE,
     replace(PICTURE, by_arrival=True),
+    replace(PICTURE, shrunk=2),
     wire.Touch(True, True, 3, 2**64 - 1),
     wire.Stamp(2**32 - 1),
     wire.Pong(7, 2**40),
@@ -68,6 +69,7 @@ BAD = [
     ("motion.screen_angle_deg", replace(MOTION, screen_angle_deg=45)),
     ("frame.size", replace(PICTURE, width=30_000, height=30_000)),
     ("frame.size", replace(PICTURE, width=0)),
+    ("frame.shrunk", replace(PICTURE, shrunk=3)),
     ("frame.data", replace(PICTURE, codec=Codec.JPEG)),
     ("frame", replace(PICTURE, data=b"")),
 ]

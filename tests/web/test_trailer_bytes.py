@@ -37,7 +37,8 @@ def test_what_the_page_appends_the_server_takes_off() -> None:
         w, x, y, z = (round(32767 * q / length) / 32767 for q in turn)
         orientation = rng.choice([None, (w, x, y, z)])
         angle = rng.choice([0, 90, 180, 270])
-        records.append(FrameRecord(rng.getrandbits(32), rng.getrandbits(50), angle, orientation))
+        number, t_us, shrunk = rng.getrandbits(32), rng.getrandbits(50), rng.randrange(3)
+        records.append(FrameRecord(number, t_us, angle, orientation, shrunk))
         pictures.append(rng.randbytes(rng.randrange(1, 200)))
     asked = [
         {
@@ -46,6 +47,7 @@ def test_what_the_page_appends_the_server_takes_off() -> None:
             "captureUs": record.t_us,
             "screenAngle": record.screen_angle_deg,
             "orientation": record.orientation_wxyz,
+            "shrunk": record.shrunk,
         }
         for data, record in zip(pictures, records, strict=True)
     ]

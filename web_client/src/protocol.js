@@ -35,6 +35,7 @@ export const Codec = Object.freeze({ JPEG: 1, H264: 2, VP8: 3 });
  * @typedef {object} Picture
  * @property {number} codec One of `Codec`.
  * @property {boolean} key Decodable without an earlier one.
+ * @property {number} [shrunk] By so many quarters it is smaller than the camera's.
  * @property {number} width
  * @property {number} height
  * @property {ScreenAngle} screen_angle_deg
@@ -102,6 +103,7 @@ export function encodeFrame(sequence, tUs, picture) {
   const bytes = FRAME_HEAD_BYTES + picture.data.byteLength;
   const view = begin(Kind.FRAME, picture.key ? 1 : 0, sequence, tUs, bytes);
   view.setUint8(HEADER_BYTES, picture.codec);
+  view.setUint8(HEADER_BYTES + 1, picture.shrunk ?? 0);
   view.setUint16(HEADER_BYTES + 2, picture.width, true);
   view.setUint16(HEADER_BYTES + 4, picture.height, true);
   view.setInt16(HEADER_BYTES + 6, picture.screen_angle_deg, true);

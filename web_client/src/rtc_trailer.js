@@ -12,6 +12,7 @@
  * @property {number} captureUs When it was taken, on the page's clock.
  * @property {ScreenAngle} screenAngle
  * @property {Quaternion | null} orientation Device to earth.
+ * @property {number} shrunk By so many quarters the picture is smaller than the camera's.
  */
 
 const FIELDS_BYTES = 21;
@@ -21,6 +22,7 @@ const MARK = [0xcc, 0xd2, 0x81];
 export const TRAILER_BYTES = RAW_BYTES + Math.ceil(RAW_BYTES / GROUP) + MARK.length;
 const ONE = 32767;
 const HAS_ORIENTATION = 4;
+const SHRUNK = 3;
 
 /**
  * An encoded picture with its record behind it.
@@ -36,12 +38,12 @@ export function withTrailer(data, record) {
 }
 
 /** @param {FrameRecord} record */
-function rawOf({ sequence, captureUs, screenAngle, orientation }) {
+function rawOf({ sequence, captureUs, screenAngle, orientation, shrunk }) {
   const raw = new Uint8Array(RAW_BYTES);
   const view = new DataView(raw.buffer);
   view.setUint32(0, sequence, true);
   view.setBigInt64(4, BigInt(Math.max(0, Math.round(captureUs))), true);
-  view.setUint8(12, screenAngle / 90 + (orientation ? HAS_ORIENTATION : 0));
+  view.setUint8(12, screenAngle / 90 + (orientation ? HAS_ORIENTATION : 0) + (shrunk << SHRUNK));
   (orientation ?? [1, 0, 0, 0]).forEach((q, i) => {
     view.setInt16(13 + 2 * i, Math.round(ONE * Math.min(1, Math.max(-1, q))), true);
   });

@@ -55,3 +55,14 @@ def test_the_picture_ends_half_a_pixel_beyond_its_last_pixels():
 
 def test_the_mean_focal_length_counts():
     assert camera().focal_px == pytest.approx(930.75)
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_in_a_picture_made_smaller_each_point_keeps_its_share_of_width_and_height(model):
+    points = np.array([[1.0, 0.0, 0.0], [1.0, 0.4, -0.2], [2.0, -0.7, 0.4]])
+    small = camera(model).resized(640, 360)
+    assert (small.width, small.height) == (640, 360)
+    edges = 0.5 * (camera(model).pixels(points) + 0.5)
+    np.testing.assert_allclose(small.pixels(points) + 0.5, edges, rtol=1e-12)
+    same = camera(model)
+    assert same.resized(1280, 720) is same
