@@ -185,7 +185,7 @@ class Hub:
             return self.recordings.start()
         name = self.recordings.start(phone.device, phone.camera_text)
         self.recordings.message("phone", encode_message(phone.hello), now())
-        phone.want_key()  # what follows can't be decoded without one
+        self._ask_key()
         return name
 
     def record(self, data: str | bytes, t: float) -> None:
@@ -194,6 +194,11 @@ class Hub:
             self.recordings.record("phone", data, t)
         else:
             self.recordings.message("phone", data, t)
+
+    def _ask_key(self) -> None:
+        """Pictures recorded before the next key are of no use."""
+        if self.recordings.key_is_due(now()):
+            self.paths.want_key()
 
     def ping(self) -> None:
         """Ask the phone for a sign of life; called 20 times a second."""
@@ -223,6 +228,7 @@ class Hub:
         self._shown = status
         self.broadcast(status)
         self._show_picture()
+        self._ask_key()
         self._desk.tell(self.phone, self.status)
 
     def broadcast(self, message: ToPage) -> None:

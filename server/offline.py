@@ -7,19 +7,12 @@ estimates, as rows of `offline_table`.
 from __future__ import annotations
 
 import csv
-import json
-import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from hardware.camera_file import CAMERAS, CameraFileError, find_camera
-from hardware.robot_file import RobotFile, RobotFileError, load_robot
-from pipeline.camera.lens import Camera
 from pipeline.config import TeleopConfig
 from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose
 from pipeline.teleop import Output
@@ -34,19 +27,13 @@ from server.controller import Controller
 from server.ingest import EncodedFrame, Ingest
 from server.messages import Command, Hello, decode_message
 from server.offline_table import COLUMNS, row_of
-from server.recording import (
-    CAMERA_KEY,
-    PHONE_MESSAGES,
-    PHONE_RECORDS,
-    ROBOT_KEY,
-    SERVER_RECORDS,
-    STATUS,
-    RecordingError,
-)
-from server.recording_files import Entry, Recording, device_of
+from server.recorded_setting import body_samples, first_shape, recorded_camera, recorded_robot
+from server.recording import PHONE_MESSAGES, PHONE_RECORDS, SERVER_RECORDS, RecordingError
+from server.recording_files import Entry, Recording
 from server.seen_input import SeenInput
+from server.shape import Shape
 from server.sight import Sight
-from server.wire import Picture, Ping, WireError, decode
+from server.wire import Picture, Ping, Record, WireError, decode
 
 PERIOD_S = 0.005
 READY_EVERY, EXPECT_EVERY = 20, 4
@@ -65,14 +52,13 @@ class Offline:
             RecordingError: damaged, or its robot or camera can't be used.
         """
         self._recording = recording
-        robot_file, camera = _setting(recording)
-        config = TeleopConfig()
-        self.robot, self._tap = robot_file.robot, tap
-        self._controller = Controller(robot_file.robot, config)
-        self._new_sight = partial(Sight, camera, robot_file.robot, config.gates)
+        self.robot, self._tap = recorded_robot(recording).robot, tap
+        self._config = TeleopConfig()
+        self._controller = Controller(self.robot, self._config)
+        self._shape = first_shape(recording)
         self._nonces: deque[int] = deque()
         self._greet()
-        self._body = deque(_body_samples(recording))
+        self._body = deque(body_samples(recording))
         self._inbox: list[Input] = []
         self._seen: list[tuple[EncodedFrame, RelativePose | None]] = []
         self.refused = 0
@@ -80,9 +66,19 @@ class Offline:
 
     def _greet(self) -> None:
         """A phone has come: nothing is known of its clock and its pictures."""
-        self._ingest, self._sight = Ingest(self._nonces.popleft), self._new_sight()
-        self._ingest.mounting = self._sight.camera.mounting
-        self._undated: list[EncodedFrame] = []
+        self._ingest = Ingest(self._nonces.popleft)
+        self._new_sight()
+
+    def _new_sight(self) -> None:
+        """Open eyes for pictures of the present shape.
+
+        Raises:
+            RecordingError: nobody knows a camera that takes such pictures.
+        """
+        camera = recorded_camera(self._recording, self._shape)
+        self._sight = Sight(camera, self.robot, self._config.gates)
+        self._ingest.mounting = camera.mounting
+        self._is_blind = False
 
     def rows(self) -> Iterator[dict[str, str]]:
         """One row per picture.
@@ -133,75 +129,45 @@ class Offline:
                 self._nonces.append(record.body.nonce)
                 self._ingest.ping(entry.t)
             elif entry.topic == PHONE_RECORDS:
-                signal = self._ingest.record(record, entry.t)
-                if signal is None and isinstance(record.body, Picture):
-                    self._keep_undated(EncodedFrame(entry.t, entry.t, record.sequence, record.body))
-                self._take(signal)
+                self._take(record, entry.t)
         except WireError:
             self.refused += 1
 
-    def _keep_undated(self, frame: EncodedFrame) -> None:
-        """From before the phone's clock is known: later pictures can't be decoded without it."""
-        if frame.picture.key:
-            self._undated.clear()
-        self._undated.append(frame)
+    def _take(self, record: Record, now: float) -> None:
+        """A record of the phone."""
+        match self._ingest.record(record, now):
+            case PhoneImu() as sample:
+                self._sight.feel(sample)
+                self._inbox.append(PhoneImuInput.of(sample))
+            case Operator() as operator:
+                self._inbox.append(OperatorInput.of(operator))
+            case EncodedFrame() as frame:
+                self._see(frame)
+            case None if isinstance(record.body, Picture):  # those that follow lean on it
+                self._fit(record.body)
+                self._sight.decoded(EncodedFrame(now, now, record.sequence, record.body))
 
-    def _take(self, signal: PhoneImu | Operator | EncodedFrame | None) -> None:
-        match signal:
-            case PhoneImu():
-                self._sight.feel(signal)
-                self._inbox.append(PhoneImuInput.of(signal))
-            case Operator():
-                self._inbox.append(OperatorInput.of(signal))
-            case EncodedFrame():
-                controller = self._controller
-                frames, self._undated = [*self._undated, signal], []
-                sighting = self._sight.see(frames, controller.up_in_b, controller.omega_bf_in_b)
-                self._seen.append((signal, sighting.pose if sighting is not None else None))
-                seen = sighting.seen(self._sight.camera) if sighting is not None else None
-                if seen is not None:
-                    self._inbox.append(SeenInput.of(seen))
-
-
-def _body_samples(recording: Recording) -> list[BodyImu]:
-    """The robot's motion samples out of the recorded statuses, in the order of time."""
-    samples: list[BodyImu] = []
-    for entry in recording.entries(STATUS):
+    def _fit(self, picture: Picture) -> None:
+        """Open other eyes for another size or angle, as the server did; none if it had none."""
+        shape = Shape.of(picture)
+        if shape == self._shape:
+            return
+        self._shape = shape
         try:
-            rows = np.array(json.loads(entry.data)["body_samples"], dtype=np.float64)
-            rows = rows.reshape(-1, 7)
-        except (ValueError, LookupError, TypeError) as error:
-            what = f"holds a status that can't be read: {error}"
-            raise RecordingError(recording.path, what, "record anew") from error
-        samples += [BodyImu(float(row[0]), row[1:4], row[4:7]) for row in rows]
-    return sorted(samples, key=lambda sample: sample.t)
+            self._new_sight()
+        except RecordingError:
+            self._is_blind = True
 
-
-def _setting(recording: Recording) -> tuple[RobotFile, Camera]:
-    """Robot and camera of a recording: its own files, else what is known by their names."""
-    metadata = recording.metadata
-    try:
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            robot_file = load_robot("ames")
-            if metadata.get(ROBOT_KEY):
-                (folder / "robot.toml").write_text(metadata[ROBOT_KEY])
-                robot_file = load_robot(folder / "robot.toml")
-            if metadata.get(CAMERA_KEY):
-                (folder / "camera.yaml").write_text(metadata[CAMERA_KEY])
-            device, size = device_of(recording), _picture_size(recording)
-            return robot_file, find_camera(device, *size, folders=(folder, CAMERAS))
-    except (RobotFileError, CameraFileError) as error:
-        raise RecordingError(recording.path, str(error), "a recording with both files") from error
-
-
-def _picture_size(recording: Recording) -> tuple[int, int]:
-    for _, data in recording.phone_records():
-        with suppress(WireError):
-            body = decode(data).body
-            if isinstance(body, Picture):
-                return body.width, body.height
-    raise RecordingError(recording.path, "holds no picture", "name another recording")
+    def _see(self, frame: EncodedFrame) -> None:
+        self._fit(frame.picture)
+        controller, sighting = self._controller, None
+        if not self._is_blind:
+            known = controller.up_in_b, controller.omega_bf_in_b
+            sighting = self._sight.see([frame], *known)
+        self._seen.append((frame, sighting.pose if sighting is not None else None))
+        seen = sighting.seen(self._sight.camera) if sighting is not None else None
+        if seen is not None:
+            self._inbox.append(SeenInput.of(seen))
 
 
 def run_offline(recording: Recording, out: Path) -> str:

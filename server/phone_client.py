@@ -116,7 +116,7 @@ class PhoneClient:
         self._access = access
         self._on_ping, self._on_status = on_ping, on_status
         self._sockets: list[ClientConnection] = []
-        self._unanswered: set[int] = set()
+        self._unanswered: list[int] = []
         self._credit = asyncio.Event()
         self._credit.set()
         self.refusals: list[Refused] = []
@@ -179,7 +179,7 @@ class PhoneClient:
         """
         socket = self._sockets[-1 if isinstance(record.body, Picture) else 0]
         if isinstance(record.body, Picture):
-            self._unanswered.add(record.sequence)
+            self._unanswered.append(record.sequence)
             if len(self._unanswered) >= MAX_IN_FLIGHT:
                 self._credit.clear()
         try:
@@ -222,7 +222,8 @@ class PhoneClient:
             case Ping(nonce=nonce):
                 await self.send(self._on_ping(nonce, record.t_us))
             case Credit(sequence=sequence):
-                self._unanswered = {sent for sent in self._unanswered if sent > sequence}
+                if sequence in self._unanswered:  # and with it all that were sent before
+                    del self._unanswered[: self._unanswered.index(sequence) + 1]
                 if len(self._unanswered) < MAX_IN_FLIGHT:
                     self._credit.set()
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import time
+from math import inf
 from pathlib import Path
 
 from server.control_link import ControlStatus
 from server.recording import CAMERA_KEY, DEVICE_KEY, Direction, Recorder
+from server.wire import HEADER, KEY_FLAG, Kind
+
+KEY_S = 0.5
+"""Between two requests for a key: one may be lost on the way."""
 
 
 class Recordings:
@@ -16,6 +21,7 @@ class Recordings:
         """Files go to `directory`; `metadata` goes into each."""
         self._directory, self._metadata = directory, metadata
         self._recorder: Recorder | None = None
+        self._has_key, self._t_asked = True, -inf
 
     @property
     def name(self) -> str:
@@ -32,20 +38,30 @@ class Recordings:
             name = time.strftime("%Y%m%d-%H%M%S")
             own = {DEVICE_KEY: device, CAMERA_KEY: camera_text}
             self._recorder = Recorder(self._directory, name, {**self._metadata, **own})
+            self._has_key, self._t_asked = False, -inf
         return self.name
 
     def stop(self) -> str:
         """End; gives the path of the file, or ""."""
         recorder, self._recorder = self._recorder, None
+        self._has_key = True
         if recorder is None:
             return ""
         recorder.close()
         return str(recorder.path)
 
+    def key_is_due(self, now: float) -> bool:
+        """Whether to ask the page for a key: without one no recorded picture can be decoded."""
+        if self._has_key or now - self._t_asked < KEY_S:
+            return False
+        self._t_asked = now
+        return True
+
     def record(self, direction: Direction, data: bytes, t: float) -> None:
         """A record that came or went."""
         if self._recorder is not None:
             self._recorder.record(direction, data, t)
+            self._has_key = self._has_key or _is_key(data)
 
     def message(self, direction: Direction, text: str, t: float) -> None:
         """A message that came or went."""
@@ -56,3 +72,8 @@ class Recordings:
         """A status of the control process."""
         if self._recorder is not None:
             self._recorder.status(status, t)
+
+
+def _is_key(data: bytes) -> bool:
+    """Whether a record is a picture that can be decoded alone."""
+    return len(data) > HEADER.size and data[2] == Kind.FRAME and bool(data[3] & KEY_FLAG)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
+from server import hub as hub_module
 from server.clock import now
 from server.control_link import ReadyInput, RequestInput
 from server.hub import EVENTS, LEASE_S
 from server.knobs import TuneInput
 from server.messages import Command, Hello, Tune, encode_message
-from server.wire import VERSION, Ping, decode
-from tests.server.house import control_status, house_in, is_request
+from server.wire import VERSION, Codec, Ping, Record, decode, encode
+from tests.server.house import JPEG, control_status, house_in, is_request
 
 
 class Paper:
@@ -263,5 +265,27 @@ def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
         assert (after.sigma_p, after.sigma_theta, after.time_offset) == (0.01, 0.02, 0.0)
         assert after.p_bc_in_c.tolist() == [2.5, 0.0, 0.0]
         assert after.R_cb.tolist() == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
+    in_loop(scene)
+
+
+def test_a_recording_asks_for_a_key_again_until_one_has_come(house, monkeypatch):
+    def scene():
+        fast, t = Fast(), now()
+        phone = house.hub.greet(hello("first"), Paper())
+        house.hub.join_fast(phone.id, fast)
+        house.hub.start_recording()
+        picture = replace(JPEG, codec=Codec.H264, key=False)
+        for _ in range(30):
+            t += 0.1
+            monkeypatch.setattr(hub_module, "now", lambda t=t: t)
+            house.hub.record(encode(Record(1, 1, picture)), t)
+            house.hub._ask_key()
+        assert 6 <= fast.keys <= 8  # twice a second
+        house.hub.record(encode(Record(2, 1, replace(picture, key=True))), t)
+        asked = fast.keys
+        monkeypatch.setattr(hub_module, "now", lambda: t + 10.0)
+        house.hub._ask_key()
+        assert fast.keys == asked
 
     in_loop(scene)
