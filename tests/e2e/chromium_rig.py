@@ -11,7 +11,8 @@ from playwright.sync_api import BrowserContext
 
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
-from tests.e2e.chromium_phone import CALIBRATION, ChromiumPhone, browser
+from tests.e2e.chromium_phone import ChromiumPhone, browser
+from tests.e2e.played_phone import CALIBRATION, PlayedPhone
 from tests.e2e.serving import DEVICE, Serving, serving
 
 LANDSCAPE = {
@@ -25,11 +26,11 @@ STARVED = ("are silent", "No word from the phone", "time stamps are off")
 """How the robot says that a machine was too busy for the page's sensors, finger or pictures."""
 
 
-def calibrate(folder: Path) -> Path:
+def calibrate(folder: Path, device: str = DEVICE) -> Path:
     """A folder with the canvas camera's calibration."""
     cameras = folder / "cameras"
     cameras.mkdir()
-    (cameras / "canvas.yaml").write_text(CALIBRATION.format(name=DEVICE))
+    (cameras / "canvas.yaml").write_text(CALIBRATION.format(name=device))
     return cameras
 
 
@@ -40,12 +41,12 @@ def start(phone: ChromiumPhone, server: Serving) -> None:
     phone.play_until("!document.querySelector('#wish').disabled", 25.0)
 
 
-def lead(phone: ChromiumPhone, tries: int = 3) -> None:
+def lead(phone: PlayedPhone, tries: int = 3) -> None:
     """Arm and hold; again if a busy machine starved the sensors and the robot was disarmed."""
     for left in reversed(range(tries)):
         try:
             phone.play_until("!document.querySelector('#wish').disabled", 25.0)
-            phone.page.tap("#wish")
+            phone.tap("#wish")
             phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
             phone.play(0.7)
             phone.hold()
@@ -58,7 +59,7 @@ def lead(phone: ChromiumPhone, tries: int = 3) -> None:
 
 
 def flight(
-    phone: ChromiumPhone, server: Serving, seconds: float, tries: int = 3
+    phone: PlayedPhone, server: Serving, seconds: float, tries: int = 3
 ) -> tuple[list[tuple[float, float]], dict[str, object]]:
     """Lead for so long: distances as `ChromiumPhone.track` gives them, and the status at the end.
 

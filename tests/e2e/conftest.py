@@ -7,17 +7,22 @@ import subprocess
 import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FIREFOX_NAMES = ("firefox-esr", "firefox")
 
 
 def find_chromium() -> str | None:
-    return next(filter(None, map(shutil.which, NAMES)), None)
+    return find(NAMES)
 
 
-def install_chromium() -> str:
-    """Install Debian's Chromium; return why it could not be done, or nothing."""
+def find(names: tuple[str, ...]) -> str | None:
+    return next(filter(None, map(shutil.which, names)), None)
+
+
+def install(package: str) -> str:
+    """Install one of Debian's packages; return why it could not be done, or nothing."""
     if os.geteuid() != 0 or shutil.which("apt-get") is None:
         return "only root on a Debian machine can install one here"
-    for step in (["update"], ["install", "--yes", "--no-install-recommends", "chromium"]):
+    for step in (["update"], ["install", "--yes", "--no-install-recommends", package]):
         done = subprocess.run(
             ["apt-get", "--quiet", *step],
             env={**os.environ, "DEBIAN_FRONTEND": "noninteractive"},
@@ -30,11 +35,22 @@ def install_chromium() -> str:
     return ""
 
 
+def demand(names: tuple[str, ...], package: str) -> str:
+    """Path to a browser; without one the test is skipped."""
+    why = "" if find(names) else install(package)
+    path = find(names)
+    if path is None:
+        pytest.skip(f"NO BROWSER, not tested: none of {', '.join(names)} found; {why}")
+    return path
+
+
 @pytest.fixture(scope="session")
 def chromium() -> str:
     """Path to a Chromium (or Chrome) executable."""
-    why = "" if find_chromium() else install_chromium()
-    path = find_chromium()
-    if path is None:
-        pytest.skip(f"NO BROWSER, not tested: none of {', '.join(NAMES)} found; {why}")
-    return path
+    return demand(NAMES, "chromium")
+
+
+@pytest.fixture(scope="session")
+def firefox_path() -> str:
+    """Path to a Firefox executable."""
+    return demand(FIREFOX_NAMES, "firefox-esr")

@@ -1,0 +1,163 @@
+"""A real Firefox, spoken to by WebDriver BiDi on a plain websocket, without a driver program."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+START_S = 60.0
+ANSWER_S = 60.0
+PREFS = {
+    "media.navigator.permission.disabled": True,
+    "media.navigator.streams.fake": True,
+    "media.peerconnection.ice.loopback": True,
+    "media.peerconnection.ice.obfuscate_host_addresses": False,
+    "device.sensors.enabled": True,
+    "device.sensors.motion.enabled": True,
+    "datareporting.policy.dataSubmissionEnabled": False,
+    "app.update.enabled": False,
+    "network.captive-portal-service.enabled": False,
+    "network.connectivity-service.enabled": False,
+    "browser.shell.checkDefaultBrowser": False,
+    "dom.ipc.processPrelaunch.enabled": False,
+    "remote.prefs.recommended": True,
+}
+"""Permissions without asking, and no word to anyone else."""
+LISTENING = re.compile(r"WebDriver BiDi listening on (ws://\S+)")
+
+
+class FirefoxError(Exception):
+    """What Firefox answers when it can't do as it is told."""
+
+
+class Firefox:
+    """One tab."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        """Opens a session in it; certificates of our own authority are taken."""
+        self._socket, self._count = socket, 0
+        self.command("session.new", capabilities={"alwaysMatch": {"acceptInsecureCerts": True}})
+        tree = self.command("browsingContext.getTree")
+        self._tab = tree["contexts"][0]["context"]
+
+    def command(self, method: str, **params: Any) -> dict[str, Any]:
+        """Do something, and wait until it is done.
+
+        Raises:
+            FirefoxError: it was refused.
+        """
+        self._count += 1
+        self._socket.send(json.dumps({"id": self._count, "method": method, "params": params}))
+        while True:
+            answer = json.loads(self._socket.recv(ANSWER_S))
+            if answer.get("id") != self._count:
+                continue  # an event
+            if answer["type"] == "error":
+                raise FirefoxError(f"{method}: {answer['error']}: {answer['message']}")
+            result: dict[str, Any] = answer["result"]
+            return result
+
+    def before_each_page(self, script: str) -> None:
+        """Run a script before those of every page."""
+        self.command("script.addPreloadScript", functionDeclaration=f"() => {{ {script} }}")
+
+    def open(self, url: str) -> None:
+        """Go to a page and wait until it is loaded."""
+        self.command("browsingContext.navigate", context=self._tab, url=url, wait="complete")
+
+    def size(self, width: int, height: int) -> None:
+        """Of the window's inside [px]."""
+        viewport = {"width": width, "height": height}
+        self.command("browsingContext.setViewport", context=self._tab, viewport=viewport)
+
+    def evaluate(self, expression: str) -> Any:
+        """The value of a JavaScript expression, by way of JSON; promises are awaited.
+
+        Raises:
+            FirefoxError: it has thrown.
+        """
+        answer = self.command(
+            "script.evaluate",
+            expression=f"Promise.resolve({expression}).then((v) => JSON.stringify(v ?? null))",
+            target={"context": self._tab},
+            awaitPromise=True,
+            userActivation=True,
+        )
+        if answer["type"] == "exception":
+            raise FirefoxError(answer["exceptionDetails"]["text"])
+        return json.loads(answer["result"]["value"])
+
+    def touch(self, *actions: dict[str, object]) -> None:
+        """What a finger does."""
+        finger = {"type": "pointer", "id": "finger", "parameters": {"pointerType": "touch"}}
+        self.command(
+            "input.performActions", context=self._tab, actions=[{**finger, "actions": actions}]
+        )
+
+    def press(self, selector: str) -> None:
+        """Put the finger on the middle of an element, and leave it there."""
+        box = self.evaluate(
+            f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])"
+            f"(document.querySelector({selector!r}).getBoundingClientRect())"
+        )
+        x, y = map(round, box)
+        self.touch(
+            {"type": "pointerMove", "x": x, "y": y, "duration": 0},
+            {"type": "pointerDown", "button": 0},
+        )
+
+    def release(self) -> None:
+        """Take it off."""
+        self.touch({"type": "pointerUp", "button": 0})
+
+    def tap(self, selector: str) -> None:
+        """Touch an element shortly."""
+        self.press(selector)
+        self.release()
+
+
+@contextlib.contextmanager
+def firefox(executable: str) -> Iterator[Firefox]:
+    """A Firefox with a profile of its own, ended at the end."""
+    profile = Path(tempfile.mkdtemp(prefix="lightleash-firefox-"))
+    lines = [f"user_pref({json.dumps(k)}, {json.dumps(v)});" for k, v in PREFS.items()]
+    (profile / "user.js").write_text("\n".join(lines))
+    log = (profile / "firefox.log").open("wb")
+    command = [executable, "--headless", "--no-remote", "--remote-debugging-port", "0"]
+    process = subprocess.Popen(
+        [*command, "--profile", str(profile), "about:blank"], stdout=log, stderr=log
+    )
+    try:
+        url = f"{_address(process, profile / 'firefox.log')}/session"
+        with connect(url, compression=None, max_size=None, proxy=None) as socket:
+            yield Firefox(socket)
+    finally:
+        process.terminate()
+        try:
+            process.wait(15.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        log.close()
+        shutil.rmtree(profile, ignore_errors=True)
+
+
+def _address(process: subprocess.Popen[bytes], log: Path) -> str:
+    """Where it listens, as it says itself."""
+    end = time.monotonic() + START_S
+    while time.monotonic() < end and process.poll() is None:
+        found = LISTENING.search(log.read_text(errors="replace"))
+        if found:
+            return found[1]
+        time.sleep(0.1)
+    raise FirefoxError(f"it does not listen: {log.read_text(errors='replace')[-500:]}")

@@ -1,0 +1,79 @@
+"""The phone page in a real Firefox: motion by events of a script, for it has no sensors to feed."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from hardware.sim.hand import Hand
+from tests.e2e.firefox import Firefox
+from tests.e2e.played_phone import CANVAS, LENS, PlayedPhone
+
+WIDTH, HEIGHT = 915, 412
+FEEL = """
+window.felt = null;
+setInterval(() => {
+  if (window.felt) window.dispatchEvent(new DeviceMotionEvent('devicemotion', window.felt));
+}, 16);
+"""
+NO_MOTION = "delete window.DeviceMotionEvent;"
+
+
+class FirefoxPhone(PlayedPhone):
+    """A page in Firefox."""
+
+    def __init__(
+        self, tab: Firefox, hand: Hand, leds_in_b: np.ndarray, truth_port: int, script: str = ""
+    ) -> None:
+        """`leds_in_b` (n, 3) [m]; `script` runs before the page's own."""
+        super().__init__(hand, leds_in_b, truth_port, 0.0)
+        self.tab, self._url = tab, ""
+        tab.size(WIDTH, HEIGHT)
+        tab.before_each_page(CANVAS + FEEL + script)
+
+    def open(self, url: str) -> None:
+        """Go to the page."""
+        self.tab.open(url)
+        self._url = url
+
+    @property
+    def address(self) -> str:
+        """Of the page."""
+        return self._url
+
+    def evaluate(self, script: str) -> Any:
+        """The value of a JavaScript expression."""
+        return self.tab.evaluate(script)
+
+    def _sense(self, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
+        felt = {
+            "accelerationIncludingGravity": _named("xyz", force),
+            "acceleration": _named("xyz", linear),
+            "rotationRate": _named(("alpha", "beta", "gamma"), np.degrees(omega)),
+            "interval": 16,
+        }
+        self.evaluate(f"window.felt = {json.dumps(felt)}")
+
+    def tap(self, selector: str) -> None:
+        """Touch an element shortly."""
+        self.tab.tap(selector)
+
+    def hold(self) -> None:
+        """Put a finger on the big button."""
+        self.tab.press("#hold")
+
+    def let_go(self) -> None:
+        """Take it off."""
+        self.tab.release()
+
+
+def device_of(tab: Firefox) -> str:
+    """What the page will call itself there."""
+    width, height, ratio = tab.evaluate("[screen.width, screen.height, devicePixelRatio]")
+    return f"Linux {min(width, height)}x{max(width, height)}@{ratio:g} / {LENS}"
+
+
+def _named(names: Any, values: np.ndarray) -> dict[str, float]:
+    return dict(zip(names, map(float, values), strict=True))

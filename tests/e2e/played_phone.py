@@ -1,0 +1,204 @@
+"""A page that films a simulated robot: a canvas for a camera, a hand for sensors; any browser."""
+
+from __future__ import annotations
+
+import json
+import time
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+
+from hardware.sim.hand import Hand
+from hardware.sim.intent import Intent, Pose
+from hardware.sim.truth import Truth, TruthClient
+from pipeline.camera.lens import Camera
+from pipeline.config import VirtualCameraConfig
+from pipeline.frames import GRAVITY, R_cd
+
+LENS = "canvas camera"
+AHEAD_S = 0.02
+"""So far each picture is foretold."""
+CAMERA = Camera(
+    1280,
+    720,
+    np.array([[930.0, 0.0, 640.0], [0.0, 930.0, 360.0], [0.0, 0.0, 1.0]]),
+    "plumb_bob",
+    np.zeros(5),
+)
+CALIBRATION = """image_width: 1280
+image_height: 720
+camera_name: {name}
+camera_matrix: {{rows: 3, cols: 3, data: [930, 0, 640, 0, 930, 360, 0, 0, 1]}}
+distortion_model: plumb_bob
+distortion_coefficients: {{rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}}
+"""
+CANVAS = """
+(() => {
+  const canvas = Object.assign(document.createElement('canvas'), {width: 1280, height: 720});
+  const paint = canvas.getContext('2d', {alpha: false});
+  // A frame shows the lights where they are when it is painted, from what was told of two moments.
+  let told = null;
+  window.tellSpots = (t, t_ahead, spots, ahead) => { told = {t, t_ahead, spots, ahead}; };
+  const between = ({t, t_ahead, spots, ahead}) => {
+    const share = Math.min(2, (performance.now() - t) / (t_ahead - t));
+    return spots.map((spot, i) => spot.map((now, k) => now + share * (ahead[i][k] - now)));
+  };
+  const draw = (spots) => {
+    paint.fillStyle = '#1c1c1c';
+    paint.fillRect(0, 0, 1280, 720);
+    for (const [u, v, r] of spots) {
+      const light = paint.createRadialGradient(u, v, 0, u, v, r + 2);
+      light.addColorStop(0, '#fff');
+      light.addColorStop(r / (r + 2), '#eee');
+      light.addColorStop(1, 'rgba(28,28,28,0)');
+      paint.fillStyle = light;
+      paint.beginPath();
+      paint.arc(u, v, r + 2, 0, 7);
+      paint.fill();
+    }
+  };
+  const onFrame = () => {
+    draw(told ? between(told) : []);
+    requestAnimationFrame(onFrame);
+  };
+  onFrame();
+  navigator.mediaDevices.getUserMedia = async () => {
+    const stream = canvas.captureStream(30);
+    const [track] = stream.getVideoTracks();
+    Object.defineProperty(track, 'label', {value: 'LENS'});
+    return stream;
+  };
+})();
+""".replace("LENS", LENS)
+
+
+class PlayedPhone(ABC):
+    """Plays a hand into a page: moves the picture and the sensors together."""
+
+    def __init__(
+        self, hand: Hand, leds_in_b: np.ndarray, truth_port: int, screen_angle_deg: float
+    ) -> None:
+        """`leds_in_b` (n, 3) [m]; the page's `screen.orientation.angle` [°]."""
+        self._hand, self._leds_in_b = hand, leds_in_b
+        self._truth = TruthClient(truth_port, timeout=1.0)
+        self._R_dc = R_cd(screen_angle_deg).T
+        self._stepped = time.monotonic()
+        self._page_shown, self._epoch = "", 0.0
+        Intent.warm_up()
+
+    @property
+    @abstractmethod
+    def address(self) -> str:
+        """Of the page."""
+
+    @abstractmethod
+    def evaluate(self, script: str) -> Any:
+        """The value of a JavaScript expression."""
+
+    @abstractmethod
+    def _sense(self, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
+        """Let the page's sensors feel it, each (3,) in d: with gravity, without, turning."""
+
+    @abstractmethod
+    def tap(self, selector: str) -> None:
+        """Touch an element shortly."""
+
+    @abstractmethod
+    def hold(self) -> None:
+        """Put a finger on the big button."""
+
+    @abstractmethod
+    def let_go(self) -> None:
+        """Take it off."""
+
+    def close(self) -> None:
+        """Give the truth's socket back."""
+        self._truth.close()
+
+    def step(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Show what the camera would see and feel now; gives the poses of hand and body."""
+        truth = self._truth.latest()
+        t = float(truth.t[-1])
+        body, hand = truth.at(t), self._hand.pose(t)
+        self._show(t, hand, body, (self._hand.pose(t + AHEAD_S), _onwards(truth, AHEAD_S)))
+        now = time.monotonic()
+        t_felt, self._stepped = now + 0.5 * (now - self._stepped), now  # what is set is read on
+        force_in_d = self._R_dc @ self._hand.specific_force_in_c(t_felt)
+        up_in_d = self._R_dc @ self._hand.pose(t_felt)[0][2] * GRAVITY
+        omega_in_d = self._R_dc @ self._hand.omega_in_c(t_felt)
+        self._sense(force_in_d, force_in_d - up_in_d, omega_in_d)
+        return hand, body
+
+    def _show(self, t: float, hand: Pose, body: Pose, ahead: tuple[Pose, Pose]) -> None:
+        t_page = 1e3 * (t - self._page_epoch())
+        told = [t_page, t_page + 1e3 * AHEAD_S, self._spots(hand, body), self._spots(*ahead)]
+        self.evaluate(f"tellSpots(...{json.dumps(told)})")
+
+    def _spots(self, hand: Pose, body: Pose) -> list[list[float]]:
+        """(u, v, radius) [px] of each LED."""
+        q = (body[1] - hand[1] + self._leds_in_b @ body[0].T) @ hand[0]
+        radius = 930.0 * 0.008 / q[:, :1]
+        spots: list[list[float]] = np.hstack((CAMERA.pixels(q), radius)).tolist()
+        return spots
+
+    def _page_epoch(self) -> float:
+        """When the page's clock began [s]; from the quickest of some questions."""
+        if self._page_shown != self.address:
+            self._page_shown, answers = self.address, []
+            for _ in range(10):
+                asked = time.monotonic()
+                elapsed = 1e-3 * float(self.evaluate("performance.now()"))
+                answered = time.monotonic()
+                answers.append((answered - asked, 0.5 * (asked + answered) - elapsed))
+            self._epoch = min(answers)[1]
+        return self._epoch
+
+    def play(self, seconds: float) -> None:
+        """Play without measuring."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.step()
+
+    def play_until(self, condition: str, seconds: float) -> None:
+        """Play until a JavaScript expression is true.
+
+        Raises:
+            TimeoutError: it never was.
+        """
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.step()
+            if self.evaluate(condition):
+                return
+        raise TimeoutError(f"{condition} within {seconds} s; the page says: {self.words()}")
+
+    def words(self) -> str:
+        """All that is written on the page."""
+        return str(self.evaluate("document.body.innerText")).replace("\n", " · ")
+
+    def track(self, seconds: float) -> list[tuple[float, float]]:
+        """Play while the button is held: (time [s], distance from where the hand means it [m])."""
+        hand, body = self.step()
+        started = before = time.monotonic()
+        intent = Intent(VirtualCameraConfig(), hand, body)
+        distances: list[tuple[float, float]] = []
+        while (now := time.monotonic()) < started + seconds:
+            hand, body = self.step()
+            _, p_rf = intent.step(hand, now - before)
+            before = now
+            distances.append((now - started, float(np.linalg.norm(body[1] - p_rf))))
+        return distances
+
+    @staticmethod
+    def rms_mm(distances: list[tuple[float, float]], after_s: float) -> float:
+        """RMS of what came after the first seconds [mm]."""
+        kept = [distance for t, distance in distances if t >= after_s]
+        return 1e3 * float(np.sqrt(np.mean(np.square(kept))))
+
+
+def _onwards(truth: Truth, seconds: float) -> Pose:
+    """Of the body after the last known moment, if it goes on as it did."""
+    t = float(truth.t[-1])
+    (R_before, p_before), (R, p) = truth.at(t - seconds), truth.at(t)
+    return R @ R_before.T @ R, 2.0 * p - p_before
