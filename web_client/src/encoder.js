@@ -4,6 +4,7 @@
 /** @import {Wanted} from './camera.js' */
 
 import { Problem } from './problems.js';
+import { shrunkSize } from './pace.js';
 import { Codec, MAX_RECORD_BYTES } from './protocol.js';
 
 /** The server asks for a key when it lacks one; each costs the ten pictures after it their sharpness. */
@@ -13,7 +14,7 @@ const HEADERS_BYTES = 24;
 
 /**
  * A frame without its picture.
- * @typedef {Pick<Frame, 'width' | 'height' | 'captureUs' | 'screenAngle'>} About
+ * @typedef {Pick<Frame, 'width' | 'height' | 'captureUs' | 'screenAngle'> & { shrunk: number }} About
  */
 
 /**
@@ -28,6 +29,8 @@ const HEADERS_BYTES = 24;
  * `encode` takes the frame over and calls `onEncoded` or `onLost` once for it.
  * @typedef {object} Encoder
  * @property {string} name
+ * @property {number} shrunk By so many quarters its pictures are smaller than the camera's.
+ * @property {number} waiting Pictures in its queue.
  * @property {(frame: Frame) => void} encode
  * @property {() => void} requestKey
  * @property {() => void} close
@@ -83,6 +86,7 @@ export async function supportedH264(Encoders, stream) {
 /** @implements {Encoder} */
 export class H264Encoder {
   name = 'H.264';
+  shrunk = 0;
 
   /**
    * @param {typeof VideoEncoder} Encoders
@@ -106,9 +110,10 @@ export class H264Encoder {
   encode(frame) {
     const image = /** @type {VideoFrame} */ (frame.image);
     try {
-      this.fit(frame);
+      const about = aboutOf(frame, this.shrunk);
+      this.fit(about);
       const keyFrame = this.wantsKey || frame.captureUs - this.lastKeyUs >= KEY_EVERY_US;
-      this.inside.set(image.timestamp, aboutOf(frame));
+      this.inside.set(image.timestamp, about);
       this.encoder.encode(image, { keyFrame });
       if (keyFrame) this.lastKeyUs = frame.captureUs;
       this.wantsKey = this.wantsKey && !keyFrame;
@@ -121,9 +126,13 @@ export class H264Encoder {
     }
   }
 
+  get waiting() {
+    return this.encoder.encodeQueueSize ?? 0;
+  }
+
   /**
-   * The phone was turned, or this is the first frame.
-   * @param {Frame} frame
+   * The phone was turned, another size is wanted, or this is the first frame. The encoder scales.
+   * @param {About} about
    */
   fit({ width, height }) {
     const same = this.config.width === width && this.config.height === height;
@@ -160,6 +169,8 @@ export class H264Encoder {
 /** @implements {Encoder} */
 export class JpegEncoder {
   name = 'JPEG';
+  shrunk = 0;
+  waiting = 0;
 
   /**
    * @param {new (width: number, height: number) => OffscreenCanvas} Canvas
@@ -177,13 +188,15 @@ export class JpegEncoder {
   /** @param {Frame} frame */
   encode(frame) {
     const { canvas } = this;
-    if (canvas.width !== frame.width || canvas.height !== frame.height) {
-      canvas.width = frame.width;
-      canvas.height = frame.height;
+    const about = aboutOf(frame, this.shrunk);
+    const { width, height } = about;
+    if (canvas.width !== width || canvas.height !== height) {
+      canvas.width = width;
+      canvas.height = height;
     }
-    this.context?.drawImage(frame.image, 0, 0, frame.width, frame.height);
+    this.context?.drawImage(frame.image, 0, 0, width, height);
     frame.close();
-    void this.compress(aboutOf(frame));
+    void this.compress(about);
   }
 
   /** @param {About} about */
@@ -213,8 +226,9 @@ export class JpegEncoder {
 
 /**
  * @param {Frame} frame
+ * @param {number} shrunk
  * @returns {About}
  */
-function aboutOf({ width, height, captureUs, screenAngle }) {
-  return { width, height, captureUs, screenAngle };
+function aboutOf({ width, height, captureUs, screenAngle }, shrunk) {
+  return { ...shrunkSize(width, height, shrunk), captureUs, screenAngle, shrunk };
 }

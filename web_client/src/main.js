@@ -7,6 +7,7 @@ import { browserOf } from './browser.js';
 import { CameraFeed } from './camera_feed.js';
 import { Feedback } from './feedback.js';
 import { LensPanel } from './lens_panel.js';
+import { PaceKeeper } from './pace_keeper.js';
 import { Imu, requestMotionPermission } from './imu.js';
 import { Phone } from './phone.js';
 import { Problem, adviceFor, problemOf } from './problems.js';
@@ -23,6 +24,8 @@ import { becomeKnown, isStranger, tokenOf } from './pairing.js';
 const TICK_MS = 33;
 const STOP_TICK_MS = 50;
 const HEALTH_MS = 500;
+/** Phases of a calibration that need pictures of the camera's own size. */
+const WHOLE = ['filming', 'solving'];
 const SILENT_MOTION_MS = 3000;
 
 const here = browserOf(window);
@@ -85,6 +88,15 @@ const camera = new CameraFeed({
   onLost: (text) => {
     notice(text);
     phone.log(text);
+  },
+});
+
+const pace = new PaceKeeper({
+  paths,
+  camera: () => camera.track?.getSettings() ?? {},
+  tell: (words) => {
+    notice(words);
+    phone.log(words);
   },
 });
 
@@ -189,6 +201,7 @@ async function welcomed(welcome) {
     const words = await camera.settle(welcome);
     identity.video = await video.prepare(welcome, paths.wish === 'JPEG');
     phone.log(`${identity.device}: ${words}, ${identity.video}`);
+    pace.begin(welcome.frame_rate_hz);
     paths.begin(welcome);
   } catch (error) {
     phone.log(`camera: ${error}`);
@@ -210,7 +223,9 @@ async function comeBack() {
 function reportHealth() {
   const now = performance.now();
   paths.look((state.heard && state.status?.streams['video']?.age_ms) || null);
-  dispatch({ type: 'health', health: { ...paths.health(now), imuHz: motionRate.perSecond(now) } });
+  pace.wantWhole(WHOLE.includes(state.calibration?.phase ?? ''));
+  void pace.look();
+  dispatch({ type: 'health', health: { ...paths.health(now), eased: pace.sign, imuHz: motionRate.perSecond(now) } });
   const silent = now - startedAtMs > SILENT_MOTION_MS && motionRate.perSecond(now) === 0;
   if (silent !== state.motionSilent) dispatch({ type: 'motion_silent', silent });
 }

@@ -1,11 +1,14 @@
 /** The camera's track in a WebRTC connection: each encoded picture with its record, what the encoder may spend. */
 
 /** @import {Frame} from './frame_source.js' */
+/** @import {Level} from './pace.js' */
 /** @import {Quaternion} from './protocol.js' */
 /** @import {FromWorker, ToWorker} from './rtc_worker.js' */
 /** @import {Welcome} from './protocol_types.js' */
 
+import { QUARTERS } from './pace.js';
 import { Rate } from './clock.js';
+import { RtcLoad, countsOf } from './rtc_load.js';
 
 /** @typedef {{ rtpTimestamp: number, captureUs: number }} Pair */
 
@@ -28,6 +31,12 @@ export class RtcPictures {
     /** @type {Worker | null} */
     this.worker = null;
     this.isFlowing = false;
+    /** What is asked of the encoder; null: all that is wanted. @type {Level | null} */
+    this.level = null;
+    /** @type {Welcome | null} */
+    this.welcome = null;
+    this.loads = new RtcLoad();
+    this.captures = new Rate();
     this.frames = new Rate();
     this.bytes = new Rate();
   }
@@ -78,16 +87,44 @@ export class RtcPictures {
    * The picture keeps its size: another size is another camera to the server.
    * @param {Welcome} welcome
    */
-  async limit({ bitrate_bps, frame_rate_hz }) {
+  async limit(welcome) {
+    this.welcome = welcome;
+    const { bitrate_bps, frame_rate_hz } = welcome;
+    const { hz, shrunk } = this.level ?? { hz: frame_rate_hz, shrunk: 0 };
     const parameters = this.sender?.getParameters();
     if (this.sender === null || parameters === undefined) return;
     parameters.degradationPreference = 'maintain-resolution';
     for (const encoding of parameters.encodings) {
       encoding.maxBitrate = bitrate_bps;
-      encoding.maxFramerate = frame_rate_hz;
-      encoding.scaleResolutionDownBy = 1;
+      encoding.maxFramerate = hz;
+      encoding.scaleResolutionDownBy = this.haveRecords ? QUARTERS / (QUARTERS - shrunk) : 1; // else nobody would tell
     }
     await this.sender.setParameters(parameters).catch(() => {}); // a wish; the server checks every picture
+    this.holdSize(this.sender);
+  }
+
+  /**
+   * Where a sender does not know what to give up last, the track says that it is the size.
+   * @param {RTCRtpSender | null} sender
+   */
+  holdSize(sender) {
+    const track = sender?.track;
+    if (!track || sender.getParameters().degradationPreference === 'maintain-resolution') return;
+    if ('contentHint' in track) track.contentHint = 'detail';
+  }
+
+  /** @param {Level} level So many pictures of such a size, no more. */
+  async ease(level) {
+    this.level = level;
+    if (this.welcome !== null) await this.limit(this.welcome);
+  }
+
+  /** How the encoder has done since the last call. */
+  async load() {
+    const reports = await this.sender?.getStats().catch(() => null);
+    const now = this.surroundings.performance.now();
+    const inHz = Math.min(this.level?.hz ?? Infinity, this.captures.perSecond(now));
+    return this.loads.since(countsOf(reports?.values() ?? []), inHz, now);
   }
 
   close() {
@@ -100,9 +137,10 @@ export class RtcPictures {
    * The camera has given a frame: the track sends it, the record says when it was taken.
    * @param {Frame} frame
    */
-  captured({ image, captureUs, screenAngle }) {
+  captured({ image, captureUs, screenAngle, width, height }) {
     const stampUs = 'timestamp' in image ? image.timestamp : captureUs;
-    this.tell({ type: 'capture', capture: { captureUs, stampUs, screenAngle } });
+    this.captures.add(this.surroundings.performance.now());
+    this.tell({ type: 'capture', capture: { captureUs, stampUs, screenAngle }, size: { width, height } });
     if (this.worker !== null) return;
     this.isFlowing = this.sender !== null; // nobody tells of its pictures
     this.frames.add(this.surroundings.performance.now());

@@ -29,7 +29,7 @@ export const INITIAL = Object.freeze({
   nonce: 0n,
   stopping: false,
   motionSilent: false,
-  health: { path: /** @type {const} */ ('–'), fps: 0, rttMs: null, imuHz: 0, kbps: 0 },
+  health: { path: /** @type {const} */ ('–'), fps: 0, eased: '', rttMs: null, imuHz: 0, kbps: 0 },
   calibration: null,
 });
 

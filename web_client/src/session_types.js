@@ -9,6 +9,7 @@
  * @typedef {object} Health
  * @property {import('./video_paths.js').PathName} path The way pictures go.
  * @property {number} fps Frames sent per second.
+ * @property {string} eased What is kept back because the phone can't keep up, in a sign.
  * @property {number | null} rttMs Quickest way there and back of the last frames.
  * @property {number} imuHz
  * @property {number} kbps Video [kbit/s].

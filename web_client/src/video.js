@@ -2,11 +2,17 @@
 
 /** @import {Encoded, Encoder, Outlet, Stream} from './encoder.js' */
 /** @import {Frame} from './frame_source.js' */
+/** @import {Level} from './pace.js' */
 
+import { EncoderLoad } from './encoder_load.js';
 import { Rate } from './clock.js';
+import { Throttle } from './throttle.js';
 import { Credits } from './credits.js';
 import { H264Encoder, JpegEncoder, supportedH264 } from './encoder.js';
 import { encodeFrame } from './protocol.js';
+
+/** A new encoder that gives nothing for so long collects pictures before it begins, as Firefox's H.264 does. */
+export const HELD_MS = 1500;
 
 /**
  * @typedef {object} Surroundings
@@ -28,6 +34,11 @@ export class VideoSender {
     /** @type {Encoder | null} */
     this.encoder = null;
     this.dropped = 0;
+    this.load = new EncoderLoad();
+    this.throttle = new Throttle();
+    this.shrunk = 0;
+    /** H.264 of this browser is of no use. */
+    this.needsJpeg = false;
     /** What the last pictures took from the camera out of the encoder. @type {number[]} */
     this.encodedMs = [];
   }
@@ -46,14 +57,28 @@ export class VideoSender {
    */
   async prepare(stream, wantsJpeg = false) {
     const { VideoEncoder: Encoders } = this.surroundings;
-    const config = wantsJpeg ? null : await supportedH264(Encoders, stream);
+    const config = wantsJpeg || this.needsJpeg ? null : await supportedH264(Encoders, stream);
+    this.encodedMs = [];
+    this.replace(config !== null && Encoders !== undefined
+      ? new H264Encoder(Encoders, config, this.outlet())
+      : this.jpegEncoder());
+    return this.encoder?.name ?? 'none';
+  }
+
+  /** @param {Encoder | null} encoder Takes the place of the one before. */
+  replace(encoder) {
     this.encoder?.close();
     this.credits.encoding = 0;
-    this.encodedMs = [];
-    this.encoder = config !== null && Encoders !== undefined
-      ? new H264Encoder(Encoders, config, this.outlet())
-      : this.jpegEncoder();
-    return this.encoder?.name ?? 'none';
+    this.load.reset();
+    this.encoder = encoder;
+    if (encoder !== null) encoder.shrunk = this.shrunk;
+  }
+
+  /** @param {Level} level So many pictures of such a size, no more. */
+  ease({ hz, shrunk }) {
+    this.throttle.limit(hz);
+    this.shrunk = shrunk;
+    if (this.encoder !== null) this.encoder.shrunk = shrunk;
   }
 
   jpegEncoder() {
@@ -80,13 +105,27 @@ export class VideoSender {
    * @param {Frame} frame
    */
   offer(frame) {
-    if (this.encoder === null || !this.credits.mayTake(this.surroundings.performance.now())) {
+    const { encoder } = this;
+    const now = this.surroundings.performance.now();
+    if (encoder === null || !this.throttle.passes(frame.captureUs)) {
+      frame.close();
+      return;
+    }
+    if (this.load.heldMs(now) > HELD_MS) {
+      frame.close();
+      this.needsJpeg = true;
+      this.failed(new Error('holds pictures back'));
+      return;
+    }
+    this.load.meant(encoder.waiting);
+    if (!this.credits.mayTake(now)) {
       this.dropped += 1;
       frame.close();
       return;
     }
     this.credits.taken();
-    this.encoder.encode(frame);
+    this.load.entered(now);
+    encoder.encode(frame);
   }
 
   /**
@@ -99,8 +138,14 @@ export class VideoSender {
   /** @returns {Outlet} */
   outlet() {
     return {
-      onEncoded: (encoded) => this.send(encoded),
-      onLost: () => this.credits.lost(),
+      onEncoded: (encoded) => {
+        this.load.left(this.surroundings.performance.now());
+        this.send(encoded);
+      },
+      onLost: () => {
+        this.load.lost();
+        this.credits.lost();
+      },
       onFailure: (error) => this.failed(error),
     };
   }
@@ -109,10 +154,10 @@ export class VideoSender {
   send({ about, ...picture }) {
     const now = this.surroundings.performance.now();
     const sequence = (this.sequence + 1) >>> 0;
-    const { width, height, screenAngle } = about;
+    const { width, height, screenAngle, shrunk } = about;
     this.encodedMs = [...this.encodedMs.slice(-29), now - about.captureUs / 1000];
     const record = encodeFrame(
-      sequence, about.captureUs, { ...picture, width, height, screen_angle_deg: screenAngle },
+      sequence, about.captureUs, { ...picture, width, height, screen_angle_deg: screenAngle, shrunk },
     );
     if (!this.surroundings.send(record)) {
       this.credits.lost();
@@ -131,9 +176,7 @@ export class VideoSender {
    */
   failed(error) {
     this.surroundings.log(`${this.encoder?.name} encoder: ${error}`);
-    this.encoder?.close();
-    this.credits.encoding = 0;
-    this.encoder = this.encoder instanceof JpegEncoder ? null : this.jpegEncoder();
+    this.replace(this.encoder instanceof JpegEncoder ? null : this.jpegEncoder());
   }
 
   /** @param {number} now [ms] */

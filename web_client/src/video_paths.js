@@ -1,6 +1,7 @@
 /** The ways of a picture to the server, best first: WebRTC, H.264 by websocket, JPEG by websocket. */
 
 /** @import {Frame} from './frame_source.js' */
+/** @import {Level} from './pace.js' */
 /** @import {Welcome} from './protocol_types.js' */
 /** @import {RtcPath} from './rtc.js' */
 /** @import {VideoSender} from './video.js' */
@@ -161,6 +162,18 @@ export class VideoPaths {
       rttMs: rtc.isFlowing ? null : video.credits.roundTripMs,
       kbps: bytes.perSecond(now) * 0.008,
     };
+  }
+
+  /** @param {Level} level So many pictures of such a size, by whichever way. */
+  ease(level) {
+    this.surroundings.video.ease(level);
+    void this.surroundings.rtc.pictures.ease(level);
+  }
+
+  /** How the encoder of the present way has done since the last call. */
+  async load() {
+    const { rtc, video, performance } = this.surroundings;
+    return rtc.isFlowing ? rtc.pictures.load() : video.load.since(performance.now());
   }
 
   /**

@@ -148,7 +148,8 @@ export class View {
   health({ health, status, heard }) {
     this.text('h-leds', heard && status ? String(status.leds) : '–');
     this.text('h-path', health.path);
-    this.text('h-fps', `${Math.round(health.fps)} fps`);
+    this.text('h-fps', `${Math.round(health.fps)} fps${health.eased && ` ${health.eased}`}`);
+    this.data('h-fps', 'eased', health.eased);
     this.text('h-rtt', health.rttMs === null ? '–' : `${Math.round(health.rttMs)} ms`);
     this.text('h-imu', `${Math.round(health.imuHz)} Hz`);
     this.text('h-kbps', `${(health.kbps / 1000).toFixed(1)} Mb/s`);

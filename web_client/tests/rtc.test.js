@@ -116,8 +116,10 @@ function channelOpens() {
   channel.onopen();
 }
 
-async function opened() {
-  const opening = rtc.open('s1', TRACK, WELCOME);
+/** @param {MediaStreamTrack} [track] */
+async function opened(track = TRACK) {
+  posted.length = 0;
+  const opening = rtc.open('s1', track, WELCOME);
   while (posted.length < 2) await new Promise((resolve) => setImmediate(resolve));
   channelOpens();
   await opening;
@@ -139,13 +141,34 @@ test('it answers the offer with the camera, records behind each picture, and a p
   assert.equal(rtc.isOpen, true);
 });
 
+test('what is asked of the encoder changes while pictures flow, and comes back with the next connection', async () => {
+  await opened();
+  await rtc.pictures.ease({ hz: 15, shrunk: 1 });
+  assert.deepEqual(FakeConnection.newest.parameters.encodings, [
+    { maxBitrate: 3e6, maxFramerate: 15, scaleResolutionDownBy: 4 / 3 },
+  ]);
+  await opened();
+  assert.equal(FakeConnection.newest.parameters.encodings[0].maxFramerate, 15);
+});
+
+test('a browser that does not know what to give up last is told by the track', async () => {
+  const track = /** @type {any} */ ({ kind: 'video', contentHint: '' });
+  await opened(track);
+  assert.equal(track.contentHint, '');
+  FakeConnection.newest.sender.setParameters = async () => {};
+  FakeConnection.newest.parameters = { encodings: [{}] };
+  FakeConnection.newest.sender.getParameters = () => ({ encodings: [{}] });
+  await rtc.pictures.limit(WELCOME);
+  assert.equal(track.contentHint, 'detail');
+});
+
 test('the worker is told when pictures were taken, how the phone is turned, and the page’s clock', async () => {
   await opened();
-  rtc.pictures.captured(/** @type {any} */ ({ image: { timestamp: 7 }, captureUs: 12, screenAngle: 90, close() {} }));
+  rtc.pictures.captured(/** @type {any} */ ({ image: { timestamp: 7 }, captureUs: 12, screenAngle: 90, width: 1280, height: 720, close() {} }));
   rtc.pictures.turned([1, 0, 0, 0]);
   assert.deepEqual(told, [
     { type: 'origin', timeOrigin: 5000 },
-    { type: 'capture', capture: { captureUs: 12, stampUs: 7, screenAngle: 90 } },
+    { type: 'capture', capture: { captureUs: 12, stampUs: 7, screenAngle: 90 }, size: { width: 1280, height: 720 } },
     { type: 'attitude', orientation: [1, 0, 0, 0] },
   ]);
 });
@@ -242,7 +265,7 @@ test('a browser with neither sends pictures without records, dated by their arri
   rtc.pictures.surroundings.ScriptTransform = undefined;
   assert.deepEqual([rtc.isAble, rtc.pictures.haveRecords], [true, false]);
   await opened();
-  rtc.pictures.captured(/** @type {any} */ ({ image: { timestamp: 7 }, captureUs: 12, screenAngle: 90, close() {} }));
+  rtc.pictures.captured(/** @type {any} */ ({ image: { timestamp: 7 }, captureUs: 12, screenAngle: 90, width: 1280, height: 720, close() {} }));
   assert.equal(rtc.isFlowing, true);
   assert.deepEqual(told, []);
 });

@@ -3,7 +3,7 @@ import { test } from 'node:test';
 
 import { Credits, MAX_UNDER_WAY } from '../src/credits.js';
 import { H264Encoder, h264Candidates, supportedH264 } from '../src/encoder.js';
-import { VideoSender } from '../src/video.js';
+import { HELD_MS, VideoSender } from '../src/video.js';
 import { FakeTime } from './fakes.js';
 
 /** @import {Frame} from '../src/frame_source.js' */
@@ -241,4 +241,44 @@ test('an encoder that throws frees the frame and is given up', () => {
     close: () => log.push('closed'),
   });
   assert.deepEqual(log, ['lost', 'failure', 'closed']);
+});
+
+test('fewer and smaller pictures are asked of the encoder, and each says by how much it was made smaller', async () => {
+  const { sender, sent, offer } = await senderOf();
+  sender.ease({ hz: 15, shrunk: 1 });
+  let taken = 0;
+  for (let i = 0; i < 30; i++) {
+    offer();
+    if (FakeEncoder.newest.out() === undefined) continue;
+    taken += 1;
+    sender.credit(headOf(sent.at(-1)).sequence);
+  }
+  assert.ok(Math.abs(taken - 15) <= 1, `${taken} of 30`);
+  assert.deepEqual(FakeEncoder.newest.configs.map(({ width, height }) => [width, height]), [[960, 540]]);
+  const { width, height } = headOf(sent[0]);
+  assert.deepEqual([width, height, new DataView(sent[0] ?? new ArrayBuffer(0)).getUint8(17)], [960, 540, 1]);
+  sender.failed(new Error('the encoder is gone')); // JPEG takes over at the same size
+  assert.equal(sender.encoder?.shrunk, 1);
+  offer();
+  offer();
+  await new Promise((resolve) => setTimeout(resolve, 10));
+  assert.deepEqual([headOf(sent.at(-1)).codec, headOf(sent.at(-1)).width], [1, 960]);
+});
+
+test('an encoder that holds its first pictures back is given up for good, one that was only slow is not', async () => {
+  const { sender, time, offer } = await senderOf();
+  offer();
+  time.ms = HELD_MS;
+  offer();
+  assert.equal(sender.encoder?.name, 'H.264');
+  FakeEncoder.newest.out();
+  time.ms = 3 * HELD_MS;
+  offer();
+  assert.equal(sender.encoder?.name, 'H.264');
+  await sender.prepare(STREAM);
+  offer();
+  time.ms += HELD_MS + 1;
+  offer();
+  assert.equal(sender.encoder?.name, 'JPEG');
+  assert.equal(await sender.prepare(STREAM), 'JPEG');
 });
