@@ -53,7 +53,7 @@ def test_the_clients_own_constants_are_the_servers():
 @pytest.mark.parametrize("kind", Kind)
 def test_every_field_of_every_record_is_on_the_page(kind):
     body, layout, names = protocol_text.RECORDS[kind]
-    told = {name for name, _ in names if name} | {"data", "key"}
+    told = {name for name, _ in names if name} | {"data", "key", "by_arrival"}
     assert {field.name for field in fields(body)} <= told | {"orientation_wxyz"}
     page = (ROOT / "PROTOCOL.md").read_text(encoding="utf-8")
     assert f"### {kind.name} ({int(kind)})" in page
