@@ -11,6 +11,8 @@ from server.page import Page
 from server.wire import Credit, Record, encode
 
 KEY_WANTED = encode_message(Command("key_frame"))
+ASK_AGAIN_S = 0.3
+"""Between requests for a key frame while the fast path's pictures can't be used."""
 
 
 class FastPath(Protocol):
@@ -57,6 +59,7 @@ class PhonePaths:
         self._operator: Page | None = None
         self._video: Page | None = None
         self._fast: FastPath | None = None
+        self._t_asked = -float("inf")
         self.pictures = PictureWay()
 
     def begin(self, operator: Page) -> None:
@@ -103,6 +106,15 @@ class PhonePaths:
             data = encode(Record(sequence, int(1e6 * now()), Credit(sequence)))
             self._video.push(data)
             self._keep(data)
+
+    def takes_from_fast(self, record_us: int, key: bool) -> bool:
+        """Whether a picture of the fast path is for the eyes; without a key it can't take over."""
+        if self.pictures.takes(True, record_us, key):
+            return True
+        if self._fast is not None and not key and now() >= self._t_asked + ASK_AGAIN_S:
+            self._t_asked = now()
+            self._fast.request_key()
+        return False
 
     def takes_from_socket(self, record_us: int, sequence: int, key: bool) -> bool:
         """Whether a picture of the websocket is for the eyes; if not, it is given back unseen."""

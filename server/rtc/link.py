@@ -132,7 +132,7 @@ class RtcLink:
             return
         try:
             record = self._dated(codec, frame, t)
-            if record is None or not self._hub.paths.pictures.takes(True, record.t_us, frame.key):
+            if record is None or not self._hub.paths.takes_from_fast(record.t_us, frame.key):
                 return
             data = encode(record)
             said = self.frames.receive(data, t)

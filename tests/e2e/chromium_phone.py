@@ -30,7 +30,10 @@ FLAGS = [
 
 @contextlib.contextmanager
 def browser(
-    executable: str, camera_file: Path | None = None, **options: object
+    executable: str,
+    camera_file: Path | None = None,
+    flags: tuple[str, ...] = (),
+    **options: object,
 ) -> Iterator[BrowserContext]:
     """A context with everything granted that the phone page asks for.
 
@@ -38,7 +41,7 @@ def browser(
     """
     played = [f"--use-file-for-fake-video-capture={camera_file}"] if camera_file else []
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=executable, args=FLAGS + played)
+        chromium = playwright.chromium.launch(executable_path=executable, args=[*FLAGS, *played, *flags])
         context = chromium.new_context(
             ignore_https_errors=True,
             permissions=["camera", "accelerometer", "gyroscope", "magnetometer"],
@@ -61,6 +64,7 @@ class ChromiumPhone(PlayedPhone):
         self.page: Page = context.new_page()
         self.page.add_init_script(CANVAS)
         self._cdp: CDPSession = context.new_cdp_session(self.page)
+        self._touches = False
         for kind in ("accelerometer", "gyroscope", "linear-acceleration"):
             self._override(kind, (0.0, 0.0, 0.0), enable=True)
 
@@ -97,9 +101,13 @@ class ChromiumPhone(PlayedPhone):
         assert box is not None
         point = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
         self._cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [point]})
+        self._touches = True
 
     def let_go(self) -> None:
-        """Take it off."""
+        """Take it off, if it is there."""
+        if not self._touches:
+            return
+        self._touches = False
         self._cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
 
 

@@ -58,6 +58,15 @@ def test_stragglers_of_the_websocket_are_given_back_and_ask_for_a_key_where_none
     assert (operator.data, fast.keys) == ([KEY_WANTED], 1)
 
 
+def test_a_fast_way_that_can_not_take_over_is_asked_for_a_key_but_not_for_each_picture():
+    paths, _, _, fast = house()
+    assert paths.takes_from_fast(10, True)
+    assert paths.takes_from_socket(20, 1, True)  # the page had not stopped yet
+    assert not any(paths.takes_from_fast(t_us, False) for t_us in (30, 40, 50))
+    assert fast.keys == 1
+    assert paths.takes_from_fast(60, True)
+
+
 def test_credit_is_for_pictures_of_the_websocket():
     paths, _, video, _ = house()
     paths.taken(3)

@@ -126,7 +126,8 @@ export class VideoPaths {
     this.fastTries.reset();
     this.encoderTries.reset();
     if (wish === 'WebSocket' || wish === 'JPEG') rtc.close();
-    void video.prepare(welcome, wish === 'JPEG').then(() => video.requestKey());
+    if ((wish === 'JPEG') !== (video.encoder?.name === 'JPEG')) void video.prepare(welcome, wish === 'JPEG');
+    else video.requestKey();
     this.seek();
   }
 
