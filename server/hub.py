@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import msgspec
 from msgspec.structs import asdict
@@ -130,11 +131,7 @@ class Hub:
             if current.silent_for(now()) < LEASE_S:
                 return None
             self.part(current)
-        loop = asyncio.get_running_loop()
-
-        def soon(do: Callable[..., None], *what: int) -> None:
-            loop.call_soon_threadsafe(do, *what)
-
+        soon: Callable[..., Any] = asyncio.get_running_loop().call_soon_threadsafe
         self.phone = OperatorPhone(
             hello,
             self.robot,
@@ -240,16 +237,13 @@ class Hub:
         self.paths.tell(text)
 
     def _show_picture(self) -> None:
-        vision = self.phone.vision if self.phone is not None else None
-        if vision is None:
+        picture = self.phone.thumbnail(bool(self.supervisors)) if self.phone is not None else None
+        if picture is None:
             return
-        vision.watched = bool(self.supervisors)
-        if vision.watched and vision.thumbnail is not None:
-            picture, vision.thumbnail = vision.thumbnail, None
-            self.last_thumbnail = picture
-            data = encode(Record(0, int(1e6 * now()), Thumbnail(jpeg(picture))))
-            for page in self.supervisors:
-                page.push(data)
+        self.last_thumbnail = picture
+        data = encode(Record(0, int(1e6 * now()), Thumbnail(jpeg(picture))))
+        for page in self.supervisors:
+            page.push(data)
 
     def snapshot(self) -> bytes:
         """The last status as JSON, for people with a terminal."""

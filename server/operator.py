@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from hardware.camera_file import CameraFileError
 from pipeline.camera.lens import Camera
@@ -164,6 +165,14 @@ class OperatorPhone:
         }
         self._check.saw(sighting)
         self.sighting = sighting
+
+    def thumbnail(self, wanted: bool) -> npt.NDArray[np.uint8] | None:
+        """The next small picture (h, w, 3) RGB of what the camera sees, if anyone `wanted` it."""
+        if self.vision is None:
+            return None
+        self.vision.watched = wanted
+        picture, self.vision.thumbnail = self.vision.thumbnail, None
+        return picture if wanted else None
 
     def refusals(self, now: float) -> list[str]:
         """What this phone still lacks, in words for the person who can mend it."""

@@ -41,7 +41,9 @@ def browser(
     """
     played = [f"--use-file-for-fake-video-capture={camera_file}"] if camera_file else []
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=executable, args=[*FLAGS, *played, *flags])
+        chromium = playwright.chromium.launch(
+            executable_path=executable, args=[*FLAGS, *played, *flags]
+        )
         context = chromium.new_context(
             ignore_https_errors=True,
             permissions=["camera", "accelerometer", "gyroscope", "magnetometer"],

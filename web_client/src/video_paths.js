@@ -7,12 +7,9 @@
 /** @import {VideoSender} from './video.js' */
 
 import { RtcRefused } from './rtc.js';
+import { Retry } from './retry.js';
 import { Staleness } from './staleness.js';
 
-/** Between a way that was left and another try of it [ms]; the last one stays. */
-export const RETRY_MS = Object.freeze([2000, 10_000, 30_000]);
-/** A way that lasted so long was a good one: the next try comes soon again [ms]. */
-export const GOOD_MS = 20_000;
 /** A fast path that was silent for longer, or has no picture after so long, is given up [ms]. */
 export const SILENT_MS = 1500;
 export const FIRST_PICTURE_MS = 4000;
@@ -37,43 +34,6 @@ export const SLOW_FOR_MS = 3000;
  * @property {() => { session: string, track: MediaStreamTrack | null }} place
  * @property {(text: string) => void} say To the supervisor.
  */
-
-/** Waits longer from failure to failure, and begins anew after a good while. */
-class Retry {
-  /** @param {Surroundings} surroundings */
-  constructor(surroundings) {
-    this.surroundings = surroundings;
-    this.failures = 0;
-    this.goodSinceMs = Infinity;
-    /** @type {any} */
-    this.timer = null;
-  }
-
-  succeeded() {
-    this.goodSinceMs = this.surroundings.performance.now();
-  }
-
-  /** @param {() => void} again */
-  failed(again) {
-    const { performance, setTimeout } = this.surroundings;
-    if (performance.now() - this.goodSinceMs > GOOD_MS) this.failures = 0;
-    this.goodSinceMs = Infinity;
-    const waitMs = RETRY_MS[Math.min(this.failures, RETRY_MS.length - 1)] ?? 0;
-    this.failures += 1;
-    this.stop();
-    this.timer = setTimeout(again, waitMs);
-  }
-
-  stop() {
-    this.surroundings.clearTimeout(this.timer);
-  }
-
-  reset() {
-    this.stop();
-    this.failures = 0;
-    this.goodSinceMs = Infinity;
-  }
-}
 
 export class VideoPaths {
   /** @param {Surroundings} surroundings */

@@ -3,8 +3,9 @@ import { beforeEach, test } from 'node:test';
 
 import { RtcRefused } from '../src/rtc.js';
 import {
-  FIRST_PICTURE_MS, GOOD_MS, OLD_FOR_MS, OLD_MS, RETRY_MS, SILENT_MS, SLOW_ENCODER_MS, SLOW_FOR_MS, VideoPaths,
+  FIRST_PICTURE_MS, OLD_FOR_MS, OLD_MS, SILENT_MS, SLOW_ENCODER_MS, SLOW_FOR_MS, VideoPaths,
 } from '../src/video_paths.js';
+import { GOOD_MS, RETRY_MS } from '../src/retry.js';
 import { FakeTime } from './fakes.js';
 
 const WELCOME = /** @type {any} */ ({ session: 's1' });
