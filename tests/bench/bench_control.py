@@ -24,7 +24,9 @@ from pathlib import Path
 from websockets.asyncio.client import connect
 
 from pipeline.config import VirtualCameraConfig
+from server.messages import Hello, encode_message
 from server.runtime import RUN_FILE
+from server.wire import VERSION
 from tests.e2e.serving import serving
 
 SUPERVISORS = 4
@@ -44,7 +46,7 @@ async def watch(run: dict[str, str], seconds: float) -> int:
     headers = {"Authorization": f"Bearer {run['supervisor_token']}"}
     taken = 0
     async with connect(url, additional_headers=headers, compression=None) as socket:
-        await socket.send('{"type":"hello","version":1,"role":"supervisor"}')
+        await socket.send(encode_message(Hello(VERSION, "supervisor")))
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 async for _ in socket:

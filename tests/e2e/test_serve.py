@@ -22,6 +22,7 @@ from websockets.sync.client import connect
 
 from hardware.follower import FollowerError
 from hardware.sim.truth import TruthClient
+from server.wire import VERSION
 from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
@@ -213,7 +214,7 @@ def reset(server: Serving) -> None:
     url = server.http_url.replace("http", "ws") + "/ws/supervisor"
     headers = {"Authorization": f"Bearer {server.supervisor_token}"}
     with connect(url, additional_headers=headers, proxy=None) as page:
-        page.send(json.dumps({"type": "hello", "version": 1, "role": "supervisor"}))
+        page.send(json.dumps({"type": "hello", "version": VERSION, "role": "supervisor"}))
         page.recv()
         for _ in range(20):
             page.send(json.dumps({"type": "command", "what": "reset"}))

@@ -21,7 +21,7 @@ from server.recording import (
     part_of,
 )
 from server.recording_files import read, recover, recover_all
-from server.wire import Ping, Pong, Record, Touch, encode
+from server.wire import VERSION, Ping, Pong, Record, Touch, encode
 
 TOUCH = encode(Record(7, 5_000_000, Touch(True, True, 1, 99)))
 METADATA = {"device": "a phone", "robot_file": "name = 'ames'\n"}
@@ -65,7 +65,7 @@ def test_what_was_recorded_is_read_back_in_order_of_time(tmp_path):
     recorder.close()
     recording = read(recorder.path)
     assert recording.metadata["robot_file"] == METADATA["robot_file"]
-    assert recording.metadata["protocol_version"] == "1"
+    assert recording.metadata["protocol_version"] == str(VERSION)
     assert list(recording.phone_records()) == [(99.5, pong), (100.0, TOUCH)]
     entries = list(recording.entries())
     assert [e.topic for e in entries] == [
