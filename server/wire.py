@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import isfinite
 
-VERSION = 1
+VERSION = 2
 """Of the protocol. A page of another version is told so and refused."""
 
 MAGIC = 0x4C

@@ -148,11 +148,11 @@ def test_page_and_server_have_the_same_constants() -> None:
 
 def test_the_messages_the_page_writes_are_taken_by_the_server() -> None:
     hello = (
-        '{"type":"hello","version":1,"role":"operator","session":"","device":"Pixel 7 / camera2 0",'
+        '{"type":"hello","version":2,"role":"operator","session":"","device":"Pixel 7 / camera2 0",'
         '"sensors":"DeviceMotion","video":"H.264"}'
     )
     assert decode_message(hello) == Hello(
-        1, "operator", "Pixel 7 / camera2 0", "", "DeviceMotion", "H.264"
+        2, "operator", "Pixel 7 / camera2 0", "", "DeviceMotion", "H.264"
     )
     assert decode_message('{"type":"command","what":"stop"}') == Command("stop")
     assert decode_message('{"type":"log","text":"x"}') == Log("x")

@@ -5,7 +5,7 @@
 
 /** @import {ToPage} from './protocol_types.js' */
 
-export const VERSION = 1;
+export const VERSION = 2;
 export const MAX_RECORD_BYTES = 262_144;
 const MAGIC = 0x4c;
 const HEADER_BYTES = 16;

@@ -124,7 +124,7 @@ export function estimateOf(parts = {}) {
 /** A PING as the server writes it. @param {bigint} nonce @param {number} tUs @param {number} sequence */
 export function pingOf(nonce, tUs, sequence = 1) {
   const view = new DataView(new ArrayBuffer(24));
-  [0x4c, 1, 129, 0].forEach((byte, i) => view.setUint8(i, byte));
+  [0x4c, 2, 129, 0].forEach((byte, i) => view.setUint8(i, byte));
   view.setUint32(4, sequence, true);
   view.setBigInt64(8, BigInt(tUs), true);
   view.setBigUint64(16, nonce, true);

@@ -26,7 +26,7 @@ beforeEach(() => {
 });
 
 const WELCOME = {
-  type: 'welcome', session: 's1', version: 1, robot: 'ames', width: 1280, height: 720, frame_rate_hz: 30, bitrate_bps: 4e6,
+  type: 'welcome', session: 's1', version: 2, robot: 'ames', width: 1280, height: 720, frame_rate_hz: 30, bitrate_bps: 4e6,
 };
 
 /** @param {FakeSocket | undefined} socket */
@@ -36,7 +36,7 @@ test('hello comes first, and the video socket follows the welcome with its sessi
   const [main] = FakeSocket.made;
   main?.opens();
   assert.deepEqual(firstMessage(main), {
-    type: 'hello', version: 1, role: 'operator', session: '', device: 'Pixel 7', sensors: 'DeviceMotion', video: 'H.264',
+    type: 'hello', version: 2, role: 'operator', session: '', device: 'Pixel 7', sensors: 'DeviceMotion', video: 'H.264',
   });
   assert.equal(FakeSocket.made.length, 1);
   main?.says(WELCOME);
@@ -113,7 +113,7 @@ test('credits and wishes for a key reach the encoder', () => {
   main?.says(WELCOME);
   FakeSocket.newest.opens();
   const credit = new DataView(new ArrayBuffer(20));
-  [0x4c, 1, 130].forEach((byte, i) => credit.setUint8(i, byte));
+  [0x4c, 2, 130].forEach((byte, i) => credit.setUint8(i, byte));
   credit.setUint32(16, 9, true);
   FakeSocket.newest.says(credit.buffer);
   FakeSocket.newest.says({ type: 'command', what: 'key_frame' });

@@ -11,7 +11,7 @@ test('a TOUCH has the bytes worked out by hand', () => {
   const touch = { held: true, visible: false, press: 7, nonce: 0x0102030405060708n };
   assert.equal(
     hex(protocol.encodeTouch(5, 1e6, touch)),
-    '4c010300' + '05000000' + '40420f0000000000' + '01' + '00' + '0000' + '07000000' + '0807060504030201',
+    '4c020300' + '05000000' + '40420f0000000000' + '01' + '00' + '0000' + '07000000' + '0807060504030201',
   );
 });
 
@@ -49,7 +49,7 @@ test('a FRAME carries its head and then its data', () => {
 });
 
 test('records of another version, kind, size or magic are refused', () => {
-  for (const [at, value] of [[0, 0], [1, 2], [2, 77]]) {
+  for (const [at, value] of [[0, 0], [1, 1], [2, 77]]) {
     const record = new Uint8Array(pingOf(1n, 0));
     record[at ?? 0] = value ?? 0;
     assert.throws(() => protocol.decodeRecord(record.buffer), protocol.ProtocolError);
