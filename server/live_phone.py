@@ -25,8 +25,6 @@ MakeClient = Callable[
 """By websockets or by WebRTC."""
 EXPOSED_S = 0.03
 """After the middle row's exposure all rows are exposed, and their truth has arrived."""
-LATE_S = 0.1
-"""A picture later than this after its time is not worth encoding."""
 LEAVE_S = 0.4
 """Between letting go and closing, for the server to notice."""
 
@@ -153,10 +151,11 @@ class LivePhone:
         while self.script.pongs < SYNCHRONISED_PONGS:  # the first picture is the key to the others
             await asyncio.sleep(TOUCH_S)
         loop = asyncio.get_running_loop()
+        period = 1.0 / self.script.phone.options.frame_rate_hz
         with ThreadPoolExecutor(1, "camera") as thread:
             for event in _endless(self.script.phone.pictures):
                 await until(event.t_capture + EXPOSED_S)
-                late = time.monotonic() > event.t_deliver + LATE_S
+                late = is_superseded(event, time.monotonic(), period)
                 if late or self._made.full() or not self.client.has_credit:
                     self.skipped += 1
                     continue
@@ -177,6 +176,14 @@ class LivePhone:
         while True:
             await asyncio.sleep(0.5)
             report(self)
+
+
+def is_superseded(event: Event, now: float, period: float) -> bool:
+    """At `now` [s] it should have arrived, and the next one, a `period` [s] later, is there.
+
+    The camera of a busy phone gives the newest picture, not one after the other ever later.
+    """
+    return now > max(event.t_deliver, event.t_capture + EXPOSED_S + period)
 
 
 def _endless(stream: Stream) -> Iterator[Event]:

@@ -128,12 +128,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--rest", type=float, help="seconds before it moves")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="then leave politely")
     parser.add_argument("--codec", choices=("h264", "vp8", "jpeg"), default="h264")
-    parser.add_argument("--transport", choices=("websocket", "rtc"), default="websocket")
+    parser.add_argument("--path", choices=("websocket", "webrtc"), default="websocket")
     parser.add_argument(
         "--dated-by",
         choices=("record", "pair", "arrival"),
         default="record",
-        help="with rtc: how the server learns when a picture was taken",
+        help="with webrtc: how the server learns when a picture was taken",
     )
     parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
     parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
@@ -151,10 +151,10 @@ def _client_of(arguments: argparse.Namespace) -> MakeClient:
     Raises:
         ValueError: a codec that WebRTC hasn't got.
     """
-    if arguments.transport == "websocket":
+    if arguments.path == "websocket":
         return PhoneClient
     if arguments.codec == "jpeg":
-        raise ValueError("--codec jpeg: allowed with --transport rtc: h264, vp8")
+        raise ValueError("--codec jpeg: allowed with --path webrtc: h264, vp8")
     from server.rtc.client import RtcPhoneClient  # takes a while to import
 
     return partial(RtcPhoneClient, codec=arguments.codec, dated_by=arguments.dated_by)

@@ -83,12 +83,14 @@ def thrust(truth: TruthClient) -> float:
 
 
 @contextlib.contextmanager
-def flight(server: Serving) -> Iterator[subprocess.Popen[bytes]]:
+def flight(server: Serving, *options: str) -> Iterator[subprocess.Popen[bytes]]:
     """A virtual phone leads the robot."""
     command = [sys.executable, "-m", "server", "phone", "--hand", "steady", "--rest", "1"]
-    phone = subprocess.Popen(command, env=server.environment, stdout=subprocess.DEVNULL)
+    phone = subprocess.Popen(
+        [*command, *options], env=server.environment, stdout=subprocess.PIPE, bufsize=0
+    )
     try:
-        until(lambda: mode(server) == "TRACK", 30.0, "TRACK")
+        until(lambda: mode(server) == "TRACK", 60.0, "TRACK")
         yield phone
     finally:
         phone.send_signal(signal.SIGINT)
@@ -97,6 +99,8 @@ def flight(server: Serving) -> Iterator[subprocess.Popen[bytes]]:
         except subprocess.TimeoutExpired:
             phone.kill()
             phone.wait()
+        assert phone.stdout is not None
+        phone.stdout.close()
         until(lambda: mode(server) == "DISARMED", 20.0, "DISARMED")
 
 
@@ -149,6 +153,27 @@ def test_a_second_one_in_the_same_place_is_refused_and_the_first_goes_on(server:
     assert done.returncode == 2
     assert "runs already" in done.stderr
     assert status(server)["mode"] == "DISARMED"
+
+
+@pytest.mark.parametrize(
+    ("path", "words"), [("webrtc", "WebRTC, H264"), ("websocket", "websocket")]
+)
+def test_a_virtual_phone_leads_the_robot_by_either_path(
+    path: str, words: str, server: Serving
+) -> None:
+    with flight(server, "--path", path) as phone:
+        until(lambda: str(status(server)["video_path"]).startswith(words), 5.0, words)
+        time.sleep(4.0)
+        said = status(server)
+        streams = said["streams"]
+        assert isinstance(streams, dict)
+        assert streams["phone_imu"]["rate_hz"] > 30.0
+        assert streams["pose"]["rate_hz"] > 5.0
+        phone.send_signal(signal.SIGINT)
+        assert phone.stdout is not None
+        summary = json.loads(phone.stdout.read().decode().splitlines()[-1])
+    assert summary["tracked_s"] > 2.0
+    assert summary["rms_mm"] < 100.0
 
 
 def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarmed(

@@ -10,13 +10,13 @@ import pytest
 from hardware.camera_file import find_camera
 from hardware.sim.codec import Encoder
 from hardware.sim.hand import make_hand
-from hardware.sim.phone import PERFECT, EventKind, PhoneOptions, VirtualPhone
+from hardware.sim.phone import PERFECT, Event, EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import exp
 from pipeline.signals import Operator, PhoneImu
 from server.ingest import EncodedFrame, Ingest
-from server.live_phone import LivePhone
+from server.live_phone import EXPOSED_S, LivePhone, is_superseded
 from server.messages import encode_message
 from server.phone_script import Manners, PhoneScript, Score, VirtualOperator
 from server.virtual_phone import main, summary
@@ -233,9 +233,26 @@ def test_a_phone_asked_to_leave_lets_go_first():
     assert json.loads(main[-1]) == {"type": "command", "what": "disarm"}
 
 
+def test_a_busy_phone_leaves_a_picture_out_once_the_next_is_there_and_it_would_come_late():
+    period = 1.0 / 30.0
+    quick = Event(1.0 + EXPOSED_S, 1.0, EventKind.PICTURE)
+    there = 1.0 + EXPOSED_S + period
+    assert not is_superseded(quick, there - 1e-6, period)
+    assert is_superseded(quick, there + 1e-6, period)
+    slow = Event(1.12, 1.0, EventKind.PICTURE)
+    assert not is_superseded(slow, 1.1199, period)  # there is time until it is to arrive
+    assert is_superseded(slow, 1.1201, period)
+
+
 @pytest.mark.parametrize(
     "arguments",
-    [["--latency-ms", "5"], ["--fps", "500"], ["--codec", "gif"], ["--fault", "haunted"]],
+    [
+        ["--path", "carrier-pigeon"],
+        ["--latency-ms", "5"],
+        ["--fps", "500"],
+        ["--codec", "gif"],
+        ["--fault", "haunted"],
+    ],
 )
 def test_command_refuses_what_it_cannot_play(arguments):
     with pytest.raises(SystemExit):
@@ -244,7 +261,13 @@ def test_command_refuses_what_it_cannot_play(arguments):
 
 @pytest.mark.e2e
 @pytest.mark.parametrize(
-    ("arguments", "words"), [(["--hand", "juggling"], "juggling"), ([], r"127.0.0.1:9")]
+    ("arguments", "words"),
+    [
+        (["--hand", "juggling"], "juggling"),
+        ([], r"127.0.0.1:9"),
+        (["--path", "webrtc"], r"127.0.0.1:9"),
+        (["--path", "webrtc", "--codec", "jpeg"], "h264, vp8"),
+    ],
 )
 def test_command_says_what_is_wrong(arguments, words, capsys):
     assert main([*arguments, "--url", "http://127.0.0.1:9", "--token", "t"]) == 1
