@@ -18,6 +18,7 @@ EXPERIMENTS: Final = {
     "tremor": "what of the hand's tremor the virtual camera lets through",
     "margins": "what delay, gain and phase the control loops can lose, axis by axis",
     "estimators": "where the robot is now: three estimators on the same data",
+    "network": "a phone by WebRTC and by websockets over bad lines; as root on Linux",
 }
 """Name of the file, what it measures."""
 

@@ -236,7 +236,7 @@ def test_a_calibration_that_does_not_tell_its_angle_fits_any_but_comes_second(tm
     assert find_camera_file("pixel-7", 1280, 720, [tmp_path], 90)[1].K[0, 0] == 900.0
 
 
-@pytest.mark.parametrize("wanted", [("pixel-7", 1280, 720), ("lightleash-virtual-phone", 640, 480)])
+@pytest.mark.parametrize("wanted", [("pixel-7", 1280, 720), ("lightleash-virtual-phone", 320, 240)])
 def test_a_camera_nobody_calibrated_is_refused_with_those_there_are(wanted):
     with pytest.raises(CameraFileError, match="lightleash-virtual-phone 1280x720") as raised:
         find_camera(*wanted)
