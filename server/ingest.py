@@ -14,7 +14,7 @@ from pipeline.signals import Operator, PhoneImu
 from pipeline.timing.clock_offset import ClockOffset
 from server.wire import Motion, Picture, Ping, Pong, Record, Touch, WireError
 
-REMEMBERED_NONCES = 64
+REMEMBERED_NONCES = 192
 FUTURE_S = 0.05
 """A capture later than this after its arrival is a broken clock."""
 ARRIVAL_S = 0.05
@@ -36,7 +36,7 @@ Signal = PhoneImu | Operator | EncodedFrame
 
 
 class Ingest:
-    """One phone's stream. Ask it for a PING 20 times a second; feed it every record."""
+    """One phone's stream. Ask it for a PING 20 to 60 times a second; feed it every record."""
 
     def __init__(self, new_nonce: Callable[[], int]) -> None:
         """`new_nonce` gives unpredictable 64-bit numbers (live) or a seeded sequence (tests)."""

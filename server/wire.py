@@ -98,7 +98,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """TOUCH: sign of life of the page's main thread, at 30 Hz and at each change."""
+    """TOUCH: sign of life of the page's main thread, 30 Hz, at each change and each fast PING."""
 
     held: bool
     visible: bool
@@ -127,7 +127,7 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """PING: asks for a sign of life and for the phone's clock, at 20 Hz."""
+    """PING: asks for a sign of life and for the phone's clock, at 20 Hz, by WebRTC at 60 Hz."""
 
     nonce: int
 

@@ -26,11 +26,13 @@ from server.phone_client import Access, PhoneClient, PhoneClientError
 from server.rtc.dating import RTP_HZ, Source
 from server.rtc.peer import CHANNEL, GONE, MAX_UNSENT_BYTES
 from server.rtc.signalling import Answer, Ask, Offer
+from server.rtc.touches import Touches
 from server.rtc.trailer import FrameRecord, append
 from server.wire import (
     Motion,
     Picture,
     Ping,
+    Pong,
     Record,
     Stamp,
     Touch,
@@ -82,7 +84,8 @@ class RtcPhoneClient(PhoneClient):
         self._channel: RTCDataChannel | None = None
         self._opened, self._gone = asyncio.Event(), asyncio.Event()
         self._heard: asyncio.Queue[bytes] = asyncio.Queue(64)
-        self._pinged = 0
+        self._pinged = self._answered_us = 0
+        self._touches = Touches()
         self._attitude: tuple[float, float, float, float] | None = None
 
     @property
@@ -104,12 +107,22 @@ class RtcPhoneClient(PhoneClient):
             return
         if isinstance(record.body, Motion):
             self._attitude = record.body.orientation_wxyz
-        channel = self._channel
-        is_open = channel is not None and channel.readyState == "open"
-        if channel is not None and is_open and channel.bufferedAmount <= MAX_UNSENT_BYTES:
-            channel.send(encode(record))
+        elif isinstance(record.body, Pong):
+            self._answered_us = record.t_us
+        elif isinstance(record.body, Touch):
+            record = self._touches.numbered(record.t_us, record.body)
+        is_open = self._send_fast(record)
         if not is_open or isinstance(record.body, Touch):
             await super().send(record)
+
+    def _send_fast(self, record: Record) -> bool:
+        """Send it by the data channel, or drop it; whether that is open."""
+        channel = self._channel
+        if channel is None or channel.readyState != "open":
+            return False
+        if channel.bufferedAmount <= MAX_UNSENT_BYTES:
+            channel.send(encode(record))
+        return True
 
     async def _take(self, record: Record) -> None:
         """Each PING comes by both ways: the first one is answered."""
@@ -157,9 +170,15 @@ class RtcPhoneClient(PhoneClient):
     async def _answer(self) -> None:
         while True:
             try:
-                await self._take(decode(await self._heard.get()))
+                record = decode(await self._heard.get())
             except WireError as error:
                 raise PhoneClientError(f"{self._access.url}: {error}") from error
+            is_new = record.sequence > self._pinged
+            await self._take(record)
+            if is_new and isinstance(record.body, Ping):
+                touch = self._touches.again(self._answered_us, record.body.nonce)
+                if touch is not None:
+                    self._send_fast(touch)
 
     async def _notice_end(self) -> None:
         await self._gone.wait()

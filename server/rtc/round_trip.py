@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-REMEMBERED = 20
+REMEMBERED = 60
 """Answers, a second of them: a line that gets worse is noticed, one slow answer is not believed."""
 SHARE = 0.75
 """Of the answers that were quicker."""

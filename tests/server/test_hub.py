@@ -78,6 +78,19 @@ def test_whoever_comes_to_lead_finds_the_robot_disarmed(house):
     assert any(map(is_request("disarm"), house.control.inputs()))
 
 
+def test_without_a_fast_path_there_are_no_pings_beyond_those_of_the_websocket(house):
+    def scene():
+        page = Paper()
+        house.hub.greet(hello("first"), page)
+        house.hub.ping(by_all=False)
+        assert page.data == []
+        house.hub.ping()
+        (ping,) = map(decode, page.data)
+        assert ping.sequence == 1  # none was made in vain
+
+    in_loop(scene)
+
+
 def test_pings_go_to_the_phone_that_leads_alone(house, monkeypatch):
     def scene():
         old, new = Paper(), Paper()

@@ -10,7 +10,7 @@ import pytest
 from pipeline.camera.mounting import Mounting
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import Operator, PhoneImu
-from server.ingest import EncodedFrame, Ingest
+from server.ingest import REMEMBERED_NONCES, EncodedFrame, Ingest
 from server.wire import Codec, Motion, Picture, Ping, Pong, Record, Touch, WireError
 
 OFFSET = 4321.5
@@ -142,7 +142,7 @@ def test_invented_and_repeated_nonces_are_refused() -> None:
     ingest.record(pong(ping, 2.0), 2.0)
     with pytest.raises(WireError, match=r"pong\.nonce"):
         ingest.record(pong(ping, 2.0), 2.0)
-    for k in range(100):
+    for k in range(REMEMBERED_NONCES):
         ingest.ping(3.0 + k)
     with pytest.raises(WireError, match=r"touch\.nonce"):
         ingest.record(Record(1, 1, Touch(True, True, 1, nonce_of(ping))), 4.0)

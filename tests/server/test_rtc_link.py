@@ -12,8 +12,9 @@ from server.clock import now
 from server.control_link import OperatorInput, PhoneImuInput
 from server.recording_files import read
 from server.rtc import link as link_module
+from server.rtc.touches import NEWEST_TOUCH_US
 from server.rtc.trailer import split
-from server.wire import Motion, Picture, decode
+from server.wire import Motion, Picture, Touch, decode
 from tests.server.house import eventually
 from tests.server.rtc_house import ATTITUDES, FRAME_S, rtc_house_in
 
@@ -130,9 +131,28 @@ def test_whichever_way_dies_without_a_word_the_finger_is_felt_by_the_other(dead,
         for sequence, held in ((1, False), (2, True)):
             await page.touch(sequence, held)
         heard = await house.control_hears(lambda one: isinstance(one, OperatorInput) and one.held)
-        assert [one.held for one in heard if isinstance(one, OperatorInput)] == [False, True]
+        felt = [one.held for one in heard if isinstance(one, OperatorInput)]
+        assert sorted(felt) == felt  # said again with a PING, but never in another order
+        assert set(felt) == {False, True}
         age = now() - heard[-1].t
         assert house.hub.phone.silent_for(now()) <= age + 0.01
+
+    in_house(tmp_path, play)
+
+
+def test_the_newest_touch_comes_back_with_each_ping_of_the_fast_path(tmp_path):
+    async def play(house, page):
+        swallow(page.client._sockets[0])
+        await page.touch(1, held=True)
+        await eventually(lambda: sum(isinstance(r.body, Touch) for r, _ in house.taken) >= 4)
+        touches = [r for r, _ in house.taken if isinstance(r.body, Touch)]
+        assert len({r.body.nonce for r in touches}) == len(touches)
+        assert [r.sequence for r in touches] == list(range(1, len(touches) + 1))
+        assert all(r.body.held and r.body.press == 1 for r in touches)
+        assert touches[-1].t_us - touches[0].t_us <= NEWEST_TOUCH_US  # then the page may hang
+        count, pongs = len(touches), page.pongs
+        await eventually(lambda: page.pongs > pongs + 20)
+        assert sum(isinstance(r.body, Touch) for r, _ in house.taken) <= count + 6
 
     in_house(tmp_path, play)
 

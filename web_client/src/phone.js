@@ -16,6 +16,8 @@ import { Link, socketUrl } from './link.js';
 import { Kind, MAX_RECORD_BYTES, VERSION, encodeMotion, encodePong, encodeTouch } from './protocol.js';
 
 const LOG_EVERY_MS = 200;
+/** An older touch is not said again: whatever makes them may have stopped. */
+const NEWEST_TOUCH_MS = 100;
 
 /** @typedef {{ device: string, sensors: string, video: string }} Identity */
 
@@ -37,6 +39,8 @@ export class Phone {
     this.session = '';
     this.loggedMs = -Infinity;
     this.sequences = { motion: 0, touch: 0, pong: 0, ping: 0 };
+    /** @type {{ touch: Touch | null, tMs: number }} */
+    this.newest = { touch: null, tMs: -Infinity };
     /** @type {VideoSender | null} */
     this.video = null;
     /** @type {FastRecords | null} */
@@ -112,6 +116,7 @@ export class Phone {
     if (welcome.session === this.session && this.videoLink.isOpen) return; // said again, on the video link
     this.session = welcome.session;
     this.sequences = { motion: 0, touch: 0, pong: 0, ping: 0 };
+    this.newest = { touch: null, tMs: -Infinity };
     this.videoLink.failures = 0;
     this.videoLink.open();
     this.surroundings.dispatch({ type: 'welcomed' });
@@ -121,24 +126,30 @@ export class Phone {
   /**
    * @param {Received} record
    * @param {(record: ArrayBuffer) => void} answer By the way that it came.
+   * @param {boolean} [isFast] That is the fast one.
    */
-  record(record, answer) {
-    if (record.kind === Kind.PING) this.pinged(record, answer);
+  record(record, answer, isFast = false) {
+    if (record.kind === Kind.PING) this.pinged(record, answer, isFast);
     else if (record.kind === Kind.CREDIT) this.video?.credit(record.taken);
   }
 
   /**
-   * Each PING comes by all ways: the first one is answered.
+   * Each PING comes by all ways, or by the fast one alone: the first one is answered, there with the touch too.
    * @param {{ sequence: number, tUs: number, nonce: bigint }} ping
    * @param {(record: ArrayBuffer) => void} answer
+   * @param {boolean} isFast
    */
-  pinged(ping, answer) {
+  pinged(ping, answer, isFast) {
     const { performance, dispatch } = this.surroundings;
     if (ping.sequence <= this.sequences.ping) return;
     this.sequences.ping = ping.sequence;
     this.sequences.pong += 1;
     answer(encodePong(this.sequences.pong, nowUs(performance), ping));
     dispatch({ type: 'ping', nonce: ping.nonce });
+    const { touch, tMs } = this.newest;
+    if (isFast && touch !== null && performance.now() - tMs <= NEWEST_TOUCH_MS) {
+      answer(this.touchRecord({ ...touch, nonce: ping.nonce }));
+    }
   }
 
   /**
@@ -155,11 +166,17 @@ export class Phone {
 
   /** @param {Touch} touch By all ways at once: whatever becomes of one, the server knows of the finger. */
   sendTouch(touch) {
-    this.sequences.touch += 1;
-    const record = encodeTouch(this.sequences.touch, nowUs(this.surroundings.performance), touch);
+    this.newest = { touch, tMs: this.surroundings.performance.now() };
+    const record = this.touchRecord(touch);
     this.fast?.send(record);
     // Never dropped: a release must get through, and an old one says nothing that a newer one does not.
     this.link.sendRecord(record, Infinity);
+  }
+
+  /** @param {Touch} touch */
+  touchRecord(touch) {
+    this.sequences.touch += 1;
+    return encodeTouch(this.sequences.touch, nowUs(this.surroundings.performance), touch);
   }
 
   /** @param {ArrayBuffer} record */
