@@ -23,8 +23,9 @@ from server.ingest import EncodedFrame
 from server.recording_files import read
 from server.wire import Picture, decode
 from tests.bench.y4m_camera import number_of, write_y4m
-from tests.e2e.chromium_phone import CALIBRATION, browser
+from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
+from tests.e2e.played_phone import CALIBRATION
 from tests.e2e.serving import Serving, serving
 
 START_S = 4.0
@@ -54,6 +55,8 @@ class Speed:
     """Bits a second shrink with the pictures, so that a picture has as many as in real time."""
     bitrate_bps: int
     """In real time."""
+    by_webrtc: bool = False
+    """Else by websocket."""
 
     @property
     def rate_hz(self) -> int:
@@ -64,7 +67,8 @@ class Speed:
     def options(self) -> list[str]:
         """Of `lightleash serve`."""
         rate, bits = str(self.rate_hz), str(self.bitrate_bps // self.slower)
-        return ["--video.frame-rate-hz", rate, "--video.bitrate-bps", bits]
+        path = ["--rtc.enabled", "true" if self.by_webrtc else "false"]
+        return ["--video.frame-rate-hz", rate, "--video.bitrate-bps", bits, *path]
 
 
 class Studio:
