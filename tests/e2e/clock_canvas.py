@@ -17,15 +17,21 @@ CLOCK_CANVAS = """
     paint.fillStyle = on ? '#fff' : '#000';
     paint.fillRect(40 * column, 40 * row, 40, 40);
   };
+  const noise = Object.assign(document.createElement('canvas'), {width: 512, height: 512});
+  const grain = noise.getContext('2d', {alpha: false});
+  const pixels = grain.createImageData(512, 512);
+  for (let i = 0; i < pixels.data.length; i += 4) {
+    pixels.data.fill(90 + 60 * Math.random(), i, i + 3);
+    pixels.data[i + 3] = 255;
+  }
+  grain.putImageData(pixels, 0, 0);
   window.painted = 0;
   const onFrame = () => {
     painted += 1;
     paint.fillStyle = `hsl(${painted % 360} 30% 25%)`;
     paint.fillRect(0, 80, 1280, 640);
-    for (let k = 0; k < 40; k += 1) { // something to encode
-      paint.fillStyle = `rgb(${(37 * k) % 255} ${(91 * k) % 255} 90)`;
-      paint.fillRect((97 * k + 5 * painted) % 1280, 90 + (61 * k) % 600, 60, 24);
-    }
+    const [x, y] = [(painted * 37) % 192, (painted * 23) % 192];
+    paint.drawImage(noise, x, y, 320, 320, 480, 240, 320, 320); // something to encode
     const ms = Math.round(performance.now()) & 0xffffff;
     const check = (ms ^ (ms >> 8) ^ (ms >> 16) ^ 0x5a) & 0xff;
     for (let i = 0; i < 32; i += 1) {

@@ -20,33 +20,13 @@ from server.wire import Codec, Picture, Record, Touch, decode
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE, STARVED, calibrate, lead, led_server
 from tests.e2e.clock_canvas import CLOCK_CANVAS, painted_ms
+from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
 from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
 FILM_S = 6.0
 FRAME_MS = 1000.0 / 30.0
-KEEP_CONNECTIONS = """
-window.made = [];
-window.RTCPeerConnection = class extends RTCPeerConnection {
-  constructor(configuration) { super(configuration); made.push(this); }
-};
-"""
 FAIL = "made.at(-1).close(); made.at(-1).dispatchEvent(new Event('connectionstatechange'))"
-NO_H264 = r"""
-window.RTCPeerConnection = class extends RTCPeerConnection {
-  setRemoteDescription({type, sdp}) {
-    const lines = sdp.split('\r\n');
-    const found = (pattern) => lines.map((line) => line.match(pattern)).filter(Boolean);
-    const h264 = found(/^a=rtpmap:(\d+) H264/).map(([, n]) => n);
-    const again = found(/^a=fmtp:(\d+) apt=(\d+)/).filter(([, , n]) => h264.includes(n));
-    const gone = [...h264, ...again.map(([, n]) => n)];
-    const kept = lines.filter((line) => !gone.some((n) => RegExp(`^a=[a-z-]+:${n} `).test(line)));
-    const less = (line) => line.split(' ').filter((word) => !gone.includes(word)).join(' ');
-    const said = kept.map((line) => (line.startsWith('m=video') ? less(line) : line));
-    return super.setRemoteDescription({type, sdp: said.join('\r\n')});
-  }
-};
-"""
 STREAMS_ONLY = "delete window.RTCRtpScriptTransform;"
 LISTEN = """
 window.left = [];

@@ -1,0 +1,260 @@
+"""How fresh pictures are by each way, in a real Chromium on the loopback, 1280x720 at 30 Hz.
+
+    python -m tests.bench.bench_rtc [--rounds 3] [--seconds 15] [--ways tuned stock …]
+
+A canvas shows when it was painted; of each picture counts when its luma is in numpy at the server.
+Runs are interleaved, so that what else the machine does falls on all of them; medians over rounds.
+The exit code is 1 if a goal is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from math import pi, sin
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import numpy as np
+from playwright.sync_api import BrowserContext, Page
+
+from server.experiments.text import table
+from server.settings import VideoSettings
+from tests.e2e.chromium_phone import browser
+from tests.e2e.chromium_rig import LANDSCAPE
+from tests.e2e.clock_canvas import CLOCK_CANVAS
+from tests.e2e.conftest import find_chromium
+from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
+
+RATE_HZ, FRAME_MS = 30.0, 1000.0 / 30.0
+SETTLED_S = 3.0
+"""From the first picture until the figures count; the bitrate is that of its last second."""
+NO_WEBRTC = "delete window.RTCPeerConnection;"
+NO_ENCODER = "delete window.VideoEncoder;"
+SCRIPTS: dict[str, tuple[str, ...]] = {
+    "tuned": (),
+    "tuned VP8": (NO_H264,),
+    "stock": (),
+    "WebCodecs": (NO_WEBRTC,),
+    "JPEG": (NO_WEBRTC, NO_ENCODER),
+}
+STOCK = """
+async ([token, bitrate]) => {
+  const stream = await navigator.mediaDevices.getUserMedia({video: true});
+  const call = new RTCPeerConnection();
+  const place = call.addTransceiver(stream.getVideoTracks()[0], {direction: 'sendonly'});
+  const {codecs} = RTCRtpSender.getCapabilities('video');
+  place.setCodecPreferences(codecs.filter(({mimeType}) => mimeType === 'video/H264'));
+  await call.setLocalDescription(await call.createOffer());
+  await new Promise((resolve) => {
+    if (call.iceGatheringState === 'complete') resolve();
+    call.onicegatheringstatechange = () => call.iceGatheringState === 'complete' && resolve();
+  });
+  const response = await fetch('stock', {
+    method: 'POST', headers: {Authorization: `Bearer ${token}`, 'X-Lightleash': '1'},
+    body: JSON.stringify({sdp: call.localDescription.sdp}),
+  });
+  await call.setRemoteDescription(await response.json());
+  const parameters = place.sender.getParameters();
+  parameters.encodings[0].maxBitrate = bitrate;
+  parameters.degradationPreference = 'maintain-resolution';
+  await place.sender.setParameters(parameters);
+}
+"""
+BYTES_SENT = """
+async () => {
+  let bytes = 0;
+  for (const one of (await made.at(-1)?.getStats() ?? new Map()).values()) {
+    if (one.type === 'outbound-rtp') bytes += one.bytesSent;
+  }
+  return bytes;
+}
+"""
+COLUMNS = (
+    ("way", "way", "{}"),
+    ("p50_ms", "p50 ms", "{:.1f}"),
+    ("p95_ms", "p95 ms", "{:.1f}"),
+    ("dropped_percent", "drops %", "{:.1f}"),
+    ("first_s", "first s", "{:.2f}"),
+    ("bitrate_percent", "bitrate %", "{:.0f}"),
+    ("matched_percent", "matched %", "{:.2f}"),
+    ("imu_hz", "IMU Hz", "{:.1f}"),
+    ("sync_ms", "sync p95 ms", "{:.2f}"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One run, or the medians of several."""
+
+    way: str
+    p50_ms: float
+    """Painted to luma in numpy."""
+    p95_ms: float
+    dropped_percent: float
+    """Of 30 a second."""
+    first_s: float
+    """From the tap to the first whole picture of 1280x720."""
+    bitrate_percent: float
+    """Of what is wanted, in the third second after the first picture."""
+    matched_percent: float
+    """Pictures whose record is of when they were painted, to half a picture."""
+    imu_hz: float
+    sync_ms: float
+    """Error of the clock, p95."""
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.bench_rtc")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--seconds", type=float, default=15.0, help="that count, of each run")
+    parser.add_argument("--ways", nargs="+", choices=list(SCRIPTS), default=list(SCRIPTS))
+    return parser.parse_args()
+
+
+@contextmanager
+def receiving(result: Path) -> Iterator[dict[str, object]]:
+    """The other end, in a process of its own."""
+    command = [sys.executable, "-m", "tests.bench.rtc_receiver", str(result)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            yield json.loads(process.stdout.readline())
+        finally:
+            process.stdin.close()
+            process.wait(20.0)
+
+
+class Sensors:
+    """Motion sensors that sway, fed at more than 100 Hz."""
+
+    KINDS = ("accelerometer", "gyroscope", "linear-acceleration")
+
+    def __init__(self, context: BrowserContext, page: Page) -> None:
+        self._page, self._cdp = page, context.new_cdp_session(page)
+        for kind in self.KINDS:
+            told = {"enabled": True, "type": kind, "metadata": {}}
+            self._cdp.send("Emulation.setSensorOverrideEnabled", told)
+
+    def sway(self, seconds: float) -> None:
+        """Play for so long."""
+        end = time.monotonic() + seconds
+        while (t := time.monotonic()) < end:
+            turn = 0.3 * sin(2.0 * pi * t)
+            for kind, z in zip(self.KINDS, (9.81 + turn, turn, turn), strict=True):
+                reading = {"xyz": {"x": 0.5 * turn, "y": turn, "z": z}}
+                told = {"type": kind, "reading": reading}
+                self._cdp.send("Emulation.setSensorOverrideReadings", told)
+            self._page.wait_for_timeout(4)
+
+
+def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
+    with receiving(result) as told:
+        page = context.new_page()
+        for script in (CLOCK_CANVAS, KEEP_CONNECTIONS, *SCRIPTS[way]):
+            page.add_init_script(script)
+        sensors = Sensors(context, page)
+        operator, supervisor = told["tokens"]  # type: ignore[misc]
+        page.goto(f"http://127.0.0.1:{told['port']}/#k={operator}")
+        sensors.sway(1.0)
+        epoch = float(page.evaluate("performance.timeOrigin")) * 1e-3
+        epoch += time.monotonic() - time.time()
+        tapped = time.monotonic()
+        if way == "stock":
+            page.evaluate(STOCK, [supervisor, VideoSettings().bitrate_bps])
+        else:
+            page.tap("#start")
+        sensors.sway(SETTLED_S)
+        before, t_before = page.evaluate(BYTES_SENT), time.monotonic()
+        sensors.sway(1.0)
+        sent = 8.0 * (page.evaluate(BYTES_SENT) - before) / (time.monotonic() - t_before)
+        sensors.sway(seconds)
+        page.close()
+    return judged(way, json.loads(result.read_text()), epoch, tapped, seconds, sent)
+
+
+def judged(
+    way: str, seen: dict[str, list], epoch: float, tapped: float, seconds: float, sent_bps: float
+) -> Row:
+    """`epoch` is when the page's clock began, `tapped` when it began to film, by our clock [s]."""
+    rows = [row for row in seen["pictures"] if row[4] == 1280]
+    pictures = np.array([[np.nan if x is None else x for x in row] for row in rows], float)
+    t, painted, taken, size, _ = pictures.T
+    first = t[0]
+    counts = (t > first + SETTLED_S) & (t <= first + SETTLED_S + seconds) & ~np.isnan(painted)
+    delay = (1e3 * (t - epoch) - painted)[counts]
+    late = (1e3 * (taken - epoch) - painted)[counts]
+    fine = np.abs(late - np.median(late)) < 0.5 * FRAME_MS if len(late) else late
+    third = (t > first + SETTLED_S - 1.0) & (t <= first + SETTLED_S)
+    bps = sent_bps if "stock" in way else 8.0 * size[third].sum()
+    clock = np.abs(np.array(seen["clock"]) + epoch)
+    return Row(
+        way=way,
+        p50_ms=float(np.percentile(delay, 50)),
+        p95_ms=float(np.percentile(delay, 95)),
+        dropped_percent=100.0 * (1.0 - len(np.unique(painted[counts])) / (RATE_HZ * seconds)),
+        first_s=first - tapped,
+        bitrate_percent=100.0 * bps / VideoSettings().bitrate_bps,
+        matched_percent=100.0 * float(np.mean(fine)) if way != "stock" else np.nan,
+        imu_hz=float(np.median(seen["imu_hz"])) if seen["imu_hz"] else np.nan,
+        sync_ms=1e3 * float(np.percentile(clock, 95)) if len(clock) else np.nan,
+    )
+
+
+def median(rows: list[Row]) -> Row:
+    figures = [field.name for field in fields(Row)][1:]
+    return Row(rows[0].way, *(float(np.median([getattr(r, f) for r in rows])) for f in figures))
+
+
+def goals(rows: dict[str, Row]) -> Iterator[tuple[bool, str]]:
+    """Whether it is met, and the figures."""
+    tuned = rows["tuned"]
+    for other, most in (("stock", 0.5), ("WebCodecs", 1.2)):
+        if other in rows:
+            ratio = tuned.p50_ms / rows[other].p50_ms
+            yield ratio <= most, f"p50 tuned / {other}: {ratio:.2f}, at most {most}"
+    yield tuned.dropped_percent <= 2.0, f"drops {tuned.dropped_percent:.1f} %, at most 2"
+    yield tuned.first_s <= 2.0, f"first picture after {tuned.first_s:.2f} s, at most 2"
+    yield tuned.bitrate_percent >= 80.0, f"bitrate {tuned.bitrate_percent:.0f} %, at least 80"
+    for way in ("tuned", "tuned VP8"):
+        if way in rows:
+            share = rows[way].matched_percent
+            yield share == 100.0, f"{way}: records matched {share:.2f} %, 100"
+    yield tuned.imu_hz >= 55.0, f"IMU {tuned.imu_hz:.1f} Hz, at least 55"
+    yield tuned.sync_ms <= 1.0, f"clock p95 {tuned.sync_ms:.2f} ms, at most 1"
+
+
+def main() -> int:
+    told, executable = arguments(), find_chromium()
+    if executable is None:
+        sys.exit("no Chromium found: apt-get install chromium")
+    rows: dict[str, list[Row]] = {way: [] for way in told.ways}
+    with tempfile.TemporaryDirectory() as folder, browser(executable, **LANDSCAPE) as context:
+        for number in range(told.rounds):
+            for way in told.ways:
+                rows[way].append(run(context, way, told.seconds, Path(folder) / "seen.json"))
+                print(f"round {number + 1}, load {os.getloadavg()[0]:.1f}")
+                print(table(COLUMNS, rows[way][-1:]), flush=True)
+    medians = {way: median(some) for way, some in rows.items()}
+    print(f"\nmedians of {told.rounds}")
+    print(table(COLUMNS, medians.values()))
+    judgement = list(goals(medians)) if "tuned" in medians else []
+    for met, words in judgement:
+        print(f"{'met   ' if met else 'MISSED'}  {words}")
+    return 0 if all(met for met, _ in judgement) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,155 @@
+"""The receiving end of `bench_rtc`: the real server's paths, or aiortc as it is shipped.
+
+    python -m tests.bench.rtc_receiver RESULT.json
+
+It says its port and tokens in one line of JSON, and writes what it saw when its input ends. There
+is no robot: of each picture luma is what counts, and when it was there.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+
+from pipeline.signals import Image
+from server.app import body_of, make_app
+from server.clock import now
+from server.frame_decoder import FrameDecoder
+from server.frame_thread import FrameThread
+from server.ingest import EncodedFrame
+from server.operator import OperatorPhone
+from server.security import Guard
+from server.serving import SWITCH_S
+from server.settings import VideoSettings
+from server.view_proxy import routes as view_routes
+from server.websocket import PageServer
+from tests.e2e.clock_canvas import painted_ms
+from tests.server.house import HOST
+from tests.server.rtc_house import RtcHouse
+
+WATCH_S = 0.1
+
+
+class Seen:
+    """What came, in the order it came."""
+
+    def __init__(self) -> None:
+        self.pictures: list[tuple[float, int | None, float, int, int]] = []
+        """Luma was there [s], painted [ms], taken [s], bytes, width [px]."""
+        self.clock: list[float] = []
+        """The page's clock minus ours [s]."""
+        self.imu_hz: list[float] = []
+        self.paths: set[str] = set()
+
+    def add(self, luma: Image, t_taken: float, size: int) -> None:
+        t = now()
+        self.pictures.append((t, painted_ms(luma), t_taken, size, luma.shape[1]))
+
+
+class Eyes(FrameThread):
+    """Decodes, as vision does, and looks at the clock in the picture."""
+
+    def __init__(self, phone: OperatorPhone, shape: tuple[int, int], seen: Seen) -> None:
+        super().__init__("eyes", phone._on_taken)
+        self._seen, self._want_key = seen, phone._on_key_wanted
+        self._decoder = FrameDecoder(*shape)
+        self.start()
+
+    def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
+        self._decoder.needs_key |= has_gap
+        luma = None
+        for frame in frames:
+            luma = self._decoder.decoded(frame)
+        if luma is None:
+            self._want_key()
+        else:
+            self._seen.add(luma, frames[-1].t, len(frames[-1].picture.data))
+
+
+class Receiver(RtcHouse):
+    """Our server without a robot, and beside it aiortc as it comes."""
+
+    def __init__(self, folder: Path, seen: Seen) -> None:
+        super().__init__(folder)
+        self.seen = seen
+        self._eyes: Eyes | None = None
+        self._calls: list[RTCPeerConnection] = []
+        self._reading: set[asyncio.Task[None]] = set()
+        routes = [*view_routes(lambda: 9), *self.desk.routes()]
+        routes.append(Route("/stock", self._stock, methods=["POST"]))
+        pages = PageServer(self.hub, VideoSettings())
+        self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
+        OperatorPhone._see = lambda phone, frame, t: self._see(phone, frame, t)
+
+    def _see(self, phone: OperatorPhone, frame: EncodedFrame, t: float) -> None:
+        phone.meters["video"].tick(t, frame.t)
+        if self._eyes is None:
+            shape = frame.picture.width, frame.picture.height
+            self._eyes = Eyes(phone, shape, self.seen)
+        self._eyes.offer(frame)
+
+    async def _stock(self, request: Request) -> Response:
+        call = RTCPeerConnection(RTCConfiguration(iceServers=[]))  # its default asks the internet
+        self._calls.append(call)
+
+        @call.on("track")
+        def came(track):
+            reading = asyncio.ensure_future(self._read(track))
+            self._reading.add(reading)
+
+        offer = json.loads(await body_of(request, 65_536))
+        await call.setRemoteDescription(RTCSessionDescription(offer["sdp"], "offer"))
+        await call.setLocalDescription(await call.createAnswer())
+        return JSONResponse({"sdp": call.localDescription.sdp, "type": "answer"})
+
+    async def _read(self, track) -> None:
+        while True:
+            frame = await track.recv()
+            luma = frame.to_ndarray(format="gray")
+            self.seen.add(np.asarray(luma, np.uint8), float("nan"), 0)
+
+    async def watch(self) -> None:
+        """Ten times a second: clock, motion, path."""
+        while True:
+            await asyncio.sleep(WATCH_S)
+            phone = self.hub.phone
+            if phone is None or not phone.ingest.clock.ready:
+                continue
+            self.seen.clock.append(phone.ingest.clock.offset)
+            self.seen.imu_hz.append(phone.meters["phone_imu"].stream(now()).rate_hz)
+            self.seen.paths.add(phone.video_path)
+
+    async def close_calls(self) -> None:
+        for call in self._calls:
+            await call.close()
+        for reading in self._reading:
+            reading.cancel()
+
+
+async def receive(result: Path) -> None:
+    seen = Seen()
+    with tempfile.TemporaryDirectory() as folder:
+        house = Receiver(Path(folder), seen)
+        async with house.open():
+            watching = asyncio.create_task(house.watch())
+            tokens = (house.doors.operator_token, house.doors.supervisor_token)
+            print(json.dumps({"port": house.port, "tokens": tokens}), flush=True)
+            await asyncio.to_thread(sys.stdin.read)
+            watching.cancel()
+            await house.close_calls()
+    told = {name: getattr(seen, name) for name in ("pictures", "clock", "imu_hz")}
+    result.write_text(json.dumps({**told, "paths": sorted(seen.paths)}))
+
+
+if __name__ == "__main__":
+    sys.setswitchinterval(SWITCH_S)
+    asyncio.run(receive(Path(sys.argv[1])))

@@ -1,0 +1,23 @@
+"""What is told a page before it runs: to be another browser, or to be looked into."""
+
+KEEP_CONNECTIONS = """
+window.made = [];
+window.RTCPeerConnection = class extends RTCPeerConnection {
+  constructor(configuration) { super(configuration); made.push(this); }
+};
+"""
+NO_H264 = r"""
+window.RTCPeerConnection = class extends RTCPeerConnection {
+  setRemoteDescription({type, sdp}) {
+    const lines = sdp.split('\r\n');
+    const found = (pattern) => lines.map((line) => line.match(pattern)).filter(Boolean);
+    const h264 = found(/^a=rtpmap:(\d+) H264/).map(([, n]) => n);
+    const again = found(/^a=fmtp:(\d+) apt=(\d+)/).filter(([, , n]) => h264.includes(n));
+    const gone = [...h264, ...again.map(([, n]) => n)];
+    const kept = lines.filter((line) => !gone.some((n) => RegExp(`^a=[a-z-]+:${n} `).test(line)));
+    const less = (line) => line.split(' ').filter((word) => !gone.includes(word)).join(' ');
+    const said = kept.map((line) => (line.startsWith('m=video') ? less(line) : line));
+    return super.setRemoteDescription({type, sdp: said.join('\r\n')});
+  }
+};
+"""
