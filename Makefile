@@ -87,6 +87,7 @@ bench: dev
 	-$(BIN)/lightleash bench vision --jobs 2 --learn 5
 	for name in control control_law ekf estimators relative virtual_camera; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
 	-$(BIN)/python -m tests.bench.bench_browser
+	-$(BIN)/python -m tests.bench.bench_rtc
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt

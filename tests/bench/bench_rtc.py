@@ -18,7 +18,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
 from math import pi, sin
 from pathlib import Path
 
@@ -26,20 +25,17 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-import numpy as np
 from playwright.sync_api import BrowserContext, Page
 
 from server.experiments.text import table
 from server.settings import VideoSettings
+from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.clock_canvas import CLOCK_CANVAS
 from tests.e2e.conftest import find_chromium
 from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
 
-RATE_HZ, FRAME_MS = 30.0, 1000.0 / 30.0
-SETTLED_S = 3.0
-"""From the first picture until the figures count; the bitrate is that of its last second."""
 NO_WEBRTC = "delete window.RTCPeerConnection;"
 NO_ENCODER = "delete window.VideoEncoder;"
 SCRIPTS: dict[str, tuple[str, ...]] = {
@@ -81,38 +77,6 @@ async () => {
   return bytes;
 }
 """
-COLUMNS = (
-    ("way", "way", "{}"),
-    ("p50_ms", "p50 ms", "{:.1f}"),
-    ("p95_ms", "p95 ms", "{:.1f}"),
-    ("dropped_percent", "drops %", "{:.1f}"),
-    ("first_s", "first s", "{:.2f}"),
-    ("bitrate_percent", "bitrate %", "{:.0f}"),
-    ("matched_percent", "matched %", "{:.2f}"),
-    ("imu_hz", "IMU Hz", "{:.1f}"),
-    ("sync_ms", "sync p95 ms", "{:.2f}"),
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One run, or the medians of several."""
-
-    way: str
-    p50_ms: float
-    """Painted to luma in numpy."""
-    p95_ms: float
-    dropped_percent: float
-    """Of 30 a second."""
-    first_s: float
-    """From the tap to the first whole picture of 1280x720."""
-    bitrate_percent: float
-    """Of what is wanted, in the third second after the first picture."""
-    matched_percent: float
-    """Pictures whose record is of when they were painted, to half a picture."""
-    imu_hz: float
-    sync_ms: float
-    """Error of the clock, p95."""
 
 
 def arguments() -> argparse.Namespace:
@@ -183,57 +147,6 @@ def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
         sensors.sway(seconds)
         page.close()
     return judged(way, json.loads(result.read_text()), epoch, tapped, seconds, sent)
-
-
-def judged(
-    way: str, seen: dict[str, list], epoch: float, tapped: float, seconds: float, sent_bps: float
-) -> Row:
-    """`epoch` is when the page's clock began, `tapped` when it began to film, by our clock [s]."""
-    rows = [row for row in seen["pictures"] if row[4] == 1280]
-    pictures = np.array([[np.nan if x is None else x for x in row] for row in rows], float)
-    t, painted, taken, size, _ = pictures.T
-    first = t[0]
-    counts = (t > first + SETTLED_S) & (t <= first + SETTLED_S + seconds) & ~np.isnan(painted)
-    delay = (1e3 * (t - epoch) - painted)[counts]
-    late = (1e3 * (taken - epoch) - painted)[counts]
-    fine = np.abs(late - np.median(late)) < 0.5 * FRAME_MS if len(late) else late
-    third = (t > first + SETTLED_S - 1.0) & (t <= first + SETTLED_S)
-    bps = sent_bps if "stock" in way else 8.0 * size[third].sum()
-    clock = np.abs(np.array(seen["clock"]) + epoch)
-    return Row(
-        way=way,
-        p50_ms=float(np.percentile(delay, 50)),
-        p95_ms=float(np.percentile(delay, 95)),
-        dropped_percent=100.0 * (1.0 - len(np.unique(painted[counts])) / (RATE_HZ * seconds)),
-        first_s=first - tapped,
-        bitrate_percent=100.0 * bps / VideoSettings().bitrate_bps,
-        matched_percent=100.0 * float(np.mean(fine)) if way != "stock" else np.nan,
-        imu_hz=float(np.median(seen["imu_hz"])) if seen["imu_hz"] else np.nan,
-        sync_ms=1e3 * float(np.percentile(clock, 95)) if len(clock) else np.nan,
-    )
-
-
-def median(rows: list[Row]) -> Row:
-    figures = [field.name for field in fields(Row)][1:]
-    return Row(rows[0].way, *(float(np.median([getattr(r, f) for r in rows])) for f in figures))
-
-
-def goals(rows: dict[str, Row]) -> Iterator[tuple[bool, str]]:
-    """Whether it is met, and the figures."""
-    tuned = rows["tuned"]
-    for other, most in (("stock", 0.5), ("WebCodecs", 1.2)):
-        if other in rows:
-            ratio = tuned.p50_ms / rows[other].p50_ms
-            yield ratio <= most, f"p50 tuned / {other}: {ratio:.2f}, at most {most}"
-    yield tuned.dropped_percent <= 2.0, f"drops {tuned.dropped_percent:.1f} %, at most 2"
-    yield tuned.first_s <= 2.0, f"first picture after {tuned.first_s:.2f} s, at most 2"
-    yield tuned.bitrate_percent >= 80.0, f"bitrate {tuned.bitrate_percent:.0f} %, at least 80"
-    for way in ("tuned", "tuned VP8"):
-        if way in rows:
-            share = rows[way].matched_percent
-            yield share == 100.0, f"{way}: records matched {share:.2f} %, 100"
-    yield tuned.imu_hz >= 55.0, f"IMU {tuned.imu_hz:.1f} Hz, at least 55"
-    yield tuned.sync_ms <= 1.0, f"clock p95 {tuned.sync_ms:.2f} ms, at most 1"
 
 
 def main() -> int:

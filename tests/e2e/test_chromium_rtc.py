@@ -24,7 +24,7 @@ from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
 from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
-FILM_S = 6.0
+FILM_S, SETTLED_S = 6.0, 1.5
 FRAME_MS = 1000.0 / 30.0
 FAIL = "made.at(-1).close(); made.at(-1).dispatchEvent(new Event('connectionstatechange'))"
 STREAMS_ONLY = "delete window.RTCRtpScriptTransform;"
@@ -65,6 +65,14 @@ def path_is(server: Serving, page: Page, beginning: str, seconds: float = 25.0) 
     raise AssertionError(f"{path}, not {beginning}")
 
 
+def becomes(page: Page, condition: str, seconds: float = 20.0) -> None:
+    """Wait for a JavaScript expression; Playwright's own way is forbidden by the page's policy."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(condition):
+        assert time.monotonic() < end, condition
+        page.wait_for_timeout(50)
+
+
 def tell_of_leaving(route: Route) -> None:
     """The worker as it is, but it says when each picture leaves it."""
     response = route.fetch()
@@ -95,7 +103,8 @@ def filming(
 
 
 def filmed(server: Serving, page: Page) -> Film:
-    """Record for a while."""
+    """Record for a while, when the worker has seen what a page tells it late."""
+    page.wait_for_timeout(1e3 * SETTLED_S)
     server.request("POST", "/api/recording")
     page.wait_for_timeout(1e3 * FILM_S)
     recorded = Path(str(server.request("DELETE", "/api/recording")["path"]))
@@ -118,7 +127,7 @@ def each_has_its_own_record(film: Film, codec: Codec) -> None:
         late.append(1e-3 * record.t_us - ms)
         checked += 1
     assert checked >= 5 * FILM_S  # 30 on a quiet machine
-    assert min(late) > -2.0
+    assert min(late) > -0.5 * FRAME_MS  # not the picture before
     assert np.percentile(late, 90) < FRAME_MS  # a starved page paints, and is looked at later
     assert np.median(late) < 0.5 * FRAME_MS
 
@@ -132,7 +141,7 @@ def test_pictures_go_by_webrtc_with_their_records_by_websocket_when_it_ends_and_
         page.evaluate(FAIL)
         path_is(server, page, "websocket, H264")
         path_is(server, page, "WebRTC, H264")
-        page.wait_for_function("document.querySelector('#h-path').innerText === 'WebRTC'")
+        becomes(page, "document.querySelector('#h-path').innerText === 'WebRTC'")
     each_has_its_own_record(film, Codec.H264)
     ways = [
         1e3 * (t - film.left[r.sequence]) for t, r, _ in film.pictures if r.sequence in film.left
@@ -158,7 +167,7 @@ def test_where_udp_is_blocked_pictures_go_by_websocket(chromium: str, tmp_path: 
     blocked = ("--webrtc-ip-handling-policy=disable_non_proxied_udp",)
     with filming(chromium, tmp_path, flags=blocked) as (server, page):
         path_is(server, page, "websocket, H264")
-        page.wait_for_function("made.length > 0 && made.at(-1).connectionState !== 'connected'")
+        becomes(page, "made.length > 0 && made.at(-1).connectionState !== 'connected'")
         film = filmed(server, page)
         assert str(server.request("GET", "/api/status")["video_path"]) == "websocket, H264"
         assert page.inner_text("#h-path") == "WebSocket"
