@@ -67,7 +67,7 @@ class Speed:
     def options(self) -> list[str]:
         """Of `lightleash serve`."""
         rate, bits = str(self.rate_hz), str(self.bitrate_bps // self.slower)
-        path = ["--rtc.enabled", "true" if self.by_webrtc else "false"]
+        path = ["--rtc.enabled" if self.by_webrtc else "--no-rtc.enabled"]
         return ["--video.frame-rate-hz", rate, "--video.bitrate-bps", bits, *path]
 
 
