@@ -5,7 +5,7 @@ from __future__ import annotations
 from hardware.sim.codec import DecodeError, Decoder
 from pipeline.signals import Image
 from server.ingest import EncodedFrame
-from server.wire import Codec
+from server.wire_records import Codec
 
 CODEC_NAMES = {Codec.JPEG: "jpeg", Codec.H264: "h264", Codec.VP8: "vp8"}
 

@@ -27,7 +27,8 @@ from server.paths import FastPath, PhonePaths
 from server.recorder import Recordings
 from server.status import build
 from server.vision import Picture, jpeg
-from server.wire import Record, Thumbnail, encode
+from server.wire import encode
+from server.wire_records import Record, Thumbnail
 
 log = logging.getLogger("lightleash")
 
@@ -35,8 +36,7 @@ LEASE_S = 2.0
 """A phone silent for longer may be taken over from."""
 INSIST_S, INSISTS = 0.01, 100
 """How often and how many times a STOP is sent to a control process that can't take it."""
-EVENTS = 12
-TICK_S = 0.1
+EVENTS, TICK_S = 12, 0.1
 
 
 class Hub:

@@ -12,7 +12,8 @@ from pipeline.camera.mounting import SQUARE
 from pipeline.frames import R_cd
 from pipeline.signals import Operator, PhoneImu
 from pipeline.timing.clock_offset import ClockOffset
-from server.wire import Motion, Picture, Ping, Pong, Record, Touch, WireError
+from server.wire import WireError
+from server.wire_records import Motion, Picture, Ping, Pong, Record, Touch
 
 REMEMBERED_NONCES = 192
 FUTURE_S = 0.05

@@ -17,7 +17,7 @@ from pipeline.frames import Array
 from server.messages import Command, Status
 from server.phone_client import Access, PhoneClient
 from server.phone_script import ALL, DEVICE, SYNCHRONISED_PONGS, TOUCH_S, PhoneScript, Score
-from server.wire import Record
+from server.wire_records import Record
 
 MakeClient = Callable[
     [Access, Callable[[int, int], Record], Callable[[Status], Command | None]], PhoneClient

@@ -39,7 +39,8 @@ from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.robot_link import RobotLink
 from server.seen_input import SeenInput
 from server.sight import Sight
-from server.wire import Ping, Record, decode, encode
+from server.wire import decode, encode
+from server.wire_records import Ping, Record
 
 PERIOD_S = 0.005
 EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}

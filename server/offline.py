@@ -33,7 +33,8 @@ from server.recording_files import Entry, Recording
 from server.seen_input import SeenInput
 from server.shape import Shape
 from server.sight import Sight
-from server.wire import Picture, Ping, Record, WireError, decode
+from server.wire import WireError, decode
+from server.wire_records import Picture, Ping, Record
 
 PERIOD_S = 0.005
 READY_EVERY, EXPECT_EVERY = 20, 4

@@ -34,7 +34,8 @@ from server.sensor_check import SensorCheck
 from server.shape import Shape
 from server.sight import Sight
 from server.vision import VisionThread
-from server.wire import Motion, Picture, Record, WireError
+from server.wire import WireError
+from server.wire_records import Motion, Picture, Record
 
 STALE_S = 1.0
 """A stream silent for longer keeps the robot from being armed."""

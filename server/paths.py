@@ -8,7 +8,8 @@ from typing import Protocol
 from server.clock import now
 from server.messages import Command, encode_message
 from server.page import Page
-from server.wire import Credit, Record, encode
+from server.wire import encode
+from server.wire_records import Credit, Record
 
 KEY_WANTED = encode_message(Command("key_frame"))
 ASK_AGAIN_S = 0.3

@@ -27,7 +27,8 @@ from server.messages import (
     encode_message,
 )
 from server.runtime import RUN_FILE, runtime_directory
-from server.wire import VERSION, Credit, Picture, Ping, Record, WireError, decode, encode
+from server.wire import VERSION, WireError, decode, encode
+from server.wire_records import Credit, Picture, Ping, Record
 
 MAX_IN_FLIGHT = 3
 """Pictures sent and not yet taken by the server."""

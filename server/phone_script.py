@@ -12,7 +12,8 @@ from hardware.sim.intent import Intent, missed_by
 from hardware.sim.phone import BodyHistory, VirtualPhone
 from pipeline.config import VirtualCameraConfig
 from server.messages import Command
-from server.wire import Codec, Kind, Motion, Picture, Pong, Record, Touch
+from server.wire import Kind
+from server.wire_records import Codec, Motion, Picture, Pong, Record, Touch
 
 DEVICE = "lightleash-virtual-phone"
 TOUCH_S = 1.0 / 30.0

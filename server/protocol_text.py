@@ -7,7 +7,7 @@ from typing import Any
 
 from starlette.routing import Route, WebSocketRoute
 
-from server import ingest, session, wire
+from server import ingest, session, wire, wire_records
 from server.app import MAX_BODY, Api
 from server.hub import LEASE_S, TICK_S
 from server.phone_client import MAX_IN_FLIGHT
@@ -22,7 +22,7 @@ Layout = tuple[type[Any], struct.Struct | None, tuple[tuple[str, int], ...]]
 
 RECORDS: dict[Kind, Layout] = {
     Kind.MOTION: (
-        wire.Motion,
+        wire_records.Motion,
         wire.MOTION,
         (
             ("rotation_rate", 3),
@@ -33,20 +33,20 @@ RECORDS: dict[Kind, Layout] = {
         ),
     ),
     Kind.FRAME: (
-        wire.Picture,
+        wire_records.Picture,
         wire.FRAME,
         (("codec", 1), ("shrunk", 1), ("width", 1), ("height", 1), ("screen_angle_deg", 1)),
     ),
     Kind.TOUCH: (
-        wire.Touch,
+        wire_records.Touch,
         wire.TOUCH,
         (("held", 1), ("visible", 1), ("", 1), ("press", 1), ("nonce", 1)),
     ),
-    Kind.PONG: (wire.Pong, wire.PONG, (("nonce", 1), ("server_time_us", 1))),
-    Kind.STAMP: (wire.Stamp, wire.STAMP, (("rtp_timestamp", 1),)),
-    Kind.PING: (wire.Ping, wire.PING, (("nonce", 1),)),
-    Kind.CREDIT: (wire.Credit, wire.CREDIT, (("sequence", 1),)),
-    Kind.PICTURE: (wire.Thumbnail, None, ()),
+    Kind.PONG: (wire_records.Pong, wire.PONG, (("nonce", 1), ("server_time_us", 1))),
+    Kind.STAMP: (wire_records.Stamp, wire.STAMP, (("rtp_timestamp", 1),)),
+    Kind.PING: (wire_records.Ping, wire.PING, (("nonce", 1),)),
+    Kind.CREDIT: (wire_records.Credit, wire.CREDIT, (("sequence", 1),)),
+    Kind.PICTURE: (wire_records.Thumbnail, None, ()),
 }
 """Fields of each payload in the order of its bytes; "" is padding."""
 
@@ -114,8 +114,8 @@ def page(records: str, messages: str) -> str:
     codes = "\n".join(f"| `{code}` | {words} |" for code, words in CODES.items())
     return f"""# Protocol
 
-Version {wire.VERSION}. Generated from `server/wire.py`, `server/messages.py` and the server's
-routes by `python -m server.wire_types`: edit those, not this.
+Version {wire.VERSION}. Generated from `server/wire.py`, `server/wire_records.py`,
+`server/messages.py` and the server's routes by `python -m server.wire_types`: edit those, not this.
 
 ## Sockets
 

@@ -16,7 +16,8 @@ from pipeline.signals import BodyImu
 from server.recording import CAMERA_KEY, ROBOT_KEY, STATUS, RecordingError
 from server.recording_files import Recording, device_of
 from server.shape import Shape
-from server.wire import Picture, WireError, decode
+from server.wire import WireError, decode
+from server.wire_records import Picture
 
 
 def recorded_robot(recording: Recording) -> RobotFile:

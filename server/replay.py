@@ -25,7 +25,8 @@ from server.phone_client import (
 from server.phone_script import SYNCHRONISED_PONGS
 from server.recording import RecordingError
 from server.recording_files import Recording, device_of, read, recover
-from server.wire import Picture, Pong, Record, Touch, WireError, decode
+from server.wire import WireError, decode
+from server.wire_records import Picture, Pong, Record, Touch
 
 PHONE_CLOCK_OFFSET_S = 1000.0
 """Of the replayed phone's clock: any will do, the server must find it."""

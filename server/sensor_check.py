@@ -11,7 +11,7 @@ from pipeline.estimator_config import GravityTestConfig
 from pipeline.frames import Array
 from pipeline.vision.sighting import Sighting
 from server.control_link import ControlStatus
-from server.wire import Motion
+from server.wire_records import Motion
 
 MAX_WAITING = 64
 """Poses between two samples of the phone."""

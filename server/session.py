@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from server.calibration_messages import Calibrate
 from server.messages import Command, FromPage, Hello, Log, Tune, decode_message
-from server.wire import VERSION, Motion, Picture, Pong, Record, Stamp, Touch, WireError, decode
+from server.wire import VERSION, WireError, decode
+from server.wire_records import Motion, Picture, Pong, Record, Stamp, Touch
 
 MAX_FAULTS, FAULTS_HZ = 50, 0.5
 """So many faults at once, so many a second; more, and the connection is closed."""

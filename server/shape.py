@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hardware.camera_file import find_camera_file
 from pipeline.camera.lens import Camera
-from server.wire import QUARTERS, Picture
+from server.wire_records import QUARTERS, Picture
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,8 @@ from server.messages import Command, FromPage, Hello, Log, Refused, Tune, Welcom
 from server.operator import OperatorPhone
 from server.session import Session
 from server.settings import VideoSettings
-from server.wire import VERSION, Picture, Record, WireError
+from server.wire import VERSION, WireError
+from server.wire_records import Picture, Record
 
 log = logging.getLogger("lightleash")
 

@@ -1,6 +1,6 @@
 """Generates `PROTOCOL.md` and the web client's types: `python -m server.wire_types [--check]`.
 
-Fields, sizes and words come from `wire.py`, `messages.py` and the routes themselves; what a field
+Fields, sizes and words come from `wire*.py`, `messages.py` and the routes themselves; what a field
 may be is what the decoder says when it refuses one.
 """
 
@@ -20,10 +20,11 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from server import calibration_messages, camera_messages, knobs, messages, wire
+from server import calibration_messages, camera_messages, knobs, messages, wire, wire_records
 from server.one_line import Parser
 from server.protocol_text import RECORDS, page
-from server.wire import Codec, Kind, Record, WireError
+from server.wire import Kind, WireError
+from server.wire_records import Codec, Record
 
 ROOT = Path(__file__).resolve().parents[1]
 TYPES = {"B": "u8", "H": "u16", "h": "i16", "I": "u32", "q": "i64", "Q": "u64", "f": "f32"}
@@ -53,10 +54,10 @@ HEADER_FIELDS = (
     ("time", 1, "[µs] of the sender's own clock; of a reading or picture: when it was taken"),
 )
 
-MOTION = wire.Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.8), (1.0, 0.0, 0.0, 0.0), 0)
-PICTURE = wire.Picture(Codec.JPEG, True, 1280, 720, 0, b"\xff\xd8")
-TOUCH = wire.Touch(False, True, 0, 1)
-BROKEN: tuple[wire.Body, ...] = (
+MOTION = wire_records.Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.8), (1.0, 0.0, 0.0, 0.0), 0)
+PICTURE = wire_records.Picture(Codec.JPEG, True, 1280, 720, 0, b"\xff\xd8")
+TOUCH = wire_records.Touch(False, True, 0, 1)
+BROKEN: tuple[wire_records.Body, ...] = (
     replace(MOTION, rotation_rate=(1e9, 0.0, 0.0)),
     replace(MOTION, acceleration=(1e9, 0.0, 0.0)),
     replace(MOTION, orientation_wxyz=(0.1, 0.0, 0.0, 0.0)),
@@ -123,7 +124,7 @@ def _record(kind: Kind) -> list[str]:
     sender = "page → server" if kind < 128 else "server → page"
     lines = [f"### {title} ({int(kind)}), {sender}", "", words[:1].upper() + words[1:], ""]
     for field in body.__dataclass_fields__:
-        if "flag bit" in (doc := docs(wire).get(f"{body.__name__}.{field}", "")):
+        if "flag bit" in (doc := docs(wire_records).get(f"{body.__name__}.{field}", "")):
             lines += [f"Flags: `{field}`. {doc}", ""]
     lines += ["| offset | type | field | |", "|---|---|---|---|"]
     fields = [(f"`{n}`" if n else "zero", count, _about(title, body, n)) for n, count in names]
@@ -137,7 +138,7 @@ def _record(kind: Kind) -> list[str]:
 
 def _about(title: str, body: type, name: str) -> str:
     allowed = limits().get(f"{title.lower()}.{name}", "")
-    words = docs(wire).get(f"{body.__name__}.{name}", "")
+    words = docs(wire_records).get(f"{body.__name__}.{name}", "")
     return " ".join(filter(None, (words, f"Allowed: {allowed}." if allowed not in words else "")))
 
 

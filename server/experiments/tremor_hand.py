@@ -21,7 +21,8 @@ from pipeline.signals import PhoneImu
 from server.ingest import Ingest
 from server.recording import PHONE_RECORDS, SERVER_RECORDS, RecordingError
 from server.recording_files import Recording
-from server.wire import Motion, Ping, Pong, WireError, decode
+from server.wire import WireError, decode
+from server.wire_records import Motion, Ping, Pong
 
 PERIOD_S = 0.005
 SHORTEST_S = 5.0

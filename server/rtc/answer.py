@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from ipaddress import ip_address
 
-from server.wire import Codec, WireError
+from server.wire import WireError
+from server.wire_records import Codec
 
 MAX_BYTES, MAX_LINES, MAX_LINE = 16_384, 400, 1_024
 MAX_CANDIDATES = 24

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from server.wire import Codec
+from server.wire_records import Codec
 
 START_CODE = b"\0\0\1"
 DELIMITER, PARAMETERS = 9, 7

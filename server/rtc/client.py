@@ -28,18 +28,8 @@ from server.rtc.peer import CHANNEL, GONE, MAX_UNSENT_BYTES
 from server.rtc.signalling import Answer, Ask, Offer
 from server.rtc.touches import Touches
 from server.rtc.trailer import FrameRecord, append
-from server.wire import (
-    Motion,
-    Picture,
-    Ping,
-    Pong,
-    Record,
-    Stamp,
-    Touch,
-    WireError,
-    decode,
-    encode,
-)
+from server.wire import WireError, decode, encode
+from server.wire_records import Motion, Picture, Ping, Pong, Record, Stamp, Touch
 
 RTP_TIMESTAMP = "_RTCRtpSender__rtp_timestamp"
 MAX_WAITING = 4

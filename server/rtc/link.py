@@ -18,7 +18,8 @@ from server.rtc.peer import Listener, Peer
 from server.rtc.round_trip import RoundTrip
 from server.session import Session
 from server.settings import RtcSettings
-from server.wire import Codec, Motion, Picture, Pong, Record, Stamp, WireError, encode
+from server.wire import WireError, encode
+from server.wire_records import Codec, Motion, Picture, Pong, Record, Stamp
 
 VIDEO_S = 0.5
 """Pictures come this way if one came within this time."""

@@ -25,7 +25,8 @@ from server.rtc.jitter import Assembled
 from server.rtc.offer import bitrates, tuned
 from server.rtc.stun import build_wall
 from server.settings import RtcSettings
-from server.wire import Codec, WireError
+from server.wire import WireError
+from server.wire_records import Codec
 
 log = logging.getLogger("lightleash")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from server.wire import Record, Touch
+from server.wire_records import Record, Touch
 
 NEWEST_TOUCH_US = 100_000
 """An older TOUCH is not said again: whoever makes them may have stopped."""

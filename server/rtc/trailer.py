@@ -12,7 +12,8 @@ from binascii import crc_hqx
 from dataclasses import dataclass
 from math import sqrt
 
-from server.wire import MOST_SHRUNK, WireError
+from server.wire import WireError
+from server.wire_records import MOST_SHRUNK
 
 FIELDS = struct.Struct("<IqBhhhh")
 """sequence u32, time i64 [µs of the phone's clock], flags u8, orientation w x y z 4 × i16."""

@@ -21,7 +21,8 @@ from pipeline.signals import Image
 from server.frame_decoder import FrameDecoder
 from server.ingest import EncodedFrame
 from server.recording_files import read
-from server.wire import Picture, decode
+from server.wire import decode
+from server.wire_records import Picture
 from tests.bench.y4m_camera import number_of, write_y4m
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE

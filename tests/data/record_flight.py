@@ -10,7 +10,8 @@ from server.lockstep import Lockstep, Scene
 from server.messages import Hello, encode_message
 from server.phone_script import DEVICE
 from server.recording import CAMERA_KEY, DEVICE_KEY, ROBOT_KEY, SETTINGS_KEY, Recorder
-from server.wire import VERSION, Ping, encode
+from server.wire import VERSION, encode
+from server.wire_records import Ping
 
 SCENE = Scene(hand="demo", seed=11, frame_rate_hz=20.0, bitrate_bps=450_000)
 SECONDS = 5.5

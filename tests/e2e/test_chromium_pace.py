@@ -9,7 +9,8 @@ import pytest
 
 from server.offline import run_offline
 from server.recording_files import read
-from server.wire import Picture, decode
+from server.wire import decode
+from server.wire_records import Picture
 from tests.e2e.chromium_phone import ChromiumPhone
 from tests.e2e.chromium_rig import led_server
 from tests.e2e.serving import Serving

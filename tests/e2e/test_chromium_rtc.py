@@ -16,7 +16,8 @@ from playwright.sync_api import Page, Route
 from hardware.sim.codec import Decoder
 from server.frame_decoder import CODEC_NAMES
 from server.recording_files import read
-from server.wire import Codec, Picture, Record, Touch, decode
+from server.wire import decode
+from server.wire_records import Codec, Picture, Record, Touch
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE, STARVED, calibrate, lead, led_server
 from tests.e2e.clock_canvas import CLOCK_CANVAS, painted_ms

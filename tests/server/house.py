@@ -26,7 +26,8 @@ from server.security import Doors, Guard
 from server.settings import VideoSettings
 from server.view_proxy import routes as view_routes
 from server.websocket import PageServer
-from server.wire import VERSION, Body, Codec, Picture, Ping, Pong, Record, Touch, decode, encode
+from server.wire import VERSION, decode, encode
+from server.wire_records import Body, Codec, Picture, Ping, Pong, Record, Touch
 
 HOST = "127.0.0.1"
 DEADLINE_S = 5.0

@@ -6,7 +6,8 @@ from websockets.asyncio.server import serve
 
 from server.messages import Command, Status, Welcome
 from server.phone_client import Access, PhoneClient
-from server.wire import Codec, Credit, Picture, Pong, Record, decode, encode
+from server.wire import decode, encode
+from server.wire_records import Codec, Credit, Picture, Pong, Record
 
 WELCOME = Welcome("s1", 1, "ames", 1280, 720, 30, 4_000_000)
 JPEG = b"\xff\xd8" + bytes(30)

@@ -23,7 +23,7 @@ from server.security import Guard
 from server.settings import RtcSettings, VideoSettings
 from server.view_proxy import routes as view_routes
 from server.websocket import PageServer
-from server.wire import Motion, Picture, Pong, Record, Touch
+from server.wire_records import Motion, Picture, Pong, Record, Touch
 from tests.server.house import HOST, House
 
 FRAME_S = 1.0 / 60.0

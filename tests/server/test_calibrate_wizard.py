@@ -14,7 +14,8 @@ from server.calibration_messages import Calibrate, Calibration
 from server.ingest import EncodedFrame
 from server.messages import Hello, decode_from_server, encode_message
 from server.operator import OperatorPhone
-from server.wire import MAX_MESSAGE_BYTES, VERSION, Codec, Picture, WireError
+from server.wire import MAX_MESSAGE_BYTES, VERSION, WireError
+from server.wire_records import Codec, Picture
 from tests.server.filming import Motion, Phone, Studio, corner_film, scaled
 from tests.server.house import ROBOT, control_status
 

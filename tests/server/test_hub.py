@@ -13,7 +13,8 @@ from server.control_link import ReadyInput, RequestInput
 from server.hub import EVENTS, LEASE_S
 from server.knobs import TuneInput
 from server.messages import Command, Hello, Tune, encode_message
-from server.wire import VERSION, Codec, Ping, Record, decode, encode
+from server.wire import VERSION, decode, encode
+from server.wire_records import Codec, Ping, Record
 from tests.server.house import JPEG, control_status, house_in, is_request
 
 

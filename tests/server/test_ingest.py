@@ -11,7 +11,8 @@ from pipeline.camera.mounting import Mounting
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import Operator, PhoneImu
 from server.ingest import REMEMBERED_NONCES, EncodedFrame, Ingest
-from server.wire import Codec, Motion, Picture, Ping, Pong, Record, Touch, WireError
+from server.wire import WireError
+from server.wire_records import Codec, Motion, Picture, Ping, Pong, Record, Touch
 
 OFFSET = 4321.5
 

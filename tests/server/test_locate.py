@@ -21,7 +21,7 @@ from server.ingest import EncodedFrame
 from server.locate.optical import COLUMNS, SIGMAS, optical
 from server.locate.work import AHEAD_S
 from server.sight import Sight
-from server.wire import Codec, Picture
+from server.wire_records import Codec, Picture
 from tests.server.locating import FRAMES, SEED, copied, error, errors, number, run, table
 
 

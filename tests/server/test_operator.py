@@ -23,7 +23,8 @@ from server.messages import Hello
 from server.operator import STALE_S, OperatorPhone
 from server.phone_script import DEVICE
 from server.seen_input import SeenInput
-from server.wire import VERSION, Motion, Ping, Pong, Record, Touch, WireError
+from server.wire import VERSION, WireError
+from server.wire_records import Motion, Ping, Pong, Record, Touch
 from tests.pipeline.seeing import CAMERA, rays_at
 from tests.server.house import JPEG, ROBOT
 

@@ -1,7 +1,8 @@
 """Pictures by two ways: those of one count, and a change begins with a key picture."""
 
 from server.paths import KEY_WANTED, PhonePaths, PictureWay
-from server.wire import Credit, decode
+from server.wire import decode
+from server.wire_records import Credit
 from tests.server.test_hub import Fast
 
 

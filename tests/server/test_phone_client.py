@@ -9,7 +9,8 @@ from server.knobs import Knobs
 from server.messages import Refused, encode_message
 from server.phone_client import Access, PhoneClient, PhoneClientError, running_server
 from server.runtime import RUN_FILE
-from server.wire import Credit, Ping, Pong, Record, decode, encode
+from server.wire import decode, encode
+from server.wire_records import Credit, Ping, Pong, Record
 from tests.server.page_server import WELCOME, PageServer, picture, status
 
 BAD_KNOBS = '{"http_url": "http://127.0.0.1:1", "operator_token": "t", "virtual_camera": {"x": 1}}'

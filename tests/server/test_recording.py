@@ -21,7 +21,8 @@ from server.recording import (
     part_of,
 )
 from server.recording_files import read, recover, recover_all
-from server.wire import VERSION, Ping, Pong, Record, Touch, encode
+from server.wire import VERSION, encode
+from server.wire_records import Ping, Pong, Record, Touch
 
 TOUCH = encode(Record(7, 5_000_000, Touch(True, True, 1, 99)))
 METADATA = {"device": "a phone", "robot_file": "name = 'ames'\n"}

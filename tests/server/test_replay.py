@@ -19,7 +19,8 @@ from server.offline_table import COLUMNS
 from server.recording import PHONE_RECORDS, STATUS, Recorder, RecordingError
 from server.recording_files import Recording, device_of, read
 from server.replay import Replay, play, timed
-from server.wire import Motion, Ping, Pong, Record, Touch, decode, encode
+from server.wire import decode, encode
+from server.wire_records import Motion, Ping, Pong, Record, Touch
 from tests.server.page_server import WELCOME, PageServer, status
 
 FLIGHT = Path(__file__).parents[1] / "data" / "virtual_phone.mcap"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hardware.sim.codec import Encoder
 from server.rtc.bitstream import begins_key, size_of_key
-from server.wire import Codec
+from server.wire_records import Codec
 
 SIZES = [(1280, 720), (640, 360), (854, 480), (320, 240), (1920, 1080)]
 CODECS = [("h264", Codec.H264), ("vp8", Codec.VP8)]

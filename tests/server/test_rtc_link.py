@@ -14,7 +14,8 @@ from server.recording_files import read
 from server.rtc import link as link_module
 from server.rtc.touches import NEWEST_TOUCH_US
 from server.rtc.trailer import split
-from server.wire import Motion, Picture, Touch, decode
+from server.wire import decode
+from server.wire_records import Motion, Picture, Touch
 from tests.server.house import eventually
 from tests.server.rtc_house import ATTITUDES, FRAME_S, rtc_house_in
 

@@ -13,7 +13,8 @@ from server.offline import run_offline
 from server.phone_client import PhoneClient
 from server.phone_script import DEVICE
 from server.recording_files import read
-from server.wire import Picture, decode
+from server.wire import decode
+from server.wire_records import Picture
 from tests.server.house import eventually
 from tests.server.rtc_house import FRAME_S, rtc_house_in
 

@@ -16,7 +16,8 @@ from server.rtc.client import EncodedTrack
 from server.rtc.offer import Bitrates, bitrates, tuned
 from server.rtc.peer import Listener, Peer
 from server.settings import RtcSettings
-from server.wire import Codec, WireError
+from server.wire import WireError
+from server.wire_records import Codec
 
 SILENT = Listener(*[lambda *_: None] * 5)
 

@@ -25,7 +25,8 @@ from server.operator import OperatorPhone
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.recording_files import read
 from server.replay import timed
-from server.wire import VERSION, Motion, Ping, decode, encode
+from server.wire import VERSION, decode, encode
+from server.wire_records import Motion, Ping
 from tests.server.house import ROBOT, control_status
 
 FLIGHT = Path(__file__).parents[1] / "data" / "virtual_phone.mcap"

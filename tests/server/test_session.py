@@ -11,23 +11,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server import wire
+from server import wire, wire_records
 from server.messages import Command, Hello, Log, Tune, encode_message
 from server.session import BYTES_HZ, MAX_FAULTS, MESSAGES_HZ, RECORDS_HZ, Bucket, Session
-from server.wire import Record, WireError
+from server.wire import WireError
+from server.wire_records import Record
 
-FLAT = wire.Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
-JPEG = wire.Picture(wire.Codec.JPEG, True, 1280, 720, 0, b"\xff\xd8 not really")
+FLAT = wire_records.Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
+JPEG = wire_records.Picture(wire_records.Codec.JPEG, True, 1280, 720, 0, b"\xff\xd8 not really")
 ROLES = ("operator", "video", "supervisor")
-TOUCH = wire.Touch(False, True, 0, 1)
+TOUCH = wire_records.Touch(False, True, 0, 1)
 BODIES = {
     "Motion": FLAT,
     "Picture": JPEG,
     "Touch": TOUCH,
-    "Pong": wire.Pong(1, 2),
-    "Ping": wire.Ping(1),
-    "Credit": wire.Credit(1),
-    "Thumbnail": wire.Thumbnail(b"x"),
+    "Pong": wire_records.Pong(1, 2),
+    "Ping": wire_records.Ping(1),
+    "Credit": wire_records.Credit(1),
+    "Thumbnail": wire_records.Thumbnail(b"x"),
 }
 MAY = {"operator": {"Motion", "Touch", "Pong"}, "video": {"Picture"}, "supervisor": set()}
 
@@ -58,7 +59,7 @@ def fault(session: Session, data: str | bytes, now: float) -> str | None:
     return None
 
 
-def record(body: wire.Body) -> bytes:
+def record(body: wire_records.Body) -> bytes:
     return wire.encode(Record(1, 2, body))
 
 

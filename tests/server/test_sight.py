@@ -15,7 +15,7 @@ from pipeline.signals import PhoneImu, StampOffset
 from pipeline.vision_config import GatesConfig
 from server.ingest import ARRIVAL_S, EncodedFrame
 from server.sight import Sight
-from server.wire import Codec, Picture
+from server.wire_records import Codec, Picture
 from tests.pipeline.seeing import CAMERA, is_wrong, moved, picture, truth_at
 
 ROBOT = load_robot(Path(hardware.__file__).parent / "robots" / "ames.toml").robot

@@ -20,7 +20,8 @@ from server.live_phone import EXPOSED_S, LivePhone, is_superseded
 from server.messages import encode_message
 from server.phone_script import Manners, PhoneScript, Score, VirtualOperator
 from server.virtual_phone import main, summary
-from server.wire import Codec, Motion, Picture, Ping, Pong, Record, Touch, decode, encode
+from server.wire import decode, encode
+from server.wire_records import Codec, Motion, Picture, Ping, Pong, Record, Touch
 from tests.server.page_server import WELCOME, PageServer, status
 
 LEDS_IN_B = np.array(

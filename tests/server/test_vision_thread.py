@@ -15,7 +15,7 @@ from pipeline.vision.sighting import Sighting
 from server.frame_thread import MAX_WAITING
 from server.ingest import EncodedFrame
 from server.vision import THUMBNAIL_WIDTH, VisionThread, draw, jpeg
-from server.wire import Codec, Picture
+from server.wire_records import Codec, Picture
 
 NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
 

@@ -11,7 +11,8 @@ from server.control_link import OperatorInput, PhoneImuInput, RequestInput
 from server.hub import Hub
 from server.seen_input import SeenInput
 from server.session import MAX_FAULTS
-from server.wire import MAX_RECORD_BYTES, Codec, Credit, Motion, Picture, Record, Touch, encode
+from server.wire import MAX_RECORD_BYTES, encode
+from server.wire_records import Codec, Credit, Motion, Picture, Record, Touch
 from tests.server.house import JPEG, control_status, eventually, house_in, is_request
 
 pytestmark = pytest.mark.slow  # real sockets, whose server stops by its own tick

@@ -9,28 +9,29 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server import wire
-from server.wire import Codec, Record, WireError
+from server import wire, wire_records
+from server.wire import WireError
+from server.wire_records import Codec, Record
 
-MOTION = wire.Motion((0.1, 0.2, 0.3), (0.0, 0.0, 9.8), (1.0, 0.0, 0.0, 0.0), 90)
-PICTURE = wire.Picture(Codec.H264, True, 1280, 720, 90, b"\x00\x00\x00\x01x")
+MOTION = wire_records.Motion((0.1, 0.2, 0.3), (0.0, 0.0, 9.8), (1.0, 0.0, 0.0, 0.0), 90)
+PICTURE = wire_records.Picture(Codec.H264, True, 1280, 720, 90, b"\x00\x00\x00\x01x")
 BODIES = [
     replace(MOTION, rotation_rate=(0.5, 0.25, -2.0), acceleration=(0.0, 1.0, 9.75)),
     replace(MOTION, orientation_wxyz=None, rotation_rate=(0.5,) * 3, acceleration=(0.5,) * 3),
     PICTURE,
     replace(PICTURE, by_arrival=True),
     replace(PICTURE, shrunk=2),
-    wire.Touch(True, True, 3, 2**64 - 1),
-    wire.Stamp(2**32 - 1),
-    wire.Pong(7, 2**40),
-    wire.Ping(2**63),
-    wire.Credit(2**32 - 1),
-    wire.Thumbnail(b"\xff\xd8jpeg"),
+    wire_records.Touch(True, True, 3, 2**64 - 1),
+    wire_records.Stamp(2**32 - 1),
+    wire_records.Pong(7, 2**40),
+    wire_records.Ping(2**63),
+    wire_records.Credit(2**32 - 1),
+    wire_records.Thumbnail(b"\xff\xd8jpeg"),
 ]
 
 
 @pytest.mark.parametrize("body", BODIES, ids=lambda b: type(b).__name__)
-def test_what_is_encoded_is_decoded(body: wire.Body) -> None:
+def test_what_is_encoded_is_decoded(body: wire_records.Body) -> None:
     record = Record(2**32 - 1, 1_234_567_890_123, body)
     assert wire.decode(wire.encode(record)) == record
 
@@ -52,7 +53,7 @@ def test_any_bytes_give_a_record_or_a_named_error(data: bytes) -> None:
 
 @given(st.sampled_from(BODIES), st.integers(0, 60), st.integers(0, 255))
 def test_a_flipped_byte_gives_a_record_or_a_named_error(
-    body: wire.Body, at: int, value: int
+    body: wire_records.Body, at: int, value: int
 ) -> None:
     data = bytearray(wire.encode(Record(1, 2, body)))
     data[at % len(data)] = value
@@ -76,7 +77,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("field", "body"), BAD)
-def test_bad_values_are_refused_by_name(field: str, body: wire.Body) -> None:
+def test_bad_values_are_refused_by_name(field: str, body: wire_records.Body) -> None:
     with pytest.raises(WireError) as refusal:
         wire.decode(wire.encode(Record(1, 2, body)))
     assert refusal.value.field == field

@@ -9,7 +9,8 @@ import pytest
 
 from server import protocol_text, wire, wire_types
 from server.messages import Hello, Status
-from server.wire import Codec, Kind
+from server.wire import Kind
+from server.wire_records import Codec
 
 ROOT = wire_types.ROOT
 

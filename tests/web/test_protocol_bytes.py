@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from server import wire
+from server import wire, wire_records
 from server.messages import Command, Hello, Log, Welcome, decode_message, encode_message
+from server.wire_records import Record
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(
@@ -67,41 +68,41 @@ def single(value: float) -> float:
     return nearest
 
 
-def random_records(rng: random.Random, count: int) -> list[wire.Record]:
+def random_records(rng: random.Random, count: int) -> list[Record]:
     def singles(limit: float, n: int) -> tuple[float, ...]:
         return tuple(single(rng.uniform(-limit, limit)) for _ in range(n))
 
-    def body() -> wire.Body:
+    def body() -> wire_records.Body:
         angle = rng.choice([0, 90, 180, 270])
         match rng.randrange(4):
             case 0:
                 quaternion = rng.choice([None, (0.5, -0.5, 0.5, -0.5), (0.0, 0.0, 0.0, 1.0)])
-                return wire.Motion(singles(70, 3), singles(320, 3), quaternion, angle)  # type: ignore[arg-type]
+                return wire_records.Motion(singles(70, 3), singles(320, 3), quaternion, angle)  # type: ignore[arg-type]
             case 1:
-                codec = rng.choice(list(wire.Codec))
+                codec = rng.choice(list(wire_records.Codec))
                 data = b"\xff\xd8" + rng.randbytes(rng.randrange(1, 300))
-                return wire.Picture(codec, rng.random() < 0.5, 1280, 720, angle, data)
+                return wire_records.Picture(codec, rng.random() < 0.5, 1280, 720, angle, data)
             case 2:
                 flags = rng.random() < 0.5, rng.random() < 0.5
-                return wire.Touch(*flags, rng.getrandbits(32), rng.getrandbits(64))
+                return wire_records.Touch(*flags, rng.getrandbits(32), rng.getrandbits(64))
             case _:
-                return wire.Pong(rng.getrandbits(64), rng.getrandbits(53))
+                return wire_records.Pong(rng.getrandbits(64), rng.getrandbits(53))
 
-    return [wire.Record(rng.getrandbits(32), rng.getrandbits(50), body()) for _ in range(count)]
+    return [Record(rng.getrandbits(32), rng.getrandbits(50), body()) for _ in range(count)]
 
 
-def for_the_page(record: wire.Record) -> tuple[str, dict[str, Any]]:
+def for_the_page(record: Record) -> tuple[str, dict[str, Any]]:
     body = record.body
     head = {"sequence": record.sequence, "t_us": record.t_us}
     fields = {name: getattr(body, name) for name in body.__slots__}
     match body:
-        case wire.Motion():
+        case wire_records.Motion():
             return "motion", head | fields
-        case wire.Picture():
+        case wire_records.Picture():
             return "frame", head | fields | {"codec": int(body.codec), "data": body.data.hex()}
-        case wire.Touch():
+        case wire_records.Touch():
             return "touch", head | fields | {"nonce": str(body.nonce)}
-        case wire.Pong():
+        case wire_records.Pong():
             return "pong", head | fields | {"nonce": str(body.nonce)}
     raise AssertionError(body)
 
@@ -117,23 +118,23 @@ def test_what_the_page_encodes_the_server_decodes_bit_for_bit() -> None:
 def test_what_the_server_encodes_the_page_decodes() -> None:
     rng = random.Random(8)
     for_pages = [
-        wire.Record(rng.getrandbits(32), rng.getrandbits(50), body)
+        Record(rng.getrandbits(32), rng.getrandbits(50), body)
         for _ in range(50)
         for body in (
-            wire.Ping(rng.getrandbits(64)),
-            wire.Credit(rng.getrandbits(32)),
-            wire.Thumbnail(rng.randbytes(40)),
+            wire_records.Ping(rng.getrandbits(64)),
+            wire_records.Credit(rng.getrandbits(32)),
+            wire_records.Thumbnail(rng.randbytes(40)),
         )
     ]
     decoded = in_node(decode=[wire.encode(record).hex() for record in for_pages])["decoded"]
     for record, got in zip(for_pages, decoded, strict=True):
         assert (got["sequence"], got["tUs"]) == (record.sequence, record.t_us)
         match record.body:
-            case wire.Ping(nonce):
+            case wire_records.Ping(nonce):
                 assert (got["kind"], got["nonce"]) == (wire.Kind.PING, str(nonce))
-            case wire.Credit(sequence):
+            case wire_records.Credit(sequence):
                 assert (got["kind"], got["taken"]) == (wire.Kind.CREDIT, sequence)
-            case wire.Thumbnail(data):
+            case wire_records.Thumbnail(data):
                 assert (got["kind"], got["data"]) == (wire.Kind.PICTURE, data.hex())
 
 
@@ -141,7 +142,7 @@ def test_page_and_server_have_the_same_constants() -> None:
     assert in_node()["constants"] == {
         "version": wire.VERSION,
         "kinds": {kind.name: int(kind) for kind in wire.Kind},
-        "codecs": {codec.name: int(codec) for codec in wire.Codec},
+        "codecs": {codec.name: int(codec) for codec in wire_records.Codec},
         "bytes": wire.MAX_RECORD_BYTES,
     }
 
