@@ -7,7 +7,7 @@ allows, and the same for a seed every time.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from hardware.camera_file import find_camera
 from hardware.robot_file import RobotFile
 from hardware.sim.codec import Encoder
 from hardware.sim.hand import make_hand
-from hardware.sim.intent import Intent, missed_by
 from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
@@ -23,7 +22,7 @@ from hardware.sim.truth import Truth
 from pipeline.camera.mounting import SQUARE, Mounting
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, Mode, Operator, PhoneImu
+from pipeline.signals import BodyImu, Operator, PhoneImu
 from pipeline.teleop import Output
 from server.control import too_late
 from server.control_link import (
@@ -35,6 +34,7 @@ from server.control_link import (
 )
 from server.controller import Controller, never_too_late
 from server.ingest import EncodedFrame, Ingest
+from server.lockstep_trace import Judge, Trace
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.robot_link import RobotLink
 from server.seen_input import SeenInput
@@ -78,39 +78,17 @@ class Scene:
         return tuple(sorted({led for leds in covered for led in leds}))
 
 
-@dataclass(slots=True)
-class Trace:
-    """What happened while tracking, one row a tick."""
-
-    t: list[float] = field(default_factory=list)
-    error_in_f: list[Array] = field(default_factory=list)
-    """Body minus intended place, along the controlled axes (3,) [m]."""
-    turn: list[Array] = field(default_factory=list)
-    """From the intended attitude (3,) [rad]."""
-    estimate_error_in_c: list[Array] = field(default_factory=list)
-    """Estimated minus true relative position (3,) [m]."""
-    thrusts: list[Array] = field(default_factory=list)
-    saturated: list[bool] = field(default_factory=list)
-    intended_in_f: list[Array] = field(default_factory=list)
-    body_in_f: list[Array] = field(default_factory=list)
-    pictures: int = 0
-    poses: int = 0
-    leds: list[int] = field(default_factory=list)
-    """Named in each picture."""
-    left: str = ""
-    """Why tracking ended, if it did."""
-
-
 class Lockstep:
     """One flight. `advance` moves everything by one control period."""
 
     def __init__(self, robot_file: RobotFile, config: TeleopConfig, scene: Scene) -> None:
         """Everything at rest at time 0."""
-        self.scene, self._config = scene, config
+        self.scene = scene
         self.follower = LockstepFollower(robot_file, scene.seed)
         late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
         self.controller = Controller(robot_file.robot, config, too_late=late)
-        self.trace, self._axes = Trace(), robot_file.robot.axes
+        self._judge = Judge(config.virtual_camera, robot_file.robot.axes, PERIOD_S)
+        self.trace = self._judge.trace
         self.lost: set[str] = set()
         """What of the phone does not arrive now: motion, picture, touch."""
         self._script = make_script(robot_file, scene)
@@ -125,7 +103,6 @@ class Lockstep:
         self._on_their_way: deque[tuple[int, Record]] = deque()
         self._inbox: list[Input] = []
         self._body: list[BodyImu] = []
-        self._intent: Intent | None = None
         self._ticks = 0
 
     @property
@@ -161,7 +138,8 @@ class Lockstep:
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
         if wish is not None:
             self._inbox.append(RequestInput(wish.what))
-        self._measure(output)
+        body, hand = (plant.R_fb, plant.p_bf_in_f), self._script.phone.hand.pose(self.t)
+        self._judge.look(self.t, body, hand, output)
         return output
 
     def _robot_at(self, t: float) -> tuple[Array, Array]:
@@ -219,28 +197,6 @@ class Lockstep:
         if seen is not None:
             self.trace.poses += seen.pose is not None
             self._inbox.append(SeenInput.of(seen))
-
-    def _measure(self, output: Output) -> None:
-        """Compare with what the hand meant, since the button was pressed."""
-        plant, trace = self.follower.plant, self.trace
-        body, hand = (plant.R_fb, plant.p_bf_in_f), self._script.phone.hand.pose(self.t)
-        if output.failsafe.mode != Mode.TRACK:
-            trace.left = output.failsafe.reason if self._intent is not None else ""
-            return
-        if self._intent is None:
-            self._intent = Intent(self._config.virtual_camera, hand, body)
-        intended = self._intent.step(hand, PERIOD_S)
-        offset_in_f, turn = missed_by(body, intended, self._axes)
-        trace.t.append(self.t)
-        trace.error_in_f.append(offset_in_f)
-        trace.turn.append(turn)
-        trace.intended_in_f.append(intended[1])
-        trace.body_in_f.append(body[1])
-        trace.thrusts.append(output.thrusts)
-        trace.saturated.append(output.saturated)
-        if output.relative is not None:
-            p_bc_in_c = output.relative.p_bc_in_c
-            trace.estimate_error_in_c.append(p_bc_in_c - hand[0].T @ (body[1] - hand[1]))
 
 
 def make_script(robot_file: RobotFile, scene: Scene) -> PhoneScript:

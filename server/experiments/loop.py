@@ -19,7 +19,8 @@ from pipeline.control.cutoff import cutoff_hz
 from pipeline.frames import Array
 from server.control import teleop_config
 from server.experiments import text
-from server.lockstep import Lockstep, Scene, Trace
+from server.lockstep import Lockstep, Scene
+from server.lockstep_trace import Trace
 
 Hidden = tuple[float, float, tuple[int, ...]]
 SETTLE_S = 2.0

@@ -9,7 +9,8 @@ import pytest
 
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
-from server.lockstep import Lockstep, Scene, Trace
+from server.lockstep import Lockstep, Scene
+from server.lockstep_trace import Trace
 
 
 def flight(seconds: float, seed: int = 5) -> Trace:
