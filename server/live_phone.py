@@ -14,8 +14,9 @@ from hardware.follower import FollowerError
 from hardware.sim.phone import Event, Stream
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
+from server.access import Access
 from server.messages import Command, Status
-from server.phone_client import Access, PhoneClient
+from server.phone_client import PhoneClient
 from server.phone_script import ALL, DEVICE, SYNCHRONISED_PONGS, TOUCH_S, PhoneScript, Score
 from server.wire_records import Record
 

@@ -11,8 +11,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from pipeline.config import TeleopConfig
 from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose
 from pipeline.teleop import Output

@@ -12,16 +12,11 @@ from pathlib import Path
 from time import monotonic as now
 
 from pipeline.timing.clock_offset import ClockOffset
+from server.access import Access, PhoneClientError, access_of, add_access_arguments
 from server.messages import Command, Status
 from server.offline import run_offline
 from server.one_line import Parser
-from server.phone_client import (
-    Access,
-    PhoneClient,
-    PhoneClientError,
-    access_of,
-    add_access_arguments,
-)
+from server.phone_client import PhoneClient
 from server.phone_script import SYNCHRONISED_PONGS
 from server.recording import RecordingError
 from server.recording_files import Recording, device_of, read, recover

@@ -23,9 +23,10 @@ from hardware.sim.phone_faults import Fault
 from hardware.sim.render import Look
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
+from server.access import PhoneClientError, access_of, add_access_arguments
 from server.live_phone import EXPOSED_S, LivePhone, MakeClient
 from server.one_line import Parser
-from server.phone_client import PhoneClient, PhoneClientError, access_of, add_access_arguments
+from server.phone_client import PhoneClient
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 
 WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000

@@ -21,8 +21,9 @@ from hardware.sim.codec import Encoder
 from hardware.sim.hand import make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
+from server.access import Access, PhoneClientError
 from server.live_phone import EXPOSED_S, LivePhone
-from server.phone_client import Access, PhoneClient, PhoneClientError
+from server.phone_client import PhoneClient
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.rtc.client import RtcPhoneClient
 

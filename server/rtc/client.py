@@ -21,8 +21,9 @@ from aiortc import (
     RTCSessionDescription,
 )
 
+from server.access import Access, PhoneClientError
 from server.messages import Command, Status, Welcome
-from server.phone_client import Access, PhoneClient, PhoneClientError
+from server.phone_client import PhoneClient
 from server.rtc.dating import RTP_HZ, Source
 from server.rtc.peer import CHANNEL, GONE, MAX_UNSENT_BYTES
 from server.rtc.signalling import Answer, Ask, Offer

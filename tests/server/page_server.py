@@ -4,8 +4,9 @@ import json
 
 from websockets.asyncio.server import serve
 
+from server.access import Access
 from server.messages import Command, Status, Welcome
-from server.phone_client import Access, PhoneClient
+from server.phone_client import PhoneClient
 from server.wire import decode, encode
 from server.wire_records import Codec, Credit, Picture, Pong, Record
 

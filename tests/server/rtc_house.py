@@ -12,10 +12,10 @@ import httpx2
 import numpy as np
 
 from hardware.sim.codec import Encoder
+from server.access import Access
 from server.app import make_app
 from server.clock import now
 from server.messages import Status
-from server.phone_client import Access
 from server.phone_script import CODECS, DEVICE
 from server.rtc.client import RtcPhoneClient
 from server.rtc.desk import RtcDesk
