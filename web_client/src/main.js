@@ -8,18 +8,17 @@ import { CameraFeed } from './camera_feed.js';
 import { Feedback } from './feedback.js';
 import { LensPanel } from './lens_panel.js';
 import { PaceKeeper } from './pace_keeper.js';
-import { Imu, requestMotionPermission } from './imu.js';
+import { Imu } from './imu.js';
 import { Phone } from './phone.js';
-import { Problem, adviceFor, problemOf } from './problems.js';
+import { adviceFor, problemOf } from './problems.js';
 import { Rate } from './clock.js';
 import { stayAwake, toggleFullScreen } from './display.js';
+import { Start } from './start.js';
 import { StopPost } from './stop.js';
-import { USUAL, deviceName } from './camera.js';
 import { joinPaths } from './join_paths.js';
 import { VideoSender } from './video.js';
 import { View } from './view.js';
 import { INITIAL, reduce, touchOf, wish } from './session.js';
-import { becomeKnown, isStranger, tokenOf } from './pairing.js';
 
 const TICK_MS = 33;
 const STOP_TICK_MS = 50;
@@ -36,7 +35,6 @@ const motionRate = new Rate();
 const identity = { device: '', sensors: '', video: '' };
 let state = INITIAL;
 let shown = false;
-let startedAtMs = Infinity;
 
 const phone = new Phone({
   base: document.baseURI,
@@ -45,11 +43,11 @@ const phone = new Phone({
   dispatch,
   identity: () => identity,
   onWelcome: (welcome) => void welcomed(welcome),
-  onUnwelcome: () => void checkPairing(),
+  onUnwelcome: () => void start.checkPairing(), // it hung up: perhaps it does not know this phone any more
 });
 
 const view = new View(document, window, {
-  onStart: () => void start(),
+  onStart: () => void start.begin(),
   onReload: () => window.location.reload(),
   onPress: () => dispatch({ type: 'press' }),
   onRelease: () => dispatch({ type: 'release' }),
@@ -113,6 +111,10 @@ const imu = new Imu({
   rtc.pictures.turned(motion.orientation_wxyz);
 });
 
+const start = new Start({
+  window, performance, fetchHere, dispatch, identity, feedback, camera, video, imu, phone,
+});
+
 const lensPanel = new LensPanel(document, platform, performance, camera, (text) => phone.log(text));
 
 /** @param {Event} event */
@@ -158,43 +160,6 @@ function perform(effect) {
   }
 }
 
-/** Everything a tap starts; what fails is told with the way to mend it. */
-async function start() {
-  const motionAllowed = requestMotionPermission(window); // must come first: it needs the tap itself
-  motionAllowed.catch(() => {}); // awaited below
-  feedback.unlock();
-  dispatch({ type: 'start' });
-  try {
-    step('Pairing with the server…');
-    if ((await becomeKnown(fetchHere, window)) === null) throw new Problem('not_paired');
-    step('Waiting for your permission: motion sensors…');
-    await motionAllowed;
-    step('Waiting for your permission: camera…');
-    if (!camera.isLive) await camera.open();
-    identity.device = await deviceName(navigator, screen, window.devicePixelRatio, camera.lens);
-    await begin();
-  } catch (error) {
-    dispatch({ type: 'problem', problem: problemOf(error) });
-  }
-}
-
-async function begin() {
-  identity.video = await video.prepare({ ...USUAL, bitrate_bps: 4e6 });
-  if (video.encoder === null) throw new Problem('encoder_missing');
-  imu.stop();
-  imu.start();
-  startedAtMs = performance.now();
-  identity.sensors = imu.source;
-  void stayAwake(navigator);
-  dispatch({ type: 'started' });
-  phone.open();
-}
-
-/** The server hung up before welcoming us: perhaps it does not know this phone any more. */
-async function checkPairing() {
-  if (await isStranger(fetchHere)) dispatch({ type: 'problem', problem: new Problem('not_paired') });
-}
-
 /** @param {Welcome} welcome */
 async function welcomed(welcome) {
   try {
@@ -226,31 +191,13 @@ function reportHealth() {
   pace.wantWhole(WHOLE.includes(state.calibration?.phase ?? ''));
   void pace.look();
   dispatch({ type: 'health', health: { ...paths.health(now), eased: pace.sign, imuHz: motionRate.perSecond(now) } });
-  const silent = now - startedAtMs > SILENT_MOTION_MS && motionRate.perSecond(now) === 0;
+  const silent = now - start.startedAtMs > SILENT_MOTION_MS && motionRate.perSecond(now) === 0;
   if (silent !== state.motionSilent) dispatch({ type: 'motion_silent', silent });
-}
-
-/** @param {string} text */
-function step(text) {
-  dispatch({ type: 'step', text });
 }
 
 /** @param {string} text */
 function notice(text) {
   dispatch({ type: 'notice', text, now: performance.now() });
-}
-
-async function arrive() {
-  if (!window.isSecureContext) {
-    dispatch({ type: 'problem', problem: new Problem('insecure') });
-    return;
-  }
-  const token = tokenOf(window.location.hash);
-  if (token === '' && (await isStranger(fetchHere))) {
-    dispatch({ type: 'problem', problem: new Problem('not_paired') });
-    return;
-  }
-  dispatch({ type: 'step', text: '' });
 }
 
 document.addEventListener('visibilitychange', () => {
@@ -262,7 +209,7 @@ window.addEventListener('pageshow', () => dispatch({ type: 'visibility', visible
 window.addEventListener('unhandledrejection', (event) => phone.log(`page: ${event.reason}`));
 window.addEventListener('error', (event) => phone.log(`page: ${event.message}`));
 view.sound(feedback.sound);
-void arrive().then(() => {
+void start.arrive().then(() => {
   window.setInterval(() => dispatch({ type: 'tick', now: performance.now() }), TICK_MS);
   window.setInterval(() => dispatch({ type: 'stop_tick' }), STOP_TICK_MS);
   window.setInterval(reportHealth, HEALTH_MS);

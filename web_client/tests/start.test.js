@@ -1,0 +1,71 @@
+import assert from 'node:assert/strict';
+import { beforeEach, test } from 'node:test';
+
+import { Start } from '../src/start.js';
+import { FakeTime } from './fakes.js';
+
+/** @type {string[]} */
+let log = [];
+/** @type {number} */
+let whoami = 200;
+/** @type {any} */
+let surroundings;
+
+beforeEach(() => {
+  [log, whoami] = [[], 200];
+  surroundings = {
+    window: {
+      isSecureContext: true,
+      location: { hash: '', pathname: '/', search: '' },
+      history: { replaceState() {} },
+      navigator: { userAgent: 'Android' },
+      screen: { width: 412, height: 915 },
+      devicePixelRatio: 2,
+      DeviceMotionEvent: { async requestPermission() { log.push('permission'); return 'granted'; } },
+    },
+    performance: new FakeTime(),
+    fetchHere: async () => new Response('{"role":"operator"}', { status: whoami }),
+    dispatch: (/** @type {any} */ event) => log.push(event.problem?.code ?? event.text ?? event.type),
+    identity: { device: '', sensors: '', video: '' },
+    feedback: { unlock: () => log.push('unlock') },
+    camera: { isLive: false, lens: 'back', open: async () => log.push('camera') },
+    video: { encoder: {}, prepare: async () => 'H.264' },
+    imu: { source: 'DeviceMotion', stop() {}, start: () => log.push('imu') },
+    phone: { open: () => log.push('open') },
+  };
+});
+
+test('a tap asks for the motion sensors before all else, and comes to an open link', async () => {
+  const start = new Start(surroundings);
+  const begun = start.begin();
+  assert.deepEqual(log.slice(0, 2), ['permission', 'unlock'], 'within the tap itself');
+  await begun;
+  assert.deepEqual(log.filter((one) => !one.endsWith('…')), ['permission', 'unlock', 'start', 'camera', 'imu', 'started', 'open']);
+  assert.deepEqual(surroundings.identity, { device: 'Android 412x915@2 / back', sensors: 'DeviceMotion', video: 'H.264' });
+  assert.equal(start.startedAtMs, surroundings.performance.now());
+});
+
+test('what is in the way is told, and nothing is opened', async () => {
+  surroundings.video.encoder = null;
+  await new Start(surroundings).begin();
+  assert.equal(log.at(-1), 'encoder_missing');
+  surroundings.window.DeviceMotionEvent.requestPermission = async () => 'denied';
+  await new Start(surroundings).begin();
+  assert.equal(log.at(-1), 'motion_denied');
+  whoami = 401;
+  await new Start(surroundings).begin();
+  assert.equal(log.at(-1), 'not_paired');
+  assert.ok(!log.includes('open'));
+});
+
+test('a stranger, and a page that is not secure, are told before any tap; who brings a token may tap', async () => {
+  const start = new Start(surroundings);
+  await start.arrive();
+  whoami = 401;
+  await start.arrive();
+  surroundings.window.location.hash = '#k=token';
+  await start.arrive();
+  surroundings.window.isSecureContext = false;
+  await start.arrive();
+  assert.deepEqual(log, ['', 'not_paired', '', 'insecure']);
+});
