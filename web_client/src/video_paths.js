@@ -6,19 +6,9 @@
 /** @import {RtcPath} from './rtc.js' */
 /** @import {VideoSender} from './video.js' */
 
+import { Complaints } from './complaints.js';
 import { RtcRefused } from './rtc.js';
 import { Retry } from './retry.js';
-import { Staleness } from './staleness.js';
-
-/** A fast path that was silent for longer, or has no picture after so long, is given up [ms]. */
-export const SILENT_MS = 1500;
-export const FIRST_PICTURE_MS = 4000;
-/** Pictures older than this at the server, for so long, are reason to try the next way [ms]. */
-export const OLD_MS = 400;
-export const OLD_FOR_MS = 1500;
-/** The same of what the page's own encoder takes. */
-export const SLOW_ENCODER_MS = 200;
-export const SLOW_FOR_MS = 3000;
 
 /** @typedef {'WebRTC' | 'WebSocket' | 'JPEG' | '–'} PathName */
 /** What a person wants. @typedef {'auto' | 'WebRTC' | 'WebSocket' | 'JPEG'} PathWish */
@@ -46,8 +36,7 @@ export class VideoPaths {
     this.isConnecting = false;
     this.fastTries = new Retry(surroundings);
     this.encoderTries = new Retry(surroundings);
-    this.old = new Staleness(OLD_MS, OLD_FOR_MS);
-    this.slow = new Staleness(SLOW_ENCODER_MS, SLOW_FOR_MS);
+    this.complaints = new Complaints();
   }
 
   /** The way pictures go now. @returns {PathName} */
@@ -145,26 +134,14 @@ export class VideoPaths {
     const { rtc, video, performance } = this.surroundings;
     const now = performance.now();
     if (rtc.isOpen) {
-      const why = this.complaint(now, ageMs);
+      const why = this.complaints.ofFast(now, rtc, this.fastTries.goodSinceMs, ageMs);
       if (why === '') return;
       rtc.close();
       this.lost(why);
-    } else if (this.wish === 'auto' && this.slow.isStale(now, video.encodeMs) && this.name === 'WebSocket') {
-      this.slow.reset();
+    } else if (this.wish === 'auto' && this.complaints.ofEncoder(now, video.encodeMs) && this.name === 'WebSocket') {
+      this.complaints.slow.reset();
       void this.encodeLess();
     }
-  }
-
-  /**
-   * What is wrong with the fast path that is open; "" if nothing is.
-   * @param {number} now [ms]
-   * @param {number | null} ageMs
-   */
-  complaint(now, ageMs) {
-    const { rtc } = this.surroundings;
-    if (now - rtc.heardMs > SILENT_MS) return 'silent';
-    if (!rtc.isFlowing) return now - this.fastTries.goodSinceMs > FIRST_PICTURE_MS ? 'no picture' : '';
-    return this.old.isStale(now, ageMs) ? `pictures are ${ageMs} ms old` : '';
   }
 
   async connect() {
@@ -175,7 +152,7 @@ export class VideoPaths {
     this.isConnecting = true;
     try {
       await rtc.open(session, track, welcome);
-      this.old.reset();
+      this.complaints.old.reset();
       this.fastTries.succeeded();
       say('pictures go by WebRTC');
     } catch (error) {

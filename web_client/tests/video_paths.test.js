@@ -2,9 +2,8 @@ import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
 import { RtcRefused } from '../src/rtc.js';
-import {
-  FIRST_PICTURE_MS, OLD_FOR_MS, OLD_MS, SILENT_MS, SLOW_ENCODER_MS, SLOW_FOR_MS, VideoPaths,
-} from '../src/video_paths.js';
+import { VideoPaths } from '../src/video_paths.js';
+import { FIRST_PICTURE_MS, OLD_FOR_MS, OLD_MS, SILENT_MS, SLOW_ENCODER_MS, SLOW_FOR_MS } from '../src/complaints.js';
 import { GOOD_MS, RETRY_MS } from '../src/retry.js';
 import { FakeTime } from './fakes.js';
 
