@@ -179,7 +179,7 @@ def _seconds(text: str) -> float:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    told = "; ".join(f"{one.name}: {one.told}" for one in SCENARIOS.values())
+    told = "; ".join(f"{one.name}: {one.told}" for one in SCENARIOS.values()).replace("%", "%%")
     parser.add_argument(
         "--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), help=told
     )

@@ -142,3 +142,12 @@ def test_options_are_checked(arguments, capsys):
     with pytest.raises(SystemExit):
         main(["network", *arguments])
     assert arguments[0] in capsys.readouterr().err
+
+
+def test_help_tells_every_line(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["network", "--help"])
+    assert ended.value.code == 0
+    told = "".join(capsys.readouterr().out.split())  # lines are broken anywhere
+    for one in SCENARIOS.values():
+        assert "".join(f"{one.name}: {one.told}".split()) in told
