@@ -32,7 +32,7 @@ from server.settings import VideoSettings
 from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
-from tests.e2e.clock_canvas import CLOCK_CANVAS
+from tests.e2e.clock_canvas import clock_canvas
 from tests.e2e.conftest import find_chromium
 from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
 
@@ -127,7 +127,7 @@ class Sensors:
 def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
     with receiving(result) as told:
         page = context.new_page()
-        for script in (CLOCK_CANVAS, KEEP_CONNECTIONS, *SCRIPTS[way]):
+        for script in (clock_canvas(1280), KEEP_CONNECTIONS, *SCRIPTS[way]):
             page.add_init_script(script)
         sensors = Sensors(context, page)
         operator, supervisor = told["tokens"]  # type: ignore[misc]

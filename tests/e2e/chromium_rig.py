@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from playwright.sync_api import BrowserContext
@@ -12,7 +12,7 @@ from playwright.sync_api import BrowserContext
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from tests.e2e.chromium_phone import ChromiumPhone, browser
-from tests.e2e.played_phone import CALIBRATION, PlayedPhone
+from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone, calibration
 from tests.e2e.serving import DEVICE, Serving, serving
 
 LANDSCAPE = {
@@ -22,15 +22,17 @@ LANDSCAPE = {
     "device_scale_factor": 1,
 }
 
-STARVED = ("are silent", "No word from the phone", "time stamps are off")
-"""How the robot says that a machine was too busy for the page's sensors, finger or pictures."""
+STARVED = ("are silent", "No word from the phone", "time stamps are off", "too uncertain")
+"""How the robot says that a machine was too busy for the page's sensors, finger or pictures: a hand
+is told to the page as often as the machine manages, and a tremor told 30 times a second is none."""
 
 
 def calibrate(folder: Path, device: str = DEVICE) -> Path:
-    """A folder with the canvas camera's calibration."""
+    """A folder with the canvas camera's calibrations."""
     cameras = folder / "cameras"
     cameras.mkdir()
-    (cameras / "canvas.yaml").write_text(CALIBRATION.format(name=device))
+    for camera in (CAMERA, HD_CAMERA):
+        (cameras / f"canvas_{camera.width}.yaml").write_text(calibration(camera, device))
     return cameras
 
 
@@ -59,7 +61,11 @@ def lead(phone: PlayedPhone, tries: int = 3) -> None:
 
 
 def flight(
-    phone: PlayedPhone, server: Serving, seconds: float, tries: int = 3
+    phone: PlayedPhone,
+    server: Serving,
+    seconds: float,
+    meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
+    tries: int = 3,
 ) -> tuple[list[tuple[float, float]], dict[str, object]]:
     """Lead for so long: distances as `ChromiumPhone.track` gives them, and the status at the end.
 
@@ -67,7 +73,7 @@ def flight(
     """
     for left in reversed(range(tries)):
         lead(phone)
-        distances = phone.track(seconds)
+        distances = phone.track(seconds, meanwhile)
         status = server.request("GET", "/api/status")
         starved = any(words in str(status["reason"]) for words in STARVED)
         if status["mode"] == "TRACK" or not starved or not left:

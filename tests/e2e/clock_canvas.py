@@ -6,16 +6,18 @@ import numpy as np
 
 from pipeline.signals import Image
 
-BITS, BLOCK_PX = 24, 40
+BITS = 24
 """Of milliseconds; a checksum of 8 bits follows. The second row is the first one inverted."""
 CHECK = 0x5A
-CLOCK_CANVAS = """
+_CANVAS = """
 (() => {
-  const canvas = Object.assign(document.createElement('canvas'), {width: 1280, height: 720});
+  const [width, height] = [WIDTH, WIDTH * 9 / 16];
+  const canvas = Object.assign(document.createElement('canvas'), {width, height});
+  const size = width / 32;
   const paint = canvas.getContext('2d', {alpha: false});
   const block = (row, column, on) => {
     paint.fillStyle = on ? '#fff' : '#000';
-    paint.fillRect(40 * column, 40 * row, 40, 40);
+    paint.fillRect(size * column, size * row, size, size);
   };
   const noise = Object.assign(document.createElement('canvas'), {width: 512, height: 512});
   const grain = noise.getContext('2d', {alpha: false});
@@ -29,9 +31,10 @@ CLOCK_CANVAS = """
   const onFrame = () => {
     painted += 1;
     paint.fillStyle = `hsl(${painted % 360} 30% 25%)`;
-    paint.fillRect(0, 80, 1280, 640);
+    paint.fillRect(0, 2 * size, width, height);
     const [x, y] = [(painted * 37) % 192, (painted * 23) % 192];
-    paint.drawImage(noise, x, y, 320, 320, 480, 240, 320, 320); // something to encode
+    // something to encode
+    paint.drawImage(noise, x, y, 320, 320, 12 * size, 6 * size, 8 * size, 8 * size);
     const ms = Math.round(performance.now()) & 0xffffff;
     const check = (ms ^ (ms >> 8) ^ (ms >> 16) ^ 0x5a) & 0xff;
     for (let i = 0; i < 32; i += 1) {
@@ -52,10 +55,16 @@ CLOCK_CANVAS = """
 """
 
 
+def clock_canvas(width: int) -> str:
+    """The script; 16:9, 32 blocks wide."""
+    return _CANVAS.replace("WIDTH", str(width))
+
+
 def painted_ms(luma: Image) -> int | None:
     """The time of the page's clock that a picture shows [ms], to 24 bits; None if it is damaged."""
-    middles = BLOCK_PX // 2 + BLOCK_PX * np.arange(BITS + 8)
-    upper, lower = (luma[y, middles].astype(int) for y in (BLOCK_PX // 2, BLOCK_PX * 3 // 2))
+    block = luma.shape[1] // (BITS + 8)
+    middles = block // 2 + block * np.arange(BITS + 8)
+    upper, lower = (luma[y, middles].astype(int) for y in (block // 2, block * 3 // 2))
     if np.any(np.abs(upper - lower) < 60):
         return None
     word = int(np.sum((upper > lower).astype(np.int64) << np.arange(BITS + 8)))

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import time
 from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
+import yaml
 
 from hardware.sim.hand import Hand
 from hardware.sim.intent import Intent, Pose
@@ -19,23 +22,35 @@ from pipeline.frames import GRAVITY, R_cd
 LENS = "canvas camera"
 AHEAD_S = 0.02
 """So far each picture is foretold."""
-CAMERA = Camera(
-    1280,
-    720,
-    np.array([[930.0, 0.0, 640.0], [0.0, 930.0, 360.0], [0.0, 0.0, 1.0]]),
-    "plumb_bob",
-    np.zeros(5),
-)
-CALIBRATION = """image_width: 1280
-image_height: 720
-camera_name: {name}
-camera_matrix: {{rows: 3, cols: 3, data: [930, 0, 640, 0, 930, 360, 0, 0, 1]}}
-distortion_model: plumb_bob
-distortion_coefficients: {{rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}}
-"""
+
+
+def _camera(width: int) -> Camera:
+    """16:9, 69° wide."""
+    f, c = 930.0 * width / 1280, 0.5 * width
+    K = np.array([[f, 0.0, c], [0.0, f, 0.5625 * c], [0.0, 0.0, 1.0]])
+    return Camera(width, width * 9 // 16, K, "plumb_bob", np.zeros(5))
+
+
+CAMERA, HD_CAMERA = _camera(640), _camera(1280)
+"""Robots are filmed in small pictures: two processors paint, encode, decode, fly and judge."""
+
+
+def calibration(camera: Camera, name: str) -> str:
+    """The file of a camera of a phone that calls itself so."""
+    table = {
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "camera_name": name,
+        "camera_matrix": {"rows": 3, "cols": 3, "data": camera.K.ravel().tolist()},
+        "distortion_model": camera.model,
+        "distortion_coefficients": {"rows": 1, "cols": 5, "data": camera.distortion.tolist()},
+    }
+    return yaml.safe_dump(table)
+
+
 CANVAS = """
 (() => {
-  const canvas = Object.assign(document.createElement('canvas'), {width: 1280, height: 720});
+  const canvas = Object.assign(document.createElement('canvas'), {width: 640, height: 360});
   const paint = canvas.getContext('2d', {alpha: false});
   // A frame shows the lights where they are when it is painted, from what was told of two moments.
   let told = null;
@@ -46,15 +61,15 @@ CANVAS = """
   };
   const draw = (spots) => {
     paint.fillStyle = '#1c1c1c';
-    paint.fillRect(0, 0, 1280, 720);
+    paint.fillRect(0, 0, canvas.width, canvas.height);
     for (const [u, v, r] of spots) {
-      const light = paint.createRadialGradient(u, v, 0, u, v, r + 2);
+      const light = paint.createRadialGradient(u, v, 0, u, v, r + 1);
       light.addColorStop(0, '#fff');
-      light.addColorStop(r / (r + 2), '#eee');
+      light.addColorStop(r / (r + 1), '#eee');
       light.addColorStop(1, 'rgba(28,28,28,0)');
       paint.fillStyle = light;
       paint.beginPath();
-      paint.arc(u, v, r + 2, 0, 7);
+      paint.arc(u, v, r + 1, 0, 7);
       paint.fill();
     }
   };
@@ -138,7 +153,7 @@ class PlayedPhone(ABC):
     def _spots(self, hand: Pose, body: Pose) -> list[list[float]]:
         """(u, v, radius) [px] of each LED."""
         q = (body[1] - hand[1] + self._leds_in_b @ body[0].T) @ hand[0]
-        radius = 930.0 * 0.008 / q[:, :1]
+        radius = CAMERA.K[0, 0] * 0.008 / q[:, :1]
         spots: list[list[float]] = np.hstack((CAMERA.pixels(q), radius)).tolist()
         return spots
 
@@ -177,8 +192,14 @@ class PlayedPhone(ABC):
         """All that is written on the page."""
         return str(self.evaluate("document.body.innerText")).replace("\n", " · ")
 
-    def track(self, seconds: float) -> list[tuple[float, float]]:
-        """Play while the button is held: (time [s], distance from where the hand means it [m])."""
+    def track(
+        self, seconds: float, meanwhile: Iterable[tuple[float, Callable[[], object]]] = ()
+    ) -> list[tuple[float, float]]:
+        """Play while the button is held: (time [s], distance from where the hand means it [m]).
+
+        `meanwhile` is what to do when, in order.
+        """
+        waiting = deque(meanwhile)
         hand, body = self.step()
         started = before = time.monotonic()
         intent = Intent(VirtualCameraConfig(), hand, body)
@@ -188,6 +209,8 @@ class PlayedPhone(ABC):
             _, p_rf = intent.step(hand, now - before)
             before = now
             distances.append((now - started, float(np.linalg.norm(body[1] - p_rf))))
+            if waiting and now - started >= waiting[0][0]:
+                waiting.popleft()[1]()
         return distances
 
     @staticmethod
