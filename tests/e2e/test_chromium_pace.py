@@ -70,7 +70,7 @@ def test_pictures_become_fewer_then_smaller_and_the_robot_is_seen_at_every_size(
         recording = read(Path(str(server.request("DELETE", "/api/recording")["path"])))
     bodies = [decode(data).body for _, data in recording.phone_records()]
     sizes = [(b.width, b.height, b.shrunk) for b in bodies if isinstance(b, Picture)]
-    assert list(dict.fromkeys(sizes)) == [(1280, 720, 0), (960, 540, 1), (640, 360, 2)]
+    assert list(dict.fromkeys(sizes)) == [(640, 360, 0), (480, 270, 1), (320, 180, 2)]
     run_offline(recording, tmp_path / "run.csv")
     rows = (tmp_path / "run.csv").read_text().splitlines()[1:]
     found = [row.split(",")[3] == "1" for row in rows]
