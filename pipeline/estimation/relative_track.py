@@ -171,8 +171,9 @@ class RelativeTrack:
             self._look(anchor, anchor.seen, anchor.use)
 
     def _look(self, anchor: Anchor, seen: Seen, use: Flags) -> float:
-        anchor.P[:MOVING] *= sqrt(anchor.stretch)
-        anchor.P[:, :MOVING] *= sqrt(anchor.stretch)
+        if anchor.stretch != 1.0:
+            anchor.P[:MOVING] *= sqrt(anchor.stretch)
+            anchor.P[:, :MOVING] *= sqrt(anchor.stretch)
         rays = seen.rays
         felt = self._inputs(anchor)
         return float(

@@ -37,7 +37,7 @@ class ClockOffset:
         self._needed = needed
         self._buckets: deque[Bucket] = deque()
         self._contradictions: list[tuple[float, float, float]] = []
-        self._answers, self._t_heard = 0, 0.0
+        self._answers = 0
         self._trips: deque[tuple[float, float]] = deque()
         self._line: Line | None = None
         self._mapping = Mapping()
@@ -86,7 +86,7 @@ class ClockOffset:
         By and large half the quickest round trip, for delays there and back may differ; as long
         as they don't, the error is a tenth of that. Raises ValueError before the first answer.
         """
-        line, t = self._known(), self._t_heard
+        line, t = self._known(), self._trips[-1][0]
         unknown = 2.0 * MAX_DRIFT * (t - line.t)  # answers since then said nothing new
         return line.error + unknown + abs(line.at(t) - self._mapping.offset(t))
 
@@ -130,7 +130,7 @@ class ClockOffset:
         lower = Bound(t_answered, t_remote - t_answered)
         upper = Bound(t_asked, t_remote - t_asked)
         is_news = self._remember(lower, upper, drift)
-        self._answers, self._t_heard = self._answers + 1, t_answered
+        self._answers += 1
         self._trips.append((t_answered, t_answered - t_asked))
         while self._trips[0][0] < t_answered - WINDOW_S:
             self._trips.popleft()
