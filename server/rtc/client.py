@@ -24,8 +24,9 @@ from aiortc import (
 from server.access import Access, PhoneClientError
 from server.messages import Command, Status, Welcome
 from server.phone_client import PhoneClient
-from server.rtc.dating import RTP_HZ, Source
+from server.rtc.dating import Source
 from server.rtc.peer import CHANNEL, GONE, MAX_UNSENT_BYTES
+from server.rtc.rtp import RTP_HZ
 from server.rtc.signalling import Answer, Ask, Offer
 from server.rtc.touches import Touches
 from server.rtc.trailer import FrameRecord, append

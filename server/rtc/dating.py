@@ -6,10 +6,10 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Literal
 
+from server.rtc.rtp import RTP_HZ, TIMESTAMP_BITS, ahead
 from server.rtc.trailer import FrameRecord
 
 Source = Literal["record", "pair", "arrival"]
-RTP_HZ = 90_000
 REMEMBERED_PAIRS = 64
 OLDEST_PAIR_S = 5.0
 """Clocks of 90 kHz and of the page drift apart: an older pair says nothing."""
@@ -60,13 +60,13 @@ class Dating:
         if not self._pairs:
             return None
         known, t_us = next(reversed(self._pairs.items()))
-        since = _signed(rtp_timestamp - known) / RTP_HZ
+        since = ahead(rtp_timestamp, known, TIMESTAMP_BITS) / RTP_HZ
         return t_us + round(1e6 * since) if abs(since) <= OLDEST_PAIR_S else None
 
     def _by_arrival(self, rtp_timestamp: int, arrival_us: float) -> int:
         """As much before its arrival as is even with the quickest of the last pictures."""
         if self._last is not None:
-            self._ticks += _signed(rtp_timestamp - self._last)
+            self._ticks += ahead(rtp_timestamp, self._last, TIMESTAMP_BITS)
         self._last = rtp_timestamp
         stamp_us = 1e6 * self._ticks / RTP_HZ
         delay = arrival_us - stamp_us
@@ -78,8 +78,3 @@ class Dating:
         if self._count >= WINDOW:
             self._least, self._count = [delay, self._least[0]], 0
         return max(0, round(stamp_us + least))
-
-
-def _signed(ticks: int) -> int:
-    """The shorter way round the circle of 2^32."""
-    return (ticks + (1 << 31) & (1 << 32) - 1) - (1 << 31)

@@ -16,13 +16,13 @@ from server.clock import now
 from server.rtc import fit
 from server.rtc.jitter import Assembled, JitterBuffer, Packet
 from server.rtc.nack import NackGenerator
+from server.rtc.rtp import RTP_HZ, TIMESTAMP_BITS, ahead
 
 LONGEST_ROUND_TRIP_S = 0.25
 """A longer one is not waited for."""
 UNKNOWN_ROUND_TRIP_S = 0.1
 FRAME_S = 1.0 / 30.0
 SHORTEST_FRAME_S, LONGEST_FRAME_S = 1.0 / 60.0, 0.2
-RTP_HZ = 90_000
 
 
 class Intake:
@@ -74,7 +74,7 @@ class Intake:
 
     def _release(self, frame: Assembled) -> None:
         if self._last_timestamp is not None:
-            took = (frame.timestamp - self._last_timestamp & 0xFFFFFFFF) / RTP_HZ
+            took = ahead(frame.timestamp, self._last_timestamp, TIMESTAMP_BITS) / RTP_HZ
             if SHORTEST_FRAME_S <= took <= LONGEST_FRAME_S:
                 self._frame_s += 0.1 * (took - self._frame_s)
         self._last_timestamp = frame.timestamp

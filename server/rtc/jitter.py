@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from server.rtc.rtp import NUMBER_BITS, ahead
 from server.wire import MAX_RECORD_BYTES
 
 CAPACITY = 2048
@@ -100,8 +101,7 @@ class JitterBuffer:
     def _position(self, sequence_number: int) -> int:
         if self._next is None:
             self._next = sequence_number
-        ahead = (sequence_number - self._next + 0x8000 & 0xFFFF) - 0x8000
-        return self._next + ahead
+        return self._next + ahead(sequence_number, self._next, NUMBER_BITS)
 
     def _restart(self, position: int) -> None:
         self.restarts += 1

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+from server.rtc.rtp import NUMBER_BITS, ahead
+
 MAX_MISSING = 512
 """More at once is another stream, or a line that is no use asking on."""
 CLOSEST_S = 0.01
@@ -51,9 +53,9 @@ class NackGenerator:
         number, now = packet.sequence_number, self._clock()
         if self._newest is None:
             self._newest = number
-        ahead = (number - self._newest + 0x8000 & 0xFFFF) - 0x8000
-        if ahead > 0:
-            self._miss(self._newest, ahead, now)
+        steps = ahead(number, self._newest, NUMBER_BITS)
+        if steps > 0:
+            self._miss(self._newest, steps, now)
             self._newest = number
         else:
             self._lost.pop(number, None)
@@ -75,9 +77,9 @@ class NackGenerator:
             return None
         return min(one.asked for one in self._lost.values()) + max(CLOSEST_S, self._round_trip())
 
-    def _miss(self, newest: int, ahead: int, now: float) -> None:
-        if len(self._lost) + ahead > MAX_MISSING:
+    def _miss(self, newest: int, steps: int, now: float) -> None:
+        if len(self._lost) + steps > MAX_MISSING:
             self._lost.clear()
             return
-        for step in range(1, ahead):
+        for step in range(1, steps):
             self._lost[newest + step & 0xFFFF] = _Lost(now)
