@@ -26,9 +26,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from server.experiments.text import table
 from server.one_line import Parser
-from tests.bench.bench_rtc import NO_ENCODER, NO_WEBRTC
 from tests.e2e.chromium_rig import flight, led_server, start
 from tests.e2e.conftest import find_chromium
+from tests.e2e.page_scripts import NO_ENCODER, NO_WEBRTC
 from tests.e2e.serving import serving
 
 HAND, SEED, REST_S = "moving", 2, 12.0
@@ -116,9 +116,12 @@ def by_virtual_phone(way: Way, seconds: float, folder: Path) -> Row:
                 try:
                     process.wait(1.0)
                 except subprocess.TimeoutExpired:
-                    status = server.request("GET", "/api/status")
+                    said = server.request("GET", "/api/status")
+                    status = said if said["mode"] == "TRACK" else status
             assert process.stdout is not None
             told = json.loads(process.stdout.read().splitlines()[-1])
+        if not status:
+            sys.exit(f"{way.name}: the virtual phone never led: {told}")
         return _row(way, "virtual phone", float(told["rms_mm"] or "nan"), status)
 
 
