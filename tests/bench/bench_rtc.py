@@ -34,10 +34,8 @@ from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.clock_canvas import clock_canvas
 from tests.e2e.conftest import find_chromium
-from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
+from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_ENCODER, NO_H264, NO_WEBRTC
 
-NO_WEBRTC = "delete window.RTCPeerConnection;"
-NO_ENCODER = "delete window.VideoEncoder;"
 SCRIPTS: dict[str, tuple[str, ...]] = {
     "tuned": (),
     "tuned VP8": (NO_H264,),

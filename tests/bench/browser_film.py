@@ -18,6 +18,7 @@ from playwright.sync_api import Page
 
 from hardware.sim.scenes_film import RATE_HZ
 from pipeline.signals import Image
+from server.bench.write import camera_text
 from server.frame_decoder import FrameDecoder
 from server.ingest import EncodedFrame
 from server.recording_files import read
@@ -26,7 +27,7 @@ from server.wire_records import Picture
 from tests.bench.y4m_camera import number_of, write_y4m
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
-from tests.e2e.played_phone import HD_CAMERA, calibration
+from tests.e2e.played_phone import HD_CAMERA
 from tests.e2e.serving import Serving, serving
 
 START_S = 4.0
@@ -112,7 +113,7 @@ def studio(executable: str, speed: Speed) -> Iterator[Studio]:
     with TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "cameras").mkdir()
-        text = calibration(HD_CAMERA, f"Linux 412x915@1 / {folder / 'film.y4m'}")
+        text = camera_text(HD_CAMERA, f"Linux 412x915@1 / {folder / 'film.y4m'}")
         (folder / "cameras" / "film.yaml").write_text(text)
         with serving(folder, "--cameras", str(folder / "cameras"), *speed.options) as server:
             yield Studio(executable, server, folder, speed)

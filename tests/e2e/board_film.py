@@ -11,6 +11,7 @@ import numpy as np
 from playwright.sync_api import BrowserContext, CDPSession, Page
 
 from pipeline.frames import GRAVITY, R_cd, R_co
+from tests.e2e.page_scripts import BE_CAMERA
 from tests.server.filming import Motion, Phone, Studio, omega_cf_in_o, scaled
 
 FILM_FPS, FILM_S = 15.0, 30.0
@@ -37,11 +38,7 @@ FILM = """
     requestAnimationFrame(onFrame);
   };
   onFrame();
-  navigator.mediaDevices.getUserMedia = async () => {
-    const stream = canvas.captureStream(30);
-    Object.defineProperty(stream.getVideoTracks()[0], 'label', {value: 'canvas camera'});
-    return stream;
-  };
+  BE_CAMERA
 })();
 """
 
@@ -65,7 +62,7 @@ class FilmingPhone:
         self._cdp: CDPSession = context.new_cdp_session(self.page)
         self._motion = motion
         frames = [base64.b64encode(one).decode() for one in film(motion)]
-        script = FILM.replace("FPS", str(FILM_FPS))
+        script = FILM.replace("FPS", str(FILM_FPS)).replace("BE_CAMERA", BE_CAMERA)
         script = script.replace("WIDTH", str(PHONE.width)).replace("HEIGHT", str(PHONE.height))
         self.page.add_init_script(script.replace("FRAMES", json.dumps(frames)))
         for kind in ("accelerometer", "gyroscope", "linear-acceleration"):

@@ -11,8 +11,9 @@ from playwright.sync_api import BrowserContext
 
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
+from server.bench.write import camera_text
 from tests.e2e.chromium_phone import ChromiumPhone, browser
-from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone, calibration
+from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone
 from tests.e2e.serving import DEVICE, Serving, serving
 
 LANDSCAPE = {
@@ -32,7 +33,7 @@ def calibrate(folder: Path, device: str = DEVICE) -> Path:
     cameras = folder / "cameras"
     cameras.mkdir()
     for camera in (CAMERA, HD_CAMERA):
-        (cameras / f"canvas_{camera.width}.yaml").write_text(calibration(camera, device))
+        (cameras / f"canvas_{camera.width}.yaml").write_text(camera_text(camera, device))
     return cameras
 
 

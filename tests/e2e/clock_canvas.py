@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.signals import Image
+from tests.e2e.page_scripts import BE_CAMERA
 
 BITS = 24
 """Of milliseconds; a checksum of 8 bits follows. The second row is the first one inverted."""
@@ -45,19 +46,14 @@ _CANVAS = """
     requestAnimationFrame(onFrame);
   };
   onFrame();
-  navigator.mediaDevices.getUserMedia = async () => {
-    const stream = canvas.captureStream(30);
-    const [track] = stream.getVideoTracks();
-    Object.defineProperty(track, 'label', {value: 'canvas camera'});
-    return stream;
-  };
+  BE_CAMERA
 })();
 """
 
 
 def clock_canvas(width: int) -> str:
     """The script; 16:9, 32 blocks wide."""
-    return _CANVAS.replace("WIDTH", str(width))
+    return _CANVAS.replace("WIDTH", str(width)).replace("BE_CAMERA", BE_CAMERA)
 
 
 def painted_ms(luma: Image) -> int | None:

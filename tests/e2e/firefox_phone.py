@@ -9,7 +9,8 @@ import numpy as np
 
 from hardware.sim.hand import Hand
 from tests.e2e.firefox import Firefox
-from tests.e2e.played_phone import CANVAS, LENS, PlayedPhone
+from tests.e2e.page_scripts import LENS
+from tests.e2e.played_phone import CANVAS, PlayedPhone
 
 WIDTH, HEIGHT = 915, 412
 FEEL = """

@@ -1,5 +1,14 @@
 """What is told a page before it runs: to be another browser, or to be looked into."""
 
+LENS = "canvas camera"
+BE_CAMERA = f"""navigator.mediaDevices.getUserMedia = async () => {{
+    const stream = canvas.captureStream(30);
+    Object.defineProperty(stream.getVideoTracks()[0], 'label', {{value: '{LENS}'}});
+    return stream;
+  }};"""
+"""What is painted on `canvas` is what the page's camera sees."""
+NO_WEBRTC = "delete window.RTCPeerConnection;"
+NO_ENCODER = "delete window.VideoEncoder;"
 KEEP_CONNECTIONS = """
 window.made = [];
 window.RTCPeerConnection = class extends RTCPeerConnection {

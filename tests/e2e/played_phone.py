@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-import yaml
 
 from hardware.sim.hand import Hand
 from hardware.sim.intent import Intent, Pose
@@ -18,8 +17,8 @@ from hardware.sim.truth import Truth, TruthClient
 from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd
+from tests.e2e.page_scripts import BE_CAMERA
 
-LENS = "canvas camera"
 AHEAD_S = 0.02
 """So far each picture is foretold."""
 
@@ -35,22 +34,9 @@ CAMERA, HD_CAMERA = _camera(640), _camera(1280)
 """Robots are filmed in small pictures: two processors paint, encode, decode, fly and judge."""
 
 
-def calibration(camera: Camera, name: str) -> str:
-    """The file of a camera of a phone that calls itself so."""
-    table = {
-        "image_width": camera.width,
-        "image_height": camera.height,
-        "camera_name": name,
-        "camera_matrix": {"rows": 3, "cols": 3, "data": camera.K.ravel().tolist()},
-        "distortion_model": camera.model,
-        "distortion_coefficients": {"rows": 1, "cols": 5, "data": camera.distortion.tolist()},
-    }
-    return yaml.safe_dump(table)
-
-
 CANVAS = """
 (() => {
-  const canvas = Object.assign(document.createElement('canvas'), {width: 640, height: 360});
+  const canvas = Object.assign(document.createElement('canvas'), {width: WIDTH, height: HEIGHT});
   const paint = canvas.getContext('2d', {alpha: false});
   // A frame shows the lights where they are when it is painted, from what was told of two moments.
   let told = null;
@@ -78,14 +64,11 @@ CANVAS = """
     requestAnimationFrame(onFrame);
   };
   onFrame();
-  navigator.mediaDevices.getUserMedia = async () => {
-    const stream = canvas.captureStream(30);
-    const [track] = stream.getVideoTracks();
-    Object.defineProperty(track, 'label', {value: 'LENS'});
-    return stream;
-  };
+  BE_CAMERA
 })();
-""".replace("LENS", LENS)
+"""
+CANVAS = CANVAS.replace("WIDTH", str(CAMERA.width)).replace("HEIGHT", str(CAMERA.height))
+CANVAS = CANVAS.replace("BE_CAMERA", BE_CAMERA)
 
 
 class PlayedPhone(ABC):
