@@ -21,8 +21,9 @@ from server.messages import (
     decode_from_server,
     encode_message,
 )
+from server.touches import Touches
 from server.wire import VERSION, WireError, decode, encode
-from server.wire_records import Credit, Picture, Ping, Record
+from server.wire_records import Credit, Picture, Ping, Record, Touch
 
 MAX_IN_FLIGHT = 3
 """Pictures sent and not yet taken by the server."""
@@ -42,6 +43,7 @@ class PhoneClient:
         self._access = access
         self._on_ping, self._on_status = on_ping, on_status
         self._sockets: list[ClientConnection] = []
+        self._touches = Touches()
         self._unanswered: list[int] = []
         self._credit = asyncio.Event()
         self._credit.set()
@@ -103,6 +105,12 @@ class PhoneClient:
         Raises:
             PhoneClientError: the socket is gone.
         """
+        if isinstance(record.body, Touch):
+            record = self._touches.numbered(record.t_us, record.body)
+        await self._say(record)
+
+    async def _say(self, record: Record) -> None:
+        """Send it as it is."""
         socket = self._sockets[-1 if isinstance(record.body, Picture) else 0]
         if isinstance(record.body, Picture):
             self._unanswered.append(record.sequence)
@@ -146,7 +154,11 @@ class PhoneClient:
     async def _take(self, record: Record) -> None:
         match record.body:
             case Ping(nonce=nonce):
-                await self.send(self._on_ping(nonce, record.t_us))
+                pong = self._on_ping(nonce, record.t_us)
+                await self._say(pong)
+                touch = self._touches.again(pong.t_us, nonce)
+                if touch is not None:
+                    await self._say(touch)
             case Credit(sequence=sequence):
                 if sequence in self._unanswered:  # and with it all that were sent before
                     del self._unanswered[: self._unanswered.index(sequence) + 1]

@@ -51,7 +51,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """TOUCH: sign of life of the page's main thread, 30 Hz, at each change and each fast PING."""
+    """TOUCH: sign of life of the page's main thread, 30 Hz, at each change and each PING."""
 
     held: bool
     visible: bool

@@ -28,10 +28,9 @@ from server.rtc.dating import Source
 from server.rtc.peer import CHANNEL, GONE, MAX_UNSENT_BYTES
 from server.rtc.rtp import RTP_HZ
 from server.rtc.signalling import Answer, Ask, Offer
-from server.rtc.touches import Touches
 from server.rtc.trailer import FrameRecord, append
 from server.wire import WireError, decode, encode
-from server.wire_records import Motion, Picture, Ping, Pong, Record, Stamp, Touch
+from server.wire_records import Motion, Picture, Ping, Record, Stamp, Touch
 
 RTP_TIMESTAMP = "_RTCRtpSender__rtp_timestamp"
 MAX_WAITING = 4
@@ -76,8 +75,7 @@ class RtcPhoneClient(PhoneClient):
         self._channel: RTCDataChannel | None = None
         self._opened, self._gone = asyncio.Event(), asyncio.Event()
         self._heard: asyncio.Queue[bytes] = asyncio.Queue(64)
-        self._pinged = self._answered_us = 0
-        self._touches = Touches()
+        self._pinged = 0
         self._attitude: tuple[float, float, float, float] | None = None
 
     @property
@@ -89,7 +87,7 @@ class RtcPhoneClient(PhoneClient):
         """Pictures in the making wait in the track."""
 
     async def send(self, record: Record) -> None:
-        """Send a record: pictures as a track, all else by the data channel, dropped if it is full.
+        """Send a record: pictures as a track, a touch by both ways, all else by the quick one.
 
         Raises:
             PhoneClientError: the socket is gone.
@@ -99,13 +97,17 @@ class RtcPhoneClient(PhoneClient):
             return
         if isinstance(record.body, Motion):
             self._attitude = record.body.orientation_wxyz
-        elif isinstance(record.body, Pong):
-            self._answered_us = record.t_us
         elif isinstance(record.body, Touch):
             record = self._touches.numbered(record.t_us, record.body)
-        is_open = self._send_fast(record)
-        if not is_open or isinstance(record.body, Touch):
-            await super().send(record)
+            self._send_fast(record)
+            await super()._say(record)
+            return
+        await self._say(record)
+
+    async def _say(self, record: Record) -> None:
+        """By the data channel, dropped if it is full, or by the websocket until it is open."""
+        if not self._send_fast(record):
+            await super()._say(record)
 
     def _send_fast(self, record: Record) -> bool:
         """Send it by the data channel, or drop it; whether that is open."""
@@ -165,12 +167,7 @@ class RtcPhoneClient(PhoneClient):
                 record = decode(await self._heard.get())
             except WireError as error:
                 raise PhoneClientError(f"{self._access.url}: {error}") from error
-            is_new = record.sequence > self._pinged
             await self._take(record)
-            if is_new and isinstance(record.body, Ping):
-                touch = self._touches.again(self._answered_us, record.body.nonce)
-                if touch is not None:
-                    self._send_fast(touch)
 
     async def _notice_end(self) -> None:
         await self._gone.wait()

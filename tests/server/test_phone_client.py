@@ -9,7 +9,7 @@ from server.access import Access, PhoneClientError
 from server.messages import Refused, encode_message
 from server.phone_client import PhoneClient
 from server.wire import decode, encode
-from server.wire_records import Credit, Ping, Pong, Record
+from server.wire_records import Credit, Ping, Pong, Record, Touch
 from tests.server.page_server import WELCOME, PageServer, picture, status
 
 pytestmark = pytest.mark.e2e
@@ -35,6 +35,23 @@ def test_hello_pong_and_wish():
     (_, pong), (_, wish) = server.heard
     assert decode(pong).body == Pong(42, 123)
     assert json.loads(wish) == {"type": "command", "what": "arm"}
+
+
+def test_a_ping_is_answered_with_the_newest_touch_too():
+    server = PageServer([encode_message(WELCOME)])
+
+    async def talk(client):
+        await client.open("a device")
+        await client.send(Record(1, 100, Touch(True, True, 3, 7)))
+        await client._take(Record(5, 123, Ping(42)))
+        async with asyncio.timeout(5.0):
+            while len(server.heard) < 3:
+                await asyncio.sleep(0)
+
+    asyncio.run(server.session(talk))
+    said = [decode(data) for _, data in server.heard]
+    assert said[1].body == Pong(42, 123)
+    assert (said[2].sequence, said[2].body) == (2, Touch(True, True, 3, 42))
 
 
 def test_three_pictures_are_under_way_and_no_more():

@@ -12,8 +12,8 @@ from server.clock import now
 from server.control_link import OperatorInput, PhoneImuInput
 from server.recording_files import read
 from server.rtc import link as link_module
-from server.rtc.touches import NEWEST_TOUCH_US
 from server.rtc.trailer import split
+from server.touches import NEWEST_TOUCH_US
 from server.wire import decode
 from server.wire_records import Motion, Picture, Touch
 from tests.server.house import eventually

@@ -28,7 +28,7 @@ export function joinPaths({ scope, performance, links, fetchHere, startRtcWorker
     ScriptTransform: scope.RTCRtpScriptTransform,
     hasStreams: scope.RTCRtpSender?.prototype.createEncodedStreams !== undefined,
     startWorker: startRtcWorker,
-    onRecord: (record) => phone.record(record, (answer) => rtc.send(answer), true),
+    onRecord: (record) => phone.record(record, (answer) => rtc.send(answer)),
     onLost: () => paths.lost('the connection has ended'),
   });
   const paths = new VideoPaths({

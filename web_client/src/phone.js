@@ -126,20 +126,19 @@ export class Phone {
   /**
    * @param {Received} record
    * @param {(record: ArrayBuffer) => void} answer By the way that it came.
-   * @param {boolean} [isFast] That is the fast one.
    */
-  record(record, answer, isFast = false) {
-    if (record.kind === Kind.PING) this.pinged(record, answer, isFast);
+  record(record, answer) {
+    if (record.kind === Kind.PING) this.pinged(record, answer);
     else if (record.kind === Kind.CREDIT) this.video?.credit(record.taken);
   }
 
   /**
-   * Each PING comes by all ways, or by the fast one alone: the first one is answered, there with the touch too.
+   * Each PING comes by all ways, or by the fast one alone: the first one is answered, with the touch too, as
+   * waiting for the next tick would let the nonce grow old.
    * @param {{ sequence: number, tUs: number, nonce: bigint }} ping
    * @param {(record: ArrayBuffer) => void} answer
-   * @param {boolean} isFast
    */
-  pinged(ping, answer, isFast) {
+  pinged(ping, answer) {
     const { performance, dispatch } = this.surroundings;
     if (ping.sequence <= this.sequences.ping) return;
     this.sequences.ping = ping.sequence;
@@ -147,7 +146,7 @@ export class Phone {
     answer(encodePong(this.sequences.pong, nowUs(performance), ping));
     dispatch({ type: 'ping', nonce: ping.nonce });
     const { touch, tMs } = this.newest;
-    if (isFast && touch !== null && performance.now() - tMs <= NEWEST_TOUCH_MS) {
+    if (touch !== null && performance.now() - tMs <= NEWEST_TOUCH_MS) {
       answer(this.touchRecord({ ...touch, nonce: ping.nonce }));
     }
   }

@@ -1,6 +1,6 @@
 """TOUCHes that are said again are newer to the server, not to the finger."""
 
-from server.rtc.touches import NEWEST_TOUCH_US, Touches
+from server.touches import NEWEST_TOUCH_US, Touches
 from server.wire_records import Record, Touch
 
 HELD = Touch(True, True, 4, 11)
