@@ -88,6 +88,7 @@ bench: dev
 	for name in control control_law ekf estimators relative virtual_camera; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
 	-$(BIN)/python -m tests.bench.bench_browser
 	-$(BIN)/python -m tests.bench.bench_rtc
+	-$(BIN)/python -m tests.bench.bench_flights
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt

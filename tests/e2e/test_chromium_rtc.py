@@ -141,6 +141,7 @@ def test_pictures_go_by_webrtc_with_their_records_by_websocket_when_it_ends_and_
     with filming(chromium, tmp_path) as (server, page):
         path_is(server, page, "WebRTC, H264, dated by record")
         film = filmed(server, page)
+        becomes(page, "/^\\d+ ms$/.test(document.querySelector('#h-rtt').innerText)")
         page.evaluate(FAIL)
         path_is(server, page, "websocket, H264")
         path_is(server, page, "WebRTC, H264")

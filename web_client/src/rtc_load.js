@@ -1,4 +1,4 @@
-/** What WebRTC's statistics say of the encoder. */
+/** What WebRTC's statistics say of the encoder and of the way. */
 
 /** @import {Load} from './pace.js' */
 
@@ -20,6 +20,17 @@ export function countsOf(reports) {
     const { framesEncoded: encoded, totalEncodeTime, qualityLimitationReason } = report;
     const encodeMs = totalEncodeTime === undefined ? null : 1000 * totalEncodeTime;
     return { encoded, encodeMs, starved: qualityLimitationReason === 'cpu' };
+  }
+  return null;
+}
+
+/**
+ * There and back [ms], by RTCP; null before the first answer.
+ * @param {Iterable<any>} reports Of a sender's statistics.
+ */
+export function roundTripOf(reports) {
+  for (const { type, roundTripTime } of reports) {
+    if (type === 'remote-inbound-rtp' && roundTripTime !== undefined) return 1000 * roundTripTime;
   }
   return null;
 }

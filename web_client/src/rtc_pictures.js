@@ -8,7 +8,7 @@
 
 import { QUARTERS } from './pace.js';
 import { Rate } from './clock.js';
-import { RtcLoad, countsOf } from './rtc_load.js';
+import { RtcLoad, countsOf, roundTripOf } from './rtc_load.js';
 
 /** @typedef {{ rtpTimestamp: number, captureUs: number }} Pair */
 
@@ -36,6 +36,8 @@ export class RtcPictures {
     /** @type {Welcome | null} */
     this.welcome = null;
     this.loads = new RtcLoad();
+    /** @type {number | null} */
+    this.roundTripMs = null;
     this.captures = new Rate();
     this.frames = new Rate();
     this.bytes = new Rate();
@@ -121,10 +123,11 @@ export class RtcPictures {
 
   /** How the encoder has done since the last call. */
   async load() {
-    const reports = await this.sender?.getStats().catch(() => null);
+    const reports = [...((await this.sender?.getStats().catch(() => null))?.values() ?? [])];
+    this.roundTripMs = roundTripOf(reports);
     const now = this.surroundings.performance.now();
     const inHz = Math.min(this.level?.hz ?? Infinity, this.captures.perSecond(now));
-    return this.loads.since(countsOf(reports?.values() ?? []), inHz, now);
+    return this.loads.since(countsOf(reports), inHz, now);
   }
 
   close() {

@@ -109,7 +109,7 @@ export class VideoPaths {
     return {
       path: this.name,
       fps: frames.perSecond(now),
-      rttMs: rtc.isFlowing ? null : video.credits.roundTripMs,
+      rttMs: rtc.isFlowing ? rtc.pictures.roundTripMs : video.credits.roundTripMs,
       kbps: bytes.perSecond(now) * 0.008,
     };
   }

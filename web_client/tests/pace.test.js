@@ -4,7 +4,7 @@ import { test } from 'node:test';
 import { CALM, Pace, hasExactSizes, quartersOf, shrunkSize, stepWords } from '../src/pace.js';
 import { EncoderLoad } from '../src/encoder_load.js';
 import { PaceKeeper } from '../src/pace_keeper.js';
-import { RtcLoad, countsOf } from '../src/rtc_load.js';
+import { RtcLoad, countsOf, roundTripOf } from '../src/rtc_load.js';
 import { Throttle } from '../src/throttle.js';
 
 /** @import {Level, Load} from '../src/pace.js' */
@@ -140,6 +140,11 @@ test('WebRTC’s counts become a load between two looks', () => {
   const [, told] = report(25, 0);
   const silent = { ...told, totalEncodeTime: undefined };
   assert.equal(loads.since(countsOf([silent]), 30, 3000)?.encodeMs, null);
+});
+
+test('the round trip is what RTCP last said', () => {
+  assert.equal(roundTripOf([{ type: 'outbound-rtp' }, { type: 'remote-inbound-rtp' }]), null);
+  assert.equal(roundTripOf([{ type: 'remote-inbound-rtp', roundTripTime: 0.012 }]), 12);
 });
 
 test('an encoder of ours is measured: what was meant for it, what came out, how long it took', () => {
