@@ -16,13 +16,14 @@ from hardware.robot_file import RobotFile
 from hardware.sim.codec import Encoder
 from hardware.sim.hand import make_hand
 from hardware.sim.lockstep_follower import LockstepFollower
+from hardware.sim.noisy_eye import NoisyEye
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
 from hardware.sim.truth import Truth
 from pipeline.camera.mounting import SQUARE, Mounting
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, Operator, PhoneImu
+from pipeline.signals import BodyImu, Operator, PhoneImu, Seen
 from pipeline.teleop import Output
 from server.control import too_late
 from server.control_link import (
@@ -71,6 +72,8 @@ class Scene:
     """... and whether the camera's file says it."""
     hidden: tuple[tuple[float, float, tuple[int, ...]], ...] = ()
     """From when to when [s] which LEDs can't be seen."""
+    led_noise_px: float | None = None
+    """None: pictures are rendered and looked at; else LEDs' rays come with this noise instead."""
 
     def hidden_at(self, t: float) -> tuple[int, ...]:
         """LEDs that can't be seen at `t` [s]."""
@@ -98,6 +101,7 @@ class Lockstep:
         camera = camera if scene.knows_mounting else replace(camera, mounting=SQUARE)
         self._ingest.mounting = camera.mounting
         self._sight = Sight(camera, robot_file.robot, config.gates)
+        self._eye = make_eye(robot_file, scene, self._script)
         self._link = RobotLink(self.follower)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._on_their_way: deque[tuple[int, Record]] = deque()
@@ -134,7 +138,7 @@ class Lockstep:
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._sight.expect(self.controller.expected(output))
         self._body = self._link.exchange(command, self.t)
-        self._sight.feel_body(self._body)
+        self._feel(*self._body)
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
         if wish is not None:
             self._inbox.append(RequestInput(wish.what))
@@ -153,6 +157,8 @@ class Lockstep:
                 continue
             if event.kind == EventKind.MOTION:
                 self._take(self._script.motion(event.t_capture))
+            elif self._eye is not None:
+                self._glimpse(self._eye, event.t_capture)
             else:
                 key = self._sight.needs_key
                 self._take(self._script.picture(event.t_capture, self._robot_at, key))
@@ -181,7 +187,7 @@ class Lockstep:
         """What the server does with a record: the bytes, not the object, go on."""
         match self._ingest.record(decode(encode(record)), self.t):
             case PhoneImu() as sample:
-                self._sight.feel(sample)
+                self._feel(sample)
                 self._inbox.append(PhoneImuInput.of(sample))
             case Operator() as operator:
                 self._inbox.append(OperatorInput.of(operator))
@@ -193,10 +199,42 @@ class Lockstep:
         sighting = self._sight.see([frame], up_in_b, omega)
         self.trace.pictures += 1
         self.trace.leds.append(len(sighting.rays) if sighting is not None else 0)
-        seen = sighting.seen(self._sight.camera) if sighting is not None else None
+        self._tell(sighting.seen(self._sight.camera) if sighting is not None else None)
+
+    def _glimpse(self, eye: NoisyEye, t: float) -> None:
+        """A picture of which only the LEDs' rays exist; dated as others are."""
+        clock, phone = self._ingest.clock, self._script.phone
+        if not clock.ready:
+            return
+        stamp = clock.local(phone.clock.at(t - phone.camera.mounting.time_offset_s))
+        stamp += self._sight.camera.mounting.time_offset_s
+        seen = eye.seen(t, stamp, self._robot_at)
+        self.trace.pictures += 1
+        self.trace.leds.append(len(seen.rays) if seen is not None else 0)
+        self._tell(seen)
+
+    def _tell(self, seen: Seen | None) -> None:
         if seen is not None:
             self.trace.poses += seen.pose is not None
             self._inbox.append(SeenInput.of(seen))
+
+    def _feel(self, *samples: PhoneImu | BodyImu) -> None:
+        """Motion samples, for whoever looks."""
+        for sample in samples:
+            if self._eye is not None:
+                self._eye.feel(sample)
+            elif isinstance(sample, PhoneImu):
+                self._sight.feel(sample)
+            else:
+                self._sight.feel_body([sample])
+
+
+def make_eye(robot_file: RobotFile, scene: Scene, script: PhoneScript) -> NoisyEye | None:
+    """What stands for pictures and vision in a scene without them."""
+    if scene.led_noise_px is None:
+        return None
+    rng, leds_in_b = np.random.default_rng((scene.seed, 11)), robot_file.robot.leds_in_b
+    return NoisyEye(script.phone, leds_in_b, scene.led_noise_px, scene.hidden_at, rng)
 
 
 def make_script(robot_file: RobotFile, scene: Scene) -> PhoneScript:
