@@ -75,19 +75,36 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
         RobotFileError: names file, key and what is allowed.
     """
     path = robot_path(name_or_path)
+    return robot_of(robot_table(path), str(path))
+
+
+def robot_table(path: Path) -> dict[str, Any]:
+    """What stands in a robot file, unchecked.
+
+    Raises:
+        RobotFileError: it can't be read, or is no TOML.
+    """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise RobotFileError(str(path), "", str(error)) from error
+
+
+def robot_of(table: Mapping[str, Any], file: str) -> RobotFile:
+    """The robot that a file's table describes.
+
+    Raises:
+        RobotFileError: names `file`, key and what is allowed.
+    """
     try:
         schema = RobotSchema.model_validate(table)
     except ValidationError as error:
-        raise _explained(path, error) from error
+        raise _explained(file, error) from error
     for key, reason in clashes(schema):
-        raise RobotFileError(str(path), key, reason)
+        raise RobotFileError(file, key, reason)
     robot_file = _converted(schema)
     for key, reason in faults(robot_file.robot, robot_file.plant):
-        raise RobotFileError(str(path), key, reason)
+        raise RobotFileError(file, key, reason)
     return robot_file
 
 
@@ -114,7 +131,7 @@ def _named(wrong: str, known: list[str]) -> str:
     return f"{', '.join(known)} or a path ending in .toml{hint}"
 
 
-def _explained(path: Path, error: ValidationError) -> RobotFileError:
+def _explained(file: str, error: ValidationError) -> RobotFileError:
     """The first fault; a misspelt key comes before the one that is then missing."""
     faults = error.errors()
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
@@ -128,7 +145,7 @@ def _explained(path: Path, error: ValidationError) -> RobotFileError:
         reason = f"{kind}{hint}; allowed here: {', '.join(known)}"
     else:
         reason = f"{reason}, not {fault['input']!r}"
-    return RobotFileError(str(path), key, reason)
+    return RobotFileError(file, key, reason)
 
 
 def _keys_at(where: tuple[int | str, ...]) -> list[str]:

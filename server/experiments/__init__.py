@@ -19,6 +19,7 @@ EXPERIMENTS: Final = {
     "margins": "what delay, gain and phase the control loops can lose, axis by axis",
     "estimators": "where the robot is now: three estimators on the same data",
     "network": "a phone by WebRTC and by websockets over bad lines; as root on Linux",
+    "sweep": "the closed loop over any configuration key and many seeds, on all cores",
 }
 """Name of the file, what it measures."""
 

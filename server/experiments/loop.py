@@ -49,9 +49,9 @@ class Result:
     """Why tracking ended early, or ""."""
 
 
-def result_of(trace: Trace, scene: Scene, cpu_s: float) -> Result:
+def result_of(trace: Trace, scene: Scene, cpu_s: float, settle_s: float = SETTLE_S) -> Result:
     """Figures of a trace, without the first seconds of tracking."""
-    skip = int(SETTLE_S / 0.005)
+    skip = round(settle_s / 0.005)
     errors = _rows(trace.error_in_f)[skip:]
     distance = np.linalg.norm(errors, axis=1)
     steps = np.diff(_rows(trace.thrusts)[skip:], axis=0)

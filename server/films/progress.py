@@ -38,7 +38,9 @@ class Progress:
             percent = 100 * self._done // self._total
             if percent >= self._told + STEP:
                 self._told = percent - percent % STEP
-                self._stream.write(f"{self._told} %  {words}\n")
+                left = self._left_s(self._clock() - self._started)
+                remaining = f", {left:.0f} s left" if left > 0.0 else ""
+                self._stream.write(f"{self._told} %  {words}{remaining}\n")
                 self._stream.flush()
 
     def close(self) -> None:
@@ -57,5 +59,11 @@ class Progress:
             return f"{self._done} frames, {rate:.0f}/s"
         share = min(1.0, self._done / self._total)
         bar = "█" * round(BAR * share)
-        left = (self._total - self._done) / rate if rate > 0.0 else 0.0
-        return f"{100.0 * share:3.0f} % {bar:·<{BAR}} {rate:.0f}/s, {max(0.0, left):.0f} s left"
+        speed = f"{rate:.0f}/s" if rate >= 10.0 else f"{rate:.1f}/s"
+        left = self._left_s(passed)
+        return f"{100.0 * share:3.0f} % {bar:·<{BAR}} {speed}, {left:.0f} s left"
+
+    def _left_s(self, passed: float) -> float:
+        """As far as what is done tells [s]."""
+        assert self._total is not None
+        return max(0.0, passed * (self._total - self._done) / self._done) if self._done else 0.0

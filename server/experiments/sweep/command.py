@@ -1,0 +1,129 @@
+"""The command: read, fly what is missing, keep it as it comes, tell and draw."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from time import monotonic
+
+from server.experiments.sweep import picture, summary
+from server.experiments.sweep.errors import SweepError
+from server.experiments.sweep.keys import Number, Switch, Word, known_keys
+from server.experiments.sweep.results import Results
+from server.experiments.sweep.session import Outcome, Session
+from server.experiments.sweep.sweep_file import Sweep, read
+from server.experiments.sweep.workers import on_cluster, on_processes
+from server.locate.progress import Progress
+
+INTERRUPTED, KILLED = 130, 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE.toml", help="what to sweep")
+    parser.add_argument("--out", type=Path, help="folder; default: called as the file, beside it")
+    parser.add_argument("--workers", type=_workers, help="processes; default: one a core")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, to fly there")
+    parser.add_argument("--keys", action="store_true", help="list what can be swept, and stop")
+
+
+def _workers(text: str) -> int:
+    count = int(text)
+    if not 1 <= count <= 1024:
+        raise argparse.ArgumentTypeError(f"{text}: allowed: 1 to 1024")
+    return count
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fly; 0 if all is done, 130 after Ctrl-C, 2 if it can't be flown."""
+    if arguments.keys:
+        print("\n".join(_listed()))
+        return 0
+    try:
+        if arguments.file is None:
+            raise SweepError("FILE.toml", "is missing; --keys lists what it may sweep")
+        if arguments.scheduler and arguments.workers:
+            raise SweepError("--workers", "not with --scheduler, whose cluster has its own")
+        sweep = read(arguments.file)
+        folder = arguments.out or arguments.file.with_suffix("")
+        with Results(folder, sweep) as results:
+            return _flown(sweep, results, folder, arguments)
+    except SweepError as error:
+        print(f"lightleash experiments sweep: {error}", file=sys.stderr)
+        return 2
+
+
+def _flown(sweep: Sweep, results: Results, folder: Path, arguments: argparse.Namespace) -> int:
+    sessions = sweep.sessions()
+    missing = [session for session in sessions if session.index not in results.done]
+    already = f", {len(results.done)} of them done before" if results.done else ""
+    print(f"{len(sessions)} sessions of {sweep.seconds:g} s: {len(sweep.points)} settings", end="")
+    print(f" × {len(sweep.seeds)} seeds{already}", flush=True)
+    hands = arguments.scheduler or f"{arguments.workers or _cores()} processes"
+    results.write(sys.argv, hands)
+    started, cpu_s = monotonic(), results.cpu_s
+    code = _fill(results, missing, arguments, len(sessions)) if missing else 0
+    results.write(sys.argv, hands)
+    if missing:
+        print(
+            f"{len(results.done)} sessions; now {results.cpu_s - cpu_s:.1f} CPU-seconds "
+            f"by {hands} in {monotonic() - started:.1f} s"
+        )
+    if results.done:
+        print(summary.table(sweep, results.done))
+        picture.draw(sweep, results.done, folder / "sweep.png")
+    print(f"written: {folder}/results.csv, sweep.json, sweep.png")
+    return code
+
+
+def _fill(
+    results: Results, missing: list[Session], arguments: argparse.Namespace, total: int
+) -> int:
+    """Fly what is missing; whatever stops it, what is done stays."""
+    progress = Progress(len(missing), sys.stderr)
+    try:
+        for outcome in _outcomes(missing, arguments):
+            results.add(outcome)
+            progress.advance(f"{len(results.done)}/{total} sessions")
+    except KeyboardInterrupt:
+        return _stopped("interrupted", INTERRUPTED)
+    except BrokenProcessPool:
+        return _stopped("a worker process was killed (out of memory?)", KILLED)
+    finally:
+        progress.close()
+    return 0
+
+
+def _stopped(why: str, code: int) -> int:
+    print(f"\n{why}: the same command goes on from here", file=sys.stderr)
+    return code
+
+
+def _outcomes(missing: list[Session], arguments: argparse.Namespace) -> Iterator[Outcome]:
+    if arguments.scheduler:
+        return on_cluster(missing, arguments.scheduler)
+    return on_processes(missing, min(arguments.workers or _cores(), len(missing)))
+
+
+def _cores() -> int:
+    """That this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _listed() -> Iterator[str]:
+    """Every key with what it may be."""
+    for key, allowed in known_keys(("NAME OF A GAIN SET",)).items():
+        match allowed:
+            case Number():
+                what = allowed.says_no(None)
+            case Word() | Switch():
+                what = allowed.says_no(None)
+            case _:
+                what = "as in a robot file"
+        yield f"{key}  {what}"

@@ -1,0 +1,180 @@
+"""A sweep's directory: what is done is kept as it comes, so that another run goes on from there.
+
+sessions.jsonl   an outcome a line, in the order they came
+sweep.json       what is swept, versions, command, CPU time
+results.csv      a session a line, in the order of the sweep
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import platform
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from hashlib import sha256
+from importlib.metadata import version
+from math import isnan, nan
+from pathlib import Path
+from typing import Any, Final
+
+import server
+from server.experiments.sweep.errors import SweepError
+from server.experiments.sweep.session import FIGURES, Figures, Outcome
+from server.experiments.sweep.sweep_file import Sweep
+
+LIBRARIES: Final = ("numpy", "scipy", "numba", "mujoco-core")
+
+
+class Results:
+    """Of one sweep in one directory."""
+
+    def __init__(self, folder: Path, sweep: Sweep) -> None:
+        """Take up what is there already.
+
+        Raises:
+            SweepError: it belongs to another sweep, or can't be written.
+        """
+        self._folder, self._sweep = folder, sweep
+        self._told = identity(sweep)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._refuse_another()
+            self.done = self._taken_up()
+            self._journal = (folder / "sessions.jsonl").open("a", encoding="utf-8")
+        except OSError as error:
+            raise SweepError(str(folder), str(error)) from error
+
+    def _refuse_another(self) -> None:
+        path = self._folder / "sweep.json"
+        if not path.exists():
+            if (self._folder / "sessions.jsonl").exists():
+                raise SweepError(
+                    str(path), "is missing beside sessions.jsonl; allowed: a new --out"
+                )
+            return
+        try:
+            before = json.loads(path.read_text(encoding="utf-8"))["sweep"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise SweepError(str(path), "is no sweep's; allowed: a new --out") from error
+        for key, now in json.loads(json.dumps(self._told)).items():
+            if before.get(key) != now:
+                change = f"was {_short(before.get(key))} when this was begun, now {_short(now)}"
+                raise SweepError(str(self._folder), f"{key} {change}; allowed: a new --out")
+
+    def _taken_up(self) -> dict[int, Outcome]:
+        """Outcomes of before; a last line that was cut off by a crash is flown again."""
+        path = self._folder / "sessions.jsonl"
+        done: dict[int, Outcome] = {}
+        if not path.exists():
+            return done
+        whole = 0
+        for line in path.read_bytes().splitlines(keepends=True):
+            if not line.endswith(b"\n"):
+                break
+            outcome = _outcome(json.loads(line))
+            done[outcome.index] = outcome
+            whole += len(line)
+        with path.open("r+b") as file:
+            file.truncate(whole)
+        return done
+
+    def add(self, outcome: Outcome) -> None:
+        """Another session is done."""
+        self.done[outcome.index] = outcome
+        self._journal.write(json.dumps(_line(outcome)) + "\n")
+        self._journal.flush()
+
+    def __enter__(self) -> Results:
+        """To be left when no more is added."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._journal.close()
+
+    @property
+    def cpu_s(self) -> float:
+        """Of all sessions, those of earlier runs among them."""
+        return sum(outcome.cpu_s for outcome in self.done.values())
+
+    def write(self, command: Sequence[str], hands: str) -> None:
+        """JSON and CSV of what is done so far."""
+        told = {
+            "sweep": self._told,
+            "command": list(command),
+            "flown_by": hands,
+            "versions": versions(),
+            "sessions": len(self._sweep.points) * len(self._sweep.seeds),
+            "done": len(self.done),
+            "cpu_s": round(self.cpu_s, 3),
+        }
+        path = self._folder / "sweep.json"
+        path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        with (self._folder / "results.csv").open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerows(self._rows())
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        sweep = self._sweep
+        yield "session", "seed", *sweep.varied, *FIGURES
+        for index in sorted(self.done):
+            point, figures = dict(sweep.point_of(index)), asdict(self.done[index].figures)
+            cells = (*(point[key] for key in sweep.varied), *figures.values())
+            yield index, sweep.seed_of(index), *map(_cell, cells)
+
+
+def identity(sweep: Sweep) -> dict[str, Any]:
+    """What results belong to."""
+    robot, points = json.dumps(sweep.robot, sort_keys=True), json.dumps(sweep.points)
+    return {
+        "lightleash": server.__version__,
+        "robot": f"{sweep.robot['name']} {_digest(robot)}",
+        "seeds": sweep.seeds,
+        "seconds": sweep.seconds,
+        "settle_s": sweep.settle_s,
+        "fixed": dict(sweep.fixed),
+        "varied": {
+            key: list(dict.fromkeys(dict(point)[key] for point in sweep.points))
+            for key in sweep.varied
+        },
+        "combinations": f"{len(sweep.points)} {_digest(points)}",
+    }
+
+
+def _digest(text: str) -> str:
+    return sha256(text.encode()).hexdigest()[:12]
+
+
+def versions() -> Mapping[str, str]:
+    """Of everything that a figure may depend on."""
+    found = {name: version(name) for name in LIBRARIES}
+    python = f"{platform.python_implementation()} {platform.python_version()}"
+    where = f"{sys.platform} {platform.machine()}"
+    return {"lightleash": server.__version__, "python": python, "platform": where, **found}
+
+
+def _line(outcome: Outcome) -> dict[str, Any]:
+    figures = {
+        name: None if isinstance(value, float) and isnan(value) else value
+        for name, value in asdict(outcome.figures).items()
+    }
+    return {"index": outcome.index, "cpu_s": round(outcome.cpu_s, 4), **figures}
+
+
+def _outcome(line: Mapping[str, Any]) -> Outcome:
+    figures: dict[str, Any] = {name: nan if line[name] is None else line[name] for name in FIGURES}
+    return Outcome(line["index"], Figures(**figures), line["cpu_s"])
+
+
+def _cell(value: object) -> object:
+    """Six digits of a number; nothing for what isn't known."""
+    if isinstance(value, float):
+        return "" if isnan(value) else f"{value:.6g}"
+    if isinstance(value, tuple):
+        return " ".join(f"{one:g}" for one in value)
+    return value
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 80 else text[:77] + "..."
