@@ -66,16 +66,20 @@ class NoisyEye:
 
     def _pixels(self, t: float, body: BodyHistory) -> Array:
         """(n, 2) where the LEDs are in a picture, each when its row is read; behind: nowhere."""
-        pixels = np.full((len(self._leds_in_b), 2), np.nan)
-        for k, led_in_b in enumerate(self._leds_in_b):
-            delay = 0.0
-            for _ in range(2 if self._phone.camera.readout_s != 0.0 else 1):
-                R_cb, p_bc_in_c = self._phone.relative_pose(t + delay, body)
-                q_in_c = p_bc_in_c + R_cb @ led_in_b
-                if q_in_c[0] <= 0.0:
-                    break
-                pixels[k] = self._phone.camera.pixels(q_in_c[None])[0]
-                delay = float(self._phone.camera.row_delays(pixels[k, 1:])[0])
+        pixels = self._pixels_at(t, self._leds_in_b, body)
+        if self._phone.camera.readout_s != 0.0:
+            delays = self._phone.camera.row_delays(pixels[:, 1])
+            for k in np.flatnonzero(np.isfinite(delays)):
+                later = t + float(delays[k])
+                pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body)[0]
+        return pixels
+
+    def _pixels_at(self, t: float, leds_in_b: Array, body: BodyHistory) -> Array:
+        R_cb, p_bc_in_c = self._phone.relative_pose(t, body)
+        q_in_c = p_bc_in_c + leds_in_b @ R_cb.T
+        pixels = np.full((len(leds_in_b), 2), np.nan)
+        ahead = q_in_c[:, 0] > 0.0
+        pixels[ahead] = self._phone.camera.pixels(q_in_c[ahead])
         return pixels
 
     def _spots(self, pixels: Array) -> Spots:

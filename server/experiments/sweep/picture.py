@@ -45,7 +45,7 @@ def draw(sweep: Sweep, done: Mapping[int, Outcome], path: Path) -> None:
         axis.set_visible(False)
     errors = [one.figures.rms_mm for one in done.values() if went_well(one)]
     if errors and max(errors) > WIDE_RANGE * min(errors):
-        axes.flat[0].set_yscale("log")
+        _logarithmic(axes.flat[0])
     for row in axes:
         row[0].set_ylabel("tracking error, RMS [mm]")
     bad = sum(not went_well(one) for one in done.values())
@@ -114,4 +114,14 @@ def _name_values(axis: Axes, key: str, values: Sequence[Value]) -> None:
 
 
 def _brief(key: str) -> str:
-    return key.rsplit(".", 1)[-1]
+    return key.split(".", 1)[-1]
+
+
+def _logarithmic(axis: Axes) -> None:
+    """With plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_yscale("log")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.yaxis.set_minor_formatter(NullFormatter())

@@ -66,6 +66,8 @@ def worded(value: Value) -> str:
     """As on an axis."""
     if isinstance(value, tuple):
         return " ".join(f"{one:g}" for one in value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
