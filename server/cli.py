@@ -22,6 +22,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   bench        how well it sees: right, exact, honest, fast; against stated goals
   calibrate    a camera: lens, readout time and motion sensors, from a film of a board
   robot        robot leds: can a robot's LEDs be told apart, and would others be better
+  tune         find a robot's gains for a measured latency, under stated margins
   survey       where the LEDs are, from a film of the robot at rest
   doctor       what this machine can do: real time, certificates, ports, codecs
 """
@@ -113,6 +114,12 @@ def _robot(argv: Sequence[str]) -> int:
     return main(list(argv))
 
 
+def _tune(argv: Sequence[str]) -> int:
+    from server.tune import main
+
+    return main(list(argv))
+
+
 def _survey(argv: Sequence[str]) -> int:
     from server.survey.command import main
 
@@ -134,6 +141,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "bench": _bench,
     "calibrate": _calibrate,
     "robot": _robot,
+    "tune": _tune,
     "survey": _survey,
     "doctor": _doctor,
     "_server": _server,

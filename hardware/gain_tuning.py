@@ -1,0 +1,192 @@
+"""Gains that reject disturbances best under stated margins, axis by axis.
+
+Rejection and not bandwidth is sought: what a hand does reaches the thrusters by feed-forward and
+through a virtual camera of 0.3 Hz, and needs little bandwidth; what the loop itself must do is hold
+against cable, wind and contact. So the measure is how far the body is moved by a unit of force
+whose spectrum is that of gusts and hands, by feedback alone:
+
+    J² = (1/π) ∫ |P(jω) / (1 + L(jω))|² · 2 ω₀ / (ω² + ω₀²) dω,   P = 1 / (m s² + c s + k)
+
+Margins hold with and without feed-forward, whose felt pull is another loop. Beside gain, phase and
+delay, L keeps off −1: no nearer than a loop that has both margins just so (`Goals.modulus`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from math import pi, sin
+from typing import Final
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from hardware.robot_schema import AXES
+from pipeline.control.margins import OMEGA, TILT_AXIS, AxisMargins, Loop, S, Sensing, axis_margins
+from pipeline.frames import Array
+from pipeline.gains import Gains
+
+DISTURBANCE_HZ: Final = 0.5
+"""Corner of the force's spectrum."""
+BOUNDS: Final = np.log([(0.5, 60.0), (0.2, 8.0), (0.01, 2.0)])
+"""Of w [rad/s], a and b: Kp = m w², Kd = a m w, Ki = b w Kp."""
+SPARE: Final = 1.01
+"""Margins are sought so much larger, for gains are rounded."""
+DIGITS: Final = 3
+UNSTABLE: Final = 100.0
+FORBIDDEN: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Goals:
+    """Margins that every loop must keep."""
+
+    gain: float
+    """All gains times this, or divided by it, still stable."""
+    phase: float
+    """[rad]."""
+    delay: float
+    """Further delay anywhere in the loop [s]."""
+
+    @property
+    def modulus(self) -> float:
+        """How near to −1 the open loop may come."""
+        return min(1.0 - 1.0 / self.gain, 2.0 * sin(0.5 * self.phase)) / 1.25
+
+
+class TuningError(Exception):
+    """No gains keep the goals.
+
+    Attributes:
+        axis: On this axis.
+    """
+
+    def __init__(self, axis: int) -> None:
+        super().__init__(f"no gains on {AXES[axis]} keep these margins at this latency")
+        self.axis = axis
+
+
+def tuned(loop: Loop, axes: Iterable[int], sensing: Sensing, goals: Goals) -> Gains:
+    """The gains of `loop` with those of `axes` replaced by the best there are.
+
+    The same every time. Roll and pitch of a robot that tilts come first: x and y rest on them.
+
+    Raises:
+        TuningError: there are none on some axis.
+    """
+    rows = np.array([loop.gains.Kp, loop.gains.Ki, loop.gains.Kd])
+    known: dict[tuple[float, ...], Array] = {}
+    for axis in sorted(axes, key=lambda axis: (axis not in TILT_AXIS.values(), axis)):
+        alike = _alike(loop, axis, rows)
+        if alike not in known:
+            known[alike] = _best(replace(loop, gains=Gains(*rows)), axis, sensing, goals)
+        rows[:, axis] = known[alike]
+    return Gains(*rows)
+
+
+def _alike(loop: Loop, axis: int, rows: Array) -> tuple[float, ...]:
+    """Axes that share this share their gains: x and y of most robots."""
+    d = loop.dynamics
+    inner = rows[:, TILT_AXIS[axis]] if d.needs_tilt and axis in TILT_AXIS else ()
+    return (axis // 3, d.inertia[axis], d.damping[axis], d.stiffness[axis], *rows[:, axis], *inner)
+
+
+def _best(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> Array:
+    """(3,) Kp, Ki, Kd."""
+    inertia = float(loop.dynamics.inertia[axis])
+    turns_to_move = loop.dynamics.needs_tilt and axis in TILT_AXIS.values()
+
+    def gains_of(x: Array) -> Array:
+        w, a, b = np.exp(x)
+        Kp, Kd = inertia * w * w, a * inertia * w
+        return np.array([Kp, 0.0 if turns_to_move else b * w * Kp, Kd])
+
+    def cost(x: Array) -> float:
+        return _cost(with_gains(loop, axis, gains_of(x)), axis, sensing, goals)
+
+    start = _start(loop, axis, inertia)
+    found = differential_evolution(
+        cost, BOUNDS, x0=start, popsize=12, maxiter=80, tol=1e-4, polish=False, rng=0
+    )
+    best = _rounded(gains_of(found.x))
+    if not keeps(with_gains(loop, axis, best), axis, sensing, goals):
+        raise TuningError(axis)
+    return best
+
+
+def _start(loop: Loop, axis: int, inertia: float) -> Array:
+    """What the gains so far are in the terms of the search, within its bounds."""
+    Kp, Ki, Kd = (max(float(row[axis]), 1e-6) for row in _rows(loop.gains))
+    w = np.sqrt(Kp / inertia)
+    return np.clip(np.log([w, Kd / (inertia * w), Ki / (w * Kp)]), *BOUNDS.T)
+
+
+def _cost(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> float:
+    """Logarithm of J; above all of those, by how much the goals are missed."""
+    missing = sum(shortfall(one, axis, sensing, goals) for one in variants(loop))
+    if missing > 0.0:
+        return FORBIDDEN + missing
+    return float(np.log10(moved(loop, axis, sensing)))
+
+
+def variants(loop: Loop) -> Sequence[Loop]:
+    """As it is, and without feed-forward."""
+    return (loop,) if loop.feedforward is None else (loop, replace(loop, feedforward=None))
+
+
+def shortfall(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> float:
+    """By how much the goals are missed, as shares of them; 0: they are kept with some to spare."""
+    found = axis_margins(loop, axis, sensing)
+    if not found.stable:
+        return UNSTABLE
+    pairs = (
+        (np.log(found.gain_up), np.log(goals.gain)),
+        (-np.log(max(found.gain_down, 1e-9)), np.log(goals.gain)),
+        (found.phase, goals.phase),
+        (found.delay, goals.delay),
+        (nearest(loop, axis, sensing), goals.modulus),
+    )
+    return float(sum(max(0.0, 1.0 - has / (SPARE * wanted)) for has, wanted in pairs))
+
+
+def keeps(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> bool:
+    """Whether the goals themselves are kept."""
+    found = [axis_margins(one, axis, sensing) for one in variants(loop)]
+    return all(_is_enough(one, goals) for one in found)
+
+
+def _is_enough(found: AxisMargins, goals: Goals) -> bool:
+    gain = found.gain_up >= goals.gain and found.gain_down <= 1.0 / goals.gain
+    return found.stable and gain and found.phase >= goals.phase and found.delay >= goals.delay
+
+
+def nearest(loop: Loop, axis: int, sensing: Sensing) -> float:
+    """How near to −1 the open loop comes."""
+    L, _ = loop.open_loop(axis, sensing)
+    return float(np.abs(1.0 + L).min())
+
+
+def moved(loop: Loop, axis: int, sensing: Sensing) -> float:
+    """J: RMS motion by a disturbance of 1 N or N m RMS, feedback alone [m, rad]."""
+    L, _ = replace(loop, feedforward=None).open_loop(axis, sensing)
+    d, corner = loop.dynamics, 2.0 * pi * DISTURBANCE_HZ
+    mass = d.inertia[axis] * S * S + d.damping[axis] * S + d.stiffness[axis]
+    density = 2.0 * corner / (OMEGA**2 + corner**2)
+    power = np.abs(1.0 / (mass * (1.0 + L))) ** 2 * density
+    return float(np.sqrt(np.trapezoid(power, OMEGA) / pi))
+
+
+def with_gains(loop: Loop, axis: int, gains: Array) -> Loop:
+    """The loop with other gains (3,) Kp, Ki, Kd on one axis."""
+    rows = [np.array(row) for row in _rows(loop.gains)]
+    for row, value in zip(rows, gains, strict=True):
+        row[axis] = value
+    return replace(loop, gains=Gains(*rows))
+
+
+def _rows(gains: Gains) -> tuple[Array, Array, Array]:
+    return gains.Kp, gains.Ki, gains.Kd
+
+
+def _rounded(gains: Array) -> Array:
+    return np.array([float(f"{gain:.{DIGITS}g}") for gain in gains])

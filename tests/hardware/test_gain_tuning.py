@@ -1,0 +1,84 @@
+"""Tuned gains keep the margins that were asked for, and hold the robot better than ours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import radians
+
+import numpy as np
+import pytest
+
+from hardware.dynamics import dynamics_of
+from hardware.gain_tuning import Goals, TuningError, keeps, moved, tuned, with_gains
+from hardware.robot_file import load_robot
+from pipeline.config import TeleopConfig
+from pipeline.control.margins import OMEGA, Loop, S, Sensing
+
+GOALS = Goals(gain=2.0, phase=radians(35.0), delay=0.010)
+X, ROLL, YAW = 0, 3, 5
+
+
+def loop(robot: str, gains: str = "phone") -> Loop:
+    robot_file, config = load_robot(robot), TeleopConfig()
+    dynamics = dynamics_of(robot_file.robot, robot_file.plant)
+    chosen, feedforward = robot_file.gains[gains], config.feedforward
+    return Loop(dynamics, chosen, config.margins, config.no_filter, feedforward)
+
+
+@cache
+def best(robot: str, axis: int, latency: float) -> Loop:
+    start = loop(robot)
+    return replace(start, gains=tuned(start, [axis], Sensing("relative", latency), GOALS))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", [X, YAW])
+def test_it_keeps_the_margins_and_rejects_better_than_the_gains_for_phones(axis):
+    sensing, found = Sensing("relative", 0.09), best("ames", axis, 0.09)
+    assert keeps(found, axis, sensing, GOALS)
+    assert moved(found, axis, sensing) < 0.8 * moved(loop("ames"), axis, sensing)
+
+
+@pytest.mark.slow
+def test_nothing_else_is_changed_and_the_same_is_found_again():
+    found = best("ames", X, 0.09).gains
+    np.testing.assert_array_equal(found.Kp[1:], loop("ames").gains.Kp[1:])
+    again = tuned(loop("ames"), [X], Sensing("relative", 0.09), GOALS)
+    np.testing.assert_array_equal(found.Kp, again.Kp)
+
+
+@pytest.mark.slow
+def test_all_gains_half_as_large_or_twice_are_no_better_where_the_margins_are_kept():
+    sensing, found = Sensing("relative", 0.09), best("ames", X, 0.09)
+    least = moved(found, X, sensing)
+    rows = np.array([found.gains.Kp[X], found.gains.Ki[X], found.gains.Kd[X]])
+    for factors in np.array(np.meshgrid(*3 * [(0.6, 1.0, 1.6)])).reshape(3, -1).T:
+        other = with_gains(found, X, factors * rows)
+        if keeps(other, X, sensing, GOALS) and moved(other, X, sensing) < 0.99 * least:
+            near = np.abs(1.0 + other.open_loop(X, sensing)[0]).min()
+            assert near < GOALS.modulus
+
+
+def test_motion_by_a_disturbance_is_that_of_a_simulation():
+    without = replace(loop("ames"), feedforward=None)
+    still = with_gains(without, X, np.array([1e-9, 0.0, 1e-9]))
+    d, corner = still.dynamics, np.pi
+    P = 1.0 / (d.inertia[X] * S * S + d.damping[X] * S + d.stiffness[X])
+    rng, h = np.random.default_rng(1), 0.005
+    force, x, v, sum2, n = 0.0, 0.0, 0.0, 0.0, 400_000
+    noise, fade = rng.standard_normal(n), np.exp(-corner * h)
+    for k in range(n):
+        force = fade * force + np.sqrt(1.0 - fade**2) * noise[k]
+        v += h * (force - d.damping[X] * v - d.stiffness[X] * x) / d.inertia[X]
+        x += h * v
+        sum2 += x * x
+    assert OMEGA[0] < np.abs(S[np.abs(P).argmax()]) < OMEGA[-1]
+    simulated = np.sqrt(sum2 / n)
+    assert moved(still, X, Sensing("relative", 0.09)) == pytest.approx(simulated, rel=0.1)
+
+
+@pytest.mark.slow
+def test_margins_that_nothing_keeps_are_told_with_their_axis():
+    with pytest.raises(TuningError, match="no gains on roll"):
+        tuned(loop("ames"), [ROLL], Sensing("none", 0.25), Goals(4.0, radians(70.0), 0.05))
