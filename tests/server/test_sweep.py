@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from dataclasses import replace
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
@@ -285,9 +287,9 @@ def test_a_cluster_without_dask_or_scheduler_is_refused_in_one_line(tmp_path, ca
 @pytest.mark.slow
 def test_a_dask_cluster_gives_the_same_figures(tmp_path):
     distributed = pytest.importorskip("distributed")
-    sessions = swept(tmp_path, SHORT).sessions()
+    sessions = swept(tmp_path, SHORT.replace("[3, 4]", "3")).sessions()
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, dashboard_address=None
+        n_workers=1, threads_per_worker=1, dashboard_address=None
     ) as cluster:
         flown = workers.on_cluster(sessions, cluster.scheduler_address)
         found = {one.index: one.figures for one in flown}
@@ -299,3 +301,18 @@ def test_keys_are_listed(capsys):
     told = capsys.readouterr().out
     assert "scene.latency_ms  a number from 0 to 1000" in told
     assert "teleop.estimator  one of relative, paper, none" in told
+
+
+@pytest.mark.slow
+def test_an_interruption_ends_the_processes_and_keeps_what_is_done(tmp_path):
+    sessions = swept(tmp_path, SHORT.replace("seeds = [3, 4]", "seeds = 40")).sessions()
+    before = set(active_children())
+    with closing(workers.on_processes(sessions, 1)) as outcomes:
+        first = next(outcomes)
+    assert first.index == 0
+    assert set(active_children()) == before
+
+
+def test_the_example_is_a_thousand_sessions():
+    sweep = read(Path(__file__).resolve().parents[2] / "docs" / "sweep.toml")
+    assert len(sweep.sessions()) == 1000

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
 from pathlib import Path
 from time import monotonic
 
@@ -86,9 +87,10 @@ def _fill(
     """Fly what is missing; whatever stops it, what is done stays."""
     progress = Progress(len(missing), sys.stderr)
     try:
-        for outcome in _outcomes(missing, arguments):
-            results.add(outcome)
-            progress.advance(f"{len(results.done)}/{total} sessions")
+        with closing(_outcomes(missing, arguments)) as outcomes:
+            for outcome in outcomes:
+                results.add(outcome)
+                progress.advance(f"{len(results.done)}/{total} sessions")
     except KeyboardInterrupt:
         return _stopped("interrupted", INTERRUPTED)
     except BrokenProcessPool:
@@ -103,7 +105,9 @@ def _stopped(why: str, code: int) -> int:
     return code
 
 
-def _outcomes(missing: list[Session], arguments: argparse.Namespace) -> Iterator[Outcome]:
+def _outcomes(
+    missing: list[Session], arguments: argparse.Namespace
+) -> Generator[Outcome, None, None]:
     if arguments.scheduler:
         return on_cluster(missing, arguments.scheduler)
     return on_processes(missing, min(arguments.workers or _cores(), len(missing)))

@@ -9,10 +9,12 @@ from __future__ import annotations
 import os
 import re
 import signal
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
-from multiprocessing import get_context
+from itertools import islice
+from multiprocessing import active_children, get_context
+from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Final
 
 import server
@@ -28,31 +30,41 @@ AHEAD: Final = 2
 ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
-def on_processes(sessions: Iterable[Session], workers: int) -> Iterator[Outcome]:
-    """Outcomes as they come, by so many fresh processes.
+def on_processes(sessions: Iterable[Session], workers: int) -> Generator[Outcome, None, None]:
+    """Outcomes as they come, by so many fresh processes; closing it ends them at once.
 
     Raises:
         BrokenProcessPool: one of them was killed.
     """
-    with _single_threaded():
-        pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_die_quietly)
-        given: set[Future[Outcome]] = set()
-        try:
-            for session in sessions:
-                given.add(pool.submit(fly, session))
-                if len(given) >= AHEAD * workers:
-                    done, given = wait(given, return_when=FIRST_COMPLETED)
-                    yield from (one.result() for one in done)
-            while given:
-                done, given = wait(given, return_when=FIRST_COMPLETED)
-                yield from (one.result() for one in done)
-        finally:
-            pool.shutdown(cancel_futures=True)
+    others = set(active_children())
+    pool = ProcessPoolExecutor(workers, get_context("spawn"))
+    waiting, given = iter(sessions), set[Future[Outcome]]()
+    try:
+        with _single_threaded(), _deaf():
+            given |= {pool.submit(fly, one) for one in islice(waiting, AHEAD * workers)}
+        while given:
+            done, given = wait(given, return_when=FIRST_COMPLETED)
+            given |= {pool.submit(fly, one) for one in islice(waiting, len(done))}
+            yield from (one.result() for one in done)
+    except BaseException:
+        for child in set(active_children()) - others:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
-def _die_quietly() -> None:
-    """An interrupt from the keyboard reaches every process; one message is enough."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes started in here don't hear the keyboard's interrupt, which reaches all; we do."""
+    if current_thread() is not main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
@@ -75,7 +87,7 @@ def version() -> str:
     return server.__version__
 
 
-def on_cluster(sessions: Iterable[Session], address: str) -> Iterator[Outcome]:
+def on_cluster(sessions: Iterable[Session], address: str) -> Generator[Outcome, None, None]:
     """Outcomes as they come, by the workers of the Dask scheduler at `address`.
 
     Raises:
@@ -94,14 +106,13 @@ def on_cluster(sessions: Iterable[Session], address: str) -> Iterator[Outcome]:
     with client:
         hands, coming = _hands(client, address), as_completed(loop=client.loop)
         waiting = iter(sessions)
-        for session, _ in zip(waiting, range(AHEAD * hands), strict=False):
+        for session in islice(waiting, AHEAD * hands):
             coming.add(client.submit(fly, session, pure=False))
         for future in coming:
             outcome: Outcome = future.result()
             yield outcome
-            for session in waiting:
+            for session in islice(waiting, 1):
                 coming.add(client.submit(fly, session, pure=False))
-                break
 
 
 def _hands(client: Client, address: str) -> int:
