@@ -15,7 +15,7 @@ from pipeline.vision_config import GatesConfig
 
 EstimatorName = Literal["relative", "paper", "none"]
 VirtualCameraMode = Literal["full", "selective", "off"]
-SaturationPolicy = Literal["torque_first", "scale", "clip"]
+SaturationPolicy = Literal["torque_first", "scale", "lift", "clip"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class AllocationConfig:
     """What the thrusters do about a wrench that is too much for them."""
 
     policy: SaturationPolicy = "torque_first"
-    """`scale` keeps the wrench's direction; `clip` is there for comparison."""
+    """`scale` keeps the wrench's direction; `lift` and `clip` are there for comparison."""
     torque_weight: float = 10.0
     """Torque first [1/m]: 0.1 N m counts as much as 1 N."""
 

@@ -6,6 +6,8 @@ Where it can't:
     torque_first  min ‖W (A f − w)‖² + ε ‖f‖²: torque errors weigh more than force errors, because
                   losing the attitude loses everything
     scale         the largest share of the wrench that can be had, its direction kept exactly
+    lift          the least thrusts above the lower limit, each cut at the upper one: [26] knows
+                  only the former; what the paper does, as far as it tells
     clip          pseudo-inverse, each thrust cut at its limits: what others do, for comparison
 """
 
@@ -25,6 +27,8 @@ DEFAULT = AllocationConfig()
 INSIDE = 1.0 - 1e-9
 """A wrench on the border is asked for a hair inside: the last digit must not decide."""
 
+BOUNDLESS = 1e3
+"""Times the upper limit: above any thrust."""
 EXACT = 1e-8
 """Of `scale` [N, N m]; reached after one correction, unless thrusters are nearly parallel."""
 MOST_CORRECTIONS = 20
@@ -49,9 +53,12 @@ class Allocation:
         )
         self._G = np.ascontiguousarray(weighted.T * weight)
         self._active = np.zeros(thrusters, dtype=np.int8)
-        self._least = {"torque_first": self._nearest, "scale": self._scaled, "clip": self._clipped}[
-            config.policy
-        ]
+        self._least = {
+            "torque_first": self._nearest,
+            "scale": self._scaled,
+            "lift": self._lifted,
+            "clip": self._clipped,
+        }[config.policy]
         if config.policy == "scale":
             self._set = WrenchSet(robot.A[axes], robot.f_min, robot.f_max)
         self._inverse = np.linalg.pinv(weighted) * weight
@@ -80,6 +87,13 @@ class Allocation:
             asked = asked + short
             thrusts = self._nearest(asked)
         return thrusts
+
+    def _lifted(self, wrench_in_b: Array) -> Array:
+        low, high = self._robot.f_min, self._robot.f_max
+        thrusts = box_least_squares(
+            self._H, self._G @ wrench_in_b, low, BOUNDLESS * high, self._active
+        )
+        return np.minimum(thrusts, high)
 
     def _clipped(self, wrench_in_b: Array) -> Array:
         return np.clip(self._inverse @ wrench_in_b, self._robot.f_min, self._robot.f_max)

@@ -54,7 +54,7 @@ def allocation() -> None:
 
     slow = median_us(scipy, 300)
     print(f"allocation, scipy lsq_linear (bvls)  {slow:8.1f} µs")
-    for policy in ("torque_first", "scale", "clip"):
+    for policy in ("torque_first", "scale", "lift", "clip"):
         solver = Allocation(robot, AllocationConfig(policy=policy))
         cost = median_us(lambda k, s=solver: s.thrusts(asked[k]), len(asked))
         missed = np.array([asked[k] - robot.A @ solver.thrusts(asked[k]) for k in range(1500)])

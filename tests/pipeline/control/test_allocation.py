@@ -17,7 +17,7 @@ from pipeline.robot import Robot
 
 LOW, HIGH = 0.2, 3.0
 WEIGHT = np.repeat((1.0, 10.0), 3)
-POLICIES: tuple[SaturationPolicy, ...] = ("torque_first", "scale", "clip")
+POLICIES: tuple[SaturationPolicy, ...] = ("torque_first", "scale", "lift", "clip")
 seeds = st.integers(0, 10**6)
 
 
@@ -144,6 +144,22 @@ def test_scale_is_as_exact_on_other_robots_unless_thrusters_are_nearly_parallel(
     assert np.nanquantile(errors, 0.95) < 1e-6
     assert np.nanmax(errors) < 1e-3
     assert np.isfinite(errors).sum() > 25
+
+
+def test_lift_differs_from_torque_first_only_where_it_cuts_and_cuts_torque_too() -> None:
+    robot = load_robot("ames").robot
+    missing, kept = [], []
+    lift, torque_first = allocation(robot, "lift"), allocation(robot)
+    for seed in range(100):
+        wrench = random_wrench(seed, 3.0) * np.repeat((1.0, 0.1), 3)
+        thrusts = lift.thrusts(wrench)
+        if thrusts.max() < robot.f_max:
+            np.testing.assert_allclose(thrusts, torque_first.thrusts(wrench), atol=1e-9)
+        else:
+            missing.append(wrench - robot.A @ thrusts)
+            kept.append(wrench - robot.A @ torque_first.thrusts(wrench))
+    assert 10 < len(missing) < 90
+    assert np.std(missing, axis=0)[3:].max() > 2.0 * np.std(kept, axis=0)[3:].max()
 
 
 def test_where_no_share_can_be_had_scale_does_what_torque_first_does() -> None:
