@@ -92,6 +92,10 @@ class Teleop:
         """Turn the virtual camera's knobs in flight, without a jump."""
         self._virtual_camera.tune(virtual_camera)
 
+    def push(self, wrench_in_b: Array) -> None:
+        """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
+        self._actuation.push_in_b = wrench_in_b
+
     def step(self, inputs: Inputs) -> Output:
         """One control period. Fig. 4."""
         self._fuse(inputs)
@@ -115,7 +119,7 @@ class Teleop:
         if self._failsafe.mode != before:
             known, error = self._change_mode(before, known)
         thrusts, saturated = self._act(known, error)
-        self._given_in_b = self._robot.A[:3] @ thrusts
+        self._given_in_b = self._robot.A[:3] @ thrusts - self._actuation.push_in_b[:3]
         return Output(
             t=inputs.t,
             thrusts=thrusts,

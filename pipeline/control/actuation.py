@@ -35,14 +35,17 @@ class Actuation:
         self._A, self._axes = robot.A, robot.wrench_axes
         self._allocation = Allocation(robot, config.allocation)
         self._tilt = TiltToMove(robot, config.gains, config.tilt) if robot.needs_tilt else None
+        self.push_in_b = np.zeros(6)
+        """Given beside what is asked for, a disturbance for experiments. Sec. V-C."""
 
     def give(self, wrench_in_b: Array, R_fb: Array, omega_bf_in_b: Array) -> Given:
         """Thrusts for a wrench (6,) at the attitude and angular rate of the body."""
         if self._tilt is None:
-            thrusts = self._allocation.thrusts(wrench_in_b)
-            missing_in_b = (wrench_in_b - self._A @ thrusts) * self._axes
+            pushed_in_b = wrench_in_b + self.push_in_b
+            thrusts = self._allocation.thrusts(pushed_in_b)
+            missing_in_b = (pushed_in_b - self._A @ thrusts) * self._axes
             return Given(thrusts, missing_in_b, _is_short(missing_in_b))
-        tilting = self._tilt.wrench(wrench_in_b, R_fb, omega_bf_in_b)
+        tilting = self._tilt.wrench(wrench_in_b, R_fb, omega_bf_in_b) + self.push_in_b
         thrusts = self._allocation.thrusts(tilting)
         missing_in_b = (tilting - self._A @ thrusts) * self._axes
         saturated = _is_short(missing_in_b) or _is_short(self._tilt.refused_in_b)
