@@ -1,0 +1,168 @@
+"""The command: which experiments, with which sensors; print, write JSON, draw."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
+from pathlib import Path
+from typing import Final, Protocol, get_args
+
+from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from pipeline.config import EstimatorName, VirtualCameraMode
+from server.experiments.paper import assumptions, disturbance, published, table_1, table_4
+from server.experiments.paper.leader import PAPER, Leader, phone
+from server.experiments.paper.measure import Setup
+from server.experiments.paper.variants import (
+    WITH_EKF,
+    WITHOUT_EKF,
+    Variant,
+    Wishes,
+    ours,
+)
+
+
+class Outcome(Protocol):
+    """What an experiment gives."""
+
+    @property
+    def name(self) -> str:
+        """Of its JSON file."""
+
+    @property
+    def holds(self) -> Mapping[str, bool]:
+        """Statements, and whether they hold."""
+
+    def text(self) -> str:
+        """To print."""
+
+    def json(self) -> dict[str, object]:
+        """To write."""
+
+    def draw(self, folder: Path) -> list[Path]:
+        """Pictures."""
+
+
+Measure = Callable[[Setup, Sequence[Variant]], Outcome]
+EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
+    table_1.NAME: (table_1.measure, "off"),
+    table_4.NAME: (table_4.measure, "selective"),
+    disturbance.NAME: (disturbance.measure, "selective"),
+}
+"""Each with the virtual camera that ours has in it unless another is wished."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fly, print, write, draw; 1 if a statement of the paper does not hold, 2 if it can't fly."""
+    leader, wishes = leader_of(arguments), wishes_of(arguments)
+    try:
+        robot_file = load_robot(arguments.robot)
+        check_gains(robot_file, arguments.robot, arguments.gains)
+    except (RobotFileError, ValueError) as error:
+        print(f"lightleash experiments paper: {error}", file=sys.stderr)
+        return 2
+    setup = Setup(robot_file, leader, tuple(range(1, arguments.seeds + 1)))
+    print(published.SOURCE)
+    print(assumptions.text(setup))
+    adds = bool(wishes) or leader.name != PAPER.name
+    outcomes = []
+    for name in arguments.only or EXPERIMENTS:
+        measure, vci = EXPERIMENTS[name]
+        outcome = measure(setup, [ours(leader, wishes, vci)] if adds else [])
+        outcomes.append(outcome)
+        print(f"\n{outcome.text()}", flush=True)
+    if arguments.out is not None:
+        print(f"\nwritten: {', '.join(map(str, write(outcomes, setup, arguments.out)))}")
+    good = all(all(outcome.holds.values()) for outcome in outcomes)
+    return 0 if good or leader.name != PAPER.name else 1
+
+
+def write(outcomes: Sequence[Outcome], setup: Setup, folder: Path) -> list[Path]:
+    """JSON and pictures; gives the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    head = {"source": published.SOURCE, "assumptions": assumptions.json(setup)}
+    results = {outcome.name: outcome.json() for outcome in outcomes}
+    figures = folder / "paper.json"
+    figures.write_text(json.dumps({**head, **results}, indent=1, ensure_ascii=False))
+    return [figures, *(path for outcome in outcomes for path in outcome.draw(folder))]
+
+
+def check_gains(robot_file: RobotFile, name: str, wished: str | None) -> None:
+    """Whether the robot has what is to be flown.
+
+    Raises:
+        ValueError: it lacks a set; says which there are.
+    """
+    needed = {WITHOUT_EKF.gains, WITH_EKF.gains, *([wished] if wished else [])}
+    for gains in sorted(needed - set(robot_file.gains)):
+        has = ", ".join(robot_file.gains)
+        raise ValueError(f"{name}: gains: {gains!r} is not one of its sets: {has}")
+
+
+def leader_of(arguments: argparse.Namespace) -> Leader:
+    """The paper's sensors, or a phone with its rate and delay."""
+    if arguments.leader == PAPER.name:
+        return PAPER
+    low, high = sorted(arguments.latency_ms)
+    return phone(arguments.fps, (1e-3 * low, 1e-3 * high))
+
+
+def wishes_of(arguments: argparse.Namespace) -> Wishes:
+    """What was asked for."""
+    return Wishes(
+        arguments.estimator,
+        arguments.gains,
+        arguments.vci,
+        arguments.cutoff_hz,
+        arguments.feedforward,
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--out", type=Path, default=None, help="folder for pictures and JSON")
+    parser.add_argument("--only", nargs="+", choices=tuple(EXPERIMENTS), help="not all of them")
+    parser.add_argument("--seeds", type=_whole(1, 1000), default=3, help="flights of each kind")
+    parser.add_argument("--robot", default="ames", help="name or path of a robot file")
+    parser.add_argument("--leader", choices=(PAPER.name, "phone"), default=PAPER.name)
+    parser.add_argument("--fps", type=_number(5.0, 240.0), default=30.0, help="of a phone")
+    parser.add_argument(
+        "--latency-ms",
+        nargs=2,
+        type=_number(1.0, 400.0),
+        default=(60.0, 120.0),
+        metavar=("LOW", "HIGH"),
+        help="of a phone's pictures",
+    )
+    add = parser.add_argument_group("a column of our own, beside the paper's")
+    add.add_argument("--estimator", choices=get_args(EstimatorName))
+    add.add_argument("--gains", help="a gain set of the robot file")
+    add.add_argument("--vci", choices=get_args(VirtualCameraMode))
+    add.add_argument("--cutoff-hz", type=_number(0.01, 10.0), help="of the VCI; else the paper's")
+    add.add_argument("--feedforward", action=argparse.BooleanOptionalAction, default=None)
+
+
+def _number(low: float, high: float) -> Callable[[str], float]:
+    """Reads a number within a range."""
+
+    def read(text: str) -> float:
+        value = float(text)
+        if not low <= value <= high < inf:
+            raise argparse.ArgumentTypeError(f"{text}: allowed: {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def _whole(low: int, high: int) -> Callable[[str], int]:
+    """Reads a whole number within a range."""
+
+    def read(text: str) -> int:
+        value = int(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text}: allowed: {low} to {high}")
+        return value
+
+    return read

@@ -1,0 +1,139 @@
+"""Fig. 9: −4 N along y_b while the robot still follows the slow virtual camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pipeline.frames import Array
+from server.experiments.paper import published
+from server.experiments.paper.flight import Push, Trace
+from server.experiments.paper.measure import Setup, plain
+from server.experiments.paper.picture import figure_9
+from server.experiments.paper.variants import WITH_VCI, Variant
+from server.experiments.text import Column, table
+
+NAME: Final = "disturbance"
+TITLE: Final = (
+    f"Fig. 9: {published.PUSH_N:g} N along y_b at {published.PUSH_AT_S:g} s, after the turn of "
+    f"Table IV at {published.MOVE_AT_S:g} s"
+)
+HAND: Final = "turn_z"
+SECONDS: Final = 13.0
+PUSH: Final = Push(published.PUSH_AT_S - published.MOVE_AT_S, published.PUSH_N)
+SHARE: Final = 0.1
+"""Of the peak: back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """What the push did: the true place with it, less the same flight without."""
+
+    variant: str
+    peak_mm: float
+    back_s: float
+    """From the push until it stays within a tenth of the peak."""
+    spread_s: float
+    """Standard deviation over the seeds."""
+    answer_n: float
+    """How much more thrust along y_b control asks for in the end."""
+    ended: str
+    """Why tracking ended early, if it did."""
+
+
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("variant", "", "{}"),
+    ("peak_mm", "peak mm", "{:.1f}"),
+    ("back_s", "back within 10 % after s", "{:.2f}"),
+    ("spread_s", "±", "{:.2f}"),
+    ("answer_n", "answered with N", "{:.2f}"),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pushed:
+    """The experiment's result."""
+
+    rows: tuple[Rejection, ...]
+    shown: Trace
+    name: str = NAME
+
+    @property
+    def holds(self) -> dict[str, bool]:
+        """What Fig. 9 shows, and whether it does here."""
+        low, high = published.BACK_S
+        back = self.rows[0].back_s
+        return {f"back within 10 % after {low:g} to {high:g} s": bool(low <= back <= high)}
+
+    def text(self) -> str:
+        """Title, table, statements."""
+        lines = table(COLUMNS, self.rows).splitlines()
+        ends = ["", *(f"  ended at {row.ended}" if row.ended else "" for row in self.rows)]
+        said = (f"{'holds' if good else 'MISSED'}: {what}" for what, good in self.holds.items())
+        return "\n".join((TITLE, *(a + b for a, b in zip(lines, ends, strict=True)), *said))
+
+    def json(self) -> dict[str, object]:
+        """The same for programs; null is what could not be measured."""
+        rows = [
+            {
+                "variant": row.variant,
+                "peak_mm": plain(row.peak_mm),
+                "back_s": plain(row.back_s),
+                "spread_s": plain(row.spread_s),
+                "answer_n": plain(row.answer_n),
+                "ended": row.ended,
+            }
+            for row in self.rows
+        ]
+        return {
+            "title": TITLE,
+            "paper": {"back_s": published.BACK_S},
+            "rows": rows,
+            "holds": self.holds,
+        }
+
+    def draw(self, folder: Path) -> list[Path]:
+        """Fig. 9."""
+        return [figure_9(self.shown, folder / "fig_9.png")]
+
+
+def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Pushed:
+    """Fly with the push and without; the paper's variant first."""
+    rows, shown = [], []
+    for variant in (WITH_VCI, *extra):
+        pushed = setup.fly(variant, HAND, SECONDS, PUSH)
+        rows.append(rejection(variant.name, pushed, setup.fly(variant, HAND, SECONDS)))
+        shown.append(pushed[0])
+    return Pushed(tuple(rows), shown[0])
+
+
+def rejection(name: str, pushed: Sequence[Trace], left: Sequence[Trace]) -> Rejection:
+    """Figures of flights with the push, against those left alone with the same seeds."""
+    ended = next((trace.ended for trace in (*pushed, *left) if trace.ended), "")
+    if ended:
+        return Rejection(name, nan, nan, nan, nan, ended)
+    pairs = list(zip(pushed, left, strict=True))
+    moved = [a.missed_in_b[:, 1] - b.missed_in_b[:, 1] for a, b in pairs]
+    asked = [a.wrench_in_b[-200:, 1].mean() - b.wrench_in_b[-200:, 1].mean() for a, b in pairs]
+    back = [
+        back_after(trace.t - PUSH.after_s, away) for trace, away in zip(pushed, moved, strict=True)
+    ]
+    return Rejection(
+        name,
+        peak_mm=1e3 * float(np.mean([np.abs(away).max() for away in moved])),
+        back_s=float(np.mean(back)),
+        spread_s=float(np.std(back)),
+        answer_n=float(np.mean(asked)),
+        ended="",
+    )
+
+
+def back_after(t: Array, away: Array) -> float:
+    """When (n,) `away` last leaves a tenth of its peak, in the time of `t` (n,) [s]."""
+    outside = np.flatnonzero(np.abs(away) > SHARE * np.abs(away).max())
+    return float(t[outside[-1]]) if len(outside) else 0.0

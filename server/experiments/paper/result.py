@@ -1,0 +1,36 @@
+"""What an experiment gives: figures, statements that hold or not, pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from server.experiments.paper.measure import Cell, plain, table_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """Of one of the paper's experiments."""
+
+    name: str
+    """Of its file."""
+    title: str
+    cells: tuple[Cell, ...]
+    holds: Mapping[str, bool]
+    """Statements of the paper, and whether they hold here."""
+    draw: Callable[[Path], list[Path]]
+    """Draws the paper's figures into a folder; gives the files."""
+
+    def text(self) -> str:
+        """Title, table, statements."""
+        said = (f"{'holds' if good else 'MISSED'}: {what}" for what, good in self.holds.items())
+        return "\n".join((self.title, table_of(self.cells), *said))
+
+    def json(self) -> dict[str, object]:
+        """The same for programs; null is what could not be measured."""
+        rows = [
+            {key: plain(v) if isinstance(v, float) else v for key, v in row.items()}
+            for row in ({**asdict(cell), "ratio": cell.ratio} for cell in self.cells)
+        ]
+        return {"title": self.title, "cells": rows, "holds": dict(self.holds)}

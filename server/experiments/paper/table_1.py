@@ -1,0 +1,45 @@
+"""Table I and Fig. 6: the camera moved by 3 cm in 0.3 s along each axis, EKF on and off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+from pathlib import Path
+
+from server.experiments.paper import published
+from server.experiments.paper.flight import Trace
+from server.experiments.paper.measure import Cell, Setup, cell_of
+from server.experiments.paper.picture import figure_6
+from server.experiments.paper.result import Result
+from server.experiments.paper.variants import WITH_EKF, WITHOUT_EKF, Variant
+
+NAME = "table_1"
+TITLE = "Table I, Fig. 6: 3 cm in 0.3 s along each axis, RMS in mm"
+SECONDS = 4.0
+
+
+def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Result:
+    """Fly every axis with each variant; the paper's two columns and `extra` ones."""
+    cells: list[Cell] = []
+    shown: dict[str, Trace] = {}
+    for variant in (WITHOUT_EKF, WITH_EKF, *extra):
+        for axis in "xyz":
+            traces = setup.fly(variant, f"step_{axis}", SECONDS)
+            paper = published.TABLE_I.get(variant.name, {}).get(axis, nan)
+            cells.append(cell_of(variant.name, axis, paper, traces))
+            if axis == "x":
+                shown[variant.name] = traces[0]
+
+    def draw(folder: Path) -> list[Path]:
+        return [figure_6(shown, folder / "fig_6.png")]
+
+    return Result(NAME, TITLE, tuple(cells), orderings(cells), draw)
+
+
+def orderings(cells: Sequence[Cell]) -> dict[str, bool]:
+    """What the paper's table says, whether it holds here."""
+    rms = {(cell.variant, cell.axis): cell.ours for cell in cells}
+    return {
+        f"{axis}: the EKF lowers the error": rms["with EKF", axis] < rms["without EKF", axis]
+        for axis in "xyz"
+    }
