@@ -18,7 +18,7 @@ from server.experiments.sweep.results import Results
 from server.experiments.sweep.session import Outcome, Session
 from server.experiments.sweep.sweep_file import Sweep, read
 from server.experiments.sweep.workers import on_cluster, on_processes
-from server.locate.progress import Progress
+from server.films.progress import Progress
 
 INTERRUPTED, KILLED = 130, 1
 
