@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from math import isnan
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from hardware.robot_file import load_robot
 from server.cli import main
 from server.experiments.paper import (
     assumptions,
+    beaten,
     disturbance,
     flight,
     published,
@@ -133,6 +135,32 @@ def test_pictures_of_a_phone_are_as_late_and_as_many_as_asked_for() -> None:
     assert leader.options.step_a == 0.1  # the browser's rounding
 
 
+def test_goals_are_the_papers_better_columns_and_half_of_them() -> None:
+    limits = {(g.leader.name, g.table, g.axis): g.limit for g in beaten.goals()}
+    assert limits["phone", "I", "x"] == 3.65
+    assert limits["paper", "I", "z"] == pytest.approx(2.045)
+    assert limits["phone", "IV", "yaw"] == limits["paper", "IV", "yaw"] == 0.21
+    assert len(limits) == 10
+
+
+def test_a_goal_that_is_missed_is_flown_again_in_better_worlds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(flight, "HOVER_S", 2.5)
+    monkeypatch.setattr(beaten, "SECONDS", 0.5)
+    hard = replace(beaten.goals()[1], limit=0.5)
+    monkeypatch.setattr(beaten, "goals", lambda: [hard, replace(hard, limit=50.0)])
+    missed, reached = beaten.measure(SETUP).rows
+    assert missed.reached.startswith("missed by")
+    assert missed.no_thruster_lag < missed.true
+    assert missed.perfect_sensors < missed.true
+    assert missed.twice_the_thrust > 0.0
+    assert reached.reached == "reached"
+    assert isnan(reached.no_thruster_lag)
+    said = json.loads(json.dumps(beaten.Summary((missed, reached)).json(), allow_nan=False))
+    assert said["rows"][1]["no_thruster_lag"] is None
+
+
 def test_wishes_are_flown() -> None:
     wishes = Wishes("none", "paper_without_ekf", "full", 0.28, False)
     config = config_of(AMES, ours(phone(), wishes, "off"), phone())
@@ -145,7 +173,7 @@ def test_wishes_are_flown() -> None:
 
 def test_every_number_says_what_it_rests_on() -> None:
     for setup in (SETUP, Setup(AMES, phone(), (1,))):
-        said = assumptions.json(setup)
+        said = assumptions.json(assumptions.of(setup))
         assert {one["status"] for one in said} == {"known", "identified", "chosen"}
         assert len({one["what"] for one in said}) == len(said)
         assert all(one["value"] for one in said)

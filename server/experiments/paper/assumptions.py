@@ -6,7 +6,7 @@ reproduces Tables I and IV (`hardware/robots/ames.toml`); chosen: ours, plausibl
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -93,7 +93,10 @@ def _common(leader: Leader) -> Iterator[Assumption]:
         "derivative without EKF", f"low pass of {1e3 * leader.derivative_tau_s:g} ms", "chosen"
     )
     yield Assumption(
-        "feed-forward of ours", f"low pass {leader.feedforward_low_pass_hz:g} Hz", "chosen"
+        "ours, unless wished otherwise",
+        f"relative filter, gains {leader.gains}, feed-forward through a low pass of "
+        f"{leader.feedforward_low_pass_hz:g} Hz",
+        "chosen",
     )
 
 
@@ -129,11 +132,11 @@ def _ms(span_s: tuple[float, float]) -> str:
     return f"{1e3 * span_s[0]:g}-{1e3 * span_s[1]:g} ms"
 
 
-def text(setup: Setup) -> str:
+def lines(ones: Iterable[Assumption]) -> str:
     """One line each."""
-    return "\n".join(f"  {one.status:<10} {one.what}: {one.value}" for one in of(setup))
+    return "\n".join(f"  {one.status:<10} {one.what}: {one.value}" for one in ones)
 
 
-def json(setup: Setup) -> list[dict[str, str]]:
+def json(ones: Iterable[Assumption]) -> list[dict[str, str]]:
     """For programs."""
-    return [asdict(one) for one in of(setup)]
+    return [asdict(one) for one in ones]

@@ -12,7 +12,7 @@ from typing import Final, Protocol, get_args
 
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.config import EstimatorName, VirtualCameraMode
-from server.experiments.paper import assumptions, disturbance, published, table_1, table_4
+from server.experiments.paper import assumptions, beaten, disturbance, published, table_1, table_4
 from server.experiments.paper.leader import PAPER, Leader, phone
 from server.experiments.paper.measure import Setup
 from server.experiments.paper.variants import (
@@ -50,6 +50,7 @@ EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
     table_1.NAME: (table_1.measure, "off"),
     table_4.NAME: (table_4.measure, "selective"),
     disturbance.NAME: (disturbance.measure, "selective"),
+    beaten.NAME: (beaten.measure, "selective"),
 }
 """Each with the virtual camera that ours has in it unless another is wished."""
 
@@ -65,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 2
     setup = Setup(robot_file, leader, tuple(range(1, arguments.seeds + 1)))
     print(published.SOURCE)
-    print(assumptions.text(setup))
+    print(assumptions.lines(assumptions.of(setup)))
     adds = bool(wishes) or leader.name != PAPER.name
     outcomes = []
     for name in arguments.only or EXPERIMENTS:
@@ -82,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 def write(outcomes: Sequence[Outcome], setup: Setup, folder: Path) -> list[Path]:
     """JSON and pictures; gives the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    head = {"source": published.SOURCE, "assumptions": assumptions.json(setup)}
+    head = {"source": published.SOURCE, "assumptions": assumptions.json(assumptions.of(setup))}
     results = {outcome.name: outcome.json() for outcome in outcomes}
     figures = folder / "paper.json"
     figures.write_text(json.dumps({**head, **results}, indent=1, ensure_ascii=False))

@@ -6,17 +6,17 @@ makes of spots whose names are known (rays, and a pose by PnP) goes on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians, sqrt
 from typing import Final
 
 import numpy as np
 
 from hardware.sim.hand import Hand
+from hardware.sim.phone import PERFECT as PERFECT_PHONE
 from hardware.sim.phone import BodyHistory, EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
 from pipeline.camera.lens import Camera
-from pipeline.config import FeedForwardConfig
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.frames import GRAVITY, Array, R_cd
 from pipeline.identification.pnp import pose_of, solve
@@ -42,9 +42,9 @@ class Leader:
     derivative_tau_s: float
     """Low pass of the derivative where there is no filter."""
     feedforward_low_pass_hz: float
-    """What its accelerometer's noise allows."""
+    """What its accelerometer's noise and rounding allow."""
     gains: str
-    """The set that its delays allow."""
+    """The set of ours: what its delays allow."""
 
     @property
     def camera(self) -> Camera:
@@ -74,10 +74,24 @@ PAPER: Final = Leader(
     focal_px=1351.0,
     noise_px=0.1,
     derivative_tau_s=0.01,
-    feedforward_low_pass_hz=25.0,
+    feedforward_low_pass_hz=8.0,
     gains="paper_with_ekf",
 )
 """Ximea MQ003MG-CM with its lens at 10 mm, Xsens MTi-630. Sec. V-A."""
+
+PERFECT: Final = replace(
+    PAPER,
+    name="perfect",
+    options=replace(
+        PERFECT_PHONE,
+        motion_rate_hz=MTI_RATE_HZ,
+        frame_rate_hz=500.0,
+        motion_delay_s=(0.0, 0.001),
+        picture_delay_s=(0.0, 0.001),
+    ),
+    noise_px=0.005,
+)
+"""Next to no noise and delay: what is left is not the sensors'."""
 
 
 def phone(fps: float = 30.0, latency_s: tuple[float, float] = (0.060, 0.120)) -> Leader:
@@ -94,8 +108,8 @@ def phone(fps: float = 30.0, latency_s: tuple[float, float] = (0.060, 0.120)) ->
         focal_px=930.0,
         noise_px=0.05,
         derivative_tau_s=NoFilterConfig().tau,
-        feedforward_low_pass_hz=FeedForwardConfig().low_pass_hz,
-        gains="phone",
+        feedforward_low_pass_hz=8.0,
+        gains="paper_with_ekf",
     )
 
 
