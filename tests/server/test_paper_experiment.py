@@ -17,6 +17,7 @@ from server.experiments.paper import (
     beaten,
     disturbance,
     flight,
+    picture,
     published,
     table_1,
     table_4,
@@ -75,6 +76,16 @@ def test_back_is_where_it_last_leaves_a_tenth_of_its_peak() -> None:
     away = np.where(t > 0.0, np.exp(-t), 0.0)
     assert disturbance.back_after(t, away) == pytest.approx(np.log(10.0), abs=0.02)
     assert disturbance.back_after(t, np.zeros_like(t)) == 0.0
+
+
+def test_flights_that_ended_before_the_move_are_drawn_empty(tmp_path: Path) -> None:
+    lost = trace_of(1.0, np.zeros(0), "-5 s: lost")
+    rows = (disturbance.rejection("ours", [lost], [lost]),)
+    assert "lost" in disturbance.Pushed(rows, lost).text()
+    assert disturbance.Pushed(rows, lost).draw(tmp_path)[0].stat().st_size > 5_000
+    assert picture.figure_6({"with EKF": lost, "ours": lost}, tmp_path / "6.png").is_file()
+    both = {"with VCI": lost, "without VCI": lost}
+    assert picture.figure_8(both, 3.0, tmp_path / "8.png").is_file()
 
 
 def test_the_flight_is_the_papers_move() -> None:

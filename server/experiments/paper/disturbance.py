@@ -72,7 +72,7 @@ class Pushed:
 
     def text(self) -> str:
         """Title, table, statements."""
-        lines = table(COLUMNS, self.rows).splitlines()
+        lines = table(COLUMNS, self.rows).replace("nan", "  –").splitlines()
         ends = ["", *(f"  ended at {row.ended}" if row.ended else "" for row in self.rows)]
         said = (f"{'holds' if good else 'MISSED'}: {what}" for what, good in self.holds.items())
         return "\n".join((TITLE, *(a + b for a, b in zip(lines, ends, strict=True)), *said))
@@ -109,7 +109,8 @@ def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Pushed:
         pushed = setup.fly(variant, HAND, SECONDS, PUSH)
         rows.append(rejection(variant.name, pushed, setup.fly(variant, HAND, SECONDS)))
         shown.append(pushed[0])
-    return Pushed(tuple(rows), shown[0])
+    flown = (trace for trace in shown if not trace.ended)
+    return Pushed(tuple(rows), next(flown, shown[0]))
 
 
 def rejection(name: str, pushed: Sequence[Trace], left: Sequence[Trace]) -> Rejection:
