@@ -162,6 +162,7 @@ class Teleop:
         if relative is None or R_fc is None:
             return None
         p_ref_in_v = self._reference.p_rv_in_v if self._reference is not None else None
+        self._virtual_camera.turn(self.attitude.take_turn())
         view = self._virtual_camera.view(relative, R_fc, self._period, p_ref_in_v, self._half_field)
         return Situation(relative, R_fc, view)
 

@@ -197,6 +197,14 @@ def begin(s: Array, c: Quaternion, knobs: Array) -> None:
 
 
 @kernel
+def turn_f(s: Array, R: Array) -> None:
+    """Turn both stages by R (3, 3), in f; a state that has not begun stays so."""
+    q = quaternion(R)
+    for i in (0, 4):
+        s[i], s[i + 1], s[i + 2], s[i + 3] = product(q, (s[i], s[i + 1], s[i + 2], s[i + 3]))
+
+
+@kernel
 def step(
     s: Array, knobs: Array, c: Quaternion, x: Array, half_field: tuple[float, float], h: float
 ) -> Vector:

@@ -30,6 +30,7 @@ class Attitude:
         self._bias = np.zeros(3)
         self._omega = np.zeros(3)
         self._t = self._t_start = -np.inf
+        self._turn: Array = np.eye(3)
         self.resets = 0
 
     @property
@@ -46,6 +47,14 @@ class Attitude:
     def up_in_c(self) -> Array | None:
         """Opposite of gravity in camera axes, or None before the first sample."""
         return None if self._R_fc is None else self._R_fc[2]
+
+    def take_turn(self) -> Array:
+        """How the axes of f were turned since the last call, (3, 3), to put its vertical right.
+
+        R_fc has turned with them, though the camera has not: no motion, but better knowledge.
+        """
+        turn, self._turn = self._turn, np.eye(3)
+        return turn
 
     def add(self, imu: PhoneImu) -> None:
         """Take a sample; samples not newer than the last are ignored."""
@@ -64,7 +73,8 @@ class Attitude:
         if 0.7 * GRAVITY < norm < 1.3 * GRAVITY:
             tilt = cross(force / norm, R_fc[2])
             gain = max(GAIN, 1.0 / (imu.t - self._t_start + dt))
-            R_fc = R_fc @ exp(min(1.0, gain * dt) * tilt)
+            turn = exp(min(1.0, gain * dt) * (R_fc @ tilt))
+            R_fc, self._turn = turn @ R_fc, turn @ self._turn
             self._bias = self._bias - BIAS_GAIN * dt * tilt
         self._R_fc = R_fc
 

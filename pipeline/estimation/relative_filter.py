@@ -147,7 +147,9 @@ class RelativeFilter:
                 return self._start(seen, now)
         if used:
             self._t_seen = max(self._t_seen, seen.t)
-        if self._offset.must_begin_again(float(self._track.newest.x[X_OFFSET]), seen.t):
+        newest = self._track.newest
+        sigma = float(np.sqrt(newest.P[OFFSET, OFFSET]))
+        if self._offset.must_begin_again(float(newest.x[X_OFFSET]), sigma, seen.t):
             self._t_start = seen.t  # nothing learnt at a wrong time is worth keeping
             return self._start(seen, now)
         return Fusion.FUSED if used else Fusion.GATED

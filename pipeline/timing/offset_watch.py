@@ -15,6 +15,8 @@ STRAY_S: Final = 0.02
 """So far may the learnt offset be from the coarse one, or from none."""
 SURE: Final = 4.0
 """Standard deviations of the coarse one that count as well."""
+UNSURE: Final = 3.0
+"""Standard deviations of the learnt one, where there is none to compare it with."""
 PATIENCE_S: Final = 3.0
 """Strayed again so soon after it was set right: the stamps themselves drift."""
 UNKNOWN = "The pictures' time stamps are off: move the phone a little, so that by how much is seen."
@@ -31,11 +33,14 @@ class OffsetWatch:
         """Why the filter's offset can't be believed; empty if it can."""
         self._t_set_right = -float("inf")
 
-    def must_begin_again(self, value: float, t: float) -> bool:
-        """Whether the learnt `value` [s], at time `t`, is wrong and the coarse one should start."""
+    def must_begin_again(self, value: float, sigma: float, t: float) -> bool:
+        """Whether what is learnt, `value` ± `sigma` [s] at time `t`, is wrong: start by the coarse.
+
+        Without a coarse one nothing speaks against a value that is not learnt yet.
+        """
         coarse = self.coarse
         middle = coarse.value if coarse is not None else 0.0
-        reach = max(STRAY_S, SURE * coarse.sigma) if coarse is not None else STRAY_S
+        reach = max(STRAY_S, SURE * coarse.sigma if coarse is not None else UNSURE * sigma)
         if abs(value - middle) <= reach:
             self.complaint = ""
             return False

@@ -54,6 +54,20 @@ def test_time_constants_of_the_comfortable_cutoff_are_the_defaults() -> None:
     assert time_constants(0.05) == pytest.approx((3.18, 0.16), rel=2e-3)
 
 
+@given(first=rotations, later=rotations, turn_of_f=rotations)
+def test_axes_of_f_put_right_are_no_motion(first, later, turn_of_f) -> None:
+    seen, robot = [], relative(np.array([0.0, 0.0, 2.5]), np.eye(3))
+    for R in (np.eye(3), turn_of_f):
+        camera = VirtualCamera(PAPER)
+        camera.view(robot, first, H)
+        camera.turn(R)
+        seen.append(camera.view(robot, R @ later, H))
+    before, turned = seen
+    np.testing.assert_allclose(turned.R_fv, turn_of_f @ before.R_fv, atol=1e-9)
+    for name in ("omega_vf_in_v", "p_bv_in_v", "v_bv_in_v", "R_vb"):
+        np.testing.assert_allclose(getattr(turned, name), getattr(before, name), atol=1e-6)
+
+
 def test_a_sine_at_the_cutoff_is_passed_at_minus_three_decibels() -> None:
     config, f = VirtualCameraConfig(), cutoff_hz(VirtualCameraConfig())
     seconds = np.arange(0.0, 4.0 / f, H)

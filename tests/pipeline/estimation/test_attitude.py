@@ -84,6 +84,21 @@ def test_the_first_second_is_averaged_not_the_first_sample_believed() -> None:
     assert np.linalg.norm(attitude.up_in_c - UP) < 0.02
 
 
+def test_what_the_accelerometer_turns_is_told_apart_from_what_the_gyroscope_felt() -> None:
+    attitude, rate = Attitude(), np.array([0.1, -0.2, 0.3])
+    attitude.add(sample(0.0, np.eye(3), rate))
+    turned, R_felt = np.eye(3), np.eye(3)
+    for k in range(1, 60):
+        R_felt = R_felt @ exp((rate - attitude.bias_omega) * DT)
+        pushed = np.array([2.0, 0.0, GRAVITY])  # a hand that starts to move
+        attitude.add(PhoneImu(k * DT, rate, R_felt.T @ pushed))
+        turned = attitude.take_turn() @ turned
+        assert attitude.R_fc is not None
+        np.testing.assert_allclose(attitude.R_fc, turned @ R_felt, atol=1e-9)
+    assert np.linalg.norm(log(turned)) > 0.02
+    np.testing.assert_array_equal(attitude.take_turn(), np.eye(3))
+
+
 def test_after_a_gap_the_heading_stays() -> None:
     attitude = Attitude()
     rate = np.array([0.0, 0.0, 1.0])

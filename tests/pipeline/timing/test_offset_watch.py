@@ -1,0 +1,38 @@
+"""Offset watch: a learnt time offset is believed only where nothing speaks against it."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.signals import StampOffset
+from pipeline.timing.offset_watch import DRIFTING, STRAY_S, UNKNOWN, UNSURE, OffsetWatch
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "complaint"),
+    [
+        (0.9 * STRAY_S, 1e-3, ""),
+        (1.5 * STRAY_S, 1e-3, UNKNOWN),
+        (-1.5 * STRAY_S, 1e-3, UNKNOWN),
+        (1.5 * STRAY_S, STRAY_S, ""),  # not learnt yet: noise
+        (1.1 * UNSURE * STRAY_S, STRAY_S, UNKNOWN),
+    ],
+)
+def test_without_a_coarse_one_it_must_be_near_none_as_far_as_it_is_sure(
+    value: float, sigma: float, complaint: str
+) -> None:
+    watch = OffsetWatch()
+    assert not watch.must_begin_again(value, sigma, 1.0)
+    assert watch.complaint == complaint
+
+
+def test_one_that_the_coarse_one_refutes_begins_again_and_soon_after_complains() -> None:
+    watch = OffsetWatch()
+    watch.coarse = StampOffset(0.08, 0.002)
+    assert not watch.must_begin_again(0.07, 1e-3, 1.0)
+    assert watch.must_begin_again(0.0, 1.0, 2.0)  # however unsure of itself it is
+    assert watch.complaint == ""
+    assert watch.must_begin_again(0.0, 1e-3, 3.0)
+    assert watch.complaint == DRIFTING
+    assert not watch.must_begin_again(0.08, 1e-3, 4.0)
+    assert watch.complaint == ""
