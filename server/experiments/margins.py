@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from math import degrees
+from dataclasses import dataclass, fields, replace
+from math import degrees, isfinite
 from pathlib import Path
 
 import numpy as np
@@ -153,11 +154,21 @@ def run(arguments: argparse.Namespace) -> int:
     )
     found = list(rows(robot_file, arguments))
     print(text.table(COLUMNS, found))
-    print("\n".join(verdicts(robot_file, arguments)))
+    arming = list(verdicts(robot_file, arguments))
+    print("\n".join(arming))
     if arguments.out is not None:
         draw(found, arguments.out / "margins.png")
-        print(f"written: {arguments.out / 'margins.png'}")
+        figures = {"margins": [told(one) for one in found], "arming": arming}
+        path = arguments.out / "margins.json"
+        path.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
+        print(f"written: {arguments.out / 'margins.png'}, {path}")
     return 0
+
+
+def told(one: Row) -> dict[str, str | float | None]:
+    """For programs, without the response; null is what has no limit, or isn't there."""
+    values = {f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"}
+    return {k: v if isinstance(v, str) or isfinite(v) else None for k, v in values.items()}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -172,4 +183,4 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action=argparse.BooleanOptionalAction,
         default=TeleopConfig().feedforward.enabled,
     )
-    parser.add_argument("--out", type=Path, default=None, help="folder for the picture")
+    parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,12 @@ def test_an_unknown_gain_set_is_refused_with_those_there_are(
 
 
 @pytest.mark.slow
-def test_it_draws(tmp_path: Path) -> None:
+def test_it_draws_and_writes_the_figures(tmp_path: Path) -> None:
     arguments = ["margins", "ground", "--gains", "phone", "--out", str(tmp_path)]
     assert main(arguments) == 0
     assert (tmp_path / "margins.png").stat().st_size > 10_000
+    figures = json.loads((tmp_path / "margins.json").read_text())
+    assert [row["axis"] for row in figures["margins"]] == 2 * ["x", "y", "yaw"]
+    assert all(row["delay_ms"] > 0.0 for row in figures["margins"] if not row["state"])
+    assert all("response" not in row for row in figures["margins"])
+    assert figures["arming"][0] == "arming with phone, relative: yes"
