@@ -19,7 +19,7 @@ from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.keys import RobotNumber, known_keys
 from server.experiments.sweep.results import Results
 from server.experiments.sweep.session import Figures, Outcome, Session, fly, prepared
-from server.experiments.sweep.sweep_file import Sweep, read
+from server.experiments.sweep.sweep_file import Sweep, examples, read
 
 SHORT = """
 seeds = [3, 4]
@@ -69,6 +69,8 @@ def test_one_and_two_processes_write_the_same_results(tmp_path, capsys):
     ]
     assert (tmp_path / "2" / "sweep.png").stat().st_size > 10_000
     told = json.loads((tmp_path / "2" / "sweep.json").read_text())
+    assert [(row["value"], row["sessions"]) for row in told["summary"]] == [("0.8", 2), ("1", 2)]
+    assert all(row["median_mm"] > 0.0 for row in told["summary"])
     assert told["done"] == told["sessions"] == 4
     assert told["sweep"]["seeds"] == [3, 4]
     assert {"lightleash", "numpy", "mujoco-core"} <= told["versions"].keys()
@@ -316,3 +318,10 @@ def test_an_interruption_ends_the_processes_and_keeps_what_is_done(tmp_path):
 def test_the_example_is_a_thousand_sessions():
     sweep = read(Path(__file__).resolve().parents[2] / "docs" / "sweep.toml")
     assert len(sweep.sessions()) == 1000
+
+
+def test_sweeps_of_the_project_are_known_by_name_and_can_be_flown(tmp_path, capsys):
+    assert set(examples()) >= {"latency", "latency_quick"}
+    assert all(read(path).sessions() for path in examples().values())
+    assert main(["sweep", "latenzy", "--out", str(tmp_path)]) == 2
+    assert "latenzy" in capsys.readouterr().err

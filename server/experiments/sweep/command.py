@@ -16,7 +16,7 @@ from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.keys import Number, Switch, Word, known_keys
 from server.experiments.sweep.results import Results
 from server.experiments.sweep.session import Outcome, Session
-from server.experiments.sweep.sweep_file import Sweep, read
+from server.experiments.sweep.sweep_file import Sweep, examples, read
 from server.experiments.sweep.workers import on_cluster, on_processes
 from server.films.progress import Progress
 
@@ -25,7 +25,8 @@ INTERRUPTED, KILLED = 130, 1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument("file", nargs="?", type=Path, metavar="FILE.toml", help="what to sweep")
+    given = f"what to sweep; given with the project: {', '.join(examples())}"
+    parser.add_argument("file", nargs="?", type=Path, metavar="FILE.toml", help=given)
     parser.add_argument("--out", type=Path, help="folder; default: called as the file, beside it")
     parser.add_argument("--workers", type=_workers, help="processes; default: one a core")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, to fly there")
@@ -49,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise SweepError("FILE.toml", "is missing; --keys lists what it may sweep")
         if arguments.scheduler and arguments.workers:
             raise SweepError("--workers", "not with --scheduler, whose cluster has its own")
-        sweep = read(arguments.file)
+        sweep = read(examples().get(str(arguments.file), arguments.file))
         folder = arguments.out or arguments.file.with_suffix("")
         with Results(folder, sweep) as results:
             return _flown(sweep, results, folder, arguments)

@@ -1,7 +1,7 @@
 """A sweep's directory: what is done is kept as it comes, so that another run goes on from there.
 
 sessions.jsonl   an outcome a line, in the order they came
-sweep.json       what is swept, versions, command, CPU time
+sweep.json       what is swept, versions, command, CPU time, each value's figures
 results.csv      a session a line, in the order of the sweep
 """
 
@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import server
+from server.experiments.sweep import summary
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.session import FIGURES, Figures, Outcome
 from server.experiments.sweep.sweep_file import Sweep
@@ -108,11 +109,17 @@ class Results:
             "sessions": len(self._sweep.points) * len(self._sweep.seeds),
             "done": len(self.done),
             "cpu_s": round(self.cpu_s, 3),
+            "summary": self._summary(),
         }
         path = self._folder / "sweep.json"
         path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         with (self._folder / "results.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows(self._rows())
+
+    def _summary(self) -> list[dict[str, Any]]:
+        """As printed; null of what nobody flew to the end."""
+        rows = map(asdict, summary.rows(self._sweep, self.done)) if self.done else ()
+        return [{key: _known(value) for key, value in row.items()} for row in rows]
 
     def _rows(self) -> Iterator[Sequence[object]]:
         sweep = self._sweep
@@ -154,11 +161,13 @@ def versions() -> Mapping[str, str]:
 
 
 def _line(outcome: Outcome) -> dict[str, Any]:
-    figures = {
-        name: None if isinstance(value, float) and isnan(value) else value
-        for name, value in asdict(outcome.figures).items()
-    }
+    figures = {name: _known(value) for name, value in asdict(outcome.figures).items()}
     return {"index": outcome.index, "cpu_s": round(outcome.cpu_s, 4), **figures}
+
+
+def _known(value: object) -> object:
+    """For JSON, which has no NaN."""
+    return None if isinstance(value, float) and isnan(value) else value
 
 
 def _outcome(line: Mapping[str, Any]) -> Outcome:

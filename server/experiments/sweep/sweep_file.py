@@ -34,6 +34,7 @@ SEEDS: Final = Number(1, 100_000, whole=True)
 SEED: Final = Number(0, 2**31 - 1, whole=True)
 MOST: Final = 1_000_000
 """Sessions."""
+EXAMPLES: Final = Path(__file__).with_name("examples")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,11 @@ class Sweep:
     def seed_of(self, index: int) -> int:
         """The seed of a session."""
         return self.seeds[index % len(self.seeds)]
+
+
+def examples() -> dict[str, Path]:
+    """Sweeps that come with the project, by name."""
+    return {path.stem: path for path in sorted(EXAMPLES.glob("*.toml"))}
 
 
 def read(path: Path) -> Sweep:
