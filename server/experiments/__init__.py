@@ -14,6 +14,7 @@ from typing import Final, Protocol, cast
 from server.one_line import Parser
 
 EXPERIMENTS: Final = {
+    "all": "every one below, as one page that stands by itself",
     "paper": "the paper's tables and figures, flown again in virtual time",
     "loop": "tracking of the closed loop, in virtual time",
     "tremor": "what of the hand's tremor the virtual camera lets through",

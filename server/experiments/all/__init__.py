@@ -1,0 +1,12 @@
+"""`lightleash experiments all`: every experiment, as one page that stands by itself.
+
+`parts` lists what is flown, `running` flies each in a process of its own and keeps what became of
+it, `results` reads the files it wrote, `tables` makes tables of them, `markup` and `page` the page;
+`facts` is what it all ran on.
+"""
+
+from __future__ import annotations
+
+from server.experiments.all.command import add_arguments, run
+
+__all__ = ["add_arguments", "run"]
