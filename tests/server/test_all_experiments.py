@@ -16,17 +16,10 @@ from server.experiments.all import command, facts, running
 from server.experiments.all.parts import CAPTIONS, LEFT_OUT, PARTS, Part
 
 GOOD = "margins ground --gains phone --estimator relative"
-REFUSED = "margins --estimator best"
 FLOWN = (
     Part("good", GOOD, GOOD, "Good", "It runs."),
     Part("bad", "margins --gains sport", "margins --gains sport", "Bad", "It fails."),
-    Part(
-        "not_here",
-        "margins --estimator best",
-        "margins --estimator best",
-        "Not here",
-        "It refuses.",
-    ),
+    Part("not_here", "fly", "fly", "Not here", "It refuses."),
 )
 MADE_UP = Part("made_up", "margins", "margins", "Made up", "By the test.")
 EVIL = '"><script>alert(1)</script><img src=x onerror=alert(2)>\ud800&amp;</pre>'
@@ -96,7 +89,7 @@ def test_parts_that_fail_or_cannot_run_here_say_why_and_the_rest_is_there(flown)
     assert "✗ failed" in page.text
     assert "exit code 1: gains: 'sport' is not one of" in page.text
     assert "– could not run here" in page.text
-    assert "invalid choice: 'best'" in page.text
+    assert "invalid choice: 'fly'" in page.text
     assert [src for src in page.values("src") if src.startswith("data:image/png")]
 
 
@@ -146,6 +139,25 @@ def test_what_another_version_or_command_made_is_not_taken_over(tmp_path, monkey
     assert report._is_finished(MADE_UP)
     monkeypatch.setattr(facts, "versions", lambda: {"lightleash": "another"})
     assert not command.Report(tmp_path, [], quick=False)._is_finished(MADE_UP)
+
+
+def test_a_clone_tells_its_commit_and_which_change_was_made_since(tmp_path) -> None:
+    def git(*words: str) -> None:
+        who = ["-c", "user.name=x", "-c", "user.email=x@x", "-c", "commit.gpgsign=false"]
+        subprocess.run(["git", "-C", str(tmp_path), *who, *words], check=True, capture_output=True)
+
+    assert facts.commit(tmp_path) == ""
+    git("init")
+    (tmp_path / "a").write_text("1")
+    git("add", "a")
+    git("commit", "-m", "a")
+    clean = facts.commit(tmp_path)
+    assert len(clean) == 40
+    (tmp_path / "a").write_text("2")
+    second = facts.commit(tmp_path)
+    (tmp_path / "a").write_text("3")
+    assert second.startswith(f"{clean}, changed since")
+    assert facts.commit(tmp_path) != second
 
 
 def test_text_of_results_never_becomes_markup(tmp_path, monkeypatch) -> None:

@@ -27,7 +27,7 @@ def test_paper_ours_and_ratio_adjoin_and_are_judged_in_words() -> None:
     assert table.columns == ("axis", "paper", "ours", "ratio", GOAL_COLUMN, "unit")
     assert [row[4].text for row in table.rows] == ["✓ within", "✗ out", "–"]
     assert [row[4].kind for row in table.rows] == ["within", "out", "text"]
-    assert texts(table)[0][1:4] == ["4.000", "5.000", "1.250"]
+    assert texts(table)[0][1:4] == ["4", "5.0", "1.250"]
 
 
 def test_an_experiments_objects_become_tables_statements_and_lines() -> None:
@@ -39,7 +39,7 @@ def test_an_experiments_objects_become_tables_statements_and_lines() -> None:
             "holds": {"x": False},
         },
         "arming": ["yes", "no"],
-        "assumptions": [{"what": "told elsewhere"}],
+        "versions": {"numpy": "told elsewhere"},
     }
     lines, source, table, statements = blocks(told)
     assert lines == Lines("", ("yes", "no"))
@@ -47,21 +47,27 @@ def test_an_experiments_objects_become_tables_statements_and_lines() -> None:
     assert texts(source) == [["source", "paper"]]
     assert isinstance(table, Table)
     assert (table.title, table.columns) == ("Table III", ("a",))
-    assert statements == Statements("Table III", {"x": False})
+    assert statements == Statements("", {"x": False})
 
 
 @pytest.mark.parametrize("odd", [nan, inf, -inf, 10**400, None, [], {}, True, "x" * 10_000])
 def test_any_value_can_stand_in_a_table(odd: object) -> None:
     (table,) = blocks([{"name": "first", "value": odd}, {"name": "second", "value": 2.0}])
     assert isinstance(table, Table)
-    assert texts(table)[1] == ["second", "2.000"]
+    assert texts(table)[1] == ["second", "2"]
     assert len(texts(table)[0][1]) < 500
 
 
 def test_a_column_has_the_decimals_that_its_largest_number_asks_for() -> None:
-    (table,) = blocks([{"n": 1234.5, "m": 0.0421, "k": 3}, {"n": 0.25, "m": 0.00042, "k": 20}])
+    (table,) = blocks([{"n": 123.45, "m": 0.0421, "k": 3}, {"n": 1.0, "m": 0.00042, "k": 20}])
     assert isinstance(table, Table)
-    assert texts(table) == [["1234", "0.04210", "3"], ["0", "0.00042", "20"]]
+    assert texts(table) == [["123.5", "0.04210", "3"], ["1.0", "0.00042", "20"]]
+
+
+def test_numbers_of_very_different_sizes_have_their_own_digits() -> None:
+    (table,) = blocks([{"n": 512345.6}, {"n": 5.234}, {"n": 0.0}])
+    assert isinstance(table, Table)
+    assert texts(table) == [["512346"], ["5.234"], ["0"]]
 
 
 def test_units_are_told_as_people_write_them() -> None:
@@ -90,6 +96,15 @@ def test_what_cannot_be_shown_is_named(tmp_path: Path) -> None:
     assert {"long.csv", "ragged.csv"} <= {note.split(":")[0] for note in found.notes}
     tables = [block for block in found.blocks if isinstance(block, Table)]
     assert ("RMS [mm]", "b") in [table.columns for table in tables]
+
+
+def test_only_a_parts_own_assumptions_are_shown_with_it(tmp_path: Path) -> None:
+    common, own = {"what": "mass", "value": "5"}, {"what": "wall", "value": "stiff"}
+    (tmp_path / "a.json").write_text(json.dumps({"assumptions": [common, own]}))
+    (tmp_path / "b.json").write_text(json.dumps({"assumptions": [common]}))
+    (table,) = read(tmp_path, "any", [common]).blocks
+    assert isinstance(table, Table)
+    assert texts(table) == [["wall", "stiff"]]
 
 
 def test_of_two_pictures_of_one_name_the_smaller_file_is_shown(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from server.experiments.all import facts, results, running
 from server.experiments.all.page import Chapter, Ending, page
 from server.experiments.all.parts import PARTS, Part
 from server.experiments.all.running import FINISHED, FolderError, Record
-from server.experiments.all.tables import Table, table
+from server.experiments.all.tables import table
 
 PAGE, FOLDER = "index.html", "parts"
 NOT_SAID: Final = "none are used"
@@ -115,7 +115,7 @@ class Report:
             running.stamp(),
             self._versions,
             self._machine,
-            self._assumptions,
+            table("", self._assumptions),
             f"Parts that are not in it: {others}." if others else "",
         )
         text = page([self._chapter(part) for part in shown], ending)
@@ -126,7 +126,11 @@ class Report:
 
     def _chapter(self, part: Part) -> Chapter:
         words, kept = part.words(self._quick), self._kept(part)
-        found = results.read(self._place(part), words[0]) if kept else results.Results()
+        found = (
+            results.read(self._place(part), words[0], self._assumptions)
+            if kept
+            else results.Results()
+        )
         seeds = results.seeds_of(words) or found.seeds or (NOT_SAID if kept else "not known yet")
         command = shlex.join(["lightleash", "experiments", *words, "--out", part.name])
         return Chapter(part, command, seeds, kept, found)
@@ -137,13 +141,13 @@ class Report:
         return shlex.join(["lightleash", "experiments", "all", "--out", "report", *options])
 
 
-def assumptions() -> Table:
+def assumptions() -> list[dict[str, str]]:
     """Of the paper's experiments with the AMES."""
     from server.experiments.paper import assumptions as paper
     from server.experiments.paper.leader import PAPER
     from server.experiments.paper.measure import Setup
 
-    return table("", paper.json(paper.of(Setup(load_robot("ames"), PAPER, (1,)))))
+    return paper.json(paper.of(Setup(load_robot("ames"), PAPER, (1,))))
 
 
 def _say(words: str) -> None:

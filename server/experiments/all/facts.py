@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -44,12 +45,13 @@ def _installed(name: str) -> str:
 
 
 def commit(root: Path) -> str:
-    """Of the clone at `root`, and whether it was changed since; "" if it is none."""
+    """Of the clone at `root`, with a digest of what was changed since; "" if it is none."""
     if not (root / ".git").exists():
         return ""
     head = _git(root, "rev-parse", "HEAD")
-    changed = _git(root, "status", "--porcelain", "--untracked-files=no")
-    return head and head + (", changed since" if changed else "")
+    change = _git(root, "diff", "HEAD")
+    digest = sha256(change.encode()).hexdigest()[:8]
+    return head and head + (f", changed since ({digest})" if change else "")
 
 
 def _git(root: Path, *words: str) -> str:
@@ -57,7 +59,8 @@ def _git(root: Path, *words: str) -> str:
         done = subprocess.run(
             ["git", "-C", str(root), *words],
             capture_output=True,
-            text=True,
+            encoding="utf-8",
+            errors="replace",
             timeout=GIT_S,
             check=True,
         )

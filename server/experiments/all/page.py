@@ -60,8 +60,9 @@ class Ending:
 def page(chapters: Sequence[Chapter], ending: Ending) -> Markup:
     """The whole of it."""
     version = ending.versions.get("lightleash", "")
-    commit = ending.versions.get("git commit", "")
-    of = f"Version {version}, " + (f"commit {commit}, " if commit else "") + f"{ending.date}."
+    commit, _, changed = ending.versions.get("git commit", "").partition(",")
+    known = [f"commit {commit[:12]}{changed}"] if commit else []
+    of = ", ".join([f"Version {version}", *known, ending.date])
     body = (
         element("h1", TITLE),
         element("p", of, class_="dim"),
@@ -95,7 +96,7 @@ def _section(chapter: Chapter, ending: Ending) -> Markup:
         element("h2", part.heading),
         element("p", part.shows),
         element("p", _state(chapter), f" {_told(chapter, ending)}", class_="dim"),
-        element("pre", element("code", chapter.command), class_="command"),
+        _command(chapter.command),
         *([_reason(record)] if record and record.reason else []),
         *map(shown, results.blocks),
         *(pictured(one, part.heading) for one in results.figures),
@@ -144,10 +145,10 @@ def _printed(results: Results) -> Iterator[Markup]:
 
 def _ending(ending: Ending) -> Iterator[Markup]:
     goal = (
-        f"Where the paper gives a figure, “within” means that ours is at most {GOAL:.0%} from it. "
-        "Ratios are ours over the paper's."
+        f"Where the paper gives a figure, “within” means that ours is at most {100 * GOAL:g} % "
+        "from it. Ratios are ours over the paper's."
     )
-    again = element("pre", element("code", ending.command), class_="command")
+    again = _command(ending.command)
     yield _closing("again", "How to read this page and make it again", element("p", goal), again)
     if ending.not_shown:
         yield element("p", ending.not_shown, class_="dim")
@@ -163,6 +164,12 @@ def _ending(ending: Ending) -> Iterator[Markup]:
 
 def _closing(name: str, heading: str, *inside: Markup) -> Markup:
     return element("section", element("h2", heading), *inside, id=name)
+
+
+def _command(command: str) -> Markup:
+    """Its lines break between words, not at hyphens."""
+    words = (element("span", f"{word} ") for word in command.split(" "))
+    return element("pre", element("code", *words), class_="command")
 
 
 def _pairs(values: Mapping[str, str]) -> Table:

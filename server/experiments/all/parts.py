@@ -47,7 +47,7 @@ PARTS: Final[tuple[Part, ...]] = (
     Part(
         "loop",
         "loop --seconds 60 --seed 1",
-        "loop --seconds 6 --seed 1 --hands moving",
+        "loop --seconds 12 --seed 1 --hands moving",
         "The closed loop",
         "How closely the robot follows a phone's hand in virtual time, through rendered and "
         "encoded pictures that come as late as a phone's.",
@@ -98,6 +98,8 @@ CAPTIONS: Final[Mapping[tuple[str, str], str]] = {
     "and without VCI; dashed: its limit.",
     ("paper", "fig_9"): "Fig. 9 flown again: relative position along y_c and thrust along y_b, "
     "turned and then pushed; dotted: when.",
+    ("paper", "table_3"): "Times of all attempts of Table III, with and without EKF.",
+    ("paper", "table_3_beam"): "Where the laser's beam was in one attempt of each kind.",
     ("margins", "margins"): "Open loops of each axis as Nyquist and Bode pictures; dotted: "
     "unstable when closed.",
     ("loop", "loop"): "Where the robot was meant to be (dashed) and was, and how far apart that "
@@ -107,6 +109,7 @@ CAPTIONS: Final[Mapping[tuple[str, str], str]] = {
     ("estimators", "estimators"): "Error of each estimator over time, with ±3 σ as it believes.",
     ("tremor", "tremor"): "Spectra of the turns across and about the line of sight, and a turn of "
     "3° in 0.3 s, for each kind of virtual camera.",
-    ("network", "network"): "How old pictures and records were over time, on each line and path.",
+    ("network", "network"): "How large a share of the pictures, and of the newest records at any "
+    "time, was older than an age, on each line and path.",
 }
 """(experiment, its file without suffix): what is seen; others are called as their file."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from base64 import b64encode
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import Final
 
 from server.experiments.all.parts import CAPTIONS
 from server.experiments.all.running import ERRORS, OURS, OUTPUT
-from server.experiments.all.tables import Block, Cell, Lines, Table, blocks, titled
+from server.experiments.all.tables import Block, Cell, Table, Text, blocks, titled
 
 PICTURES: Final = {".png": "image/png", ".svg": "image/svg+xml"}
 MOST_BYTES: Final = 8_000_000
@@ -49,16 +49,17 @@ class Results:
     """As its files say."""
 
 
-def read(folder: Path, name: str) -> Results:
-    """Everything that the experiment `name` has left in a folder."""
+def read(folder: Path, name: str, assumed: Sequence[object] = ()) -> Results:
+    """Everything that the experiment `name` has left in a folder, but what is `assumed` of all."""
     found: list[Block] = []
     notes: list[str] = []
     seeds = ""
-    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name not in OURS)
+    files = [path for path in folder.iterdir() if path.is_file() and path.name not in OURS]
+    files.sort(key=lambda path: (path.suffix != ".json", path.name))
     for path in files:
         try:
             if path.suffix == ".json":
-                value = json.loads(path.read_text(encoding="utf-8"))
+                value = _without(json.loads(path.read_text(encoding="utf-8")), assumed)
                 found += blocks(value, _untold(titled(path.stem), name))
                 seeds = seeds or _seeds(value)
             elif path.suffix in (".txt", ".csv"):
@@ -76,6 +77,15 @@ def read(folder: Path, name: str) -> Results:
     )
 
 
+def _without(value: object, assumed: Sequence[object]) -> object:
+    """Its own assumptions stay."""
+    if not isinstance(value, dict) or not isinstance(value.get("assumptions"), list):
+        return value
+    own = [one for one in value["assumptions"] if one not in assumed]
+    rest = {key: one for key, one in value.items() if key != "assumptions"}
+    return {**rest, "assumptions": own} if own else rest
+
+
 class UnshownError(Exception):
     """A file that does not fit into the page; says why."""
 
@@ -85,11 +95,11 @@ def _untold(title: str, name: str) -> str:
     return "" if title == name else title
 
 
-def _text(path: Path) -> Lines:
+def _text(path: Path) -> Text:
     text = path.read_text(encoding="utf-8", errors="replace")
     if len(text) > MOST_TEXT:
         raise UnshownError(f"{len(text)} characters, beside this page")
-    return Lines(path.stem, (text,))
+    return Text(path.stem, text)
 
 
 def _sheet(path: Path) -> Table:

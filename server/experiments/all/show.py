@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from server.experiments.all.markup import Markup, element, joined
 from server.experiments.all.results import Figure
-from server.experiments.all.tables import Block, Cell, Lines, Statements, Table
+from server.experiments.all.tables import Block, Cell, Lines, Statements, Table, Text
 
 
 def shown(block: Block) -> Markup:
@@ -18,7 +18,10 @@ def shown(block: Block) -> Markup:
             items = (element("li", _mark(good), f" {what}") for what, good in block.holds.items())
             return joined((_title(block.title), element("ul", *items, class_="holds")))
         case Lines():
-            return joined((_title(block.title), element("pre", "\n".join(block.lines))))
+            items = (element("li", line) for line in block.lines)
+            return joined((_title(block.title), element("ul", *items)))
+        case Text():
+            return joined((_title(block.title), element("pre", block.text)))
 
 
 def _title(title: str) -> Markup:
@@ -36,20 +39,19 @@ def table_of(table: Table) -> Markup:
     columns = zip(table.columns, zip(*table.rows, strict=True), strict=bool(table.columns))
     heads = [element("th", title, scope="col", **_class(column)) for title, column in columns]
     rows = (element("tr", *_cells(row)) for row in table.rows)
-    inside = [element("caption", table.title)] if table.title else []
-    inside += [element("thead", element("tr", *heads))] if heads else []
+    inside = [element("thead", element("tr", *heads))] if heads else []
     inside.append(element("tbody", *rows))
     whole = element(
         "div",
-        element("table", *inside),
+        element("table", *inside, class_="figures" if heads else "pairs"),
         class_="scroll",
         tabindex="0",
         role="region",
         aria_label=table.title or "table",
     )
-    if not table.left_out:
-        return whole
-    return joined((whole, element("p", f"{table.left_out} more rows in the file.", class_="dim")))
+    more = f"{table.left_out} more rows in the file." if table.left_out else ""
+    below = element("p", more, class_="dim") if more else joined(())
+    return joined((_title(table.title), whole, below))
 
 
 def _class(column: Sequence[Cell]) -> dict[str, str]:

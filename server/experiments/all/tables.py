@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain, repeat
 from math import floor, isfinite, log10
 from typing import Any, Final, Literal, TypeGuard
 
 GOAL: Final = 0.25
 """Of the paper's figure."""
 MOST_ROWS: Final = 200
+WIDE_RANGE: Final = 300.0
+"""Largest over smallest of a column, above which each number has its own digits."""
 LONGEST: Final = 400
 """Text in a cell."""
 LARGEST: Final = 1e300
 DIGITS, MOST_DECIMALS = 4, 6
-"""Digits of a column's largest number."""
-UNSAID: Final = ("title", "assumptions", "versions", "command")
+"""Digits of a column's largest number; zeros that all end with are left out."""
+UNSAID: Final = ("title", "versions", "command")
 """The page tells these itself."""
 GOAL_COLUMN: Final = "±25 %"
 Kind = Literal["text", "number", "within", "out"]
@@ -89,7 +92,15 @@ class Lines:
     lines: tuple[str, ...]
 
 
-Block = Table | Statements | Lines
+@dataclass(frozen=True, slots=True)
+class Text:
+    """As it was written, with its own line breaks."""
+
+    title: str
+    text: str
+
+
+Block = Table | Statements | Lines | Text
 
 
 def blocks(value: object, title: str = "") -> Iterator[Block]:
@@ -109,27 +120,33 @@ def _of_list(values: list[Any], title: str) -> Iterator[Block]:
 
 
 def _of_object(value: dict[str, Any], title: str) -> Iterator[Block]:
+    """Its title stands above the first thing of it; further ones are called as their keys."""
     said = value.get("title")
-    title = said if isinstance(said, str) else title
+    titles = chain([said if isinstance(said, str) else title], repeat(None))
     told = {key: one for key, one in value.items() if key not in UNSAID}
-    is_long = {key: isinstance(one, list) and not _is_short(one) for key, one in told.items()}
-    for k, key in enumerate(key for key in told if is_long[key]):
-        yield from blocks(told[key], title if k == 0 else _joined(title, key))
+    long = {k: one for k, one in told.items() if isinstance(one, list) and not _is_short(one)}
     inner = {key: one for key, one in told.items() if isinstance(one, dict) and one}
-    for key, one in inner.items():
-        if all(isinstance(truth, bool) for truth in one.values()):
-            yield Statements(title if key == "holds" else _joined(title, key), one)
-    single = [key for key in told if not is_long[key] and not isinstance(told[key], dict)]
+    truths = {key: one for key, one in inner.items() if _is_truths(one)}
+    single = {key: one for key, one in told.items() if key not in long and key not in inner}
+    for key, one in long.items():
+        yield from blocks(one, _first(titles, titled(key)))
+    for key, truth in truths.items():
+        yield Statements(_first(titles, "" if key == "holds" else titled(key)), truth)
     if single:
-        rows = tuple((Cell(titled(key)), Cell(_plain(told[key]))) for key in single)
-        yield Table("" if any(is_long.values()) else title, (), rows)
-    for key, one in inner.items():
-        if not all(isinstance(truth, bool) for truth in one.values()):
-            yield from blocks(one, _joined(title, key))
+        rows = tuple((Cell(titled(key)), Cell(_plain(one))) for key, one in single.items())
+        yield Table(_first(titles, ""), (), rows)
+    for key in inner:
+        if key not in truths:
+            yield from blocks(inner[key], titled(key))
 
 
-def _joined(title: str, key: str) -> str:
-    return f"{title}: {titled(key)}" if title else titled(key)
+def _first(titles: Iterator[str | None], otherwise: str) -> str:
+    title = next(titles)
+    return otherwise if title is None else title
+
+
+def _is_truths(value: dict[str, Any]) -> bool:
+    return all(isinstance(truth, bool) for truth in value.values())
 
 
 def _is_short(values: list[Any]) -> bool:
@@ -184,6 +201,10 @@ def _column(values: Sequence[object]) -> list[Cell]:
     decimals = 0 if whole else min(max(DIGITS - 1 - size, 0), MOST_DECIMALS)
     if not numbers:
         return [Cell(_plain(one)) for one in values]
+    if not whole and largest > WIDE_RANGE * min((one for one in numbers if one), default=largest):
+        return [Cell(_plain(one), "number") for one in values]
+    while decimals and all(f"{one:.{decimals}f}".endswith("0") for one in numbers):
+        decimals -= 1
     return [
         Cell(f"{one:.{decimals}f}" if _is_number(one) else _plain(one), "number") for one in values
     ]
@@ -202,7 +223,8 @@ def _plain(value: object) -> str:
         case bool():
             return "yes" if value else "no"
         case float():
-            return f"{value:.{DIGITS}g}" if isfinite(value) else "–"
+            form = ".0f" if 1e4 <= abs(value) < LARGEST else f".{DIGITS}g"
+            return format(value, form) if isfinite(value) else "–"
         case list() | tuple():
             return ", ".join(map(_plain, value))
         case dict():
