@@ -54,6 +54,24 @@ def _fade(s: float) -> Array:
     return np.array([value, rate, 60.0 * s * rest * (rest - s)])
 
 
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """There along x, a stay, and back; velocity and acceleration without jumps."""
+
+    reach_m: float
+    go_s: float
+    stay_s: float
+    back_s: float
+
+    def at(self, t: float) -> Array:
+        """(3, 6): value, rate and acceleration."""
+        rows = np.zeros((3, 6))
+        gone = _fade(t / self.go_s) / self.go_s ** np.arange(3)
+        back = _fade((t - self.go_s - self.stay_s) / self.back_s) / self.back_s ** np.arange(3)
+        rows[:, 0] = self.reach_m * (gone - back)
+        return rows
+
+
 class Keyed:
     """A spline that begins and ends at rest, and stays where it ended."""
 

@@ -1,4 +1,4 @@
-"""A robot as a rigid body in MuJoCo: thrusters with lag and delay, drag, IMU, cable or floor.
+"""A robot as a rigid body in MuJoCo: thrusters with lag and delay, drag, IMU, cable or floor, wall.
 
 World axes f: z up, origin where the robot's centre of mass is at rest with zero thrust, hanging or
 standing, which is also the start: `R_fb` = I, `p_bf_in_f` = 0. An anchor is straight above.
@@ -13,8 +13,10 @@ from math import sqrt
 import mujoco
 import numpy as np
 
+from hardware.sim.obstacle import Obstacle
 from hardware.sim.parameters import BodyImuParameters, PlantParameters
 from hardware.sim.plant_model import STEP_MS, mjcf
+from hardware.sim.touch import Touch, Touched
 from pipeline.frames import Array, R_from_wxyz, wxyz_from_R
 
 SETTLE_MS = 1000
@@ -30,6 +32,8 @@ class PlantOptions:
     """The rounding of the flight controller."""
     imu_rate_hz: float = 200.0
     """How often `imu` is asked: white noise of the density's bandwidth, half of this."""
+    obstacle: Obstacle | None = None
+    """A tool on the robot and a wall before it."""
 
 
 class Plant:
@@ -43,11 +47,13 @@ class Plant:
     ) -> None:
         """Hanging or standing at rest, thrusters off."""
         self.parameters = parameters
-        self._model = mujoco.MjModel.from_xml_string(mjcf(parameters))
+        options = options or PlantOptions()
+        self._model = mujoco.MjModel.from_xml_string(mjcf(parameters, options.obstacle))
         self._model.dof_damping[:3] = parameters.air_damping
         self._model.dof_damping[3:6] = parameters.air_damping_rotation
         self._data = mujoco.MjData(self._model)
-        self._imu = _Imu(parameters.imu, rng, options or PlantOptions())
+        self._imu = _Imu(parameters.imu, rng, options)
+        self._touch = Touch(self._model, self._data) if options.obstacle else None
         thrusters = len(parameters.thruster_torques)
         self._delay_ms = round(1e3 * parameters.delay)
         self._on_their_way: deque[tuple[int, Array]] = deque()
@@ -90,12 +96,16 @@ class Plant:
         """
         commands = np.clip(thrust_commands, 0.0, self.parameters.f_max)
         self._on_their_way.append((self._now_ms + self._delay_ms, commands))
+        if self._touch is not None:
+            self._touch.start()
         for _ in range(round(1e3 * dt / STEP_MS)):
             while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
                 self._data.ctrl[:] = self._on_their_way.popleft()[1] * self.thruster_health
             self._apply_surroundings()
             mujoco.mj_step(self._model, self._data)
             self._now_ms += STEP_MS
+            if self._touch is not None:
+                self._touch.feel()
         mujoco.mj_forward(self._model, self._data)
 
     def _apply_surroundings(self) -> None:
@@ -177,7 +187,21 @@ class Plant:
     @property
     def stands(self) -> bool:
         """Whether it touches the floor."""
-        return bool(self._data.ncon > 0)
+        if self.parameters.stand is None:
+            return False
+        floor = self._model.geom("floor").id
+        return any(floor in (touch.geom1, touch.geom2) for touch in self._data.contact)
+
+    @property
+    def touched(self) -> Touched:
+        """What the obstacle did in the last step; of robots that have one before them.
+
+        Raises:
+            ValueError: there is none.
+        """
+        if self._touch is None:
+            raise ValueError("plant: touched: no obstacle; allowed: with PlantOptions.obstacle")
+        return self._touch.touched()
 
     def imu(self) -> tuple[Array, Array]:
         """What the body's sensors read: (ω (3,) [rad/s], specific force (3,) [m/s²]) in b.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hardware.sim.obstacle import Obstacle
 from hardware.sim.parameters import PlantParameters, StandParameters, SuspensionParameters
 from pipeline.frames import GRAVITY, Array, R_between, wxyz_from_R
 
@@ -12,10 +13,12 @@ UP = np.array([0.0, 0.0, 1.0])
 FOOT_RADIUS_M = 0.005
 
 
-def mjcf(parameters: PlantParameters) -> str:
-    """The robot as a MuJoCo model."""
+def mjcf(parameters: PlantParameters, obstacle: Obstacle | None = None) -> str:
+    """The robot as a MuJoCo model, with something before it to touch if wished."""
     suspension, stand = parameters.suspension, parameters.stand
     directions = parameters.thruster_directions_in_b
+    contact = "disable" if stand is None and obstacle is None else "enable"
+    wall, tool = (obstacle.wall_mjcf(), obstacle.tool_mjcf()) if obstacle else ("", "")
     sites = "".join(
         f'<site name="thruster{i}" pos="{_text(position)}" '
         f'quat="{_text(wxyz_from_R(R_between(UP, direction / np.linalg.norm(direction))))}"/>'
@@ -32,16 +35,16 @@ def mjcf(parameters: PlantParameters) -> str:
       <compiler inertiafromgeom="false"/>
       <option timestep="{1e-3 * STEP_MS}" gravity="0 0 {-GRAVITY}" integrator="implicitfast"
               cone="elliptic">
-        <flag contact="{"disable" if stand is None else "enable"}" midphase="disable"/>
+        <flag contact="{contact}" midphase="disable"/>
       </option>
       <worldbody>
-        {_anchor(suspension)}{_floor(stand)}
+        {_anchor(suspension)}{_floor(stand)}{wall}
         <body name="b">
           <freejoint/>
           <inertial pos="0 0 0" mass="{parameters.mass:.9g}"
                     diaginertia="{_text(parameters.inertia)}"/>
           <site name="com"/>
-          {_hook(suspension)}{sites}{_contacts(parameters)}
+          {_hook(suspension)}{sites}{_contacts(parameters)}{tool}
         </body>
       </worldbody>
       {_cable(suspension, parameters.mass)}

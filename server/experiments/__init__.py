@@ -16,6 +16,7 @@ from server.one_line import Parser
 EXPERIMENTS: Final = {
     "all": "every one below, as one page that stands by itself",
     "paper": "the paper's tables and figures, flown again in virtual time",
+    "contact": "pushing a wall and plugging in, compliant beside stiff, in virtual time",
     "loop": "tracking of the closed loop, in virtual time",
     "tremor": "what of the hand's tremor the virtual camera lets through",
     "margins": "what delay, gain and phase the control loops can lose, axis by axis",

@@ -6,12 +6,12 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from math import inf
 from pathlib import Path
 from typing import Final, Protocol, get_args
 
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.config import EstimatorName, VirtualCameraMode
+from server.experiments.numbers import number, whole
 from server.experiments.paper import assumptions, beaten, disturbance, published, table_1, table_4
 from server.experiments.paper.leader import PAPER, Leader, phone
 from server.experiments.paper.measure import Setup
@@ -125,14 +125,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("--out", type=Path, default=None, help="folder for pictures and JSON")
     parser.add_argument("--only", nargs="+", choices=tuple(EXPERIMENTS), help="not all of them")
-    parser.add_argument("--seeds", type=_whole(1, 1000), default=3, help="flights of each kind")
+    parser.add_argument("--seeds", type=whole(1, 1000), default=3, help="flights of each kind")
     parser.add_argument("--robot", default="ames", help="name or path of a robot file")
     parser.add_argument("--leader", choices=(PAPER.name, "phone"), default=PAPER.name)
-    parser.add_argument("--fps", type=_number(5.0, 240.0), default=30.0, help="of a phone")
+    parser.add_argument("--fps", type=number(5.0, 240.0), default=30.0, help="of a phone")
     parser.add_argument(
         "--latency-ms",
         nargs=2,
-        type=_number(1.0, 400.0),
+        type=number(1.0, 400.0),
         default=(60.0, 120.0),
         metavar=("LOW", "HIGH"),
         help="of a phone's pictures",
@@ -141,29 +141,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add.add_argument("--estimator", choices=get_args(EstimatorName))
     add.add_argument("--gains", help="a gain set of the robot file")
     add.add_argument("--vci", choices=get_args(VirtualCameraMode))
-    add.add_argument("--cutoff-hz", type=_number(0.01, 10.0), help="of the VCI; else the paper's")
+    add.add_argument("--cutoff-hz", type=number(0.01, 10.0), help="of the VCI; else the paper's")
     add.add_argument("--feedforward", action=argparse.BooleanOptionalAction, default=None)
-
-
-def _number(low: float, high: float) -> Callable[[str], float]:
-    """Reads a number within a range."""
-
-    def read(text: str) -> float:
-        value = float(text)
-        if not low <= value <= high < inf:
-            raise argparse.ArgumentTypeError(f"{text}: allowed: {low:g} to {high:g}")
-        return value
-
-    return read
-
-
-def _whole(low: int, high: int) -> Callable[[str], int]:
-    """Reads a whole number within a range."""
-
-    def read(text: str) -> int:
-        value = int(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text}: allowed: {low} to {high}")
-        return value
-
-    return read

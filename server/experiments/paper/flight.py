@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from hardware.follower import ThrustCommand
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import make_hand
 from hardware.sim.intent import Intent, missed_by
-from hardware.sim.lockstep_follower import LockstepFollower
-from hardware.sim.truth import Truth
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, Mode, Operator, Requests
-from pipeline.teleop import Inputs, Output, Teleop
-from server.experiments.paper.leader import Leader, Rig
-from server.robot_link import RobotLink
+from pipeline.teleop import Output
+from server.experiments.paper.leader import Leader
+from server.experiments.paper.led import PERIOD_S, Led
 
-PERIOD_S = 0.005
 HOVER_S = 8.0
 """From switching on to the arm's move; tracking begins within the first second."""
 REST_S = 1.0
@@ -83,15 +77,8 @@ class Flight:
         robot = robot_file.robot
         self._robot, self._config, self._push = robot, config, push
         self._hand = make_hand(hand, seed=seed, start=robot_file.start, rest_s=HOVER_S)
-        self._rig = Rig(leader, self._hand, robot.leds_in_b, seed)
-        self._follower = LockstepFollower(robot_file, seed)
-        self._link = RobotLink(self._follower)
-        self._teleop = Teleop(robot, config, PERIOD_S)
+        self._led = Led(robot_file, config, leader, self._hand, seed)
         self._push_in_b = np.zeros(6)
-        self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
-        self._body: list[BodyImu] = []
-        self._mode = Mode.DISARMED
-        self._ready = False
         self._intent: Intent | None = None
         self._rows, self._ended = _Rows(), ""
 
@@ -105,39 +92,18 @@ class Flight:
 
     def _advance(self) -> None:
         """One control period of everything."""
-        before = self._follower.t
-        self._follower.advance(PERIOD_S)
-        now, plant = self._follower.t, self._follower.plant
-        self._poses.append((now, plant.wxyz_fb, plant.p_bf_in_f))
-        felt, seen = self._rig.arrivals(before, now, self._robot_at)
-        tracking = self._mode is Mode.TRACK
-        if self._push is not None and now >= HOVER_S + self._push.after_s:
+        led = self._led
+        if self._push is not None and led.t + PERIOD_S >= HOVER_S + self._push.after_s:
             self._push_in_b[1] = self._push.y_n
-            self._teleop.push(self._push_in_b)
-        inputs = Inputs(
-            t=now,
-            phone_imu=tuple(felt),
-            body_imu=tuple(self._body),
-            seen=tuple(seen),
-            operator=Operator(now, held=self._mode in (Mode.ARMED, Mode.TRACK), press=1),
-            requests=Requests(arm=self._ready),
-            refusals=(self._link.reason,) if self._link.reason else (),
-        )
-        output = self._teleop.step(inputs)
-        self._mode = output.failsafe.mode
-        self._ready = self._mode is Mode.DISARMED and not output.refusals
-        if tracking and self._mode is not Mode.TRACK:
-            self._ended = f"{now - HOVER_S:+.2f} s: {output.failsafe.reason}"
-        self._body = self._link.exchange(ThrustCommand(output.thrusts, output.armed), now)
-        if self._mode is Mode.TRACK:
-            self._measure(now, output)
-
-    def _robot_at(self, t: float) -> tuple[Array, Array]:
-        times, wxyz, p = zip(*self._poses, strict=True)
-        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0)).at(t)
+            led.push(self._push_in_b)
+        output = led.advance()
+        if led.ended:
+            self._ended = f"{led.t - HOVER_S:+.2f} s: {led.ended}"
+        if led.tracks:
+            self._measure(led.t, output)
 
     def _measure(self, now: float, output: Output) -> None:
-        plant = self._follower.plant
+        plant = self._led.plant
         body, hand = (plant.R_fb, plant.p_bf_in_f), self._hand.pose(now)
         if self._intent is None:
             self._intent = Intent(self._config.virtual_camera, hand, body)

@@ -1,0 +1,151 @@
+"""The command: fly each scene stiff and compliant; print, write JSON, draw."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from hardware.sim.obstacle import Socket
+from server.experiments.contact import assumptions, picture
+from server.experiments.contact.flight import Trace, fly
+from server.experiments.contact.free import Free, free_flights, free_table
+from server.experiments.contact.measure import Row, row_of, table_of
+from server.experiments.contact.setting import LEAST_N, Scene, Way, foretold_n
+from server.experiments.numbers import number, whole
+from server.experiments.paper.leader import PAPER, Leader, phone
+from server.experiments.paper.measure import plain
+
+STIFF: Final = Way("stiff", None)
+IN_BAND_PCT: Final = 95.0
+"""Of the time of pressing: held."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fly, print, write, draw; 1 if the goal is missed, 2 if it can't be flown."""
+    leader = PAPER if arguments.leader == PAPER.name else phone(arguments.fps)
+    try:
+        robot_file = load_robot(arguments.robot)
+        flown = flown_of(arguments, robot_file)
+    except (RobotFileError, ValueError) as error:
+        print(f"lightleash experiments contact: {error}", file=sys.stderr)
+        return 2
+    seeds = range(1, arguments.seeds + 1)
+    said = assumptions.of(robot_file.plant, leader, [scene for scene, _ in flown], arguments.seeds)
+    print(assumptions.lines(said), flush=True)
+    rows: list[Row] = []
+    shown: list[tuple[Row, Trace]] = []
+    for scene, way in flown:
+        foretold = foretold_n(way.limit_n or max(arguments.limit_n), scene, robot_file.plant)
+        traces = [_flown(robot_file, leader, scene, way, seed) for seed in seeds]
+        rows.append(row_of(scene, way, foretold, traces))
+        shown.append((rows[-1], traces[0]))
+    free = free_flights(robot_file, leader, [STIFF, *_soft(arguments)], list(seeds))
+    holds = goals(rows, free)
+    print(f"\n{table_of(rows)}\n\n{free_table(free)}\n")
+    print("\n".join(f"{'holds' if good else 'MISSED'}: {what}" for what, good in holds.items()))
+    if arguments.out is not None:
+        head = {"assumptions": assumptions.json(said), "seeds": list(seeds)}
+        figures = {**head, "rows": _plain(rows), "free": _plain(free), "holds": holds}
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        file = arguments.out / "contact.json"
+        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False))
+        drawn = picture.draw(shown, arguments.out / "contact.png")
+        print(f"\nwritten: {file}, {drawn}")
+    return 0 if all(holds.values()) else 1
+
+
+def flown_of(arguments: argparse.Namespace, robot_file: RobotFile) -> list[tuple[Scene, Way]]:
+    """Each scene with each controller; a socket only with limits that reach its bottom.
+
+    Raises:
+        ValueError: no limit reaches an obstacle; says which would.
+    """
+    gap, beyond = 1e-3 * arguments.gap_mm, 1e-3 * arguments.depth_mm
+    socket = Socket(1e-3 * arguments.clearance_mm, 1e-3 * arguments.chamfer_mm)
+    flown = []
+    for scene in (Scene("wall", gap, beyond), Scene("socket", gap, beyond, socket)):
+        soft = [
+            way
+            for way in _soft(arguments)
+            if foretold_n(way.limit_n or 0.0, scene, robot_file.plant) >= LEAST_N
+        ]
+        if not soft:
+            least = LEAST_N - foretold_n(0.0, scene, robot_file.plant)
+            raise ValueError(
+                f"--limit-n: none reaches the {scene.name}, the suspension pulls back; "
+                f"allowed: one of {least:.1f} or more, or a smaller --gap-mm"
+            )
+        flown += [(scene, way) for way in (STIFF, *soft)]
+    return flown
+
+
+def _soft(arguments: argparse.Namespace) -> list[Way]:
+    return [Way(f"compliant {limit:g} N", limit) for limit in arguments.limit_n]
+
+
+def _flown(robot_file: RobotFile, leader: Leader, scene: Scene, way: Way, seed: int) -> Trace:
+    """A flight, and a word of progress."""
+    trace = fly(robot_file, leader, scene, way, seed)
+    print(f"flown: {scene.name}, {way.name}, seed {seed}", file=sys.stderr, flush=True)
+    return trace
+
+
+def goals(rows: Sequence[Row], free: Sequence[Free]) -> dict[str, bool]:
+    """What is to be shown, and whether it was."""
+    soft = [row for row in rows if row.way != STIFF.name]
+    plugs = [row for row in soft if row.plugged]
+    walls = [row for row in soft if not row.plugged]
+    stiff = {one.hand: one.rms_mm for one in free if one.way == STIFF.name}
+    return {
+        f"compliant, a wall: in the band {IN_BAND_PCT:g} % of the time of pressing": all(
+            row.in_band_pct >= IN_BAND_PCT for row in walls
+        ),
+        "compliant: contact is never lost while pressing": all(row.lost == 0 for row in soft),
+        "compliant: the plug goes in, and out again": all(
+            len(set(row.plugged.split("/"))) == 1 and row.out == row.plugged for row in plugs
+        ),
+        "compliant, in the free: error no more than 2 % above stiff": all(
+            one.rms_mm <= 1.02 * stiff[one.hand] for one in free
+        ),
+    }
+
+
+def _plain(rows: Sequence[Row] | Sequence[Free]) -> list[dict[str, object]]:
+    """For JSON, which has no NaN."""
+    return [
+        {key: plain(v) if isinstance(v, float) else v for key, v in asdict(row).items()}
+        for row in rows
+    ]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")
+    parser.add_argument("--seeds", type=whole(1, 1000), default=3, help="flights of each kind")
+    parser.add_argument("--robot", default="ames", help="name or path of a robot file")
+    parser.add_argument("--leader", choices=(PAPER.name, "phone"), default="phone")
+    parser.add_argument("--fps", type=number(5.0, 240.0), default=30.0, help="of a phone")
+    parser.add_argument(
+        "--limit-n",
+        nargs="+",
+        type=number(0.2, 20.0),
+        default=[1.5, 3.0],
+        help="of compliance, beyond what holds the robot",
+    )
+    parser.add_argument(
+        "--gap-mm", type=number(5.0, 500.0), default=20.0, help="from the tip to the wall, at rest"
+    )
+    parser.add_argument(
+        "--depth-mm",
+        type=number(5.0, 300.0),
+        default=50.0,
+        help="how far the reference goes behind the obstacle",
+    )
+    parser.add_argument("--clearance-mm", type=number(0.5, 100.0), default=5.0, help="of the plug")
+    parser.add_argument("--chamfer-mm", type=number(1.0, 40.0), default=10.0, help="of the socket")

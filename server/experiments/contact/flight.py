@@ -1,0 +1,73 @@
+"""One flight against an obstacle, in virtual time: hover, go, press, come back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hardware.robot_file import RobotFile
+from hardware.sim.plant import PlantOptions
+from pipeline.frames import Array
+from server.experiments.contact.setting import FLIGHT_S, HOVER_S, Scene, Way
+from server.experiments.paper.leader import Leader
+from server.experiments.paper.led import PERIOD_S, Led
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """Rows since the hand's move, one a control period; the truth."""
+
+    t: Array
+    """(n,) since the hand's move [s]."""
+    force_n: Array
+    """(n,) that the tool presses along x_f with, mean over the period."""
+    peak_n: Array
+    """(n,) largest contact force of any direction within it."""
+    pushes: Array
+    """(5 n,) bool, millisecond by millisecond: whether anything touches."""
+    depth_m: Array
+    """(n,) of the tip behind the wall's face."""
+    side_m: Array
+    """(n,) of the centre of mass from where it was at the start, along y and z."""
+    ended: str
+    """Why tracking ended early, or ""."""
+
+
+def fly(
+    robot_file: RobotFile,
+    leader: Leader,
+    scene: Scene,
+    way: Way,
+    seed: int,
+    seconds: float = FLIGHT_S,
+) -> Trace:
+    """Until `seconds` after the hand's move, or until tracking ends."""
+    obstacle = scene.obstacle(seed)
+    led = Led(
+        robot_file,
+        way.config(robot_file, leader),
+        leader,
+        scene.hand(seed, robot_file),
+        seed,
+        PlantOptions(obstacle=obstacle),
+    )
+    rows: list[tuple[float, ...]] = []
+    pushes: list[bool] = []
+    while led.t < HOVER_S + seconds and not led.ended:
+        led.advance()
+        if led.t <= HOVER_S:
+            continue
+        plant, touched = led.plant, led.plant.touched
+        p = plant.p_bf_in_f
+        depth, side = obstacle.depth_of_tip(p, plant.R_fb), float(np.hypot(p[1], p[2]))
+        t = led.t - HOVER_S
+        rows.append((t, -touched.force_in_f[0], touched.peak_n, depth, side))
+        pushes += touched.pushes
+    columns = np.array(rows).reshape(-1, 5).T
+    ended = f"{led.t - HOVER_S:+.2f} s: {led.ended}" if led.ended else ""
+    return Trace(*columns[:3], np.array(pushes, dtype=bool), *columns[3:], ended)
+
+
+PER_PERIOD = round(1e3 * PERIOD_S)
+"""Of `Trace.pushes`, for each row of the others."""

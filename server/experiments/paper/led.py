@@ -1,0 +1,95 @@
+"""A robot that is led, in virtual time: hand with its sensors, pipeline, link, simulated robot."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from hardware.follower import ThrustCommand
+from hardware.robot_file import RobotFile
+from hardware.sim.hand import Hand
+from hardware.sim.lockstep_follower import LockstepFollower
+from hardware.sim.plant import Plant, PlantOptions
+from hardware.sim.truth import Truth
+from pipeline.config import TeleopConfig
+from pipeline.frames import Array
+from pipeline.signals import BodyImu, Mode, Operator, Requests
+from pipeline.teleop import Inputs, Output, Teleop
+from server.experiments.paper.leader import Leader, Rig
+from server.robot_link import RobotLink
+
+PERIOD_S = 0.005
+
+
+class Led:
+    """It arms itself as soon as it may, with the button held; `advance` moves everything."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        config: TeleopConfig,
+        leader: Leader,
+        hand: Hand,
+        seed: int = 0,
+        options: PlantOptions | None = None,
+    ) -> None:
+        """Everything at rest."""
+        self._rig = Rig(leader, hand, robot_file.robot.leds_in_b, seed)
+        self._follower = LockstepFollower(robot_file, seed, options=options)
+        self._link = RobotLink(self._follower)
+        self._teleop = Teleop(robot_file.robot, config, PERIOD_S)
+        self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
+        self._body: list[BodyImu] = []
+        self._mode = Mode.DISARMED
+        self._ready = False
+        self.ended = ""
+        """Why tracking ended, or ""."""
+
+    @property
+    def t(self) -> float:
+        """Virtual time [s]."""
+        return self._follower.t
+
+    @property
+    def plant(self) -> Plant:
+        """The truth."""
+        return self._follower.plant
+
+    @property
+    def tracks(self) -> bool:
+        """Whether it follows the hand now."""
+        return self._mode is Mode.TRACK
+
+    def push(self, wrench_in_b: Array) -> None:
+        """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
+        self._teleop.push(wrench_in_b)
+
+    def advance(self) -> Output:
+        """One control period of everything."""
+        before = self.t
+        self._follower.advance(PERIOD_S)
+        now = self.t
+        self._poses.append((now, self.plant.wxyz_fb, self.plant.p_bf_in_f))
+        felt, seen = self._rig.arrivals(before, now, self._robot_at)
+        tracking = self.tracks
+        inputs = Inputs(
+            t=now,
+            phone_imu=tuple(felt),
+            body_imu=tuple(self._body),
+            seen=tuple(seen),
+            operator=Operator(now, held=self._mode in (Mode.ARMED, Mode.TRACK), press=1),
+            requests=Requests(arm=self._ready),
+            refusals=(self._link.reason,) if self._link.reason else (),
+        )
+        output = self._teleop.step(inputs)
+        self._mode = output.failsafe.mode
+        self._ready = self._mode is Mode.DISARMED and not output.refusals
+        if tracking and not self.tracks:
+            self.ended = output.failsafe.reason
+        self._body = self._link.exchange(ThrustCommand(output.thrusts, output.armed), now)
+        return output
+
+    def _robot_at(self, t: float) -> tuple[Array, Array]:
+        times, wxyz, p = zip(*self._poses, strict=True)
+        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0)).at(t)

@@ -1,0 +1,98 @@
+"""Wall and socket before the tool: they push back as much, let in what fits, change no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hardware.robot_file import load_robot
+from hardware.sim.obstacle import Obstacle, Socket
+from hardware.sim.plant import Plant, PlantOptions
+
+AMES = load_robot("ames")
+STILL = np.zeros(6)
+
+
+def make(obstacle: Obstacle | None, imu: bool = False, robot: str = "ames") -> Plant:
+    options = PlantOptions(imu_noise=imu, imu_bias=imu, imu_steps=imu, obstacle=obstacle)
+    return Plant(load_robot(robot).plant, np.random.default_rng(0), options)
+
+
+def run(plant: Plant, seconds: float, wrench_in_f: np.ndarray = STILL) -> None:
+    plant.external_wrench_in_f = wrench_in_f.copy()
+    for _ in range(round(seconds / 0.005)):
+        plant.step(np.zeros(len(plant.parameters.thruster_torques)))
+
+
+@pytest.mark.parametrize("robot", ["ames", "ground"])
+def test_far_from_the_wall_the_robot_flies_as_without(robot: str) -> None:
+    free, walled = make(None, True, robot), make(Obstacle(gap_m=0.5), True, robot)
+    for plant in (free, walled):
+        run(plant, 0.3, np.array([2.0, -1.0, 0.5, 0.02, -0.03, 0.05]))
+    np.testing.assert_allclose(walled.p_bf_in_f, free.p_bf_in_f, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(walled.wxyz_fb, free.wxyz_fb, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(walled.imu(), free.imu(), rtol=0.0, atol=1e-6)
+    assert walled.stands == free.stands
+    assert not any(walled.touched.pushes)
+
+
+def test_the_wall_pushes_back_what_presses_less_what_the_cable_takes() -> None:
+    obstacle = Obstacle(gap_m=0.02)
+    plant = make(obstacle)
+    run(plant, 12.0, np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    spring = AMES.plant.mass * 9.80665 / AMES.plant.suspension.length
+    force = plant.touched.force_in_f
+    assert -force[0] == pytest.approx(3.0 - spring * 0.02, rel=0.03)
+    assert np.abs(force[1:]).max() < 1e-3
+    assert all(plant.touched.pushes)
+    assert 0.0 <= obstacle.depth_of_tip(plant.p_bf_in_f, plant.R_fb) < 1e-4
+
+
+def test_it_rebounds_with_about_half_the_speed_of_impact() -> None:
+    speeds = []
+    plant = make(Obstacle(gap_m=0.02))
+    plant.cut_cable()
+    plant.external_wrench_in_f = np.array([4.0, 0.0, 9.80665 * AMES.plant.mass, 0.0, 0.0, 0.0])
+    for _ in range(120):
+        plant.step(np.zeros(8), 0.001)
+        speeds.append(plant.v_bf_in_f[0])
+        if plant.v_bf_in_f[0] < 0.0:
+            plant.external_wrench_in_f[0] = 0.0
+    for _ in range(100):
+        plant.step(np.zeros(8), 0.001)
+    assert 0.4 < -plant.v_bf_in_f[0] / max(speeds) < 0.65
+
+
+def pressed_at(y: float, z: float) -> float:
+    """How deep the tip gets, pushed with 3 N against a socket whose middle is at (y, z) [m]."""
+    obstacle = Obstacle(0.02, Socket(centre_y_m=y, centre_z_m=z))
+    plant = make(obstacle)
+    plant.parameters = AMES.plant
+    deepest = 0.0
+    for _ in range(16):
+        run(plant, 0.25, np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        deepest = max(deepest, obstacle.depth_of_tip(plant.p_bf_in_f, plant.R_fb))
+    return deepest
+
+
+@pytest.mark.parametrize("side", [(0.0, 0.0), (0.004, 0.0), (0.0, -0.009), (-0.009, 0.009)])
+def test_a_plug_near_the_middle_slides_in(side: tuple[float, float]) -> None:
+    assert pressed_at(*side) == pytest.approx(0.05, abs=0.002)
+
+
+@pytest.mark.parametrize("side", [(0.05, 0.0), (0.0, 0.05), (-0.05, 0.0), (0.0, -0.05)])
+def test_a_plug_beside_the_mouth_stays_out(side: tuple[float, float]) -> None:
+    assert pressed_at(*side) < 0.001
+
+
+def test_what_is_no_wall_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"gap_m: 0; allowed: 0\.005 to 1"):
+        Obstacle(gap_m=0)
+    with pytest.raises(ValueError, match="depth_m"):
+        Socket(depth_m=0.01)
+    with pytest.raises(ValueError, match="clearance_m: nan"):
+        replace(Socket(), clearance_m=float("nan"))
+    with pytest.raises(ValueError, match="no obstacle"):
+        make(None).touched  # noqa: B018

@@ -1,0 +1,124 @@
+"""`experiments contact`: pressing holds the foretold force, and what is said has a shape."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from math import isnan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hardware.robot_file import load_robot
+from hardware.sim.obstacle import Socket
+from server.experiments.contact import command, picture
+from server.experiments.contact.flight import Trace, fly
+from server.experiments.contact.free import Free
+from server.experiments.contact.measure import gaps, row_of, settling, table_of, touching
+from server.experiments.contact.setting import GO_S, STAY_S, Scene, Way, foretold_n, spring_n_m
+from server.experiments.paper.leader import phone
+
+AMES = load_robot("ames")
+WALL = Scene("wall", 0.02, 0.05)
+SOCKET = Scene("socket", 0.02, 0.03, Socket())
+SOFT = Way("compliant 3 N", 3.0)
+TIMES = np.arange(0.005, 20.0, 0.005)
+
+
+def trace_of(force_n: np.ndarray, ended: str = "") -> Trace:
+    touches = force_n > 0.0
+    depth = np.where(touches, 0.0, -0.02)
+    return Trace(TIMES, force_n, force_n, np.repeat(touches, 5), depth, 0.0 * depth, ended)
+
+
+def pressed(force_n: float) -> np.ndarray:
+    return np.where((TIMES > 1.0) & (TIMES < GO_S + STAY_S + 1.0), force_n, 0.0)
+
+
+def test_a_steady_force_is_in_the_band_and_never_lost() -> None:
+    one = touching(trace_of(pressed(2.4)), 2.5)
+    assert one.mean_n == pytest.approx(2.4)
+    assert one.in_band_pct == 100.0
+    assert one.settling_s < 0.1
+    assert (one.bounces, one.lost, one.out) == (0, 0, 1.0)
+    assert one.overshoot_pct == pytest.approx(-4.0)
+
+
+def test_contact_lost_and_regained_is_counted_when_it_happens() -> None:
+    force = pressed(2.5)
+    force[(TIMES > 1.2) & (TIMES < 1.25)] = 0.0
+    for after in (1400, 1600):
+        force[after : after + 4] = 0.0
+    one = touching(trace_of(force), 2.5)
+    assert (one.bounces, one.lost) == (1, 2)
+
+
+def test_a_contact_that_begins_or_ends_is_no_gap() -> None:
+    pushes = np.array([False, True, True, False, False, True, False])
+    assert gaps(np.ones(7, dtype=bool), pushes) == 1
+    assert gaps(np.ones(4, dtype=bool), pushes[:4]) == 0
+
+
+def test_what_never_settles_says_so() -> None:
+    assert isnan(settling(np.arange(1000) % 100 < 90))
+    assert settling(np.arange(1000) >= 300) == pytest.approx(1.5)
+
+
+def test_the_table_has_a_line_for_each_and_says_what_ended() -> None:
+    good = row_of(WALL, SOFT, 2.5, [trace_of(pressed(2.4))])
+    bad = row_of(SOCKET, SOFT, 1.2, [trace_of(pressed(2.4), "+3 s: lost")])
+    title, first, second = table_of([good, bad]).splitlines()
+    assert "foretold N" in title
+    assert "in band %" in title
+    assert first.split()[:6] == ["wall", "compliant", "3", "N", "2.50", "2.40"]
+    assert second.endswith("ended at +3 s: lost")
+    assert "–" in second
+
+
+def test_the_goal_is_missed_if_contact_is_lost_or_the_plug_stays_out() -> None:
+    wall = row_of(WALL, SOFT, 2.5, [trace_of(pressed(2.4))])
+    free = [Free("circle", "stiff", 5.0, ""), Free("circle", SOFT.name, 5.0, "")]
+    assert all(command.goals([wall], free).values())
+    outside = row_of(SOCKET, SOFT, 2.5, [trace_of(pressed(2.4))])
+    assert not all(command.goals([wall, outside], free).values())
+    slow = [free[0], Free("circle", SOFT.name, 6.0, "")]
+    assert not all(command.goals([wall], slow).values())
+
+
+def test_the_law_foretells_the_limit_less_the_suspensions_part() -> None:
+    assert spring_n_m(AMES.plant) == pytest.approx(26.4, abs=0.05)
+    assert foretold_n(3.0, WALL, AMES.plant) == pytest.approx(3.0 - 26.4 * 0.02, abs=0.01)
+    assert spring_n_m(load_robot("ground").plant) == 0.0
+
+
+def test_limits_that_do_not_reach_the_obstacle_are_refused() -> None:
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    with pytest.raises(ValueError, match="--limit-n: none reaches the socket"):
+        command.flown_of(parser.parse_args(["--limit-n", "1.5"]), AMES)
+    names = [(s.name, w.name) for s, w in command.flown_of(parser.parse_args([]), AMES)]
+    assert names[:3] == [("wall", w) for w in ("stiff", "compliant 1.5 N", "compliant 3 N")]
+
+
+def test_the_picture_has_both_scenes(tmp_path: Path) -> None:
+    shown = [(row_of(s, SOFT, 2.5, [t]), t) for s in (WALL, SOCKET) for t in [trace_of(pressed(2))]]
+    assert picture.draw(shown, tmp_path / "contact.png").stat().st_size > 10_000
+
+
+def test_a_compliant_push_is_held_without_a_bounce() -> None:
+    trace = fly(AMES, phone(), WALL, SOFT, 1, 9.0)
+    assert trace.ended == ""
+    pressing = trace.t > GO_S + 2.0
+    assert trace.force_n[pressing] == pytest.approx(foretold_n(3.0, WALL, AMES.plant), rel=0.25)
+    assert trace.pushes[np.repeat(pressing, 5)].all()
+
+
+@pytest.mark.slow
+def test_the_experiment_reaches_its_goal(tmp_path: Path) -> None:
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args(["--seeds", "1", "--out", str(tmp_path)])) == 0
+    figures = json.loads((tmp_path / "contact.json").read_text())
+    assert all(figures["holds"].values())
+    assert (tmp_path / "contact.png").is_file()
