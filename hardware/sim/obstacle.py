@@ -60,9 +60,9 @@ class Obstacle:
     """From the centre of mass to the tip, along x_b: before all thrusters of the AMES."""
     radius_m: float = 0.010
     friction: float = 0.3
-    stiffness_s2: float = 3.0e4
-    """Of the contact, per mass that it stops [1/s²]: 1e5 N/m for the AMES ..."""
-    damping_s: float = 60.0
+    stiffness_s2: float = 3.0e3
+    """Of the contact, per mass that it stops [1/s²]: 1e4 N/m for the AMES, hard rubber ..."""
+    damping_s: float = 20.0
     """... and its damping [1/s]: it rebounds with about half the speed of impact."""
 
     def __post_init__(self) -> None:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hardware.sim.hand import HANDS, REST_S, STEP_S, make_hand
-from hardware.sim.hand_parts import FADE_S, LIFT_S
+from hardware.sim.hand import HANDS, REST_S, STEP_S, MovingHand, make_hand
+from hardware.sim.hand_parts import FADE_S, LIFT_S, Stroke
 from hardware.sim.parameters import StartParameters
 from pipeline.frames import GRAVITY, log, rotation_about_z, rpy_from_R
 
@@ -136,6 +136,13 @@ def test_it_lifts_the_phone_straight_up_to_take_off():
     assert heights[-1] - heights[0] == pytest.approx([0.0, 0.0, 0.4])
     for t in (REST_S + 0.4, REST_S + 1.7):
         assert hand.specific_force_in_c(t) == pytest.approx(numeric_force(hand, t), abs=1e-5)
+
+
+def test_a_stroke_goes_there_stays_and_comes_back():
+    hand = MovingHand((Stroke(0.07, 3.0, 12.0, 2.0),), np.zeros(3), np.zeros(3), 0.0)
+    assert [round(hand.pose(t)[1][0], 9) for t in (0.0, 3.0, 15.0, 17.0)] == [0.0, 0.07, 0.07, 0.0]
+    for t in (0.7, 2.2, 9.0, 15.4, 16.6):
+        assert np.abs(hand.specific_force_in_c(t) - numeric_force(hand, t)).max() < 2e-6
 
 
 def test_recorded_hand_passes_through_its_samples(tmp_path):

@@ -15,8 +15,16 @@ from hardware.sim.obstacle import Socket
 from server.experiments.contact import command, picture
 from server.experiments.contact.flight import Trace, fly
 from server.experiments.contact.free import Free
-from server.experiments.contact.measure import gaps, row_of, settling, table_of, touching
-from server.experiments.contact.setting import GO_S, STAY_S, Scene, Way, foretold_n, spring_n_m
+from server.experiments.contact.measure import gaps, row_of, settling, smooth, table_of, touching
+from server.experiments.contact.setting import (
+    BAND_N,
+    GO_S,
+    STAY_S,
+    Scene,
+    Way,
+    foretold_n,
+    spring_n_m,
+)
 from server.experiments.paper.leader import phone
 
 AMES = load_robot("ames")
@@ -55,9 +63,13 @@ def test_contact_lost_and_regained_is_counted_when_it_happens() -> None:
 
 
 def test_a_contact_that_begins_or_ends_is_no_gap() -> None:
-    pushes = np.array([False, True, True, False, False, True, False])
-    assert gaps(np.ones(7, dtype=bool), pushes) == 1
-    assert gaps(np.ones(4, dtype=bool), pushes[:4]) == 0
+    pushes = np.repeat([False, True, True, False, False, True, False], 8)
+    assert gaps(np.ones(56, dtype=bool), pushes) == 1
+    assert gaps(np.ones(32, dtype=bool), pushes[:32]) == 0
+
+
+def test_rattling_of_a_few_milliseconds_is_no_lost_contact() -> None:
+    assert gaps(np.ones(90, dtype=bool), np.arange(90) % 10 < 3) == 0
 
 
 def test_what_never_settles_says_so() -> None:
@@ -78,11 +90,11 @@ def test_the_table_has_a_line_for_each_and_says_what_ended() -> None:
 
 def test_the_goal_is_missed_if_contact_is_lost_or_the_plug_stays_out() -> None:
     wall = row_of(WALL, SOFT, 2.5, [trace_of(pressed(2.4))])
-    free = [Free("circle", "stiff", 5.0, ""), Free("circle", SOFT.name, 5.0, "")]
+    free = [Free("moving", "stiff", 5.0, ""), Free("moving", SOFT.name, 5.0, "")]
     assert all(command.goals([wall], free).values())
     outside = row_of(SOCKET, SOFT, 2.5, [trace_of(pressed(2.4))])
     assert not all(command.goals([wall, outside], free).values())
-    slow = [free[0], Free("circle", SOFT.name, 6.0, "")]
+    slow = [free[0], Free("moving", SOFT.name, 6.0, "")]
     assert not all(command.goals([wall], slow).values())
 
 
@@ -107,11 +119,13 @@ def test_the_picture_has_both_scenes(tmp_path: Path) -> None:
 
 
 def test_a_compliant_push_is_held_without_a_bounce() -> None:
-    trace = fly(AMES, phone(), WALL, SOFT, 1, 9.0)
+    trace = fly(AMES, phone(), WALL, SOFT, 1, 6.0)
     assert trace.ended == ""
-    pressing = trace.t > GO_S + 2.0
-    assert trace.force_n[pressing] == pytest.approx(foretold_n(3.0, WALL, AMES.plant), rel=0.25)
-    assert trace.pushes[np.repeat(pressing, 5)].all()
+    pressing = trace.t > GO_S
+    foretold = foretold_n(3.0, WALL, AMES.plant)
+    assert trace.force_n[pressing].mean() == pytest.approx(foretold, abs=BAND_N)
+    assert np.abs(smooth(trace.force_n)[pressing] - foretold).max() < 2.0 * BAND_N
+    assert gaps(np.repeat(pressing, 5), trace.pushes) == 0
 
 
 @pytest.mark.slow

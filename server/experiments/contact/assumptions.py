@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from hardware.sim.obstacle import Obstacle
 from hardware.sim.parameters import PlantParameters
-from server.experiments.contact.measure import SETTLE_S, SMOOTH_S
+from server.experiments.contact.measure import IMPACT_S, LOST_MS, SETTLE_S, SMOOTH_S
 from server.experiments.contact.setting import (
     AIM_M,
-    BAND,
+    BAND_N,
     FULL,
     GO_S,
     HOVER_S,
@@ -43,7 +43,7 @@ def _touching(plant: PlantParameters, scenes: Sequence[Scene]) -> Iterator[Assum
     )
     yield Assumption(
         "wall",
-        f"stiff: {tool.stiffness_s2 * plant.mass:g} N/m for this robot, rebounds with about half "
+        f"{tool.stiffness_s2 * plant.mass:g} N/m for this robot, rebounds with about half "
         f"the speed, friction {tool.friction:g}",
         "chosen",
     )
@@ -76,7 +76,7 @@ def _judging(plant: PlantParameters, seeds: int) -> Iterator[Assumption]:
     yield Assumption("force", "MuJoCo's contact force, every millisecond", "chosen")
     yield Assumption(
         "band",
-        f"± {100 * BAND:g} % of what is foretold: compliance's limit, less the suspension's "
+        f"± {BAND_N:g} N about what is foretold: compliance's limit, less the suspension's "
         f"{spring_n_m(plant):.1f} N/m times the way to the obstacle; stiff is held against the "
         "highest limit's",
         "chosen",
@@ -86,5 +86,9 @@ def _judging(plant: PlantParameters, seeds: int) -> Iterator[Assumption]:
         f"from {SETTLE_S:g} s after the hand's arrival until it goes back; averaged over "
         f"{1e3 * SMOOTH_S:g} ms",
         "chosen",
+    )
+    yield Assumption("contact lost", f"nothing touches for {LOST_MS} ms or longer", "chosen")
+    yield Assumption(
+        "overshoot", f"later than {1e3 * IMPACT_S:g} ms after the first touch", "chosen"
     )
     yield Assumption("seeds", f"1 to {seeds}", "chosen")

@@ -14,7 +14,7 @@ from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from hardware.sim.obstacle import Socket
 from server.experiments.contact import assumptions, picture
 from server.experiments.contact.flight import Trace, fly
-from server.experiments.contact.free import Free, free_flights, free_table
+from server.experiments.contact.free import NEAR, Free, free_flights, free_table
 from server.experiments.contact.measure import Row, row_of, table_of
 from server.experiments.contact.setting import LEAST_N, Scene, Way, foretold_n
 from server.experiments.numbers import number, whole
@@ -110,8 +110,8 @@ def goals(rows: Sequence[Row], free: Sequence[Free]) -> dict[str, bool]:
         "compliant: the plug goes in, and out again": all(
             len(set(row.plugged.split("/"))) == 1 and row.out == row.plugged for row in plugs
         ),
-        "compliant, in the free: error no more than 2 % above stiff": all(
-            one.rms_mm <= 1.02 * stiff[one.hand] for one in free
+        "compliant, in the free near where it began: error no more than 2 % above stiff": all(
+            one.rms_mm <= 1.02 * stiff[NEAR] for one in free if one.hand == NEAR
         ),
     }
 

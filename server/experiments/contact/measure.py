@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 from server.experiments.contact.flight import PER_PERIOD, Trace
-from server.experiments.contact.setting import BAND, FULL, GO_S, STAY_S, Scene, Way
+from server.experiments.contact.setting import BAND_N, FULL, GO_S, STAY_S, Scene, Way
 from server.experiments.paper.led import PERIOD_S
 from server.experiments.paper.measure import rms
 from server.experiments.text import Column, table
@@ -21,6 +21,11 @@ SETTLE_S: Final = 2.0
 """After the hand has arrived; from then on until it goes back the force is to be in the band."""
 SMOOTH_S: Final = 0.05
 """Over which the force is averaged; what is shorter counts as impact."""
+IMPACT_S: Final = 0.5
+"""After the first touch the force is the impact's, and no overshoot of control."""
+LOST_MS: Final = 10
+"""Without any touch for so long: contact is lost. Where the tip slides on the wall it rattles, for
+a few milliseconds and micrometres at a time."""
 STAYS_S: Final = 1.0
 """In the band for so long: settled."""
 
@@ -33,12 +38,14 @@ class Touching:
     """While pressing."""
     deviation_n: float
     """Standard deviation while pressing."""
+    touching_pct: float
+    """Milliseconds with any force, while pressing."""
     in_band_pct: float
     """Of the time of pressing."""
     impact_n: float
     """Largest force of a millisecond."""
     overshoot_pct: float
-    """Of the averaged force beyond what is foretold, at its largest."""
+    """Of the averaged force beyond what is foretold, at its largest after the impact."""
     settling_s: float
     """From the first touch until it stays in the band for `STAYS_S`; NaN: never."""
     bounces: float
@@ -61,6 +68,7 @@ class Row:
     """Middle of the band."""
     mean_n: float
     deviation_n: float
+    touching_pct: float
     in_band_pct: float
     impact_n: float
     overshoot_pct: float
@@ -82,6 +90,7 @@ COLUMNS: Final[tuple[Column, ...]] = (
     ("foretold_n", "foretold N", "{:.2f}"),
     ("mean_n", "force N", "{:.2f}"),
     ("deviation_n", "± N", "{:.2f}"),
+    ("touching_pct", "touching %", "{:.1f}"),
     ("in_band_pct", "in band %", "{:.1f}"),
     ("overshoot_pct", "overshoot %", "{:.0f}"),
     ("impact_n", "impact N", "{:.1f}"),
@@ -113,15 +122,16 @@ def touching(trace: Trace, foretold_n: float) -> Touching:
     """Figures of a flight that did not end early."""
     pressing = (trace.t >= GO_S + SETTLE_S) & (trace.t < GO_S + STAY_S)
     force = smooth(trace.force_n)
-    inside = np.abs(force - foretold_n) <= BAND * foretold_n
+    inside = np.abs(force - foretold_n) <= BAND_N
     touches = trace.peak_n > 0.0
     first = int(np.argmax(touches)) if touches.any() else len(trace.t)
-    before = trace.t[first:] < GO_S + STAY_S
-    peak = float(force[first:][before].max(initial=0.0))
+    later = (np.arange(len(trace.t)) >= first + IMPACT_S / PERIOD_S) & (trace.t < GO_S + STAY_S)
+    peak = float(force[later].max(initial=0.0))
     early = (np.arange(len(trace.t)) >= first) & (trace.t < GO_S + SETTLE_S)
     return Touching(
         mean_n=float(force[pressing].mean()),
         deviation_n=float(force[pressing].std()),
+        touching_pct=100.0 * float(trace.pushes[np.repeat(pressing, PER_PERIOD)].mean()),
         in_band_pct=100.0 * float(inside[pressing].mean()),
         impact_n=float(trace.peak_n.max()),
         overshoot_pct=100.0 * (peak / foretold_n - 1.0),
@@ -142,11 +152,9 @@ def settling(inside: npt.NDArray[np.bool_]) -> float:
 
 
 def gaps(within: npt.NDArray[np.bool_], pushes: npt.NDArray[np.bool_]) -> int:
-    """How often contact was lost and regained in the time that counts, both (n,)."""
-    steps = np.diff(pushes[within].astype(int))
-    regained = np.flatnonzero(steps > 0)
-    lost = np.flatnonzero(steps < 0)
-    return int((regained > lost[0]).sum()) if len(lost) else 0
+    """How often contact was lost for `LOST_MS` and regained in the time that counts, both (n,)."""
+    touched = np.flatnonzero(pushes[within])
+    return int((np.diff(touched) > LOST_MS).sum())
 
 
 def row_of(scene: Scene, way: Way, foretold_n: float, traces: Sequence[Trace]) -> Row:
@@ -165,6 +173,7 @@ def row_of(scene: Scene, way: Way, foretold_n: float, traces: Sequence[Trace]) -
         foretold_n=foretold_n,
         mean_n=mean(lambda one: one.mean_n),
         deviation_n=rms(np.array([one.deviation_n for one in ones])),
+        touching_pct=mean(lambda one: one.touching_pct),
         in_band_pct=mean(lambda one: one.in_band_pct),
         impact_n=max((one.impact_n for one in ones), default=nan),
         overshoot_pct=mean(lambda one: one.overshoot_pct),

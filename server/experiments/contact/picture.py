@@ -7,7 +7,7 @@ from pathlib import Path
 
 from server.experiments.contact.flight import Trace
 from server.experiments.contact.measure import Row, smooth
-from server.experiments.contact.setting import BAND, GO_S, STAY_S
+from server.experiments.contact.setting import BAND_N, GO_S, STAY_S
 from server.experiments.paper.picture import TIME, panels, save
 
 
@@ -21,7 +21,7 @@ def draw(shown: Sequence[tuple[Row, Trace]], path: Path) -> Path:
             colour = f"C{3 - k}" if k < 4 else f"C{k}"
             axis.plot(trace.t, smooth(trace.force_n), color=colour, lw=1.0, label=row.way)
             if k > 0:
-                edges = (1.0 - BAND) * row.foretold_n, (1.0 + BAND) * row.foretold_n
+                edges = row.foretold_n - BAND_N, row.foretold_n + BAND_N
                 axis.axhspan(*edges, color=colour, alpha=0.15)
         for moment in (GO_S, GO_S + STAY_S):
             axis.axvline(moment, color="k", ls=":", lw=0.8)

@@ -17,7 +17,7 @@ from pipeline.frames import GRAVITY
 from server.experiments.paper.leader import Leader
 from server.experiments.paper.variants import Wishes, config_of, ours
 
-HOVER_S: Final = 5.0
+HOVER_S: Final = 4.0
 """From switching on to the hand's move."""
 GO_S: Final = 3.0
 STAY_S: Final = 12.0
@@ -27,8 +27,8 @@ AFTER_S: Final = 2.0
 FLIGHT_S: Final = GO_S + STAY_S + BACK_S + AFTER_S
 AIM_M: Final = 0.003
 """RMS of what the socket's middle is off the tool's axis, along y and z."""
-BAND: Final = 0.2
-"""Half the width of the band, in what is foretold."""
+BAND_N: Final = 0.4
+"""Half the width of the band; the suspension changes its pull by as much over 15 mm."""
 LEAST_N: Final = 0.2
 """Smaller foretold forces have no band worth the name."""
 FULL: Final = 0.9
