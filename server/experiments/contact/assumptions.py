@@ -42,7 +42,7 @@ def _touching(plant: PlantParameters, scenes: Sequence[Scene]) -> Iterator[Assum
         "chosen",
     )
     yield Assumption(
-        "wall",
+        "touch",
         f"{tool.stiffness_s2 * plant.mass:g} N/m for this robot, rebounds with about half "
         f"the speed, friction {tool.friction:g}",
         "chosen",
