@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from hardware.robot_file import RobotFile
 from hardware.sim.plant import PlantOptions
@@ -24,8 +25,8 @@ class Trace:
     """(n,) that the tool presses along x_f with, mean over the period."""
     peak_n: Array
     """(n,) largest contact force of any direction within it."""
-    pushes: Array
-    """(5 n,) bool, millisecond by millisecond: whether anything touches."""
+    pushes: npt.NDArray[np.bool_]
+    """(5 n,), millisecond by millisecond: whether anything touches."""
     depth_m: Array
     """(n,) of the tip behind the wall's face."""
     side_m: Array
@@ -66,7 +67,9 @@ def fly(
         pushes += touched.pushes
     columns = np.array(rows).reshape(-1, 5).T
     ended = f"{led.t - HOVER_S:+.2f} s: {led.ended}" if led.ended else ""
-    return Trace(*columns[:3], np.array(pushes, dtype=bool), *columns[3:], ended)
+    t_s, force_n, peak_n, depth_m, side_m = columns
+    touches = np.array(pushes, dtype=np.bool_)
+    return Trace(t_s, force_n, peak_n, touches, depth_m, side_m, ended)
 
 
 PER_PERIOD = round(1e3 * PERIOD_S)

@@ -12,8 +12,9 @@ from typing import Literal
 
 from hardware.sim.parameters import PlantParameters
 from server.experiments.paper import published
-from server.experiments.paper.flight import HOVER_S, PERIOD_S, REST_S
+from server.experiments.paper.flight import HOVER_S, REST_S
 from server.experiments.paper.leader import PAPER, Leader
+from server.experiments.paper.led import PERIOD_S
 from server.experiments.paper.measure import WINDOW_S, Setup
 
 Status = Literal["known", "identified", "chosen"]
