@@ -13,6 +13,8 @@ from hardware.sim.plant import Plant, PlantOptions
 
 AMES = load_robot("ames")
 STILL = np.zeros(6)
+SOFT_M = 0.004
+"""How far the tip presses into hard rubber when it arrives with 0.2 m/s."""
 
 
 def make(obstacle: Obstacle | None, imu: bool = False, robot: str = "ames") -> Plant:
@@ -76,12 +78,12 @@ def pressed_at(y: float, z: float) -> float:
 
 @pytest.mark.parametrize("side", [(0.0, 0.0), (0.004, 0.0), (0.0, -0.009), (-0.009, 0.009)])
 def test_a_plug_near_the_middle_slides_in(side: tuple[float, float]) -> None:
-    assert pressed_at(*side) == pytest.approx(0.05, abs=0.002)
+    assert pressed_at(*side) == pytest.approx(0.05, abs=SOFT_M)
 
 
 @pytest.mark.parametrize("side", [(0.05, 0.0), (0.0, 0.05), (-0.05, 0.0), (0.0, -0.05)])
 def test_a_plug_beside_the_mouth_stays_out(side: tuple[float, float]) -> None:
-    assert pressed_at(*side) < 0.001
+    assert pressed_at(*side) < SOFT_M
 
 
 def test_what_is_no_wall_is_refused() -> None:
