@@ -53,6 +53,14 @@ PARTS: Final[tuple[Part, ...]] = (
         "encoded pictures that come as late as a phone's.",
     ),
     Part(
+        "contact",
+        "contact --seeds 3",
+        "contact --seeds 1",
+        "Touching things",
+        "Pushing a wall and plugging into a socket: what force the robot holds with compliance and "
+        "without, and what compliance costs in free flight.",
+    ),
+    Part(
         "sweep",
         "sweep latency",
         "sweep latency_quick",
@@ -104,6 +112,8 @@ CAPTIONS: Final[Mapping[tuple[str, str], str]] = {
     "unstable when closed.",
     ("loop", "loop"): "Where the robot was meant to be (dashed) and was, and how far apart that "
     "is, over time; dotted: the RMS.",
+    ("contact", "contact"): "Force on the wall and in the socket while the hand presses; shaded: "
+    "the band about what is foretold; dotted: the time that counts.",
     ("sweep", "sweep"): "Tracking error over each swept key; points are seeds, lines are medians, "
     "crosses on top ended early.",
     ("estimators", "estimators"): "Error of each estimator over time, with ±3 σ as it believes.",
