@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 
 import mujoco
 import numpy as np
 
+from hardware.sim.laser_task import Beam, Tube
 from hardware.sim.obstacle import Obstacle
 from hardware.sim.parameters import BodyImuParameters, PlantParameters
 from hardware.sim.plant_model import STEP_MS, mjcf
@@ -34,6 +35,8 @@ class PlantOptions:
     """How often `imu` is asked: white noise of the density's bandwidth, half of this."""
     obstacle: Obstacle | None = None
     """A tool on the robot and a wall before it."""
+    tube: Tube | None = None
+    """Stands in the world; the robot can't touch it, beams can."""
 
 
 class Plant:
@@ -48,7 +51,8 @@ class Plant:
         """Hanging or standing at rest, thrusters off."""
         self.parameters = parameters
         options = options or PlantOptions()
-        self._model = mujoco.MjModel.from_xml_string(mjcf(parameters, options.obstacle))
+        scenery = options.tube.mjcf() if options.tube is not None else ""
+        self._model = mujoco.MjModel.from_xml_string(mjcf(parameters, options.obstacle, scenery))
         self._model.dof_damping[:3] = parameters.air_damping
         self._model.dof_damping[3:6] = parameters.air_damping_rotation
         self._data = mujoco.MjData(self._model)
@@ -202,6 +206,12 @@ class Plant:
         if self._touch is None:
             raise ValueError("plant: touched: no obstacle; allowed: with PlantOptions.obstacle")
         return self._touch.touched()
+
+    def reach(self, beam: Beam) -> float:
+        """How far a beam goes until it meets something [m]; inf: nothing."""
+        origin, direction = beam
+        met = float(mujoco.mj_ray(self._model, self._data, origin, direction, None, 1, -1, None))
+        return met if met >= 0.0 else inf
 
     def imu(self) -> tuple[Array, Array]:
         """What the body's sensors read: (ω (3,) [rad/s], specific force (3,) [m/s²]) in b.

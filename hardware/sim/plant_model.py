@@ -13,8 +13,13 @@ UP = np.array([0.0, 0.0, 1.0])
 FOOT_RADIUS_M = 0.005
 
 
-def mjcf(parameters: PlantParameters, obstacle: Obstacle | None = None) -> str:
-    """The robot as a MuJoCo model, with something before it to touch if wished."""
+def mjcf(
+    parameters: PlantParameters, obstacle: Obstacle | None = None, scenery: str = ""
+) -> str:
+    """The robot as a MuJoCo model, with something before it to touch if wished.
+
+    `scenery` stands in the world, in MuJoCo's words.
+    """
     suspension, stand = parameters.suspension, parameters.stand
     directions = parameters.thruster_directions_in_b
     contact = "disable" if stand is None and obstacle is None else "enable"
@@ -38,7 +43,7 @@ def mjcf(parameters: PlantParameters, obstacle: Obstacle | None = None) -> str:
         <flag contact="{contact}" midphase="disable"/>
       </option>
       <worldbody>
-        {_anchor(suspension)}{_floor(stand)}{wall}
+        {_anchor(suspension)}{_floor(stand)}{wall}{scenery}
         <body name="b">
           <freejoint/>
           <inertial pos="0 0 0" mass="{parameters.mass:.9g}"
