@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Generator, Iterator
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from time import monotonic
 
+from server.experiments.processes import cores
 from server.experiments.sweep import picture, summary
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.keys import Number, Switch, Word, known_keys
@@ -65,7 +65,7 @@ def _flown(sweep: Sweep, results: Results, folder: Path, arguments: argparse.Nam
     already = f", {len(results.done)} of them done before" if results.done else ""
     print(f"{len(sessions)} sessions of {sweep.seconds:g} s: {len(sweep.points)} settings", end="")
     print(f" × {len(sweep.seeds)} seeds{already}", flush=True)
-    hands = arguments.scheduler or f"{arguments.workers or _cores()} processes"
+    hands = arguments.scheduler or f"{arguments.workers or cores()} processes"
     results.write(sys.argv, hands)
     started, cpu_s = monotonic(), results.cpu_s
     code = _fill(results, missing, arguments, len(sessions)) if missing else 0
@@ -111,14 +111,7 @@ def _outcomes(
 ) -> Generator[Outcome, None, None]:
     if arguments.scheduler:
         return on_cluster(missing, arguments.scheduler)
-    return on_processes(missing, min(arguments.workers or _cores(), len(missing)))
-
-
-def _cores() -> int:
-    """That this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return on_processes(missing, min(arguments.workers or cores(), len(missing)))
 
 
 def _listed() -> Iterator[str]:

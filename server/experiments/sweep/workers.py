@@ -6,18 +6,14 @@ long sweep needs no memory.
 
 from __future__ import annotations
 
-import os
 import re
-import signal
-from collections.abc import Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from collections.abc import Generator, Iterable
 from itertools import islice
-from multiprocessing import active_children, get_context
-from threading import current_thread, main_thread
 from typing import TYPE_CHECKING, Final
 
 import server
+from server.experiments import processes
+from server.experiments.processes import AHEAD
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.session import Outcome, Session, fly
 
@@ -25,9 +21,6 @@ if TYPE_CHECKING:
     from distributed import Client
 
 ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
-AHEAD: Final = 2
-"""Sessions given out for each hand."""
-ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def on_processes(sessions: Iterable[Session], workers: int) -> Generator[Outcome, None, None]:
@@ -36,50 +29,7 @@ def on_processes(sessions: Iterable[Session], workers: int) -> Generator[Outcome
     Raises:
         BrokenProcessPool: one of them was killed.
     """
-    others = set(active_children())
-    pool = ProcessPoolExecutor(workers, get_context("spawn"))
-    waiting, given = iter(sessions), set[Future[Outcome]]()
-    try:
-        with _single_threaded(), _deaf():
-            given |= {pool.submit(fly, one) for one in islice(waiting, AHEAD * workers)}
-        while given:
-            done, given = wait(given, return_when=FIRST_COMPLETED)
-            given |= {pool.submit(fly, one) for one in islice(waiting, len(done))}
-            yield from (one.result() for one in done)
-    except BaseException:
-        for child in set(active_children()) - others:
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Processes started in here don't hear the keyboard's interrupt, which reaches all; we do."""
-    if current_thread() is not main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-@contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Processes started in here don't share their cores with threads of linear algebra."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+    yield from processes.each(fly, sessions, workers)
 
 
 def version() -> str:

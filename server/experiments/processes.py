@@ -1,0 +1,84 @@
+"""Work spread over fresh processes of this machine; the results are the same as by one.
+
+They are given a few jobs more than there are hands for, so an interruption loses little and many
+jobs need no memory.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from itertools import islice
+from multiprocessing import active_children, get_context
+from threading import current_thread, main_thread
+from typing import Final, TypeVar
+
+AHEAD: Final = 2
+"""Jobs given out for each hand."""
+ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+def cores() -> int:
+    """That this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def each(
+    work: Callable[[Job], Result], jobs: Iterable[Job], workers: int
+) -> Generator[Result, None, None]:
+    """Results as they come, by so many fresh processes; closing it ends them at once.
+
+    Raises:
+        BrokenProcessPool: one of them was killed.
+    """
+    others = set(active_children())
+    pool = ProcessPoolExecutor(workers, get_context("spawn"))
+    waiting, given = iter(jobs), set[Future[Result]]()
+    try:
+        with _single_threaded(), _deaf():
+            given |= {pool.submit(work, one) for one in islice(waiting, AHEAD * workers)}
+        while given:
+            done, given = wait(given, return_when=FIRST_COMPLETED)
+            given |= {pool.submit(work, one) for one in islice(waiting, len(done))}
+            yield from (one.result() for one in done)
+    except BaseException:
+        for child in set(active_children()) - others:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes started in here don't hear the keyboard's interrupt, which reaches all; we do."""
+    if current_thread() is not main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _single_threaded() -> Iterator[None]:
+    """Processes started in here don't share their cores with threads of linear algebra."""
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
