@@ -95,14 +95,14 @@ def _strata(rng: np.random.Generator, n: int) -> Array:
     return (np.arange(n)[:, None] + rng.uniform(0.0, 1.0, (n, 6))) / n
 
 
-def tremor(rng: np.random.Generator) -> Part:
+def tremor(rng: np.random.Generator, sigma_m: float = 5e-5, sigma_deg: float = 0.03) -> Part:
     """Physiological tremor: 8-12 Hz, 0.05 mm and 0.03° RMS."""
-    return _noise(rng, 8.0 + 4.0 * _strata(rng, 12), 5e-5, 0.03)
+    return _noise(rng, 8.0 + 4.0 * _strata(rng, 12), sigma_m, sigma_deg)
 
 
-def steady_wander(rng: np.random.Generator) -> Part:
+def steady_wander(rng: np.random.Generator, sigma_m: float = 5e-3, sigma_deg: float = 0.4) -> Part:
     """Someone trying to hold still: below 0.5 Hz, 5 mm and 0.4° RMS."""
-    return _noise(rng, 0.05 + 0.4 * _strata(rng, 12), 5e-3, 0.4)
+    return _noise(rng, 0.05 + 0.4 * _strata(rng, 12), sigma_m, sigma_deg)
 
 
 def three_poles(rng: np.random.Generator, hz: float, sigma_m: float, sigma_deg: float) -> Part:
