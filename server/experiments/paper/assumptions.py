@@ -7,32 +7,22 @@ reproduces Tables I and IV (`hardware/robots/ames.toml`); chosen: ours, plausibl
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
-from typing import Literal
+from dataclasses import asdict
 
 from hardware.sim.parameters import PlantParameters
 from server.experiments.paper import published
+from server.experiments.paper.assumption import Assumption
+from server.experiments.paper.assumptions_task import of_task
 from server.experiments.paper.flight import HOVER_S, REST_S
 from server.experiments.paper.leader import PAPER, Leader
 from server.experiments.paper.led import PERIOD_S
 from server.experiments.paper.measure import WINDOW_S, Setup
 
-Status = Literal["known", "identified", "chosen"]
-
-
-@dataclass(frozen=True, slots=True)
-class Assumption:
-    """One of them."""
-
-    what: str
-    value: str
-    status: Status
-
 
 def of(setup: Setup) -> list[Assumption]:
     """Of the experiments as they are set up."""
     leader = sensors(setup.leader) if setup.leader == PAPER else phone_sensors(setup.leader)
-    return [*method(), *leader, *plant(setup.robot_file.plant)]
+    return [*method(), *leader, *plant(setup.robot_file.plant), *of_task()]
 
 
 def method() -> Iterator[Assumption]:

@@ -15,7 +15,7 @@ from typing import Final
 from hardware.robot_file import RobotFile
 from pipeline.config import VirtualCameraMode
 from server.experiments.paper import assumptions, published
-from server.experiments.paper.assumptions import Assumption
+from server.experiments.paper.assumption import Assumption
 from server.experiments.paper.leader import PAPER, PERFECT, Leader, phone
 from server.experiments.paper.measure import Cell, Setup, cell_of, plain
 from server.experiments.paper.variants import Variant, Wishes, ours

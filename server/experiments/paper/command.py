@@ -11,8 +11,17 @@ from typing import Final, Protocol, get_args
 
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.config import EstimatorName, VirtualCameraMode
+from server.experiments import processes
 from server.experiments.numbers import number, whole
-from server.experiments.paper import assumptions, beaten, disturbance, published, table_1, table_4
+from server.experiments.paper import (
+    assumptions,
+    beaten,
+    disturbance,
+    published,
+    table_1,
+    table_3,
+    table_4,
+)
 from server.experiments.paper.leader import PAPER, Leader, phone
 from server.experiments.paper.measure import Setup
 from server.experiments.paper.variants import (
@@ -48,6 +57,7 @@ class Outcome(Protocol):
 Measure = Callable[[Setup, Sequence[Variant]], Outcome]
 EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
     table_1.NAME: (table_1.measure, "off"),
+    table_3.NAME: (table_3.measure, "off"),
     table_4.NAME: (table_4.measure, "selective"),
     disturbance.NAME: (disturbance.measure, "selective"),
     beaten.NAME: (beaten.measure, "selective"),
@@ -64,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     except (RobotFileError, ValueError) as error:
         print(f"lightleash experiments paper: {error}", file=sys.stderr)
         return 2
-    setup = Setup(robot_file, leader, tuple(range(1, arguments.seeds + 1)))
+    setup = Setup(robot_file, leader, tuple(range(1, arguments.seeds + 1)), arguments.workers)
     print(published.SOURCE)
     print(assumptions.lines(assumptions.of(setup)))
     adds = bool(wishes) or leader.name != PAPER.name
@@ -126,6 +136,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=None, help="folder for pictures and JSON")
     parser.add_argument("--only", nargs="+", choices=tuple(EXPERIMENTS), help="not all of them")
     parser.add_argument("--seeds", type=whole(1, 1000), default=3, help="flights of each kind")
+    parser.add_argument(
+        "--workers",
+        type=whole(1, 256),
+        default=processes.cores(),
+        help="processes for Table III; else one for each core",
+    )
     parser.add_argument("--robot", default="ames", help="name or path of a robot file")
     parser.add_argument("--leader", choices=(PAPER.name, "phone"), default=PAPER.name)
     parser.add_argument("--fps", type=number(5.0, 240.0), default=30.0, help="of a phone")

@@ -103,8 +103,7 @@ class Flight:
             self._measure(led.t, output)
 
     def _measure(self, now: float, output: Output) -> None:
-        plant = self._led.plant
-        body, hand = (plant.R_fb, plant.p_bf_in_f), self._hand.pose(now)
+        body, hand = self._led.body, self._hand.pose(now)
         if self._intent is None:
             self._intent = Intent(self._config.virtual_camera, hand, body)
         offset_in_f, turn = missed_by(body, self._intent.step(hand, PERIOD_S), self._robot.axes)

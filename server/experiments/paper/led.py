@@ -9,6 +9,7 @@ import numpy as np
 from hardware.follower import ThrustCommand
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import Hand
+from hardware.sim.intent import Pose
 from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.plant import Plant, PlantOptions
 from hardware.sim.truth import Truth
@@ -55,6 +56,11 @@ class Led:
     def plant(self) -> Plant:
         """The truth."""
         return self._follower.plant
+
+    @property
+    def body(self) -> Pose:
+        """Where the robot truly is."""
+        return self.plant.R_fb, self.plant.p_bf_in_f
 
     @property
     def tracks(self) -> bool:

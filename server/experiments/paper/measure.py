@@ -29,6 +29,8 @@ class Setup:
     robot_file: RobotFile
     leader: Leader
     seeds: tuple[int, ...]
+    workers: int = 1
+    """Processes, where an experiment has many flights."""
 
     def fly(
         self, variant: Variant, hand: str, seconds: float, push: Push | None = None

@@ -27,3 +27,17 @@ PUSH_N: Final = -4.0
 """Along y_b, given by the thrusters."""
 SETTLED: Final = 0.1
 """Of the move's amplitude: the dashed lines of Fig. 6."""
+TABLE_III: Final = {
+    "without EKF": {"1": 34.93, "2": 18.51},
+    "with EKF": {"1": 21.89, "2": 13.89},
+}
+"""Mean times [s] of two operators for the task of Sec. V-B.2."""
+TUBE_BORE_M: Final = 0.030
+TUBE_TILT_DEG: Final = 15.0
+"""Of the tube's axis from the vertical."""
+HELD_S: Final = 3.0
+"""The beam has to be held through the tube for so long ..."""
+LIMIT_S: Final = 60.0
+"""... within this, or the attempt has failed."""
+REPETITIONS: Final = 5
+"""Of each operator with each flavour of the controller."""
