@@ -38,7 +38,9 @@ TUBE: Final = Tube(
     radius=0.5 * published.TUBE_BORE_M,
 )
 # Crossovers leave about 45° of phase margin on the worst axis without the EKF, by linear analysis;
-# drifts are near the project's steady hand, tremors half of it and less: two hands hold a camera.
+# drifts are near the project's steady hand. Tremors are half of it and less: with all of its 0.03°
+# the gains of Table II (a) keep the thrusters at their limits for a quarter of the time, and nobody
+# succeeds with the EKF; the paper's operators did.
 SLOWER: Final = Person(
     name="1",
     delay_s=0.30,
