@@ -13,9 +13,7 @@ UP = np.array([0.0, 0.0, 1.0])
 FOOT_RADIUS_M = 0.005
 
 
-def mjcf(
-    parameters: PlantParameters, obstacle: Obstacle | None = None, scenery: str = ""
-) -> str:
+def mjcf(parameters: PlantParameters, obstacle: Obstacle | None = None, scenery: str = "") -> str:
     """The robot as a MuJoCo model, with something before it to touch if wished.
 
     `scenery` stands in the world, in MuJoCo's words.

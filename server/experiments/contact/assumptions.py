@@ -17,9 +17,10 @@ from server.experiments.contact.setting import (
     Scene,
     spring_n_m,
 )
-from server.experiments.paper.assumptions import Assumption, phone_sensors, sensors
+from server.experiments.paper.assumption import Assumption
 from server.experiments.paper.assumptions import json as json
 from server.experiments.paper.assumptions import lines as lines
+from server.experiments.paper.assumptions import phone_sensors, sensors
 from server.experiments.paper.assumptions import plant as plant_parts
 from server.experiments.paper.leader import PAPER, Leader
 

@@ -116,7 +116,7 @@ class Flight:
                 (
                     view.R_vb.T @ error.e_p_in_v,
                     error.e_eta_in_b,
-                    -plant.R_fb.T @ offset_in_f,
+                    -body[0].T @ offset_in_f,
                     -turn,
                     relative.p_bc_in_c,
                     [output.saturated],

@@ -95,16 +95,16 @@ def attempt(
     start = np.array([-robot_file.start.distance, 0.0, 0.0])
     shake = tremor(rng, person.tremor_m, degrees(person.tremor_rad))
     hand = MovingHand((guiding, drift, shake), start, np.zeros(3), START_S)
-    loop = Led(robot_file, config, leader, hand, seed, PlantOptions(tube=TUBE))
-    while loop.t < START_S:
-        loop.advance()
+    led = Led(robot_file, config, leader, hand, seed, PlantOptions(tube=TUBE))
+    while led.t < START_S:
+        led.advance()
 
     def move() -> str:
-        guiding.look(loop.body, hand.pose(loop.t))
-        loop.advance()
-        return loop.ended
+        guiding.look(led.body, hand.pose(led.t))
+        led.advance()
+        return led.ended
 
-    return _judged(move, lambda: TUBE.clearance(LASER.beam(*loop.body)))
+    return _judged(move, lambda: TUBE.clearance(LASER.beam(*led.body)))
 
 
 def _judged(move: Callable[[], str], clearance: Callable[[], float]) -> Attempt:
