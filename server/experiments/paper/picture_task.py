@@ -35,7 +35,7 @@ def figure_times(times: Sequence[tuple[str, str, int, float]], path: Path) -> Pa
         axis.set_ylabel("time [s]")
         axis.set_ylim(0.0, published.LIMIT_S + 2.0)
     axes[-1].set_xlabel("attempt")
-    axes[0].legend(loc="upper right", fontsize="small")
+    axes[0].legend(loc="best", fontsize="small")
     return save(figure, path)
 
 
