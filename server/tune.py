@@ -85,7 +85,9 @@ def _tuned(arguments: argparse.Namespace) -> str:
     if not _flies(robot_table(path), {base: before, name: found}, arguments):
         raise TuningFlightError(f"{name} does not fly here: nothing is written")
     written = with_gains(content, name, found, comment, arguments.replace)
-    target.write_text(written, encoding="utf-8")
+    new = target.with_name(f"{target.name}.new")
+    new.write_text(written, encoding="utf-8")
+    new.replace(target)
     return f"written: [gains.{name}] in {target}; fly it with --robot {target} --gains {name}"
 
 
@@ -101,7 +103,7 @@ def _base(robot_file: RobotFile, wanted: str | None) -> str:
 def _target(path: Path, arguments: argparse.Namespace) -> Path:
     """Where the set is written to: the robot's own file, or a copy."""
     out: Path | None = arguments.out
-    if out is None and path.parent == ROBOTS:
+    if out is None and path.resolve().parent == ROBOTS.resolve():
         raise TuneError(f"{path.stem} is built in: --out FILE.toml says where its copy goes")
     if out is None:
         return path
@@ -189,7 +191,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     """Options from the command line."""
     parser = Parser(prog="lightleash tune", description=__doc__)
     parser.add_argument("robot", metavar="ROBOT", help="name or path of a robot file")
-    latency, gain, phase = _between(0.0, 500.0), _between(2.0, 20.0), _between(15.0, 75.0)
+    latency, gain, phase = _between(0.0, 400.0), _between(2.0, 20.0), _between(15.0, 75.0)
     parser.add_argument(
         "--latency-ms", type=latency, required=True, metavar="X", help="of a picture, until fused"
     )

@@ -61,7 +61,7 @@ class Person:
     """Exponent of the power law of practice (Newell, Rosenbloom 1981)."""
 
     def practised(self, attempt: int) -> Person:
-        """At the so-manieth attempt, from 1: quicker to react, and steadier."""
+        """At an attempt, counted from 1: quicker to react, and steadier."""
         share = float(attempt) ** -self.practice
         return replace(
             self,

@@ -68,8 +68,8 @@ def recorded(recording: Recording) -> Iterator[Arrival]:
 
 
 def attitudes(arrivals: Iterable[Arrival]) -> tuple[Array, Array]:
-    """(n,) times [s] and (n, 3, 3) R_fc, one a period."""
-    attitude, newest = Attitude(), None
+    """(n,) times [s] and (n, 3, 3) R_fc, one a period; f as it was before it was put right."""
+    attitude, newest, turned = Attitude(), None, np.eye(3)
     times: list[float] = []
     turns: list[Array] = []
     t = 0.0
@@ -80,9 +80,10 @@ def attitudes(arrivals: Iterable[Arrival]) -> tuple[Array, Array]:
             if attitude.R_fc is not None:
                 omega = newest.omega_m_cf_in_c - attitude.bias_omega
                 times.append(t)
-                turns.append(attitude.R_fc @ exp(omega * (t - newest.t)))
+                turns.append(turned.T @ attitude.R_fc @ exp(omega * (t - newest.t)))
             t += PERIOD_S
         attitude.add(sample)
+        turned = attitude.take_turn() @ turned
         newest = sample
     return np.array(times), np.array(turns).reshape(-1, 3, 3)
 

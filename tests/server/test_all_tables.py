@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from server.experiments.all.results import read, seeds_of
+from server.experiments.all.show import table_of
 from server.experiments.all.tables import GOAL_COLUMN, Lines, Statements, Table, blocks, titled
 
 
@@ -68,6 +69,10 @@ def test_numbers_of_very_different_sizes_have_their_own_digits() -> None:
     (table,) = blocks([{"n": 512345.6}, {"n": 5.234}, {"n": 0.0}])
     assert isinstance(table, Table)
     assert texts(table) == [["512346"], ["5.234"], ["0"]]
+
+
+def test_a_table_that_has_no_rows_yet_has_its_heads() -> None:
+    assert str(table_of(Table("t", ("session", "seed"), ()))).count("<th") == 3  # and the thead
 
 
 def test_units_are_told_as_people_write_them() -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from hardware.robot_file import load_robot
 from hardware.sim.obstacle import Socket
+from server.experiments import main
 from server.experiments.contact import command, picture
 from server.experiments.contact.flight import Trace, fly
 from server.experiments.contact.free import Free
@@ -141,3 +142,8 @@ def test_pressing_with_3_n_keeps_contact_and_the_plug_goes_in_and_out(tmp_path: 
     assert soft["overshoot_pct"] < 30.0 < stiff["overshoot_pct"]
     assert (plug["plugged"], plug["out"]) == ("1/1", "1/1")
     assert (tmp_path / "contact.png").is_file()
+
+
+def test_a_robot_without_the_papers_gains_is_refused_in_one_line(capsys):
+    assert main(["contact", "--robot", "quadrotor"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

@@ -36,8 +36,9 @@ def _mark(good: bool) -> Markup:
 
 def table_of(table: Table) -> Markup:
     """It can be pushed sideways where it is too wide."""
-    columns = zip(table.columns, zip(*table.rows, strict=True), strict=bool(table.columns))
-    heads = [element("th", title, scope="col", **_class(column)) for title, column in columns]
+    columns = list(zip(*table.rows, strict=True)) or [()] * len(table.columns)
+    named = zip(table.columns, columns, strict=bool(table.columns))
+    heads = [element("th", title, scope="col", **_class(column)) for title, column in named]
     rows = (element("tr", *_cells(row)) for row in table.rows)
     inside = [element("thead", element("tr", *heads))] if heads else []
     inside.append(element("tbody", *rows))

@@ -20,6 +20,7 @@ from server.experiments.contact.setting import LEAST_N, Scene, Way, foretold_n
 from server.experiments.numbers import number, whole
 from server.experiments.paper.leader import PAPER, Leader, phone
 from server.experiments.paper.measure import plain
+from server.experiments.paper.variants import check_gains
 
 STIFF: Final = Way("stiff", None)
 IN_BAND_PCT: Final = 95.0
@@ -31,6 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     leader = PAPER if arguments.leader == PAPER.name else phone(arguments.fps)
     try:
         robot_file = load_robot(arguments.robot)
+        check_gains(robot_file, arguments.robot)
         flown = flown_of(arguments, robot_file)
     except (RobotFileError, ValueError) as error:
         print(f"lightleash experiments contact: {error}", file=sys.stderr)
@@ -54,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         figures = {**head, "rows": _plain(rows), "free": _plain(free), "holds": holds}
         arguments.out.mkdir(parents=True, exist_ok=True)
         file = arguments.out / "contact.json"
-        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False))
+        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
         drawn = picture.draw(shown, arguments.out / "contact.png")
         print(f"\nwritten: {file}, {drawn}")
     return 0 if all(holds.values()) else 1
@@ -106,7 +108,9 @@ def goals(rows: Sequence[Row], free: Sequence[Free]) -> dict[str, bool]:
         f"compliant, a wall: in the band {IN_BAND_PCT:g} % of the time of pressing": all(
             row.in_band_pct >= IN_BAND_PCT for row in walls
         ),
-        "compliant: contact is never lost while pressing": all(row.lost == 0 for row in soft),
+        "compliant: contact is never lost while pressing": all(
+            row.lost == 0 and row.touching_pct > 0.0 and not row.ended for row in soft
+        ),
         "compliant: the plug goes in, and out again": all(
             len(set(row.plugged.split("/"))) == 1 and row.out == row.plugged for row in plugs
         ),

@@ -66,7 +66,8 @@ def fly(
         rows.append((t, -touched.force_in_f[0], touched.peak_n, depth, side))
         pushes += touched.pushes
     columns = np.array(rows).reshape(-1, 5).T
-    ended = f"{led.t - HOVER_S:+.2f} s: {led.ended}" if led.ended else ""
+    why = led.ended or ("" if led.tracks else "tracking never began")
+    ended = f"{led.t - HOVER_S:+.2f} s: {why}" if why else ""
     t_s, force_n, peak_n, depth_m, side_m = columns
     touches = np.array(pushes, dtype=np.bool_)
     return Trace(t_s, force_n, peak_n, touches, depth_m, side_m, ended)

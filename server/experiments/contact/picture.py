@@ -19,6 +19,8 @@ def draw(shown: Sequence[tuple[Row, Trace]], path: Path) -> Path:
         ones = [(row, trace) for row, trace in shown if row.scene == scene]
         for k, (row, trace) in enumerate(ones):
             colour = f"C{3 - k}" if k < 4 else f"C{k}"
+            if not len(trace.t):
+                continue
             axis.plot(trace.t, smooth(trace.force_n), color=colour, lw=1.0, label=row.way)
             if k > 0:
                 edges = row.foretold_n - BAND_N, row.foretold_n + BAND_N

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Protocol, get_args
 
-from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from hardware.robot_file import RobotFileError, load_robot
 from pipeline.config import EstimatorName, VirtualCameraMode
 from server.experiments import processes
 from server.experiments.numbers import number, whole
@@ -25,10 +25,9 @@ from server.experiments.paper import (
 from server.experiments.paper.leader import PAPER, Leader, phone
 from server.experiments.paper.measure import Setup
 from server.experiments.paper.variants import (
-    WITH_EKF,
-    WITHOUT_EKF,
     Variant,
     Wishes,
+    check_gains,
     ours,
 )
 
@@ -96,20 +95,9 @@ def write(outcomes: Sequence[Outcome], setup: Setup, folder: Path) -> list[Path]
     head = {"source": published.SOURCE, "assumptions": assumptions.json(assumptions.of(setup))}
     results = {outcome.name: outcome.json() for outcome in outcomes}
     figures = folder / "paper.json"
-    figures.write_text(json.dumps({**head, **results}, indent=1, ensure_ascii=False))
+    told = json.dumps({**head, **results}, indent=1, ensure_ascii=False)
+    figures.write_text(told, encoding="utf-8")
     return [figures, *(path for outcome in outcomes for path in outcome.draw(folder))]
-
-
-def check_gains(robot_file: RobotFile, name: str, wished: str | None) -> None:
-    """Whether the robot has what is to be flown.
-
-    Raises:
-        ValueError: it lacks a set; says which there are.
-    """
-    needed = {WITHOUT_EKF.gains, WITH_EKF.gains, *([wished] if wished else [])}
-    for gains in sorted(needed - set(robot_file.gains)):
-        has = ", ".join(robot_file.gains)
-        raise ValueError(f"{name}: gains: {gains!r} is not one of its sets: {has}")
 
 
 def leader_of(arguments: argparse.Namespace) -> Leader:

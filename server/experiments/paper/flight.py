@@ -88,6 +88,8 @@ class Flight:
             self._advance()
             if self._ended:
                 break
+        if not self._ended and not self._rows.t:
+            self._ended = "tracking never began"
         return self._trace()
 
     def _advance(self) -> None:

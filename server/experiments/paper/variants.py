@@ -101,3 +101,15 @@ def config_of(robot_file: RobotFile, variant: Variant, leader: Leader) -> Teleop
         feedforward=feedforward,
         allocation=AllocationConfig(policy=variant.allocation),
     )
+
+
+def check_gains(robot_file: RobotFile, name: str, wished: str | None = None) -> None:
+    """Whether the robot has what is to be flown.
+
+    Raises:
+        ValueError: it lacks a set; says which there are.
+    """
+    needed = {WITHOUT_EKF.gains, WITH_EKF.gains, *([wished] if wished else [])}
+    for gains in sorted(needed - set(robot_file.gains)):
+        has = ", ".join(robot_file.gains)
+        raise ValueError(f"{name}: gains: {gains!r} is not one of its sets: {has}")

@@ -20,7 +20,7 @@ from server.experiments.sweep.sweep_file import Sweep, examples, read
 from server.experiments.sweep.workers import on_cluster, on_processes
 from server.films.progress import Progress
 
-INTERRUPTED, KILLED = 130, 1
+INTERRUPTED, KILLED = 130, 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,7 +41,7 @@ def _workers(text: str) -> int:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Fly; 0 if all is done, 130 after Ctrl-C, 2 if it can't be flown."""
+    """Fly; 0 if all is done, 130 after Ctrl-C, 2 if it can't be flown, 3 if a worker was killed."""
     if arguments.keys:
         print("\n".join(_listed()))
         return 0
@@ -75,10 +75,12 @@ def _flown(sweep: Sweep, results: Results, folder: Path, arguments: argparse.Nam
             f"{len(results.done)} sessions; now {results.cpu_s - cpu_s:.1f} CPU-seconds "
             f"by {hands} in {monotonic() - started:.1f} s"
         )
+    drawn = ""
     if results.done:
         print(summary.table(sweep, results.done))
         picture.draw(sweep, results.done, folder / "sweep.png")
-    print(f"written: {folder}/results.csv, sweep.json, sweep.png")
+        drawn = ", sweep.png"
+    print(f"written: {folder}/results.csv, sweep.json{drawn}")
     return code
 
 

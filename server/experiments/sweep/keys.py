@@ -81,8 +81,8 @@ Allowed = Number | Word | Switch | RobotNumber
 
 SCENE: Final[Mapping[str, Allowed]] = {
     "hand": Word(tuple(HANDS)),
-    "latency_ms": Number(0.0, 1000.0),  # mean, from capture to arrival
-    "jitter_ms": Number(0.0, 1000.0),  # whole width about the mean
+    "latency_ms": Number(0.0, 400.0),  # mean, from capture to arrival; filters look back 500 ms
+    "jitter_ms": Number(0.0, 400.0),  # whole width about the mean, which it leaves as it is
     "fps": Number(1.0, 1000.0),
     "led_noise_px": Number(0.0, 10.0),  # at 1280x720
     "readout_ms": Number(-50.0, 50.0),  # of the rolling shutter

@@ -74,7 +74,11 @@ class Results:
         for line in path.read_bytes().splitlines(keepends=True):
             if not line.endswith(b"\n"):
                 break
-            outcome = _outcome(json.loads(line))
+            try:
+                outcome = _outcome(json.loads(line))
+                self._sweep.point_of(outcome.index)
+            except (ValueError, KeyError, TypeError, IndexError) as error:
+                raise SweepError(str(path), "a line is damaged; allowed: a new --out") from error
             done[outcome.index] = outcome
             whole += len(line)
         with path.open("r+b") as file:
@@ -180,7 +184,7 @@ def _cell(value: object) -> object:
     if isinstance(value, float):
         return "" if isnan(value) else f"{value:.6g}"
     if isinstance(value, tuple):
-        return " ".join(f"{one:g}" for one in value)
+        return " ".join(str(_cell(one)) for one in value)
     return value
 
 

@@ -131,11 +131,12 @@ def prepared(session: Session) -> Flown:
     robot_file = _robot(session.robot, settings)
     told = {key.partition(".")[2]: value for key, value in settings.items() if _is(key, "scene")}
     wanted = {**USUAL, **told}
-    mean_s, half_s = 1e-3 * wanted["latency_ms"], 0.5e-3 * wanted["jitter_ms"]
+    mean_s = 1e-3 * wanted["latency_ms"]
+    half_s = min(0.5e-3 * wanted["jitter_ms"], mean_s)
     scene = Scene(
         hand=wanted["hand"],
         seed=session.seed,
-        latency_s=(max(0.0, mean_s - half_s), mean_s + half_s),
+        latency_s=(mean_s - half_s, mean_s + half_s),
         frame_rate_hz=wanted["fps"],
         readout_s=1e-3 * wanted["readout_ms"],
         led_noise_px=None if wanted["rendered"] else wanted["led_noise_px"],

@@ -20,7 +20,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from hardware.robot_file import RobotFileError, robot_of, robot_path, robot_table
 from server.experiments.sweep.errors import SweepError
@@ -107,6 +107,9 @@ def _checked(table: Mapping[str, Any], folder: Path) -> Sweep:
         varied=tuple(dict.fromkeys([key for row in rows for key in row] + list(grid))),
         points=tuple(_points(grid, rows)),
     )
+    total = len(sweep.points) * len(sweep.seeds)
+    if total > MOST:
+        raise SweepError("seeds", f"{total} sessions; allowed: {MOST}")
     for robot_point in dict.fromkeys(map(_robot_part, sweep.points)):
         prepared(Session(0, 0, 1.0, 0.0, robot, merged((*sweep.fixed, *robot_point))))
     return sweep
@@ -183,7 +186,12 @@ def _value(key: str, value: object, known: Mapping[str, Allowed]) -> Value:
     refused = known[key].says_no(value)
     if refused:
         raise SweepError(key, f"{refused}, not {value!r}")
-    return tuple(value) if isinstance(value, list) else value  # type: ignore[return-value]
+    return cast(Value, _frozen(value))
+
+
+def _frozen(value: object) -> object:
+    """Lists as tuples, those inside too: settings are compared and counted."""
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
 def _seeds(seeds: object) -> tuple[int, ...]:
