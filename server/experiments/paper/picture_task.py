@@ -35,7 +35,9 @@ def figure_times(times: Sequence[tuple[str, str, int, float]], path: Path) -> Pa
         axis.set_ylabel("time [s]")
         axis.set_ylim(0.0, published.LIMIT_S + 2.0)
     axes[-1].set_xlabel("attempt")
-    axes[0].legend(loc="best", fontsize="small")
+    axes[0].legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize="small", frameon=False
+    )
     return save(figure, path)
 
 
