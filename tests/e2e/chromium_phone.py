@@ -94,8 +94,8 @@ class ChromiumPhone(PlayedPhone):
         self._override("gyroscope", _triple(omega))
 
     def tap(self, selector: str) -> None:
-        """Touch an element shortly."""
-        self.page.tap(selector)
+        """Touch an element shortly, whatever it does now: waiting for it would still the hand."""
+        self.page.tap(selector, force=True)
 
     def hold(self) -> None:
         """Put a finger on the big button."""

@@ -23,6 +23,9 @@ LANDSCAPE = {
     "device_scale_factor": 1,
 }
 
+MAY_ARM = """
+(({disabled, dataset}) => !disabled && dataset.what === 'arm')(document.querySelector('#wish'))
+"""
 STARVED = ("are silent", "No word from the phone", "time stamps are off", "too uncertain")
 """How the robot says that a machine was too busy for the page's sensors, finger or pictures: a hand
 is told to the page as often as the machine manages, and a tremor told 30 times a second is none."""
@@ -41,14 +44,14 @@ def start(phone: ChromiumPhone, server: Serving) -> None:
     """Open the page, tap Start, wait until arming would be granted."""
     phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
     phone.page.tap("#start")
-    phone.play_until("!document.querySelector('#wish').disabled", 25.0)
+    phone.play_until(MAY_ARM, 25.0)
 
 
 def lead(phone: PlayedPhone, tries: int = 3) -> None:
     """Arm and hold; again if a busy machine starved the sensors and the robot was disarmed."""
     for left in reversed(range(tries)):
         try:
-            phone.play_until("!document.querySelector('#wish').disabled", 25.0)
+            phone.play_until(MAY_ARM, 25.0)
             phone.tap("#wish")
             phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
             phone.play(0.7)
