@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import radians
 from pathlib import Path
@@ -31,6 +31,7 @@ from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.margins import Loop, Sensing
 from pipeline.gains import Gains
 from server import tune_table
+from server.experiments.numbers import number
 from server.experiments.sweep.session import Figures, Session, fly
 from server.one_line import Parser
 
@@ -191,7 +192,7 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
     """Options from the command line."""
     parser = Parser(prog="lightleash tune", description=__doc__)
     parser.add_argument("robot", metavar="ROBOT", help="name or path of a robot file")
-    latency, gain, phase = _between(0.0, 400.0), _between(2.0, 20.0), _between(15.0, 75.0)
+    latency, gain, phase = number(0.0, 400.0), number(2.0, 20.0), number(15.0, 75.0)
     parser.add_argument(
         "--latency-ms", type=latency, required=True, metavar="X", help="of a picture, until fused"
     )
@@ -206,15 +207,3 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         "--flights", type=int, choices=range(1, 101), default=3, metavar="N", help="of each kind"
     )
     return parser.parse_args(argv)
-
-
-def _between(low: float, high: float) -> Callable[[str], float]:
-    """Reads a number within a range."""
-
-    def number(word: str) -> float:
-        value = float(word)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{word}: allowed: {low:g} to {high:g}")
-        return value
-
-    return number

@@ -6,7 +6,7 @@ import argparse
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from math import degrees, isfinite
+from math import degrees
 from pathlib import Path
 
 import numpy as np
@@ -165,10 +165,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def told(one: Row) -> dict[str, str | float | None]:
+def told(one: Row) -> dict[str, object]:
     """For programs, without the response; null is what has no limit, or isn't there."""
-    values = {f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"}
-    return {k: v if isinstance(v, str) or isfinite(v) else None for k, v in values.items()}
+    return text.plain({f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

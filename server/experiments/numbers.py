@@ -10,22 +10,22 @@ from math import inf
 def number(low: float, high: float) -> Callable[[str], float]:
     """Reads a number within a range."""
 
-    def read(text: str) -> float:
+    def number(text: str) -> float:  # argparse names it where this is none
         value = float(text)
         if not low <= value <= high < inf:
             raise argparse.ArgumentTypeError(f"{text}: allowed: {low:g} to {high:g}")
         return value
 
-    return read
+    return number
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:
     """Reads a whole number within a range."""
 
-    def read(text: str) -> int:
+    def whole_number(text: str) -> int:
         value = int(text)
         if not low <= value <= high:
             raise argparse.ArgumentTypeError(f"{text}: allowed: {low} to {high}")
         return value
 
-    return read
+    return whole_number

@@ -1,8 +1,10 @@
-"""Tables as the experiments print them."""
+"""Tables and statements as the experiments print them, rows as they write them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from math import isfinite
+from typing import Protocol
 
 Column = tuple[str, str, str]
 """Attribute of a row, title, format such as "{:>7.2f}"."""
@@ -15,3 +17,37 @@ def table(columns: Sequence[Column], rows: Iterable[object]) -> str:
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = ("  ".join(c.rjust(w) for c, w in zip(line, widths, strict=True)) for line in cells)
     return "\n".join(lines)
+
+
+class Flown(Protocol):
+    """A row about flights."""
+
+    @property
+    def ended(self) -> str:
+        """When and why one ended early; empty: none did."""
+        ...
+
+
+def dashed(columns: Sequence[Column], rows: Iterable[object]) -> str:
+    """A table with a dash for what nobody knows."""
+    return table(columns, rows).replace("nan", "  –")
+
+
+def flights(columns: Sequence[Column], rows: Sequence[Flown]) -> str:
+    """A table with dashes that also says which flights ended early."""
+    ends = ["", *(f"  ended at {row.ended}" if row.ended else "" for row in rows)]
+    lines = dashed(columns, rows).splitlines()
+    return "\n".join(line + end for line, end in zip(lines, ends, strict=True))
+
+
+def statements(holds: Mapping[str, bool]) -> Iterator[str]:
+    """A line each."""
+    return (f"{'holds' if good else 'MISSED'}: {what}" for what, good in holds.items())
+
+
+def plain(row: Mapping[str, object]) -> dict[str, object]:
+    """For JSON, which has no NaN."""
+    return {
+        key: None if isinstance(value, float) and not isfinite(value) else value
+        for key, value in row.items()
+    }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -19,6 +19,7 @@ from pipeline.config import VirtualCameraConfig
 from pipeline.control.cutoff import time_constants
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import Array, log, rotation_about_z
+from server.experiments.numbers import number
 from server.experiments.text import Column, table
 from server.experiments.tremor_hand import (
     PERIOD_S,
@@ -207,25 +208,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _between(low: float, high: float) -> Callable[[str], float]:
-    """Reads a number within a range."""
-
-    def number(text: str) -> float:
-        value = float(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text}: allowed: {low:g} to {high:g}")
-        return value
-
-    return number
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("--hand", default="steady", help="of the virtual phone")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seconds", type=_between(SHORTEST_S, 3600.0), default=64.0)
+    parser.add_argument("--seconds", type=number(SHORTEST_S, 3600.0), default=64.0)
     parser.add_argument("--recording", type=Path, default=None, help="MCAP: its phone's motion")
-    parser.add_argument("--cutoff-hz", type=_between(SLOWEST_HZ, FASTEST_HZ), default=0.28)
-    parser.add_argument("--distance-m", type=_between(0.3, 12.0), default=2.5)
-    parser.add_argument("--side-deg", type=_between(-60.0, 60.0), default=0.0, help="off the axis")
+    parser.add_argument("--cutoff-hz", type=number(SLOWEST_HZ, FASTEST_HZ), default=0.28)
+    parser.add_argument("--distance-m", type=number(0.3, 12.0), default=2.5)
+    parser.add_argument("--side-deg", type=number(-60.0, 60.0), default=0.0, help="off the axis")
     parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")

@@ -19,8 +19,8 @@ from server.experiments.contact.measure import Row, row_of, table_of
 from server.experiments.contact.setting import LEAST_N, Scene, Way, foretold_n
 from server.experiments.numbers import number, whole
 from server.experiments.paper.leader import PAPER, Leader, phone
-from server.experiments.paper.measure import plain
 from server.experiments.paper.variants import check_gains
+from server.experiments.text import plain, statements
 
 STIFF: Final = Way("stiff", None)
 IN_BAND_PCT: Final = 95.0
@@ -50,10 +50,14 @@ def run(arguments: argparse.Namespace) -> int:
     free = free_flights(robot_file, leader, [STIFF, *_soft(arguments)], list(seeds))
     holds = goals(rows, free)
     print(f"\n{table_of(rows)}\n\n{free_table(free)}\n")
-    print("\n".join(f"{'holds' if good else 'MISSED'}: {what}" for what, good in holds.items()))
+    print("\n".join(statements(holds)))
     if arguments.out is not None:
         head = {"assumptions": assumptions.json(said), "seeds": list(seeds)}
-        figures = {**head, "rows": _plain(rows), "free": _plain(free), "holds": holds}
+        told = {
+            "rows": [plain(asdict(row)) for row in rows],
+            "free": [plain(asdict(one)) for one in free],
+        }
+        figures = {**head, **told, "holds": holds}
         arguments.out.mkdir(parents=True, exist_ok=True)
         file = arguments.out / "contact.json"
         file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
@@ -118,14 +122,6 @@ def goals(rows: Sequence[Row], free: Sequence[Free]) -> dict[str, bool]:
             one.rms_mm <= 1.02 * stiff[NEAR] for one in free if one.hand == NEAR
         ),
     }
-
-
-def _plain(rows: Sequence[Row] | Sequence[Free]) -> list[dict[str, object]]:
-    """For JSON, which has no NaN."""
-    return [
-        {key: plain(v) if isinstance(v, float) else v for key, v in asdict(row).items()}
-        for row in rows
-    ]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

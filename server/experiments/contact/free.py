@@ -15,7 +15,7 @@ from server.experiments.contact.setting import Way
 from server.experiments.paper.flight import Flight
 from server.experiments.paper.leader import Leader
 from server.experiments.paper.measure import rms
-from server.experiments.text import Column, table
+from server.experiments.text import Column, dashed
 
 NEAR: Final = "moving"
 """About ±6 cm at 0.3 Hz: the suspension pulls by up to 1.6 N."""
@@ -62,4 +62,4 @@ def free_flights(
 
 def free_table(rows: Sequence[Free]) -> str:
     """One line a row."""
-    return table(COLUMNS, rows).replace("nan", "  –")
+    return dashed(COLUMNS, rows)

@@ -15,7 +15,7 @@ from server.experiments.contact.flight import PER_PERIOD, Trace
 from server.experiments.contact.setting import BAND_N, FULL, GO_S, STAY_S, Scene, Way
 from server.experiments.paper.led import PERIOD_S
 from server.experiments.paper.measure import rms
-from server.experiments.text import Column, table
+from server.experiments.text import Column, flights
 
 SETTLE_S: Final = 2.0
 """After the hand has arrived; from then on until it goes back the force is to be in the band."""
@@ -105,9 +105,7 @@ COLUMNS: Final[tuple[Column, ...]] = (
 
 def table_of(rows: Sequence[Row]) -> str:
     """One line a row."""
-    lines = table(COLUMNS, rows).replace("nan", "  –").splitlines()
-    ends = ["", *(f"  ended at {row.ended}" if row.ended else "" for row in rows)]
-    return "\n".join(line + end for line, end in zip(lines, ends, strict=True))
+    return flights(COLUMNS, rows)
 
 
 def smooth(force_n: Array) -> Array:

@@ -17,9 +17,9 @@ from pipeline.config import VirtualCameraMode
 from server.experiments.paper import assumptions, published
 from server.experiments.paper.assumption import Assumption
 from server.experiments.paper.leader import PAPER, PERFECT, Leader, phone
-from server.experiments.paper.measure import Cell, Setup, cell_of, plain
+from server.experiments.paper.measure import Cell, Setup, cell_of
 from server.experiments.paper.variants import Variant, Wishes, ours
-from server.experiments.text import Column, table
+from server.experiments.text import Column, flights, plain
 
 NAME: Final = "beaten"
 TITLE: Final = (
@@ -102,17 +102,12 @@ class Summary:
 
     def text(self) -> str:
         """Title and table."""
-        lines = table(COLUMNS, self.rows).replace("nan", "  –").splitlines()
-        ends = ["", *(f"  ended at {row.ended}" if row.ended else "" for row in self.rows)]
-        rows = (a + b for a, b in zip(lines, ends, strict=True))
-        return "\n".join((TITLE, *rows, "Its phone:", assumptions.lines(_of_phone())))
+        rows = flights(COLUMNS, self.rows)
+        return "\n".join((TITLE, rows, "Its phone:", assumptions.lines(_of_phone())))
 
     def json(self) -> dict[str, object]:
         """The same for programs; null is what was not flown."""
-        rows = [
-            {key: plain(v) if isinstance(v, float) else v for key, v in asdict(row).items()}
-            for row in self.rows
-        ]
+        rows = [plain(asdict(row)) for row in self.rows]
         return {"title": TITLE, "rows": rows, "phone": assumptions.json(_of_phone())}
 
     def draw(self, folder: Path) -> list[Path]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import nan
 from pathlib import Path
 from typing import Final
@@ -13,10 +13,10 @@ import numpy as np
 from pipeline.frames import Array
 from server.experiments.paper import published
 from server.experiments.paper.flight import Push, Trace
-from server.experiments.paper.measure import Setup, plain
+from server.experiments.paper.measure import Setup
 from server.experiments.paper.picture import figure_9
 from server.experiments.paper.variants import WITH_VCI, Variant
-from server.experiments.text import Column, table
+from server.experiments.text import Column, flights, plain, statements
 
 NAME: Final = "disturbance"
 TITLE: Final = (
@@ -72,24 +72,11 @@ class Pushed:
 
     def text(self) -> str:
         """Title, table, statements."""
-        lines = table(COLUMNS, self.rows).replace("nan", "  –").splitlines()
-        ends = ["", *(f"  ended at {row.ended}" if row.ended else "" for row in self.rows)]
-        said = (f"{'holds' if good else 'MISSED'}: {what}" for what, good in self.holds.items())
-        return "\n".join((TITLE, *(a + b for a, b in zip(lines, ends, strict=True)), *said))
+        return "\n".join((TITLE, flights(COLUMNS, self.rows), *statements(self.holds)))
 
     def json(self) -> dict[str, object]:
         """The same for programs; null is what could not be measured."""
-        rows = [
-            {
-                "variant": row.variant,
-                "peak_mm": plain(row.peak_mm),
-                "back_s": plain(row.back_s),
-                "spread_s": plain(row.spread_s),
-                "answer_n": plain(row.answer_n),
-                "ended": row.ended,
-            }
-            for row in self.rows
-        ]
+        rows = [plain(asdict(row)) for row in self.rows]
         return {
             "title": TITLE,
             "paper": {"back_s": published.BACK_S},

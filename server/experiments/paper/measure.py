@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite, nan
+from math import nan
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from pipeline.frames import Array
 from server.experiments.paper.flight import Flight, Push, Trace
 from server.experiments.paper.leader import Leader
 from server.experiments.paper.variants import Variant, config_of
-from server.experiments.text import Column, table
+from server.experiments.text import Column, flights
 
 WINDOW_S: Final = 3.5
 """Of all RMS and largest errors, since the arm's move begins."""
@@ -89,11 +89,7 @@ COLUMNS: Final[tuple[Column, ...]] = (
 
 def table_of(cells: Sequence[Cell]) -> str:
     """One line a figure."""
-    lines = table(COLUMNS, cells).splitlines()
-    ends = ["", *(f"  ended at {cell.ended}" if cell.ended else "" for cell in cells)]
-    return "\n".join(line + end for line, end in zip(lines, ends, strict=True)).replace(
-        "nan", "  –"
-    )
+    return flights(COLUMNS, cells)
 
 
 def cell_of(variant: str, axis: str, paper: float, traces: Sequence[Trace]) -> Cell:
@@ -128,8 +124,3 @@ def within(trace: Trace, rows: Array) -> Array:
 def rms(values: Array) -> float:
     """Root of the mean square; NaN of nothing."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else nan
-
-
-def plain(value: float) -> float | None:
-    """For JSON, which has no NaN."""
-    return value if isfinite(value) else None

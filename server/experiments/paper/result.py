@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from server.experiments.paper.measure import Cell, plain, table_of
+from server.experiments.paper.measure import Cell, table_of
+from server.experiments.text import plain, statements
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,13 +25,9 @@ class Result:
 
     def text(self) -> str:
         """Title, table, statements."""
-        said = (f"{'holds' if good else 'MISSED'}: {what}" for what, good in self.holds.items())
-        return "\n".join((self.title, table_of(self.cells), *said))
+        return "\n".join((self.title, table_of(self.cells), *statements(self.holds)))
 
     def json(self) -> dict[str, object]:
         """The same for programs; null is what could not be measured."""
-        rows = [
-            {key: plain(v) if isinstance(v, float) else v for key, v in row.items()}
-            for row in ({**asdict(cell), "ratio": cell.ratio} for cell in self.cells)
-        ]
+        rows = [plain({**asdict(cell), "ratio": cell.ratio}) for cell in self.cells]
         return {"title": self.title, "cells": rows, "holds": dict(self.holds)}

@@ -17,12 +17,12 @@ from typing import Final
 import numpy as np
 
 from server.experiments.paper import published
-from server.experiments.paper.measure import Setup, plain
+from server.experiments.paper.measure import Setup
 from server.experiments.paper.picture_task import figure_beam, figure_times
 from server.experiments.paper.task import PEOPLE, Attempt
 from server.experiments.paper.trials import Trial, flown, trials_of
 from server.experiments.paper.variants import WITH_EKF, WITHOUT_EKF, Variant
-from server.experiments.text import Column, table
+from server.experiments.text import Column, dashed, plain, statements
 from server.films.progress import Progress
 
 NAME: Final = "table_3"
@@ -121,16 +121,11 @@ class Study:
             for trial, one in self.flown
             if one.ended
         )
-        said = (f"{'holds' if good else 'MISSED'}: {what}" for what, good in self.holds.items())
-        rows = table(COLUMNS, self.cells).replace("nan", "  –")
-        return "\n".join((TITLE, rows, *lost, *said))
+        return "\n".join((TITLE, dashed(COLUMNS, self.cells), *lost, *statements(self.holds)))
 
     def json(self) -> dict[str, object]:
         """The same for programs; null is what the paper has not."""
-        cells = [
-            {key: plain(v) if isinstance(v, float) else v for key, v in row.items()}
-            for row in ({**asdict(cell), "ratio": cell.ratio} for cell in self.cells)
-        ]
+        cells = [plain({**asdict(cell), "ratio": cell.ratio}) for cell in self.cells]
         attempts = [
             {
                 "operator": trial.name,

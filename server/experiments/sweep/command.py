@@ -10,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from time import monotonic
 
+from server.experiments.numbers import whole
 from server.experiments.processes import cores
 from server.experiments.sweep import picture, summary
 from server.experiments.sweep.errors import SweepError
@@ -28,16 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     given = f"what to sweep; given with the project: {', '.join(examples())}"
     parser.add_argument("file", nargs="?", type=Path, metavar="FILE.toml", help=given)
     parser.add_argument("--out", type=Path, help="folder; default: called as the file, beside it")
-    parser.add_argument("--workers", type=_workers, help="processes; default: one a core")
+    parser.add_argument("--workers", type=whole(1, 1024), help="processes; default: one a core")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, to fly there")
     parser.add_argument("--keys", action="store_true", help="list what can be swept, and stop")
-
-
-def _workers(text: str) -> int:
-    count = int(text)
-    if not 1 <= count <= 1024:
-        raise argparse.ArgumentTypeError(f"{text}: allowed: 1 to 1024")
-    return count
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -120,9 +114,7 @@ def _listed() -> Iterator[str]:
     """Every key with what it may be."""
     for key, allowed in known_keys(("NAME OF A GAIN SET",)).items():
         match allowed:
-            case Number():
-                what = allowed.says_no(None)
-            case Word() | Switch():
+            case Number() | Word() | Switch():
                 what = allowed.says_no(None)
             case _:
                 what = "as in a robot file"
