@@ -25,11 +25,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+import numpy as np
 from playwright.sync_api import BrowserContext, Page
 
 from server.experiments.text import table
 from server.settings import VideoSettings
 from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
+from tests.e2e.chromium_channel import Channel, reading
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.clock_canvas import clock_canvas
@@ -100,26 +102,28 @@ def receiving(result: Path) -> Iterator[dict[str, object]]:
 
 
 class Sensors:
-    """Motion sensors that sway, fed at more than 100 Hz."""
+    """Motion sensors that sway, fed at 100 Hz."""
 
     KINDS = ("accelerometer", "gyroscope", "linear-acceleration")
 
     def __init__(self, context: BrowserContext, page: Page) -> None:
-        self._page, self._cdp = page, context.new_cdp_session(page)
+        self._channel = Channel(context, page)
         for kind in self.KINDS:
-            told = {"enabled": True, "type": kind, "metadata": {}}
-            self._cdp.send("Emulation.setSensorOverrideEnabled", told)
+            told: dict[str, object] = {"enabled": True, "type": kind, "metadata": {}}
+            self._channel.orders(("Emulation.setSensorOverrideEnabled", told))
 
     def sway(self, seconds: float) -> None:
         """Play for so long."""
         end = time.monotonic() + seconds
         while (t := time.monotonic()) < end:
             turn = 0.3 * sin(2.0 * pi * t)
-            for kind, z in zip(self.KINDS, (9.81 + turn, turn, turn), strict=True):
-                reading = {"xyz": {"x": 0.5 * turn, "y": turn, "z": z}}
-                told = {"type": kind, "reading": reading}
-                self._cdp.send("Emulation.setSensorOverrideReadings", told)
-            self._page.wait_for_timeout(4)
+            felt = (np.array((0.5 * turn, turn, z)) for z in (9.81 + turn, turn, turn))
+            self._channel.orders(*map(reading, self.KINDS, felt))
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        """They read nothing any more."""
+        self._channel.close()
 
 
 def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
@@ -143,6 +147,7 @@ def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
         sensors.sway(1.0)
         sent = 8.0 * (page.evaluate(BYTES_SENT) - before) / (time.monotonic() - t_before)
         sensors.sway(seconds)
+        sensors.close()
         page.close()
     return judged(way, json.loads(result.read_text()), epoch, tapped, seconds, sent)
 

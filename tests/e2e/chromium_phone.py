@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from playwright.sync_api import BrowserContext, CDPSession, Page, sync_playwright
+from playwright.sync_api import BrowserContext, Page, sync_playwright
 
 from hardware.sim.hand import Hand
+from tests.e2e.chromium_channel import Channel, evaluation, reading, value_of
 from tests.e2e.played_phone import CANVAS, PlayedPhone
 
 FLAGS = [
@@ -25,7 +26,10 @@ FLAGS = [
     "--disable-sync",
     "--disable-renderer-backgrounding",
     "--disable-backgrounding-occluded-windows",
+    "--enable-automation",
+    "--remote-debugging-port=0",
 ]
+"""The last two are for `Channel`."""
 
 
 @contextlib.contextmanager
@@ -65,19 +69,16 @@ class ChromiumPhone(PlayedPhone):
         super().__init__(hand, leds_in_b, truth_port, 90.0)  # a phone emulated in landscape
         self.page: Page = context.new_page()
         self.page.add_init_script(CANVAS)
-        self._cdp: CDPSession = context.new_cdp_session(self.page)
+        self._channel = Channel(context, self.page)
         self._touches = False
         for kind in ("accelerometer", "gyroscope", "linear-acceleration"):
-            self._override(kind, (0.0, 0.0, 0.0), enable=True)
+            on: dict[str, object] = {"enabled": True, "type": kind, "metadata": {}}
+            self._channel.orders(("Emulation.setSensorOverrideEnabled", on))
 
-    def _override(self, kind: str, xyz: tuple[float, float, float], enable: bool = False) -> None:
-        if enable:
-            self._cdp.send(
-                "Emulation.setSensorOverrideEnabled",
-                {"enabled": True, "type": kind, "metadata": {}},
-            )
-        reading = {"xyz": dict(zip("xyz", xyz, strict=True))}
-        self._cdp.send("Emulation.setSensorOverrideReadings", {"type": kind, "reading": reading})
+    def close(self) -> None:
+        """Give the sockets back."""
+        super().close()
+        self._channel.close()
 
     @property
     def address(self) -> str:
@@ -86,23 +87,26 @@ class ChromiumPhone(PlayedPhone):
 
     def evaluate(self, script: str) -> Any:
         """The value of a JavaScript expression."""
-        return self.page.evaluate(script)
+        (answer,) = self._channel.orders(evaluation(script))
+        return value_of(answer)
 
-    def _sense(self, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
-        self._override("accelerometer", _triple(force))
-        self._override("linear-acceleration", _triple(linear))
-        self._override("gyroscope", _triple(omega))
+    def _tell(self, shown: str, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
+        answer, *_ = self._channel.orders(
+            evaluation(shown),
+            reading("accelerometer", force),
+            reading("linear-acceleration", linear),
+            reading("gyroscope", omega),
+        )
+        value_of(answer)
 
     def tap(self, selector: str) -> None:
-        """Touch an element shortly, whatever it does now: waiting for it would still the hand."""
-        self.page.tap(selector, force=True)
+        """Touch an element shortly."""
+        self._touch("touchStart", self._middle(selector))
+        self._touch("touchEnd")
 
     def hold(self) -> None:
         """Put a finger on the big button."""
-        box = self.page.locator("#hold").bounding_box()
-        assert box is not None
-        point = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
-        self._cdp.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [point]})
+        self._touch("touchStart", self._middle("#hold"))
         self._touches = True
 
     def let_go(self) -> None:
@@ -110,8 +114,15 @@ class ChromiumPhone(PlayedPhone):
         if not self._touches:
             return
         self._touches = False
-        self._cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        self._touch("touchEnd")
 
+    def _middle(self, selector: str) -> dict[str, float]:
+        """Of an element [px], asked without waiting for anything, which would still the hand."""
+        box = f"document.querySelector({selector!r}).getBoundingClientRect()"
+        x, y = self.evaluate(
+            f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])({box})"
+        )
+        return {"x": x, "y": y}
 
-def _triple(v: np.ndarray) -> tuple[float, float, float]:
-    return (float(v[0]), float(v[1]), float(v[2]))
+    def _touch(self, kind: str, *points: dict[str, float]) -> None:
+        self._channel.orders(("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points}))

@@ -48,14 +48,14 @@ class FirefoxPhone(PlayedPhone):
         """The value of a JavaScript expression."""
         return self.tab.evaluate(script)
 
-    def _sense(self, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
+    def _tell(self, shown: str, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
         felt = {
             "accelerationIncludingGravity": _named("xyz", force),
             "acceleration": _named("xyz", linear),
             "rotationRate": _named(("alpha", "beta", "gamma"), np.degrees(omega)),
             "interval": 16,
         }
-        self.evaluate(f"window.felt = {json.dumps(felt)}")
+        self.evaluate(f"({shown}, window.felt = {json.dumps(felt)}, null)")
 
     def tap(self, selector: str) -> None:
         """Touch an element shortly."""

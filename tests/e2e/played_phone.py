@@ -16,11 +16,15 @@ from hardware.sim.intent import Intent, Pose
 from hardware.sim.truth import Truth, TruthClient
 from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
-from pipeline.frames import GRAVITY, R_cd
+from pipeline.frames import GRAVITY, R_cd, exp, log
 from tests.e2e.page_scripts import BE_CAMERA
 
-AHEAD_S = 0.02
-"""So far each picture is foretold."""
+STEP_S = 0.01
+"""The hand is told so often, where the machine manages."""
+FORETOLD_S = np.array((0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.12, 0.16, 0.2))
+"""When the lights are told from now on: a page that is told late still shows where the hand is."""
+RECENT_S = 0.02
+"""The robot's last motion, which is taken to go on."""
 
 
 def _camera(width: int) -> Camera:
@@ -38,12 +42,15 @@ CANVAS = """
 (() => {
   const canvas = Object.assign(document.createElement('canvas'), {width: WIDTH, height: HEIGHT});
   const paint = canvas.getContext('2d', {alpha: false});
-  // A frame shows the lights where they are when it is painted, from what was told of two moments.
+  // A frame shows the lights where they are when it is painted, from what was told of the future.
   let told = null;
-  window.tellSpots = (t, t_ahead, spots, ahead) => { told = {t, t_ahead, spots, ahead}; };
-  const between = ({t, t_ahead, spots, ahead}) => {
-    const share = Math.min(2, (performance.now() - t) / (t_ahead - t));
-    return spots.map((spot, i) => spot.map((now, k) => now + share * (ahead[i][k] - now)));
+  window.tellSpots = (times, spots) => { told = {times, spots}; };
+  const now_of = ({times, spots}) => {
+    const t = Math.min(performance.now(), times.at(-1));
+    const next = Math.max(1, times.findIndex((later) => later >= t));
+    const share = (t - times[next - 1]) / (times[next] - times[next - 1]);
+    const mix = (from, to) => from.map((value, k) => value + share * (to[k] - value));
+    return spots[next - 1].map((spot, i) => mix(spot, spots[next][i]));
   };
   const draw = (spots) => {
     paint.fillStyle = '#1c1c1c';
@@ -60,7 +67,7 @@ CANVAS = """
     }
   };
   const onFrame = () => {
-    draw(told ? between(told) : []);
+    draw(told ? now_of(told) : []);
     requestAnimationFrame(onFrame);
   };
   onFrame();
@@ -95,8 +102,11 @@ class PlayedPhone(ABC):
         """The value of a JavaScript expression."""
 
     @abstractmethod
-    def _sense(self, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
-        """Let the page's sensors feel it, each (3,) in d: with gravity, without, turning."""
+    def _tell(self, shown: str, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
+        """Run `shown`, a JavaScript expression, and let the sensors feel from now on.
+
+        Each (3,) in d: specific force, the same without gravity [m/s²], turn rate [rad/s].
+        """
 
     @abstractmethod
     def tap(self, selector: str) -> None:
@@ -116,28 +126,33 @@ class PlayedPhone(ABC):
 
     def step(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Show what the camera would see and feel now; gives the poses of hand and body."""
+        time.sleep(max(0.0, self._stepped + STEP_S - time.monotonic()))
         truth = self._truth.latest()
-        t = float(truth.t[-1])
-        body, hand = truth.at(t), self._hand.pose(t)
-        self._show(t, hand, body, (self._hand.pose(t + AHEAD_S), _onwards(truth, AHEAD_S)))
         now = time.monotonic()
         t_felt, self._stepped = now + 0.5 * (now - self._stepped), now  # what is set is read on
         force_in_d = self._R_dc @ self._hand.specific_force_in_c(t_felt)
         up_in_d = self._R_dc @ self._hand.pose(t_felt)[0][2] * GRAVITY
         omega_in_d = self._R_dc @ self._hand.omega_in_c(t_felt)
-        self._sense(force_in_d, force_in_d - up_in_d, omega_in_d)
-        return hand, body
+        self._tell(self._shown(truth), force_in_d, force_in_d - up_in_d, omega_in_d)
+        t = float(truth.t[-1])
+        return self._hand.pose(t), truth.at(t)
 
-    def _show(self, t: float, hand: Pose, body: Pose, ahead: tuple[Pose, Pose]) -> None:
-        t_page = 1e3 * (t - self._page_epoch())
-        told = [t_page, t_page + 1e3 * AHEAD_S, self._spots(hand, body), self._spots(*ahead)]
-        self.evaluate(f"tellSpots(...{json.dumps(told)})")
+    def _shown(self, truth: Truth) -> str:
+        """The expression that paints the lights from now on."""
+        t = float(truth.t[-1])
+        times = (1e3 * (t - self._page_epoch() + FORETOLD_S)).tolist()
+        bodies = _onwards(truth)
+        spots = [
+            self._spots(self._hand.pose(t + ahead), body)
+            for ahead, body in zip(FORETOLD_S, bodies, strict=True)
+        ]
+        return f"tellSpots({json.dumps(times)}, {json.dumps(spots)})"
 
     def _spots(self, hand: Pose, body: Pose) -> list[list[float]]:
         """(u, v, radius) [px] of each LED."""
         q = (body[1] - hand[1] + self._leds_in_b @ body[0].T) @ hand[0]
         radius = CAMERA.K[0, 0] * 0.008 / q[:, :1]
-        spots: list[list[float]] = np.hstack((CAMERA.pixels(q), radius)).tolist()
+        spots: list[list[float]] = np.hstack((CAMERA.pixels(q), radius)).round(4).tolist()
         return spots
 
     def _page_epoch(self) -> float:
@@ -171,6 +186,12 @@ class PlayedPhone(ABC):
                 return
         raise TimeoutError(f"{condition} within {seconds} s; the page says: {self.words()}")
 
+    def choose(self, selector: str, value: str) -> None:
+        """In a list, as a person does, who can't be imitated in a list of the system's own."""
+        list_is = f"list = document.querySelector({json.dumps(selector)})"
+        choice = f"list.value = {json.dumps(value)}; list.dispatchEvent(new Event('change'));"
+        self.evaluate(f"(({list_is}) => {{ {choice} }})()")
+
     def words(self) -> str:
         """All that is written on the page."""
         return str(self.evaluate("document.body.innerText")).replace("\n", " · ")
@@ -203,8 +224,9 @@ class PlayedPhone(ABC):
         return 1e3 * float(np.sqrt(np.mean(np.square(kept))))
 
 
-def _onwards(truth: Truth, seconds: float) -> Pose:
-    """Of the body after the last known moment, if it goes on as it did."""
+def _onwards(truth: Truth) -> list[Pose]:
+    """Of the body at all times foretold, if it goes on as it did."""
     t = float(truth.t[-1])
-    (R_before, p_before), (R, p) = truth.at(t - seconds), truth.at(t)
-    return R @ R_before.T @ R, 2.0 * p - p_before
+    (R_before, p_before), (R, p) = truth.at(t - RECENT_S), truth.at(t)
+    v, turn = (p - p_before) / RECENT_S, log(R @ R_before.T) / RECENT_S
+    return [(exp(ahead * turn) @ R, p + ahead * v) for ahead in FORETOLD_S]

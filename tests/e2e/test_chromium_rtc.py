@@ -192,7 +192,7 @@ def test_the_robot_is_led_by_webrtc_and_does_not_jump_when_the_way_is_changed_by
         for before, wish in itertools.pairwise((*ways, "WebRTC")):
             # the first one may have been left by a flight that a busy machine ended
             wishes = [
-                (t, partial(phone.page.select_option, "#path-wish", way))
+                (t, partial(phone.choose, "#path-wish", way))
                 for t, way in ((0.0, before), (STEADY_S, wish))
             ]
             distances, status = flight(phone, server, STEADY_S + CHANGED_S, wishes, tries=4)

@@ -19,12 +19,6 @@ from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
 WAIT_S = 60.0
-CHOOSE = """(() => {{
-  const wish = document.querySelector('#path-wish');
-  wish.value = '{}';
-  wish.dispatchEvent(new Event('change'));
-}})()"""
-"""As a person does, who can't be imitated in a list of the system's own."""
 
 
 @contextlib.contextmanager
@@ -76,7 +70,7 @@ def test_it_leads_by_webrtc_and_sends_jpeg_where_its_encoder_holds_pictures_back
         phone.play_until("document.querySelector('#h-path').innerText === 'WebRTC'", 10.0)
         lead_or_hear_why(phone)
         phone.let_go()
-        phone.evaluate(CHOOSE.format("WebSocket"))
+        phone.choose("#path-wish", "WebSocket")
         wait_for(server, phone, lambda s: s["video_path"] == "websocket, JPEG" and s["leds"] == 5)
         phone.play_until("document.querySelector('#h-path').innerText === 'JPEG'", 10.0)
 

@@ -1,0 +1,90 @@
+"""A page of Chromium's spoken to past the browser's driver: many orders, one wait for all answers.
+
+A hand is played into a page a hundred times a second. By a driver, each of its orders is a round
+trip through three processes, which two processors do not have time for beside a flight.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import BrowserContext, Page
+from websockets.sync.client import connect
+
+ANSWER_S = 60.0
+Order = tuple[str, dict[str, object]]
+"""A method of the DevTools protocol, and what it is given."""
+
+
+class ChannelError(Exception):
+    """What Chromium answers when it can't do as it is told."""
+
+
+def _port(context: BrowserContext) -> int:
+    """Where Chromium listens, which it writes into its profile; see `FLAGS`."""
+    browser = context.browser
+    assert browser is not None
+    told = browser.new_browser_cdp_session().send("Browser.getBrowserCommandLine")
+    (profile,) = (w.split("=", 1)[1] for w in told["arguments"] if w.startswith("--user-data-dir="))
+    return int((Path(profile) / "DevToolsActivePort").read_text().split()[0])
+
+
+class Channel:
+    """To one page, through all its addresses."""
+
+    def __init__(self, context: BrowserContext, page: Page) -> None:
+        """Opens it; what is ordered lasts as long as it is open."""
+        target = context.new_cdp_session(page).send("Target.getTargetInfo")["targetInfo"]
+        url = f"ws://127.0.0.1:{_port(context)}/devtools/page/{target['targetId']}"
+        self._socket, self._count = connect(url, max_size=None, compression=None), 0
+
+    def orders(self, *orders: Order) -> list[dict[str, Any]]:
+        """Do them in this order; gives what each answers.
+
+        Raises:
+            ChannelError: one was refused.
+        """
+        waiting: dict[int, Order] = {}
+        for method, given in orders:
+            self._count += 1
+            waiting[self._count] = (method, given)
+            self._socket.send(json.dumps({"id": self._count, "method": method, "params": given}))
+        answers: dict[int, dict[str, Any]] = {}
+        while len(answers) < len(waiting):
+            answer = json.loads(self._socket.recv(ANSWER_S))
+            if answer.get("id") not in waiting:
+                continue  # an event
+            if "error" in answer:
+                raise ChannelError(f"{waiting[answer['id']]}: {answer['error']['message']}")
+            answers[answer["id"]] = answer["result"]
+        return [answers[i] for i in waiting]
+
+    def close(self) -> None:
+        """What was ordered for as long as it is open ends."""
+        self._socket.close()
+
+
+def reading(kind: str, v: np.ndarray) -> Order:
+    """What a sensor reads from now on, (3,) in d."""
+    reading = {"xyz": dict(zip("xyz", map(float, v), strict=True))}
+    return ("Emulation.setSensorOverrideReadings", {"type": kind, "reading": reading})
+
+
+def evaluation(expression: str) -> Order:
+    """The order whose answer `value_of` reads; promises are awaited."""
+    given = {"expression": expression, "returnByValue": True, "awaitPromise": True}
+    return ("Runtime.evaluate", given)
+
+
+def value_of(answer: dict[str, Any]) -> Any:
+    """What a JavaScript expression gave.
+
+    Raises:
+        ChannelError: it has thrown.
+    """
+    if "exceptionDetails" in answer:
+        raise ChannelError(str(answer["exceptionDetails"]))
+    return answer["result"].get("value")
