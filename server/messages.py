@@ -14,6 +14,7 @@ from pipeline.config import EstimatorName, VirtualCameraMode
 from server.calibration_messages import Calibrate, Calibration
 from server.camera_messages import CameraHealth
 from server.knobs import AdaptiveBeta, CutoffHz, Knobs, SpeedLimit
+from server.path_messages import PathChoice
 from server.wire import MAX_MESSAGE_BYTES, WireError
 
 Text = Annotated[str, Meta(max_length=200)]
@@ -193,10 +194,12 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """None before the control process has told of it."""
     camera: CameraHealth | None = None
     """Of the operator's phone; None while nobody looks through it."""
+    path_choice: PathChoice | None = None
+    """As the operator's page says; None: it lets nobody choose."""
 
 
-FromPage = Hello | Command | Tune | Calibrate | Log
-ToPage = Welcome | Refused | Status | Command | Calibration
+FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log
+ToPage = Welcome | Refused | Status | Command | PathChoice | Calibration
 
 _decoder = msgspec.json.Decoder(FromPage)
 _to_page_decoder = msgspec.json.Decoder(ToPage)

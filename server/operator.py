@@ -29,6 +29,7 @@ from server.control_link import (
 from server.ingest import EncodedFrame, Ingest
 from server.messages import Hello
 from server.meter import Meter
+from server.path_messages import PathChoice
 from server.seen_input import SeenInput
 from server.sensor_check import SensorCheck
 from server.shape import Shape
@@ -70,6 +71,7 @@ class OperatorPhone:
         """The camera's calibration, while one is under way."""
         self.video_path = ""
         """How the pictures come, in words."""
+        self.path_choice: PathChoice | None = None
         self.camera_problem = self.camera_text = ""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.sighting: Sighting | None = None

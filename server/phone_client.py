@@ -166,6 +166,7 @@ class PhoneClient:
                     self._credit.set()
 
     async def _read_message(self, text: str) -> None:
+        """A `PathChoice` changes nothing: whoever runs this has chosen the one way there is."""
         message = _message(text)
         if isinstance(message, Refused):
             self.refusals = [*self.refusals[-9:], message]

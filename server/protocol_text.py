@@ -121,10 +121,10 @@ Version {wire.VERSION}. Generated from `server/wire.py`, `server/wire_records.py
 
 | websocket | role | page → server | server → page |
 |---|---|---|---|
-| `/ws/phone` | operator | `hello`, `command`, `calibrate`, `log`; MOTION, TOUCH, PONG | \
-`welcome`, `status`, `refused`, `calibration`, `command` (`key_frame`); PING |
+| `/ws/phone` | operator | `hello`, `command`, `path`, `calibrate`, `log`; MOTION, TOUCH, PONG | \
+`welcome`, `status`, `refused`, `calibration`, `path`, `command` (`key_frame`); PING |
 | `/ws/video` | video | `hello`, `log`; FRAME | `welcome`, `refused`; CREDIT |
-| `/ws/supervisor` | supervisor | `hello`, `command`, `tune`, `log` | `welcome`, `status`, \
+| `/ws/supervisor` | supervisor | `hello`, `command`, `tune`, `path`, `log` | `welcome`, `status`, \
 `refused`; PICTURE |
 
 A binary websocket message is one *record*, a text message is one JSON *message*. Compression is

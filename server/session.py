@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from server.calibration_messages import Calibrate
 from server.messages import Command, FromPage, Hello, Log, Tune, decode_message
+from server.path_messages import PathChoice
 from server.wire import VERSION, WireError, decode
 from server.wire_records import Motion, Picture, Pong, Record, Stamp, Touch
 
@@ -19,10 +20,10 @@ ALLOWED: dict[str, tuple[type, ...]] = {
 }
 """Kinds of record by role."""
 MESSAGES: dict[str, tuple[type, ...]] = {
-    "operator": (Command, Calibrate, Log),
+    "operator": (Command, PathChoice, Calibrate, Log),
     "rtc": (),
     "video": (Log,),
-    "supervisor": (Command, Tune, Log),
+    "supervisor": (Command, Tune, PathChoice, Log),
 }
 
 

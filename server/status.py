@@ -80,6 +80,7 @@ def build(hub: Known) -> Status:
         camera=health(phone.vision.looking)
         if phone is not None and phone.vision is not None
         else None,
+        path_choice=phone.path_choice if phone is not None else None,
     )
 
 

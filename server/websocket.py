@@ -8,6 +8,7 @@ import logging
 from collections import deque
 from collections.abc import Awaitable
 
+from msgspec import structs
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server.calibration_messages import Calibrate
@@ -15,6 +16,7 @@ from server.clock import now
 from server.hub import Hub
 from server.messages import Command, FromPage, Hello, Log, Refused, Tune, Welcome, encode_message
 from server.operator import OperatorPhone
+from server.path_messages import PathChoice
 from server.session import Session
 from server.settings import VideoSettings
 from server.wire import VERSION, WireError
@@ -191,10 +193,29 @@ class PageServer:
                 self._hub.calibrate(said)
             elif isinstance(said, Tune):
                 self._hub.tune(said)
+            elif isinstance(said, PathChoice):
+                self._choose(said, phone)
             elif isinstance(said, Log):
                 self._hub.say(f"page: {said.text}")
         except WireError as error:
             page.refuse(error, fatal=session.hopeless)
+
+    def _choose(self, choice: PathChoice, phone: OperatorPhone | None) -> None:
+        """Hand a supervisor's choice on to the page, which obeys and says so; hear what it says.
+
+        Raises:
+            WireError: no phone leads, or its page lets nobody choose.
+        """
+        if phone is None:
+            leading = self._hub.phone
+            if leading is None or leading.path_choice is None:
+                raise WireError("order", "path.wish", "while a phone leads that has several ways")
+            self._hub.paths.tell(encode_message(structs.replace(choice, by="supervisor")))
+            return
+        if choice.by and choice != phone.path_choice:
+            way = "the best way" if choice.wish == "auto" else choice.wish
+            self._hub.say(f"pictures by {way}: chosen by the {choice.by}")
+        phone.path_choice = choice
 
     def _is_straggler(self, said: FromPage | Record) -> bool:
         """A picture that was on its way when the phone went over to its fast path."""

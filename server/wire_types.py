@@ -22,6 +22,7 @@ import msgspec
 
 from server import calibration_messages, camera_messages, knobs, messages, wire, wire_records
 from server.one_line import Parser
+from server.path_messages import PathChoice
 from server.protocol_text import RECORDS, page
 from server.wire import Kind, WireError
 from server.wire_records import Codec, Record
@@ -32,6 +33,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Hello,
     messages.Command,
     messages.Tune,
+    PathChoice,
     calibration_messages.Calibrate,
     messages.Log,
     messages.Welcome,

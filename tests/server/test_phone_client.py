@@ -7,6 +7,7 @@ import pytest
 
 from server.access import Access, PhoneClientError
 from server.messages import Refused, encode_message
+from server.path_messages import PathChoice
 from server.phone_client import PhoneClient
 from server.wire import decode, encode
 from server.wire_records import Credit, Ping, Pong, Record, Touch
@@ -34,6 +35,25 @@ def test_hello_pong_and_wish():
     assert (video["role"], video["session"]) == ("video", "s1")
     (_, pong), (_, wish) = server.heard
     assert decode(pong).body == Pong(42, 123)
+    assert json.loads(wish) == {"type": "command", "what": "arm"}
+
+
+def test_a_supervisors_choice_of_another_way_changes_nothing():
+    choice = encode_message(PathChoice("JPEG", "supervisor"))
+    server = PageServer([encode_message(WELCOME), choice, encode_message(status("DISARMED"))])
+
+    async def talk(client):
+        await client.open("a device")
+        running = asyncio.create_task(client.run())
+        async with asyncio.timeout(5.0):
+            while not server.heard:
+                await asyncio.sleep(0)
+        assert not running.done()
+        assert client.refusals == []
+        running.cancel()
+
+    asyncio.run(server.session(talk))
+    ((_, wish),) = server.heard
     assert json.loads(wish) == {"type": "command", "what": "arm"}
 
 

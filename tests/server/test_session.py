@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from server import wire, wire_records
 from server.messages import Command, Hello, Log, Tune, encode_message
+from server.path_messages import PathChoice
 from server.session import BYTES_HZ, MAX_FAULTS, MESSAGES_HZ, RECORDS_HZ, Bucket, Session
 from server.wire import WireError
 from server.wire_records import Record
@@ -226,6 +227,15 @@ def test_only_a_supervisor_resets_after_stop() -> None:
     reset = encode_message(Command("reset"))
     assert opened("supervisor").receive(reset, 0.1) == Command("reset")
     assert refusal(opened("operator"), reset).field == "command.what"
+
+
+def test_a_supervisor_and_the_operator_choose_the_pictures_way_from_those_there_are() -> None:
+    choice = PathChoice("WebSocket", "operator")
+    for role in ("operator", "supervisor"):
+        assert opened(role).receive(encode_message(choice), 0.0) == choice
+        error = refusal(opened(role), '{"type": "path", "wish": "pigeon"}')
+        assert (error.code, error.field) == ("value", "$.wish")
+    assert refusal(opened("video"), encode_message(choice)).code == "role"
 
 
 def test_only_a_supervisor_turns_knobs() -> None:

@@ -40,6 +40,7 @@ export function joinPaths({ scope, performance, links, fetchHere, startRtcWorker
     socketIsOpen: () => phone.videoLink.isOpen,
     place: () => ({ session: phone.session, track: track() }),
     say: (text) => phone.log(text),
+    tell: (choice) => phone.link.sendMessage(choice),
   });
   phone.fast = rtc;
   return { rtc, paths };

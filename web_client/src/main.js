@@ -1,7 +1,7 @@
 /** The phone page: joins browser, sensors, links and screen. The only module that acts by itself. */
 
 /** @import {Effect, Event} from './session_types.js' */
-/** @import {Welcome} from './protocol_types.js' */
+/** @import {PathChoice, Welcome} from './protocol_types.js' */
 
 import { browserOf } from './browser.js';
 import { CameraFeed } from './camera_feed.js';
@@ -43,6 +43,7 @@ const phone = new Phone({
   dispatch,
   identity: () => identity,
   onWelcome: (welcome) => void welcomed(welcome),
+  onPath: ({ wish }) => choosePath(wish, 'supervisor'),
   onUnwelcome: () => void start.checkPairing(), // it hung up: perhaps it does not know this phone any more
 });
 
@@ -53,7 +54,7 @@ const view = new View(document, window, {
   onRelease: () => dispatch({ type: 'release' }),
   onStop: () => dispatch({ type: 'stop' }),
   onCalibrate: (what) => dispatch({ type: 'calibrate', what }),
-  onPath: (wished) => paths.choose(wished),
+  onPath: (wished) => choosePath(wished, 'operator'),
   onWish: () => dispatch({ type: 'ask', what: wish(state).what }),
   onSound: () => {
     feedback.unlock();
@@ -171,6 +172,16 @@ async function welcomed(welcome) {
   } catch (error) {
     phone.log(`camera: ${error}`);
   }
+}
+
+/**
+ * @param {PathChoice['wish']} wish
+ * @param {'operator' | 'supervisor'} by
+ */
+function choosePath(wish, by) {
+  paths.choose(wish, by);
+  view.path(wish, by);
+  if (by === 'supervisor') notice(`Pictures by ${wish === 'auto' ? 'the best way' : wish}: chosen by the supervisor`);
 }
 
 async function comeBack() {

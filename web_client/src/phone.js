@@ -1,6 +1,6 @@
 /** The phone's two links and what travels on them: who we are, motion, touch, pictures, wishes. */
 
-/** @import {Calibrate, Command, Hello, ToPage, Welcome} from './protocol_types.js' */
+/** @import {Calibrate, Command, Hello, PathChoice, ToPage, Welcome} from './protocol_types.js' */
 /** @import {Motion, Received, Touch} from './protocol.js' */
 /** @import {Surroundings as LinkSurroundings} from './link.js' */
 /** @import {Event} from './session_types.js' */
@@ -29,6 +29,7 @@ const NEWEST_TOUCH_MS = 100;
  * @property {(event: Event) => void} dispatch
  * @property {() => Identity} identity
  * @property {(welcome: Welcome) => void} onWelcome
+ * @property {(choice: PathChoice) => void} onPath A supervisor's.
  * @property {() => void} onUnwelcome A connection ended before the server welcomed us.
  */
 
@@ -105,6 +106,9 @@ export class Phone {
         break;
       case 'calibration':
         dispatch({ type: 'calibration', calibration: message });
+        break;
+      case 'path':
+        this.surroundings.onPath(message);
         break;
       case 'command':
         if (message.what === 'key_frame') this.video?.requestKey();

@@ -34,6 +34,14 @@
  */
 
 /**
+ * Which way the pictures of the phone that leads shall come by, and who chose it. A supervisor's page → server → operator's page: choose so. Operator's page → server: so it stands, when welcomed and at each choice; `status` shows that to all.
+ * @typedef {object} PathChoice
+ * @property {'path'} type
+ * @property {'auto' | 'WebRTC' | 'WebSocket' | 'JPEG'} wish `auto`: the best that works.
+ * @property {'' | 'operator' | 'supervisor'} by Who chose last; "": nobody yet. The server itself says who, of a supervisor's choice.
+ */
+
+/**
  * Page → server: begin to calibrate the phone's camera, or leave it. Only an operator may, and only while the robot is not armed. `calibration` is the answer.
  * @typedef {object} Calibrate
  * @property {'calibrate'} type
@@ -183,9 +191,10 @@
  * @property {VirtualCamera | null} virtual_camera null before the control process has told of it.
  * @property {Estimate | null} estimate null before the control process has told of it.
  * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
+ * @property {PathChoice | null} path_choice As the operator's page says; null: it lets nobody choose.
  */
 
-/** @typedef {Hello | Command | Tune | Calibrate | Log} FromPage */
-/** @typedef {Welcome | Refused | Status | Command | Calibration} ToPage */
+/** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log} FromPage */
+/** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration} ToPage */
 
 export {};

@@ -2,7 +2,7 @@
 
 /** @import {Frame} from './frame_source.js' */
 /** @import {Level} from './pace.js' */
-/** @import {Welcome} from './protocol_types.js' */
+/** @import {PathChoice, Welcome} from './protocol_types.js' */
 /** @import {RtcPath} from './rtc.js' */
 /** @import {VideoSender} from './video.js' */
 
@@ -11,7 +11,7 @@ import { RtcRefused } from './rtc.js';
 import { Retry } from './retry.js';
 
 /** @typedef {'WebRTC' | 'WebSocket' | 'JPEG' | '–'} PathName */
-/** What a person wants. @typedef {'auto' | 'WebRTC' | 'WebSocket' | 'JPEG'} PathWish */
+/** What a person wants. @typedef {PathChoice['wish']} PathWish */
 
 /**
  * @typedef {object} Surroundings
@@ -23,6 +23,7 @@ import { Retry } from './retry.js';
  * @property {() => boolean} socketIsOpen
  * @property {() => { session: string, track: MediaStreamTrack | null }} place
  * @property {(text: string) => void} say To the supervisor.
+ * @property {(choice: PathChoice) => void} tell To the server.
  */
 
 export class VideoPaths {
@@ -33,6 +34,8 @@ export class VideoPaths {
     this.welcome = null;
     /** @type {PathWish} */
     this.wish = 'auto';
+    /** Whose wish. @type {PathChoice['by']} */
+    this.by = '';
     this.isConnecting = false;
     this.fastTries = new Retry(surroundings);
     this.encoderTries = new Retry(surroundings);
@@ -54,7 +57,12 @@ export class VideoPaths {
   begin(welcome) {
     this.end();
     this.welcome = welcome;
+    this.tell();
     this.seek();
+  }
+
+  tell() {
+    this.surroundings.tell({ type: 'path', wish: this.wish, by: this.by });
   }
 
   /** The server has gone. */
@@ -65,13 +73,17 @@ export class VideoPaths {
     this.surroundings.rtc.close();
   }
 
-  /** @param {PathWish} wish A person's. */
-  choose(wish) {
-    const { rtc, video, say } = this.surroundings;
+  /**
+   * The last one to choose is obeyed.
+   * @param {PathWish} wish
+   * @param {PathChoice['by']} by
+   */
+  choose(wish, by) {
+    const { rtc, video } = this.surroundings;
     const { welcome } = this;
-    this.wish = wish;
+    Object.assign(this, { wish, by });
     if (welcome === null) return;
-    say(`pictures: ${wish} was chosen`);
+    this.tell();
     this.fastTries.reset();
     this.encoderTries.reset();
     if (wish === 'WebSocket' || wish === 'JPEG') rtc.close();

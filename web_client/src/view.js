@@ -71,6 +71,12 @@ export class View {
     this.find('sound').setAttribute('aria-pressed', String(on));
   }
 
+  /** @param {PathWish} wish @param {string} by */
+  path(wish, by) {
+    /** @type {HTMLSelectElement} */ (this.find('path-wish')).value = wish;
+    this.text('path-by', by === 'supervisor' ? 'By supervisor' : 'Path');
+  }
+
   /**
    * @param {State} state
    * @param {Advice | null} advice On the state's problem.
@@ -89,8 +95,7 @@ export class View {
    */
   welcome(state, advice) {
     const starting = state.phase === 'starting';
-    this.show('intro', advice === null);
-    this.show('art', advice === null);
+    for (const id of ['intro', 'art']) this.show(id, advice === null);
     this.show('problem', advice !== null);
     this.text('problem-title', advice?.title ?? '');
     this.list('problem-steps', advice?.steps ?? []);

@@ -20,6 +20,7 @@ beforeEach(() => {
     dispatch: (event) => log.push(event.type),
     identity: () => ({ device: 'Pixel 7', sensors: 'DeviceMotion', video: 'H.264' }),
     onWelcome: () => log.push('onWelcome'),
+    onPath: ({ wish }) => log.push(`onPath ${wish}`),
     onUnwelcome: () => log.push('onUnwelcome'),
   });
   phone.open();
@@ -57,6 +58,14 @@ test('a PING is answered with the newest touch and its nonce too, while that is 
   assert.equal(ping(4).length, 1, 'an old touch may be of a page that hangs');
   main?.says({ ...WELCOME, session: 's2' });
   assert.equal(ping(1).length, 1, 'nor is one of a former session said again');
+});
+
+test('a way of the pictures that a supervisor chose is handed on', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  main?.says({ type: 'path', wish: 'WebSocket', by: 'supervisor' });
+  assert.equal(log.at(-1), 'onPath WebSocket');
 });
 
 test('hello comes first, and the video socket follows the welcome with its session', () => {

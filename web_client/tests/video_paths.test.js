@@ -11,6 +11,8 @@ const WELCOME = /** @type {any} */ ({ session: 's1' });
 
 /** @type {string[]} */
 let log = [];
+/** What the server is told of choices. @type {string[]} */
+let told = [];
 let time = new FakeTime();
 /** What the next tries come to; none left: they succeed. @type {(Error | null)[]} */
 let tries = [];
@@ -23,7 +25,7 @@ let socketIsOpen = true;
 let paths;
 
 beforeEach(() => {
-  [log, time, tries, socketIsOpen] = [[], new FakeTime(), [], true];
+  [log, told, time, tries, socketIsOpen] = [[], [], new FakeTime(), [], true];
   rtc = {
     isAble: true,
     isOpen: false,
@@ -56,6 +58,7 @@ beforeEach(() => {
     socketIsOpen: () => socketIsOpen,
     place: () => ({ session: 's1', track: /** @type {any} */ ({}) }),
     say: (text) => log.push(text),
+    tell: ({ wish, by }) => told.push(`${wish} ${by}`),
   });
 });
 
@@ -174,16 +177,31 @@ test('a person’s choice is kept until he chooses again', async () => {
   paths.begin(WELCOME);
   await settled();
   for (const wish of /** @type {const} */ (['JPEG', 'WebSocket'])) {
-    paths.choose(wish);
+    paths.choose(wish, 'operator');
     await settled();
     paths.lost('late news');
     time.advance(1e6);
     await settled();
     assert.equal(paths.name, wish);
   }
-  paths.choose('auto');
+  paths.choose('auto', 'operator');
   await settled();
   assert.equal(paths.name, 'WebRTC');
+});
+
+test('who chose last is obeyed, and the server is told of it, and again when it welcomes the page anew', async () => {
+  paths.begin(WELCOME);
+  await settled();
+  paths.choose('JPEG', 'supervisor');
+  await settled();
+  assert.equal(paths.name, 'JPEG');
+  paths.choose('WebSocket', 'operator');
+  await settled();
+  assert.equal(paths.name, 'WebSocket');
+  paths.end();
+  paths.choose('JPEG', 'supervisor');
+  paths.begin(/** @type {any} */ ({ session: 's2' }));
+  assert.deepEqual(told, ['auto ', 'JPEG supervisor', 'WebSocket operator', 'JPEG supervisor']);
 });
 
 test('by choice pictures go by WebRTC even without records', async () => {
@@ -191,7 +209,7 @@ test('by choice pictures go by WebRTC even without records', async () => {
   paths.begin(WELCOME);
   await settled();
   assert.equal(paths.name, 'WebSocket');
-  paths.choose('WebRTC');
+  paths.choose('WebRTC', 'operator');
   await settled();
   assert.equal(paths.name, 'WebRTC');
 });

@@ -11,6 +11,7 @@ import { EstimatePanel } from './estimate.js';
 import { EMPTY, reduce } from './model.js';
 import { KnobPanel } from './knobs.js';
 import { Link, socketUrl } from '../link.js';
+import { PathSelect } from './path_select.js';
 import { PhoneCard } from './phone_card.js';
 import { Kind, VERSION } from '../protocol.js';
 import { Problem, adviceFor, problemOf } from '../problems.js';
@@ -52,6 +53,7 @@ const view = new BoardView(document, {
   onReload: () => window.location.reload(),
 });
 const knobs = new KnobPanel(document, (tune) => void link.sendMessage(tune), () => performance.now());
+const path = new PathSelect(document, (choice) => void link.sendMessage(choice), () => performance.now());
 const estimate = new EstimatePanel(document);
 const card = new PhoneCard(document, URL, fetchInvite);
 
@@ -66,6 +68,7 @@ function dispatch(event) {
     view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
     estimate.render(board);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);
+    path.take(board.heard ? board.status?.path_choice ?? null : null);
     view.text('virtual', isVirtual() ? 'Stop virtual phone' : 'Start virtual phone');
   });
 }

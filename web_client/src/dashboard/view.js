@@ -83,8 +83,10 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  phone({ operator, phones, supervisors, recording, video_path: path }) {
-    this.text('video-path', path && `video by ${path}`);
+  phone({ operator, phones, supervisors, recording, video_path: path, path_choice: choice }) {
+    const words = path && `${choice?.by ? `${choice.by}’s choice: ` : 'video by '}${path}`;
+    this.text('video-path', words);
+    this.find('video-path').title = words;
     this.text('operator', operator || 'none');
     this.find('operator').title = operator;
     this.text('crowd', `phones ${phones} · supervisors ${supervisors}`);

@@ -1,0 +1,33 @@
+/** A choice of the way that the phone's pictures come by. */
+
+/** @import {PathChoice} from '../protocol_types.js' */
+
+import { Elements } from './elements.js';
+import { PATIENCE_MS } from './knobs.js';
+
+export class PathSelect extends Elements {
+  /**
+   * @param {Document} document
+   * @param {(choice: PathChoice) => void} send
+   * @param {() => number} now [ms]
+   */
+  constructor(document, send, now) {
+    super(document);
+    this.now = now;
+    this.wishedMs = -Infinity;
+    this.select = /** @type {HTMLSelectElement} */ (this.find('path-wish'));
+    this.select.addEventListener('change', () => {
+      this.wishedMs = now();
+      send({ type: 'path', wish: /** @type {PathChoice['wish']} */ (this.select.value), by: 'supervisor' });
+    });
+  }
+
+  /** @param {PathChoice | null} choice As the phone says, which soon obeys; null: it lets nobody choose. */
+  take(choice) {
+    const { select } = this;
+    select.disabled = choice === null;
+    const wish = choice?.wish ?? 'auto';
+    if (wish === select.value) this.wishedMs = -Infinity;
+    else if (choice === null || this.now() - this.wishedMs > PATIENCE_MS) select.value = wish;
+  }
+}
