@@ -14,7 +14,7 @@ import pytest
 from hardware.robot_file import ROBOTS
 from pipeline.config import TeleopConfig
 from server.experiments import main
-from server.experiments.sweep import command, workers
+from server.experiments.sweep import command, made_with, results, workers
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.keys import RobotNumber, known_keys
 from server.experiments.sweep.results import Results
@@ -108,9 +108,9 @@ def test_what_was_done_before_an_interruption_is_not_flown_again(tmp_path, capsy
 
 def test_a_line_that_a_crash_cut_off_is_flown_again(tmp_path):
     sweep = swept(tmp_path, SHORT)
-    with Results(tmp_path / "out", sweep) as results:
-        results.write(["sweep"], "nobody")
-        results.add(Outcome(0, Figures(1.0, 2.0), 0.1))
+    with Results(tmp_path / "out", sweep) as begun:
+        begun.write(["sweep"], "nobody")
+        begun.add(Outcome(0, Figures(1.0, 2.0), 0.1))
     journal = tmp_path / "out" / "sessions.jsonl"
     whole = journal.read_text()
     journal.write_text(whole + '{"index": 1, "cpu')
@@ -122,8 +122,8 @@ def test_a_line_that_a_crash_cut_off_is_flown_again(tmp_path):
 @pytest.mark.parametrize("line", ["bananas", '{"index": 1}', '{"index": 99'])
 def test_a_damaged_line_is_no_traceback(line, tmp_path):
     sweep = swept(tmp_path, SHORT)
-    with Results(tmp_path / "out", sweep) as results:
-        results.write(["sweep"], "nobody")
+    with Results(tmp_path / "out", sweep) as begun:
+        begun.write(["sweep"], "nobody")
     (tmp_path / "out" / "sessions.jsonl").write_text(line + "\n")
     with pytest.raises(SweepError, match="a line is damaged"):
         Results(tmp_path / "out", sweep)
@@ -140,6 +140,72 @@ def test_another_sweep_in_the_same_folder_is_refused_and_says_why(tmp_path, caps
     told = capsys.readouterr().err
     assert "seconds was 2.2 when this was begun, now 2.4" in told
     assert told.count("\n") == 1
+
+
+def begun_by_other_code(folder: Path, monkeypatch) -> Path:
+    """A sweep with one session of four to do; its file."""
+    path = folder / "short.toml"
+    path.write_text(SHORT)
+    flown_here(monkeypatch, stop_after=3)
+    with monkeypatch.context() as other:
+        other.setattr(results, "versions", lambda: {**made_with.versions(), "code": "0ther"})
+        assert main(["sweep", str(path)]) == 130
+    return path
+
+
+def test_what_other_code_began_is_refused_and_says_so_unless_told_to_mix(
+    tmp_path, capsys, monkeypatch
+):
+    path = begun_by_other_code(tmp_path, monkeypatch)
+    before = {one.name: one.read_bytes() for one in (tmp_path / "short").iterdir()}
+    capsys.readouterr()
+    flown = flown_here(monkeypatch)
+    assert main(["sweep", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert (
+        f"3 of 4 sessions were flown by other code (code was 0ther, is {made_with.code()})" in told
+    )
+    assert "allowed: a new --out, or --mix" in told
+    assert told.count("\n") == 1
+    assert {one.name: one.read_bytes() for one in (tmp_path / "short").iterdir()} == before
+    assert main(["sweep", str(path), "--mix"]) == 0
+    assert flown == [3]
+    assert "MIXED" in capsys.readouterr().out
+    assert [one["code"] for one in kept(tmp_path)["mixed"]] == ["0ther"]
+    assert kept(tmp_path)["versions"] == made_with.versions()
+    assert main(["sweep", str(path)]) == 0
+    assert "MIXED" in capsys.readouterr().out, "it stays said"
+
+
+def kept(folder: Path) -> dict:
+    return json.loads((folder / "short" / "sweep.json").read_text())
+
+
+def test_a_finished_sweep_is_told_again_with_the_versions_that_flew_it(tmp_path, monkeypatch):
+    path = begun_by_other_code(tmp_path, monkeypatch)
+    flown_here(monkeypatch)
+    now = made_with.versions()
+    with monkeypatch.context() as other:
+        other.setattr(results, "versions", lambda: {**now, "code": "0ther"})
+        assert main(["sweep", str(path)]) == 0
+    assert main(["sweep", str(path)]) == 0
+    assert (kept(tmp_path)["versions"]["code"], kept(tmp_path)["mixed"]) == ("0ther", [])
+
+
+def test_any_edit_of_the_code_is_other_code(tmp_path):
+    def code() -> str:
+        made_with.code.cache_clear()
+        return made_with.code(tmp_path)
+
+    file = tmp_path / "pipeline" / "control" / "pid.py"
+    file.parent.mkdir(parents=True)
+    file.write_text("Kp = 1.0\n")
+    first = code()
+    assert code() == first
+    file.write_text("Kp = 2.0\n")
+    second = code()
+    file.rename(file.with_name("gains.py"))
+    assert len({first, second, code()}) == 3
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, help="folder; default: called as the file, beside it")
     parser.add_argument("--workers", type=whole(1, 1024), help="processes; default: one a core")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, to fly there")
+    parser.add_argument("--mix", action="store_true", help="go on with what other code has begun")
     parser.add_argument("--keys", action="store_true", help="list what can be swept, and stop")
 
 
@@ -46,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise SweepError("--workers", "not with --scheduler, whose cluster has its own")
         sweep = read(examples().get(str(arguments.file), arguments.file))
         folder = arguments.out or arguments.file.with_suffix("")
-        with Results(folder, sweep) as results:
+        with Results(folder, sweep, arguments.mix) as results:
             return _flown(sweep, results, folder, arguments)
     except SweepError as error:
         print(f"lightleash experiments sweep: {error}", file=sys.stderr)
@@ -59,6 +60,8 @@ def _flown(sweep: Sweep, results: Results, folder: Path, arguments: argparse.Nam
     already = f", {len(results.done)} of them done before" if results.done else ""
     print(f"{len(sessions)} sessions of {sweep.seconds:g} s: {len(sweep.points)} settings", end="")
     print(f" × {len(sweep.seeds)} seeds{already}", flush=True)
+    if results.mixed:
+        print("MIXED: some of them were flown by other code or libraries, see sweep.json")
     hands = arguments.scheduler or f"{arguments.workers or cores()} processes"
     results.write(sys.argv, hands)
     started, cpu_s = monotonic(), results.cpu_s

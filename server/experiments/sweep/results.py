@@ -1,7 +1,8 @@
 """A sweep's directory: what is done is kept as it comes, so that another run goes on from there.
 
 sessions.jsonl   an outcome a line, in the order they came
-sweep.json       what is swept, versions, command, CPU time, each value's figures
+sweep.json       what is swept, versions (`mixed`: others, of sessions before), command, CPU time,
+                 each value's figures
 results.csv      a session a line, in the order of the sweep
 """
 
@@ -9,60 +10,78 @@ from __future__ import annotations
 
 import csv
 import json
-import platform
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from hashlib import sha256
-from importlib.metadata import version
 from math import isnan, nan
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-import server
 from server.experiments.sweep import summary
 from server.experiments.sweep.errors import SweepError
+from server.experiments.sweep.made_with import other, versions
 from server.experiments.sweep.session import FIGURES, Figures, Outcome
 from server.experiments.sweep.sweep_file import Sweep
-
-LIBRARIES: Final = ("numpy", "scipy", "numba", "mujoco-core")
 
 
 class Results:
     """Of one sweep in one directory."""
 
-    def __init__(self, folder: Path, sweep: Sweep) -> None:
-        """Take up what is there already.
+    def __init__(self, folder: Path, sweep: Sweep, mix: bool = False) -> None:
+        """Take up what is there already; what other code has flown, only if told to `mix`.
 
         Raises:
-            SweepError: it belongs to another sweep, or can't be written.
+            SweepError: it belongs to another sweep or other code, or can't be written.
         """
         self._folder, self._sweep = folder, sweep
         self._told = identity(sweep)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._refuse_another()
+            before = self._before()
             self.done = self._taken_up()
+            self._versions, self.mixed = self._made_with(before, mix)
             self._journal = (folder / "sessions.jsonl").open("a", encoding="utf-8")
         except OSError as error:
             raise SweepError(str(folder), str(error)) from error
 
-    def _refuse_another(self) -> None:
+    def _before(self) -> dict[str, Any]:
+        """What sweep.json tells of earlier runs; nothing if there were none."""
         path = self._folder / "sweep.json"
         if not path.exists():
             if (self._folder / "sessions.jsonl").exists():
                 raise SweepError(
                     str(path), "is missing beside sessions.jsonl; allowed: a new --out"
                 )
-            return
+            return {}
         try:
-            before = json.loads(path.read_text(encoding="utf-8"))["sweep"]
+            told: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            before, _ = dict(told["sweep"]), dict(told["versions"])
         except (ValueError, KeyError, TypeError) as error:
             raise SweepError(str(path), "is no sweep's; allowed: a new --out") from error
         for key, now in json.loads(json.dumps(self._told)).items():
             if before.get(key) != now:
                 change = f"was {_short(before.get(key))} when this was begun, now {_short(now)}"
                 raise SweepError(str(self._folder), f"{key} {change}; allowed: a new --out")
+        return told
+
+    def _made_with(
+        self, before: Mapping[str, Any], mix: bool
+    ) -> tuple[Mapping[str, str], list[Mapping[str, str]]]:
+        """What the newest sessions are flown with, and what others of them were."""
+        now, mixed = versions(), list(before.get("mixed", []))
+        was = before.get("versions", now)
+        change = other(was, now)
+        if not change or not self.done:
+            return now, mixed
+        if len(self.done) == self._sessions:
+            return was, mixed  # all was flown before: it is only told again
+        if not mix:
+            raise SweepError(
+                str(self._folder),
+                f"{len(self.done)} of {self._sessions} sessions were flown by other code "
+                f"({change}); allowed: a new --out, or --mix",
+            )
+        return now, [*mixed, was]
 
     def _taken_up(self) -> dict[int, Outcome]:
         """Outcomes of before; a last line that was cut off by a crash is flown again."""
@@ -99,6 +118,10 @@ class Results:
         self._journal.close()
 
     @property
+    def _sessions(self) -> int:
+        return len(self._sweep.points) * len(self._sweep.seeds)
+
+    @property
     def cpu_s(self) -> float:
         """Of all sessions, those of earlier runs among them."""
         return sum(outcome.cpu_s for outcome in self.done.values())
@@ -109,8 +132,9 @@ class Results:
             "sweep": self._told,
             "command": list(command),
             "flown_by": hands,
-            "versions": versions(),
-            "sessions": len(self._sweep.points) * len(self._sweep.seeds),
+            "versions": self._versions,
+            "mixed": self.mixed,
+            "sessions": self._sessions,
             "done": len(self.done),
             "cpu_s": round(self.cpu_s, 3),
             "summary": self._summary(),
@@ -138,7 +162,6 @@ def identity(sweep: Sweep) -> dict[str, Any]:
     """What results belong to."""
     robot, points = json.dumps(sweep.robot, sort_keys=True), json.dumps(sweep.points)
     return {
-        "lightleash": server.__version__,
         "robot": f"{sweep.robot['name']} {_digest(robot)}",
         "seeds": sweep.seeds,
         "seconds": sweep.seconds,
@@ -154,14 +177,6 @@ def identity(sweep: Sweep) -> dict[str, Any]:
 
 def _digest(text: str) -> str:
     return sha256(text.encode()).hexdigest()[:12]
-
-
-def versions() -> Mapping[str, str]:
-    """Of everything that a figure may depend on."""
-    found = {name: version(name) for name in LIBRARIES}
-    python = f"{platform.python_implementation()} {platform.python_version()}"
-    where = f"{sys.platform} {platform.machine()}"
-    return {"lightleash": server.__version__, "python": python, "platform": where, **found}
 
 
 def _line(outcome: Outcome) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import server
 from server.experiments import processes
 from server.experiments.processes import AHEAD
+from server.experiments.sweep import made_with
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.session import Outcome, Session, fly
 
@@ -34,7 +35,7 @@ def on_processes(sessions: Iterable[Session], workers: int) -> Generator[Outcome
 
 def version() -> str:
     """Of what a worker flies with."""
-    return server.__version__
+    return f"{server.__version__}, code {made_with.code()}"
 
 
 def on_cluster(sessions: Iterable[Session], address: str) -> Generator[Outcome, None, None]:
