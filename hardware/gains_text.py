@@ -1,4 +1,4 @@
-"""A gain set written into a robot file's text; comments, order and all else stay as they are."""
+"""A gain set written into a robot file's text; comments, order, line ends and all else stay."""
 
 from __future__ import annotations
 
@@ -32,6 +32,8 @@ class GainsTextError(ValueError):
 def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool = False) -> str:
     """The text of a robot file with another gain set, said in one line to be `comment`.
 
+    Its lines end as the first one does.
+
     Raises:
         GainsTextError: a name that none can have, or a set there is (unless `overwrite`).
     """
@@ -41,11 +43,13 @@ def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool
     sets = before.get("gains", {})
     if name in sets and not overwrite:
         raise GainsTextError(name, f"is there already; allowed: --replace, or none of {_all(sets)}")
-    text = text if not text or text.endswith("\n") else text + "\n"
+    line_end = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
+    text = text if not text or text.endswith("\n") else text + line_end
     places = _places(text)
     start, end = places.get(name) or (max((e for _, e in places.values()), default=len(text)),) * 2
     new = _section(name, gains, comment)
-    changed = text[:start] + (new if name in places else f"\n{new}") + text[end:]
+    new = (new if name in places else f"\n{new}").replace("\n", line_end)
+    changed = text[:start] + new + text[end:]
     _verify(before, changed, name, gains)
     return changed
 

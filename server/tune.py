@@ -72,7 +72,8 @@ def _tuned(arguments: argparse.Namespace) -> str:
     """Find, tell, fly, write; where it is."""
     path = robot_path(arguments.robot)
     target = _target(path, arguments)
-    robot_file, content = load_robot(path), path.read_text(encoding="utf-8")
+    robot_file = load_robot(path)
+    content = path.read_bytes().decode("utf-8")  # line ends as they are
     base = _base(robot_file, arguments.base)
     name, comment = arguments.name or f"tuned_{arguments.latency_ms:.0f}ms", _comment(arguments)
     before = robot_file.gains[base]
@@ -87,7 +88,7 @@ def _tuned(arguments: argparse.Namespace) -> str:
         raise TuningFlightError(f"{name} does not fly here: nothing is written")
     written = with_gains(content, name, found, comment, arguments.replace)
     new = target.with_name(f"{target.name}.new")
-    new.write_text(written, encoding="utf-8")
+    new.write_text(written, encoding="utf-8", newline="")
     new.replace(target)
     return f"written: [gains.{name}] in {target}; fly it with --robot {target} --gains {name}"
 

@@ -31,6 +31,16 @@ def test_a_new_set_stands_behind_the_others_and_nothing_else_changes(path, tmp_p
     assert list(robot_file.gains)[-1] == "late"
 
 
+@pytest.mark.parametrize("last", ["\r\n", ""])
+def test_lines_end_as_they_did(last):
+    text = "# mine\r\n[gains.a]\r\nKp = [1.0]\r\n\r\n[x]\r\ny = 1" + last
+    for name in ("a", "late"):
+        written = with_gains(text, name, GAINS, "for tests", overwrite=True)
+        assert written.count("\r\n") == written.count("\n") == written.count("\r")
+        plain = with_gains(text.replace("\r", ""), name, GAINS, "for tests", overwrite=True)
+        assert written.replace("\r", "") == plain
+
+
 def test_a_set_is_overwritten_only_if_told_to():
     text = ROBOT_FILES[0].read_text(encoding="utf-8")
     once = with_gains(text, "late", GAINS, "first")

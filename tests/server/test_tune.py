@@ -38,6 +38,20 @@ def test_a_set_is_found_flown_and_written_into_the_robots_own_file(mine, capsys,
     assert "--replace" in capsys.readouterr().err
 
 
+def test_a_file_of_another_system_keeps_its_line_ends(mine, monkeypatch):
+    before = mine.read_bytes().replace(b"\n", b"\r\n")
+    mine.write_bytes(before)
+    robot_file = load_robot(mine)
+    monkeypatch.setattr(tune, "tuned", lambda *_: robot_file.gains["phone"])
+    flown = Figures(3.0, 4.0, chatter_n=0.1)
+    monkeypatch.setattr(tune, "fly", lambda session: Outcome(session.index, flown, 0.1))
+    assert tune.main([str(mine), "--latency-ms", "90", "--name", "late"]) == 0
+    written = mine.read_bytes()
+    assert b"[gains.late]" in written
+    assert written.count(b"\r\n") == written.count(b"\n") == before.count(b"\n") + 5
+    assert set(before.splitlines(keepends=True)) <= set(written.splitlines(keepends=True))
+
+
 def test_what_does_not_fly_is_not_written(mine, capsys, monkeypatch):
     text = mine.read_text()
     robot_file = load_robot(mine)
