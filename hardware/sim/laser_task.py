@@ -63,16 +63,12 @@ class Tube:
         return crossing
 
     def clearance(self, beam: Beam) -> float:
-        """How far the beam stays from the bore's edge at the worse end [m]; negative: outside."""
-        ends = (self.offset(beam, share * self.length) for share in (-0.5, 0.5))
-        return self.radius - max(float(np.linalg.norm(end)) for end in ends)
-
-    def passes(self, beam: Beam) -> bool:
-        """Whether the beam enters by one end and leaves by the other.
+        """How far the beam stays from the bore's edge at the worse end [m]; negative: outside.
 
         A bore is convex: what is inside at both ends is inside between them.
         """
-        return self.clearance(beam) >= 0.0
+        ends = (self.offset(beam, share * self.length) for share in (-0.5, 0.5))
+        return self.radius - max(float(np.linalg.norm(end)) for end in ends)
 
     def mjcf(self) -> str:
         """As a ring of boxes that touch nothing but rays."""

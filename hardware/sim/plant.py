@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import sqrt
 
 import mujoco
 import numpy as np
 
-from hardware.sim.laser_task import Beam, Tube
+from hardware.sim.laser_task import Tube
 from hardware.sim.obstacle import Obstacle
 from hardware.sim.parameters import BodyImuParameters, PlantParameters
 from hardware.sim.plant_model import STEP_MS, mjcf
@@ -206,12 +206,6 @@ class Plant:
         if self._touch is None:
             raise ValueError("plant: touched: no obstacle; allowed: with PlantOptions.obstacle")
         return self._touch.touched()
-
-    def reach(self, beam: Beam) -> float:
-        """How far a beam goes until it meets something [m]; inf: nothing."""
-        origin, direction = beam
-        met = float(mujoco.mj_ray(self._model, self._data, origin, direction, None, 1, -1, None))
-        return met if met >= 0.0 else inf
 
     def imu(self) -> tuple[Array, Array]:
         """What the body's sensors read: (ω (3,) [rad/s], specific force (3,) [m/s²]) in b.
