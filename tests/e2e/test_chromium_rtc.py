@@ -178,6 +178,25 @@ def test_where_udp_is_blocked_pictures_go_by_websocket(chromium: str, tmp_path: 
     each_has_its_own_record(film, Codec.H264)
 
 
+def test_a_supervisor_chooses_the_way_and_the_phone_obeys_says_so_and_may_choose_again(
+    chromium: str, tmp_path: Path
+) -> None:
+    with filming(chromium, tmp_path) as (server, page):
+        path_is(server, page, "WebRTC, H264")
+        board = page.context.new_page()
+        board.goto(f"{server.http_url}/supervisor#k={server.supervisor_token}")
+        becomes(board, "!document.querySelector('#path-wish').disabled")
+        board.select_option("#path-wish", "WebSocket")
+        path_is(server, board, "websocket, H264")
+        page.bring_to_front()
+        becomes(page, "document.querySelector('#path-by').innerText === 'By supervisor'")
+        assert page.evaluate("document.querySelector('#path-wish').value") == "WebSocket"
+        page.select_option("#path-wish", "WebRTC")
+        path_is(server, page, "WebRTC, H264")
+        said = server.request("GET", "/api/status")["path_choice"]
+        assert said == {"type": "path", "wish": "WebRTC", "by": "operator"}
+
+
 LEARNT_S, STEADY_S, CHANGED_S = 7.0, 11.0, 4.0
 """Of tracking: the suspension is learnt, pictures change their way, and go on by the other."""
 
