@@ -84,7 +84,7 @@ export class BoardView extends Elements {
 
   /** @param {Status} status */
   phone({ operator, phones, supervisors, recording, video_path: path, path_choice: choice }) {
-    const words = path && `${choice?.by ? `${choice.by}’s choice: ` : 'video by '}${path}`;
+    const words = path && `video by ${path}${choice?.by ? `, ${choice.by}’s choice` : ''}`;
     this.text('video-path', words);
     this.find('video-path').title = words;
     this.text('operator', operator || 'none');
