@@ -17,7 +17,8 @@ from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, Mode, Operator, Requests
 from pipeline.teleop import Inputs, Output, Teleop
-from server.experiments.paper.leader import Leader, Rig
+from server.experiments.paper.leader import Leader
+from server.experiments.paper.rig import Rig
 from server.robot_link import RobotLink
 
 PERIOD_S = 0.005
