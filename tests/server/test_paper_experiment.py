@@ -160,7 +160,7 @@ def test_a_goal_that_is_missed_is_flown_again_in_better_worlds(
     monkeypatch.setattr(flight, "HOVER_S", 2.5)
     monkeypatch.setattr(beaten, "SECONDS", 0.5)
     hard = replace(beaten.goals()[1], limit=0.5)
-    monkeypatch.setattr(beaten, "goals", lambda: [hard, replace(hard, limit=50.0)])
+    monkeypatch.setattr(beaten, "goals", lambda pictures: [hard, replace(hard, limit=50.0)])
     missed, reached = beaten.measure(SETUP).rows
     assert missed.reached.startswith("missed by")
     assert missed.no_thruster_lag < missed.true
@@ -168,8 +168,15 @@ def test_a_goal_that_is_missed_is_flown_again_in_better_worlds(
     assert missed.twice_the_thrust > 0.0
     assert reached.reached == "reached"
     assert isnan(reached.no_thruster_lag)
-    said = json.loads(json.dumps(beaten.Summary((missed, reached)).json(), allow_nan=False))
+    said = json.loads(
+        json.dumps(beaten.Summary((missed, reached), phone()).json(), allow_nan=False)
+    )
     assert said["rows"][1]["no_thruster_lag"] is None
+
+
+def test_beaten_flies_its_phones_with_the_pictures_asked_for() -> None:
+    pictures = {(goal.leader.name, goal.leader.pictures) for goal in beaten.goals("h264")}
+    assert pictures == {("phone", "h264"), ("paper", "spots")}
 
 
 def test_wishes_are_flown() -> None:
@@ -183,11 +190,20 @@ def test_wishes_are_flown() -> None:
 
 
 def test_every_number_says_what_it_rests_on() -> None:
-    for setup in (SETUP, Setup(AMES, phone(), (1,))):
+    leaders = (PAPER, phone(), phone(pictures="h264"))
+    for setup in (Setup(AMES, leader, (1,)) for leader in leaders):
         said = assumptions.json(assumptions.of(setup))
         assert {one["status"] for one in said} == {"known", "identified", "chosen"}
         assert len({one["what"] for one in said}) == len(said)
         assert all(one["value"] for one in said)
+
+
+def test_it_is_said_whether_there_are_pictures() -> None:
+    spots = assumptions.lines(assumptions.phone_sensors(phone()))
+    film = assumptions.lines(assumptions.phone_sensors(phone(pictures="vp8")))
+    assert "nothing is rendered" in spots
+    assert "rendered, vp8 at 3 Mbit/s" in film
+    assert "nothing is rendered" not in film
 
 
 def test_the_command_writes_its_figures_and_pictures(
@@ -216,6 +232,7 @@ def test_the_command_writes_its_figures_and_pictures(
         (["--gains", "stiff"], "'stiff' is not one of its sets: phone, paper_with_ekf"),
         (["--robot", "quadrotor"], "is not one of its sets"),
         (["--robot", "amse"], "no such robot"),
+        (["--pictures", "h264"], "allowed with --leader paper: spots"),
     ],
 )
 def test_what_can_not_be_flown_is_said(
@@ -226,7 +243,14 @@ def test_what_can_not_be_flown_is_said(
 
 
 @pytest.mark.parametrize(
-    "words", [["--fps", "nan"], ["--latency-ms", "60"], ["--seeds", "0"], ["--only", "table_9"]]
+    "words",
+    [
+        ["--fps", "nan"],
+        ["--latency-ms", "60"],
+        ["--seeds", "0"],
+        ["--only", "table_9"],
+        ["--pictures", "raw"],
+    ],
 )
 def test_options_out_of_range_are_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit):

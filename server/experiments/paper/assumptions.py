@@ -10,11 +10,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 
 from hardware.sim.parameters import PlantParameters
+from hardware.sim.render import Look
 from server.experiments.paper import published
 from server.experiments.paper.assumption import Assumption
 from server.experiments.paper.assumptions_task import of_task
+from server.experiments.paper.eyes import BITRATE_BPS
 from server.experiments.paper.flight import HOVER_S, REST_S
-from server.experiments.paper.leader import PAPER, Leader
+from server.experiments.paper.leader import PAPER, Leader, Pictures
 from server.experiments.paper.led import PERIOD_S
 from server.experiments.paper.measure import WINDOW_S, Setup
 
@@ -67,6 +69,8 @@ def phone_sensors(leader: Leader) -> Iterator[Assumption]:
     """A phone on the same arm: nothing of it is the paper's."""
     o = leader.options
     yield Assumption("pictures", f"{o.frame_rate_hz:g} fps", "chosen")
+    if leader.pictures != "spots":
+        yield from _filmed(leader.pictures)
     yield Assumption("pictures' delay", _ms(o.picture_delay_s), "chosen")
     yield Assumption(
         "phone's IMU", f"{o.motion_rate_hz:g} Hz, {_ms(o.motion_delay_s)} late", "chosen"
@@ -78,8 +82,26 @@ def phone_sensors(leader: Leader) -> Iterator[Assumption]:
     yield from _common(leader)
 
 
+def _filmed(codec: Pictures) -> Iterator[Assumption]:
+    """Pictures that are rendered."""
+    look = Look()
+    # a JPEG's size follows from its quality
+    rate = "" if codec == "jpeg" else f" at {1e-6 * BITRATE_BPS:g} Mbit/s"
+    yield Assumption(
+        "their way", f"rendered, {codec}{rate}, decoded, the server's vision looks", "chosen"
+    )
+    yield Assumption(
+        "their light",
+        f"{1e3 * look.exposure_s:g} ms exposure, all rows at once, LEDs of "
+        f"{2e3 * look.led_radius_m:g} mm, a dim room without other lamps",
+        "chosen",
+    )
+
+
 def _common(leader: Leader) -> Iterator[Assumption]:
-    yield Assumption("LEDs' centres", f"{leader.noise_px:g} px per coordinate, white", "chosen")
+    if leader.pictures == "spots":
+        noise = f"{leader.noise_px:g} px per coordinate, white, names known: nothing is rendered"
+        yield Assumption("LEDs' centres", noise, "chosen")
     yield Assumption(
         "derivative without EKF", f"low pass of {1e3 * leader.derivative_tau_s:g} ms", "chosen"
     )

@@ -6,7 +6,7 @@ with one thing of the world made better at a time: what helps is what bounds it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import nan
 from pathlib import Path
@@ -15,8 +15,7 @@ from typing import Final
 from hardware.robot_file import RobotFile
 from pipeline.config import VirtualCameraMode
 from server.experiments.paper import assumptions, published
-from server.experiments.paper.assumption import Assumption
-from server.experiments.paper.leader import PAPER, PERFECT, Leader, phone
+from server.experiments.paper.leader import PAPER, PERFECT, Leader, Pictures, phone
 from server.experiments.paper.measure import Cell, Setup, cell_of
 from server.experiments.paper.variants import Variant, Wishes, ours
 from server.experiments.text import Column, flights, plain
@@ -42,12 +41,12 @@ class Goal:
     """[mm] or [°]."""
 
 
-def goals() -> list[Goal]:
+def goals(pictures: Pictures = "spots") -> list[Goal]:
     """A phone: not worse than the paper's better columns; the paper's sensors: half of Table I."""
     moves = published.TABLE_I["with EKF"].items()
     turns = published.TABLE_IV["with VCI"].items()
     listed: list[Goal] = []
-    for leader, share in ((phone(), 1.0), (PAPER, 0.5)):
+    for leader, share in ((phone(pictures=pictures), 1.0), (PAPER, 0.5)):
         listed += [
             Goal(leader, "I", f"step_{axis}", axis, "off", share * limit) for axis, limit in moves
         ]
@@ -93,6 +92,7 @@ class Summary:
     """The experiment's result."""
 
     rows: tuple[Row, ...]
+    phone: Leader
     name: str = NAME
 
     @property
@@ -103,25 +103,28 @@ class Summary:
     def text(self) -> str:
         """Title and table."""
         rows = flights(COLUMNS, self.rows)
-        return "\n".join((TITLE, rows, "Its phone:", assumptions.lines(_of_phone())))
+        of_phone = assumptions.lines(assumptions.phone_sensors(self.phone))
+        return "\n".join((TITLE, rows, "Its phone:", of_phone))
 
     def json(self) -> dict[str, object]:
         """The same for programs; null is what was not flown."""
         rows = [plain(asdict(row)) for row in self.rows]
-        return {"title": TITLE, "rows": rows, "phone": assumptions.json(_of_phone())}
+        of_phone = assumptions.json(assumptions.phone_sensors(self.phone))
+        return {"title": TITLE, "rows": rows, "phone": of_phone}
 
     def draw(self, folder: Path) -> list[Path]:
         """It has no picture."""
         return []
 
 
-def _of_phone() -> Iterator[Assumption]:
-    return assumptions.phone_sensors(phone())
-
-
 def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Summary:
-    """Fly what the goals ask for, whatever leader and `extra` variants are set."""
-    return Summary(tuple(_judged(setup, goal) for goal in goals()))
+    """Fly what the goals ask for, whatever leader and `extra` variants are set.
+
+    Of the leader set, its phones only take the kind of pictures.
+    """
+    pictures = setup.leader.pictures
+    rows = tuple(_judged(setup, goal) for goal in goals(pictures))
+    return Summary(rows, phone(pictures=pictures))
 
 
 def _judged(setup: Setup, goal: Goal) -> Row:

@@ -22,7 +22,7 @@ from server.experiments.paper import (
     table_3,
     table_4,
 )
-from server.experiments.paper.leader import PAPER, Leader, phone
+from server.experiments.paper.leader import PAPER, Leader, Pictures, phone
 from server.experiments.paper.measure import Setup
 from server.experiments.paper.variants import (
     Variant,
@@ -66,8 +66,9 @@ EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, print, write, draw; 1 if a statement of the paper does not hold, 2 if it can't fly."""
-    leader, wishes = leader_of(arguments), wishes_of(arguments)
+    wishes = wishes_of(arguments)
     try:
+        leader = leader_of(arguments)
         robot_file = load_robot(arguments.robot)
         check_gains(robot_file, arguments.robot, arguments.gains)
     except (RobotFileError, ValueError) as error:
@@ -101,11 +102,20 @@ def write(outcomes: Sequence[Outcome], setup: Setup, folder: Path) -> list[Path]
 
 
 def leader_of(arguments: argparse.Namespace) -> Leader:
-    """The paper's sensors, or a phone with its rate and delay."""
+    """The paper's sensors, or a phone with its rate and delay.
+
+    Raises:
+        ValueError: pictures that the paper's sensors have not; says what is allowed.
+    """
     if arguments.leader == PAPER.name:
+        if arguments.pictures != PAPER.pictures:
+            raise ValueError(
+                f"--pictures {arguments.pictures}: allowed with --leader {PAPER.name}: "
+                f"{PAPER.pictures}; its camera's 500 pictures/s went through no codec"
+            )
         return PAPER
     low, high = sorted(arguments.latency_ms)
-    return phone(arguments.fps, (1e-3 * low, 1e-3 * high))
+    return phone(arguments.fps, (1e-3 * low, 1e-3 * high), arguments.pictures)
 
 
 def wishes_of(arguments: argparse.Namespace) -> Wishes:
@@ -140,6 +150,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=(60.0, 120.0),
         metavar=("LOW", "HIGH"),
         help="of a phone's pictures",
+    )
+    parser.add_argument(
+        "--pictures",
+        choices=get_args(Pictures),
+        default=PAPER.pictures,
+        help="spots: LEDs with a camera's noise; else a phone's pictures are rendered, encoded, "
+        "decoded and looked at",
     )
     add = parser.add_argument_group("a column of our own, beside the paper's")
     add.add_argument("--estimator", choices=get_args(EstimatorName))

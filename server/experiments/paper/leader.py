@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import radians, sqrt
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from pipeline.estimator_config import NoFilterConfig
 from pipeline.frames import GRAVITY
 
 MTI_RATE_HZ: Final = 400.0
+Pictures = Literal["spots", "h264", "vp8", "jpeg"]
+"""spots: none, LEDs come as spots with noise; else rendered, through this codec, looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,13 +29,14 @@ class Leader:
     height: int
     focal_px: float
     noise_px: float
-    """Standard deviation of a spot's centre, per coordinate."""
+    """Standard deviation of a spot's centre, per coordinate, where there are no pictures."""
     derivative_tau_s: float
     """Low pass of the derivative where there is no filter."""
     feedforward_low_pass_hz: float
     """What its accelerometer's noise and rounding allow."""
     gains: str
     """The set of ours: what its delays allow."""
+    pictures: Pictures = "spots"
 
     @property
     def camera(self) -> Camera:
@@ -83,7 +86,11 @@ PERFECT: Final = replace(
 """Next to no noise and delay: what is left is not the sensors'."""
 
 
-def phone(fps: float = 30.0, latency_s: tuple[float, float] = (0.060, 0.120)) -> Leader:
+def phone(
+    fps: float = 30.0,
+    latency_s: tuple[float, float] = (0.060, 0.120),
+    pictures: Pictures = "spots",
+) -> Leader:
     """A phone's page: pictures at `fps` that arrive `latency_s` late, samples as Chromium rounds.
 
     Its biases and noises are the virtual phone's.
@@ -99,4 +106,5 @@ def phone(fps: float = 30.0, latency_s: tuple[float, float] = (0.060, 0.120)) ->
         derivative_tau_s=NoFilterConfig().tau,
         feedforward_low_pass_hz=8.0,
         gains="paper_with_ekf",
+        pictures=pictures,
     )

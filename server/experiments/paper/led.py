@@ -37,7 +37,7 @@ class Led:
         options: PlantOptions | None = None,
     ) -> None:
         """Everything at rest."""
-        self._rig = Rig(leader, hand, robot_file.robot.leds_in_b, seed)
+        self._rig = Rig(leader, hand, robot_file.robot, config.gates, seed)
         self._follower = LockstepFollower(robot_file, seed, options=options)
         self._link = RobotLink(self._follower)
         self._teleop = Teleop(robot_file.robot, config, PERIOD_S)
@@ -95,6 +95,8 @@ class Led:
         if tracking and not self.tracks:
             self.ended = output.failsafe.reason
         self._body = self._link.exchange(ThrustCommand(output.thrusts, output.armed), now)
+        offset = self._teleop.estimator.health.time_offset
+        self._rig.learn(output.relative, offset, self._body)
         return output
 
     def _robot_at(self, t: float) -> tuple[Array, Array]:

@@ -1,30 +1,38 @@
-"""A leader in a hand, looking at a robot: what of it reaches control when. Virtual time.
-
-Nothing is rendered: LEDs come as spots with a camera's noise, and each picture's time is known.
-"""
+"""A leader in a hand, looking at a robot: what of it reaches control when. Virtual time."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from hardware.sim.hand import Hand
-from hardware.sim.noisy_eye import NoisyEye
 from hardware.sim.phone import BodyHistory, EventKind, VirtualPhone
 from hardware.sim.render import Look
-from pipeline.frames import Array, R_cd
-from pipeline.signals import PhoneImu, Seen
+from pipeline.frames import R_cd
+from pipeline.robot import Robot
+from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
+from pipeline.vision_config import GatesConfig
+from server.experiments.paper.eyes import Eye, PicturesEye, SpotsEye
 from server.experiments.paper.leader import Leader
 
 
 class Rig:
     """Its clock is known exactly."""
 
-    def __init__(self, leader: Leader, hand: Hand, leds_in_b: Array, seed: int) -> None:
-        """Noise, biases and delays follow from `seed`."""
+    def __init__(
+        self, leader: Leader, hand: Hand, robot: Robot, gates: GatesConfig, seed: int
+    ) -> None:
+        """Noise, biases and delays follow from `seed`, the same whatever its pictures are."""
+        leds_in_b = robot.leds_in_b
         rng, spots_rng = np.random.default_rng((seed, 3)).spawn(2)
         self._R_cd = R_cd(leader.options.screen_angle_deg)
         self._phone = VirtualPhone(leader.camera, hand, leds_in_b, Look(), rng, leader.options)
-        self._eye = NoisyEye(self._phone, leds_in_b, leader.noise_px, lambda t: (), spots_rng)
+        self._eye: Eye
+        if leader.pictures == "spots":
+            self._eye = SpotsEye(self._phone, leds_in_b, leader.noise_px, spots_rng)
+        else:
+            self._eye = PicturesEye(self._phone, leader.pictures, robot, gates)
 
     def arrivals(
         self, t_from: float, t_to: float, body: BodyHistory
@@ -35,9 +43,20 @@ class Rig:
         """
         events = [e for e in self._phone.events(t_from, t_to) if e.t_capture > 0.0]
         motions = [self._felt(e.t_capture) for e in events if e.kind is EventKind.MOTION]
-        captures = [e.t_capture for e in events if e.kind is EventKind.PICTURE]
-        sights = (self._eye.seen(t, t, body) for t in captures[-1:])
-        return motions, [seen for seen in sights if seen is not None]
+        self._eye.feel(motions)
+        pictures = [e for e in events if e.kind is EventKind.PICTURE]
+        seen = self._eye.see(pictures, body) if pictures else None
+        return motions, [seen] if seen is not None else []
+
+    def learn(
+        self, relative: RelativeState | None, time_offset: float, body: Sequence[BodyImu]
+    ) -> None:
+        """What vision hears back after a period: control's filter, and the robot's samples.
+
+        `time_offset` [s] of pictures, as the filter knows it; NaN if it doesn't.
+        """
+        self._eye.expect(relative, time_offset)
+        self._eye.feel(body)
 
     def _felt(self, t: float) -> PhoneImu:
         reading = self._phone.motion(t)
