@@ -52,6 +52,29 @@ def test_the_wall_pushes_back_what_presses_less_what_the_cable_takes() -> None:
     assert 0.0 <= obstacle.depth_of_tip(plant.p_bf_in_f, plant.R_fb) < 5e-4
 
 
+def test_it_gives_way_as_hard_rubber_does_and_no_less() -> None:
+    depths = []
+    for push_n in (2.0, 4.0):
+        plant, obstacle = make(Obstacle(gap_m=0.02)), Obstacle(gap_m=0.02)
+        run(plant, 5.0, np.array([push_n, 0.0, 0.0, 0.0, 0.0, 0.0]))
+        depths.append((obstacle.depth_of_tip(plant.p_bf_in_f, plant.R_fb), plant.touched))
+    (shallow, light), (deep, hard) = depths
+    stiffness = (light.force_in_f[0] - hard.force_in_f[0]) / (deep - shallow)
+    assert stiffness == pytest.approx(Obstacle().stiffness_s2 * AMES.plant.mass, rel=0.1)
+
+
+def test_a_tip_that_slides_while_it_presses_does_not_rattle() -> None:
+    plant = make(Obstacle(gap_m=0.02))
+    run(plant, 4.0, np.array([1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    touches, start = [], plant.p_bf_in_f[1]
+    for k in range(400):
+        plant.external_wrench_in_f[1] = 1.5 * k / 400
+        plant.step(np.zeros(8))
+        touches += plant.touched.pushes
+    assert plant.p_bf_in_f[1] - start > 0.01
+    assert all(touches)
+
+
 def test_it_rebounds_with_about_half_the_speed_of_impact() -> None:
     speeds = []
     plant = make(Obstacle(gap_m=0.02))
