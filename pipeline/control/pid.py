@@ -109,7 +109,7 @@ class Pid:
         Kp, Kd = self._Kp, self._Kd
         force_in_b = (
             Kp[:3] * (view.R_vb.T @ error.e_p_in_v)
-            + self.damping_in_b(error, view)
+            + Kd[:3] * (view.R_vb.T @ error.e_p_rate_in_v)
             + self._axes[:3] * ((view.R_fv @ view.R_vb).T @ self.constant_force_in_f)
         )
         torque_in_b = (
@@ -117,10 +117,10 @@ class Pid:
         )
         return np.concatenate((force_in_b, torque_in_b))
 
-    def damping_in_b(self, error: PoseError, view: VirtualView) -> Array:
-        """What of the force answers to the error's rate (3,) [N]."""
-        damping_in_b: Array = self._Kd[:3] * (view.R_vb.T @ error.e_p_rate_in_v)
-        return damping_in_b
+    def braking_in_b(self, a_bf_in_b: Array) -> Array:
+        """How fast the damping answers to the body's own acceleration (3,) [m/s²]: (3,) [N/s]."""
+        braking_in_b: Array = -self._Kd[:3] * a_bf_in_b
+        return braking_in_b
 
     def integrate(
         self, error: PoseError, view: VirtualView, missing_wrench_in_b: Array, h: float

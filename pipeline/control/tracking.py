@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
 from pipeline.config import TeleopConfig
 from pipeline.control.compliance import Compliance
-from pipeline.control.feedforward import FeedForward
+from pipeline.control.feedforward import G_IN_F, FeedForward
 from pipeline.control.pid import Pid, PoseError, Reference
 from pipeline.frames import Array
 from pipeline.robot import Robot
@@ -67,13 +68,17 @@ class Tracking:
             wrench_in_b = wrench_in_b + (
                 ahead_in_b if self._robot.needs_tilt else ahead_in_b * self._robot.axes
             )
-        return self._softened(wrench_in_b, now.view, error)
+        return self._softened(wrench_in_b, now, error)
 
-    def _softened(self, wrench_in_b: Array, view: VirtualView, error: PoseError) -> Array:
+    def _softened(self, wrench_in_b: Array, now: Situation, error: PoseError) -> Array:
         """Yield where the force would be more than an obstacle is to bear."""
-        R_fb = view.R_fv @ view.R_vb
+        R_fb = now.view.R_fv @ now.view.R_vb
+        a_bf_in_b = now.relative.f_bf_in_b + R_fb.T @ G_IN_F
         soft_in_f = self._compliance.force(
-            R_fb @ wrench_in_b[:3], R_fb @ self._pid.damping_in_b(error, view), self._period
+            R_fb @ wrench_in_b[:3],
+            R_fb @ self._pid.braking_in_b(a_bf_in_b),
+            sqrt(float(error.e_p_in_v @ error.e_p_in_v)),
+            self._period,
         )
         soft_in_b = R_fb.T @ soft_in_f
         self._yielded_in_b = wrench_in_b[:3] - soft_in_b

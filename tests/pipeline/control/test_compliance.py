@@ -50,7 +50,7 @@ def fly(
     pid.take_over(-pull * ALONG)
     soft.start(-pull * ALONG)
     waiting = deque([-pull] * 3)
-    x = v = 0.0
+    x = v = v_before = 0.0
     force, touching, lost, rows = -pull, False, 0, []
     damping = 0.4 * np.sqrt(stiffness * MASS)
     for k in range(round(seconds / H)):
@@ -60,9 +60,11 @@ def fly(
         view = VirtualView(np.eye(3), np.zeros(3), x * ALONG, np.eye(3), (v - moving) * ALONG, ZERO)
         error = pose_error(view, Reference(target * ALONG, np.eye(3)))
         wrench = pid.wrench(error, view)
+        felt_a, v_before = (v - v_before) / H * ALONG, v
         if switch is not None:
             soft.on = switch(t)
-        given = np.clip(soft.force(wrench[:3], pid.damping_in_b(error, view), H), -6.0, 6.0)
+        soft_in_f = soft.force(wrench[:3], pid.braking_in_b(felt_a), abs(target - x), H)
+        given = np.clip(soft_in_f, -6.0, 6.0)
         pid.integrate(error, view, wrench - np.append(given, ZERO), H)
         waiting.append(given[0])
         command, felt = waiting.popleft(), 0.0
@@ -114,6 +116,40 @@ def test_in_the_free_it_changes_nothing() -> None:
 def test_a_reference_just_behind_the_wall_is_no_harder_push_in_the_end() -> None:
     flight = fly(behind=0.01, seconds=16.0, wall=lambda t: True)
     assert flight.contact[flight.t > 3.0].max() < 1.2 * LIMIT
+
+
+def test_where_it_follows_a_pull_beyond_the_limit_is_carried_and_nothing_is_cut() -> None:
+    soft = Compliance(ON)
+    for k in range(4000):
+        force = (LIMIT + 1.5) * np.sin(0.3 * 2.0 * np.pi * k * H) * ALONG
+        np.testing.assert_array_equal(soft.force(force, ZERO, 0.003, H), force)
+
+
+def test_what_was_carried_is_no_allowance_against_a_wall() -> None:
+    soft = Compliance(ON)
+    for _ in range(400):
+        soft.force(5.5 * ALONG, ZERO, 0.003, H)
+    for _ in range(400):
+        given = soft.force(9.0 * ALONG, ZERO, 0.05, H)
+    assert given[0] == pytest.approx(LIMIT, abs=0.02)
+
+
+def test_a_reference_within_reach_of_following_pushes_with_twice_the_limit_at_most() -> None:
+    soft = Compliance(ON)
+    given = [soft.force(min(9.0, 0.02 * k) * ALONG, ZERO, 0.005, H)[0] for k in range(4000)]
+    learnt_on_the_way = 0.05
+    assert max(given) < 2.0 * LIMIT + learnt_on_the_way
+
+
+def test_tremor_of_the_hand_does_not_reach_the_wall_but_the_bodys_own_motion_is_damped() -> None:
+    soft = Compliance(ON)
+    given = []
+    for k in range(1000):
+        tremor = 0.3 * np.sin(2.0 * np.pi * 10.0 * k * H)
+        given.append(soft.force((6.0 + tremor) * ALONG, ZERO, 0.05, H)[0])
+    assert np.ptp(given[500:]) < 1e-6
+    rebound = soft.force(6.0 * ALONG, -30.0 * 20.0 * ALONG, 0.05, H)[0]
+    assert rebound < given[-1] - 2.0
 
 
 def test_switched_on_while_pushing_it_eases_and_switched_off_it_does_not_jump() -> None:
