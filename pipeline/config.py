@@ -103,7 +103,7 @@ class ComplianceConfig:
 
     enabled: bool = False
     limit_n: float = 3.0
-    """Beyond what has held it lately [N]."""
+    """Beyond what has held it lately, and as much again within `follows_m` [N]."""
     usual_s: float = 10.0
     """How fast what holds it is learnt, while it is not pushing too hard [s]."""
     quick_s: float = 0.05

@@ -9,7 +9,9 @@ import numpy as np
 
 from server.settings import VideoSettings
 
-RATE_HZ, FRAME_MS = 30.0, 1000.0 / 30.0
+RATE_HZ = 30.0
+CLOCK_MS = 2.0
+"""So far the clocks of page and server may be apart."""
 SETTLED_S = 3.0
 """From the first picture until the figures count; the bitrate is that of its last second."""
 COLUMNS = (
@@ -40,7 +42,7 @@ class Row:
     bitrate_percent: float
     """Of what is wanted, in the third second after the first picture."""
     matched_percent: float
-    """Pictures whose record is of when they were painted, to half a picture."""
+    """Pictures taken, as their record says, after they were painted and before the next one was."""
     imu_hz: float
     sync_ms: float
     """Error of the clock, p95."""
@@ -56,8 +58,8 @@ def judged(
     first = t[0]
     counts = (t > first + SETTLED_S) & (t <= first + SETTLED_S + seconds) & ~np.isnan(painted)
     delay = (1e3 * (t - epoch) - painted)[counts]
-    late = (1e3 * (taken - epoch) - painted)[counts]
-    fine = np.abs(late - np.median(late)) < 0.5 * FRAME_MS if len(late) else late
+    shown, shot = painted[counts], 1e3 * (taken[counts] - epoch)
+    own = (shot > shown - CLOCK_MS) & (shot < np.append(shown[1:], np.inf) + CLOCK_MS)
     third = (t > first + SETTLED_S - 1.0) & (t <= first + SETTLED_S)
     bps = sent_bps if "stock" in way else 8.0 * size[third].sum()
     clock = np.abs(np.array(seen["clock"]) + epoch)
@@ -69,7 +71,7 @@ def judged(
         * max(0.0, 1.0 - len(np.unique(painted[counts])) / (RATE_HZ * seconds)),
         first_s=first - tapped,
         bitrate_percent=100.0 * bps / VideoSettings().bitrate_bps,
-        matched_percent=100.0 * float(np.mean(fine)) if way != "stock" else np.nan,
+        matched_percent=100.0 * float(np.mean(own)) if way != "stock" else np.nan,
         imu_hz=float(np.median(seen["imu_hz"])) if seen["imu_hz"] else np.nan,
         sync_ms=1e3 * float(np.percentile(clock, 95)) if len(clock) else np.nan,
     )
