@@ -1,9 +1,9 @@
 """What a real Chromium costs: `python -m tests.bench.bench_browser`.
 
-Films with known truth are a Chromium's camera; the real page encodes them and sends them over the
-real websocket, or by WebRTC. The live stages look at what the server recorded, and at the same
-pictures raw. In between: the same luma in video range, and through x264 with as many bits. The exit
-code is 1 if a goal is missed.
+Films with known truth are a Chromium's camera; the real page encodes them and sends them by a real
+path. The live stages look at what the server recorded, and at the same pictures raw. In between:
+the same luma in video range, and through x264 with as many bits. The exit code is 1 if a goal is
+missed.
 
 The film is played slower, at the same bits a picture, so that a busy machine loses few pictures.
 """
@@ -26,7 +26,7 @@ from server.bench.verdicts import REFERENCE
 from server.experiments.text import table
 from server.settings import VideoSettings
 from tests.bench.browser_eyes import CHROMIUM, RAW, WAYS, Row, Seen, look, row
-from tests.bench.browser_film import Speed, Studio, studio
+from tests.bench.browser_film import PATHS, Speed, Studio, studio
 from tests.e2e.conftest import find_chromium
 
 USUAL = ("clean", "typical", "motion_blur", "rolling_shutter", "clutter", "low_light")
@@ -59,7 +59,7 @@ def arguments():
     parser.add_argument("--slower", type=int, default=3, help="times slower than real time")
     default = VideoSettings().bitrate_bps
     parser.add_argument("--bitrate", type=int, default=default, help="[bit/s], in real time")
-    parser.add_argument("--webrtc", action="store_true", help="not by websocket")
+    parser.add_argument("--path", choices=list(PATHS), default="WebCodecs", help="of the pictures")
     return parser.parse_args()
 
 
@@ -96,7 +96,7 @@ def main() -> int:
     if executable is None:
         sys.exit("no Chromium found: apt-get install chromium")
     warm_up()
-    with studio(executable, Speed(told.slower, told.bitrate, told.webrtc)) as films:
+    with studio(executable, Speed(told.slower, told.bitrate, told.path)) as films:
         rows = [one for name in told.scenes for one in rows_of(name, told, films)]
     print(table(COLUMNS, rows))
     print(f"\ngoals: {ADDED_PX} px in the median; poses (lateral / depth / rotation) {POSES} × raw")

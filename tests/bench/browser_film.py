@@ -23,10 +23,11 @@ from server.frame_decoder import FrameDecoder
 from server.ingest import EncodedFrame
 from server.recording_files import read
 from server.wire import decode
-from server.wire_records import Picture
+from server.wire_records import Codec, Picture
 from tests.bench.y4m_camera import number_of, write_y4m
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
+from tests.e2e.page_scripts import NO_ENCODER, NO_WEBRTC
 from tests.e2e.played_phone import HD_CAMERA
 from tests.e2e.serving import Serving, serving
 
@@ -34,6 +35,8 @@ START_S = 4.0
 """From the tap until pictures flow, and the encoder's rate control knows the film."""
 KEY_S = 1.0
 """Until the key picture that a recording asks for."""
+PATHS = {"WebRTC": (), "WebCodecs": (NO_WEBRTC,), "JPEG": (NO_WEBRTC, NO_ENCODER)}
+"""What the page must lack for each."""
 STREAMING = "Number.parseInt(document.body.innerText.split('Video')[1] ?? '') > 0"
 
 
@@ -57,8 +60,8 @@ class Speed:
     """Bits a second shrink with the pictures, so that a picture has as many as in real time."""
     bitrate_bps: int
     """In real time."""
-    by_webrtc: bool = False
-    """Else by websocket."""
+    path: str = "WebCodecs"
+    """One of `PATHS`."""
 
     @property
     def rate_hz(self) -> int:
@@ -69,8 +72,7 @@ class Speed:
     def options(self) -> list[str]:
         """Of `lightleash serve`."""
         rate, bits = str(self.rate_hz), str(self.bitrate_bps // self.slower)
-        path = ["--rtc.enabled" if self.by_webrtc else "--no-rtc.enabled"]
-        return ["--video.frame-rate-hz", rate, "--video.bitrate-bps", bits, *path]
+        return ["--video.frame-rate-hz", rate, "--video.bitrate-bps", bits]
 
 
 class Studio:
@@ -97,6 +99,8 @@ class Studio:
         seconds = KEY_S + 3.0 * count / self._speed.rate_hz
         with browser(self._executable, camera_file=self._y4m, **LANDSCAPE) as context:
             page = context.new_page()
+            for script in PATHS[self._speed.path]:
+                page.add_init_script(script)
             _rest(page)
             page.goto(f"{self._server.local_https}/#k={self._server.operator_token}")
             page.tap("#start")
@@ -146,7 +150,7 @@ def _rest(page: Page) -> None:
 def _delivered(recording: Path) -> Iterator[Delivered]:
     """Every picture that can be decoded, in order."""
     decoder: FrameDecoder | None = None
-    colours = av.CodecContext.create("h264", "r")
+    colours: av.CodecContext | None = None
     for t, data in read(recording).phone_records():
         record = decode(data)
         picture = record.body
@@ -156,6 +160,8 @@ def _delivered(recording: Path) -> Iterator[Delivered]:
         luma = decoder.decoded(EncodedFrame(t, t, record.sequence, picture))
         if luma is None:
             continue
+        name = "h264" if picture.codec is Codec.H264 else "mjpeg"
+        colours = colours or av.CodecContext.create(name, "r")
         number = number_of(_chroma(colours, picture.data))
         if number is not None:
             size = len(picture.data)
