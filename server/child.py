@@ -62,7 +62,7 @@ class Child:
         parent = os.getpid()
         self.process = subprocess.Popen(
             [sys.executable, "-m", *self.arguments],
-            preexec_fn=lambda: _die_with(parent),
+            preexec_fn=lambda: die_with(parent),
             start_new_session=True,
             env={**os.environ, **self.environment},
             pass_fds=self.descriptors,
@@ -83,7 +83,8 @@ class Child:
             self.process.wait()
 
 
-def _die_with(parent: int) -> None:
+def die_with(parent: int) -> None:
+    """Let this process end when its parent, which is that one, does."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:  # it died before we asked
         os.kill(os.getpid(), signal.SIGTERM)

@@ -9,7 +9,6 @@ import os
 import signal
 import socket
 import sys
-import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from starlette.types import ASGIApp
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
-from pipeline.vision.looking import warm_up
+from server import warm_up
 from server.app import Api, make_app
 from server.calibrate.camera_yaml import PROFILES
 from server.dashboard import Dashboard
@@ -97,8 +96,7 @@ def _hub(settings: Settings, given: Given) -> Hub:
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
     robot = load_robot(settings.robot).robot
-    # what the first picture needs compiled is compiled beside the start
-    threading.Thread(target=warm_up, name="warm-up", daemon=True).start()
+    warm_up.begin()
     profiles = settings.state / PROFILES
     profiles.mkdir(parents=True, exist_ok=True)
     cameras = [*settings.cameras, profiles, CAMERAS]
