@@ -171,6 +171,7 @@ def test_the_command_flies_it_and_says_how_far_it_is(
 
 @pytest.mark.slow
 def test_processes_fly_the_same_as_one() -> None:
-    few = [next(trials_of(SETUP, (WITHOUT_EKF,))), next(trials_of(SETUP, (WITH_EKF,)))]
+    # the other person is slow, and fails without EKF after a whole minute
+    few = [t for t in trials_of(SETUP, (WITH_EKF,)) if t.person == 1 and t.repetition == 1]
     (alone, spread) = (dict(flown(few, workers)) for workers in (1, 2))
     assert [alone[k].seconds for k in (0, 1)] == [spread[k].seconds for k in (0, 1)]
