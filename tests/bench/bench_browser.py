@@ -26,8 +26,9 @@ from server.bench.verdicts import REFERENCE
 from server.experiments.text import table
 from server.settings import VideoSettings
 from tests.bench.browser_eyes import CHROMIUM, RAW, WAYS, Row, Seen, look, row
-from tests.bench.browser_film import PATHS, Speed, Studio, studio
+from tests.bench.browser_film import Speed, Studio, studio
 from tests.e2e.conftest import find_chromium
+from tests.e2e.page_scripts import LACKING
 
 USUAL = ("clean", "typical", "motion_blur", "rolling_shutter", "clutter", "low_light")
 ADDED_PX, POSES = 0.1, 1.5
@@ -59,7 +60,9 @@ def arguments():
     parser.add_argument("--slower", type=int, default=3, help="times slower than real time")
     default = VideoSettings().bitrate_bps
     parser.add_argument("--bitrate", type=int, default=default, help="[bit/s], in real time")
-    parser.add_argument("--path", choices=list(PATHS), default="WebCodecs", help="of the pictures")
+    parser.add_argument(
+        "--path", choices=list(LACKING), default="WebCodecs", help="of the pictures"
+    )
     return parser.parse_args()
 
 

@@ -28,7 +28,7 @@ from server.experiments.text import table
 from server.one_line import Parser
 from tests.e2e.chromium_rig import flight, led_server, start
 from tests.e2e.conftest import find_chromium
-from tests.e2e.page_scripts import NO_ENCODER, NO_WEBRTC
+from tests.e2e.page_scripts import LACKING
 from tests.e2e.serving import serving
 
 HAND, SEED, REST_S = "moving", 2, 12.0
@@ -58,9 +58,9 @@ class Way:
 WAYS: Final = {
     way.name: way
     for way in (
-        Way("WebRTC", (), ("--path", "webrtc")),
-        Way("WebCodecs", (NO_WEBRTC,), ()),
-        Way("JPEG", (NO_WEBRTC, NO_ENCODER), ("--codec", "jpeg")),
+        Way("WebRTC", LACKING["WebRTC"], ("--path", "webrtc")),
+        Way("WebCodecs", LACKING["WebCodecs"], ()),
+        Way("JPEG", LACKING["JPEG"], ("--codec", "jpeg")),
     )
 }
 

@@ -31,19 +31,19 @@ from playwright.sync_api import BrowserContext, Page
 from server.experiments.text import table
 from server.settings import VideoSettings
 from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
-from tests.e2e.chromium_channel import Channel, reading
+from tests.e2e.chromium_channel import SENSORS, Channel, feeling, reading
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.clock_canvas import clock_canvas
 from tests.e2e.conftest import find_chromium
-from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_ENCODER, NO_H264, NO_WEBRTC
+from tests.e2e.page_scripts import KEEP_CONNECTIONS, LACKING, NO_H264
 
 SCRIPTS: dict[str, tuple[str, ...]] = {
     "tuned": (),
     "tuned VP8": (NO_H264,),
     "stock": (),
-    "WebCodecs": (NO_WEBRTC,),
-    "JPEG": (NO_WEBRTC, NO_ENCODER),
+    "WebCodecs": LACKING["WebCodecs"],
+    "JPEG": LACKING["JPEG"],
 }
 STOCK = """
 async ([token, bitrate]) => {
@@ -104,13 +104,9 @@ def receiving(result: Path) -> Iterator[dict[str, object]]:
 class Sensors:
     """Motion sensors that sway, fed at 100 Hz."""
 
-    KINDS = ("accelerometer", "gyroscope", "linear-acceleration")
-
     def __init__(self, context: BrowserContext, page: Page) -> None:
         self._channel = Channel(context, page)
-        for kind in self.KINDS:
-            told: dict[str, object] = {"enabled": True, "type": kind, "metadata": {}}
-            self._channel.orders(("Emulation.setSensorOverrideEnabled", told))
+        self._channel.orders(*map(feeling, SENSORS))
 
     def sway(self, seconds: float) -> None:
         """Play for so long."""
@@ -118,7 +114,7 @@ class Sensors:
         while (t := time.monotonic()) < end:
             turn = 0.3 * sin(2.0 * pi * t)
             felt = (np.array((0.5 * turn, turn, z)) for z in (9.81 + turn, turn, turn))
-            self._channel.orders(*map(reading, self.KINDS, felt))
+            self._channel.orders(*map(reading, SENSORS, felt))
             time.sleep(0.01)
 
     def close(self) -> None:

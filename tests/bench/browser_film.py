@@ -25,9 +25,10 @@ from server.recording_files import read
 from server.wire import decode
 from server.wire_records import Codec, Picture
 from tests.bench.y4m_camera import number_of, write_y4m
+from tests.e2e.chromium_channel import feeling, reading
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
-from tests.e2e.page_scripts import NO_ENCODER, NO_WEBRTC
+from tests.e2e.page_scripts import LACKING
 from tests.e2e.played_phone import HD_CAMERA
 from tests.e2e.serving import Serving, serving
 
@@ -35,8 +36,6 @@ START_S = 4.0
 """From the tap until pictures flow, and the encoder's rate control knows the film."""
 KEY_S = 1.0
 """Until the key picture that a recording asks for."""
-PATHS = {"WebRTC": (), "WebCodecs": (NO_WEBRTC,), "JPEG": (NO_WEBRTC, NO_ENCODER)}
-"""What the page must lack for each."""
 STREAMING = "Number.parseInt(document.body.innerText.split('Video')[1] ?? '') > 0"
 
 
@@ -61,7 +60,7 @@ class Speed:
     bitrate_bps: int
     """In real time."""
     path: str = "WebCodecs"
-    """One of `PATHS`."""
+    """One of `LACKING`."""
 
     @property
     def rate_hz(self) -> int:
@@ -99,7 +98,7 @@ class Studio:
         seconds = KEY_S + 3.0 * count / self._speed.rate_hz
         with browser(self._executable, camera_file=self._y4m, **LANDSCAPE) as context:
             page = context.new_page()
-            for script in PATHS[self._speed.path]:
+            for script in LACKING[self._speed.path]:
                 page.add_init_script(script)
             _rest(page)
             page.goto(f"{self._server.local_https}/#k={self._server.operator_token}")
@@ -141,10 +140,8 @@ def _rest(page: Page) -> None:
     """Sensors of a phone that lies still."""
     cdp = page.context.new_cdp_session(page)
     for kind, z in (("accelerometer", 9.8), ("gyroscope", 0.0), ("linear-acceleration", 0.0)):
-        on = {"enabled": True, "type": kind, "metadata": {}}
-        cdp.send("Emulation.setSensorOverrideEnabled", on)
-        reading = {"xyz": {"x": 0.0, "y": 0.0, "z": z}}
-        cdp.send("Emulation.setSensorOverrideReadings", {"type": kind, "reading": reading})
+        cdp.send(*feeling(kind))
+        cdp.send(*reading(kind, np.array((0.0, 0.0, z))))
 
 
 def _delivered(recording: Path) -> Iterator[Delivered]:

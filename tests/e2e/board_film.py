@@ -11,6 +11,7 @@ import numpy as np
 from playwright.sync_api import BrowserContext, CDPSession, Page
 
 from pipeline.frames import GRAVITY, R_cd, R_co
+from tests.e2e.chromium_channel import SENSORS, feeling, reading
 from tests.e2e.page_scripts import BE_CAMERA
 from tests.server.filming import Motion, Phone, Studio, omega_cf_in_o, scaled
 
@@ -65,9 +66,8 @@ class FilmingPhone:
         script = FILM.replace("FPS", str(FILM_FPS)).replace("BE_CAMERA", BE_CAMERA)
         script = script.replace("WIDTH", str(PHONE.width)).replace("HEIGHT", str(PHONE.height))
         self.page.add_init_script(script.replace("FRAMES", json.dumps(frames)))
-        for kind in ("accelerometer", "gyroscope", "linear-acceleration"):
-            on = {"enabled": True, "type": kind, "metadata": {}}
-            self._cdp.send("Emulation.setSensorOverrideEnabled", on)
+        for kind in SENSORS:
+            self._cdp.send(*feeling(kind))
         self._R_do = R_cd(90.0).T @ R_co
 
     def roll(self) -> None:
@@ -80,12 +80,9 @@ class FilmingPhone:
         rate = np.zeros(3)
         if t > 0.0:
             rate = self._R_do @ omega_cf_in_o(self._motion, PHONE, t % FILM_S)
-        self._feel("gyroscope", rate)
-        self._feel("accelerometer", self._R_do @ np.array([0.0, -GRAVITY, 0.0]))
-
-    def _feel(self, kind: str, xyz: np.ndarray) -> None:
-        reading = {"xyz": dict(zip("xyz", map(float, xyz), strict=True))}
-        self._cdp.send("Emulation.setSensorOverrideReadings", {"type": kind, "reading": reading})
+        self._cdp.send(*reading("gyroscope", rate))
+        up = self._R_do @ np.array([0.0, -GRAVITY, 0.0])
+        self._cdp.send(*reading("accelerometer", up))
 
     def play_until(self, selector: str, seconds: float) -> None:
         """Play until an element is visible.

@@ -15,6 +15,7 @@ from playwright.sync_api import BrowserContext, Page
 from websockets.sync.client import connect
 
 ANSWER_S = 60.0
+SENSORS = ("accelerometer", "gyroscope", "linear-acceleration")
 Order = tuple[str, dict[str, object]]
 """A method of the DevTools protocol, and what it is given."""
 
@@ -65,6 +66,12 @@ class Channel:
     def close(self) -> None:
         """What was ordered for as long as it is open ends."""
         self._socket.close()
+
+
+def feeling(kind: str) -> Order:
+    """The order that lets a sensor read what it is told, instead of the machine's own."""
+    on: dict[str, object] = {"enabled": True, "type": kind, "metadata": {}}
+    return ("Emulation.setSensorOverrideEnabled", on)
 
 
 def reading(kind: str, v: np.ndarray) -> Order:

@@ -11,7 +11,7 @@ import numpy as np
 from playwright.sync_api import BrowserContext, Page, sync_playwright
 
 from hardware.sim.hand import Hand
-from tests.e2e.chromium_channel import Channel, evaluation, reading, value_of
+from tests.e2e.chromium_channel import SENSORS, Channel, evaluation, feeling, reading, value_of
 from tests.e2e.played_phone import CANVAS, PlayedPhone
 
 FLAGS = [
@@ -71,9 +71,7 @@ class ChromiumPhone(PlayedPhone):
         self.page.add_init_script(CANVAS)
         self._channel = Channel(context, self.page)
         self._touches = False
-        for kind in ("accelerometer", "gyroscope", "linear-acceleration"):
-            on: dict[str, object] = {"enabled": True, "type": kind, "metadata": {}}
-            self._channel.orders(("Emulation.setSensorOverrideEnabled", on))
+        self._channel.orders(*map(feeling, SENSORS))
 
     def close(self) -> None:
         """Give the sockets back."""

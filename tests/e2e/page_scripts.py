@@ -9,6 +9,8 @@ BE_CAMERA = f"""navigator.mediaDevices.getUserMedia = async () => {{
 """What is painted on `canvas` is what the page's camera sees."""
 NO_WEBRTC = "delete window.RTCPeerConnection;"
 NO_ENCODER = "delete window.VideoEncoder;"
+LACKING = {"WebRTC": (), "WebCodecs": (NO_WEBRTC,), "JPEG": (NO_WEBRTC, NO_ENCODER)}
+"""What a page lacks whose pictures can't come by a better path than this."""
 KEEP_CONNECTIONS = """
 window.made = [];
 window.RTCPeerConnection = class extends RTCPeerConnection {
