@@ -37,6 +37,8 @@ from pipeline.frames import Array
 Peer = tuple[str, int]
 """Address and port."""
 
+SILENCE_US = 60_000
+"""Without a command taken: rule 2."""
 NONCES_KEPT = 32
 FORGET_PEER_US = 5_000_000
 """Nobody is sent samples who was not heard for this long."""
@@ -55,7 +57,7 @@ class LinkLimits:
     """How much more a thruster may be told than one command before [N]."""
     ramp_us: int
     """From full thrust to zero in silence [µs]: `Robot.ramp_s`."""
-    silence_us: int = 60_000
+    silence_us: int = SILENCE_US
     max_age_us: int = 40_000
     handshake_us: int = 500_000
     max_jump: int = 200

@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from hardware.follower import ThrustCommand
+from hardware.robot_end import SILENCE_US
 from pipeline.config import TeleopConfig
 from pipeline.estimation.vertical import Vertical
 from pipeline.expected import Expected
 from pipeline.frames import Array, wxyz_from_R
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, Operator, PhoneImu, Requests, Seen
+from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, Requests, Seen
 from pipeline.teleop import Inputs, Output, Teleop
 from server.control_link import (
     ControlStatus,
@@ -28,6 +29,8 @@ from server.seen_input import SeenInput, triple
 
 SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
+STOOD_STILL_S = 1e-6 * SILENCE_US
+"""Between two ticks: the robot has heard nothing for so long and goes to zero by itself."""
 
 
 TooLate = Callable[[float, float], str]
@@ -76,6 +79,7 @@ class Controller:
         self._estimator_name = config.estimator
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
+        self._t_tick, self._armed = np.inf, False
         self._vertical = Vertical()
         self.omega_bf_in_b = np.zeros(3)
         self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
@@ -105,7 +109,7 @@ class Controller:
             now: Time [s].
             messages: From the server, oldest first.
             body: The robot's samples on our clock, oldest first.
-            robot_reason: Why the robot itself refuses thrust; empty if it doesn't.
+            robot_reason: Why the robot itself refuses thrust; empty if it doesn't. Ends a flight.
         """
         phone, seen, operator, wishes = self._sort(messages, now)
         for sample in body:
@@ -122,8 +126,10 @@ class Controller:
                 operator=operator,
                 requests=wishes,
                 refusals=self._why_not(now, robot_reason),
+                fault=self._stood_still(now) or (robot_reason if self._armed else ""),
             )
         )
+        self._t_tick, self._armed = now, output.failsafe.mode not in (Mode.DISARMED, Mode.STOPPED)
         if output.relative is not None:
             self.omega_bf_in_b = output.relative.omega_bf_in_b
         for one in seen:
@@ -163,6 +169,11 @@ class Controller:
             return ("The server is silent.",)
         late = self._too_late(self._picture_age.value, self._body_age.value)
         return (*self._refusals, *(why for why in (robot_reason, self._unfit, late) if why))
+
+    def _stood_still(self, now: float) -> str:
+        """Said in its own words, or the robot would seem to be what was silent."""
+        gap = now - self._t_tick
+        return f"The server's computer stood still for {gap:.2f} s." if gap > STOOD_STILL_S else ""
 
     def status(
         self,

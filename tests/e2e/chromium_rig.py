@@ -26,9 +26,18 @@ LANDSCAPE = {
 MAY_ARM = """
 (({disabled, dataset}) => !disabled && dataset.what === 'arm')(document.querySelector('#wish'))
 """
-STARVED = ("are silent", "No word from the phone", "time stamps are off", "too uncertain")
-"""How the robot says that a machine was too busy for the page's sensors, finger or pictures: a hand
-is told to the page as often as the machine manages, and a tremor told 30 times a second is none."""
+STARVED = (
+    "are silent",
+    "No word from the phone",
+    "No word from the robot",
+    "stood still",
+    "went to zero by itself",
+    "time stamps are off",
+    "too uncertain",
+)
+"""How the robot says that a machine was too busy for the page's sensors, finger or pictures, or was
+not given to us at all for a while: a hand is told to the page as often as the machine manages, and
+a tremor told 30 times a second is none."""
 
 
 def calibrate(folder: Path, device: str = DEVICE) -> Path:

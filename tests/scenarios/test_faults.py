@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hardware.follower import EXPLANATIONS, Refusal
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
 from pipeline.signals import Mode
@@ -71,6 +72,22 @@ def test_a_lost_link_ramps_down_on_both_sides() -> None:
     assert float(np.abs(loop.follower.plant.thrusts).max()) < 0.02
     loop.follower.connected = True
     entered, thrust = after(loop, 0.4)
+    assert thrust == 0.0
+
+
+def test_a_link_lost_just_long_enough_for_the_robot_ends_the_flight_with_its_reason() -> None:
+    """It goes to zero by itself after 60 ms: control must not seem to go on."""
+    loop = tracking()
+    loop.follower.connected = False
+    assert set(after(loop, 0.1)[0]) == {"TRACK"}
+    loop.follower.connected = True
+    loop._script.operator.leaving = True
+    entered, _ = after(loop, 0.05)
+    assert entered["RAMP"] <= 0.011
+    loop.advance()
+    assert loop.trace.left == EXPLANATIONS[Refusal.SILENT]
+    entered, thrust = after(loop, 5.0)
+    assert "DISARMED" in entered
     assert thrust == 0.0
 
 

@@ -7,6 +7,7 @@ from math import inf, nan
 
 import msgspec
 import numpy as np
+import pytest
 
 from hardware.follower import ThrustCommand
 from hardware.robot_file import load_robot
@@ -140,6 +141,26 @@ def test_a_silent_server_ends_a_flight_in_a_ramp():
     modes = [output.failsafe.mode for _, output in rig.run(seconds)]
     order = [mode for mode, before in zip(modes, [None, *modes], strict=False) if mode != before]
     assert order == [Mode.TRACK, Mode.HOLD, Mode.RAMP, Mode.DISARMED]
+
+
+def test_a_robot_that_refuses_ends_a_flight_with_its_own_reason():
+    rig = Rig()
+    rig.track()
+    (_, output), *_ = rig.run(0.005, robot_reason="The robot ramps.")
+    assert output.failsafe.mode == Mode.RAMP
+    assert output.failsafe.reason == "The robot ramps."
+    later = rig.run(ROBOT.ramp_s + 0.1)[-1][1].failsafe
+    assert (later.mode, later.reason) == (Mode.DISARMED, "The robot ramps.")
+
+
+@pytest.mark.parametrize(("ticks", "mode"), [(11, Mode.TRACK), (13, Mode.RAMP), (60, Mode.RAMP)])
+def test_a_server_that_stood_still_longer_than_the_robot_waits_says_so(ticks: int, mode: Mode):
+    rig = Rig()
+    rig.track()
+    rig.k += ticks - 1
+    reason = rig.run(0.005)[-1][1].failsafe.reason
+    assert (f"stood still for {0.005 * ticks:.2f} s" in reason) == (mode == Mode.RAMP)
+    assert rig.run(0.1)[-1][1].failsafe.mode == mode
 
 
 def test_what_is_no_number_never_reaches_the_state_by_a_datagram(tmp_path):
