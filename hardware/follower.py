@@ -117,12 +117,19 @@ class Follower(Protocol):
     thrusters: int
     """m."""
 
-    def exchange(self, command: ThrustCommand) -> list[BodySample]:
-        """Send `command` and give all samples that have arrived since the last call, oldest first.
+    def receive(self) -> list[BodySample]:
+        """All samples that have arrived since the last call, oldest first.
+
+        Raises:
+            FollowerError: closed. A lost link is no error: samples stay away.
+        """
+
+    def send(self, command: ThrustCommand) -> None:
+        """Send `command`, which was made of what `receive` last gave.
 
         Raises:
             FollowerError: wrong shape, not finite, outside the limits, thrust while not armed, or
-                closed. Nothing was sent. A lost link is no error: samples stay away.
+                closed. Nothing was sent. A lost link is no error.
         """
 
     def stop(self) -> None:

@@ -24,7 +24,7 @@ from hardware.follower import BodySample, FollowerError, ThrustCommand
 from hardware.robot_file import RobotFile
 
 MAX_SAMPLES = 256
-"""Taken in one exchange; the rest waits for the next."""
+"""Taken at once; the rest waits for the next call."""
 STOP_REPEATS = 5
 
 
@@ -38,7 +38,7 @@ class UdpFollower:
         end: ControlEnd,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Ready to exchange with `host`:`port`; sends nothing yet.
+        """Ready to talk with `host`:`port`; sends nothing yet.
 
         Raises:
             FollowerError: no such host.
@@ -67,13 +67,16 @@ class UdpFollower:
         """Datagrams that were damaged, repeated or overtaken."""
         return self._end.dropped
 
-    def exchange(self, command: ThrustCommand) -> list[BodySample]:
-        """Send `command` and give what has arrived. See `Follower`."""
-        if self._closed:
-            raise FollowerError("the link is closed", "an open one")
-        self._send(command)
+    def receive(self) -> list[BodySample]:
+        """What has arrived. See `Follower`."""
+        self._check_open()
         samples = (self._end.receive(data, self._clock()) for data in self._arrived())
         return [sample for sample in samples if sample is not None]
+
+    def send(self, command: ThrustCommand) -> None:
+        """See `Follower`."""
+        self._check_open()
+        self._send(command)
 
     def stop(self) -> None:
         """Zero thrust, several times."""
@@ -85,6 +88,10 @@ class UdpFollower:
         self.stop()
         self._closed = True
         self._socket.close()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise FollowerError("the link is closed", "an open one")
 
     def _send(self, command: ThrustCommand) -> None:
         data = self._end.command(command, self._clock())

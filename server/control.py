@@ -25,7 +25,6 @@ from hardware.udp_link import UdpFollower
 from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.estimation.estimators import warm_up
-from pipeline.signals import BodyImu
 from server import realtime
 from server.control_link import Endpoint, control_end
 from server.controller import Controller, TooLate
@@ -144,14 +143,14 @@ def _loop(
 ) -> None:
     """Tick until told to stop."""
     schedule, link = realtime.Schedule(PERIOD_S), RobotLink(follower)
-    body: list[BodyImu] = []
     lateness: dict[str, float] = {}
     cpu_ms = np.zeros(LATENESS_EVERY)
     while not stopping:
         now = schedule.wait()
         cpu = time.thread_time()
+        body = link.receive(now)
         command, output = controller.tick(now, endpoint.inputs(), body, link.reason)
-        body = link.exchange(command, now)
+        follower.send(command)
         cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (time.thread_time() - cpu)
         if schedule.ticks % LATENESS_EVERY == 0:
             lateness = schedule.lateness_ms()

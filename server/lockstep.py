@@ -106,7 +106,6 @@ class Lockstep:
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._on_their_way: deque[tuple[int, Record]] = deque()
         self._inbox: list[Input] = []
-        self._body: list[BodyImu] = []
         self._ticks = 0
 
     @property
@@ -134,11 +133,12 @@ class Lockstep:
         self._hear_phone(t_before)
         self._hear_small_talk()
         inbox, self._inbox = self._inbox, []
-        command, output = self.controller.tick(self.t, inbox, self._body, self._link.reason)
+        felt = self._link.receive(self.t)
+        command, output = self.controller.tick(self.t, inbox, felt, self._link.reason)
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._sight.expect(self.controller.expected(output))
-        self._body = self._link.exchange(command, self.t)
-        self._feel(*self._body)
+        self.follower.send(command)
+        self._feel(*felt)
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
         if wish is not None:
             self._inbox.append(RequestInput(wish.what))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState, ThrustCommand
+from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState
 from pipeline.signals import BodyImu
 
 
@@ -33,14 +33,14 @@ class RobotLink:
 
     def __init__(self, follower: Follower) -> None:
         """Nothing heard yet."""
-        self.follower = follower
+        self._follower = follower
         self._clock = BodyClock()
         self._boot_id: int | None = None
         self.reason = "The robot has not answered yet."
 
-    def exchange(self, command: ThrustCommand, now: float) -> list[BodyImu]:
-        """Send thrusts; the samples that have come meanwhile."""
-        samples = self.follower.exchange(command)
+    def receive(self, now: float) -> list[BodyImu]:
+        """The samples that have come since the last call."""
+        samples = self._follower.receive()
         for sample in samples:
             if self._boot_id is not None and sample.boot_id != self._boot_id:
                 self._clock.forget()

@@ -55,13 +55,16 @@ class LockstepFollower:
                 sample = self._end.receive(data, self.t)
                 self._arrived += [sample] if sample else []
 
-    def exchange(self, command: ThrustCommand) -> list[BodySample]:
-        """Send `command` and give what has arrived. See `Follower`."""
-        if self._closed:
-            raise FollowerError("the link is closed", "an open one")
-        self._send(command)
+    def receive(self) -> list[BodySample]:
+        """What has arrived. See `Follower`."""
+        self._check_open()
         arrived, self._arrived = self._arrived, []
         return arrived
+
+    def send(self, command: ThrustCommand) -> None:
+        """See `Follower`."""
+        self._check_open()
+        self._send(command)
 
     def stop(self) -> None:
         """Zero thrust."""
@@ -72,6 +75,10 @@ class LockstepFollower:
         """Stop and close."""
         self.stop()
         self._closed = True
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise FollowerError("the link is closed", "an open one")
 
     def _send(self, command: ThrustCommand) -> None:
         data = self._end.command(command, self.t)

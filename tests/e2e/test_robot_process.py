@@ -14,7 +14,7 @@ from hardware import udp_link
 from hardware.follower import FollowerState, ThrustCommand
 from hardware.sim.truth import TruthClient
 from tests.e2e.robot_rig import AMES, priority, simulated_robot
-from tests.hardware.follower_contract import FollowerContract
+from tests.hardware.follower_contract import FollowerContract, exchange
 
 pytestmark = pytest.mark.e2e
 TICK_US = 5_000
@@ -50,7 +50,7 @@ def test_it_flies_at_two_hundred_hertz_then_ramps_by_itself_when_commands_stop(r
     lift = AMES.robot.f_max * 0.5 * (AMES.robot.A[2] > 0.0)
     flown = []
     for _ in range(300):
-        flown += robot.follower.exchange(ThrustCommand(lift, armed=True))
+        flown += exchange(robot.follower, ThrustCommand(lift, armed=True))
         robot.advance(0.005)
     assert {s.state for s in flown[20:]} == {FollowerState.RUNNING}
     steps = np.diff([s.t_us for s in flown])
@@ -81,7 +81,8 @@ CLIENT = """
     follower = udp_link.connect(load_robot("ames"), host="127.0.0.1", port=int(sys.argv[1]))
     for k in range(10**6):
         thrust = 1.0 if k > 150 else 0.0
-        follower.exchange(ThrustCommand(np.full(8, thrust), armed=k > 150))
+        follower.send(ThrustCommand(np.full(8, thrust), armed=k > 150))
+        follower.receive()
         if k == 300:
             print("flying", flush=True)
         time.sleep(0.004)
@@ -115,7 +116,7 @@ def test_asked_to_end_it_switches_its_thrusters_off_and_says_so(robot, number):
     contract.fly(robot, 1.0, 0.2)
     robot.process.send_signal(number)
     assert robot.process.wait(2.0) == 0
-    last = robot.follower.exchange(ThrustCommand.zero(8))[-1]
+    last = exchange(robot.follower, ThrustCommand.zero(8))[-1]
     assert last.state == FollowerState.REFUSING
     assert not last.thrusts.any()
 
@@ -130,7 +131,7 @@ def test_garbage_and_floods_do_not_disturb_a_flight(robot):
         samples += contract.fly(robot, 1.0, 0.005)
         for _ in range(5):
             stranger._socket.send(rng.bytes(int(rng.integers(0, 400))))
-            stranger.exchange(ThrustCommand(np.full(8, 3.0), armed=True))
+            exchange(stranger, ThrustCommand(np.full(8, 3.0), armed=True))
     stranger.close()
     assert {s.state for s in samples[20:]} == {FollowerState.RUNNING}
     assert max(s.thrusts.max() for s in samples) < 1.0 + 1e-3

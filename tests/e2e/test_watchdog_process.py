@@ -8,7 +8,7 @@ import pytest
 
 from hardware.follower import FollowerState, ThrustCommand
 from tests.e2e.robot_rig import AMES, RealTimeRig, free_port, priority, start
-from tests.hardware.follower_contract import FollowerContract
+from tests.hardware.follower_contract import FollowerContract, exchange
 
 pytestmark = pytest.mark.e2e
 SOURCE = Path(__file__).parents[2] / "deploy" / "watchdog"
@@ -50,6 +50,6 @@ def test_asked_to_end_it_switches_off_and_says_so(robot):
     contract.fly(robot, 1.0, 0.2)
     robot.process.terminate()
     assert robot.process.wait(2.0) == 0
-    last = robot.follower.exchange(ThrustCommand.zero(8))[-1]
+    last = exchange(robot.follower, ThrustCommand.zero(8))[-1]
     assert last.state == FollowerState.REFUSING
     assert not last.thrusts.any()

@@ -21,6 +21,12 @@ class Rig(Protocol):
     def cut_link(self) -> None: ...
 
 
+def exchange(follower: Follower, command: ThrustCommand) -> list[BodySample]:
+    """Send, then take what has come."""
+    follower.send(command)
+    return follower.receive()
+
+
 class FollowerContract:
     @pytest.fixture
     def rig(self) -> Rig:
@@ -31,7 +37,7 @@ class FollowerContract:
         thrusts = np.full(rig.follower.thrusters, thrust)
         samples: list[BodySample] = []
         for _ in range(round(duration / 0.005)):
-            samples += rig.follower.exchange(ThrustCommand(thrusts, armed=thrust > 0.0))
+            samples += exchange(rig.follower, ThrustCommand(thrusts, armed=thrust > 0.0))
             rig.advance(0.005)
         return samples
 
@@ -97,17 +103,19 @@ class FollowerContract:
         thrusts = np.zeros(rig.follower.thrusters)
         thrusts[-1] = thrust
         with pytest.raises(FollowerError):
-            rig.follower.exchange(ThrustCommand(thrusts, armed=True))
+            rig.follower.send(ThrustCommand(thrusts, armed=True))
 
     def test_refuses_wrong_shapes_and_thrust_without_arming(self, rig: Rig) -> None:
         with pytest.raises(FollowerError, match="shape"):
-            rig.follower.exchange(ThrustCommand(np.zeros(3), armed=True))
+            rig.follower.send(ThrustCommand(np.zeros(3), armed=True))
         with pytest.raises(FollowerError, match="armed"):
-            rig.follower.exchange(ThrustCommand(np.ones(rig.follower.thrusters), armed=False))
+            rig.follower.send(ThrustCommand(np.ones(rig.follower.thrusters), armed=False))
 
     def test_a_closed_one_sends_nothing_and_closes_again(self, rig: Rig) -> None:
         rig.follower.close()
         rig.follower.close()
         rig.follower.stop()
         with pytest.raises(FollowerError, match="closed"):
-            rig.follower.exchange(ThrustCommand.zero(rig.follower.thrusters))
+            rig.follower.send(ThrustCommand.zero(rig.follower.thrusters))
+        with pytest.raises(FollowerError, match="closed"):
+            rig.follower.receive()

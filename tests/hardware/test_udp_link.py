@@ -8,7 +8,7 @@ import pytest
 from hardware import udp_link
 from hardware.follower import FollowerError, FollowerState, ThrustCommand
 from hardware.robot_file import load_robot
-from tests.hardware.follower_contract import FollowerContract
+from tests.hardware.follower_contract import FollowerContract, exchange
 from tests.hardware.rigs import LoopbackRig
 
 AMES = load_robot("ames")
@@ -31,7 +31,7 @@ class TestContract(FollowerContract):
 def run(rig, command, ticks):
     samples = []
     for _ in range(ticks):
-        samples += rig.follower.exchange(command)
+        samples += exchange(rig.follower, command)
         rig.advance(0.005)
     return samples
 
@@ -41,7 +41,7 @@ def test_a_robot_that_is_not_there_is_silence_and_counted():
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
     follower = udp_link.connect(AMES, host="127.0.0.1", port=port)
-    assert [follower.exchange(ZERO) for _ in range(10)] == [[]] * 10
+    assert [exchange(follower, ZERO) for _ in range(10)] == [[]] * 10
     assert follower.lost > 0
     follower.close()
 
@@ -59,7 +59,7 @@ def test_damaged_repeated_and_overtaken_samples_are_dropped_and_counted(loopback
     late = loopback.robot.tick(loopback.now_us + 10000)
     for data in (damaged, late, late, good, b"", b"x" * 2000):
         loopback.socket.sendto(data, peer)
-    loopback.follower.exchange(ZERO)
+    loopback.follower.receive()
     assert len(samples) == 19
     assert loopback.follower.dropped == 5
 
@@ -69,8 +69,7 @@ def test_a_second_control_process_is_not_heard_while_the_first_lives(loopback):
     flying = ThrustCommand(np.full(8, 0.5), armed=True)
     second = udp_link.connect(AMES, *[None], *loopback.socket.getsockname())
     for _ in range(150):
-        second.exchange(ZERO)
-        assert second.exchange(ZERO) == []
+        assert exchange(second, ZERO) == []
         samples = run(loopback, flying, 1)
     assert samples[-1].state == FollowerState.RUNNING
     second.close()
@@ -88,7 +87,7 @@ def test_a_new_control_process_takes_over_after_the_old_one_died_and_never_the_o
     assert FollowerState.RAMP in {s.state for s in samples}
     assert samples[-1].state == FollowerState.IDLE
     for _ in range(100):
-        old.exchange(ThrustCommand(np.full(8, 0.5), armed=True))
+        exchange(old, ThrustCommand(np.full(8, 0.5), armed=True))
         samples = run(loopback, ZERO, 1)
     assert samples[-1].state == FollowerState.IDLE
     assert samples[-1].thrusts.max() < 1e-3

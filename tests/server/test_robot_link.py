@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 from hardware.follower import EXPLANATIONS, BodySample, FollowerState, Refusal, ThrustCommand
 from server.robot_link import BodyClock, RobotLink
 
-ZERO = ThrustCommand.zero(8)
-
 
 def sample(
     t_us: int,
@@ -29,13 +27,13 @@ class Script:
     thrusters = 8
 
     def __init__(self) -> None:
-        self.commands: list[ThrustCommand] = []
         self.next: list[BodySample] = []
 
-    def exchange(self, command: ThrustCommand) -> list[BodySample]:
-        self.commands.append(command)
+    def receive(self) -> list[BodySample]:
         given_, self.next = self.next, []
         return given_
+
+    def send(self, command: ThrustCommand) -> None: ...
 
     def stop(self) -> None: ...
 
@@ -73,25 +71,24 @@ def test_a_robot_that_restarts_has_another_clock() -> None:
     follower = Script()
     link = RobotLink(follower)
     follower.next = [sample(50_000_000)]
-    link.exchange(ZERO, 100.0)
+    link.receive(100.0)
     follower.next = [sample(5_000, boot_id=2)]
-    (imu,) = link.exchange(ZERO, 101.0)
+    (imu,) = link.receive(101.0)
     assert imu.t == pytest.approx(101.0)
 
 
 def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
     follower = Script()
     link = RobotLink(follower)
-    assert link.exchange(ZERO, 1.0) == []
+    assert link.receive(1.0) == []
     assert link.reason == "The robot has not answered yet."
     for refusal in Refusal:
         for state in FollowerState:
             follower.next = [sample(1_000, state, refusal)]
-            link.exchange(ZERO, 1.0)
+            link.receive(1.0)
             refuses = state in (FollowerState.RAMP, FollowerState.REFUSING)
             assert link.reason == (EXPLANATIONS[refusal] if refuses else "")
     follower.next = []
     before = link.reason
-    link.exchange(ZERO, 2.0)
+    link.receive(2.0)
     assert link.reason == before
-    assert follower.commands[-1] is ZERO

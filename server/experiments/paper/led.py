@@ -15,7 +15,7 @@ from hardware.sim.plant import Plant, PlantOptions
 from hardware.sim.truth import Truth
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, Mode, Operator, Requests
+from pipeline.signals import Mode, Operator, Requests
 from pipeline.teleop import Inputs, Output, Teleop
 from server.experiments.paper.leader import Leader
 from server.experiments.paper.rig import Rig
@@ -42,7 +42,6 @@ class Led:
         self._link = RobotLink(self._follower)
         self._teleop = Teleop(robot_file.robot, config, PERIOD_S)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
-        self._body: list[BodyImu] = []
         self._mode = Mode.DISARMED
         self._ready = False
         self.ended = ""
@@ -79,24 +78,26 @@ class Led:
         now = self.t
         self._poses.append((now, self.plant.wxyz_fb, self.plant.p_bf_in_f))
         felt, seen = self._rig.arrivals(before, now, self._robot_at)
+        body = self._link.receive(now)
         tracking = self.tracks
         inputs = Inputs(
             t=now,
             phone_imu=tuple(felt),
-            body_imu=tuple(self._body),
+            body_imu=tuple(body),
             seen=tuple(seen),
             operator=Operator(now, held=self._mode in (Mode.ARMED, Mode.TRACK), press=1),
             requests=Requests(arm=self._ready),
             refusals=(self._link.reason,) if self._link.reason else (),
+            fault=self._link.reason if tracking else "",
         )
         output = self._teleop.step(inputs)
         self._mode = output.failsafe.mode
         self._ready = self._mode is Mode.DISARMED and not output.refusals
         if tracking and not self.tracks:
             self.ended = output.failsafe.reason
-        self._body = self._link.exchange(ThrustCommand(output.thrusts, output.armed), now)
+        self._follower.send(ThrustCommand(output.thrusts, output.armed))
         offset = self._teleop.estimator.health.time_offset
-        self._rig.learn(output.relative, offset, self._body)
+        self._rig.learn(output.relative, offset, body)
         return output
 
     def _robot_at(self, t: float) -> tuple[Array, Array]:
