@@ -18,6 +18,9 @@ COLUMNS = (
     ("way", "way", "{}"),
     ("p50_ms", "p50 ms", "{:.1f}"),
     ("p95_ms", "p95 ms", "{:.1f}"),
+    ("shot_ms", "shot ms", "{:.1f}"),
+    ("way_ms", "way ms", "{:.1f}"),
+    ("luma_ms", "luma ms", "{:.1f}"),
     ("dropped_percent", "drops %", "{:.1f}"),
     ("first_s", "first s", "{:.2f}"),
     ("bitrate_percent", "bitrate %", "{:.0f}"),
@@ -35,6 +38,12 @@ class Row:
     p50_ms: float
     """Painted to luma in numpy."""
     p95_ms: float
+    shot_ms: float
+    """Painted to taken by the camera, p50."""
+    way_ms: float
+    """Taken to whole at the server, p50: encoder and network."""
+    luma_ms: float
+    """Whole at the server to luma in numpy, p50: queue and decoder."""
     dropped_percent: float
     """Of 30 a second."""
     first_s: float
@@ -54,7 +63,7 @@ def judged(
     """`epoch` is when the page's clock began, `tapped` when it began to film, by our clock [s]."""
     rows = [row for row in seen["pictures"] if row[4] == 1280]
     pictures = np.array([[np.nan if x is None else x for x in row] for row in rows], float)
-    t, painted, taken, size, _ = pictures.T
+    t, painted, taken, size, _, came = pictures.T
     first = t[0]
     counts = (t > first + SETTLED_S) & (t <= first + SETTLED_S + seconds) & ~np.isnan(painted)
     delay = (1e3 * (t - epoch) - painted)[counts]
@@ -67,6 +76,9 @@ def judged(
         way=way,
         p50_ms=float(np.percentile(delay, 50)),
         p95_ms=float(np.percentile(delay, 95)),
+        shot_ms=float(np.median(shot - shown)),
+        way_ms=1e3 * float(np.median((came - taken)[counts])),
+        luma_ms=1e3 * float(np.median((t - came)[counts])),
         dropped_percent=100.0
         * max(0.0, 1.0 - len(np.unique(painted[counts])) / (RATE_HZ * seconds)),
         first_s=first - tapped,

@@ -43,16 +43,16 @@ class Seen:
     """What came, in the order it came."""
 
     def __init__(self) -> None:
-        self.pictures: list[tuple[float, int | None, float, int, int]] = []
-        """Luma was there [s], painted [ms], taken [s], bytes, width [px]."""
+        self.pictures: list[tuple[float, int | None, float, int, int, float]] = []
+        """Luma was there [s], painted [ms], taken [s], bytes, width [px], came whole [s]."""
         self.clock: list[float] = []
         """The page's clock minus ours [s]."""
         self.imu_hz: list[float] = []
         self.paths: set[str] = set()
 
-    def add(self, luma: Image, t_taken: float, size: int) -> None:
+    def add(self, luma: Image, t_taken: float, size: int, t_came: float) -> None:
         t = now()
-        self.pictures.append((t, painted_ms(luma), t_taken, size, luma.shape[1]))
+        self.pictures.append((t, painted_ms(luma), t_taken, size, luma.shape[1], t_came))
 
 
 class Eyes(FrameThread):
@@ -62,7 +62,14 @@ class Eyes(FrameThread):
         super().__init__("eyes", phone._on_taken)
         self._seen, self._want_key = seen, phone._on_key_wanted
         self._decoder = FrameDecoder(*shape)
+        self._t_came: dict[float, float] = {}
+        """Of pictures that are not decoded yet, by when they were taken [s]."""
         self.start()
+
+    def take(self, frame: EncodedFrame, t: float) -> None:
+        """A picture has come whole."""
+        self._t_came[frame.t] = t
+        self.offer(frame)
 
     def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
         self._decoder.needs_key |= has_gap
@@ -72,7 +79,10 @@ class Eyes(FrameThread):
         if luma is None:
             self._want_key()
         else:
-            self._seen.add(luma, frames[-1].t, len(frames[-1].picture.data))
+            frame = frames[-1]
+            self._seen.add(luma, frame.t, len(frame.picture.data), self._t_came[frame.t])
+        for frame in frames:
+            self._t_came.pop(frame.t, None)
 
 
 class Receiver(RtcHouse):
@@ -95,7 +105,7 @@ class Receiver(RtcHouse):
         if self._eyes is None:
             shape = frame.picture.width, frame.picture.height
             self._eyes = Eyes(phone, shape, self.seen)
-        self._eyes.offer(frame)
+        self._eyes.take(frame, t)
 
     async def _stock(self, request: Request) -> Response:
         call = RTCPeerConnection(RTCConfiguration(iceServers=[]))  # its default asks the internet
@@ -115,7 +125,7 @@ class Receiver(RtcHouse):
         while True:
             frame = await track.recv()
             luma = frame.to_ndarray(format="gray")
-            self.seen.add(np.asarray(luma, np.uint8), float("nan"), 0)
+            self.seen.add(np.asarray(luma, np.uint8), float("nan"), 0, float("nan"))
 
     async def watch(self) -> None:
         """Ten times a second: clock, motion, path."""
