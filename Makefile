@@ -73,6 +73,9 @@ web: dev
 	@if [ -e $(WEB) ]; then cd web_client && npm run check && npm test; \
 	else echo "!!! SKIPPED: types and tests of the web client (npm is missing)" >&2; fi
 
+# Tests start some hundred processes, each with a thousand modules: compiled once, not each time.
+pytest fast: export PYTHONDONTWRITEBYTECODE :=
+
 # Real processes, and what is measured, have the machine to themselves.
 pytest: dev
 	$(BIN)/pytest -n auto -m "not e2e and not bench" $(ARGS)
