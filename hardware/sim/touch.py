@@ -39,7 +39,8 @@ class Touch:
     def feel(self) -> None:
         """After each step of MuJoCo: what acted in it."""
         total = np.zeros(3)
-        for k, contact in enumerate(self._data.contact):
+        for k in range(self._data.ncon):  # the list's own iterator takes 0.5 ms to find its end
+            contact = self._data.contact[k]
             if self._tool not in (contact.geom1, contact.geom2):
                 continue
             mujoco.mj_contactForce(self._model, self._data, k, self._six)
