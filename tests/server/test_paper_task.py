@@ -171,7 +171,12 @@ def test_the_command_flies_it_and_says_how_far_it_is(
 
 @pytest.mark.slow
 def test_processes_fly_the_same_as_one() -> None:
-    # the other person is slow, and fails without EKF after a whole minute
-    few = [t for t in trials_of(SETUP, (WITH_EKF,)) if t.person == 1 and t.repetition == 1]
-    (alone, spread) = (dict(flown(few, workers)) for workers in (1, 2))
-    assert [alone[k].seconds for k in (0, 1)] == [spread[k].seconds for k in (0, 1)]
+    # the quicker person, so practised that the beam is through and held within 5 s
+    first = [t for t in trials_of(SETUP, (WITH_EKF,)) if t.person == 1 and t.repetition == 1]
+    few = [replace(one, repetition=10**6) for one in first]
+    alone, spread = (dict(flown(few, workers)) for workers in (1, 2))
+    assert alone[0].seconds != alone[1].seconds
+    for k, one in alone.items():
+        assert one.done
+        assert one.seconds == spread[k].seconds
+        np.testing.assert_array_equal(one.clearance, spread[k].clearance)
