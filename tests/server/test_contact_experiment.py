@@ -13,7 +13,7 @@ import pytest
 from hardware.robot_file import load_robot
 from hardware.sim.obstacle import Socket
 from server.experiments import main
-from server.experiments.contact import command, picture
+from server.experiments.contact import command, free, picture
 from server.experiments.contact.flight import Trace, fly
 from server.experiments.contact.free import Free
 from server.experiments.contact.measure import gaps, row_of, settling, smooth, table_of, touching
@@ -26,6 +26,7 @@ from server.experiments.contact.setting import (
     foretold_n,
     spring_n_m,
 )
+from server.experiments.paper import flight as paper_flight
 from server.experiments.paper.leader import phone
 
 AMES = load_robot("ames")
@@ -91,11 +92,11 @@ def test_the_table_has_a_line_for_each_and_says_what_ended() -> None:
 
 def test_the_goal_is_missed_if_contact_is_lost_or_the_plug_stays_out() -> None:
     wall = row_of(WALL, SOFT, 2.5, [trace_of(pressed(2.4))])
-    free = [Free("moving", "stiff", 5.0, ""), Free("moving", SOFT.name, 5.0, "")]
-    assert all(command.goals([wall], free).values())
+    flown = [Free("moving", "stiff", 5.0, ""), Free("moving", SOFT.name, 5.0, "")]
+    assert all(command.goals([wall], flown).values())
     outside = row_of(SOCKET, SOFT, 2.5, [trace_of(pressed(2.4))])
-    assert not all(command.goals([wall, outside], free).values())
-    slow = [free[0], Free("moving", SOFT.name, 6.0, "")]
+    assert not all(command.goals([wall, outside], flown).values())
+    slow = [flown[0], Free("moving", SOFT.name, 6.0, "")]
     assert not all(command.goals([wall], slow).values())
 
 
@@ -130,7 +131,11 @@ def test_a_compliant_push_is_held_without_a_bounce() -> None:
 
 
 @pytest.mark.slow
-def test_pressing_with_3_n_keeps_contact_and_the_plug_goes_in_and_out(tmp_path: Path) -> None:
+def test_pressing_with_3_n_keeps_contact_and_the_plug_goes_in_and_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(free, "SECONDS", 1.0)  # of those nothing but their end is asked here
+    monkeypatch.setattr(paper_flight, "HOVER_S", 2.5)
     parser = argparse.ArgumentParser()
     command.add_arguments(parser)
     words = ["--seeds", "1", "--limit-n", "3", "--out", str(tmp_path)]
@@ -141,6 +146,7 @@ def test_pressing_with_3_n_keeps_contact_and_the_plug_goes_in_and_out(tmp_path: 
     assert soft["in_band_pct"] > 85.0 > stiff["in_band_pct"]
     assert soft["overshoot_pct"] < 30.0 < stiff["overshoot_pct"]
     assert (plug["plugged"], plug["out"]) == ("1/1", "1/1")
+    assert [one["ended"] for one in figures["free"]] == 4 * [""]
     assert (tmp_path / "contact.png").is_file()
 
 
