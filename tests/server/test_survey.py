@@ -26,8 +26,10 @@ FRAMES = 80
 IN_LINE = ["--known", "1=0,0,0", "--known", "2=0,0,0.1", "--known", "3=0,0,0.3"]
 
 
-def surveyed(leds, walk=WALK, camera=CAMERA, gyro=False, seed=1, tape_off=0.0, **film):
-    seen = spots_only(camera, walk, leds, FRAMES, np.random.default_rng(seed), **film)
+def surveyed(
+    leds, walk=WALK, camera=CAMERA, gyro=False, seed=1, tape_off=0.0, frames=FRAMES, **film
+):
+    seen = spots_only(camera, walk, leds, frames, np.random.default_rng(seed), **film)
     felt = Gyro(walk.imu(), np.array([s.t for s in seen])) if gyro else None
     found = shape(camera, seen, len(leds), felt)
     order = matched(found.scene.points, leds)
@@ -73,7 +75,7 @@ def test_uncertainty_is_honest_over_many_films():
     nees = []
     rng = np.random.default_rng(0)
     for seed in range(24):
-        answer = surveyed(AMES, seed=seed, tape_off=rng.normal(0.0, 1e-4))
+        answer = surveyed(AMES, seed=seed, tape_off=rng.normal(0.0, 1e-4), frames=40)
         off, _ = errors(answer, AMES)
         R = fitted(answer.scene.points, AMES)[1]
         turn = np.kron(np.eye(5), R)
