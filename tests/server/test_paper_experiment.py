@@ -100,7 +100,8 @@ def test_the_flight_is_the_papers_move() -> None:
     assert trace.wrench_in_b[:, 0].max() > 1.0
 
 
-def test_the_same_seed_flies_the_same() -> None:
+def test_the_same_seed_flies_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(flight, "HOVER_S", 4.0)
     first, second = (SETUP.fly(WITHOUT_EKF, "step_y", 0.1)[0] for _ in range(2))
     assert np.array_equal(first.error_in_b, second.error_in_b)
 
@@ -130,7 +131,8 @@ def test_a_push_is_answered_by_as_much_thrust() -> None:
     assert all(result.holds.values()), result.text()
 
 
-def test_a_push_comes_when_it_is_said() -> None:
+def test_a_push_comes_when_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(flight, "HOVER_S", 4.0)
     push = Push(0.1, -4.0)
     pushed = SETUP.fly(WITH_VCI, "still", 0.4, push)[0]
     left = SETUP.fly(WITH_VCI, "still", 0.4)[0]
