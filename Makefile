@@ -78,11 +78,11 @@ pytest fast: export PYTHONDONTWRITEBYTECODE :=
 
 # Real processes, and what is measured, have the machine to themselves.
 pytest: dev
-	$(BIN)/pytest -n auto -m "not e2e and not bench" $(ARGS)
+	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench" $(ARGS)
 	$(BIN)/pytest -m "e2e or bench" $(ARGS)
 
 fast: dev
-	$(BIN)/pytest -n auto -m "not e2e and not bench and not slow" $(ARGS)
+	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench and not slow" $(ARGS)
 
 bench: dev
 	$(BIN)/lightleash experiments loop
