@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.e2e
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text()
 COMMANDS = [
@@ -19,7 +18,13 @@ COMMANDS = [
     for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL)
     for line in block.splitlines()
 ]
-ENDING = [c for c in COMMANDS if c.startswith(".venv/bin/lightleash")]
+LISTENING = {".venv/bin/lightleash doctor"}
+"""It measures the machine, and wants the ports of a server."""
+ENDING = [
+    pytest.param(c, marks=pytest.mark.e2e if c in LISTENING else pytest.mark.slow)
+    for c in COMMANDS
+    if c.startswith(".venv/bin/lightleash")
+]
 
 
 @pytest.fixture
@@ -43,6 +48,7 @@ def test_commands_that_end_end_well(command: str, environment: dict[str, str]) -
     assert done.stdout.strip()
 
 
+@pytest.mark.e2e
 def test_make_run_prints_both_addresses_and_ends_at_ctrl_c(
     environment: dict[str, str], tmp_path: Path
 ) -> None:
