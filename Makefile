@@ -9,7 +9,8 @@
 #: Needs Python 3.11 or later and make; uses uv where there is one. PYTHON=... picks the Python.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev run test check lint contracts types web pytest fast bench lock clean
+.PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
+.PHONY: lock clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -57,7 +58,11 @@ run: setup
 
 test: check
 
-check: lint contracts types web pytest
+check: dev
+	$(MAKE) --jobs=2 static
+	$(MAKE) pytest
+
+static: kernels lint contracts types web
 
 lint: dev
 	$(BIN)/ruff check
@@ -73,8 +78,12 @@ web: dev
 	@if [ -e $(WEB) ]; then cd web_client && npm run check && npm test; \
 	else echo "!!! SKIPPED: types and tests of the web client (npm is missing)" >&2; fi
 
+# A fresh clone's kernels take a minute to compile: once, and not by each of the workers at once.
+kernels: dev
+	-@$(BIN)/pytest --collect-only -qq > /dev/null
+
 # Tests start some hundred processes, each with a thousand modules: compiled once, not each time.
-pytest fast: export PYTHONDONTWRITEBYTECODE :=
+kernels pytest fast: export PYTHONDONTWRITEBYTECODE :=
 
 # Real processes, and what is measured, have the machine to themselves.
 pytest: dev
