@@ -106,14 +106,15 @@ class ComplianceConfig:
     """Beyond what has held it lately, and as much again within `follows_m` [N]."""
     usual_s: float = 10.0
     """How fast what holds it is learnt, while it is not pushing too hard [s]."""
-    quick_s: float = 0.05
-    """Damping of the body's own motion that is quicker than this is never cut [s]."""
+    quick_s: float = 0.1
+    """Damping of the body's own motion that is quicker than this is never cut, and what the hand
+    asks for quicker than this does not reach what blocks the robot [s]."""
     follows_m: float = 0.006
     """Nearer to its reference the robot follows it: nothing blocks it [m]. In the free a phone
     leads the AMES to within 4 mm."""
     carried_s: float = 0.3
     """How fast what it takes is learnt while it follows ... [s]."""
-    blocked_s: float = 0.3
+    blocked_s: float = 0.1
     """... and forgotten where it stays behind [s]."""
     ease_n_s: float = 2.0
     """How fast the limit comes down after it was switched on, or goes up after off [N/s]."""

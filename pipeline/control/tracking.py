@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
 
 import numpy as np
 
@@ -77,7 +76,7 @@ class Tracking:
         soft_in_f = self._compliance.force(
             R_fb @ wrench_in_b[:3],
             R_fb @ self._pid.braking_in_b(a_bf_in_b),
-            sqrt(float(error.e_p_in_v @ error.e_p_in_v)),
+            now.view.R_fv @ error.e_p_in_v,
             self._period,
         )
         soft_in_b = R_fb.T @ soft_in_f

@@ -93,7 +93,7 @@ def law() -> None:
     built = time.thread_time() - start
     print(f"pid (error, wrench, integral)  {median_us(control, 3000):6.1f} µs")
     print(f"feed-forward                   {median_us(feed, 3000):6.1f} µs")
-    yielding = median_us(lambda _: soft.force(up, zero, 1.0, H), 3000)
+    yielding = median_us(lambda _: soft.force(up, zero, up, H), 3000)
     print(f"compliance                     {yielding:6.1f} µs")
     refusal = median_us(lambda _: guard.refusal("phone", "relative", 0.09, 0.006), 3000)
     print(f"latency guard                  {refusal:6.1f} µs; built in {1e3 * built:.0f} ms")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import ComplianceConfig
-from pipeline.control.compliance import Compliance
+from pipeline.control.compliance import ACROSS, Compliance
 from pipeline.control.pid import Pid, Reference, pose_error
 from pipeline.gains import PHONE
 from pipeline.signals import VirtualView
@@ -19,7 +19,7 @@ H, LIMIT = 0.005, 3.0
 ON = ComplianceConfig(enabled=True, limit_n=LIMIT)
 MASS, AIR = 3.5, 1.5
 WALL = 0.1
-ALONG = np.array([1.0, 0.0, 0.0])
+ALONG, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def fly(
         felt_a, v_before = (v - v_before) / H * ALONG, v
         if switch is not None:
             soft.on = switch(t)
-        soft_in_f = soft.force(wrench[:3], pid.braking_in_b(felt_a), abs(target - x), H)
+        soft_in_f = soft.force(wrench[:3], pid.braking_in_b(felt_a), (target - x) * ALONG, H)
         given = np.clip(soft_in_f, -6.0, 6.0)
         pid.integrate(error, view, wrench - np.append(given, ZERO), H)
         waiting.append(given[0])
@@ -122,21 +122,21 @@ def test_where_it_follows_a_pull_beyond_the_limit_is_carried_and_nothing_is_cut(
     soft = Compliance(ON)
     for k in range(4000):
         force = (LIMIT + 1.5) * np.sin(0.3 * 2.0 * np.pi * k * H) * ALONG
-        np.testing.assert_array_equal(soft.force(force, ZERO, 0.003, H), force)
+        np.testing.assert_array_equal(soft.force(force, ZERO, 0.003 * ALONG, H), force)
 
 
 def test_what_was_carried_is_no_allowance_against_a_wall() -> None:
     soft = Compliance(ON)
     for _ in range(400):
-        soft.force(5.5 * ALONG, ZERO, 0.003, H)
+        soft.force(5.5 * ALONG, ZERO, 0.003 * ALONG, H)
     for _ in range(400):
-        given = soft.force(9.0 * ALONG, ZERO, 0.05, H)
+        given = soft.force(9.0 * ALONG, ZERO, 0.05 * ALONG, H)
     assert given[0] == pytest.approx(LIMIT, abs=0.02)
 
 
 def test_a_reference_within_reach_of_following_pushes_with_twice_the_limit_at_most() -> None:
     soft = Compliance(ON)
-    given = [soft.force(min(9.0, 0.02 * k) * ALONG, ZERO, 0.005, H)[0] for k in range(4000)]
+    given = [soft.force(min(9.0, 0.02 * k) * ALONG, ZERO, 0.005 * ALONG, H)[0] for k in range(4000)]
     learnt_on_the_way = 0.05
     assert max(given) < 2.0 * LIMIT + learnt_on_the_way
 
@@ -146,10 +146,51 @@ def test_tremor_of_the_hand_does_not_reach_the_wall_but_the_bodys_own_motion_is_
     given = []
     for k in range(1000):
         tremor = 0.3 * np.sin(2.0 * np.pi * 10.0 * k * H)
-        given.append(soft.force((6.0 + tremor) * ALONG, ZERO, 0.05, H)[0])
-    assert np.ptp(given[500:]) < 1e-6
-    rebound = soft.force(6.0 * ALONG, -30.0 * 20.0 * ALONG, 0.05, H)[0]
+        given.append(soft.force((6.0 + tremor) * ALONG, ZERO, 0.05 * ALONG, H)[0])
+    assert np.ptp(given[500:]) < 1e-3
+    rebound = soft.force(6.0 * ALONG, -30.0 * 20.0 * ALONG, 0.05 * ALONG, H)[0]
     assert rebound < given[-1] - 2.0
+
+
+def test_off_it_gives_what_is_asked_for_bit_by_bit() -> None:
+    soft, rng = Compliance(replace(ON, enabled=False)), np.random.default_rng(1)
+    for _ in range(500):
+        force, braking, behind = rng.normal(0.0, (5.0, 20.0, 0.05), (3, 3)).T
+        np.testing.assert_array_equal(soft.force(force, braking, behind, H), force)
+
+
+def blocked(force: Callable[[float], np.ndarray], behind: np.ndarray) -> np.ndarray:
+    """(n, 3) what is given in the last of five seconds of `force`, the reference `behind`."""
+    soft = Compliance(ON)
+    return np.array([soft.force(force(k * H), ZERO, behind, H) for k in range(1000)])[800:]
+
+
+def test_tremor_whose_troughs_are_below_the_limit_does_not_reach_the_wall_either() -> None:
+    given = blocked(lambda t: (3.4 + np.sin(20.0 * np.pi * t)) * ALONG, 0.05 * ALONG)
+    np.testing.assert_allclose(given, LIMIT * np.ones((200, 1)) * ALONG, atol=1e-3)
+
+
+def test_what_goes_on_across_the_push_takes_no_share_of_it() -> None:
+    given = blocked(lambda t: 6.0 * ALONG + 0.9 * np.sin(20.0 * np.pi * t) * UP, 0.05 * ALONG)
+    np.testing.assert_allclose(given[:, 0], LIMIT, atol=1e-3)
+    assert np.ptp(given[:, 2]) == pytest.approx(1.8, rel=0.02)
+
+
+def test_what_presses_across_is_bounded_by_its_part_of_the_limit() -> None:
+    soft = Compliance(ON)
+    given = [soft.force(6.0 * ALONG + 9.0 * UP, ZERO, 0.05 * ALONG, H) for _ in range(1000)]
+    np.testing.assert_allclose(given[-1], LIMIT * ALONG + ACROSS * LIMIT * UP, atol=1e-3)
+
+
+def test_the_low_pass_takes_no_damping_from_the_bodys_own_motion() -> None:
+    soft, damping, w = Compliance(ON), 30.0, 2.0 * np.pi * 3.0
+    missing = []
+    for k in range(1000):
+        v, a = 0.03 * np.sin(w * k * H), 0.03 * w * np.cos(w * k * H)
+        asked = 1.0 - damping * v
+        given = soft.force(asked * ALONG, -damping * a * ALONG, 0.05 * ALONG, H)
+        missing.append(given[0] - asked)
+    assert np.ptp(missing[600:]) < 0.15 * 2.0 * damping * 0.03
 
 
 def test_switched_on_while_pushing_it_eases_and_switched_off_it_does_not_jump() -> None:
