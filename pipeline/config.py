@@ -6,7 +6,8 @@ estimators are in `vision_config` and `estimator_config`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from math import inf
 from typing import Literal
 
 from pipeline.estimator_config import EkfConfig, NoFilterConfig, RelativeConfig
@@ -104,6 +105,9 @@ class ComplianceConfig:
     enabled: bool = False
     limit_n: float = 3.0
     """Beyond what has held it lately, and as much again within `follows_m` [N]."""
+    across: float = 1.0 / 3.0
+    """Share of the limit across what blocks it: more presses a socket's sides, less follows less
+    along a wall."""
     usual_s: float = 10.0
     """How fast what holds it is learnt, while it is not pushing too hard [s]."""
     quick_s: float = 0.1
@@ -116,8 +120,20 @@ class ComplianceConfig:
     """How fast what it takes is learnt while it follows ... [s]."""
     blocked_s: float = 0.1
     """... and forgotten where it stays behind [s]."""
-    ease_n_s: float = 2.0
-    """How fast the limit comes down after it was switched on, or goes up after off [N/s]."""
+    aimed_s: float = 1.0
+    """Over which the direction of what blocks it is a mean [s]: longer than a hand wanders to a
+    side."""
+
+    def __post_init__(self) -> None:
+        """Refuse what would divide by zero in flight.
+
+        Raises:
+            ValueError: a field that is not a number above zero.
+        """
+        for name in (one.name for one in fields(self) if one.name != "enabled"):
+            value = getattr(self, name)
+            if not 0.0 < value < inf:
+                raise ValueError(f"compliance.{name} is {value}: a number above 0")
 
 
 @dataclass(frozen=True, slots=True)

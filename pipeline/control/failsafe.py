@@ -119,7 +119,7 @@ def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]
         why.append("Just recovered: wait half a second.")
     if inputs.held:
         why.append("Let go of the button before arming.")
-    return tuple(why)
+    return tuple(dict.fromkeys(why))
 
 
 def step(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsafe:

@@ -33,8 +33,8 @@ class Tracking:
         self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
         self._looks_ahead = config.feedforward.enabled
         self._ahead = FeedForward(robot, config.feedforward)
-        self._compliance = Compliance(config.compliance)
-        self._yielded_in_b = np.zeros(3)
+        self._compliance = Compliance(config.compliance) if config.compliance.enabled else None
+        self._cut_in_b = np.zeros(3)
 
     @property
     def constant_force_in_f(self) -> Array:
@@ -50,7 +50,8 @@ class Tracking:
         if held_force_in_f is not None:
             self._pid.take_over(held_force_in_f)
         self._ahead.start()
-        self._compliance.start(self._pid.constant_force_in_f)
+        if self._compliance is not None:
+            self._compliance.start(self._pid.constant_force_in_f)
 
     def feel(self, now: Situation, given_force_in_b: Array) -> None:
         """Every period, whatever is done: what else than the thrusters (3,) [N] pulls at it."""
@@ -67,24 +68,27 @@ class Tracking:
             wrench_in_b = wrench_in_b + (
                 ahead_in_b if self._robot.needs_tilt else ahead_in_b * self._robot.axes
             )
-        return self._softened(wrench_in_b, now, error)
+        if self._compliance is not None:
+            return self._softened(self._compliance, wrench_in_b, now, error)
+        return wrench_in_b
 
-    def _softened(self, wrench_in_b: Array, now: Situation, error: PoseError) -> Array:
+    def _softened(
+        self, compliance: Compliance, wrench_in_b: Array, now: Situation, error: PoseError
+    ) -> Array:
         """Yield where the force would be more than an obstacle is to bear."""
         R_fb = now.view.R_fv @ now.view.R_vb
         a_bf_in_b = now.relative.f_bf_in_b + R_fb.T @ G_IN_F
-        soft_in_f = self._compliance.force(
+        soft_in_f = compliance.force(
             R_fb @ wrench_in_b[:3],
             R_fb @ self._pid.braking_in_b(a_bf_in_b),
             now.view.R_fv @ error.e_p_in_v,
             self._period,
         )
-        soft_in_b = R_fb.T @ soft_in_f
-        self._yielded_in_b = wrench_in_b[:3] - soft_in_b
-        return np.concatenate((soft_in_b, wrench_in_b[3:]))
+        self._cut_in_b = R_fb.T @ compliance.cut_in_f
+        return np.concatenate((R_fb.T @ soft_in_f, wrench_in_b[3:]))
 
     def learn(self, error: PoseError, view: VirtualView, missing_in_b: Array) -> None:
         """Carry the integrals on; `missing_in_b` (6,) of the last wrench could not be given."""
         not_given = missing_in_b.copy()
-        not_given[:3] += self._yielded_in_b
+        not_given[:3] += self._cut_in_b
         self._pid.integrate(error, view, not_given, self._period)

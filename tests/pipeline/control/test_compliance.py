@@ -1,4 +1,4 @@
-"""Compliance: no more force than allowed, no bouncing, no jump on, off, or when the wall goes."""
+"""Compliance: no more force than allowed, no bouncing, no jump, also not when the wall goes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pipeline.config import ComplianceConfig
-from pipeline.control.compliance import ACROSS, Compliance
+from pipeline.control.compliance import Compliance
 from pipeline.control.pid import Pid, Reference, pose_error
 from pipeline.gains import PHONE
 from pipeline.signals import VirtualView
@@ -33,12 +35,11 @@ class Flight:
 
 
 def fly(
-    config: ComplianceConfig = ON,
+    config: ComplianceConfig | None = ON,
     seconds: float = 14.0,
     speed: float = 0.1,
     behind: float = 0.2,
     wall: Callable[[float], bool] = lambda t: t < 9.0,
-    switch: Callable[[float], bool] | None = None,
     stiffness: float = 1e4,
     pull: float = 0.0,
 ) -> Flight:
@@ -46,9 +47,10 @@ def fly(
 
     Contact is lost when the body is more than half a millimetre off the wall it has touched.
     """
-    pid, soft = Pid(PHONE), Compliance(config)
+    pid, soft = Pid(PHONE), Compliance(config) if config is not None else None
     pid.take_over(-pull * ALONG)
-    soft.start(-pull * ALONG)
+    if soft is not None:
+        soft.start(-pull * ALONG)
     waiting = deque([-pull] * 3)
     x = v = v_before = 0.0
     force, touching, lost, rows = -pull, False, 0, []
@@ -61,11 +63,12 @@ def fly(
         error = pose_error(view, Reference(target * ALONG, np.eye(3)))
         wrench = pid.wrench(error, view)
         felt_a, v_before = (v - v_before) / H * ALONG, v
-        if switch is not None:
-            soft.on = switch(t)
-        soft_in_f = soft.force(wrench[:3], pid.braking_in_b(felt_a), (target - x) * ALONG, H)
+        soft_in_f, cut_in_f = wrench[:3], ZERO
+        if soft is not None:
+            soft_in_f = soft.force(wrench[:3], pid.braking_in_b(felt_a), (target - x) * ALONG, H)
+            cut_in_f = soft.cut_in_f
         given = np.clip(soft_in_f, -6.0, 6.0)
-        pid.integrate(error, view, wrench - np.append(given, ZERO), H)
+        pid.integrate(error, view, np.append(soft_in_f - given + cut_in_f, ZERO), H)
         waiting.append(given[0])
         command, felt = waiting.popleft(), 0.0
         for _ in range(20):
@@ -94,7 +97,7 @@ def test_the_push_settles_at_the_limit_and_does_not_bounce(speed: float, pull: f
 
 
 def test_without_compliance_the_push_is_all_the_thrusters_have() -> None:
-    flight = fly(ComplianceConfig(enabled=False), 9.0)
+    flight = fly(None, 9.0)
     pressing = (flight.t > 7.0) & (flight.t < 9.0)
     assert flight.contact[pressing].min() > 5.5
 
@@ -109,8 +112,8 @@ def test_when_the_wall_goes_it_returns_to_the_reference_without_a_jump() -> None
 
 
 def test_in_the_free_it_changes_nothing() -> None:
-    free = {on: fly(replace(ON, enabled=on), 6.0, wall=lambda t: False) for on in (True, False)}
-    np.testing.assert_array_equal(free[True].x, free[False].x)
+    with_it, without = (fly(config, 6.0, wall=lambda t: False) for config in (ON, None))
+    np.testing.assert_array_equal(with_it.x, without.x)
 
 
 def test_a_reference_just_behind_the_wall_is_no_harder_push_in_the_end() -> None:
@@ -152,11 +155,42 @@ def test_tremor_of_the_hand_does_not_reach_the_wall_but_the_bodys_own_motion_is_
     assert rebound < given[-1] - 2.0
 
 
-def test_off_it_gives_what_is_asked_for_bit_by_bit() -> None:
-    soft, rng = Compliance(replace(ON, enabled=False)), np.random.default_rng(1)
-    for _ in range(500):
-        force, braking, behind = rng.normal(0.0, (5.0, 20.0, 0.05), (3, 3)).T
-        np.testing.assert_array_equal(soft.force(force, braking, behind, H), force)
+vectors = st.tuples(*3 * [st.floats(-1.0, 1.0)]).map(np.array)
+
+
+@given(
+    st.lists(st.tuples(vectors, vectors, vectors), min_size=1, max_size=60),
+    st.floats(0.5, 20.0),
+    st.floats(0.0, 0.1),
+)
+def test_whatever_is_asked_for_the_push_is_bounded_and_told_in_full(
+    asked: list[tuple[np.ndarray, np.ndarray, np.ndarray]], size: float, far: float
+) -> None:
+    soft = Compliance(ON)
+    for force_in_f, braking_in_f, behind_in_f in 5 * asked:
+        given_in_f = soft.force(size * force_in_f, size * braking_in_f, far * behind_in_f, H)
+        pushed = given_in_f - soft._usual_in_f - soft._carried_in_f - soft._quick_in_f
+        learnt_since = H / ON.usual_s * LIMIT
+        assert np.linalg.norm(pushed) <= 1.06 * LIMIT + learnt_since
+        assert np.linalg.norm(soft._carried_in_f) <= LIMIT * (1.0 + 1e-9)
+
+
+def test_between_following_and_blocked_a_small_change_is_answered_by_a_small_one() -> None:
+    """A push against the aim, half blocked: where directions were mixed, one was undefined."""
+    given = []
+    for tilt in np.linspace(-0.01, 0.01, 21):
+        soft = Compliance(ON)
+        for _ in range(1000):
+            soft.force(2.4 * ALONG, ZERO, 0.009 * ALONG, H)
+        given.append(soft.force(-9.0 * ALONG + tilt * UP, ZERO, 0.009 * ALONG, H))
+    assert np.abs(np.diff(given, axis=0)).max() < 0.01
+
+
+@pytest.mark.parametrize("name", ["limit_n", "follows_m", "quick_s"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_what_would_divide_by_zero_in_flight_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=rf"compliance\.{name} .* above 0"):
+        replace(ON, **{name: value})
 
 
 def blocked(force: Callable[[float], np.ndarray], behind: np.ndarray) -> np.ndarray:
@@ -179,26 +213,16 @@ def test_what_goes_on_across_the_push_takes_no_share_of_it() -> None:
 def test_what_presses_across_is_bounded_by_its_part_of_the_limit() -> None:
     soft = Compliance(ON)
     given = [soft.force(6.0 * ALONG + 9.0 * UP, ZERO, 0.05 * ALONG, H) for _ in range(1000)]
-    np.testing.assert_allclose(given[-1], LIMIT * ALONG + ACROSS * LIMIT * UP, atol=1e-3)
+    np.testing.assert_allclose(given[-1], LIMIT * ALONG + ON.across * LIMIT * UP, atol=1e-3)
 
 
 def test_the_low_pass_takes_no_damping_from_the_bodys_own_motion() -> None:
-    soft, damping, w = Compliance(ON), 30.0, 2.0 * np.pi * 3.0
-    missing = []
+    soft, damping, w, fastest = Compliance(ON), 30.0, 2.0 * np.pi * 3.0, 0.01
+    missing, without = [], []
     for k in range(1000):
-        v, a = 0.03 * np.sin(w * k * H), 0.03 * w * np.cos(w * k * H)
-        asked = 1.0 - damping * v
+        v, a = fastest * np.sin(w * k * H), fastest * w * np.cos(w * k * H)
+        asked = 2.4 - damping * v
         given = soft.force(asked * ALONG, -damping * a * ALONG, 0.05 * ALONG, H)
         missing.append(given[0] - asked)
-    assert np.ptp(missing[600:]) < 0.15 * 2.0 * damping * 0.03
-
-
-def test_switched_on_while_pushing_it_eases_and_switched_off_it_does_not_jump() -> None:
-    flight = fly(wall=lambda t: True, seconds=13.0, switch=lambda t: 6.0 <= t < 10.0)
-    on, off = (flight.t >= 5.9) & (flight.t < 9.9), (flight.t >= 9.9) & (flight.t < 10.5)
-    steps = np.abs(np.diff(flight.command[on]))
-    assert flight.contact[(flight.t > 5.0) & (flight.t < 6.0)].min() > 5.5
-    assert steps.max() < 0.1
-    assert flight.contact[(flight.t > 9.0) & (flight.t < 9.9)].max() < 1.2 * LIMIT
-    assert np.abs(np.diff(flight.command[off])).max() < 0.1
-    assert flight.contact[-50:].min() > 5.5
+        without.append(given[0] - soft._quick_in_f[0] - asked)
+    assert 0.0 < np.ptp(missing[600:]) < 0.15 * 2.0 * damping * fastest < np.ptp(without[600:])
