@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState
+from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState, Refusal
 from pipeline.signals import BodyImu
 
 
@@ -36,6 +36,7 @@ class RobotLink:
         self._follower = follower
         self._clock = BodyClock()
         self._boot_id: int | None = None
+        self._restarted = False
         self.reason = "The robot has not answered yet."
 
     def receive(self, now: float) -> list[BodyImu]:
@@ -44,9 +45,15 @@ class RobotLink:
         for sample in samples:
             if self._boot_id is not None and sample.boot_id != self._boot_id:
                 self._clock.forget()
+                self._restarted = True
             self._boot_id = sample.boot_id
         if samples:
-            last = samples[-1]
-            refuses = last.state in (FollowerState.RAMP, FollowerState.REFUSING)
-            self.reason = EXPLANATIONS[last.refusal] if refuses else ""
+            self.reason = self._reason(samples[-1])
         return [self._clock.imu(sample, now) for sample in samples]
+
+    def _reason(self, last: BodySample) -> str:
+        """A robot that restarts refuses what we go on sending: the restart is what went wrong."""
+        if last.state not in (FollowerState.RAMP, FollowerState.REFUSING):
+            self._restarted = False
+            return ""
+        return EXPLANATIONS[Refusal.STARTED if self._restarted else last.refusal]

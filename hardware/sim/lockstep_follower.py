@@ -28,7 +28,7 @@ class LockstepFollower:
         self.connected = True
         """False: the link loses everything, both ways."""
         self._now_us = 0
-        self._arrived: list[BodySample] = []
+        self._arrived: list[bytes] = []
         self._closed = False
 
     @property
@@ -52,14 +52,14 @@ class LockstepFollower:
             self._now_us += TICK_US
             data = self._robot.tick(self._now_us)
             if self.connected and self._robot.end.peer(self._now_us) is not None:
-                sample = self._end.receive(data, self.t)
-                self._arrived += [sample] if sample else []
+                self._arrived.append(data)
 
     def receive(self) -> list[BodySample]:
         """What has arrived. See `Follower`."""
         self._check_open()
         arrived, self._arrived = self._arrived, []
-        return arrived
+        samples = (self._end.receive(data, self.t) for data in arrived)
+        return [sample for sample in samples if sample is not None]
 
     def send(self, command: ThrustCommand) -> None:
         """See `Follower`."""

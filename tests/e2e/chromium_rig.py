@@ -29,15 +29,13 @@ MAY_ARM = """
 STARVED = (
     "are silent",
     "No word from the phone",
-    "No word from the robot",
-    "stood still",
-    "went to zero by itself",
     "time stamps are off",
     "too uncertain",
 )
-"""How the robot says that a machine was too busy for the page's sensors, finger or pictures, or was
-not given to us at all for a while: a hand is told to the page as often as the machine manages, and
-a tremor told 30 times a second is none."""
+"""How the robot says that a machine was too busy for the page's sensors, finger or pictures: a hand
+is told to the page as often as the machine manages, and a tremor told 30 times a second is none."""
+STOPPED = ("No word from the robot", "stood still", "went to zero by itself")
+"""How it says that the machine was not given to anybody for a while."""
 
 
 def calibrate(folder: Path, device: str = DEVICE) -> Path:
@@ -88,7 +86,7 @@ def flight(
         lead(phone)
         distances = phone.track(seconds, meanwhile)
         status = server.request("GET", "/api/status")
-        starved = any(words in str(status["reason"]) for words in STARVED)
+        starved = any(words in str(status["reason"]) for words in STARVED + STOPPED)
         if status["mode"] == "TRACK" or not starved or not left:
             break
         phone.let_go()

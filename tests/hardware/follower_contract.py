@@ -92,6 +92,14 @@ class FollowerContract:
         assert refused[-1].thrusts.max() < 1e-2
         self.ready(rig)
 
+    def test_a_command_made_of_old_samples_is_not_taken(self, rig: Rig) -> None:
+        self.ready(rig)
+        self.fly(rig, 1.0, 0.2)
+        for _ in range(30):
+            rig.follower.send(ThrustCommand(np.full(rig.follower.thrusters, 1.0), armed=True))
+            rig.advance(0.005)
+        assert rig.follower.receive()[-1].state == FollowerState.RAMP
+
     def test_a_lost_link_is_no_error_but_silence(self, rig: Rig) -> None:
         self.ready(rig)
         rig.cut_link()

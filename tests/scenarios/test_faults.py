@@ -89,6 +89,10 @@ def test_a_link_lost_just_long_enough_for_the_robot_ends_the_flight_with_its_rea
     entered, thrust = after(loop, 5.0)
     assert "DISARMED" in entered
     assert thrust == 0.0
+    loop._script.operator.leaving = False
+    entered, thrust = after(loop, 3.0)
+    assert set(entered) == {"DISARMED", "ARMED", "TRACK"}
+    assert thrust > 0.0
 
 
 def test_leds_hidden_for_a_second_are_flown_through() -> None:

@@ -153,6 +153,32 @@ def test_a_robot_that_refuses_ends_a_flight_with_its_own_reason():
     assert (later.mode, later.reason) == (Mode.DISARMED, "The robot ramps.")
 
 
+def test_a_robot_that_refuses_disarms_what_is_armed_ramps_what_is_held_and_else_only_refuses():
+    rig = Rig()
+    rig.run(1.0)
+    assert rig.run(0.1, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.ARMED
+    state = rig.run(0.005, robot_reason="The robot ramps.")[-1][1].failsafe
+    assert (state.mode, state.reason) == (Mode.DISARMED, "The robot ramps.")
+    output = rig.run(0.6, robot_reason="The robot ramps.")[-1][1]
+    assert output.refusals == ("The robot ramps.",)
+    assert rig.run(0.05)[-1][1].refusals == ()
+    rig.track()
+    rig.held = False
+    assert rig.run(0.1)[-1][1].failsafe.mode == Mode.HOLD
+    state = rig.run(0.1, robot_reason="The robot ramps.")[-1][1].failsafe
+    assert (state.mode, state.reason) == (Mode.RAMP, "The robot ramps.")
+
+
+def test_a_stall_before_arming_is_a_refusal_that_passes():
+    rig = Rig()
+    rig.run(1.0)
+    rig.k += 14
+    (refused,) = rig.run(0.005)[-1][1].refusals
+    assert "stood still" in refused
+    assert rig.run(0.1)[-1][1].refusals == ("Just recovered: wait half a second.",)
+    assert rig.run(0.5)[-1][1].refusals == ()
+
+
 @pytest.mark.parametrize(("ticks", "mode"), [(11, Mode.TRACK), (13, Mode.RAMP), (60, Mode.RAMP)])
 def test_a_server_that_stood_still_longer_than_the_robot_waits_says_so(ticks: int, mode: Mode):
     rig = Rig()

@@ -77,6 +77,24 @@ def test_a_robot_that_restarts_has_another_clock() -> None:
     assert imu.t == pytest.approx(101.0)
 
 
+def test_a_robot_that_restarted_says_so_until_it_is_ready_whatever_else_it_refuses() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    reasons = []
+    for state, refusal, boot_id in [
+        (FollowerState.RUNNING, Refusal.NONE, 1),
+        (FollowerState.REFUSING, Refusal.NONCE, 2),
+        (FollowerState.REFUSING, Refusal.EPOCH, 2),
+        (FollowerState.IDLE, Refusal.NONE, 2),
+        (FollowerState.RAMP, Refusal.SILENT, 2),
+    ]:
+        follower.next = [sample(1_000, state, refusal, boot_id)]
+        link.receive(1.0)
+        reasons.append(link.reason)
+    started = EXPLANATIONS[Refusal.STARTED]
+    assert reasons == ["", started, started, "", EXPLANATIONS[Refusal.SILENT]]
+
+
 def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
     follower = Script()
     link = RobotLink(follower)

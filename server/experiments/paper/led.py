@@ -88,7 +88,7 @@ class Led:
             operator=Operator(now, held=self._mode in (Mode.ARMED, Mode.TRACK), press=1),
             requests=Requests(arm=self._ready),
             refusals=(self._link.reason,) if self._link.reason else (),
-            fault=self._link.reason if tracking else "",
+            fault=self._link.reason if self._mode is not Mode.DISARMED else "",
         )
         output = self._teleop.step(inputs)
         self._mode = output.failsafe.mode
