@@ -62,7 +62,9 @@ async def play(access: Access, path: str, seed: int) -> LivePhone:
         PhoneClientError: the server is not there, refuses or goes away.
     """
     live = LivePhone(access, script(seed), 0, make_client=CLIENTS[path])
-    asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, live.leave)
+    loop = asyncio.get_running_loop()
+    # not the loop's own handler: when the loop ends by itself that gives way to sudden death
+    signal.signal(signal.SIGUSR1, lambda *_: loop.call_soon_threadsafe(live.leave))
     is_ready = False
 
     def tell(live: LivePhone) -> None:
@@ -72,7 +74,10 @@ async def play(access: Access, path: str, seed: int) -> LivePhone:
             sys.stdout.write("ready\n")
             sys.stdout.flush()
 
-    await live.run(LONGEST_S, tell)
+    try:
+        await live.run(LONGEST_S, tell)
+    finally:
+        signal.signal(signal.SIGUSR1, signal.SIG_IGN)
     return live
 
 
