@@ -35,6 +35,8 @@ class FollowerState(IntEnum):
     """Heard nothing it could accept: goes down to zero by itself."""
     REFUSING = 3
     """No thrust until it has seen zero of a new epoch for half a second."""
+    COAST = 4
+    """Hears nothing for the moment: keeps its attitude, lets the thrust fade, may come back."""
 
 
 class Refusal(IntEnum):

@@ -38,6 +38,7 @@ class RobotLink:
         self._boot_id: int | None = None
         self._restarted = False
         self.reason = "The robot has not answered yet."
+        """Why it does not follow and will not by itself; empty while it coasts."""
 
     def receive(self, now: float) -> list[BodyImu]:
         """The samples that have come since the last call."""
