@@ -197,10 +197,10 @@ class Hub:
         if self.recordings.key_is_due(now()):
             self.paths.want_key()
 
-    def ping(self, by_all: bool = True) -> None:
-        """Ask the phone for a sign of life, by all ways or by its fast path alone."""
-        if self.phone is not None and (by_all or self.paths.has_fast):
-            self.paths.ping(encode(self.phone.ingest.ping(now())), by_all)
+    def ping(self) -> None:
+        """Ask the phone for a sign of life."""
+        if self.phone is not None:
+            self.paths.ping(encode(self.phone.ingest.ping(now())))
 
     def _hear_control(self) -> None:
         for status in self._control.statuses():

@@ -37,7 +37,7 @@ Signal = PhoneImu | Operator | EncodedFrame
 
 
 class Ingest:
-    """One phone's stream. Ask it for a PING 20 to 60 times a second; feed it every record."""
+    """One phone's stream. Ask it for a PING some 60 times a second; feed it every record."""
 
     def __init__(self, new_nonce: Callable[[], int]) -> None:
         """`new_nonce` gives unpredictable 64-bit numbers (live) or a seeded sequence (tests)."""

@@ -10,3 +10,6 @@ class Page(Protocol):
 
     def push(self, data: str | bytes) -> None:
         """Send when possible; the newest wins."""
+
+    def push_newest(self, data: bytes) -> None:
+        """Send when possible, in place of what was pushed so and still waits."""

@@ -88,22 +88,13 @@ class PhonePaths:
         if self._operator is not None:
             self._operator.push(text)
 
-    @property
-    def has_fast(self) -> bool:
-        """Whether a fast path is open, or being opened."""
-        return self._fast is not None
-
-    def ping(self, data: bytes, by_all: bool = True) -> None:
-        """A PING by all ways at once: the page answers the first, whatever becomes of the other.
-
-        Or by the fast path alone, which has time for more of them.
-        """
+    def ping(self, data: bytes) -> None:
+        """A PING by all ways at once: the page answers the first, whatever becomes of the other."""
         if self._operator is None:
             return
         if self._fast is not None:
             self._fast.push(data)
-        if by_all:
-            self._operator.push(data)
+        self._operator.push_newest(data)
         self._keep(data)
 
     def taken(self, sequence: int) -> None:

@@ -15,7 +15,7 @@ from server.rtc import answer, link, trailer
 from server.rtc.desk import OFFERS_HZ, RtcDesk
 from server.security import COOKIE, OPERATOR_PATHS, PAIR_TRIES, PAIR_WINDOW_S, PUBLIC_PATHS
 from server.view_proxy import routes as view_routes
-from server.websocket import FAST_PINGS, HELLO_S, PING_S
+from server.websocket import HELLO_S, PING_S
 from server.wire import Kind
 
 Layout = tuple[type[Any], struct.Struct | None, tuple[tuple[str, int], ...]]
@@ -206,9 +206,9 @@ channel, at most {answer.MAX_CANDIDATES} candidates; anything else is refused. W
 The data channel (unordered, never sent again) carries MOTION, TOUCH, PONG and STAMP to the server
 and PING to the page. What can't leave at once is dropped. PINGs and TOUCHes go by both ways at
 once, so that no sign of life is missed when one of them ends: the page answers the first PING of a
-number, and one that came by the data channel with the newest TOUCH too, if that is no older than
-100 ms, by the same way. TOUCHes that were overtaken or heard are ignored. MOTION goes by the data
-channel while the page has heard the server there within 200 ms, else by the websocket.
+number, with the newest TOUCH too if that is no older than 100 ms, by the same way. TOUCHes that
+were overtaken or heard are ignored. MOTION goes by the data channel while the page has heard the
+server there within 200 ms, else by the websocket.
 
 Each encoded picture has its record behind it: {trailer.TRAILER_BYTES} bytes, each with its highest
 bit set so that no start code appears. In groups of {trailer.GROUP}, each followed by a byte whose
@@ -224,11 +224,12 @@ the other one takes over with a key picture that was taken after all of them. Wh
 
 ## Clocks and signs of life
 
-A PING comes every {1e3 * PING_S:g} ms with a fresh random nonce, by a data channel
-{FAST_PINGS} times as often. The page answers PONG at once,
-stamped with its own clock; of the last answers the one with the shortest round trip gives the
-offset between the clocks (NTP's rule). MOTION and FRAME are dated by that; before it is known they
-are dropped, and dated more than {1e3 * ingest.FUTURE_S:g} ms after their arrival they are refused.
+A PING comes {1.0 / PING_S:g} times a second by every way that is open, with a fresh random nonce.
+None waits behind another: of those that could not leave the newest goes. The page answers PONG at
+once (PINGs that come together, as after a gap, are answered by the first and the newest), stamped
+with its own clock; of the last answers the one with the shortest round trip gives the offset
+between the clocks (NTP's rule). MOTION and FRAME are dated by that; before it is known they are
+dropped, and dated more than {1e3 * ingest.FUTURE_S:g} ms after their arrival they are refused.
 
 TOUCH is made by the page's main thread and returns the newest nonce. The operator's age is that of
 the nonce, so old bytes, a hung page or a proxy that answers pings can't keep the robot flying. Of

@@ -24,10 +24,9 @@ from server.wire_records import Picture, Record
 
 log = logging.getLogger("lightleash")
 
-PING_S = 0.05
-FAST_PINGS = 3
-"""By a fast path so many in that time: the operator's age is that of the newest one answered, and
-with 50 ms between them one lost packet is half of what control bears."""
+PING_S = 1.0 / 60.0
+"""The operator's age is that of the newest PING answered, so one lost packet must be little of what
+control bears; and a phone's radio falls asleep after some 75 ms in which nothing comes."""
 MAX_UNSENT = 16
 """Of one page; a page that does not read loses the oldest."""
 HELLO_S = 5.0
@@ -41,11 +40,17 @@ class Connection:
         """Not accepted yet."""
         self._socket = socket
         self._unsent: deque[str | bytes] = deque(maxlen=MAX_UNSENT)
+        self._newest: bytes | None = None
         self._news = asyncio.Event()
 
     def push(self, data: str | bytes) -> None:
         """Send when possible."""
         self._unsent.append(data)
+        self._news.set()
+
+    def push_newest(self, data: bytes) -> None:
+        """Send when possible, in place of what was pushed so and still waits."""
+        self._newest = data
         self._news.set()
 
     def refuse(self, error: WireError, fatal: bool = False) -> None:
@@ -58,12 +63,18 @@ class Connection:
         while True:
             await self._news.wait()
             self._news.clear()
-            while self._unsent:
-                data = self._unsent.popleft()
+            while (data := self._next()) is not None:
                 if isinstance(data, bytes):
                     await self._socket.send_bytes(data)
                 else:
                     await self._socket.send_text(data)
+
+    def _next(self) -> str | bytes | None:
+        """What is sent next: a sign of life is not kept waiting by the rest."""
+        data, self._newest = self._newest, None
+        if data is None and self._unsent:
+            return self._unsent.popleft()
+        return data
 
     async def read(self) -> str | bytes:
         """The next thing the page says.
@@ -228,11 +239,11 @@ class PageServer:
         return False
 
     async def _ping(self, phone: OperatorPhone | None) -> None:
-        count = 0
+        t = now()
         while phone is not None and self._hub.phone is phone:
-            self._hub.ping(by_all=count % FAST_PINGS == 0)
-            count += 1
-            await asyncio.sleep(PING_S / FAST_PINGS)
+            self._hub.ping()
+            t = max(t + PING_S, now())  # what was missed is not made up for
+            await asyncio.sleep(t - now())
 
 
 async def _quietly(closing: Awaitable[None]) -> None:

@@ -80,7 +80,7 @@ class Stamp:
 
 @dataclass(frozen=True, slots=True)
 class Ping:
-    """PING: asks for a sign of life and for the phone's clock, at 20 Hz, by WebRTC at 60 Hz."""
+    """PING: asks for a sign of life and for the phone's clock, at 60 Hz by every way."""
 
     nonce: int
 

@@ -27,6 +27,8 @@ class Paper:
     def push(self, data: str | bytes) -> None:
         self.data.append(data)
 
+    push_newest = push
+
 
 @pytest.fixture
 def house(tmp_path):
@@ -77,19 +79,6 @@ def test_one_phone_leads_until_it_has_been_silent(house, monkeypatch):
 def test_whoever_comes_to_lead_finds_the_robot_disarmed(house):
     in_loop(lambda: house.hub.greet(hello("first"), Paper()))
     assert any(map(is_request("disarm"), house.control.inputs()))
-
-
-def test_without_a_fast_path_there_are_no_pings_beyond_those_of_the_websocket(house):
-    def scene():
-        page = Paper()
-        house.hub.greet(hello("first"), page)
-        house.hub.ping(by_all=False)
-        assert page.data == []
-        house.hub.ping()
-        (ping,) = map(decode, page.data)
-        assert ping.sequence == 1  # none was made in vain
-
-    in_loop(scene)
 
 
 def test_pings_go_to_the_phone_that_leads_alone(house, monkeypatch):

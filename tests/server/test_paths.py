@@ -13,6 +13,8 @@ class Page:
     def push(self, data):
         self.data.append(data)
 
+    push_newest = push
+
     @property
     def credits(self):
         return [decode(data).body for data in self.data]
@@ -76,14 +78,12 @@ def test_credit_is_for_pictures_of_the_websocket():
     assert video.credits == [Credit(3)]
 
 
-def test_a_ping_goes_by_all_ways_or_by_the_fast_one_alone():
+def test_a_ping_goes_by_all_ways_that_are_open():
     paths, operator, _, fast = house()
     paths.ping(b"one")
-    paths.ping(b"two", by_all=False)
-    assert (operator.data, fast.data) == ([b"one"], [b"one", b"two"])
-    assert paths.has_fast
     paths.leave(fast)
-    assert not paths.has_fast
+    paths.ping(b"two")
+    assert (operator.data, fast.data) == ([b"one", b"two"], [b"one"])
 
 
 def test_nothing_is_said_to_a_phone_that_has_gone():

@@ -11,6 +11,7 @@ from server.control_link import OperatorInput, PhoneImuInput, RequestInput
 from server.hub import Hub
 from server.seen_input import SeenInput
 from server.session import MAX_FAULTS
+from server.websocket import Connection
 from server.wire import MAX_RECORD_BYTES, encode
 from server.wire_records import Codec, Credit, Motion, Picture, Record, Touch
 from tests.server.house import JPEG, control_status, eventually, house_in, is_request
@@ -266,6 +267,37 @@ def test_a_page_that_does_not_read_loses_the_oldest_and_holds_up_nobody(server):
             await watcher.until("status", phones=1)
 
     play(server, scene)
+
+
+class Stalled:
+    """A socket that takes nothing until it is `open`, and keeps what it took."""
+
+    def __init__(self):
+        self.open, self.taken = asyncio.Event(), []
+
+    async def send_bytes(self, data):
+        await self.open.wait()
+        self.taken.append(data)
+
+    send_text = send_bytes
+
+
+def test_signs_of_life_asked_for_in_a_gap_do_not_queue_and_the_rest_does_not_hold_them_up():
+    async def scene():
+        socket = Stalled()
+        page = Connection(socket)
+        writer = asyncio.create_task(page.write())
+        page.push("under way")
+        await asyncio.sleep(0)
+        for k in range(100):
+            page.push_newest(b"ping %d" % k)
+        page.push("status")
+        socket.open.set()
+        await eventually(lambda: len(socket.taken) >= 3)
+        assert socket.taken == ["under way", b"ping 99", "status"]
+        writer.cancel()
+
+    asyncio.run(scene())
 
 
 def test_a_hub_whose_control_is_gone_says_that_a_stop_did_not_arrive(server, monkeypatch):

@@ -19,6 +19,7 @@ const LOG_EVERY_MS = 200;
 /** An older touch is not said again: whatever makes them may have stopped. */
 const NEWEST_TOUCH_MS = 100;
 
+/** @typedef {{ sequence: number, tUs: number, nonce: bigint }} Ping */
 /** @typedef {{ device: string, sensors: string, video: string }} Identity */
 
 /**
@@ -40,6 +41,10 @@ export class Phone {
     this.session = '';
     this.loggedMs = -Infinity;
     this.sequences = { motion: 0, touch: 0, pong: 0, ping: 0 };
+    /** The newest PING and when it came. @type {{ tUs: number, atMs: number }} */
+    this.asked = { tUs: 0, atMs: -Infinity };
+    /** Answers the newest of PINGs that came together. @type {(() => void) | null} */
+    this.due = null;
     /** @type {{ touch: Touch | null, tMs: number }} */
     this.newest = { touch: null, tMs: -Infinity };
     /** @type {VideoSender | null} */
@@ -121,6 +126,8 @@ export class Phone {
     this.session = welcome.session;
     this.sequences = { motion: 0, touch: 0, pong: 0, ping: 0 };
     this.newest = { touch: null, tMs: -Infinity };
+    this.asked = { tUs: 0, atMs: -Infinity };
+    this.due = null;
     this.videoLink.failures = 0;
     this.videoLink.open();
     this.surroundings.dispatch({ type: 'welcomed' });
@@ -137,18 +144,40 @@ export class Phone {
   }
 
   /**
-   * Each PING comes by all ways, or by the fast one alone: the first one is answered, with the touch too, as
-   * waiting for the next tick would let the nonce grow old.
-   * @param {{ sequence: number, tUs: number, nonce: bigint }} ping
+   * Each PING comes by all ways: the first one is answered at once. After a gap of the link many come together;
+   * only the newest of those is worth an answer.
+   * @param {Ping} ping
    * @param {(record: ArrayBuffer) => void} answer
    */
   pinged(ping, answer) {
-    const { performance, dispatch } = this.surroundings;
+    const { performance, dispatch, links } = this.surroundings;
     if (ping.sequence <= this.sequences.ping) return;
     this.sequences.ping = ping.sequence;
+    const now = performance.now();
+    const waited = ping.tUs - this.asked.tUs > 2000 * (now - this.asked.atMs); // behind others
+    this.asked = { tUs: ping.tUs, atMs: now };
+    dispatch({ type: 'ping', nonce: ping.nonce });
+    const isWaiting = this.due !== null;
+    this.due = waited ? () => this.answer(ping, answer) : null;
+    if (!waited) this.answer(ping, answer);
+    else if (!isWaiting) links.setTimeout(() => this.answerDue(), 0);
+  }
+
+  answerDue() {
+    const { due } = this;
+    this.due = null;
+    due?.();
+  }
+
+  /**
+   * With the touch too: waiting for the next tick would let the nonce grow old.
+   * @param {Ping} ping
+   * @param {(record: ArrayBuffer) => void} answer
+   */
+  answer(ping, answer) {
+    const { performance } = this.surroundings;
     this.sequences.pong += 1;
     answer(encodePong(this.sequences.pong, nowUs(performance), ping));
-    dispatch({ type: 'ping', nonce: ping.nonce });
     const { touch, tMs } = this.newest;
     if (touch !== null && performance.now() - tMs <= NEWEST_TOUCH_MS) {
       answer(this.touchRecord({ ...touch, nonce: ping.nonce }));

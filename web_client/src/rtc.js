@@ -9,7 +9,7 @@ import { OWN_HEADERS, refusalOf } from './pairing.js';
 import { RtcPictures } from './rtc_pictures.js';
 import { decodeRecord, encodeStamp } from './protocol.js';
 
-/** A data channel that was silent for longer, which is four PINGs, is not relied upon. */
+/** A data channel that was silent for longer, which is twelve PINGs, is not relied upon. */
 export const HEARD_MS = 200;
 /** With more waiting in the data channel a record is dropped [bytes]. */
 export const BACKLOG_BYTES = 2048;

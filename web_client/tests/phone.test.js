@@ -60,6 +60,30 @@ test('a PING is answered with the newest touch and its nonce too, while that is 
   assert.equal(ping(1).length, 1, 'nor is one of a former session said again');
 });
 
+test('of PINGs that come together after a gap the first and the newest are answered', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  const answered = /** @type {bigint[]} */ ([]);
+  const come = (/** @type {number} */ sequence) => phone.record(
+    { kind: 129, sequence, tUs: 16_667 * sequence, nonce: BigInt(sequence) },
+    (answer) => answered.push(new DataView(answer).getBigUint64(16, true)),
+  );
+  for (let sequence = 1; sequence <= 3; sequence++) {
+    come(sequence);
+    time.advance(17);
+  }
+  assert.deepEqual(answered.splice(0), [1n, 2n, 3n], 'each at once, as they come one by one');
+  time.advance(500);
+  for (let sequence = 4; sequence <= 33; sequence++) come(sequence);
+  time.advance(0);
+  assert.deepEqual(answered.splice(0), [4n, 33n]);
+  assert.equal(log.filter((type) => type === 'ping').length, 33, 'the newest nonce is known at once');
+  time.advance(17);
+  come(34);
+  assert.deepEqual(answered, [34n]);
+});
+
 test('a way of the pictures that a supervisor chose is handed on', () => {
   const [main] = FakeSocket.made;
   main?.opens();
