@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import acos, sqrt
 
 import numpy as np
-from numba import njit
 
 from pipeline.frames import Array
+from pipeline.jit import numba
 from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import multiply, put_exp
 
-kernel = njit(cache=True, nogil=True, error_model="numpy")
+kernel = numba.njit(cache=True, nogil=True, error_model="numpy")
 """Compiled at the first call, then cached; threads run it side by side."""
 FREE, TILT, TURN = 0, 1, 2
 """What is known of the attitude: nothing; the body's z to a limit; the whole of it to a limit."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from math import acos, cos, sin, sqrt
 
-from numba import njit
-
 from pipeline.frames import Array
+from pipeline.jit import numba
 
-kernel = njit(cache=True, error_model="numpy")
+kernel = numba.njit(cache=True, error_model="numpy")
 """Compiled at the first call, then cached; a division by zero gives inf, not an exception."""
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from math import atan, hypot, tan
 
-import numba
 import numpy as np
 
 from pipeline.frames import Array
+from pipeline.jit import numba
 from pipeline.so3_kernels import kernel
 
 LENS = 13

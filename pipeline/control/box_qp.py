@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.frames import Array
+from pipeline.jit import numba
 
 Signs = npt.NDArray[np.int8]
 

@@ -12,10 +12,10 @@ from itertools import combinations, islice
 from math import comb, inf
 from typing import Final
 
-import numba
 import numpy as np
 
 from pipeline.frames import Array
+from pipeline.jit import numba
 
 FLAT: Final = 1e-6
 """Relative size below which thrusters span no face, or a face is the same as another."""

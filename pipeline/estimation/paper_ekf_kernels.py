@@ -10,9 +10,9 @@ from __future__ import annotations
 from math import cos, sin
 
 import numpy as np
-from numba import njit
 
 from pipeline.frames import Array
+from pipeline.jit import numba
 
 N, MOVING, TOUCHED = 30, 12, 24
 """States; those with a derivative; those a derivative depends on."""
@@ -29,7 +29,7 @@ MEASURED = np.array(
 )
 """(kind, component, 2): a gyroscope and accelerometer read the sum of these states. Eq. (9)."""
 
-kernel = njit(cache=True, error_model="numpy")
+kernel = numba.njit(cache=True, error_model="numpy")
 """Compiled at the first call, then cached; a division by zero gives inf, not an exception."""
 
 

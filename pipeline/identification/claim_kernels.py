@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens_kernels import OUT_2, TABLE
 from pipeline.frames import Array
 from pipeline.identification.pnp_kernels import put_residual
+from pipeline.jit import numba
 from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numba
 import numpy as np
 
 from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE
 from pipeline.frames import Array
+from pipeline.jit import numba
 from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel, multiply, put_exp
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.jit import numba
 from pipeline.signals import Image
 from pipeline.so3_kernels import kernel
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from math import ceil
 
-import numba
 import numpy as np
 
 from pipeline.camera.lens_kernels import OUT_2, VECTOR
 from pipeline.frames import Array
+from pipeline.jit import numba
 from pipeline.signals import Image
 from pipeline.so3_kernels import kernel
 from pipeline.spots.centroid_kernels import (

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE
 from pipeline.frames import Array
 from pipeline.identification.pnp_kernels import refine
+from pipeline.jit import numba
 from pipeline.so3_kernels import kernel
 
 SUSPICIOUS_PX, EXPOSED = 0.5, 0.25

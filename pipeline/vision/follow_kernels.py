@@ -5,12 +5,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
 from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE, VECTOR, bend, put_slope, unbend
 from pipeline.frames import Array
 from pipeline.identification.claim_kernels import put_shared
+from pipeline.jit import numba
 from pipeline.so3_kernels import kernel, turn
 from pipeline.spots.centroid_kernels import S_UU, S_UV, S_VV
 from pipeline.vision.believe_kernels import believe

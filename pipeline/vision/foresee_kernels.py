@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens_kernels import OUT_2, OUT_3, TABLE, VECTOR, bend
 from pipeline.frames import Array
+from pipeline.jit import numba
 from pipeline.signals import Image
 from pipeline.so3_kernels import kernel, put_exp, turn
 from pipeline.spots.centroid_kernels import C_UU, C_UV, C_VV, S_UU, S_UV, S_VV

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens_kernels import OUT_1, TABLE, VECTOR, bend
 from pipeline.frames import Array
+from pipeline.jit import numba
 from pipeline.spots.centroid_kernels import AREA, UU, UV, VV, U, V
 from pipeline.vision.foresee_kernels import NEAREST_M, led_at
 

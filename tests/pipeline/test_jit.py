@@ -1,0 +1,61 @@
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.jit import ROOT, kernel_sources
+
+CALLER = """
+import numpy as np
+from pipeline.so3_kernels import kernel, put_exp
+
+@kernel
+def corner(angle, R):
+    put_exp(0.0, 0.0, angle, R)
+    return R[0, 0]
+
+print(corner(0.5, np.eye(3)), sum(corner.stats.cache_hits.values()))
+"""
+
+
+def run(tree: Path) -> tuple[float, int]:
+    """The caller's result, and how many of its kernels came from the cache."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
+    environment = kept | {"PYTHONPATH": str(tree)}
+    command = [sys.executable, "-c", "import pipeline.caller"]
+    said = subprocess.run(
+        command, cwd=tree, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    value, hits = said.split()
+    return float(value), int(hits)
+
+
+@pytest.mark.slow
+def test_an_edited_kernel_changes_the_next_process_also_through_its_callers(tmp_path):
+    package = tmp_path / "pipeline"
+    package.mkdir()
+    for name in ("__init__", "frames", "jit", "so3_kernels"):
+        (package / f"{name}.py").write_text((Path(ROOT) / "pipeline" / f"{name}.py").read_text())
+    (package / "caller.py").write_text(CALLER)
+    first, hits = run(tmp_path)
+    assert first == pytest.approx(0.8775826)
+    assert hits == 0
+    assert run(tmp_path) == (first, 1)
+    callee = package / "so3_kernels.py"
+    callee.write_text(callee.read_text().replace("1.0 - k * (v1 * v1", "2.0 - k * (v1 * v1"))
+    assert run(tmp_path) == (pytest.approx(first + 1.0), 0)
+
+
+def test_every_module_with_kernels_is_in_the_stamp_and_takes_numba_from_one_place():
+    root = Path(ROOT)
+    known = kernel_sources()
+    modules = [*root.glob("pipeline/**/*.py"), *root.glob("hardware/**/*.py")]
+    texts = {".".join(p.relative_to(root).with_suffix("").parts): p.read_text() for p in modules}
+    compiled = {m for m, text in texts.items() if re.search(r"^@.*(jit|kernel)", text, re.M)}
+    assert len(compiled) > 30
+    assert compiled <= set(known)
+    direct = {m for m, text in texts.items() if re.search(r"^\s*(import|from) numba", text, re.M)}
+    assert direct == {"pipeline.jit"}
