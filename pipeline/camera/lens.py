@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +76,7 @@ class Camera:
         # edges of the picture stay edges, and a pixel's centre is half a pixel from its edge
         u, v = 0.5 * (sx - 1.0), 0.5 * (sy - 1.0)
         K = np.array([[sx, 0.0, u], [0.0, sy, v], [0.0, 0.0, 1.0]]) @ self.K
-        return Camera(width, height, K, self.model, self.distortion, self.readout_s)
+        return replace(self, width=width, height=height, K=K)
 
     @property
     def half_field(self) -> tuple[float, float]:

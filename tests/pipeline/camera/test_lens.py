@@ -1,7 +1,10 @@
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
 from pipeline.camera.lens import Camera, points_of
+from pipeline.camera.mounting import Mounting
 
 K = np.array([[930.0, 0.0, 646.0], [0.0, 931.5, 354.0], [0.0, 0.0, 1.0]])
 LENSES = {
@@ -66,3 +69,11 @@ def test_in_a_picture_made_smaller_each_point_keeps_its_share_of_width_and_heigh
     np.testing.assert_allclose(small.pixels(points) + 0.5, edges, rtol=1e-12)
     same = camera(model)
     assert same.resized(1280, 720) is same
+
+
+def test_a_camera_of_another_picture_size_keeps_all_else_it_knows():
+    turned = Mounting(R_ci=np.diag([1.0, -1.0, -1.0]), time_offset_s=0.012)
+    whole = replace(camera(), readout_s=-0.02, mounting=turned)
+    small = whole.resized(640, 360)
+    kept = {one.name for one in fields(Camera)} - {"width", "height", "K", "lens"}
+    assert {name for name in kept if getattr(small, name) is not getattr(whole, name)} == set()
