@@ -208,6 +208,7 @@ class Mode(IntEnum):
     HOLD = 3
     RAMP = 4
     STOPPED = 5
+    COAST = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)

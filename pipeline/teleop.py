@@ -29,6 +29,9 @@ from pipeline.signals import (
     VirtualView,
 )
 
+SHORTEST_STEP_S, LONGEST_STEP_S = 1e-4, 0.060
+"""What filters and integrals go on by in a step; whoever is longer away than that stood still."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inputs:
@@ -70,15 +73,16 @@ class Teleop:
     """Keeps the robot's pose relative to the virtual camera; time comes with the inputs."""
 
     def __init__(self, robot: Robot, config: TeleopConfig, period: float = 0.005) -> None:
-        """For one robot; `period` [s] is that of the calls to `step`."""
+        """For one robot; `period` [s] is what the first `step` counts for."""
         self.estimator = make_estimator(config, robot.leds_in_b)
         self.attitude = Attitude()
-        self._config, self._robot, self._period = config, robot, period
+        self._config, self._robot = config, robot
+        self._h, self._t_step = period, np.nan
         self._limits = failsafe.Limits.of(
             config.failsafe, robot.ramp_s, coasts=config.estimator != "none"
         )
         self._virtual_camera = VirtualCamera(config.virtual_camera)
-        self._tracking, self._hold = Tracking(robot, config, period), Hold(config.hold, robot)
+        self._tracking, self._hold = Tracking(robot, config), Hold(config.hold, robot)
         self._actuation = Actuation(robot, config)
         self._failsafe = failsafe.Failsafe()
         self._operator = Operator(-np.inf, held=False, press=0)
@@ -98,12 +102,13 @@ class Teleop:
 
     def step(self, inputs: Inputs) -> Output:
         """One control period. Fig. 4."""
+        dt_ms = self._pass_time(inputs.t)
         self._fuse(inputs)
         relative = self.estimator.state(inputs.t)  # Eq. (5)-(13)
         R_fc = self._R_fc_now(relative)
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
-            self._tracking.feel(known, self._given_in_b)
+            self._tracking.feel(known, self._given_in_b, self._h)
         error = self._error(known)  # Eq. (14)-(19)
         ages = Ages(
             inputs.t - self._operator.t,
@@ -113,9 +118,7 @@ class Teleop:
         )
         judged = self._judge(inputs, known, error, ages)
         before = self._failsafe.mode
-        self._failsafe = failsafe.step(
-            self._failsafe, judged, round(1e3 * self._period), self._limits
-        )
+        self._failsafe = failsafe.step(self._failsafe, judged, dt_ms, self._limits)
         if self._failsafe.mode != before:
             known, error = self._change_mode(before, known)
         thrusts, saturated = self._act(known, error)
@@ -134,6 +137,17 @@ class Teleop:
             saturated=saturated,
             ages=ages,
         )
+
+    def _pass_time(self, t: float) -> int:
+        """What has passed since the last step [ms], whatever the schedule; adds up without drift.
+
+        The step of filters and integrals is rounded to microseconds: virtual time is as exact.
+        """
+        before, self._t_step = self._t_step, t
+        if before != before:
+            return 0
+        self._h = min(max(round(t - before, 6), SHORTEST_STEP_S), LONGEST_STEP_S)
+        return max(0, round(1e3 * t) - round(1e3 * before))
 
     def _fuse(self, inputs: Inputs) -> None:
         """Hand each measurement to the estimators; whatever its age, it has its own time."""
@@ -163,7 +177,7 @@ class Teleop:
             return None
         p_ref_in_v = self._reference.p_rv_in_v if self._reference is not None else None
         self._virtual_camera.turn(self.attitude.take_turn())
-        view = self._virtual_camera.view(relative, R_fc, self._period, p_ref_in_v, self._half_field)
+        view = self._virtual_camera.view(relative, R_fc, self._h, p_ref_in_v, self._half_field)
         return Situation(relative, R_fc, view)
 
     def _error(self, known: Situation | None) -> PoseError | None:
@@ -212,17 +226,17 @@ class Teleop:
         omega_m_bf_in_b = self._body.omega_m_bf_in_b
         if mode == Mode.TRACK and known and reference and error:
             R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
-            wrench_in_b = self._tracking.wrench(known, reference, error)  # Eq. (20)
-            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._period)
+            wrench_in_b = self._tracking.wrench(known, reference, error, self._h)  # Eq. (20)
+            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._h)
         elif mode in (Mode.HOLD, Mode.RAMP):
-            wrench_in_b = self._hold.wrench(omega_m_bf_in_b, self._period)
+            wrench_in_b = self._hold.wrench(omega_m_bf_in_b, self._h)
             R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
         else:
             return np.zeros(self._robot.A.shape[1]), False
         given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
         self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
         if error is not None and known is not None:
-            self._tracking.learn(error, known.view, given.missing_in_b)
+            self._tracking.learn(error, known.view, given.missing_in_b, self._h)
         if not np.isfinite(given.thrusts).all():
             return np.zeros_like(given.thrusts), True
         return given.thrusts * failsafe.ceiling(self._failsafe, self._limits), given.saturated

@@ -27,12 +27,11 @@ from pipeline.control.latency_guard import LatencyGuard
 from pipeline.estimation.estimators import warm_up
 from server import realtime
 from server.control_link import Endpoint, control_end
-from server.controller import Controller, TooLate
+from server.controller import PERIOD_S, Controller, TooLate
 from server.knobs import DEFAULT_KNOBS, Knobs
 from server.one_line import Parser
 from server.robot_link import RobotLink
 
-PERIOD_S = 0.005
 STATUS_EVERY = 4
 """Ticks: 50 Hz."""
 LATENESS_EVERY = 400

@@ -26,7 +26,10 @@ from server.control_link import (
 from server.estimate import EstimateFields, finite
 from server.knobs import Knobs, TuneInput, turned
 from server.seen_input import SeenInput, triple
+from server.tick_rate import TickRate
 
+PERIOD_S = 0.005
+"""From tick to tick."""
 SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
 STOOD_STILL_S = 1e-6 * SILENCE_US
@@ -80,6 +83,7 @@ class Controller:
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
         self._t_tick, self._armed = np.inf, False
+        self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
         self._vertical = Vertical()
         self.omega_bf_in_b = np.zeros(3)
         self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
@@ -126,7 +130,7 @@ class Controller:
                 operator=operator,
                 requests=wishes,
                 refusals=self._why_not(now, robot_reason),
-                fault=self._stood_still(now) or (robot_reason if self._armed else ""),
+                fault=self._out_of_time(now) or (robot_reason if self._armed else ""),
             )
         )
         self._t_tick, self._armed = now, output.failsafe.mode not in (Mode.DISARMED, Mode.STOPPED)
@@ -170,10 +174,13 @@ class Controller:
         late = self._too_late(self._picture_age.value, self._body_age.value)
         return (*self._refusals, *(why for why in (robot_reason, self._unfit, late) if why))
 
-    def _stood_still(self, now: float) -> str:
+    def _out_of_time(self, now: float) -> str:
         """Said in its own words, or the robot would seem to be what was silent."""
         gap = now - self._t_tick
-        return f"The server's computer stood still for {gap:.2f} s." if gap > STOOD_STILL_S else ""
+        slow = self._rate.complaint(gap)
+        if gap > STOOD_STILL_S:
+            return f"The server's computer stood still for {gap:.2f} s."
+        return slow
 
     def status(
         self,

@@ -33,7 +33,7 @@ from server.control_link import (
     ReadyInput,
     RequestInput,
 )
-from server.controller import Controller, never_too_late
+from server.controller import PERIOD_S, Controller, never_too_late
 from server.ingest import EncodedFrame, Ingest
 from server.lockstep_trace import Judge, Trace
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
@@ -43,7 +43,6 @@ from server.sight import Sight
 from server.wire import decode, encode
 from server.wire_records import Ping, Record
 
-PERIOD_S = 0.005
 EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}
 NETWORK_TICKS = 2
 """10 ms one way for what is small."""

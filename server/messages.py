@@ -151,7 +151,7 @@ class Estimate(msgspec.Struct, frozen=True):
 class Status(msgspec.Struct, tag="status", frozen=True):
     """Server → page, 10 Hz: the truth about the robot, on every screen."""
 
-    mode: Literal["DISARMED", "ARMED", "TRACK", "HOLD", "RAMP", "STOPPED", "LOST"]
+    mode: Literal["DISARMED", "ARMED", "TRACK", "COAST", "HOLD", "RAMP", "STOPPED", "LOST"]
     """LOST: the control process does not answer."""
     reason: str
     """Why the mode is what it is, in words for the person who can mend it."""

@@ -21,7 +21,7 @@ from server.control_link import (
     ReadyInput,
     RequestInput,
 )
-from server.controller import Controller
+from server.controller import PERIOD_S, Controller
 from server.ingest import EncodedFrame, Ingest
 from server.messages import Command, Hello, decode_message
 from server.offline_table import COLUMNS, row_of
@@ -34,7 +34,6 @@ from server.sight import Sight
 from server.wire import WireError, decode
 from server.wire_records import Picture, Ping, Record
 
-PERIOD_S = 0.005
 READY_EVERY, EXPECT_EVERY = 20, 4
 """Ticks between words of the server to control, and of control to the server."""
 Tap = Callable[[float, Sequence[Input], Sequence[BodyImu]], None]

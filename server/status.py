@@ -18,7 +18,7 @@ from server.recorder import Recordings
 
 LOST_S = 0.3
 """A control process silent for longer is lost."""
-ModeName = Literal["DISARMED", "ARMED", "TRACK", "HOLD", "RAMP", "STOPPED", "LOST"]
+ModeName = Literal["DISARMED", "ARMED", "TRACK", "COAST", "HOLD", "RAMP", "STOPPED", "LOST"]
 
 
 class Known(Protocol):

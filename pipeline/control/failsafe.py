@@ -123,9 +123,12 @@ def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]
 
 
 def step(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsafe:
-    """The machine's next state after `dt_ms`."""
+    """The machine's next state after `dt_ms`, as measured.
+
+    A step longer than an input may be silent has seen nothing of what was good meanwhile.
+    """
     stale = staleness(inputs, limits)
-    good = not stale and not inputs.fault
+    good = not stale and not inputs.fault and dt_ms <= limits.hold
     now = replace(
         state,
         mode_ms=min(state.mode_ms + dt_ms, FOREVER_MS),

@@ -27,9 +27,9 @@ class Situation:
 class Tracking:
     """Sibling of `Hold`: what is done while the button is held and all is well."""
 
-    def __init__(self, robot: Robot, config: TeleopConfig, period: float) -> None:
-        """For one robot; `period` [s] is that of the calls."""
-        self._robot, self._period = robot, period
+    def __init__(self, robot: Robot, config: TeleopConfig) -> None:
+        """For one robot."""
+        self._robot = robot
         self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
         self._looks_ahead = config.feedforward.enabled
         self._ahead = FeedForward(robot, config.feedforward)
@@ -53,27 +53,32 @@ class Tracking:
         if self._compliance is not None:
             self._compliance.start(self._pid.constant_force_in_f)
 
-    def feel(self, now: Situation, given_force_in_b: Array) -> None:
-        """Every period, whatever is done: what else than the thrusters (3,) [N] pulls at it."""
+    def feel(self, now: Situation, given_force_in_b: Array, h: float) -> None:
+        """Every period `h` [s], whatever is done: what else than the thrusters (3,) [N] pulls."""
         R_fb = now.view.R_fv @ now.view.R_vb
-        self._ahead.feel(now.relative.f_bf_in_b, R_fb, given_force_in_b, self._period)
+        self._ahead.feel(now.relative.f_bf_in_b, R_fb, given_force_in_b, h)
 
-    def wrench(self, now: Situation, reference: Reference, error: PoseError) -> Array:
-        """Force and torque in b (6,) [N, N m]. Eq. (20)."""
+    def wrench(self, now: Situation, reference: Reference, error: PoseError, h: float) -> Array:
+        """Force and torque in b (6,) [N, N m], `h` [s] after the last. Eq. (20)."""
         wrench_in_b = self._pid.wrench(error, now.view)
         if self._looks_ahead:
             ahead_in_b = self._ahead.wrench(
-                now.relative, now.R_fc, now.view, reference.p_rv_in_v, self._period
+                now.relative, now.R_fc, now.view, reference.p_rv_in_v, h
             )
             wrench_in_b = wrench_in_b + (
                 ahead_in_b if self._robot.needs_tilt else ahead_in_b * self._robot.axes
             )
         if self._compliance is not None:
-            return self._softened(self._compliance, wrench_in_b, now, error)
+            return self._softened(self._compliance, wrench_in_b, now, error, h)
         return wrench_in_b
 
     def _softened(
-        self, compliance: Compliance, wrench_in_b: Array, now: Situation, error: PoseError
+        self,
+        compliance: Compliance,
+        wrench_in_b: Array,
+        now: Situation,
+        error: PoseError,
+        h: float,
     ) -> Array:
         """Yield where the force would be more than an obstacle is to bear."""
         R_fb = now.view.R_fv @ now.view.R_vb
@@ -82,13 +87,13 @@ class Tracking:
             R_fb @ wrench_in_b[:3],
             R_fb @ self._pid.braking_in_b(a_bf_in_b),
             now.view.R_fv @ error.e_p_in_v,
-            self._period,
+            h,
         )
         self._cut_in_b = R_fb.T @ compliance.cut_in_f
         return np.concatenate((R_fb.T @ soft_in_f, wrench_in_b[3:]))
 
-    def learn(self, error: PoseError, view: VirtualView, missing_in_b: Array) -> None:
+    def learn(self, error: PoseError, view: VirtualView, missing_in_b: Array, h: float) -> None:
         """Carry the integrals on; `missing_in_b` (6,) of the last wrench could not be given."""
         not_given = missing_in_b.copy()
         not_given[:3] += self._cut_in_b
-        self._pid.integrate(error, view, not_given, self._period)
+        self._pid.integrate(error, view, not_given, h)

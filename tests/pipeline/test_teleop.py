@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from hardware.robot_file import load_robot
 from pipeline.config import EnvelopeConfig, TeleopConfig
@@ -86,6 +87,32 @@ def test_a_robot_that_has_drifted_is_pulled_back() -> None:
     )
     assert drifted[-1].failsafe.mode == Mode.TRACK
     assert (ROBOT.A @ drifted[-1].thrusts)[1] < -0.5
+
+
+@pytest.mark.parametrize("rate_hz", [200, 50, 25, 18])
+def test_timers_go_by_the_measured_time_at_every_rate_of_control(rate_hz: int) -> None:
+    """The longest HOLD and the ramp end with the first step that is late, never a tick more."""
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    run(teleop, 1.5, 0.3, held=True)
+    times: dict[Mode, float] = {}
+    for k in range(1, 7 * rate_hz):
+        t = 1.8 + k / rate_hz
+        seen = seen_at(t - 0.05, P, LEVEL, COVARIANCE)
+        inputs = Inputs(
+            t=t,
+            phone_imu=(PhoneImu(t - 0.02, STILL, UP),),
+            body_imu=(BodyImu(t, STILL, UP),),
+            seen=(seen,) if k % (rate_hz // 15) == 0 else (),
+            operator=Operator(t - 0.01, False, 1),
+        )
+        times.setdefault(teleop.step(inputs).failsafe.mode, t)
+    for mode, after, seconds in (
+        (Mode.HOLD, Mode.RAMP, TeleopConfig().failsafe.hold_max),
+        (Mode.RAMP, Mode.DISARMED, ROBOT.ramp_s),
+    ):
+        late = times[after] - times[mode] - seconds
+        assert -0.0015 <= late < 1.0 / rate_hz + 0.0015
 
 
 def test_a_reference_out_of_reach_ends_the_flight() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import inf, nan
 
 import msgspec
@@ -28,6 +28,7 @@ from server.control_link import (
 )
 from server.controller import SERVER_SILENT_S, Controller
 from server.seen_input import SeenInput
+from server.tick_rate import OVER_S
 from tests.pipeline.seeing import seen_at
 
 ROBOT = load_robot("ames").robot
@@ -80,6 +81,21 @@ class Rig:
         self.run(0.1, [RequestInput("arm")])
         self.held, self.press = True, self.press + 1
         assert self.run(0.5)[-1][1].failsafe.mode == Mode.TRACK
+
+    def at_rate(
+        self, rate_hz: int, seconds: float, extra: Sequence[Input] = ()
+    ) -> Iterator[tuple[float, Output]]:
+        """Phone, pictures and robot as ever, control `rate_hz` times a second; (t, output)."""
+        start, said, body = 100.0 + 0.005 * self.k, list(extra), list[BodyImu]()
+        for n in range(1, round(seconds * rate_hz) + 1):
+            t = start + n / rate_hz
+            while 100.0 + 0.005 * (self.k + 1) <= t + 1e-9:
+                self.k += 1
+                heard = 100.0 + 0.005 * self.k
+                said += self.said(heard)
+                body.append(BodyImu(heard - 0.003, np.zeros(3), np.array(UP)))
+            yield t, self.controller.tick(t, said, body, "")[1]
+            said, body = [], []
 
     def status(self, output: Output) -> ControlStatus:
         return self.controller.status(output, 1, "FIFO", {}, 0.5, 0)
@@ -261,3 +277,29 @@ def test_what_the_filter_expects_is_the_same_by_status_and_in_process():
     for name in ("t", "p_bc_in_c", "u_bf_in_c", "sigma_p", "sigma_theta", "time_offset"):
         np.testing.assert_array_equal(getattr(here, name), getattr(there, name))
     np.testing.assert_allclose(here.R_cb, there.R_cb, atol=1e-12)
+
+
+@pytest.mark.parametrize("rate_hz", [50, 25, 18])
+def test_control_that_runs_slowly_ends_a_flight_with_its_own_words(rate_hz: int):
+    rig = Rig()
+    rig.track()
+    start = 100.0 + 0.005 * rig.k
+    states = [(t, output.failsafe) for t, output in rig.at_rate(rate_hz, 1.0)]
+    t, state = next((t, state) for t, state in states if state.mode != Mode.TRACK)
+    assert t - start < OVER_S + 1.0 / rate_hz + 0.001
+    assert state.mode == Mode.RAMP
+    assert state.reason.startswith("Control runs slowly: ")
+
+
+@pytest.mark.parametrize("rate_hz", [200, 50, 25, 18])
+def test_the_ramps_thrust_falls_with_the_measured_time(rate_hz: int):
+    rig = Rig()
+    rig.track()
+    entered, shares = None, []
+    for t, output in rig.at_rate(rate_hz, ROBOT.ramp_s, [RequestInput("disarm")]):
+        state = output.failsafe
+        if state.mode == Mode.RAMP:
+            entered = t if entered is None else entered
+            shares.append((t - entered, 1e-3 * state.mode_ms))
+    assert len(shares) > 0.9 * rate_hz * ROBOT.ramp_s
+    assert all(abs(told - true) <= 0.001 for true, told in shares)

@@ -7,6 +7,7 @@ export const MODE_WORDS = {
   DISARMED: ['DISARMED', 'Thrusters are off'],
   ARMED: ['ARMED', 'Ready to move'],
   TRACK: ['TRACK', 'The robot follows you'],
+  COAST: ['COAST', 'The robot waits for news'],
   HOLD: ['HOLD', 'The robot keeps still'],
   RAMP: ['RAMP', 'Thrust fades to zero'],
   STOPPED: ['STOPPED', 'Thrust is off'],

@@ -166,7 +166,7 @@
  * Server → page, 10 Hz: the truth about the robot, on every screen.
  * @typedef {object} Status
  * @property {'status'} type
- * @property {'DISARMED' | 'ARMED' | 'TRACK' | 'HOLD' | 'RAMP' | 'STOPPED' | 'LOST'} mode LOST: the control process does not answer.
+ * @property {'DISARMED' | 'ARMED' | 'TRACK' | 'COAST' | 'HOLD' | 'RAMP' | 'STOPPED' | 'LOST'} mode LOST: the control process does not answer.
  * @property {string} reason Why the mode is what it is, in words for the person who can mend it.
  * @property {boolean} ready `arm` would be granted.
  * @property {string[]} refusals What keeps it from being granted, each in words.

@@ -216,7 +216,7 @@ export function touchOf(state) {
  */
 export function wish(state) {
   const mode = shownMode(state);
-  if (mode === 'ARMED' || mode === 'TRACK' || mode === 'HOLD') return { what: 'disarm', enabled: true };
+  if (mode === 'ARMED' || mode === 'TRACK' || mode === 'COAST' || mode === 'HOLD') return { what: 'disarm', enabled: true };
   const ready = mode === 'DISARMED' && state.status?.ready === true;
   return { what: 'arm', enabled: ready && !state.held };
 }

@@ -16,9 +16,10 @@ from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.gains import Gains
+from server.controller import PERIOD_S
 from server.experiments.loop import result_of
 from server.experiments.sweep.keys import ROWS, Value
-from server.lockstep import PERIOD_S, Lockstep, Scene
+from server.lockstep import Lockstep, Scene
 
 T = TypeVar("T")
 Settings = tuple[tuple[str, Value], ...]

@@ -138,7 +138,7 @@ export function wishes(board) {
   const mode = shownMode(board);
   return {
     arm: mode === 'DISARMED' && board.status?.ready === true,
-    disarm: mode === 'ARMED' || mode === 'TRACK' || mode === 'HOLD',
+    disarm: ['ARMED', 'TRACK', 'COAST', 'HOLD'].includes(mode),
     reset: mode === 'STOPPED',
   };
 }
