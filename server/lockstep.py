@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -35,13 +36,14 @@ from server.control_link import (
 )
 from server.controller import PERIOD_S, Controller, never_too_late
 from server.ingest import EncodedFrame, Ingest
+from server.lockstep_line import Kind, Transit
 from server.lockstep_trace import Judge, Trace
 from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.robot_link import RobotLink
 from server.seen_input import SeenInput
 from server.sight import Sight
 from server.wire import decode, encode
-from server.wire_records import Ping, Record
+from server.wire_records import Ping, Record, Touch
 
 EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}
 NETWORK_TICKS = 2
@@ -93,6 +95,8 @@ class Lockstep:
         self.trace = self._judge.trace
         self.lost: set[str] = set()
         """What of the phone does not arrive now: motion, picture, touch."""
+        self.transit = Transit()
+        """Between phone and server, beyond the usual delays."""
         self._script = make_script(robot_file, scene)
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
@@ -155,12 +159,15 @@ class Lockstep:
             if event.t_capture < PERIOD_S or event.kind.value in self.lost:
                 continue
             if event.kind == EventKind.MOTION:
-                self._take(self._script.motion(event.t_capture))
+                motion = self._script.motion(event.t_capture)
+                self.transit.send(self.t, "motion", partial(self._take, motion))
             elif self._eye is not None:
                 self._glimpse(self._eye, event.t_capture)
             else:
                 key = self._sight.needs_key
-                self._take(self._script.picture(event.t_capture, self._robot_at, key))
+                picture = self._script.picture(event.t_capture, self._robot_at, key)
+                self.transit.send(self.t, "picture", partial(self._take, picture))
+        self.transit.deliver(self.t)
 
     def _hear_small_talk(self) -> None:
         """PING there and PONG back, TOUCH, and the server's readiness, each at its rate."""
@@ -174,10 +181,15 @@ class Lockstep:
         while self._on_their_way and self._on_their_way[0][0] <= self._ticks:
             _, record = self._on_their_way.popleft()
             if isinstance(record.body, Ping):
-                ping = record.body
-                self._send_later(self._script.pong(ping.nonce, record.t_us, self.t))
+                self.transit.send(self.t, "ping", partial(self._answer, record.body, record.t_us))
             elif "touch" not in self.lost:
-                self._take(record)
+                kind: Kind = "touch" if isinstance(record.body, Touch) else "pong"
+                self.transit.send(self.t, kind, partial(self._take, record))
+        self.transit.deliver(self.t)
+
+    def _answer(self, ping: Ping, t_us: int) -> None:
+        """The page answers at once."""
+        self._send_later(self._script.pong(ping.nonce, t_us, self.t))
 
     def _send_later(self, record: Record) -> None:
         self._on_their_way.append((self._ticks + NETWORK_TICKS, record))
@@ -210,7 +222,7 @@ class Lockstep:
         seen = eye.seen(t, stamp, self._robot_at)
         self.trace.pictures += 1
         self.trace.leds.append(len(seen.rays) if seen is not None else 0)
-        self._tell(seen)
+        self.transit.send(self.t, "picture", partial(self._tell, seen))
 
     def _tell(self, seen: Seen | None) -> None:
         if seen is not None:
