@@ -21,12 +21,14 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 
 from server.clock import now
+from server.command_age import refuse_old
 from server.hub import Hub
-from server.messages import Command
+from server.messages import Command, decode_message
 from server.metrics import exposition
 from server.recording import RecordingError
 from server.security import COOKIE, PAIR_TRIES, Doors
 from server.websocket import PageServer
+from server.wire import WireError
 
 CLIENT = Path(__file__).resolve().parents[1] / "web_client"
 LOOKS = sorted((*CLIENT.glob("*.css"), *CLIENT.glob("*.svg")))
@@ -114,7 +116,11 @@ class Api:
         return JSONResponse({"role": request.scope["role"]})
 
     async def _stop(self, request: Request) -> Response:
-        self._hub.wish(Command("stop"), str(request.scope["role"]))
+        try:
+            stop = await stop_of(request)
+        except WireError as error:
+            return refusal(409 if error.code == "age" else 400, error.field, error.allowed)
+        self._hub.wish(stop, str(request.scope["role"]))
         return JSONResponse({"stopping": True}, 202)
 
     async def _virtual_phone(self, request: Request) -> Response:
@@ -182,6 +188,21 @@ def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
         return FileResponse(CLIENT / name)
 
     return file
+
+
+async def stop_of(request: Request) -> Command:
+    """The STOP of a request, which says how old it is if it has a body.
+
+    Raises:
+        WireError: its body is something else, or it is too old.
+    """
+    body = await body_of(request)
+    if not body and request.headers.get("content-length", "0") == "0":
+        return Command("stop")
+    command = decode_message(body)
+    if not isinstance(command, Command) or command.what != "stop":
+        raise WireError("value", "command.what", "stop")
+    return refuse_old(command, now())
 
 
 async def body_of(request: Request, longest: int = MAX_BODY) -> bytes:

@@ -18,6 +18,7 @@ from server.path_messages import PathChoice
 from server.wire import MAX_MESSAGE_BYTES, WireError
 
 Text = Annotated[str, Meta(max_length=200)]
+AgeMs = Annotated[int, Meta(ge=0, le=3_600_000)]
 Side = Annotated[int, Meta(ge=16, le=4096)]
 
 
@@ -45,6 +46,11 @@ class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=
     """
 
     what: Literal["arm", "disarm", "stop", "reset", "key_frame"]
+    age_ms: AgeMs = 0
+    """Since the person asked, by the page's own clock."""
+    server_ms: int | None = None
+    """The server's clock when this was sent, as far as the page knows: `time_ms` of the newest
+    `status` and what has passed since that came; None: it has heard none."""
 
 
 class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):
@@ -196,6 +202,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Of the operator's phone; None while nobody looks through it."""
     path_choice: PathChoice | None = None
     """As the operator's page says; None: it lets nobody choose."""
+    time_ms: int = 0
+    """The server's clock when this was made."""
 
 
 FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log

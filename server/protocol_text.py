@@ -55,6 +55,7 @@ CODES = {
     "size": "too short or too long",
     "version": "another version of the protocol",
     "value": "out of its range, not finite, or a field nobody knows",
+    "age": "asked for too long ago: the link was away, and somebody else may be flying now",
     "order": "before `hello`, `hello` twice, or not now",
     "rate": "too much a second",
     "role": "not as this role, or somebody else has the place",
@@ -65,7 +66,7 @@ CODES = {
 REQUESTS = {
     "POST /api/pair": 'body `{"token": "…"}`; answers `{"role": …}` and sets the cookie',
     "GET /api/whoami": "the role this request has",
-    "POST /api/stop": "STOP, when the socket is gone or stuck",
+    "POST /api/stop": "STOP, when the socket is gone or stuck; body: nothing, or the `command`",
     "POST /api/virtual-phone": "start the virtual phone",
     "DELETE /api/virtual-phone": "stop it",
     "POST /api/recording": "start recording",

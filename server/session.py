@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from server.calibration_messages import Calibrate
+from server.command_age import refuse_old
 from server.messages import Command, FromPage, Hello, Log, Tune, decode_message
 from server.path_messages import PathChoice
 from server.wire import VERSION, WireError, decode
@@ -68,10 +69,12 @@ class Session:
         try:
             if isinstance(data, bytes):
                 return self._record(data, now)
-            return self._message(data, now)
+            said = self._message(data, now)
         except WireError:
             self.fault(now)
             raise
+        # no fault of the page: its link was away
+        return refuse_old(said, now) if isinstance(said, Command) else said
 
     def fault(self, now: float) -> None:
         """Count one."""
@@ -92,7 +95,8 @@ class Session:
 
     def _message(self, text: str, now: float) -> FromPage:
         message = decode_message(text)
-        if not self._messages.take(now) and message != Command("stop"):
+        wished = message.what if isinstance(message, Command) else ""
+        if not self._messages.take(now) and wished != "stop":
             raise WireError("rate", "message", f"{MESSAGES_HZ:g} a second")
         if isinstance(message, Hello):
             return self._greeted(message)
@@ -100,7 +104,7 @@ class Session:
             raise WireError("order", "message", "hello first")
         if not isinstance(message, MESSAGES[self.role]):
             raise WireError("role", "message.type", f"not as {self.role}")
-        if message == Command("reset") and self.role != "supervisor":
+        if wished == "reset" and self.role != "supervisor":
             raise WireError("role", "command.what", "arm, disarm or stop: a supervisor resets")
         return message
 

@@ -81,6 +81,7 @@ def build(hub: Known) -> Status:
         if phone is not None and phone.vision is not None
         else None,
         path_choice=phone.path_choice if phone is not None else None,
+        time_ms=int(1e3 * t),
     )
 
 

@@ -45,7 +45,8 @@ class WireError(ValueError):
     """A record or message that can't be taken.
 
     Attributes:
-        code: What kind of fault: type, size, version, value, order, rate, role or calibration.
+        code: What kind of fault: type, size, version, value, age, order, rate, role or
+            calibration.
         field: Which field.
         allowed: What would have been allowed.
     """

@@ -76,6 +76,23 @@ def test_a_stop_reaches_control_from_either_role(house, client, role):
     assert list(house.hub.events) == [f"{role}: stop"]
 
 
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ('{"type":"command","what":"stop","age_ms":400}', 202),
+        ('{"type":"command","what":"stop","age_ms":3600}', 409),
+        ('{"type":"command","what":"stop","age_ms":0,"server_ms":0}', 409),
+        ('{"type":"command","what":"arm"}', 400),
+        ("stop!", 400),
+    ],
+)
+def test_a_stop_that_was_held_back_for_too_long_does_not_end_anybodys_flight(
+    house, client, body, status
+):
+    assert client.post("/api/stop", content=body).status_code == status
+    assert any(map(is_request("stop"), house.control.inputs())) == (status == 202)
+
+
 def test_the_invitation_holds_the_link_and_its_code(client):
     invitation = client.get("/api/invite").json()
     assert invitation["url"] == "https://robot.lan:8443/#k=abc"

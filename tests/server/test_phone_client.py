@@ -1,12 +1,11 @@
 """A page's two sockets against a small server on the loopback interface."""
 
 import asyncio
-import json
 
 import pytest
 
 from server.access import Access, PhoneClientError
-from server.messages import Refused, encode_message
+from server.messages import Command, Refused, decode_message, encode_message
 from server.path_messages import PathChoice
 from server.phone_client import PhoneClient
 from server.wire import decode, encode
@@ -35,7 +34,7 @@ def test_hello_pong_and_wish():
     assert (video["role"], video["session"]) == ("video", "s1")
     (_, pong), (_, wish) = server.heard
     assert decode(pong).body == Pong(42, 123)
-    assert json.loads(wish) == {"type": "command", "what": "arm"}
+    assert decode_message(wish) == Command("arm")
 
 
 def test_a_supervisors_choice_of_another_way_changes_nothing():
@@ -54,7 +53,7 @@ def test_a_supervisors_choice_of_another_way_changes_nothing():
 
     asyncio.run(server.session(talk))
     ((_, wish),) = server.heard
-    assert json.loads(wish) == {"type": "command", "what": "arm"}
+    assert decode_message(wish) == Command("arm")
 
 
 def test_a_ping_is_answered_with_the_newest_touch_too():

@@ -8,6 +8,7 @@ import { CameraFeed } from './camera_feed.js';
 import { Feedback } from './feedback.js';
 import { LensPanel } from './lens_panel.js';
 import { PaceKeeper } from './pace_keeper.js';
+import { WakefulClock, commandOf } from './command.js';
 import { Imu } from './imu.js';
 import { Phone } from './phone.js';
 import { adviceFor, problemOf } from './problems.js';
@@ -29,6 +30,7 @@ const SILENT_MOTION_MS = 3000;
 
 const here = browserOf(window);
 const { scope, platform, fetchHere, links, screenAngle, startWorker, later } = here;
+const clock = new WakefulClock(performance, Date);
 const stopPost = new StopPost(fetchHere);
 const feedback = new Feedback(navigator, window.AudioContext, platform !== 'android');
 const motionRate = new Rate();
@@ -52,10 +54,10 @@ const view = new View(document, window, {
   onReload: () => window.location.reload(),
   onPress: () => dispatch({ type: 'press' }),
   onRelease: () => dispatch({ type: 'release' }),
-  onStop: () => dispatch({ type: 'stop' }),
+  onStop: () => dispatch({ type: 'stop', now: clock.now() }),
   onCalibrate: (what) => dispatch({ type: 'calibrate', what }),
   onPath: (wished) => choosePath(wished, 'operator'),
-  onWish: () => dispatch({ type: 'ask', what: wish(state).what }),
+  onWish: () => dispatch({ type: 'ask', what: wish(state).what, now: clock.now() }),
   onSound: () => {
     feedback.unlock();
     feedback.sound = !feedback.sound;
@@ -144,10 +146,10 @@ function perform(effect) {
       if (state.linked) phone.sendTouch(touchOf(state));
       break;
     case 'command':
-      phone.command(effect.what);
+      phone.command(effect.what, effect.ageMs);
       break;
     case 'post_stop':
-      stopPost.send();
+      stopPost.send(commandOf('stop', effect.ageMs, phone.serverTime));
       break;
     case 'feel':
       feedback.signal(effect.mode);
@@ -222,6 +224,6 @@ window.addEventListener('error', (event) => phone.log(`page: ${event.message}`))
 view.sound(feedback.sound);
 void start.arrive().then(() => {
   window.setInterval(() => dispatch({ type: 'tick', now: performance.now() }), TICK_MS);
-  window.setInterval(() => dispatch({ type: 'stop_tick' }), STOP_TICK_MS);
+  window.setInterval(() => dispatch({ type: 'stop_tick', now: clock.now() }), STOP_TICK_MS);
   window.setInterval(reportHealth, HEALTH_MS);
 });

@@ -88,11 +88,13 @@ export async function becomeKnown(fetch, { location, history }) {
  * @param {Fetch} fetch
  * @param {'POST' | 'DELETE'} method
  * @param {string} path
+ * @param {object} [body] Goes as JSON.
  */
-export async function ask(fetch, method, path) {
+export async function ask(fetch, method, path, body) {
   try {
+    const told = body === undefined ? {} : { body: JSON.stringify(body) };
     const response = await reach(fetch, path, {
-      method, headers: OWN_HEADERS, keepalive: true, signal: AbortSignal.timeout(PATIENCE_MS),
+      method, headers: OWN_HEADERS, keepalive: true, signal: AbortSignal.timeout(PATIENCE_MS), ...told,
     });
     return response.ok ? '' : await refusalOf(response);
   } catch (error) {

@@ -12,6 +12,7 @@
  */
 
 import { nowUs } from './clock.js';
+import { ServerTime, commandOf } from './command.js';
 import { Link, socketUrl } from './link.js';
 import { Kind, MAX_RECORD_BYTES, VERSION, encodeMotion, encodePong, encodeTouch } from './protocol.js';
 
@@ -47,6 +48,7 @@ export class Phone {
     this.due = null;
     /** @type {{ touch: Touch | null, tMs: number }} */
     this.newest = { touch: null, tMs: -Infinity };
+    this.serverTime = new ServerTime(surroundings.performance);
     /** @type {VideoSender | null} */
     this.video = null;
     /** @type {FastRecords | null} */
@@ -91,6 +93,7 @@ export class Phone {
   /** @param {boolean} wasWelcome */
   closed(wasWelcome) {
     this.videoLink.close();
+    this.serverTime.forget();
     this.surroundings.dispatch({ type: 'disconnected' });
     if (!wasWelcome) this.surroundings.onUnwelcome();
   }
@@ -104,6 +107,7 @@ export class Phone {
         this.welcomed(message);
         break;
       case 'status':
+        this.serverTime.heard(message.time_ms);
         dispatch({ type: 'status', status: message, now });
         break;
       case 'refused':
@@ -216,9 +220,12 @@ export class Phone {
     return this.videoLink.sendRecord(record, MAX_RECORD_BYTES);
   }
 
-  /** @param {Command['what']} what */
-  command(what) {
-    return this.link.sendMessage({ type: 'command', what });
+  /**
+   * @param {Command['what']} what
+   * @param {number} ageMs Since it was asked for.
+   */
+  command(what, ageMs) {
+    return this.link.sendMessage(commandOf(what, ageMs, this.serverTime));
   }
 
   /** @param {Calibrate['what']} what */

@@ -20,6 +20,8 @@
  * @typedef {object} Command
  * @property {'command'} type
  * @property {'arm' | 'disarm' | 'stop' | 'reset' | 'key_frame'} what
+ * @property {number} age_ms Since the person asked, by the page's own clock.
+ * @property {number | null} server_ms The server's clock when this was sent, as far as the page knows: `time_ms` of the newest `status` and what has passed since that came; null: it has heard none.
  */
 
 /**
@@ -192,6 +194,7 @@
  * @property {Estimate | null} estimate null before the control process has told of it.
  * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
  * @property {PathChoice | null} path_choice As the operator's page says; null: it lets nobody choose.
+ * @property {number} time_ms The server's clock when this was made.
  */
 
 /** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log} FromPage */

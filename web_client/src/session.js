@@ -7,11 +7,14 @@
 /** @import {Touch} from './protocol.js' */
 /** @import {Effect, Event, Outcome, ShownMode, State} from './session_types.js' */
 
+import { GIVE_UP_MS } from './command.js';
 import { Problem } from './problems.js';
 
 /** A Status older than this is no news any more [ms]. */
 export const STATUS_LIFE_MS = 500;
 const NOTICE_MS = 5000;
+/** A STOP that was given up is told of for at least so long [ms]. */
+const STOP_LOST_MS = 8000;
 
 /** @type {State} */
 export const INITIAL = Object.freeze({
@@ -28,6 +31,9 @@ export const INITIAL = Object.freeze({
   press: 0,
   nonce: 0n,
   stopping: false,
+  stopAtMs: -Infinity,
+  stopLost: /** @type {const} */ (''),
+  asked: null,
   motionSilent: false,
   health: { path: /** @type {const} */ ('–'), fps: 0, eased: '', rttMs: null, imuHz: 0, kbps: 0 },
   calibration: null,
@@ -84,11 +90,11 @@ function transition(state, event) {
     case 'visibility':
       return seen(state, event.visible);
     case 'stop':
-      return to({ ...state, stopping: true, held: false }, ...STOP, { type: 'touch' });
+      return stopped(state, event.now);
     case 'stop_tick':
-      return state.stopping ? to(state, ...STOP) : to(state);
+      return insisted(state, event.now);
     case 'ask':
-      return to(state, { type: 'command', what: event.what });
+      return asked(state, event.what, event.now);
     case 'motion_silent':
       return to({ ...state, motionSilent: event.silent });
     case 'health':
@@ -100,8 +106,58 @@ function transition(state, event) {
   }
 }
 
-/** @type {Effect[]} */
-const STOP = [{ type: 'command', what: 'stop' }, { type: 'post_stop' }];
+/** @param {number} ageMs @returns {Effect[]} */
+function stops(ageMs) {
+  return [{ type: 'command', what: 'stop', ageMs }, { type: 'post_stop', ageMs }];
+}
+
+/**
+ * @param {State} state
+ * @param {number} now
+ */
+function stopped(state, now) {
+  return to({ ...state, stopping: true, stopAtMs: now, stopLost: '', held: false }, ...stops(0), { type: 'touch' });
+}
+
+/**
+ * STOP again until the robot has stopped, but never to somebody else's flight; what was given up is said until
+ * the server has been heard again, and long enough to be read.
+ * @param {State} state
+ * @param {number} now
+ * @returns {Outcome}
+ */
+function insisted(state, now) {
+  const ageMs = now - state.stopAtMs;
+  if (state.stopping && ageMs <= GIVE_UP_MS) return to(state, ...stops(ageMs));
+  if (state.stopping) {
+    const stopLost = state.heard ? 'unconfirmed' : 'unlinked';
+    return to({ ...state, stopping: false, stopAtMs: now, stopLost }, { type: 'feel', mode: 'STOP_LOST' });
+  }
+  if (state.stopLost !== '' && state.heard && ageMs > STOP_LOST_MS) return to({ ...state, stopLost: '' });
+  return unanswered(state, now);
+}
+
+/**
+ * Arm and disarm go out once: on a link that is away the server refuses them when they come too late.
+ * @param {State} state
+ * @param {'arm' | 'disarm'} what
+ * @param {number} now
+ */
+function asked(state, what, now) {
+  return to({ ...state, asked: { what, atMs: now, mode: shownMode(state) } }, { type: 'command', what, ageMs: 0 });
+}
+
+/**
+ * @param {State} state
+ * @param {number} now
+ */
+function unanswered(state, now) {
+  const { asked, heard } = state;
+  if (asked === null || now - asked.atMs <= GIVE_UP_MS) return to(state);
+  const word = asked.what === 'arm' ? 'Arm' : 'Disarm';
+  const rest = { ...state, asked: null };
+  return to(heard ? rest : noticed(rest, `${word} did not reach the robot: there is no link. It is given up.`, now));
+}
 
 /**
  * @param {State} state
@@ -130,7 +186,9 @@ function blocked(state, problem) {
  */
 function heardFrom(state, status, now) {
   const stopping = state.stopping && status.mode !== 'STOPPED';
-  return to({ ...state, status, statusAtMs: now, heard: true, stopping });
+  const stopLost = status.mode === 'STOPPED' ? '' : state.stopLost;
+  const asked = state.asked?.mode === status.mode ? state.asked : null;
+  return to({ ...state, status, statusAtMs: now, heard: true, stopping, stopLost, asked });
 }
 
 /**
@@ -144,6 +202,8 @@ function refused(state, refusal, now) {
   if (refusal.fatal && refusal.code === 'role') {
     return to({ ...state, problem: new Problem('taken', words) });
   }
+  if (refusal.code === 'age' && state.stopping) return to(state); // it is said again
+  if (refusal.code === 'age') return to(noticed(state, 'It came too late and was not done: press again.', now));
   if (refusal.code === 'calibration') return to(state); // each picture is; the status says it once
   return to(noticed(state, `Not taken: ${words}`, now));
 }

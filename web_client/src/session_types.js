@@ -15,6 +15,8 @@
  * @property {number} kbps Video [kbit/s].
  */
 
+/** @typedef {{ what: 'arm' | 'disarm', atMs: number, mode: ShownMode }} Asked */
+
 /**
  * @typedef {object} State
  * @property {'welcome' | 'starting' | 'operating'} phase
@@ -30,6 +32,9 @@
  * @property {number} press Counts presses.
  * @property {bigint} nonce The newest one of a PING.
  * @property {boolean} stopping STOP was asked for and not yet confirmed.
+ * @property {number} stopAtMs When it was asked for, or given up.
+ * @property {'' | 'unlinked' | 'unconfirmed'} stopLost It was given up, and why.
+ * @property {Asked | null} asked Arm or disarm, while nothing shows that it was heard.
  * @property {boolean} motionSilent No motion sensor has answered.
  * @property {Health} health
  * @property {Calibration | null} calibration Of the camera, while there is something to tell.
@@ -41,15 +46,15 @@
  *   | { type: 'status', status: Status, now: number } | { type: 'refused', refused: Refused, now: number }
  *   | { type: 'notice', text: string, now: number } | { type: 'ping', nonce: bigint }
  *   | { type: 'tick', now: number } | { type: 'press' } | { type: 'release' }
- *   | { type: 'visibility', visible: boolean } | { type: 'stop' } | { type: 'stop_tick' }
- *   | { type: 'ask', what: 'arm' | 'disarm' } | { type: 'motion_silent', silent: boolean }
+ *   | { type: 'visibility', visible: boolean } | { type: 'stop', now: number }
+ *   | { type: 'stop_tick', now: number } | { type: 'ask', what: 'arm' | 'disarm', now: number } | { type: 'motion_silent', silent: boolean }
  *   | { type: 'health', health: Health } | { type: 'calibration', calibration: Calibration }
  *   | { type: 'calibrate', what: Calibrate['what'] }} Event
  */
 
 /**
- * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop' }
- *   | { type: 'post_stop' } | { type: 'feel', mode: ShownMode } | { type: 'close_link' }
+ * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop', ageMs: number }
+ *   | { type: 'post_stop', ageMs: number } | { type: 'feel', mode: ShownMode | 'STOP_LOST' } | { type: 'close_link' }
  *   | { type: 'calibrate', what: Calibrate['what'] }} Effect
  */
 

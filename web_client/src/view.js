@@ -8,6 +8,7 @@
 import { MODE_WORDS } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
+import { STOP_LOST, stopWords } from './stop.js';
 import { shownMode, wish } from './session.js';
 
 const WISH_WORDS = { arm: 'Arm', disarm: 'Disarm' };
@@ -144,7 +145,9 @@ export class View {
 
   /** @param {State} state */
   notice(state) {
-    const text = state.stopping ? 'STOP sent: waiting for the robot to confirm' : state.notice?.text ?? '';
+    const lost = state.stopLost === '' ? null : STOP_LOST[state.stopLost];
+    const text = state.stopping ? stopWords(state.heard) : lost ?? state.notice?.text ?? '';
+    this.data('notice', 'grave', String(lost !== null));
     this.show('notice', text !== '');
     this.text('notice', text);
   }

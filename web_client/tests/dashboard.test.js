@@ -22,8 +22,21 @@ test('the mode shown is never older than half a second', () => {
 });
 
 test('STOP is asked for until the robot has stopped', () => {
-  assert.equal(after({ type: 'stop' }, status({ mode: 'TRACK' })).stopping, true);
-  assert.equal(after({ type: 'stop' }, status({ mode: 'STOPPED' })).stopping, false);
+  assert.equal(after({ type: 'stop', now: 0 }, status({ mode: 'TRACK' })).stopping, true);
+  assert.equal(after({ type: 'stop', now: 0 }, status({ mode: 'STOPPED' })).stopping, false);
+});
+
+test('a STOP without a link is given up after three seconds, and said until the robot is seen at rest', () => {
+  /** @type {Event[]} */
+  const pressed = [{ type: 'disconnected' }, { type: 'stop', now: 0 }, { type: 'stop_tick', now: 3000 }];
+  assert.equal(after(...pressed).stopping, true);
+  const lost = after(...pressed, { type: 'stop_tick', now: 3001 }, { type: 'tick', now: 1e9 });
+  assert.equal(lost.stopping, false);
+  assert.match(lost.notice?.text ?? '', /^STOP did not reach the robot/);
+  const flying = [{ type: 'welcomed' }, status({ mode: 'TRACK' })].reduce(/** @type {any} */ (reduce), lost);
+  assert.match(flying.notice?.text ?? '', /^STOP did not reach the robot/);
+  assert.equal(reduce(flying, status({ mode: 'STOPPED' })).notice, null);
+  assert.equal(reduce(flying, { type: 'stop', now: 9000 }).notice, null);
 });
 
 test('the history keeps the last 200 samples', () => {

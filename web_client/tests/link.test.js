@@ -82,7 +82,7 @@ test('a record is dropped rather than queued', () => {
   FakeSocket.newest.bufferedAmount = BACKLOG_BYTES + 1;
   assert.equal(link.sendRecord(new ArrayBuffer(8)), false);
   assert.equal(link.sendRecord(new ArrayBuffer(8), Infinity), true);
-  assert.equal(link.sendMessage({ type: 'command', what: 'stop' }), true);
+  assert.equal(link.sendMessage({ type: 'command', what: 'stop', age_ms: 0, server_ms: null }), true);
   assert.equal(FakeSocket.newest.sent.length, 3);
 });
 

@@ -78,15 +78,31 @@ test('a wish resolves with the server’s reason when it is refused', async () =
   assert.equal(await ask(server({}).fetch, 'POST', 'api/x'), '404');
 });
 
+test('a STOP by POST says how old it is, and a request without a body has none', async () => {
+  /** @type {(RequestInit | undefined)[]} */
+  const sent = [];
+  /** @type {import('../src/pairing.js').Fetch} */
+  const fetch = async (_, init) => {
+    sent.push(init);
+    return new Response('{}', { status: 202 });
+  };
+  new StopPost(fetch).send({ type: 'command', what: 'stop', age_ms: 70, server_ms: 9000 });
+  await ask(fetch, 'POST', 'api/recording');
+  assert.deepEqual(JSON.parse(String(sent[0]?.body)), { type: 'command', what: 'stop', age_ms: 70, server_ms: 9000 });
+  assert.equal(sent[1]?.body, undefined);
+});
+
 test('one STOP is under way at a time, and the next may go when it has ended, well or not', async () => {
   /** @type {(() => void)[]} */
   const waiting = [];
   const post = new StopPost(() => new Promise((_, reject) => { waiting.push(() => reject(new Error('lost'))); }));
-  post.send();
-  post.send();
+  /** @type {import('../src/protocol_types.js').Command} */
+  const stop = { type: 'command', what: 'stop', age_ms: 0, server_ms: null };
+  post.send(stop);
+  post.send(stop);
   assert.equal(waiting.length, 1);
   waiting[0]?.();
   await new Promise((resolve) => { setImmediate(resolve); });
-  post.send();
+  post.send(stop);
   assert.equal(waiting.length, 2);
 });

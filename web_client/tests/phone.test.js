@@ -180,6 +180,19 @@ test('credits and wishes for a key reach the encoder', () => {
   assert.deepEqual(heard, ['restart', 'credit 9', 'key']);
 });
 
+test('a command says its age and the server’s time, which a lost link makes unknown', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  main?.says({ type: 'status', time_ms: 50_000 });
+  time.advance(20);
+  phone.command('stop', 40);
+  assert.deepEqual(JSON.parse(String(main?.sent.at(-1))), { type: 'command', what: 'stop', age_ms: 40, server_ms: 50_020 });
+  main?.drops();
+  assert.equal(phone.command('stop', 90), false, 'nothing is kept for later');
+  assert.equal(phone.serverTime.now(), null);
+});
+
 test('a flood of faults on the page does not become a flood on the wire', () => {
   const [main] = FakeSocket.made;
   main?.opens();

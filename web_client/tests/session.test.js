@@ -38,7 +38,7 @@ test('a second finger neither presses again nor releases twice', () => {
 
 test('a hidden page, a lost link and STOP release, and only a new press holds again', () => {
   /** @type {Event[]} */
-  const ends = [{ type: 'visibility', visible: false }, { type: 'disconnected' }, { type: 'stop' }];
+  const ends = [{ type: 'visibility', visible: false }, { type: 'disconnected' }, { type: 'stop', now: 0 }];
   for (const end of ends) assert.equal(after(...UP, { type: 'press' }, end).state.held, false, end.type);
   const back = after(...UP, { type: 'press' }, { type: 'disconnected' }, { type: 'welcomed' });
   assert.deepEqual([back.state.held, back.state.press], [false, 1]);
@@ -65,14 +65,60 @@ test('a nonce does not outlive its connection', () => {
 });
 
 test('STOP goes both ways, again and again, until the robot has stopped', () => {
-  const asked = after(...UP, { type: 'stop' });
+  const asked = after(...UP, { type: 'stop', now: 0 });
   assert.deepEqual(asked.kinds, ['command', 'post_stop', 'touch']);
-  const still = after(...UP, { type: 'stop' }, status({ mode: 'TRACK' }), { type: 'stop_tick' });
+  const still = after(...UP, { type: 'stop', now: 0 }, status({ mode: 'TRACK' }), { type: 'stop_tick', now: 50 });
   assert.deepEqual(still.kinds, ['command', 'post_stop']);
-  const deaf = after(...UP, { type: 'stop' }, { type: 'disconnected' }, { type: 'stop_tick' });
+  const deaf = after(...UP, { type: 'stop', now: 0 }, { type: 'disconnected' }, { type: 'stop_tick', now: 50 });
   assert.deepEqual(deaf.kinds, ['command', 'post_stop']);
-  const done = after(...UP, { type: 'stop' }, status({ mode: 'STOPPED' }), { type: 'stop_tick' });
+  const done = after(...UP, { type: 'stop', now: 0 }, status({ mode: 'STOPPED' }), { type: 'stop_tick', now: 50 });
   assert.deepEqual([done.state.stopping, done.kinds], [false, []]);
+});
+
+test('a STOP without a link is tried for three seconds, then given up, felt and said', () => {
+  /** @param {number} now @returns {Event} */
+  const tick = (now) => ({ type: 'stop_tick', now });
+  /** @type {Event[]} */
+  const pressed = [...UP, { type: 'disconnected' }, { type: 'stop', now: 1000 }];
+  const late = after(...pressed, tick(4000));
+  assert.deepEqual(late.effects, [{ type: 'command', what: 'stop', ageMs: 3000 }, { type: 'post_stop', ageMs: 3000 }]);
+  const lost = after(...pressed, tick(4001));
+  assert.deepEqual([lost.state.stopping, lost.state.stopLost], [false, 'unlinked']);
+  assert.deepEqual(lost.effects, [{ type: 'feel', mode: 'STOP_LOST' }]);
+  const minutes = after(...pressed, tick(4001), tick(4051), { type: 'welcomed' }, status({ mode: 'TRACK' }), tick(300_000));
+  assert.deepEqual(minutes.effects, [], 'never to somebody else’s flight');
+  const again = after(...pressed, tick(4001), { type: 'stop', now: 9000 });
+  assert.deepEqual([again.state.stopLost, again.kinds], ['', ['command', 'post_stop', 'touch']]);
+});
+
+test('that STOP did not arrive is said until the server is heard again, and for at least eight seconds', () => {
+  /** @param {...Event} more */
+  const lost = (...more) => after(
+    ...UP, { type: 'disconnected' }, { type: 'stop', now: 0 }, { type: 'stop_tick', now: 3001 }, ...more,
+  ).state.stopLost;
+  assert.equal(lost({ type: 'stop_tick', now: 60_000 }), 'unlinked');
+  /** @type {Event[]} */
+  const back = [{ type: 'welcomed' }, status({ mode: 'TRACK' })];
+  assert.equal(lost(...back, { type: 'stop_tick', now: 11_000 }), 'unlinked');
+  assert.equal(lost(...back, { type: 'stop_tick', now: 11_002 }), '');
+  assert.equal(lost({ type: 'welcomed' }, status({ mode: 'STOPPED' })), '');
+});
+
+test('a STOP that the robot does not confirm is given up too, in other words', () => {
+  const { state } = after(...UP, { type: 'stop', now: 0 }, status({ mode: 'LOST' }), { type: 'stop_tick', now: 3001 });
+  assert.deepEqual([state.stopping, state.stopLost], [false, 'unconfirmed']);
+});
+
+test('an arm that nobody hears is given up and said; one that is heard is not told of again', () => {
+  const ready = status({ ready: true });
+  const asked = after(...UP, ready, { type: 'ask', what: 'arm', now: 0 });
+  assert.deepEqual(asked.effects, [{ type: 'command', what: 'arm', ageMs: 0 }]);
+  const lost = after(...UP, ready, { type: 'ask', what: 'arm', now: 0 }, { type: 'disconnected' }, { type: 'stop_tick', now: 3001 });
+  assert.match(lost.state.notice?.text ?? '', /^Arm did not reach the robot/);
+  assert.deepEqual(lost.effects, []);
+  const heard = after(...UP, ready, { type: 'ask', what: 'arm', now: 0 }, status({ mode: 'ARMED' }), { type: 'disconnected' },
+    { type: 'stop_tick', now: 3001 });
+  assert.equal(heard.state.notice, null);
 });
 
 test('the mode shown is never older than half a second', () => {
@@ -131,8 +177,8 @@ test('no event is able to hold the button by itself', () => {
   /** @type {Event[]} */
   const others = [
     { type: 'start' }, { type: 'started' }, { type: 'welcomed' }, { type: 'disconnected' }, { type: 'release' },
-    { type: 'tick', now: 1 }, { type: 'ping', nonce: 1n }, { type: 'visibility', visible: true }, { type: 'stop' },
-    { type: 'stop_tick' }, { type: 'ask', what: 'arm' }, status({ mode: 'TRACK' }), { type: 'step', text: '' },
+    { type: 'tick', now: 1 }, { type: 'ping', nonce: 1n }, { type: 'visibility', visible: true }, { type: 'stop', now: 0 },
+    { type: 'stop_tick', now: 50 }, { type: 'ask', what: 'arm', now: 0 }, status({ mode: 'TRACK' }), { type: 'step', text: '' },
     { type: 'motion_silent', silent: true }, { type: 'notice', text: '', now: 0 }, { type: 'health', health: INITIAL.health },
   ];
   for (const first of others) {

@@ -10,6 +10,7 @@ import { BoardView } from './view.js';
 import { EstimatePanel } from './estimate.js';
 import { EMPTY, reduce } from './model.js';
 import { KnobPanel } from './knobs.js';
+import { ServerTime, WakefulClock, commandOf } from '../command.js';
 import { Link, socketUrl } from '../link.js';
 import { PathSelect } from './path_select.js';
 import { PhoneCard } from './phone_card.js';
@@ -22,6 +23,8 @@ const TICK_MS = 100;
 const STOP_TICK_MS = 50;
 
 const { fetchHere, links, platform } = browserOf(window);
+const clock = new WakefulClock(performance, Date);
+const serverTime = new ServerTime(performance);
 const stopPost = new StopPost(fetchHere);
 let board = EMPTY;
 let shown = false;
@@ -36,15 +39,16 @@ const link = new Link(socketUrl('ws/supervisor', document.baseURI), {
   onMessage: take,
   onRecord: record,
   onClose: (wasWelcome) => {
+    serverTime.forget();
     dispatch({ type: 'disconnected' });
     if (!wasWelcome) void checkPairing();
   },
 }, links);
 
 const view = new BoardView(document, {
-  onWish: (what) => void link.sendMessage({ type: 'command', what }),
+  onWish: (what) => void link.sendMessage(commandOf(what, 0, serverTime)),
   onStop: () => {
-    dispatch({ type: 'stop' });
+    dispatch({ type: 'stop', now: clock.now() });
     sendStop();
   },
   onVirtual: () => void toggleVirtual(),
@@ -77,6 +81,7 @@ function dispatch(event) {
 function take(message) {
   const now = performance.now();
   if (message.type === 'welcome') dispatch({ type: 'welcomed' });
+  if (message.type === 'status') serverTime.heard(message.time_ms);
   if (message.type === 'status') dispatch({ type: 'status', status: message, now });
   if (message.type !== 'refused') return;
   dispatch({ type: 'refused', refused: message, now });
@@ -89,8 +94,9 @@ function record(received) {
 }
 
 function sendStop() {
-  link.sendMessage({ type: 'command', what: 'stop' });
-  stopPost.send();
+  const stop = commandOf('stop', clock.now() - board.stopAtMs, serverTime);
+  link.sendMessage(stop);
+  stopPost.send(stop);
 }
 
 /**
@@ -151,6 +157,8 @@ void arrive().then(() => {
     dispatch({ type: 'tick', now: performance.now() });
   }, TICK_MS);
   window.setInterval(() => {
+    if (!board.stopping) return;
+    dispatch({ type: 'stop_tick', now: clock.now() });
     if (board.stopping) sendStop();
   }, STOP_TICK_MS);
 });

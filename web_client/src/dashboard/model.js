@@ -3,12 +3,16 @@
 /** @import {Refused, Status} from '../protocol_types.js' */
 /** @import {ShownMode} from '../session_types.js' */
 
+import { GIVE_UP_MS } from '../command.js';
 import { Problem } from '../problems.js';
+import { STOP_LOST } from '../stop.js';
 import { STATUS_LIFE_MS } from '../session.js';
 
 /** Twenty seconds of Status at 10 Hz. */
 export const REMEMBERED = 200;
 const NOTICE_MS = 5000;
+/** With the robot there nobody need be told any more that STOP did not reach it. @type {Status['mode'][]} */
+const AT_REST = ['DISARMED', 'STOPPED'];
 
 /**
  * @typedef {{ errorMm: number | null, errorDeg: number | null, sigmaMm: number | null,
@@ -22,6 +26,7 @@ const NOTICE_MS = 5000;
  * @property {Status | null} status
  * @property {number} statusAtMs
  * @property {boolean} stopping STOP was asked for and not yet confirmed.
+ * @property {number} stopAtMs When it was asked for.
  * @property {readonly Sample[]} history Oldest first.
  * @property {{ text: string, untilMs: number } | null} notice
  * @property {Problem | null} problem
@@ -30,7 +35,8 @@ const NOTICE_MS = 5000;
 /**
  * @typedef {{ type: 'welcomed' } | { type: 'disconnected' } | { type: 'problem', problem: Problem }
  *   | { type: 'status', status: Status, now: number } | { type: 'refused', refused: Refused, now: number }
- *   | { type: 'notice', text: string, now: number } | { type: 'tick', now: number } | { type: 'stop' }} Event
+ *   | { type: 'notice', text: string, now: number } | { type: 'tick', now: number }
+ *   | { type: 'stop', now: number } | { type: 'stop_tick', now: number }} Event
  */
 
 /** @type {Board} */
@@ -40,6 +46,7 @@ export const EMPTY = Object.freeze({
   status: null,
   statusAtMs: -Infinity,
   stopping: false,
+  stopAtMs: -Infinity,
   history: [],
   notice: null,
   problem: null,
@@ -65,7 +72,9 @@ export function reduce(board, event) {
     case 'notice':
       return { ...board, notice: { text: event.text, untilMs: event.now + NOTICE_MS } };
     case 'stop':
-      return { ...board, stopping: true };
+      return { ...board, stopping: true, stopAtMs: event.now, notice: null };
+    case 'stop_tick':
+      return insisted(board, event.now);
     case 'tick':
       return ticked(board, event.now);
   }
@@ -90,8 +99,20 @@ function heardFrom(board, status, now) {
     statusAtMs: now,
     heard: true,
     stopping: board.stopping && status.mode !== 'STOPPED',
+    notice: board.notice?.untilMs === Infinity && AT_REST.includes(status.mode) ? null : board.notice,
     history: [...board.history.slice(1 - REMEMBERED), sample],
   };
+}
+
+/**
+ * @param {Board} board
+ * @param {number} now
+ * @returns {Board}
+ */
+function insisted(board, now) {
+  if (!board.stopping || now - board.stopAtMs <= GIVE_UP_MS) return board;
+  const text = STOP_LOST[board.heard ? 'unconfirmed' : 'unlinked'];
+  return { ...board, stopping: false, notice: { text, untilMs: Infinity } };
 }
 
 /**

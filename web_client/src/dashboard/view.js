@@ -7,6 +7,7 @@
 import { Elements, write } from './elements.js';
 import { MODE_WORDS } from '../mode_words.js';
 import { age, alarm, metres, number, scaleEnd, streamName } from './format.js';
+import { stopWords } from '../stop.js';
 import { drawLines } from './sparkline.js';
 import { REMEMBERED, shownMode, wishes } from './model.js';
 
@@ -67,7 +68,7 @@ export class BoardView extends Elements {
       /** @type {HTMLButtonElement} */ (this.find(what)).disabled = !can;
     }
     this.find('stop').classList.toggle('asked', board.stopping);
-    const text = board.stopping ? 'STOP sent: waiting for the robot to confirm' : board.notice?.text ?? '';
+    const text = board.stopping ? stopWords(board.heard) : board.notice?.text ?? '';
     this.show('notice', text !== '');
     this.text('notice', text);
   }
