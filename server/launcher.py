@@ -20,7 +20,8 @@ from server.child import Child
 from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.settings import Settings
 
-BACKLOG = 128
+BACKLOG = 1_024
+"""Connections that the kernel keeps for a server that is busy or restarts."""
 MAX_DEATHS = 4
 """Of one process before anything worked: better end, with the reason on the screen."""
 POLL_S = 0.05

@@ -1,24 +1,23 @@
-"""uvicorn as we want it: impatient, with few connections for each, signals left to the owner."""
+"""uvicorn as we want it: impatient, with doors of its own, signals left to the owner."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 from collections.abc import Iterator
 
 import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from server.acceptor import Acceptor
+from server.admission import Admission
 from server.tls import Certificate
 from server.wire import MAX_RECORD_BYTES
 
 HEAD_S = 5.0
 """A request's head must be whole within this."""
-MAX_CONNECTIONS = 128
-MAX_PER_ADDRESS = 32
-"""Of another machine."""
-LOOPBACK = ("127.0.0.1", "::1")
 
 
 class Patience(H11Protocol):
@@ -27,12 +26,9 @@ class Patience(H11Protocol):
     _head_due: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Start the clock, unless the address has connections enough."""
+        """Start the clock."""
         super().connection_made(transport)
-        if self._of_same_address() > MAX_PER_ADDRESS:
-            transport.close()
-        else:
-            self._expect_head()
+        self._expect_head()
 
     def data_received(self, data: bytes) -> None:
         """A whole head stops the clock; the first byte of another one starts it again."""
@@ -49,12 +45,6 @@ class Patience(H11Protocol):
         self._head_is_whole()
         super().connection_lost(exc)
 
-    def _of_same_address(self) -> int:
-        address = _address(self)
-        if address in LOOPBACK:
-            return 0
-        return sum(_address(c) == address for c in self.connections)
-
     def _expect_head(self) -> None:
         self._head_due = self.loop.call_later(HEAD_S, self._late)
 
@@ -70,16 +60,46 @@ class Patience(H11Protocol):
 
 
 class Listener(uvicorn.Server):
-    """Leaves signals to its owner."""
+    """Accepts by admission, and leaves signals to its owner."""
+
+    def __init__(self, config: uvicorn.Config, admission: Admission) -> None:
+        """Listens when it is run, at the sockets that it is given then."""
+        super().__init__(config)
+        self._admission = admission
+        self._acceptors: list[Acceptor] = []
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
         """Capture none."""
         yield
 
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Open the doors."""
+        await self.lifespan.startup()
+        self.servers = []  # of asyncio's own: none
+        self._acceptors = [
+            Acceptor(bound, self.config.ssl, self._protocol, self._admission)
+            for bound in sockets or ()
+        ]
+        for acceptor in self._acceptors:
+            acceptor.start()
+        self.started = True
 
-def listener(app: ASGIApp, tls: Certificate | None) -> Listener:
-    """A server of `app`, with TLS or without; it is given its socket when it is run."""
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Close them."""
+        for acceptor in self._acceptors:
+            acceptor.close()
+        await super().shutdown(sockets)
+
+    def _protocol(self) -> Patience:
+        return Patience(self.config, self.server_state, self.lifespan.state)
+
+
+def listener(app: ASGIApp, tls: Certificate | None, admission: Admission | None = None) -> Listener:
+    """A server of `app`, with TLS or without; it is given its socket when it is run.
+
+    Listeners that share an `admission` share the places.
+    """
     return Listener(
         uvicorn.Config(
             app,
@@ -93,16 +113,10 @@ def listener(app: ASGIApp, tls: Certificate | None) -> Listener:
             log_config=None,
             access_log=False,
             server_header=False,
-            limit_concurrency=MAX_CONNECTIONS,
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,
             ssl_certfile=tls.cert if tls else None,
             ssl_keyfile=tls.key if tls else None,
-        )
+        ),
+        Admission() if admission is None else admission,
     )
-
-
-def _address(connection: object) -> str:
-    """Of the peer; uvicorn's kinds of connection have no common class."""
-    client: tuple[str, int] | None = getattr(connection, "client", None)
-    return client[0] if client is not None else ""

@@ -13,6 +13,9 @@ from starlette.requests import cookie_parser
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from server.admission import Admission, peer_of
+from server.clock import now
+
 Role = Literal["operator", "supervisor"]
 COOKIE = "lightleash"
 PUBLIC_FILES = (".js", ".css", ".svg")
@@ -109,9 +112,19 @@ class Doors:
 class Guard:
     """Refuses foreign hosts and origins, and those without the role; adds the security headers."""
 
-    def __init__(self, app: ASGIApp, doors: Doors, hosts: Iterable[str]) -> None:
-        """`hosts` are the names and addresses this server answers to."""
+    def __init__(
+        self,
+        app: ASGIApp,
+        doors: Doors,
+        hosts: Iterable[str],
+        admission: Admission | None = None,
+    ) -> None:
+        """`hosts` are the names and addresses this server answers to.
+
+        `admission` is told whose address has shown a role, and limits what others ask.
+        """
         self._app, self._doors = app, doors
+        self._admission = Admission() if admission is None else admission
         self._hosts = {f"[{host}]" if ":" in host else host.lower() for host in hosts}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -121,6 +134,9 @@ class Guard:
             return
         headers = {k.decode("latin-1").lower(): v.decode("latin-1") for k, v in scope["headers"]}
         role = self._doors.role_of(headers)
+        if not self._admission.may_ask(peer_of(scope), role is not None, now()):
+            await _refuse((429, "requests", "fewer"), scope, receive, send)
+            return
         refusal = self._refusal(scope, headers, role)
         if refusal is not None:
             await _refuse(refusal, scope, receive, send)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-import logging
 import os
+import resource
 import signal
 import socket
 import sys
@@ -16,7 +16,8 @@ from starlette.types import ASGIApp
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
-from server import warm_up
+from server import bounded_log, warm_up
+from server.admission import Admission, limits_for
 from server.app import Api, make_app
 from server.calibrate.camera_yaml import PROFILES
 from server.dashboard import Dashboard
@@ -35,6 +36,8 @@ from server.websocket import PageServer
 
 ANY_ADDRESS = ("0.0.0.0", "::")
 POLL_S = 0.05
+MAX_HANDLES = 8_192
+"""Some systems allow a number that they don't grant."""
 SWITCH_S = 5e-4
 """Each datagram makes the event loop give up the interpreter for a moment, ten times a picture by
 WebRTC; a vision thread that computes would keep it for Python's usual 5 ms each time."""
@@ -69,13 +72,14 @@ async def serve(settings: Settings, given: Given) -> None:
     desk = RtcDesk(hub, settings.rtc, settings.video.bitrate_bps)
     routes = [*view_routes(lambda: dashboard.port), *desk.routes()]
     app = make_app(api, PageServer(hub, settings.video), routes)
-    guarded = Guard(app, doors, [*own_names(), *settings.names])
+    admission = Admission(limits_for(raise_handles()))
+    guarded = Guard(app, doors, [*own_names(), *settings.names], admission)
     if settings.record:
         hub.start_recording()
     run = json.dumps(_run(settings, given, base, doors))
     telling = asyncio.create_task(_tell_when_ready(hub, given.runtime / RUN_FILE, run))
     try:
-        await _until_signalled(hub, guarded, tls, given)
+        await _until_signalled(hub, doors_of(guarded, tls, given, admission))
     finally:
         telling.cancel()
         await desk.close()
@@ -129,14 +133,20 @@ def _seen_from_anywhere(robot: str) -> str:
     return str(Path(robot).absolute()) if robot.endswith(".toml") else robot
 
 
-async def _until_signalled(hub: Hub, app: ASGIApp, tls: Certificate, given: Given) -> None:
+def doors_of(
+    app: ASGIApp, tls: Certificate, given: Given, admission: Admission
+) -> list[tuple[Listener, socket.socket]]:
+    """HTTPS for phones and HTTP for this machine, with their sockets."""
+    return [
+        (listener(app, tls, admission), given.https),
+        (listener(app, None, admission), given.http),
+    ]
+
+
+async def _until_signalled(hub: Hub, listeners: list[tuple[Listener, socket.socket]]) -> None:
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
-    listeners: list[tuple[Listener, socket.socket]] = [
-        (listener(app, tls), given.https),
-        (listener(app, None), given.http),
-    ]
     tasks = [asyncio.create_task(one.serve(sockets=[bound])) for one, bound in listeners]
     hub_task = asyncio.create_task(hub.run())
     stopping = asyncio.create_task(stop.wait())
@@ -151,6 +161,14 @@ async def _until_signalled(hub: Hub, app: ASGIApp, tls: Certificate, given: Give
             one.should_exit = True
         hub_task.cancel()
         await asyncio.gather(*tasks, hub_task, return_exceptions=True)
+
+
+def raise_handles() -> int:
+    """Let this process have as many file handles as it may; how many that is."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = MAX_HANDLES if most == resource.RLIM_INFINITY else min(most, MAX_HANDLES)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+    return wanted
 
 
 def _certificate(settings: Settings) -> Certificate:
@@ -170,6 +188,6 @@ def _metadata(settings: Settings) -> dict[str, str]:
 def main(settings: Settings, given: Given) -> int:
     """Entry of the server process."""
     sys.setswitchinterval(SWITCH_S)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(levelname)s %(message)s")
+    bounded_log.set_up()
     asyncio.run(serve(settings, given))
     return 0

@@ -17,6 +17,7 @@ import msgspec
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
 from pipeline.vision.looking import warm_up
+from server.admission import Admission
 from server.app import Api, make_app
 from server.clock import now
 from server.control_link import Input, OperatorInput, control_end
@@ -103,12 +104,14 @@ async def serve(host: str, folder: Path) -> None:
         url = f"http://{host}:{bound.getsockname()[1]}"
         desk = RtcDesk(hub, RtcSettings(), video.bitrate_bps)
         api = Api(hub, doors, url, None)
-        app = Guard(make_app(api, PageServer(hub, video), desk.routes()), doors, [host])
+        admission = Admission()
+        inner = make_app(api, PageServer(hub, video), desk.routes())
+        app = Guard(inner, doors, [host], admission)
         stop, loop = asyncio.Event(), asyncio.get_running_loop()
         loop.add_reader(control.fileno(), control.inputs)
         loop.add_signal_handler(signal.SIGTERM, stop.set)
         loop.add_signal_handler(signal.SIGUSR1, hub.tell_heard)
-        server = listener(app, None)
+        server = listener(app, None, admission)
         tasks = [asyncio.create_task(server.serve(sockets=[bound])), asyncio.create_task(hub.run())]
         sys.stdout.buffer.write(msgspec.json.encode(Place(url, doors.operator_token)) + b"\n")
         sys.stdout.buffer.flush()

@@ -13,6 +13,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
+from server import acceptor
 from server import listener as impatient
 from server.wire import MAX_RECORD_BYTES
 from tests.server.house import eventually
@@ -22,7 +23,6 @@ pytestmark = pytest.mark.slow  # real sockets, whose server stops by its own tic
 OK = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
 LAST = b"GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
 HEAD_S = 0.05
-FAR = "192.0.2.9"
 
 
 async def app(scope, receive, send):
@@ -54,6 +54,7 @@ async def listening() -> AsyncIterator[SimpleNamespace]:
 @pytest.fixture(autouse=True)
 def hurried(monkeypatch):
     monkeypatch.setattr(impatient, "HEAD_S", HEAD_S)
+    monkeypatch.setattr(acceptor, "HELLO_S", HEAD_S)
 
 
 async def speak(port, *parts):
@@ -137,37 +138,6 @@ def test_messages_are_not_compressed_so_that_none_is_a_bomb():
     async def run():
         async with listening() as here, connect(here.url, proxy=None) as page:
             assert "Sec-WebSocket-Extensions" not in page.response.headers
-
-    asyncio.run(run())
-
-
-def test_one_address_gets_so_many_connections_and_another_still_gets_its_own(monkeypatch):
-    monkeypatch.setattr(impatient, "MAX_PER_ADDRESS", 2)
-    monkeypatch.setattr(impatient, "HEAD_S", 60.0)
-    addresses = {}
-
-    def address(connection):
-        return addresses.get(getattr(connection, "client", None), "127.0.0.1")
-
-    monkeypatch.setattr(impatient, "_address", address)
-
-    async def open_as(name, port):
-        bound = socket.socket()
-        bound.setblocking(False)
-        bound.bind(("127.0.0.1", 0))
-        addresses[bound.getsockname()] = name
-        await asyncio.get_running_loop().sock_connect(bound, ("127.0.0.1", port))
-        return await asyncio.open_connection(sock=bound)
-
-    async def run():
-        async with listening() as here:
-            crowd = [await open_as(FAR, here.port) for _ in range(4)]
-            async with asyncio.timeout(4.0):
-                assert await crowd[2][0].read() == b""
-                assert await crowd[3][0].read() == b""
-            assert b"200" in await speak(here.port, LAST)
-            for _, writer in crowd:
-                writer.close()
 
     asyncio.run(run())
 

@@ -26,7 +26,7 @@ FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICT
 @pytest.fixture
 def rig(tmp_path):
     server = LiveServer(tmp_path)
-    server.client = TestClient(server.guard, base_url=BASE)
+    server.client = TestClient(server.guard, base_url=BASE, client=("127.0.0.1", 50_000))
     yield server
     server.close()
 
