@@ -24,6 +24,7 @@ from server.meter import Meter
 from server.operator import OperatorPhone
 from server.page import Page
 from server.paths import FastPath, PhonePaths
+from server.pauses import Pauses
 from server.recorder import Recordings
 from server.status import build
 from server.vision import Picture, jpeg
@@ -37,6 +38,7 @@ LEASE_S = 2.0
 INSIST_S, INSISTS = 0.01, 100
 """How often and how many times a STOP is sent to a control process that can't take it."""
 EVENTS, TICK_S = 12, 0.1
+AT_REST = ("DISARMED", "STOPPED", "LOST")
 
 
 class Hub:
@@ -65,16 +67,22 @@ class Hub:
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
         """What the phone saw, for the 3D view."""
+        self.pauses = Pauses()
+        self.unready = ""
+        """What the server itself has against arming."""
 
     async def run(self) -> None:
         """Serve until cancelled."""
         loop = asyncio.get_running_loop()
         loop.add_reader(self._control.fileno(), self._hear_control)
+        watching = asyncio.create_task(self.pauses.watch())
         try:
             while True:
                 await asyncio.sleep(TICK_S)
                 self._tick()
         finally:
+            watching.cancel()
+            self.pauses.close()
             loop.remove_reader(self._control.fileno())
             if self.phone is not None:
                 self.phone.close()
@@ -212,6 +220,8 @@ class Hub:
 
     def refusals(self) -> list[str]:
         """What the server has against arming."""
+        if self.unready:
+            return [self.unready]
         if self.phone is None:
             return ["No phone is connected: scan the code, or start the virtual phone."]
         return self.phone.refusals(now())
@@ -223,6 +233,8 @@ class Hub:
             self.say(f"{status.mode}: {status.reason}")
             self._last_mode = status.mode
         self._shown = status
+        if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
+            self.say(paused)
         self.broadcast(status)
         self._show_picture()
         self._ask_key()

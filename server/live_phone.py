@@ -15,6 +15,7 @@ from hardware.sim.phone import Event, Stream
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.access import Access
+from server.garbage import Garbage
 from server.messages import Command, Status
 from server.phone_client import PhoneClient
 from server.phone_script import ALL, DEVICE, SYNCHRONISED_PONGS, TOUCH_S, PhoneScript, Score
@@ -83,6 +84,7 @@ class LivePhone:
         self.status: Status | None = None
         self._made: asyncio.Queue[tuple[float, Record]] = asyncio.Queue(8)
         self._leave = asyncio.Event()
+        self._garbage = Garbage(time.thread_time)
 
     def leave(self) -> None:
         """Let go of the button, disarm and end the run."""
@@ -95,6 +97,7 @@ class LivePhone:
             PhoneClientError: the server is not there, refuses or goes away.
         """
         await self.client.open(DEVICE)
+        self._garbage.settle()
         parts = (
             self.client.run(),
             self._motions(),
@@ -114,6 +117,7 @@ class LivePhone:
             for task in (*tasks, leaving):
                 task.cancel()
             await asyncio.gather(*tasks, leaving, return_exceptions=True)
+            self._garbage.close()
             await self.client.close()
             self._seen.close()
             self._scored.close()
@@ -176,6 +180,7 @@ class LivePhone:
     async def _reports(self, report: Callable[[LivePhone], None]) -> None:
         while True:
             await asyncio.sleep(0.5)
+            self._garbage.tick(idle=False)
             report(self)
 
 

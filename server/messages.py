@@ -204,6 +204,10 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """As the operator's page says; None: it lets nobody choose."""
     time_ms: int = 0
     """The server's clock when this was made."""
+    server: dict[str, float] = {}
+    """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
+    while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections
+    while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full."""
 
 
 FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log

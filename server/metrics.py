@@ -37,6 +37,11 @@ def exposition(hub: Hub) -> bytes:
     )
     for name, value in status.control.items():
         control.labels(name).set(value)
+    pauses = Gauge(
+        "lightleash_server", "longest pauses [ms], full collections", ["figure"], registry=registry
+    )
+    for name, value in status.server.items():
+        pauses.labels(name).set(value)
     if status.error_mm is not None:
         error = Gauge("lightleash_error_metres", "from the reference", registry=registry)
         error.set(1e-3 * status.error_mm)

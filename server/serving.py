@@ -9,6 +9,7 @@ import resource
 import signal
 import socket
 import sys
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,6 +39,7 @@ ANY_ADDRESS = ("0.0.0.0", "::")
 POLL_S = 0.05
 MAX_HANDLES = 8_192
 """Some systems allow a number that they don't grant."""
+WARMING = "The server is getting ready: wait a moment."
 SWITCH_S = 5e-4
 """Each datagram makes the event loop give up the interpreter for a moment, ten times a picture by
 WebRTC; a vision thread that computes would keep it for Python's usual 5 ms each time."""
@@ -65,6 +67,7 @@ async def serve(settings: Settings, given: Given) -> None:
     """Serve until SIGTERM or SIGINT."""
     tls = _certificate(settings)
     doors = Doors(given.secret)
+    warming = warm_up.begin()
     hub = _hub(settings, given)
     dashboard = _dashboard(settings, hub)
     base = base_url(settings.host, given.https.getsockname()[1])
@@ -77,7 +80,7 @@ async def serve(settings: Settings, given: Given) -> None:
     if settings.record:
         hub.start_recording()
     run = json.dumps(_run(settings, given, base, doors))
-    telling = asyncio.create_task(_tell_when_ready(hub, given.runtime / RUN_FILE, run))
+    telling = asyncio.create_task(_tell_when_ready(hub, warming, given.runtime / RUN_FILE, run))
     try:
         await _until_signalled(hub, doors_of(guarded, tls, given, admission))
     finally:
@@ -88,10 +91,16 @@ async def serve(settings: Settings, given: Given) -> None:
         dashboard.stop()
 
 
-async def _tell_when_ready(hub: Hub, run_file: Path, run: str) -> None:
-    """The run file says that a robot can be led: the control process compiles for a while first."""
-    while hub.status is None:
+async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, run: str) -> None:
+    """The run file says that a robot can be led: the control process compiles for a while first.
+
+    So may this one. What is loaded by then is needed for ever, and frozen before anybody flies.
+    """
+    hub.unready = WARMING
+    while hub.status is None or warming.is_alive():
         await asyncio.sleep(POLL_S)
+    hub.pauses.garbage.settle()
+    hub.unready = ""
     write_private(run_file, run)
 
 
@@ -100,7 +109,6 @@ def _hub(settings: Settings, given: Given) -> Hub:
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
     robot = load_robot(settings.robot).robot
-    warm_up.begin()
     profiles = settings.state / PROFILES
     profiles.mkdir(parents=True, exist_ok=True)
     cameras = [*settings.cameras, profiles, CAMERAS]

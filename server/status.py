@@ -14,6 +14,7 @@ from server.control_link import ControlStatus
 from server.messages import Estimate, Status, Stream, VirtualCamera
 from server.meter import Meter
 from server.operator import OperatorPhone
+from server.pauses import Pauses
 from server.recorder import Recordings
 
 LOST_S = 0.3
@@ -29,6 +30,7 @@ class Known(Protocol):
     status: ControlStatus | None
     control_meter: Meter
     recordings: Recordings
+    pauses: Pauses
 
     @property
     def events(self) -> Sequence[str]:
@@ -82,6 +84,7 @@ def build(hub: Known) -> Status:
         else None,
         path_choice=phone.path_choice if phone is not None else None,
         time_ms=int(1e3 * t),
+        server=hub.pauses.figures(),
     )
 
 

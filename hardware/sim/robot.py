@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import os
 import secrets
 import select
@@ -148,6 +149,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         signal.signal(number, process.stop)
     with contextlib.suppress(AttributeError, OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    gc.collect()
+    gc.freeze()  # a real robot does not stand still to look through all its objects
     sys.stdout.write("ready port={} truth_port={}\n".format(*process.ports))
     sys.stdout.flush()
     process.run()

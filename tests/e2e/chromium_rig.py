@@ -12,6 +12,7 @@ from playwright.sync_api import BrowserContext
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from server.bench.write import camera_text
+from server.garbage import held
 from tests.e2e.chromium_phone import ChromiumPhone, browser
 from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone
 from tests.e2e.serving import DEVICE, Serving, serving
@@ -105,5 +106,5 @@ def led_server(
         motion = make_hand(hand, seed=seed, t_start=time.monotonic() + rest_s)
         leds_in_b = load_robot("ames").robot.leds_in_b
         phone = ChromiumPhone(context, motion, leds_in_b, server.truth_port)
-        with contextlib.closing(phone):
+        with contextlib.closing(phone), held():
             yield server, context, phone

@@ -12,6 +12,7 @@ import pytest
 
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
+from server.garbage import held
 from tests.e2e.chromium_rig import STARVED, calibrate, lead
 from tests.e2e.firefox import firefox
 from tests.e2e.firefox_phone import NO_MOTION, FirefoxPhone, device_of
@@ -31,7 +32,7 @@ def rig(executable: str, folder: Path, script: str = "") -> Iterator[tuple[Servi
         hand = make_hand("moving", seed=2, t_start=time.monotonic() + WAIT_S)
         leds_in_b = load_robot("ames").robot.leds_in_b
         phone = FirefoxPhone(tab, hand, leds_in_b, server.truth_port, script)
-        with contextlib.closing(phone):
+        with contextlib.closing(phone), held():
             phone.open(f"{server.local_https}/#k={server.operator_token}")
             phone.tap("#start")
             yield server, phone

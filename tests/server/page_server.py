@@ -21,7 +21,8 @@ def status(mode):
         ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""
     )
     flags = {"ready": True, "saturated": False}
-    tables = {"streams": {}, "latency_ms": {}, "control": {}, "refusals": [], "messages": []}
+    tables = {name: {} for name in ("streams", "latency_ms", "control", "server")}
+    tables |= {"refusals": [], "messages": []}
     return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
 
 

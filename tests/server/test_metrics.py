@@ -6,7 +6,9 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from pipeline.signals import Mode
+from server.clock import now
 from server.metrics import exposition
+from server.pauses import Stall
 from tests.server.house import control_status, estimate_fields, house_in
 
 
@@ -50,6 +52,16 @@ def test_lateness_ages_and_the_error_are_told_in_si_units(hub):
     assert found["lightleash_stream_rate_hertz", "body_imu"] == 200.0
     assert 0.0 < found["lightleash_stream_age_seconds", "body_imu"] < 1.0
     assert found["lightleash_stream_dropped", "control"] == 4.0
+
+
+def test_pauses_of_the_server_are_told(hub):
+    hub.pauses.tick(armed=True, idle=False)
+    hub.pauses.loop.saw(now() - 70.0, Stall(0.043, 0.012), armed=True)
+    hub.pauses.loop.saw(now(), Stall(0.025, 0.001), armed=True)
+    found = samples(hub)
+    assert found["lightleash_server", "stall_ms"] == 25.0
+    assert found["lightleash_server", "armed_stall_ms"] == 43.0
+    assert found["lightleash_server", "armed_stall_cpu_ms"] == 12.0
 
 
 def test_what_is_not_known_is_left_out(hub):

@@ -195,6 +195,7 @@
  * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
  * @property {PathChoice | null} path_choice As the operator's page says; null: it lets nobody choose.
  * @property {number} time_ms The server's clock when this was made.
+ * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
  */
 
 /** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log} FromPage */

@@ -166,11 +166,12 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  control({ realtime, control }) {
+  control({ realtime, control, server }) {
     this.text('realtime', realtime || '–');
     this.figure('control', 'p50', number(control.p50_ms, 2), 'ms');
     this.figure('control', 'p99', number(control.p99_ms, 2), 'ms');
     this.figure('control', 'p99.9', number(control.p999_ms, 2), 'ms');
     this.figure('control', 'Missed', number(control.missed), '');
+    this.figure('control', 'Server pause', number(server.stall_ms, 0), 'ms');
   }
 }

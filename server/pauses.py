@@ -1,0 +1,114 @@
+"""How long the listening process stood still: its event loop's holes, its garbage collections."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from server.clock import now
+from server.garbage import Garbage
+
+PERIOD_S = 0.005
+WINDOW_S = 60.0
+WORTH_SAYING_S = 0.02
+SAY_AGAIN_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stall:
+    """The loop was late."""
+
+    late_s: float = 0.0
+    cpu_s: float = 0.0
+    """Processor time of this process meanwhile: without it the machine was elsewhere."""
+
+
+class LoopWatch:
+    """Longest stalls of an event loop, by a ticker in it."""
+
+    def __init__(self) -> None:
+        """Nothing seen."""
+        self._worst: deque[tuple[float, Stall]] = deque()
+        """In the window, each shorter than the one before."""
+        self.armed = Stall()
+        """The longest while a robot was armed, the last time it was."""
+
+    def saw(self, t: float, stall: Stall, armed: bool) -> None:
+        """A tick at `t` [s] was late."""
+        if armed and stall.late_s > self.armed.late_s:
+            self.armed = stall
+        while self._worst and self._worst[-1][1].late_s <= stall.late_s:
+            self._worst.pop()
+        self._worst.append((t, stall))
+
+    def lately(self, t: float) -> Stall:
+        """The longest of the last minute before `t` [s]."""
+        while self._worst and self._worst[0][0] < t - WINDOW_S:
+            self._worst.popleft()
+        return self._worst[0][1] if self._worst else Stall()
+
+
+class Pauses:
+    """Of this process: kept short, measured, told."""
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = now,
+        cpu: Callable[[], float] = time.process_time,
+        thread_cpu: Callable[[], float] = time.thread_time,
+    ) -> None:
+        """Clocks [s]."""
+        self._clock, self._cpu = clock, cpu
+        self.garbage = Garbage(thread_cpu)
+        self.loop = LoopWatch()
+        self._is_armed = False
+        self._t_said, self._said = -float("inf"), Stall()
+
+    async def watch(self) -> None:
+        """Tick in the running loop until cancelled."""
+        while True:
+            due, cpu = self._clock() + PERIOD_S, self._cpu()
+            await asyncio.sleep(PERIOD_S)
+            t = self._clock()
+            late = max(0.0, t - due)
+            stall = Stall(late, min(late, self._cpu() - cpu))
+            self.loop.saw(t, stall, self._is_armed)
+
+    def tick(self, armed: bool, idle: bool) -> str:
+        """Keep garbage small; gives what people should read, or "".
+
+        To be called some ten times a second. `idle`: nobody leads the robot.
+        """
+        if armed and not self._is_armed:
+            self.garbage.reset()
+            self.loop.armed = Stall()
+            self._said = Stall()
+        self._is_armed = self.garbage.counts = armed
+        self.garbage.tick(idle and not armed)
+        return self._words() if armed else ""
+
+    def _words(self) -> str:
+        worst, t = self.loop.armed, self._clock()
+        if worst.late_s <= max(WORTH_SAYING_S, self._said.late_s) or t < self._t_said + SAY_AGAIN_S:
+            return ""
+        self._said, self._t_said = worst, t
+        late, own = 1e3 * worst.late_s, 1e3 * worst.cpu_s
+        return f"The server stood still for {late:.0f} ms while armed, {own:.0f} ms of it at work."
+
+    def figures(self) -> dict[str, float]:
+        """For a status [ms]."""
+        lately, armed = self.loop.lately(self._clock()), self.loop.armed
+        return {
+            "stall_ms": round(1e3 * lately.late_s, 1),
+            "armed_stall_ms": round(1e3 * armed.late_s, 1),
+            "armed_stall_cpu_ms": round(1e3 * armed.cpu_s, 1),
+            "gc_ms": round(1e3 * self.garbage.longest_s, 2),
+            "gc_full": float(self.garbage.count),
+        }
+
+    def close(self) -> None:
+        """Leave garbage to Python again."""
+        self.garbage.close()
