@@ -85,6 +85,8 @@ class ThrustCommand:
     """(m,) [N], each 0 (off) to the robot's f_max."""
     armed: bool
     """Thrust is meant. False demands zeros, and lets the link begin a new epoch if it must."""
+    stop: bool = False
+    """Somebody pressed STOP: zero at once, even of a robot that ramps down by itself."""
 
     @classmethod
     def zero(cls, thrusters: int) -> ThrustCommand:
@@ -154,5 +156,5 @@ def check_command(command: ThrustCommand, thrusters: int, f_max: float) -> None:
         raise FollowerError(f"thrusts {thrusts}", "finite numbers")
     if bool((thrusts < 0.0).any() or (thrusts > f_max).any()):
         raise FollowerError(f"thrusts {thrusts} N", f"0 to {f_max:g} N each")
-    if not command.armed and bool(thrusts.any()):
-        raise FollowerError(f"thrusts {thrusts} N without `armed`", "zeros")
+    if (command.stop or not command.armed) and bool(thrusts.any()):
+        raise FollowerError(f"thrusts {thrusts} N with `stop` or without `armed`", "zeros")

@@ -1,15 +1,39 @@
 """The robot's end of the link, sans-I/O: what may reach the thrusters, and what happens in silence.
 
 This is the reference for a real robot's firmware; `deploy/watchdog/` is the same in C. Its rules:
-1. A command is taken only if it is whole, of the current epoch, 1 to 200 counters ahead, echoes a
-   nonce the robot sent at most 40 ms ago, and its thrusts are finite, within [0, f_max] and rise
-   no faster than allowed. Everything else changes nothing.
+1. A datagram counts only if it was made with the robot's key. A command is *taken* only if it also
+   is of the current epoch, echoes a nonce the robot sent at most 40 ms ago, and its thrusts are
+   finite, within [0, f_max], at most 200 counters ahead and rise no faster than allowed.
+   Everything else changes nothing, except by rule 4.
 2. Nothing taken for 60 ms: thrust falls linearly to zero within one period of the suspension (or
    the robot file's `ramp_s`), whatever arrives meanwhile; only zero thrust of the current epoch
-   cuts it short. A robot that flies must keep its attitude by itself meanwhile.
+   or STOP cuts it short. A robot that flies must keep its attitude by itself meanwhile.
 3. After that, and after a start: no thrust until zero thrust of a *later* epoch has been taken for
    500 ms without a gap of 60 ms. So a control process begins with zero, and one that was frozen
-   or replaced never comes back.
+   or replaced never comes back. Zero of a later epoch is taken in every state, since the newest
+   process has the robot: if it gives thrust it begins to ramp down, and the 500 ms count meanwhile.
+4. Zero counts without a fresh nonce, too: who has just started, or gets no samples, has none. Of
+   the current epoch and newer than the last command taken it is zero thrust at once; with the flag
+   `stop` it is so of any later epoch, too. But it keeps nothing alive.
+5. Samples go to whoever sent the last command that was taken. A datagram newer (by epoch, then
+   counter) than any heard since the start is answered by one sample, which has the nonce that its
+   sender needs to go on. Nobody else gets any.
+
+Epochs grow with the wall clock and never fall back (`server/robot_epoch.py`), so that `later` is
+later and what somebody has recorded is always old news:
+
+| who shares the network can       | what it leads to                                              |
+|----------------------------------|---------------------------------------------------------------|
+| send whatever he likes           | nothing: 128 bits of key, and each datagram counted           |
+| flood the port                   | work of some µs for each datagram; the loop takes few at once |
+| send back what he heard          | nothing: either direction has its own magic under the MAC     |
+| repeat a command of this start   | nothing: its counter or epoch is not newer than what was heard|
+| repeat one of an earlier start   | at most one sample, before control speaks; never thrust: no   |
+|                                  | nonce of this start is in it                                  |
+| repeat a sample                  | nothing: `control_end.py`                                     |
+| read along                       | what the robot measures and does: nothing is encrypted        |
+| hold back, delay, cut the line   | silence: rule 2; late commands are not taken, zeros are       |
+| hand a whole datagram on in time | he gets samples, which he sees anyway, until the next command |
 """
 
 from __future__ import annotations
@@ -78,46 +102,55 @@ class LinkLimits:
 class RobotEnd:
     """Gate, watchdog and ramp. All times are [µs] on the robot's monotonic clock."""
 
-    def __init__(self, limits: LinkLimits, boot_id: int) -> None:
+    def __init__(self, limits: LinkLimits, boot_id: int, key: bytes) -> None:
         """Refusing, until zero thrust has been seen for long enough."""
-        self._limits, self._boot_id = limits, boot_id
+        self._limits, self._boot_id, self._key = limits, boot_id, key
         self.state, self.refusal = FollowerState.REFUSING, Refusal.STARTED
         self.counts: Counter[Refusal] = Counter()
         self._epoch = 0
         self._candidate = 0
-        """Epoch in its handshake, 0 none."""
-        self._counter = 0
-        self._taken_us = self._since_us = 0
+        """Epoch in its handshake, 0 none; only while in RAMP or REFUSING."""
+        self._counter = self._candidate_counter = 0
+        self._taken_us = self._ramp_us = self._handshake_us = 0
         self._thrusts = np.zeros(limits.thrusters)
         self._nonces: deque[tuple[int, int]] = deque(maxlen=NONCES_KEPT)
         self._samples = 0
+        self._newest = (0, 0)
+        """Epoch and counter of the newest command heard, taken or not."""
+        self._challenge = 0
         self._peer: Peer | None = None
-        self._heard_us = 0
+        self._asking: Peer | None = None
+        self._answered: Peer | None = None
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> Refusal:
         """Take or refuse a datagram that came from `peer`; NONE if it was taken."""
         try:
-            command = decode_command(data)
+            command = decode_command(data, self._key)
         except LinkError:
             self.counts[Refusal.MALFORMED] += 1
             return Refusal.MALFORMED
         self._advance(now_us)
-        self._note_peer(peer, now_us)
+        newest = self._note(command)
         why = self._judge(command, now_us)
         self.counts[why] += 1
         if why == Refusal.NONE:
+            self._peer = peer
             self._take(command, now_us)
         elif self.state != FollowerState.RAMP:
             self.refusal = why
             if why == Refusal.ZERO_FIRST:
                 self._candidate = 0
+        if why in (Refusal.NONCE, Refusal.STALE):
+            self._obey_zero(command, newest)
+        if newest:
+            self._asking = peer
         return why
 
     def setpoint(self, now_us: int) -> Array:
         """Thrusts (m,) [N] the thrusters are to give now."""
         self._advance(now_us)
         if self.state == FollowerState.RAMP:
-            elapsed_us = max(0, now_us - self._since_us)
+            elapsed_us = max(0, now_us - self._ramp_us)
             return self._thrusts * (1.0 - elapsed_us / self._limits.ramp_us)
         return self._thrusts.copy()
 
@@ -128,110 +161,157 @@ class RobotEnd:
     def sample(
         self, now_us: int, nonce: int, omega_in_b: Triple, a_in_b: Triple, thrusts: Array
     ) -> bytes:
-        """The next datagram for `peer`; `nonce` is random and not 0."""
+        """The next datagram for `recipients`; `nonce` is random and not 0."""
         self._advance(now_us)
         self._samples = (self._samples + 1) % U32
         self._nonces.append((nonce, now_us))
+        self._answered, self._asking = self._asking, None
         return encode_sample(
             Sample(
                 state=self.state,
                 refusal=self.refusal,
                 t_us=now_us,
+                nonce=nonce,
+                challenge=self._challenge,
+                epoch=self._epoch,
                 boot_id=self._boot_id,
                 counter=self._samples,
-                nonce=nonce,
-                epoch=self._epoch,
-                accepted=self._counter,
+                accepted=self._candidate_counter if self._candidate else self._counter,
                 omega_in_b=omega_in_b,
                 a_in_b=a_in_b,
                 thrusts=tuple(thrusts.tolist()),
-            )
+            ),
+            self._key,
         )
 
-    def peer(self, now_us: int) -> Peer | None:
-        """Whom to send samples; None if nobody was heard lately."""
-        return self._peer if now_us - self._heard_us <= FORGET_PEER_US else None
+    def recipients(self, now_us: int) -> tuple[Peer, ...]:
+        """Whom to send the sample just made; nobody if nobody was heard lately."""
+        lately = now_us - self._taken_us <= FORGET_PEER_US
+        both = self._peer if lately else None, self._answered
+        return tuple(dict.fromkeys(peer for peer in both if peer is not None))
 
-    def _note_peer(self, peer: Peer, now_us: int) -> None:
-        """Somebody else is heard only when the present peer has gone silent."""
-        silent = now_us - self._heard_us > self._limits.silence_us
-        if self._peer is None or peer == self._peer or silent:
-            self._peer, self._heard_us = peer, now_us
+    def _note(self, command: Command) -> bool:
+        """Whether nothing newer was heard before; if so, remember it, and echo its challenge."""
+        epoch, counter = self._newest
+        if command.epoch < epoch:
+            return False
+        if command.epoch == epoch and not is_later(command.counter, counter):
+            return False
+        self._newest = command.epoch, command.counter
+        self._challenge = command.challenge
+        return True
 
     def _advance(self, now_us: int) -> None:
         """Let time do its work: silence, ramp, abandoned handshakes."""
         silent = now_us - self._taken_us > self._limits.silence_us
-        if self.state == FollowerState.RAMP:
-            if now_us - self._since_us >= self._limits.ramp_us:
-                self._refuse()
-        elif self.state == FollowerState.REFUSING:
-            if silent and self._candidate:
+        if self.state in (FollowerState.RAMP, FollowerState.REFUSING):
+            if self._candidate and silent:
                 self._candidate, self.refusal = 0, Refusal.SILENT
-        elif silent and self._thrusts.any():
-            self.state, self.refusal = FollowerState.RAMP, Refusal.SILENT
-            self._since_us = now_us
+            ramping = self.state == FollowerState.RAMP
+            if ramping and now_us - self._ramp_us >= self._limits.ramp_us:
+                self._refuse(self._candidate)
         elif silent:
+            self._leave(now_us)
+
+    def _leave(self, now_us: int) -> None:
+        """Ramp down; at once if there is no thrust."""
+        if self._thrusts.any():
+            self.state, self.refusal = FollowerState.RAMP, Refusal.SILENT
+            self._ramp_us = now_us
+        else:
             self._refuse()
 
-    def _refuse(self) -> None:
+    def _refuse(self, candidate: int = 0) -> None:
         self.state, self.refusal = FollowerState.REFUSING, Refusal.SILENT
         self._thrusts[:] = 0.0
-        self._candidate = 0
+        self._candidate = candidate
 
     def _judge(self, command: Command, now_us: int) -> Refusal:
-        limits, last = self._limits, self._thrusts
+        limits = self._limits
         if len(command.thrusts) != limits.thrusters:
             return Refusal.THRUSTERS
         sent_us = next((t for nonce, t in self._nonces if nonce == command.nonce), None)
-        if sent_us is None or sent_us != command.robot_time_us:
+        if sent_us is None:
             return Refusal.NONCE
         if now_us - sent_us > limits.max_age_us:
             return Refusal.STALE
-        if not self._epoch_fits(command.epoch):
-            return Refusal.EPOCH
-        ahead = (command.counter - self._counter) % U32
-        beginning = self.state == FollowerState.REFUSING and not self._candidate
-        if not beginning and not 1 <= ahead <= limits.max_jump:
-            return Refusal.COUNTER
         if not all(map(isfinite, command.thrusts)):
             return Refusal.NOT_FINITE
+        if self._is_later_zero(command):
+            return Refusal.NONE
+        return self._judge_thrusts(command)
+
+    def _is_later_zero(self, command: Command) -> bool:
+        """Rule 3: who is newer than who flies now and who is in his handshake."""
+        newer = command.epoch > max(self._epoch, self._candidate)
+        return newer and not any(command.thrusts)
+
+    def _judge_thrusts(self, command: Command) -> Refusal:
+        limits, refusing = self._limits, self.state == FollowerState.REFUSING
         thrusts = np.array(command.thrusts)
         meant = bool(thrusts.any())
-        beyond = bool((thrusts < 0.0).any() or (thrusts > limits.f_max * ROUNDING).any())
-        if beyond or (meant and not command.armed):
-            return Refusal.LIMITS
-        if meant and self.state == FollowerState.REFUSING:
+        shaking = command.epoch == self._candidate != 0
+        if meant and (shaking or (refusing and command.epoch > self._epoch)):
             return Refusal.ZERO_FIRST
+        if not shaking and (refusing or command.epoch != self._epoch):
+            return Refusal.EPOCH
+        before = self._candidate_counter if shaking else self._counter
+        ahead = (command.counter - before) % U32
+        if not is_later(command.counter, before) or (meant and ahead > limits.max_jump):
+            return Refusal.COUNTER
+        beyond = bool((thrusts < 0.0).any() or (thrusts > limits.f_max * ROUNDING).any())
+        if beyond or (meant and (command.stop or not command.armed)):
+            return Refusal.LIMITS
         if meant and self.state == FollowerState.RAMP:
             return Refusal.SILENT
-        if bool((thrusts > (last + ahead * limits.max_rise) * ROUNDING).any()):
+        if bool((thrusts > (self._thrusts + ahead * limits.max_rise) * ROUNDING).any()):
             return Refusal.RISE
         return Refusal.NONE
 
-    def _epoch_fits(self, epoch: int) -> bool:
-        if self.state != FollowerState.REFUSING:
-            return epoch == self._epoch
-        if self._candidate:
-            return epoch == self._candidate
-        return epoch != 0 and (self._epoch == 0 or is_later(epoch, self._epoch))
-
     def _take(self, command: Command, now_us: int) -> None:
         """Act on a command that was judged good."""
-        self._taken_us, self._counter = now_us, command.counter
+        self._taken_us = now_us
+        if command.epoch != self._epoch:
+            self._shake_hands(command, now_us)
+            return
+        self._counter = command.counter
         if self.state == FollowerState.RAMP:
-            self._refuse()
-        elif self.state == FollowerState.REFUSING:
-            self._shake_hands(command.epoch, now_us)
+            self._refuse(self._candidate)
         else:
             self._thrusts = np.array(command.thrusts)
             running = bool(self._thrusts.any())
             self.state = FollowerState.RUNNING if running else FollowerState.IDLE
             self.refusal = Refusal.NONE
 
-    def _shake_hands(self, epoch: int, now_us: int) -> None:
-        if not self._candidate:
-            self._candidate, self._since_us = epoch, now_us
+    def _shake_hands(self, command: Command, now_us: int) -> None:
+        """Zero of a later epoch: it gets the robot when thrust is zero and time enough is over."""
+        if self.state not in (FollowerState.RAMP, FollowerState.REFUSING):
+            self._leave(now_us)
+        if command.stop:
+            self._refuse(self._candidate)
+        if command.epoch != self._candidate:
+            self._candidate, self._handshake_us = command.epoch, now_us
+        self._candidate_counter = command.counter
         self.refusal = Refusal.HANDSHAKE
-        if now_us - self._since_us >= self._limits.handshake_us:
-            self._epoch, self._candidate = epoch, 0
+        shaken = now_us - self._handshake_us >= self._limits.handshake_us
+        if shaken and self.state == FollowerState.REFUSING:
+            self._epoch, self._counter, self._candidate = command.epoch, command.counter, 0
             self.state, self.refusal = FollowerState.IDLE, Refusal.NONE
+
+    def _obey_zero(self, command: Command, newest: bool) -> None:
+        """Rule 4: zero without a fresh nonce, which is not taken otherwise."""
+        if any(command.thrusts) or self.state == FollowerState.REFUSING:
+            return
+        if command.epoch == self._epoch:
+            if is_later(command.counter, self._counter):
+                self._counter = command.counter
+                self._to_zero()
+        elif command.stop and newest and command.epoch > self._epoch:
+            self._refuse(self._candidate)
+
+    def _to_zero(self) -> None:
+        if self.state == FollowerState.RAMP:
+            self._refuse(self._candidate)
+        else:
+            self._thrusts[:] = 0.0
+            self.state = FollowerState.IDLE

@@ -8,8 +8,8 @@
 | `deploy/watchdog/`  | the robot's end in C, for firmware                               |
 | this file           | the socket of the control process                                |
 
-The robot listens on a port and sends samples, at its own rate, to whom it last heard; so the first
-command, of zero thrust, is also the knock on the door. Neither end ever waits for the other.
+The robot listens on a port and answers the first command of a new control process, of zero thrust;
+the next one is fresh, and samples come at the robot's own rate. Neither end waits for the other.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class UdpFollower:
 
     @property
     def dropped(self) -> int:
-        """Datagrams that were damaged, repeated or overtaken."""
+        """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
         return self._end.dropped
 
     def receive(self) -> list[BodySample]:
@@ -113,10 +113,7 @@ class UdpFollower:
 
 
 def connect(
-    robot_file: RobotFile,
-    epoch: int | None = None,
-    host: str | None = None,
-    port: int | None = None,
+    robot_file: RobotFile, key: bytes, epoch: int, host: str | None = None, port: int | None = None
 ) -> UdpFollower:
     """A link to the robot of a robot file; `host` and `port` override the file's.
 
@@ -124,4 +121,5 @@ def connect(
         FollowerError: no such host.
     """
     link = robot_file.link
-    return UdpFollower(host or link.host, port or link.port, ControlEnd.of(robot_file, epoch))
+    end = ControlEnd.of(robot_file, key, epoch)
+    return UdpFollower(host or link.host, port or link.port, end)

@@ -21,7 +21,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   experiments  measure the loop, as tables and pictures
   bench        how well it sees: right, exact, honest, fast; against stated goals
   calibrate    a camera: lens, readout time and motion sensors, from a film of a board
-  robot        robot leds: can a robot's LEDs be told apart, and would others be better
+  robot        robot leds: can its LEDs be told apart, and would others be; robot key: make its key
   tune         find a robot's gains for a measured latency, under stated margins
   survey       where the LEDs are, from a film of the robot at rest
   doctor       what this machine can do: real time, certificates, ports, codecs

@@ -8,3 +8,8 @@ import time
 def now() -> float:
     """Seconds since some start [s]; never jumps."""
     return time.monotonic()
+
+
+def unix_ms() -> int:
+    """Milliseconds of the calendar's time since 1970; may jump, and be wrong."""
+    return time.time_ns() // 1_000_000

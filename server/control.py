@@ -7,6 +7,7 @@ and disarms.
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import time
 from collections.abc import Sequence
@@ -20,16 +21,19 @@ import numpy as np
 
 from hardware.control_end import ControlEnd
 from hardware.dynamics import dynamics_of
+from hardware.link_key import LinkKeyError, take_key
 from hardware.robot_file import RobotFile, load_robot
 from hardware.udp_link import UdpFollower
 from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.estimation.estimators import warm_up
 from server import realtime
+from server.clock import unix_ms
 from server.control_link import Endpoint, control_end
 from server.controller import PERIOD_S, Controller, TooLate
 from server.knobs import DEFAULT_KNOBS, Knobs
 from server.one_line import Parser
+from server.robot_epoch import next_epoch
 from server.robot_link import RobotLink
 
 STATUS_EVERY = 4
@@ -49,6 +53,7 @@ class ControlOptions:
     gains: str
     estimator: EstimatorName
     virtual_camera: Knobs
+    epochs: Path
     real: bool
     """The robot is no simulation: it is not armed while the schedule can't be kept."""
 
@@ -65,6 +70,7 @@ def parse(argv: Sequence[str] | None) -> ControlOptions:
     parser.add_argument(
         "--virtual-camera", type=_knobs, default=DEFAULT_KNOBS, help="knobs as JSON"
     )
+    parser.add_argument("--epochs", type=Path, required=True, help="keeps the newest epoch")
     parser.add_argument("--real", action="store_true", help="the robot is no simulation")
     return ControlOptions(**vars(parser.parse_args(argv)))
 
@@ -106,9 +112,16 @@ def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate
     return partial(guard.refusal, gains, config.estimator)
 
 
+def _key() -> bytes:
+    try:
+        return take_key(os.environ)
+    except LinkKeyError as error:
+        raise SystemExit(f"control: {error}") from error
+
+
 def run(options: ControlOptions) -> None:
     """Keep the schedule until SIGTERM or SIGINT, then stop the robot."""
-    robot_file = load_robot(options.robot)
+    robot_file, key = load_robot(options.robot), _key()
     config = teleop_config(
         robot_file, options.gains, options.virtual_camera.config(), options.estimator
     )
@@ -121,7 +134,8 @@ def run(options: ControlOptions) -> None:
         f"No real robot with {granted}." if late else "",
         too_late(robot_file, options.gains, config),
     )
-    follower = UdpFollower(options.host, options.port, ControlEnd.of(robot_file))
+    epoch = next_epoch(options.epochs, unix_ms())
+    follower = UdpFollower(options.host, options.port, ControlEnd.of(robot_file, key, epoch))
     endpoint = control_end(options.runtime)
     stopping: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT):

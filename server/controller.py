@@ -141,7 +141,8 @@ class Controller:
             self._picture_age.add(now - one.t)
         if body:
             self._body_age.add(now - body[-1].t)
-        return ThrustCommand(output.thrusts, output.armed), output
+        stop = output.failsafe.mode == Mode.STOPPED
+        return ThrustCommand(output.thrusts, output.armed, stop), output
 
     def _sort(
         self, messages: Iterable[Input], now: float

@@ -15,8 +15,10 @@ from pathlib import Path
 import msgspec
 import segno
 
+from hardware.link_key import KEY_VARIABLE, LinkKeyError, new_key
 from hardware.robot_file import RobotFileError, load_robot
 from server.child import Child
+from server.robot_key import epoch_file, key_of
 from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.settings import Settings
 
@@ -119,25 +121,34 @@ def children_of(
     `sockets` (HTTPS, HTTP) and the secret of the run outlive the server process: one that is
     started anew has the same address and still knows its pages.
 
+    Robot and control share a key: of a real robot its own, of a simulated one another each run.
+
     Raises:
         RobotFileError: no such robot, or it has no such gains.
+        LinkKeyError: a real robot without a key.
     """
     robot_file = load_robot(settings.robot)
+    name = robot_file.robot.name
     if settings.gains not in robot_file.gains:
         raise RobotFileError(settings.robot, "gains", f"one of {', '.join(robot_file.gains)}")
     link = robot_file.link
     host, port = settings.robot_host or link.host, settings.robot_port or link.port
     truth_port, children = 0, []
+    key, epochs = new_key(), runtime / f"{name}.epoch"
+    if not settings.simulate:
+        key, epochs = key_of(settings.state, name), epoch_file(settings.state, name)
+    shared = {KEY_VARIABLE: key.hex()}
     if settings.simulate:
         host, port, truth_port = "127.0.0.1", free_udp_port(), free_udp_port()
         simulated = ["hardware.sim.robot", "--robot", settings.robot, "--port", str(port)]
-        children.append(Child("robot", [*simulated, "--truth-port", str(truth_port)]))
+        children.append(Child("robot", [*simulated, "--truth-port", str(truth_port)], shared))
     control = ["server.control", "--runtime", str(runtime), "--robot", settings.robot]
     control += ["--host", host, "--port", str(port), "--gains", settings.gains]
-    control += ["--estimator", settings.estimator]
+    control += ["--estimator", settings.estimator, "--epochs", str(epochs)]
+    control += [] if settings.simulate else ["--real"]
     knobs = msgspec.json.encode(settings.virtual_camera.knobs).decode()
     control += ["--virtual-camera", knobs]
-    children.append(Child("control", control))
+    children.append(Child("control", control, shared))
     descriptors = tuple(s.fileno() for s in sockets)
     server = ["server", "_server", str(runtime), str(truth_port), *map(str, descriptors)]
     secret = {SECRET_VARIABLE: secrets.token_hex(32)}
@@ -173,6 +184,6 @@ def main(settings: Settings, arguments: Sequence[str]) -> int:
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, launcher.stop)
             return launcher.run()
-    except (RobotFileError, BusyError, OSError) as error:
+    except (RobotFileError, LinkKeyError, BusyError, OSError) as error:
         print(f"lightleash serve: {error}", file=sys.stderr)
         return 2

@@ -1,4 +1,7 @@
-"""`lightleash robot leds`: can this robot's LEDs be told apart, and would others be better."""
+"""`lightleash robot leds`: can this robot's LEDs be told apart, and would others be better.
+
+Beside it `lightleash robot key` (`robot_key.py`).
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,10 @@ from hardware.led_layout_file import Layout, load_layout
 from hardware.led_layout_improve import Search, improve
 from hardware.led_looks import LedLayoutError, Looks, looks_about
 from hardware.led_reach import Ball, Reach
+from hardware.link_key import LinkKeyError
 from hardware.robot_file import RobotFileError
 from pipeline.frames import Array
+from server import robot_key
 from server.films.progress import Progress as Progressing
 from server.one_line import Parser
 from server.robot_leds_files import OutError, changes, figures, make_folder, toml, write
@@ -29,16 +34,21 @@ SEARCH_VIEWS = 100
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash robot`; 1 when the layout (the better one, if asked for) is bad."""
-    parser = Parser(prog="lightleash robot", description="Examine a robot file.")
+    parser = Parser(prog="lightleash robot", description="Examine a robot file, make a key.")
     kinds = parser.add_subparsers(required=True, metavar="WHAT")
     leds = kinds.add_parser("leds", help=_LEDS, description=_LEDS)
     _add_arguments(leds)
+    leds.set_defaults(run=_run, name="leds")
+    key = kinds.add_parser("key", help=robot_key.HELP, description=robot_key.HELP)
+    robot_key.add_arguments(key)
+    key.set_defaults(run=robot_key.run, name="key")
     arguments = parser.parse_args(argv)
     try:
-        return _run(arguments)
-    except (RobotFileError, LedLayoutError, OutError) as error:
-        print(f"lightleash robot leds: {error}", file=sys.stderr)
+        code: int = arguments.run(arguments)
+    except (RobotFileError, LedLayoutError, OutError, LinkKeyError) as error:
+        print(f"lightleash robot {arguments.name}: {error}", file=sys.stderr)
         return 2
+    return code
 
 
 _LEDS = "Can the LEDs be told apart from every view, how exact is a pose, would others be better?"

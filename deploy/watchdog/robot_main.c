@@ -1,8 +1,10 @@
 /* A whole robot around the watchdog, on Linux: 200 Hz, UDP, but no thrusters and no sensors.
  * Put yours where it says YOURS.
  *
- *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c
- *   ./robot PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS
+ *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c hmac.c
+ *   ./robot KEY_FILE PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS
+ *
+ * KEY_FILE is what `lightleash robot key` has made; on a microcontroller the key is in flash.
  */
 #define _GNU_SOURCE
 #include "watchdog.h"
@@ -15,11 +17,13 @@
 #include <string.h>
 #include <sys/random.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #define TICK_US 5000
 #define FORGET_PEER_US 5000000
+#define MAX_DATAGRAMS 64 /* taken before the clock is looked at again: a flood delays no tick */
 
 static volatile sig_atomic_t stopping;
 
@@ -36,13 +40,26 @@ static int64_t clock_us(void)
     return (int64_t)t.tv_sec * 1000000 + t.tv_nsec / 1000;
 }
 
-static uint32_t random_u32(void)
+static uint64_t random_u64(void)
 {
-    uint32_t value = 0;
+    uint64_t value = 0;
     while (value == 0)
         if (getrandom(&value, sizeof value, 0) != sizeof value)
             value = 0;
     return value;
+}
+
+/* 32 hexadecimal digits that nobody else may read. */
+static bool read_key(const char *path, uint8_t key[LL_KEY_BYTES])
+{
+    struct stat about;
+    FILE *file = fopen(path, "r");
+    bool good = file && fstat(fileno(file), &about) == 0 && (about.st_mode & 077) == 0;
+    for (int i = 0; good && i < LL_KEY_BYTES; i++)
+        good = fscanf(file, "%2hhx", &key[i]) == 1;
+    if (file)
+        fclose(file);
+    return good;
 }
 
 static void give(const float *thrusts)
@@ -62,27 +79,41 @@ typedef struct {
     int64_t heard_us;
 } peer;
 
-/* Take what has arrived; whoever is heard gets samples, another one only after a silence. */
-static void receive(int fd, ll_watchdog *w, peer *to)
+typedef struct {
+    peer control, asking; /* gets all samples; gets the next one */
+} recipients;
+
+static bool same(const struct sockaddr_in *a, const struct sockaddr_in *b)
+{
+    return a->sin_addr.s_addr == b->sin_addr.s_addr && a->sin_port == b->sin_port;
+}
+
+/* Take some of what has arrived. */
+static void receive(int fd, ll_watchdog *w, recipients *to)
 {
     uint8_t data[LL_MAX_BYTES + 1];
-    struct sockaddr_in from;
-    socklen_t length = sizeof from;
-    ssize_t size;
-    while ((size = recvfrom(fd, data, sizeof data, MSG_DONTWAIT, (struct sockaddr *)&from,
-                            &length)) >= 0) {
+    for (int i = 0; i < MAX_DATAGRAMS; i++) {
+        struct sockaddr_in from;
+        socklen_t length = sizeof from;
+        ssize_t size = recvfrom(fd, data, sizeof data, MSG_DONTWAIT, (struct sockaddr *)&from,
+                                &length);
+        if (size < 0)
+            return;
+        bool answer;
         int64_t now_us = clock_us();
-        if (ll_receive(w, data, (size_t)size, now_us) == LL_MALFORMED)
-            continue;
-        bool same = from.sin_addr.s_addr == to->address.sin_addr.s_addr &&
-                    from.sin_port == to->address.sin_port;
-        if (same || now_us - to->heard_us > LL_SILENCE_US)
-            *to = (peer){from, now_us};
-        length = sizeof from;
+        if (ll_receive(w, data, (size_t)size, now_us, &answer) == LL_NONE)
+            to->control = (peer){from, now_us};
+        if (answer)
+            to->asking = (peer){from, now_us};
     }
 }
 
-static void tick(int fd, ll_watchdog *w, const peer *to)
+static void send_to(int fd, const uint8_t *data, size_t size, const struct sockaddr_in *address)
+{
+    sendto(fd, data, size, MSG_DONTWAIT, (const struct sockaddr *)address, sizeof *address);
+}
+
+static void tick(int fd, ll_watchdog *w, recipients *to)
 {
     float thrusts[LL_MAX_THRUSTERS], gyro[3], accelerometer[3];
     uint8_t out[LL_MAX_BYTES];
@@ -90,22 +121,30 @@ static void tick(int fd, ll_watchdog *w, const peer *to)
     ll_setpoint(w, now_us, thrusts);
     give(thrusts);
     sense(gyro, accelerometer);
-    size_t size = ll_sample(w, now_us, random_u32(), gyro, accelerometer, thrusts, out);
-    if (now_us - to->heard_us <= FORGET_PEER_US)
-        sendto(fd, out, size, MSG_DONTWAIT, (const struct sockaddr *)&to->address,
-               sizeof to->address);
+    size_t size = ll_sample(w, now_us, random_u64(), gyro, accelerometer, thrusts, out);
+    bool lately = to->control.heard_us && now_us - to->control.heard_us <= FORGET_PEER_US;
+    if (lately)
+        send_to(fd, out, size, &to->control.address);
+    if (to->asking.heard_us && !(lately && same(&to->asking.address, &to->control.address)))
+        send_to(fd, out, size, &to->asking.address);
+    to->asking.heard_us = 0;
 }
 
 int main(int argc, char **argv)
 {
-    if (argc != 6 || atoi(argv[2]) < 1 || atoi(argv[2]) > LL_MAX_THRUSTERS) {
-        fprintf(stderr, "usage: %s PORT THRUSTERS(1-%d) F_MAX_N MAX_RISE_N RAMP_MS\n", argv[0],
-                LL_MAX_THRUSTERS);
+    uint8_t key[LL_KEY_BYTES];
+    if (argc != 7 || atoi(argv[3]) < 1 || atoi(argv[3]) > LL_MAX_THRUSTERS) {
+        fprintf(stderr, "usage: %s KEY_FILE PORT THRUSTERS(1-%d) F_MAX_N MAX_RISE_N RAMP_MS\n",
+                argv[0], LL_MAX_THRUSTERS);
         return 2;
     }
-    ll_limits limits = {(uint8_t)atoi(argv[2]), atof(argv[3]), atof(argv[4]),
-                        1000 * (int64_t)atoi(argv[5])};
-    struct sockaddr_in own = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(argv[1]))};
+    if (!read_key(argv[1], key)) {
+        fprintf(stderr, "%s: no key there, or others may read it: lightleash robot key\n", argv[1]);
+        return 2;
+    }
+    ll_limits limits = {(uint8_t)atoi(argv[3]), atof(argv[4]), atof(argv[5]),
+                        1000 * (int64_t)atoi(argv[6])};
+    struct sockaddr_in own = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(argv[2]))};
     own.sin_addr.s_addr = htonl(INADDR_ANY);
     int fd = socket(AF_INET, SOCK_DGRAM, 0);
     if (fd < 0 || bind(fd, (struct sockaddr *)&own, sizeof own) != 0) {
@@ -115,14 +154,14 @@ int main(int argc, char **argv)
     signal(SIGTERM, stop);
     signal(SIGINT, stop);
     ll_watchdog w;
-    ll_init(&w, &limits, random_u32());
-    peer to = {.heard_us = -FORGET_PEER_US - 1};
+    ll_init(&w, &limits, (uint32_t)random_u64(), key);
+    recipients to = {0};
     struct pollfd readable = {.fd = fd, .events = POLLIN};
     for (int64_t next_us = clock_us(); !stopping;) {
         int64_t wait_us = next_us - clock_us();
         if (wait_us > 0 && poll(&readable, 1, (int)((wait_us + 999) / 1000)) > 0)
             receive(fd, &w, &to);
-        if (clock_us() >= next_us) {
+        if (clock_us() >= next_us) { /* due by the clock, whatever arrives */
             tick(fd, &w, &to);
             next_us += TICK_US;
         }

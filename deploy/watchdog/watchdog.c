@@ -4,12 +4,12 @@
 #include <string.h>
 
 #define ROUNDING (1.0 + 1e-6) /* thrusts travel as 32-bit floats */
-#define COMMAND_OVERHEAD 32u
+#define COMMAND_BYTES (36u + LL_MAC_BYTES) /* without thrusts */
 
 typedef struct {
-    bool armed;
-    uint32_t epoch, counter, nonce;
-    uint64_t robot_time_us;
+    bool armed, stop, zero;
+    uint64_t epoch, nonce, challenge;
+    uint32_t counter;
     uint8_t thrusters;
     float thrusts[LL_MAX_THRUSTERS];
 } command;
@@ -23,6 +23,17 @@ static void write_u32(uint8_t *p, uint32_t value)
 {
     for (int i = 0; i < 4; i++)
         p[i] = (uint8_t)(value >> (8 * i));
+}
+
+static uint64_t read_u64(const uint8_t *p)
+{
+    return (uint64_t)read_u32(p + 4) << 32 | read_u32(p);
+}
+
+static void write_u64(uint8_t *p, uint64_t value)
+{
+    write_u32(p, (uint32_t)value);
+    write_u32(p + 4, (uint32_t)(value >> 32));
 }
 
 static float read_f32(const uint8_t *p)
@@ -40,36 +51,6 @@ static void write_f32(uint8_t *p, float value)
     write_u32(p, bits);
 }
 
-static uint32_t crc32(const uint8_t *data, size_t size)
-{
-    uint32_t crc = 0xFFFFFFFFu;
-    for (size_t i = 0; i < size; i++) {
-        crc ^= data[i];
-        for (int bit = 0; bit < 8; bit++)
-            crc = crc >> 1 ^ (crc & 1u ? 0xEDB88320u : 0u);
-    }
-    return ~crc;
-}
-
-static bool decode(const uint8_t *data, size_t size, command *c)
-{
-    if (size <= COMMAND_OVERHEAD || size > LL_MAX_BYTES || memcmp(data, "LLcm\1", 5) != 0)
-        return false;
-    c->thrusters = data[5];
-    if (c->thrusters > LL_MAX_THRUSTERS || size != COMMAND_OVERHEAD + 4u * c->thrusters)
-        return false;
-    if (read_u32(data + size - 4) != crc32(data, size - 4) || data[6] > 1 || data[7] != 0)
-        return false;
-    c->armed = data[6] == 1;
-    c->epoch = read_u32(data + 8);
-    c->counter = read_u32(data + 12);
-    c->robot_time_us = (uint64_t)read_u32(data + 20) << 32 | read_u32(data + 16);
-    c->nonce = read_u32(data + 24);
-    for (int i = 0; i < c->thrusters; i++)
-        c->thrusts[i] = read_f32(data + 28 + 4 * i);
-    return true;
-}
-
 static bool any(const float *thrusts, int n)
 {
     for (int i = 0; i < n; i++)
@@ -78,73 +59,109 @@ static bool any(const float *thrusts, int n)
     return false;
 }
 
-static void refuse(ll_watchdog *w)
+/* Counters go round the corner of 32 bits. */
+static bool is_later(uint32_t a, uint32_t b)
+{
+    return a != b && a - b < 0x80000000u;
+}
+
+static bool decode(const ll_watchdog *w, const uint8_t *data, size_t size, command *c)
+{
+    if (size <= COMMAND_BYTES || size > LL_MAX_BYTES || memcmp(data, "LLcm\2", 5) != 0)
+        return false;
+    c->thrusters = data[5];
+    if (c->thrusters > LL_MAX_THRUSTERS || size != COMMAND_BYTES + 4u * c->thrusters)
+        return false;
+    size -= LL_MAC_BYTES;
+    if (!ll_hmac_fits(&w->hmac, data, size, data + size) || data[6] > 3 || data[7] != 0)
+        return false;
+    c->armed = data[6] & 1;
+    c->stop = data[6] >> 1;
+    c->epoch = read_u64(data + 8);
+    c->nonce = read_u64(data + 16);
+    c->challenge = read_u64(data + 24);
+    c->counter = read_u32(data + 32);
+    for (int i = 0; i < c->thrusters; i++)
+        c->thrusts[i] = read_f32(data + 36 + 4 * i);
+    c->zero = !any(c->thrusts, c->thrusters);
+    return true;
+}
+
+static void refuse(ll_watchdog *w, uint64_t candidate)
 {
     w->state = LL_REFUSING;
     w->refusal = LL_SILENT;
-    w->candidate = 0;
+    w->candidate = candidate;
     memset(w->thrusts, 0, sizeof w->thrusts);
+}
+
+/* Ramp down; at once if there is no thrust. */
+static void leave(ll_watchdog *w, int64_t now_us)
+{
+    if (!any(w->thrusts, w->limits.thrusters)) {
+        refuse(w, 0);
+        return;
+    }
+    w->state = LL_RAMP;
+    w->refusal = LL_SILENT;
+    w->ramp_us = now_us;
 }
 
 /* Let time do its work: silence, ramp, abandoned handshakes. */
 static void advance(ll_watchdog *w, int64_t now_us)
 {
     bool silent = now_us - w->taken_us > LL_SILENCE_US;
-    if (w->state == LL_RAMP) {
-        if (now_us - w->since_us >= w->limits.ramp_us)
-            refuse(w);
-    } else if (w->state == LL_REFUSING) {
-        if (silent && w->candidate) {
+    if (w->state == LL_RAMP || w->state == LL_REFUSING) {
+        if (w->candidate && silent) {
             w->candidate = 0;
             w->refusal = LL_SILENT;
         }
-    } else if (silent && any(w->thrusts, w->limits.thrusters)) {
-        w->state = LL_RAMP;
-        w->refusal = LL_SILENT;
-        w->since_us = now_us;
+        if (w->state == LL_RAMP && now_us - w->ramp_us >= w->limits.ramp_us)
+            refuse(w, w->candidate);
     } else if (silent) {
-        refuse(w);
+        leave(w, now_us);
     }
 }
 
-static bool epoch_fits(const ll_watchdog *w, uint32_t epoch)
+/* Whether nothing newer was heard before; if so, remember it, and echo its challenge. */
+static bool note(ll_watchdog *w, const command *c)
 {
-    if (w->state != LL_REFUSING)
-        return epoch == w->epoch;
-    if (w->candidate)
-        return epoch == w->candidate;
-    uint32_t ahead = epoch - w->epoch;
-    return epoch != 0 && (w->epoch == 0 || (ahead > 0 && ahead < 0x80000000u));
+    if (c->epoch < w->newest_epoch ||
+        (c->epoch == w->newest_epoch && !is_later(c->counter, w->newest_counter)))
+        return false;
+    w->newest_epoch = c->epoch;
+    w->newest_counter = c->counter;
+    w->challenge = c->challenge;
+    return true;
 }
 
 static ll_refusal judge_nonce(const ll_watchdog *w, const command *c, int64_t now_us)
 {
-    for (int i = 0; c->nonce != 0 && i < LL_NONCES; i++) {
-        if (w->nonces[i].nonce != c->nonce)
-            continue;
-        if ((uint64_t)w->nonces[i].sent_us != c->robot_time_us)
-            return LL_NONCE;
-        return now_us - w->nonces[i].sent_us > LL_MAX_AGE_US ? LL_STALE : LL_NONE;
-    }
+    for (int i = 0; c->nonce != 0 && i < LL_NONCES; i++)
+        if (w->nonces[i].nonce == c->nonce)
+            return now_us - w->nonces[i].sent_us > LL_MAX_AGE_US ? LL_STALE : LL_NONE;
     return LL_NONCE;
 }
 
-static ll_refusal judge_thrusts(const ll_watchdog *w, const command *c, uint32_t ahead)
+static ll_refusal judge_thrusts(const ll_watchdog *w, const command *c)
 {
-    bool meant = any(c->thrusts, c->thrusters), beyond = meant && !c->armed, rises = false;
-    for (int i = 0; i < c->thrusters; i++)
-        if (!isfinite(c->thrusts[i]))
-            return LL_NOT_FINITE;
+    bool refusing = w->state == LL_REFUSING, rises = false, beyond = false;
+    bool shaking = w->candidate != 0 && c->epoch == w->candidate;
+    if (!c->zero && (shaking || (refusing && c->epoch > w->epoch)))
+        return LL_ZERO_FIRST;
+    if (!shaking && (refusing || c->epoch != w->epoch))
+        return LL_EPOCH;
+    uint32_t before = shaking ? w->candidate_counter : w->counter, ahead = c->counter - before;
+    if (!is_later(c->counter, before) || (!c->zero && ahead > LL_MAX_JUMP))
+        return LL_COUNTER;
     for (int i = 0; i < c->thrusters; i++) {
         double thrust = c->thrusts[i], allowed = w->thrusts[i] + ahead * w->limits.max_rise;
         beyond = beyond || thrust < 0.0 || thrust > w->limits.f_max * ROUNDING;
         rises = rises || thrust > allowed * ROUNDING;
     }
-    if (beyond)
+    if (beyond || (!c->zero && (c->stop || !c->armed)))
         return LL_LIMITS;
-    if (meant && w->state == LL_REFUSING)
-        return LL_ZERO_FIRST;
-    if (meant && w->state == LL_RAMP)
+    if (!c->zero && w->state == LL_RAMP)
         return LL_SILENT;
     return rises ? LL_RISE : LL_NONE;
 }
@@ -156,55 +173,94 @@ static ll_refusal judge(const ll_watchdog *w, const command *c, int64_t now_us)
     ll_refusal why = judge_nonce(w, c, now_us);
     if (why != LL_NONE)
         return why;
-    if (!epoch_fits(w, c->epoch))
-        return LL_EPOCH;
-    uint32_t ahead = c->counter - w->counter;
-    bool beginning = w->state == LL_REFUSING && !w->candidate;
-    if (!beginning && (ahead < 1 || ahead > LL_MAX_JUMP))
-        return LL_COUNTER;
-    return judge_thrusts(w, c, ahead);
+    for (int i = 0; i < c->thrusters; i++)
+        if (!isfinite(c->thrusts[i]))
+            return LL_NOT_FINITE;
+    if (c->zero && c->epoch > w->epoch && c->epoch > w->candidate)
+        return LL_NONE; /* newer than who flies and who is in his handshake */
+    return judge_thrusts(w, c);
+}
+
+/* Zero of a later epoch: it gets the robot when thrust is zero and time enough is over. */
+static void shake_hands(ll_watchdog *w, const command *c, int64_t now_us)
+{
+    if (w->state != LL_RAMP && w->state != LL_REFUSING)
+        leave(w, now_us);
+    if (c->stop)
+        refuse(w, w->candidate);
+    if (c->epoch != w->candidate) {
+        w->candidate = c->epoch;
+        w->handshake_us = now_us;
+    }
+    w->candidate_counter = c->counter;
+    w->refusal = LL_HANDSHAKE;
+    if (w->state == LL_REFUSING && now_us - w->handshake_us >= LL_HANDSHAKE_US) {
+        w->epoch = c->epoch;
+        w->counter = c->counter;
+        w->candidate = 0;
+        w->state = LL_IDLE;
+        w->refusal = LL_NONE;
+    }
 }
 
 static void take(ll_watchdog *w, const command *c, int64_t now_us)
 {
     w->taken_us = now_us;
+    if (c->epoch != w->epoch) {
+        shake_hands(w, c, now_us);
+        return;
+    }
     w->counter = c->counter;
     if (w->state == LL_RAMP) {
-        refuse(w);
-    } else if (w->state != LL_REFUSING) {
-        memcpy(w->thrusts, c->thrusts, c->thrusters * sizeof *c->thrusts);
-        w->state = any(w->thrusts, c->thrusters) ? LL_RUNNING : LL_IDLE;
-        w->refusal = LL_NONE;
-    } else {
-        if (!w->candidate) {
-            w->candidate = c->epoch;
-            w->since_us = now_us;
-        }
-        w->refusal = LL_HANDSHAKE;
-        if (now_us - w->since_us >= LL_HANDSHAKE_US) {
-            w->epoch = w->candidate;
-            w->candidate = 0;
-            w->state = LL_IDLE;
-            w->refusal = LL_NONE;
-        }
+        refuse(w, w->candidate);
+        return;
     }
+    memcpy(w->thrusts, c->thrusts, c->thrusters * sizeof *c->thrusts);
+    w->state = c->zero ? LL_IDLE : LL_RUNNING;
+    w->refusal = LL_NONE;
 }
 
-void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id)
+/* Zero without a fresh nonce: it keeps nothing alive, but it is zero. */
+static void obey_zero(ll_watchdog *w, const command *c, bool newest)
+{
+    if (!c->zero || w->state == LL_REFUSING)
+        return;
+    if (c->epoch != w->epoch) {
+        if (c->stop && newest && c->epoch > w->epoch)
+            refuse(w, w->candidate);
+        return;
+    }
+    if (!is_later(c->counter, w->counter))
+        return;
+    w->counter = c->counter;
+    if (w->state == LL_RAMP) {
+        refuse(w, w->candidate);
+        return;
+    }
+    memset(w->thrusts, 0, sizeof w->thrusts);
+    w->state = LL_IDLE;
+}
+
+void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
+             const uint8_t key[LL_KEY_BYTES])
 {
     memset(w, 0, sizeof *w);
     w->limits = *limits;
     w->boot_id = boot_id;
     w->state = LL_REFUSING;
     w->refusal = LL_STARTED;
+    ll_hmac_init(&w->hmac, key, LL_KEY_BYTES);
 }
 
-ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us)
+ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us,
+                      bool *answer)
 {
     command c;
-    if (!decode(data, size, &c))
+    *answer = false;
+    if (!decode(w, data, size, &c))
         return LL_MALFORMED;
     advance(w, now_us);
+    *answer = note(w, &c);
     ll_refusal why = judge(w, &c, now_us);
     if (why == LL_NONE) {
         take(w, &c, now_us);
@@ -213,6 +269,8 @@ ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t 
         if (why == LL_ZERO_FIRST)
             w->candidate = 0;
     }
+    if (why == LL_NONCE || why == LL_STALE)
+        obey_zero(w, &c, *answer);
     return why;
 }
 
@@ -220,40 +278,44 @@ void ll_setpoint(ll_watchdog *w, int64_t now_us, float *thrusts)
 {
     advance(w, now_us);
     float share = 1.0f;
-    if (w->state == LL_RAMP && now_us > w->since_us)
-        share = (float)(1.0 - (double)(now_us - w->since_us) / (double)w->limits.ramp_us);
+    if (w->state == LL_RAMP && now_us > w->ramp_us)
+        share = (float)(1.0 - (double)(now_us - w->ramp_us) / (double)w->limits.ramp_us);
     for (int i = 0; i < w->limits.thrusters; i++)
         thrusts[i] = share * w->thrusts[i];
 }
 
-size_t ll_sample(ll_watchdog *w, int64_t now_us, uint32_t nonce, const float gyro[3],
+size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyro[3],
                  const float accelerometer[3], const float *thrusts, uint8_t out[LL_MAX_BYTES])
 {
-    uint8_t *p = out;
-    size_t n = w->limits.thrusters;
+    size_t n = w->limits.thrusters, size = 76 + 4 * n;
+    uint8_t digest[LL_DIGEST_BYTES];
     advance(w, now_us);
     w->samples++;
     w->nonces[w->samples % LL_NONCES].nonce = nonce;
     w->nonces[w->samples % LL_NONCES].sent_us = now_us;
-    memcpy(p, "LLsm\1", 5);
-    p[5] = (uint8_t)n;
-    p[6] = (uint8_t)w->state;
-    p[7] = (uint8_t)w->refusal;
-    const uint32_t words[] = {(uint32_t)now_us, (uint32_t)((uint64_t)now_us >> 32), w->boot_id,
-                              w->samples, nonce, w->epoch, w->counter};
-    for (size_t i = 0; i < 7; i++)
-        write_u32(p + 8 + 4 * i, words[i]);
+    memcpy(out, "LLsm\2", 5);
+    out[5] = (uint8_t)n;
+    out[6] = (uint8_t)w->state;
+    out[7] = (uint8_t)w->refusal;
+    write_u64(out + 8, (uint64_t)now_us);
+    write_u64(out + 16, nonce);
+    write_u64(out + 24, w->challenge);
+    write_u64(out + 32, w->epoch);
+    write_u32(out + 40, w->boot_id);
+    write_u32(out + 44, w->samples);
+    write_u32(out + 48, w->candidate ? w->candidate_counter : w->counter);
     for (size_t i = 0; i < 3; i++) {
-        write_f32(p + 36 + 4 * i, gyro[i]);
-        write_f32(p + 48 + 4 * i, accelerometer[i]);
+        write_f32(out + 52 + 4 * i, gyro[i]);
+        write_f32(out + 64 + 4 * i, accelerometer[i]);
     }
     for (size_t i = 0; i < n; i++)
-        write_f32(p + 60 + 4 * i, thrusts[i]);
-    write_u32(p + 60 + 4 * n, crc32(out, 60 + 4 * n));
-    return 64 + 4 * n;
+        write_f32(out + 76 + 4 * i, thrusts[i]);
+    ll_hmac_of(&w->hmac, out, size, digest);
+    memcpy(out + size, digest, LL_MAC_BYTES);
+    return size + LL_MAC_BYTES;
 }
 
 void ll_halt(ll_watchdog *w)
 {
-    refuse(w);
+    refuse(w, 0);
 }

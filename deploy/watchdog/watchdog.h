@@ -8,12 +8,14 @@
 #ifndef LIGHTLEASH_WATCHDOG_H
 #define LIGHTLEASH_WATCHDOG_H
 
+#include "hmac.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #define LL_MAX_THRUSTERS 16
-#define LL_MAX_BYTES (64 + 4 * LL_MAX_THRUSTERS)
+#define LL_MAX_BYTES (92 + 4 * LL_MAX_THRUSTERS)
 #define LL_NONCES 32
 
 #define LL_SILENCE_US 60000
@@ -37,30 +39,36 @@ typedef struct {
 
 typedef struct {
     ll_limits limits;
+    ll_hmac hmac;
     uint32_t boot_id;
     ll_state state;
     ll_refusal refusal;
-    uint32_t epoch;     /* followed now or last, 0 none */
-    uint32_t candidate; /* epoch in its handshake, 0 none */
-    uint32_t counter;   /* of the newest command taken */
-    int64_t taken_us;   /* when that was */
-    int64_t since_us;   /* when the ramp or the handshake began */
+    uint64_t epoch;     /* followed now or last, 0 none */
+    uint64_t candidate; /* epoch in its handshake, 0 none */
+    uint32_t counter, candidate_counter; /* of the newest command taken of either */
+    int64_t taken_us;   /* when the newest was */
+    int64_t ramp_us, handshake_us; /* when they began */
     float thrusts[LL_MAX_THRUSTERS];
-    struct { uint32_t nonce; int64_t sent_us; } nonces[LL_NONCES];
+    struct { uint64_t nonce; int64_t sent_us; } nonces[LL_NONCES];
     uint32_t samples;
+    uint64_t newest_epoch, challenge; /* of the newest command heard, taken or not */
+    uint32_t newest_counter;
 } ll_watchdog;
 
 /* Refusing, until zero thrust has been seen for long enough. `boot_id`: another one each start. */
-void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id);
+void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
+             const uint8_t key[LL_KEY_BYTES]);
 
-/* Take or refuse a datagram; LL_NONE if it was taken. Any bytes are safe. */
-ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us);
+/* Take or refuse a datagram; LL_NONE if it was taken: from now on samples go to its sender.
+ * `*answer`: its sender gets the next sample, whoever gets the others. Any bytes are safe. */
+ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us,
+                      bool *answer);
 
 /* What the thrusters are to give now [N]. Ask at least every 5 ms, whatever else happens. */
 void ll_setpoint(ll_watchdog *w, int64_t now_us, float *thrusts);
 
 /* Write the next sample, to be sent to control; gives its size. `nonce`: random, not 0. */
-size_t ll_sample(ll_watchdog *w, int64_t now_us, uint32_t nonce, const float gyro[3],
+size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyro[3],
                  const float accelerometer[3], const float *thrusts, uint8_t out[LL_MAX_BYTES]);
 
 /* Zero at once, then refuse. */

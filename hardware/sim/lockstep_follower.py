@@ -9,6 +9,8 @@ from hardware.sim.plant import Plant, PlantOptions
 from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
 
 HERE = ("lockstep", 0)
+KEY = bytes(16)
+"""Nobody else is on this link."""
 
 
 class LockstepFollower:
@@ -22,8 +24,8 @@ class LockstepFollower:
         options: PlantOptions | None = None,
     ) -> None:
         """A robot hanging at rest at time 0, refusing thrust."""
-        self._robot = SimulatedRobot(robot_file, seed, seed + 1, seeded_nonces(seed), options)
-        self._end = ControlEnd.of(robot_file, epoch)
+        self._robot = SimulatedRobot(robot_file, seed, seed + 1, seeded_nonces(seed), KEY, options)
+        self._end = ControlEnd.of(robot_file, KEY, epoch, seeded_nonces(seed + 1))
         self.thrusters = self._end.thrusters
         self.connected = True
         """False: the link loses everything, both ways."""
@@ -51,7 +53,7 @@ class LockstepFollower:
         for _ in range(round(1e6 * dt / TICK_US)):
             self._now_us += TICK_US
             data = self._robot.tick(self._now_us)
-            if self.connected and self._robot.end.peer(self._now_us) is not None:
+            if self.connected and self._robot.end.recipients(self._now_us):
                 self._arrived.append(data)
 
     def receive(self) -> list[BodySample]:

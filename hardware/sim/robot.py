@@ -1,7 +1,8 @@
 """The simulated robot as a process of its own: `python -m hardware.sim.robot --robot ames`.
 
 It is reached as a real one is, over UDP (`udp_link.py`), and lives on when the server or the
-control process dies. Prints one line when ready: `ready port=47001 truth_port=47002`.
+control process dies. Its key comes by the environment (`link_key.py`). Prints one line when ready:
+`ready port=47001 truth_port=47002`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ import sys
 import time
 from collections.abc import Sequence
 
+from hardware.control_end import random_u64
 from hardware.datagram import MAX_BYTES
+from hardware.link_key import LinkKeyError, take_key
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from hardware.sim.simulated import TICK_US, SimulatedRobot
 from hardware.sim.truth import REQUEST_BYTES, encode_truth
@@ -102,8 +105,7 @@ class Process:
             self._truth.sendto(answer, sender)
 
     def _send(self, data: bytes) -> None:
-        peer = self._robot.end.peer(self._now_us())
-        if peer is not None:
+        for peer in self._robot.end.recipients(self._now_us()):
             with contextlib.suppress(OSError):
                 self._link.sendto(data, peer)
 
@@ -125,12 +127,13 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _robot(robot_file: RobotFile, seed: int) -> SimulatedRobot:
+def _robot(robot_file: RobotFile, seed: int, key: bytes) -> SimulatedRobot:
     return SimulatedRobot(
         robot_file,
         seed,
         boot_id=secrets.randbits(32),
-        nonces=lambda: 1 + secrets.randbelow((1 << 32) - 1),
+        nonces=random_u64,
+        key=key,
     )
 
 
@@ -140,9 +143,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         robot_file = load_robot(arguments.robot)
         port = robot_file.link.port if arguments.port is None else arguments.port
-        robot = _robot(robot_file, arguments.seed)
+        robot = _robot(robot_file, arguments.seed, take_key(os.environ))
         process = Process(robot, (arguments.listen, port), arguments.truth_port)
-    except (RobotFileError, OSError, OverflowError) as error:
+    except (RobotFileError, LinkKeyError, OSError, OverflowError) as error:
         sys.stderr.write(f"simulated robot: {error}\n")
         return 2
     for number in (signal.SIGTERM, signal.SIGINT):

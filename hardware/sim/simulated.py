@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hardware.datagram import U32, triple
+from hardware.datagram import U64, triple
 from hardware.follower import FollowerState
 from hardware.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.robot_file import RobotFile
@@ -26,7 +26,7 @@ Nonces = Callable[[], int]
 def seeded_nonces(seed: int) -> Nonces:
     """Repeatable nonces, for virtual time."""
     rng = np.random.default_rng((seed, 1))
-    return lambda: int(rng.integers(1, U32))
+    return lambda: int(rng.integers(1, U64, dtype=np.uint64))
 
 
 class SimulatedRobot:
@@ -38,12 +38,13 @@ class SimulatedRobot:
         seed: int,
         boot_id: int,
         nonces: Nonces,
+        key: bytes,
         options: PlantOptions | None = None,
     ) -> None:
         """Hanging or standing at rest, refusing thrust."""
         robot = robot_file.robot
         self.plant = Plant(robot_file.plant, np.random.default_rng(seed), options)
-        self.end = RobotEnd(LinkLimits.of(robot_file), boot_id)
+        self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
         self._nonces = nonces

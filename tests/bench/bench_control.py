@@ -119,6 +119,7 @@ def thread_server(folder: Path) -> Iterator[dict[str, str]]:
 def serve_with_thread(folder: Path) -> None:
     """Server in the main thread, the control loop in another."""
     from hardware.control_end import ControlEnd
+    from hardware.link_key import KEY_VARIABLE, new_key
     from hardware.robot_file import load_robot
     from hardware.udp_link import UdpFollower
     from pipeline.estimation.estimators import warm_up
@@ -131,7 +132,7 @@ def serve_with_thread(folder: Path) -> None:
 
     runtime = folder / "lightleash"
     runtime.mkdir(mode=0o700)
-    port, truth_port = free_udp_port(), free_udp_port()
+    port, truth_port, key = free_udp_port(), free_udp_port(), new_key()
     robot = subprocess.Popen(
         [
             sys.executable,
@@ -141,7 +142,8 @@ def serve_with_thread(folder: Path) -> None:
             str(port),
             "--truth-port",
             str(truth_port),
-        ]
+        ],
+        env={**os.environ, KEY_VARIABLE: key.hex()},
     )
     robot_file = load_robot("ames")
     config = control.teleop_config(robot_file, "phone", VirtualCameraConfig())
@@ -151,7 +153,7 @@ def serve_with_thread(folder: Path) -> None:
         target=control._loop,
         args=(
             Controller(robot_file.robot, config),
-            UdpFollower("127.0.0.1", port, ControlEnd.of(robot_file)),
+            UdpFollower("127.0.0.1", port, ControlEnd.of(robot_file, key, 1)),
             control_end(runtime),
             "a thread of the server",
             stopping,

@@ -11,9 +11,12 @@ import time
 from collections.abc import Iterator, Sequence
 
 from hardware import udp_link
+from hardware.link_key import KEY_VARIABLE
 from hardware.robot_file import load_robot
 
 AMES = load_robot("ames")
+KEY = bytes(range(16))
+ENVIRONMENT = {**os.environ, KEY_VARIABLE: KEY.hex()}
 
 
 class RealTimeRig:
@@ -21,7 +24,7 @@ class RealTimeRig:
 
     def __init__(self, process: subprocess.Popen[str], port: int, truth_port: int = 0) -> None:
         self.process, self.port, self.truth_port = process, port, truth_port
-        self.follower = udp_link.connect(AMES, host="127.0.0.1", port=port)
+        self.follower = connect(port)
         self.f_max = AMES.robot.f_max
         self._now = time.monotonic()
 
@@ -41,6 +44,10 @@ class RealTimeRig:
             self.process.stdout.close()
 
 
+def connect(port: int, epoch: int = 1, key: bytes = KEY) -> udp_link.UdpFollower:
+    return udp_link.connect(AMES, key, epoch, "127.0.0.1", port)
+
+
 def free_port() -> int:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.bind(("127.0.0.1", 0))
@@ -48,7 +55,7 @@ def free_port() -> int:
 
 
 def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
-    return subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
 
 
 def simulated_robot() -> RealTimeRig:

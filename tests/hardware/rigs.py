@@ -10,6 +10,8 @@ from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
 from hardware.udp_link import UdpFollower
 
+KEY = bytes(range(16))
+
 
 class LockstepRig:
     def __init__(self, robot_file: RobotFile) -> None:
@@ -27,7 +29,7 @@ class LoopbackRig:
     """Real sockets between the follower and a simulated robot, but virtual time at both ends."""
 
     def __init__(self, robot_file: RobotFile) -> None:
-        self.robot = SimulatedRobot(robot_file, 0, 7, seeded_nonces(0))
+        self.robot = SimulatedRobot(robot_file, 0, 7, seeded_nonces(0), KEY)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.setblocking(False)
@@ -35,7 +37,9 @@ class LoopbackRig:
         self.connected = True
         self.f_max = robot_file.robot.f_max
         self.follower = UdpFollower(
-            *self.socket.getsockname(), ControlEnd.of(robot_file), lambda: 1e-6 * self.now_us
+            *self.socket.getsockname(),
+            ControlEnd.of(robot_file, KEY, 1),
+            lambda: 1e-6 * self.now_us,
         )
 
     def advance(self, dt: float) -> None:
@@ -43,8 +47,7 @@ class LoopbackRig:
             self.receive()
             self.now_us += TICK_US
             data = self.robot.tick(self.now_us)
-            peer = self.robot.end.peer(self.now_us)
-            if peer and self.connected:
+            for peer in self.robot.end.recipients(self.now_us) if self.connected else ():
                 self.socket.sendto(data, peer)
 
     def receive(self) -> None:

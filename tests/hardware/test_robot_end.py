@@ -1,5 +1,6 @@
 """The robot's gate and watchdog: what gets thrust, what never does, what happens in silence."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,9 @@ from hardware.follower import FollowerState, Refusal
 from hardware.robot_end import LinkLimits, RobotEnd
 
 LIMITS = LinkLimits(thrusters=2, f_max=3.0, max_rise=1.0, ramp_us=2_000_000)
+KEY = bytes(range(16))
 PEER = ("control", 1)
+STRANGER = ("stranger", 2)
 STILL = (0.0, 0.0, 0.0)
 NONE = np.zeros(2)
 
@@ -21,7 +24,7 @@ class Bench:
     """A robot's end with the control end's part played by hand."""
 
     def __init__(self, limits=LIMITS):
-        self.end = RobotEnd(limits, boot_id=9)
+        self.end = RobotEnd(limits, 9, KEY)
         self.now_us = 1_000_000
         self.epoch, self.counter = 5, 100
         self.nonce = 0
@@ -30,25 +33,30 @@ class Bench:
     def tick(self, dt_us=5000):
         self.now_us += dt_us
         self.nonce += 1
-        return decode_sample(self.end.sample(self.now_us, self.nonce, STILL, STILL, NONE))
+        return decode_sample(self.end.sample(self.now_us, self.nonce, STILL, STILL, NONE), KEY)
 
     def command(self, *thrusts, **changes):
         """A good one, with changes; not counted until sent."""
         command = Command(
             self.epoch,
             (self.counter + 1) % 2**32,
-            self.now_us,
             self.nonce,
+            1_000_000 + self.counter,
             True,
             thrusts or (0.0, 0.0),
         )
         return replace(command, **changes)
 
     def send(self, command, peer=PEER):
-        why = self.end.receive(encode_command(command), peer, self.now_us)
+        why = self.end.receive(encode_command(command, KEY), peer, self.now_us)
         if why == Refusal.NONE:
-            self.counter = command.counter
+            self.counter, self.epoch = command.counter, command.epoch
         return why
+
+    def served(self):
+        """Whom the robot sends its next sample."""
+        self.tick()
+        return self.end.recipients(self.now_us)
 
     def shake_hands(self):
         for _ in range(102):
@@ -118,7 +126,6 @@ BAD = {
     "another number of thrusters": ({"thrusts": (1.0,)}, Refusal.THRUSTERS),
     "an unknown nonce": ({"nonce": 77_777}, Refusal.NONCE),
     "no nonce": ({"nonce": 0}, Refusal.NONCE),
-    "a nonce with another time": ({"robot_time_us": 1}, Refusal.NONCE),
     "an older epoch": ({"epoch": 4}, Refusal.EPOCH),
     "a newer epoch": ({"epoch": 6}, Refusal.EPOCH),
     "a far ahead counter": ({"counter": 100_000}, Refusal.COUNTER),
@@ -129,6 +136,7 @@ BAD = {
     "above f_max": ({"thrusts": (1.0, 3.01)}, Refusal.LIMITS),
     "negative": ({"thrusts": (1.0, -0.01)}, Refusal.LIMITS),
     "not armed": ({"armed": False}, Refusal.LIMITS),
+    "stopping with thrust": ({"stop": True}, Refusal.LIMITS),
     "rising too fast": ({"thrusts": (1.0, 2.1)}, Refusal.RISE),
 }
 
@@ -204,13 +212,75 @@ def test_the_ramp_goes_on_whatever_arrives(flying):
     assert (np.diff(thrusts) < 0.0).all()
 
 
-def test_zero_of_the_same_epoch_cuts_the_ramp_short_and_of_another_does_not(flying):
+def test_zero_of_the_same_epoch_cuts_the_ramp_short_and_of_a_later_one_does_not(flying):
     flying.tick(61_000)
-    assert flying.send(flying.command(epoch=6)) == Refusal.EPOCH
+    zero = flying.command(armed=False)
+    assert flying.send(replace(zero, epoch=6)) == Refusal.NONE
     assert flying.thrust > 0.9
-    assert flying.send(flying.command(armed=False)) == Refusal.NONE
+    assert flying.send(zero) == Refusal.NONE
     assert flying.thrust == 0.0
     assert flying.end.state == FollowerState.REFUSING
+
+
+def test_a_newer_control_process_ramps_it_down_and_then_has_it_and_the_older_never_again(flying):
+    older = flying.epoch
+    for _ in range(420):
+        flying.tick()
+        before = flying.thrust
+        assert flying.send(flying.command(epoch=older + 1)) == Refusal.NONE
+        assert flying.thrust <= before
+        late = flying.command(1.0, 1.0, epoch=older, counter=300)
+        assert flying.send(late) in (Refusal.COUNTER, Refusal.SILENT, Refusal.EPOCH)
+    assert flying.end.state == FollowerState.IDLE
+    flying.fly()
+
+
+def test_its_handshake_counts_while_the_robot_still_ramps(flying):
+    flying.tick(61_000)
+    while flying.end.state != FollowerState.IDLE:
+        flying.tick()
+        assert flying.send(flying.command(epoch=6)) == Refusal.NONE
+    assert flying.now_us - flying.end._ramp_us <= LIMITS.ramp_us + 5000
+
+
+ZEROS = {
+    "without a nonce": {"nonce": 0},
+    "of long ago": {"nonce": 98},
+}
+
+
+@pytest.mark.parametrize("what", ZEROS)
+@pytest.mark.parametrize("silence_us", [5_000, 70_000])
+def test_zero_is_obeyed_without_a_fresh_nonce_but_keeps_nothing_alive(flying, what, silence_us):
+    flying.tick(silence_us)
+    for _ in range(20):
+        flying.tick()
+        zero = flying.command(armed=False, **ZEROS[what])
+        assert flying.send(zero, STRANGER) in (Refusal.NONCE, Refusal.STALE)
+        flying.counter += 1
+        assert flying.thrust == 0.0
+        assert STRANGER not in flying.served()[:1]
+    assert flying.end.state == FollowerState.REFUSING
+
+
+@pytest.mark.parametrize("silence_us", [5_000, 70_000])
+def test_stop_of_a_newer_control_process_cuts_at_once_without_a_nonce(flying, silence_us):
+    flying.tick(silence_us)
+    assert flying.thrust > 0.9
+    stop = flying.command(epoch=6, counter=1, nonce=0, armed=False, stop=True)
+    assert flying.send(replace(stop, stop=False), STRANGER) == Refusal.NONCE
+    assert flying.thrust > 0.9
+    flying.send(replace(stop, counter=2), STRANGER)
+    assert flying.thrust == 0.0
+    flying.tick()
+    assert flying.send(flying.command(1.0, 1.0)) != Refusal.NONE
+    assert flying.thrust == 0.0
+
+
+def test_stop_of_an_older_control_process_is_not_heard(flying):
+    for counter in (1, 1000):
+        flying.send(flying.command(epoch=4, counter=counter, nonce=0, armed=False, stop=True))
+        assert flying.thrust == 1.0
 
 
 @pytest.mark.parametrize(
@@ -235,14 +305,76 @@ def test_halt_is_zero_at_once(flying):
     assert flying.send(flying.command(1.0, 1.0)) == Refusal.EPOCH
 
 
-def test_samples_go_to_who_was_heard_and_not_to_who_interrupts(flying):
-    stranger = ("stranger", 2)
-    flying.send(flying.command(1.0, 1.0, epoch=99), stranger)
-    assert flying.end.peer(flying.now_us) == PEER
-    flying.tick(61_000)
-    flying.send(flying.command(1.0, 1.0, epoch=99), stranger)
-    assert flying.end.peer(flying.now_us) == stranger
-    assert flying.end.peer(flying.now_us + 5_000_001) is None
+def test_samples_go_to_who_sent_the_last_command_that_was_taken(flying):
+    flying.tick()
+    flying.send(flying.command(1.0, 1.0), ("control", 3))
+    assert flying.served() == (("control", 3),)
+    flying.send(flying.command(1.0, 1.0, counter=50), PEER)
+    assert flying.served() == (("control", 3),)
+    assert flying.end.recipients(flying.now_us + 5_000_001) == ()
+
+
+def test_a_newcomer_with_the_key_is_answered_once_for_each_datagram_and_owns_nothing(flying):
+    for counter in range(1, 20):
+        hello = flying.command(epoch=6, counter=counter, nonce=0, challenge=counter, armed=False)
+        assert flying.send(hello, ("new", 3)) == Refusal.NONCE
+        assert flying.tick().challenge == counter
+        assert flying.end.recipients(flying.now_us) == (PEER, ("new", 3))
+        assert flying.served() == (PEER,)
+        assert flying.thrust == 1.0
+        assert flying.send(flying.command(1.0, 1.0)) == Refusal.NONE
+
+
+@pytest.fixture(scope="module")
+def after_two_flights():
+    """A robot in its second flight, and all that it has heard."""
+    bench, heard = Bench(), []
+    receive = bench.end.receive
+    bench.end.receive = lambda data, *rest: heard.append(data) or receive(data, *rest)
+    bench.shake_hands()
+    bench.fly()
+    bench.tick(70_000)
+    bench.send(bench.command(epoch=6, counter=1, armed=False))
+    while bench.end.state != FollowerState.IDLE:
+        bench.tick()
+        bench.send(bench.command())
+    bench.fly()
+    del bench.end.receive
+    return bench, heard
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(st.integers(0, 10**6), st.booleans()), max_size=30))
+def test_whatever_was_heard_before_and_is_repeated_changes_nothing_and_gets_nothing(
+    after_two_flights, picks
+):
+    bench, heard = copy.deepcopy(after_two_flights)
+    for pick, go_on in picks:
+        bench.tick()
+        if go_on:
+            assert bench.send(bench.command(1.0, 1.0)) == Refusal.NONE
+        before = bench.end.state, bench.thrust, bench.end._taken_us
+        again = heard[pick % len(heard)]
+        assert bench.end.receive(again, STRANGER, bench.now_us) != Refusal.NONE
+        assert (bench.end.state, bench.thrust, bench.end._taken_us) == before
+        assert STRANGER not in bench.served()
+
+
+@settings(max_examples=50)
+@given(st.binary(min_size=16, max_size=16).filter(lambda key: key != KEY), st.booleans())
+def test_who_has_another_key_gets_no_thrust_and_no_samples_and_cuts_nothing(key, fly):
+    bench = Bench()
+    if fly:
+        bench.shake_hands()
+        bench.fly()
+    before = bench.thrust
+    for stop in (False, True):
+        zero = bench.command(epoch=7, armed=False, stop=stop)
+        for command in (zero, bench.command(1.0, 1.0)):
+            data = encode_command(command, key)
+            assert bench.end.receive(data, STRANGER, bench.now_us) == Refusal.MALFORMED
+    assert bench.thrust == before
+    assert STRANGER not in bench.served()
 
 
 @settings(max_examples=50)

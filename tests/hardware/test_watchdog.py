@@ -1,9 +1,11 @@
 """The watchdog in C answers random traffic exactly as the reference in Python does."""
 
 import ctypes
+import json
 import random
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +13,14 @@ import pytest
 
 from hardware.datagram import Command, encode_command
 from hardware.follower import FollowerState, Refusal
+from hardware.link_key import mac
 from hardware.robot_end import LinkLimits, RobotEnd
 
 SOURCE = Path(__file__).parents[2] / "deploy" / "watchdog"
+KEY = bytes(range(16))
+VECTORS = json.loads((Path(__file__).parents[1] / "data" / "link_vectors.json").read_text())
 LIMITS = LinkLimits(thrusters=3, f_max=3.0, max_rise=1.0, ramp_us=700_000)
+NAMES = ("watchdog.c", "hmac.c")
 GCC = ("gcc", "-std=c99", "-pedantic", "-O2", "-Wall", "-Wextra", "-Werror", "-Wconversion")
 
 
@@ -30,16 +36,20 @@ class CLimits(ctypes.Structure):
 class CRobotEnd:
     """`ll_watchdog` with the methods of `RobotEnd`."""
 
-    def __init__(self, library, limits, boot_id):
+    def __init__(self, library, limits, boot_id, key=KEY):
         self.library = library
         self.memory = ctypes.create_string_buffer(4096)
         self.thrusters = limits.thrusters
         c_limits = CLimits(limits.thrusters, limits.f_max, limits.max_rise, limits.ramp_us)
-        library.ll_init(self.memory, ctypes.byref(c_limits), ctypes.c_uint32(boot_id))
+        library.ll_init(self.memory, ctypes.byref(c_limits), ctypes.c_uint32(boot_id), key)
+        self.answers = False
 
     def receive(self, data, _peer, now_us):
         size, now = ctypes.c_size_t(len(data)), ctypes.c_int64(now_us)
-        return Refusal(self.library.ll_receive(self.memory, data, size, now))
+        answer = ctypes.c_bool()
+        why = self.library.ll_receive(self.memory, data, size, now, ctypes.byref(answer))
+        self.answers = answer.value
+        return Refusal(why)
 
     def setpoint(self, now_us):
         thrusts = (ctypes.c_float * 16)()
@@ -47,11 +57,11 @@ class CRobotEnd:
         return np.array(thrusts[: self.thrusters])
 
     def sample(self, now_us, nonce, omega, a, thrusts):
-        out = ctypes.create_string_buffer(128)
+        out = ctypes.create_string_buffer(156)
         size = self.library.ll_sample(
             self.memory,
             ctypes.c_int64(now_us),
-            ctypes.c_uint32(nonce),
+            ctypes.c_uint64(nonce),
             (ctypes.c_float * 3)(*omega),
             (ctypes.c_float * 3)(*a),
             (ctypes.c_float * 16)(*thrusts),
@@ -65,7 +75,7 @@ def library(tmp_path_factory):
     if shutil.which("gcc") is None:
         pytest.skip("NO COMPILER, not tested: gcc is not installed")
     path = tmp_path_factory.mktemp("watchdog") / "watchdog.so"
-    sources = (str(SOURCE / "watchdog.c"), "-shared", "-fPIC", "-o", str(path), "-lm")
+    sources = (*(str(SOURCE / name) for name in NAMES), "-shared", "-fPIC", "-o", str(path), "-lm")
     subprocess.run((*GCC, *sources), check=True)
     library = ctypes.CDLL(str(path))
     library.ll_sample.restype = ctypes.c_size_t
@@ -73,14 +83,13 @@ def library(tmp_path_factory):
 
 
 class Traffic:
-    """A control process that mostly behaves, drawn from a seed."""
+    """Control processes that mostly behave, drawn from a seed."""
 
     def __init__(self, seed):
         self.random = random.Random(seed)
-        self.epoch = self.random.choice((1, 2**32 - 2, 2**31))
+        self.epoch = self.random.choice((1, 2**40, 2**63))
         self.counter = self.random.choice((0, 2**32 - 100))
-        self.thrust = 0.0
-        self.sent = b""
+        self.sent = [b""]
 
     def often(self, share):
         return self.random.random() < share
@@ -90,47 +99,90 @@ class Traffic:
             return 5000
         return self.random.choice((0, 1, 39_999, 41_000, 60_000, 60_001, 300_000, 1_500_000))
 
-    def datagram(self, state, nonce, sent_us):
+    def datagram(self, state, nonce):
         rnd = self.random
-        if self.often(0.01):
-            return rnd.choice((self.sent, rnd.randbytes(44), self.sent[:-1], b""))
-        if state == FollowerState.REFUSING and self.often(0.02):
-            self.epoch = (self.epoch + rnd.choice((1, 1, 1, -1, 2**31))) % 2**32
+        if self.often(0.02):
+            return rnd.choice((rnd.choice(self.sent), rnd.randbytes(64), self.sent[-1][:-1], b""))
+        if self.often(0.02 if state == FollowerState.REFUSING else 0.004):
+            self.epoch = max(1, self.epoch + rnd.choice((1, 1, 1, -1, 1000)))
         self.counter = (
             self.counter + (1 if self.often(0.98) else rnd.choice((0, 2, 200, 201, -3)))
         ) % 2**32
-        flying = state in (FollowerState.IDLE, FollowerState.RUNNING, FollowerState.RAMP)
-        thrusts = [self.random.uniform(0.0, 1.9) if flying and self.often(0.99) else 0.0] * 3
+        thrusting = state != FollowerState.REFUSING and self.often(0.98)
+        thrusts = [rnd.uniform(0.0, 1.9) if thrusting else 0.0] * 3
         if self.often(0.01):
             thrusts[1] = rnd.choice((float("nan"), float("inf"), -1.0, 3.5, 3.0, -0.0))
         command = Command(
             epoch=self.epoch,
             counter=self.counter,
-            robot_time_us=sent_us if self.often(0.995) else 1,
-            nonce=nonce if self.often(0.995) else 0,
+            nonce=nonce if self.often(0.99) else rnd.choice((0, max(1, nonce - 12))),
+            challenge=rnd.getrandbits(64),
             armed=any(thrusts) if self.often(0.99) else False,
             thrusts=tuple(thrusts if self.often(0.995) else thrusts[:2]),
+            stop=self.often(0.01),
         )
-        self.sent = encode_command(command)
-        return self.sent
+        key = KEY if self.often(0.995) else rnd.randbytes(16)
+        self.sent.append(encode_command(command, key))
+        return self.sent[-1]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(6))
 def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, seed):
     traffic = Traffic(seed)
-    python, c = RobotEnd(LIMITS, 77), CRobotEnd(library, LIMITS, 77)
-    now_us, states, answers = 10_000_000, set(), set()
+    python, c = RobotEnd(LIMITS, 77, KEY), CRobotEnd(library, LIMITS, 77)
+    now_us, states, answers, peers = 10_000_000, set(), set(), set()
     for nonce in range(1, 2500):
         now_us += traffic.step_us()
         values = ((0.1, -0.2, nonce), (1.0, 2.0, 9.8), np.full(3, 0.5))
         a = python.sample(now_us, nonce, *values)
         assert a == c.sample(now_us, nonce, *values)
-        data = traffic.datagram(python.state, nonce, now_us)
+        data = traffic.datagram(python.state, nonce)
         now_us += traffic.random.choice((0, 0, 3000))
-        why = python.receive(data, ("", 0), now_us)
-        assert why == c.receive(data, ("", 0), now_us), nonce
+        peer = ("", nonce)
+        why = python.receive(data, peer, now_us)
+        assert why == c.receive(data, peer, now_us), nonce
+        assert (python._asking == peer) == c.answers
+        assert (python._peer == peer) == (why == Refusal.NONE)
         np.testing.assert_allclose(python.setpoint(now_us), c.setpoint(now_us), atol=1e-6)
         states.add(python.state)
         answers.add(why)
+        peers.add((why == Refusal.NONE, c.answers))
     assert states == {*FollowerState} - {FollowerState.COAST}
     assert len(answers) >= 9
+    assert len(peers) >= 3
+
+
+@pytest.mark.parametrize("kind", ["sha256", "hmac_sha256"])
+def test_the_digests_are_those_of_fips_180_4_and_rfc_4231(library, kind):
+    for vector in VECTORS[kind]:
+        data, digest = bytes.fromhex(vector["data"]), ctypes.create_string_buffer(32)
+        if kind == "sha256":
+            library.ll_sha256(data, ctypes.c_size_t(len(data)), digest)
+        else:
+            key, prepared = bytes.fromhex(vector["key"]), ctypes.create_string_buffer(64)
+            library.ll_hmac_init(prepared, key, ctypes.c_size_t(len(key)))
+            library.ll_hmac_of(prepared, data, ctypes.c_size_t(len(data)), digest)
+        expected = bytes.fromhex(vector["digest"])
+        assert digest.raw[: len(expected)] == expected
+
+
+@pytest.mark.parametrize("length", range(130))
+def test_the_mac_is_right_for_every_length_of_message(library, length):
+    data, digest = bytes(range(length)), ctypes.create_string_buffer(32)
+    prepared = ctypes.create_string_buffer(64)
+    library.ll_hmac_init(prepared, KEY, ctypes.c_size_t(16))
+    library.ll_hmac_of(prepared, data, ctypes.c_size_t(length), digest)
+    assert digest.raw[:16] == mac(KEY, data)
+
+
+@pytest.mark.parametrize("vector", [v for v in VECTORS["datagrams"] if v["kind"] == "command"])
+def test_the_recorded_commands_are_read_and_no_byte_of_them_may_differ(library, vector):
+    data, key = bytes.fromhex(vector["bytes"]), bytes.fromhex(vector["key"])
+    limits = replace(LIMITS, thrusters=data[5])
+    for at in (None, *range(len(data))):
+        sent = bytearray(data)
+        if at is not None:
+            sent[at] ^= 1
+        robot = CRobotEnd(library, limits, 77, key)
+        why = robot.receive(bytes(sent), None, 1_000_000)
+        assert (why == Refusal.MALFORMED) == (at is not None)

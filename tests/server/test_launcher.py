@@ -8,10 +8,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from hardware.link_key import KEY_VARIABLE, LinkKeyError, new_key, read_key, write_key
 from hardware.robot_file import RobotFileError
-from server import launcher
+from server import cli, launcher
 from server.control import parse
 from server.launcher import SECRET_VARIABLE, Launcher, announce, children_of, listen
+from server.robot_key import key_file
 from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.settings import load
 
@@ -51,7 +53,9 @@ def test_control_is_led_to_the_simulated_robot(tmp_path, sockets):
 
 
 def test_a_real_robot_is_not_simulated(tmp_path, sockets):
-    settings = load(["--no-simulate", "--robot-host", "192.0.2.5", "--robot-port", "4000"])
+    write_key(key_file(tmp_path, "ames"), new_key())
+    words = ["--no-simulate", "--robot-host", "192.0.2.5", "--robot-port", "4000"]
+    settings = load([*words, "--state", str(tmp_path)])
     control, server = children_of(settings, [], tmp_path, sockets)
     assert (control.name, server.name) == ("control", "server")
     assert option(control, "--host") == "192.0.2.5"
@@ -65,8 +69,31 @@ def test_sockets_and_secret_outlive_the_server_process_and_go_to_it_alone(tmp_pa
     secret = server.environment[SECRET_VARIABLE]
     assert len(bytes.fromhex(secret)) == 32
     assert secret not in " ".join(server.arguments)
-    assert not robot.environment
-    assert not control.environment
+    assert secret not in (*robot.environment.values(), *control.environment.values())
+
+
+def test_robot_and_control_share_a_key_of_this_run_that_nobody_else_sees(tmp_path, sockets):
+    runs = [children_of(load([]), [], tmp_path, sockets) for _ in range(2)]
+    keys = set()
+    for robot, control, server in runs:
+        key = robot.environment[KEY_VARIABLE]
+        assert control.environment[KEY_VARIABLE] == key
+        assert KEY_VARIABLE not in server.environment
+        assert not any(key in " ".join(child.arguments) for child in (robot, control, server))
+        keys.add(key)
+    assert len(keys) == 2
+
+
+def test_a_real_robot_has_its_own_key_and_without_one_the_command_is_named(tmp_path, sockets):
+    settings = load(["--no-simulate", "--state", str(tmp_path)])
+    with pytest.raises(LinkKeyError, match="lightleash robot key ames"):
+        children_of(settings, [], tmp_path, sockets)
+    assert cli.main(["robot", "key", "--state", str(tmp_path)]) == 0
+    key = read_key(key_file(tmp_path, "ames"))
+    control, _server = children_of(settings, [], tmp_path, sockets)
+    assert control.environment[KEY_VARIABLE] == key.hex()
+    assert option(control, "--epochs") == str(tmp_path / "robots" / "ames.epoch")
+    assert "--real" in control.arguments
 
 
 def test_no_such_robot_or_gains_are_refused_by_name(tmp_path, sockets):
