@@ -7,6 +7,7 @@ allows, and the same for a seed every time.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,6 +17,7 @@ from hardware.camera_file import find_camera
 from hardware.robot_file import RobotFile
 from hardware.sim.codec import Encoder
 from hardware.sim.hand import make_hand
+from hardware.sim.intent import Pose
 from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.noisy_eye import NoisyEye
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
@@ -33,6 +35,7 @@ from server.control_link import (
     PhoneImuInput,
     ReadyInput,
     RequestInput,
+    is_believable,
 )
 from server.controller import PERIOD_S, Controller, never_too_late
 from server.ingest import EncodedFrame, Ingest
@@ -85,8 +88,14 @@ class Scene:
 class Lockstep:
     """One flight. `advance` moves everything by one control period."""
 
-    def __init__(self, robot_file: RobotFile, config: TeleopConfig, scene: Scene) -> None:
-        """Everything at rest at time 0."""
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        config: TeleopConfig,
+        scene: Scene,
+        operator: VirtualOperator | None = None,
+    ) -> None:
+        """Everything at rest at time 0; the phone is held by the usual `operator` or another."""
         self.scene = scene
         self.follower = LockstepFollower(robot_file, scene.seed)
         late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
@@ -97,7 +106,11 @@ class Lockstep:
         """What of the phone does not arrive now: motion, picture, touch."""
         self.transit = Transit()
         """Between phone and server, beyond the usual delays."""
-        self._script = make_script(robot_file, scene)
+        self.control_every = 1
+        """Ticks from one of control's to the next; 0: it stands still."""
+        self.tamper: Callable[[list[Input]], list[Input]] = list
+        """What becomes of what the server tells control."""
+        self._script = make_script(robot_file, scene, operator)
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
         camera = self._script.phone.camera
@@ -109,12 +122,23 @@ class Lockstep:
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._on_their_way: deque[tuple[int, Record]] = deque()
         self._inbox: list[Input] = []
+        self._output: Output | None = None
         self._ticks = 0
 
     @property
     def t(self) -> float:
         """Virtual time [s]."""
         return self.follower.t
+
+    @property
+    def phone(self) -> VirtualPhone:
+        """What the person holds."""
+        return self._script.phone
+
+    def truth(self) -> tuple[Pose, Pose]:
+        """Poses of camera and body in f."""
+        plant = self.follower.plant
+        return self._script.phone.hand.pose(self.t), (plant.R_fb, plant.p_bf_in_f)
 
     def run(self, seconds: float) -> Trace:
         """Fly until `seconds`, or until tracking ends."""
@@ -135,7 +159,16 @@ class Lockstep:
         self._poses.append((self.t, plant.wxyz_fb, plant.p_bf_in_f))
         self._hear_phone(t_before)
         self._hear_small_talk()
-        inbox, self._inbox = self._inbox, []
+        due = self.control_every > 0 and self._ticks % self.control_every == 0
+        if due or self._output is None:
+            self._output = self._control()
+        hand, body = self.truth()
+        self._judge.look(self.t, body, hand, self._output)
+        return self._output
+
+    def _control(self) -> Output:
+        """What the control process does in a tick, and what its status leads to."""
+        inbox, self._inbox = list(filter(is_believable, self.tamper(self._inbox))), []
         felt = self._link.receive(self.t)
         command, output = self.controller.tick(self.t, inbox, felt, self._link.reason)
         if self._ticks % EVERY_TICKS["status"] == 0:
@@ -145,8 +178,6 @@ class Lockstep:
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
         if wish is not None:
             self._inbox.append(RequestInput(wish.what))
-        body, hand = (plant.R_fb, plant.p_bf_in_f), self._script.phone.hand.pose(self.t)
-        self._judge.look(self.t, body, hand, output)
         return output
 
     def _robot_at(self, t: float) -> tuple[Array, Array]:
@@ -248,7 +279,9 @@ def make_eye(robot_file: RobotFile, scene: Scene, script: PhoneScript) -> NoisyE
     return NoisyEye(script.phone, leds_in_b, scene.led_noise_px, scene.hidden_at, rng)
 
 
-def make_script(robot_file: RobotFile, scene: Scene) -> PhoneScript:
+def make_script(
+    robot_file: RobotFile, scene: Scene, operator: VirtualOperator | None = None
+) -> PhoneScript:
     """The virtual phone of a scene, with its page and its holder."""
     options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
     camera = find_camera(DEVICE, scene.width, scene.height)
@@ -263,4 +296,4 @@ def make_script(robot_file: RobotFile, scene: Scene) -> PhoneScript:
     )
     size = scene.width, scene.height
     encoder = Encoder(*size, scene.frame_rate_hz, scene.bitrate_bps, scene.codec)
-    return PhoneScript(phone, encoder, VirtualOperator())
+    return PhoneScript(phone, encoder, operator or VirtualOperator())

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from hardware.control_end import ControlEnd
-from hardware.follower import BodySample, FollowerError, ThrustCommand
+from hardware.follower import BodySample, FollowerError, FollowerState, ThrustCommand
 from hardware.robot_file import RobotFile
 from hardware.sim.plant import Plant, PlantOptions
 from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
@@ -11,6 +13,13 @@ from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
 HERE = ("lockstep", 0)
 KEY = bytes(16)
 """Nobody else is on this link."""
+Tamper = Callable[[bytes], Sequence[bytes]]
+"""What comes out of a link for a datagram that goes in."""
+
+
+def whole(data: bytes) -> Sequence[bytes]:
+    """As it should."""
+    return (data,)
 
 
 class LockstepFollower:
@@ -29,6 +38,11 @@ class LockstepFollower:
         self.thrusters = self._end.thrusters
         self.connected = True
         """False: the link loses everything, both ways."""
+        self.to_robot: Tamper = whole
+        """What the link makes of a command's datagram ..."""
+        self.to_control: Tamper = whole
+        """... and of a sample's."""
+        self._robot_file = robot_file
         self._now_us = 0
         self._arrived: list[bytes] = []
         self._closed = False
@@ -48,13 +62,22 @@ class LockstepFollower:
         """Virtual time [s]; the robot's clock shows the same."""
         return 1e-6 * self._now_us
 
+    @property
+    def state(self) -> FollowerState:
+        """What the robot itself does."""
+        return self._robot.end.state
+
+    def restart(self) -> None:
+        """The robot's computer starts anew; its body goes on as it was."""
+        self._robot.restart(self._robot_file, KEY)
+
     def advance(self, dt: float = 0.005) -> None:
         """Let `dt` [s] pass, whole ticks of 5 ms."""
         for _ in range(round(1e6 * dt / TICK_US)):
             self._now_us += TICK_US
             data = self._robot.tick(self._now_us)
             if self.connected and self._robot.end.recipients(self._now_us):
-                self._arrived.append(data)
+                self._arrived += self.to_control(data)
 
     def receive(self) -> list[BodySample]:
         """What has arrived. See `Follower`."""
@@ -85,4 +108,5 @@ class LockstepFollower:
     def _send(self, command: ThrustCommand) -> None:
         data = self._end.command(command, self.t)
         if self.connected:
-            self._robot.receive(data, HERE, self._now_us)
+            for one in self.to_robot(data):
+                self._robot.receive(one, HERE, self._now_us)

@@ -47,7 +47,7 @@ class SimulatedRobot:
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
-        self._nonces = nonces
+        self._nonces, self._boot_id = nonces, boot_id
         self._setpoint = np.zeros(robot.A.shape[1])
         self._leveller = Leveller(robot, HoldConfig()) if robot.weight_to_carry > 0.0 else None
         self._omega_in_b = np.zeros(3)
@@ -71,6 +71,11 @@ class SimulatedRobot:
             self._leveller.start()
             return setpoint
         return self._leveller.thrusts(setpoint, self._omega_in_b, 1e-6 * TICK_US)
+
+    def restart(self, robot_file: RobotFile, key: bytes) -> None:
+        """Start anew, refusing thrust; the body goes on as it was."""
+        self._boot_id += 1
+        self.end = RobotEnd(LinkLimits.of(robot_file), self._boot_id, key)
 
     def shut_down(self, now_us: int) -> bytes:
         """Thrusters off; gives the last sample."""
