@@ -21,6 +21,7 @@ EXPERIMENTS: Final = {
     "tremor": "what of the hand's tremor the virtual camera lets through",
     "margins": "what delay, gain and phase the control loops can lose, axis by axis",
     "estimators": "where the robot is now: three estimators on the same data",
+    "gaps": "the closed loop against gaps in its links and recorded radio, in virtual time",
     "network": "a phone by WebRTC and by websockets over bad lines; as root on Linux",
     "sweep": "the closed loop over any configuration key and many seeds, on all cores",
 }

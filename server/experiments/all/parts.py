@@ -84,6 +84,15 @@ PARTS: Final[tuple[Part, ...]] = (
         "virtual camera.",
     ),
     Part(
+        "gaps",
+        "gaps --seeds 2",
+        "gaps --quick --no-traces --vanish 0 --seeds 1",
+        "Gaps in the links",
+        "How much of the time the robot follows when its link to the phone, or the phone's to the "
+        "server, is dark for a while, by gaps of our own and by recorded radio, and what becomes "
+        "of a phone that vanishes; in virtual time.",
+    ),
+    Part(
         "network",
         "network --seconds 32 --seed 0",
         "network --seconds 8 --seed 0 --scenarios clean",
@@ -119,6 +128,9 @@ CAPTIONS: Final[Mapping[tuple[str, str], str]] = {
     ("estimators", "estimators"): "Error of each estimator over time, with ±3 σ as it believes.",
     ("tremor", "tremor"): "Spectra of the turns across and about the line of sight, and a turn of "
     "3° in 0.3 s, for each kind of virtual camera.",
+    ("gaps", "gaps"): "Share of the time in which the robot follows and the farthest it strays, by "
+    "length of gap; recorded minutes; a flight with gaps: where it was, should be and an ideal "
+    "camera would have it, shaded while it coasts or holds.",
     ("network", "network"): "How large a share of the pictures, and of the newest records at any "
     "time, was older than an age, on each line and path.",
 }
