@@ -23,6 +23,8 @@ from starlette.staticfiles import StaticFiles
 from server.clock import now
 from server.command_age import refuse_old
 from server.hub import Hub
+from server.link_check import Rules, check
+from server.link_log import KEPT_S
 from server.messages import Command, decode_message
 from server.metrics import exposition
 from server.recording import RecordingError
@@ -88,6 +90,7 @@ class Api:
             Route("/api/recording", self._recording, methods=["POST", "DELETE"]),
             Route("/api/invite", self._invitation),
             Route("/api/status", self._status),
+            Route("/api/link", self._link),
             Route("/ca.crt", self._certificate),
             Route("/healthz", self._health),
             Route("/metrics", self._metrics),
@@ -152,6 +155,19 @@ class Api:
 
     async def _status(self, _request: Request) -> Response:
         return Response(self._hub.snapshot(), media_type="application/json")
+
+    async def _link(self, request: Request) -> Response:
+        phone = self._hub.phone
+        try:
+            seconds = float(request.query_params.get("seconds", KEPT_S))
+        except ValueError:
+            seconds = 0.0
+        if not 0.0 < seconds <= KEPT_S:
+            return refusal(400, "seconds", f"up to {KEPT_S:g}")
+        if phone is None:
+            return refusal(409, "phone", "while a phone leads: scan the code first")
+        report = check(phone.link.series(now(), seconds), Rules())
+        return Response(msgspec.json.encode(report), media_type="application/json")
 
     async def _certificate(self, _request: Request) -> Response:
         if self._authority is None:

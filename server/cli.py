@@ -24,7 +24,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   robot        robot leds: can its LEDs be told apart, and would others be; robot key: make its key
   tune         find a robot's gains for a measured latency, under stated margins
   survey       where the LEDs are, from a film of the robot at rest
-  doctor       what this machine can do: real time, certificates, ports, codecs
+  doctor       what this machine can do: real time, certificates, ports, codecs; --phone: a link
 """
 
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import os
 import queue
 import socket
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from server.access import PhoneClientError, access_of, add_access_arguments
+from server.doctor_phone import examine
+from server.link_check import LEAST_S
+from server.link_log import KEPT_S
 from server.one_line import Parser
 from server.settings import state_directory
 
@@ -134,11 +140,27 @@ def cameras() -> Iterator[Finding]:
             yield Finding(BAD, "calibration", str(error), "mend the file")
 
 
+def _phone(parser: Parser, arguments: argparse.Namespace) -> int:
+    seconds = KEPT_S if arguments.seconds is None else arguments.seconds
+    if not LEAST_S <= seconds <= KEPT_S:
+        parser.error(f"--seconds {seconds:g}: allowed with --phone: {LEAST_S:g} to {KEPT_S:g}")
+    try:
+        return examine(access_of(arguments), seconds, print)
+    except PhoneClientError as error:
+        print(f"lightleash doctor: {error}", file=sys.stderr)
+        return 1
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash doctor`: 0 if nothing is broken."""
     parser = Parser(prog="lightleash doctor", description=__doc__)
-    parser.add_argument("--seconds", type=float, default=3.0, help="of the 200 Hz test")
-    seconds = float(parser.parse_args(argv).seconds)
+    parser.add_argument("--phone", action="store_true", help="of the running server: its link")
+    parser.add_argument("--seconds", type=float, help="to listen (60), or of the 200 Hz test (3)")
+    add_access_arguments(parser)
+    arguments = parser.parse_args(argv)
+    if arguments.phone:
+        return _phone(parser, arguments)
+    seconds = 3.0 if arguments.seconds is None else arguments.seconds
     checks: list[Callable[[], Iterator[Finding]]] = [
         machine,
         lambda: realtime(seconds),

@@ -208,7 +208,7 @@ class Hub:
     def ping(self) -> None:
         """Ask the phone for a sign of life."""
         if self.phone is not None:
-            self.paths.ping(encode(self.phone.ingest.ping(now())))
+            self.paths.ping(encode(self.phone.ping(now())))
 
     def _hear_control(self) -> None:
         for status in self._control.statuses():

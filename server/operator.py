@@ -27,6 +27,7 @@ from server.control_link import (
     expected_of,
 )
 from server.ingest import EncodedFrame, Ingest
+from server.link_log import LinkLog
 from server.messages import Hello
 from server.meter import Meter
 from server.path_messages import PathChoice
@@ -36,7 +37,7 @@ from server.shape import Shape
 from server.sight import Sight
 from server.vision import VisionThread
 from server.wire import WireError
-from server.wire_records import Motion, Picture, Record
+from server.wire_records import Motion, Picture, Pong, Record
 
 STALE_S = 1.0
 """A stream silent for longer keeps the robot from being armed."""
@@ -77,10 +78,18 @@ class OperatorPhone:
         self.sighting: Sighting | None = None
         self.latency_ms: dict[str, float] = {}
         self._check = SensorCheck()
+        self.link = LinkLog(clock())
+        """What came when, lately."""
 
     def silent_for(self, now: float) -> float:
         """Since its last sign of life [s]; hello was the first."""
         return min(self.meters["operator"].age(now), now - self._greeted)
+
+    def ping(self, now: float) -> Record:
+        """The next PING, to be sent at `now` [s]."""
+        record = self.ingest.ping(now)
+        self.link.asked(1e-6 * record.t_us)
+        return record
 
     def take(self, record: Record, now: float) -> None:
         """A record of this phone, from either of its sockets.
@@ -91,6 +100,7 @@ class OperatorPhone:
         match self.ingest.record(record, now):
             case PhoneImu() as sample if isinstance(record.body, Motion):
                 self.meters["phone_imu"].tick(now, sample.t)
+                self.link.came("motion", sample.t, now)
                 self._to_control(PhoneImuInput.of(sample))
                 self._check.feel(sample.t, record.body)
                 if self.wizard is not None:
@@ -103,6 +113,8 @@ class OperatorPhone:
                 self._to_control(OperatorInput.of(operator))
             case EncodedFrame() as frame:
                 self._see(frame, now)
+            case None if isinstance(record.body, Pong):
+                self.link.came("answers", 1e-6 * record.body.server_time_us, now)
             case None if isinstance(record.body, Picture):  # it can't be dated yet
                 self._on_taken(record.sequence)
 
@@ -121,6 +133,7 @@ class OperatorPhone:
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)
+        self.link.came("pictures", frame.t, now)
         shape = Shape.of(frame.picture)
         if shape != self._shape:
             self._open_eyes(shape)

@@ -73,6 +73,7 @@ REQUESTS = {
     "DELETE /api/recording": "stop; answers with the path of the file",
     "GET /api/invite": "the link for phones and its QR code (SVG)",
     "GET /api/status": "the last `Status`",
+    "GET /api/link": "how it will be to fly with the operator's link: `?seconds=` of the last 60",
     "GET /ca.crt": "the authority to install on phones",
     "GET /healthz": "whether the server lives",
     "GET /metrics": "Prometheus",

@@ -21,7 +21,7 @@ COOKIE = "lightleash"
 PUBLIC_FILES = (".js", ".css", ".svg")
 PUBLIC_PATHS = {"/", "/supervisor", "/board", "/api/pair", "/healthz", "/ca.crt"}
 OPERATOR_PATHS = {
-    *("/api/whoami", "/api/stop", "/api/rtc", "/api/rtc/answer"),
+    *("/api/whoami", "/api/stop", "/api/link", "/api/rtc", "/api/rtc/answer"),
     *("/ws/phone", "/ws/video"),
 }
 """What an operator may reach; everything else is the supervisor's."""

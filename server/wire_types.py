@@ -20,7 +20,15 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from server import calibration_messages, camera_messages, knobs, messages, wire, wire_records
+from server import (
+    calibration_messages,
+    camera_messages,
+    knobs,
+    link_messages,
+    messages,
+    wire,
+    wire_records,
+)
 from server.one_line import Parser
 from server.path_messages import PathChoice
 from server.protocol_text import RECORDS, page
@@ -45,6 +53,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Estimate,
     camera_messages.CameraHealth,
     messages.Status,
+    link_messages.LinkReport,
 )
 UNIONS = {"FromPage": messages.FromPage, "ToPage": messages.ToPage}
 HEADER_FIELDS = (

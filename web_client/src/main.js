@@ -10,6 +10,7 @@ import { LensPanel } from './lens_panel.js';
 import { PaceKeeper } from './pace_keeper.js';
 import { WakefulClock, commandOf } from './command.js';
 import { Imu } from './imu.js';
+import { LinkCheck } from './link_check.js';
 import { Phone } from './phone.js';
 import { adviceFor, problemOf } from './problems.js';
 import { Rate } from './clock.js';
@@ -120,6 +121,8 @@ const start = new Start({
 
 const lensPanel = new LensPanel(document, platform, performance, camera, (text) => phone.log(text));
 
+const linkCheck = new LinkCheck(document, performance, fetchHere);
+
 /** @param {Event} event */
 function dispatch(event) {
   const outcome = reduce(state, event);
@@ -137,6 +140,7 @@ function show() {
   const { problem } = state;
   view.render(state, problem === null ? null : adviceFor(problem, platform, window.location.port));
   lensPanel.render(state);
+  linkCheck.render(state);
 }
 
 /** @param {Effect} effect */

@@ -198,6 +198,29 @@
  * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
  */
 
+/**
+ * Answer of `GET /api/link`: what it will be like to fly with the operator's link.
+ * @typedef {object} LinkReport
+ * @property {'good' | 'fair' | 'poor' | 'unknown'} grade
+ * @property {string} title The verdict in words.
+ * @property {string[]} lines What to expect, and why.
+ * @property {string[]} advice What to do about it; empty if there is nothing to do.
+ * @property {number} seconds So long was listened to.
+ * @property {number} follows Share of the time in which the robot would follow.
+ * @property {number} waits Silences in which it would wait, and go on by itself.
+ * @property {number} ends Silences that would end a flight.
+ * @property {Record<string, number>} sides Of both: how many by `link`, `phone` (too busy) and `server` (its computer too busy).
+ * @property {Record<string, number>} gaps Silences by length: how many were longer than so many ms.
+ * @property {number} longest_ms
+ * @property {number | null} rtt_ms Median round trip of a PING.
+ * @property {number | null} rtt_p95_ms
+ * @property {number} lost Share of PINGs without an answer.
+ * @property {number} motion_hz
+ * @property {number} picture_hz
+ * @property {number | null} picture_age_ms Median, at arrival.
+ * @property {number | null} picture_gap_ms The longest wait for one.
+ */
+
 /** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log} FromPage */
 /** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration} ToPage */
 

@@ -1,0 +1,147 @@
+"""What it will be like to fly with a phone's link, from what came of it when. Pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from msgspec.structs import replace
+
+from server.link_log import Arrival, Series
+from server.link_messages import SIDES, Grade, LinkReport, Side
+from server.link_words import advice, lines, title
+
+GAPS_MS = (60, 100, 150, 250, 400, 1000)
+LEAST_S = 5.0
+"""Nothing is said of less."""
+GOOD_SHARE, FAIR_SHARE = 0.99, 0.95
+"""Of the time in which the robot follows."""
+PRESS_S = 1.5
+"""What it costs to notice that the robot has stopped, let go, and press again."""
+ENOUGH_PICTURES_S = 0.5
+SHORTEST_BUSY_S = 0.1
+"""Within a shorter silence no picture need come, so it does not show whether the page was busy."""
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What the failsafe machine bears [s]."""
+
+    silent: float = 0.150
+    """No news for longer: the robot waits."""
+    fresh: float = 0.100
+    """After it, until it follows again."""
+    gap: float = 1.0
+    """Longer: the flight is over, or the button must be pressed anew."""
+
+
+def check(series: Series, rules: Rules) -> LinkReport:
+    """The verdict on a series."""
+    seconds = max(series.end - series.begin, 1e-9)
+    silences = _silences(series)
+    waits = [span for span in silences if _length(span) > rules.silent]
+    ends = [span for span in waits if _length(span) > rules.gap]
+    trips = sorted(came - asked for asked, came in series.answers)
+    answered = {asked for asked, _ in series.answers}
+    due = [asked for asked in series.asked if asked < series.end - rules.gap]
+    report = LinkReport(
+        grade="unknown",
+        title="",
+        lines=[],
+        advice=[],
+        seconds=round(seconds, 1),
+        follows=round(1.0 - _lost_time(series, rules) / seconds, 4),
+        waits=len(waits) - len(ends),
+        ends=len(ends),
+        sides={side: sum(side == _side(span, series) for span in waits) for side in SIDES},
+        gaps={str(ms): sum(1e3 * _length(span) > ms for span in _gaps(series)) for ms in GAPS_MS},
+        longest_ms=round(1e3 * max(map(_length, _gaps(series)), default=0.0), 1),
+        rtt_ms=_ms(_quantile(trips, 0.5)),
+        rtt_p95_ms=_ms(_quantile(trips, 0.95)),
+        lost=round(sum(asked not in answered for asked in due) / max(1, len(due)), 3),
+        motion_hz=round(len(series.motion) / seconds, 1),
+        picture_hz=round(len(series.pictures) / seconds, 1),
+        picture_age_ms=_ms(_quantile(sorted(came - t for t, came in series.pictures), 0.5)),
+        picture_gap_ms=_ms(_longest_wait(series.pictures, series)),
+    )
+    report = replace(report, grade=_grade(report, series))
+    return replace(report, title=title(report), lines=lines(report), advice=advice(report))
+
+
+def _grade(report: LinkReport, series: Series) -> Grade:
+    if report.seconds < LEAST_S or not series.answers:
+        return "unknown"
+    if report.ends or report.follows < FAIR_SHARE or not (series.motion and series.pictures):
+        return "poor"
+    pictures = report.picture_gap_ms is not None and report.picture_gap_ms < 1e3 * ENOUGH_PICTURES_S
+    return "good" if report.follows >= GOOD_SHARE and pictures else "fair"
+
+
+def _gaps(series: Series) -> list[Span]:
+    """Between signs of life, as they came."""
+    times = [series.begin, *(came for _, came in series.answers), series.end]
+    return list(pairwise(times))
+
+
+def _silences(series: Series) -> list[Span]:
+    """From when the newest sign of life was asked for until a newer one came."""
+    return _ages(series.answers, series)
+
+
+def _ages(arrivals: Sequence[Arrival], series: Series) -> list[Span]:
+    """Each until a newer one came; what comes out of order is no news."""
+    spans: list[Span] = []
+    newest = series.begin
+    for t, came in arrivals:
+        if t > newest:
+            spans.append((newest, came))
+            newest = t
+    return [*spans, (newest, series.end)]
+
+
+def _lost_time(series: Series, rules: Rules) -> float:
+    """In which the robot would not follow [s]: each cause on its own, no moment twice."""
+    away: list[Span] = []
+    for span in (*_silences(series), *_ages(series.motion, series)):
+        if _length(span) > rules.silent:
+            back = PRESS_S if _length(span) > rules.gap else rules.fresh
+            away.append((span[0] + rules.silent, min(span[1] + back, series.end)))
+    total, until = 0.0, series.begin
+    for begin, end in sorted(away):
+        total += max(0.0, end - max(begin, until))
+        until = max(until, end)
+    return total
+
+
+def _side(silence: Span, series: Series) -> Side:
+    """Whose it was: the server asked nobody, or pictures came on while the page was silent."""
+    begin, end = silence
+    asked = [begin, *(t for t in series.asked if begin < t < end), end]
+    if max(map(_length, pairwise(asked))) > 0.5 * (end - begin):
+        return "server"
+    pictures = [begin, *(came for _, came in series.pictures if begin < came < end), end]
+    if end - begin > SHORTEST_BUSY_S and max(map(_length, pairwise(pictures))) < 0.5 * (
+        end - begin
+    ):
+        return "phone"
+    return "link"
+
+
+def _longest_wait(arrivals: Iterable[Arrival], series: Series) -> float | None:
+    times = [series.begin, *(came for _, came in arrivals), series.end]
+    return max(map(_length, pairwise(times))) if len(times) > 2 else None
+
+
+def _length(span: Span) -> float:
+    return span[1] - span[0]
+
+
+def _quantile(values: Sequence[float], share: float) -> float | None:
+    return values[min(len(values) - 1, int(share * len(values)))] if values else None
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(1e3 * seconds, 1)
