@@ -140,18 +140,24 @@ class ComplianceConfig:
 class FailsafeConfig:
     """Timers of the failsafe machine [s]; the ramp's length is the robot's (`Robot.ramp_s`)."""
 
-    hold: float = 0.150
-    """Operator, phone IMU or robot silent for longer: HOLD (robot: RAMP)."""
+    silent: float = 0.150
+    """No news from operator, phone IMU or robot for longer: COAST."""
+    gap: float = 1.0
+    """The longest silence after which it follows again by itself. Operator, phone IMU or robot
+    silent for longer: RAMP (operator and phone only where the robot hangs: another one hovers)."""
+    fresh: float = 0.100
+    """All good for this long: the gap is over."""
     pose_arm: float = 0.300
     """Since the last believed picture was *taken*: latency, a frame, as long again on the IMUs."""
     pose_hold: float = 2.5
     """The estimator's own doubt holds before this (`EnvelopeConfig.max_sigma_p_m`)."""
-    ramp_start: float = 0.500
-    """HOLD becomes RAMP when operator or phone IMU are older."""
     pose_ramp: float = 4.0
     hold_max: float = 3.0
+    """From the last moment of following, a gap before included."""
     recover: float = 0.500
-    """All good for this long before arming or tracking."""
+    """All good for this long before arming, or before a press counts ..."""
+    recover_short: float = 0.200
+    """... and after no more than a gap."""
     armed_idle: float = 30.0
 
 
@@ -171,6 +177,20 @@ class HoldConfig:
     """Torque per angle and moment of inertia [1/s²]."""
     damping: float = 10.0
     """Torque per rate and moment of inertia [1/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResumptionConfig:
+    """Following again by itself after a gap: the reference goes back to where the phone has it."""
+
+    max_speed_m_s: float = 0.25
+    """ISO 10218-1's reduced speed for people beside a robot."""
+    max_rate_rad_s: float = 0.5
+    settle_s: float = 0.2
+    """Time constant of the end."""
+    max_offset_m: float = 0.4
+    """Farther away it would move where nobody expects it any more: HOLD."""
+    max_offset_rad: float = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,4 +224,5 @@ class TeleopConfig:
     gates: GatesConfig = field(default_factory=GatesConfig)
     failsafe: FailsafeConfig = field(default_factory=FailsafeConfig)
     hold: HoldConfig = field(default_factory=HoldConfig)
+    resumption: ResumptionConfig = field(default_factory=ResumptionConfig)
     envelope: EnvelopeConfig = field(default_factory=EnvelopeConfig)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.config import TeleopConfig, VirtualCameraConfig
-from pipeline.control import failsafe, judgement
+from pipeline.control import failsafe, judgement, resumption
 from pipeline.control.actuation import Actuation
 from pipeline.control.hold import Hold
 from pipeline.control.judgement import Ages
@@ -48,6 +48,8 @@ class Inputs:
     """What the server or the robot's link has against arming."""
     fault: str = ""
     """What they have against flying on."""
+    gap: str = ""
+    """A short silence that the ages don't show: the robot heard nothing, or control stood still."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +62,10 @@ class Output:
     armed: bool
     failsafe: failsafe.Failsafe
     refusals: tuple[str, ...]
+    until_ramp_s: float | None
+    """Left until RAMP if all goes on as it is [s]; None where it may for ever."""
+    resumes: bool
+    """It will follow again by itself, if news come back in time."""
     relative: RelativeState | None
     R_fc: Array | None
     view: VirtualView | None
@@ -79,7 +85,7 @@ class Teleop:
         self._config, self._robot = config, robot
         self._h, self._t_step = period, np.nan
         self._limits = failsafe.Limits.of(
-            config.failsafe, robot.ramp_s, coasts=config.estimator != "none"
+            config.failsafe, robot.ramp_s, robot.hangs, bridges=config.estimator != "none"
         )
         self._virtual_camera = VirtualCamera(config.virtual_camera)
         self._tracking, self._hold = Tracking(robot, config), Hold(config.hold, robot)
@@ -90,6 +96,7 @@ class Teleop:
         self._t_seen = self._t_phone = -np.inf
         self._body = BodyImu(-np.inf, np.zeros(3), np.zeros(3))
         self._reference: Reference | None = None
+        self._led_to: Reference | None = None
         self._force_in_b = self._given_in_b = np.zeros(3)
 
     def tune(self, virtual_camera: VirtualCameraConfig) -> None:
@@ -109,6 +116,8 @@ class Teleop:
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
             self._tracking.feel(known, self._given_in_b, self._h)
+        if self._failsafe.mode == Mode.TRACK:
+            self._follow_back()
         error = self._error(known)  # Eq. (14)-(19)
         ages = Ages(
             inputs.t - self._operator.t,
@@ -123,12 +132,15 @@ class Teleop:
             known, error = self._change_mode(before, known)
         thrusts, saturated = self._act(known, error)
         self._given_in_b = self._robot.A[:3] @ thrusts - self._actuation.push_in_b[:3]
+        left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
         return Output(
             t=inputs.t,
             thrusts=thrusts,
-            armed=self._failsafe.mode in (Mode.TRACK, Mode.HOLD, Mode.RAMP),
+            armed=self._failsafe.mode in (*failsafe.FLYING, Mode.RAMP),
             failsafe=self._failsafe,
             refusals=failsafe.refusals(self._failsafe, judged, self._limits),
+            until_ramp_s=None if left_ms is None else 1e-3 * left_ms,
+            resumes=failsafe.resumes(self._failsafe, judged),
             relative=relative,
             R_fc=R_fc,
             view=known.view if known is not None else None,
@@ -177,6 +189,8 @@ class Teleop:
             return None
         p_ref_in_v = self._reference.p_rv_in_v if self._reference is not None else None
         self._virtual_camera.turn(self.attitude.take_turn())
+        if self._failsafe.mode == Mode.COAST:
+            return Situation(relative, R_fc, self._virtual_camera.still(relative, R_fc))
         view = self._virtual_camera.view(relative, R_fc, self._h, p_ref_in_v, self._half_field)
         return Situation(relative, R_fc, view)
 
@@ -193,11 +207,19 @@ class Teleop:
             held=self._operator.held,
             press=self._operator.press,
             fault=inputs.fault or judgement.fault(limits, is_tracking, known, error),
-            doubt=judgement.doubt(limits, known, self.estimator.complaint),
+            gap=inputs.gap,
+            doubt=judgement.doubt(limits, known, self.estimator.complaint) or self._astray(known),
             refusals=inputs.refusals,
             requests=inputs.requests,
             **ages.in_ms(),
         )
+
+    def _astray(self, known: Situation | None) -> str:
+        """Why it must not follow again by itself after a gap; empty if it may."""
+        if self._failsafe.mode != Mode.COAST or known is None or self._led_to is None:
+            return ""
+        near = resumption.is_near(self._config.resumption, self._led_to, known.relative)
+        return "" if near else "Too far from where it was led."
 
     def _change_mode(
         self, before: Mode, known: Situation | None
@@ -209,16 +231,26 @@ class Teleop:
             self._virtual_camera.reset()
             known = self._look(known.relative, known.R_fc) or known
             self._reference = Reference.here(known.view)
+            if before != Mode.COAST or self._led_to is None:
+                self._led_to = self._reference
             held_in_f = known.view.R_fv @ known.view.R_vb @ self._force_in_b
-            self._tracking.start(held_in_f if before == Mode.HOLD else None)
+            self._tracking.start(held_in_f if before != Mode.ARMED else None)
             return known, self._error(known)
         if before == Mode.TRACK and known is not None:
             R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
             self._hold.start(self._force_in_b, R_fb, u_in_f, self._tracking.constant_force_in_f)
         if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
             self._tracking.reset()
-        self._reference = None
+        if mode != Mode.COAST:
+            self._reference = self._led_to = None
         return known, None
+
+    def _follow_back(self) -> None:
+        """After a gap the reference goes to where it was led before, slowly: nothing jumps."""
+        reference, led_to = self._reference, self._led_to
+        if reference is None or led_to is None or reference is led_to:
+            return
+        self._reference = resumption.toward(self._config.resumption, reference, led_to, self._h)
 
     def _act(self, known: Situation | None, error: PoseError | None) -> tuple[Array, bool]:
         """Wrench of the mode, given by the thrusters, under the failsafe's ceiling."""
@@ -228,7 +260,7 @@ class Teleop:
             R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
             wrench_in_b = self._tracking.wrench(known, reference, error, self._h)  # Eq. (20)
             self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._h)
-        elif mode in (Mode.HOLD, Mode.RAMP):
+        elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
             wrench_in_b = self._hold.wrench(omega_m_bf_in_b, self._h)
             R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
         else:

@@ -162,7 +162,7 @@ def _loop(
         now = schedule.wait()
         cpu = time.thread_time()
         body = link.receive(now)
-        command, output = controller.tick(now, endpoint.inputs(), body, link.reason)
+        command, output = controller.tick(now, endpoint.inputs(), body, link.reason, link.gap)
         follower.send(command)
         cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (time.thread_time() - cpu)
         if schedule.ticks % LATENESS_EVERY == 0:

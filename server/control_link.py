@@ -18,6 +18,7 @@ from pipeline.expected import Expected
 from pipeline.frames import R_from_wxyz
 from pipeline.signals import Operator, PhoneImu
 from server.estimate import EstimateFields
+from server.gap_log import Gaps
 from server.knobs import Knobs, TuneInput
 from server.seen_input import SeenInput, Triple, triple
 
@@ -143,6 +144,14 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     guarding: float = 0.0
     """0 to 1: how much the virtual camera hurries to keep the robot in the picture."""
     estimate: EstimateFields | None = None
+    until_ramp_s: float | None = None
+    """In COAST and HOLD: left until RAMP if all goes on as it is."""
+    resumes: bool = False
+    """It will follow again by itself, if news come back in time."""
+    gaps: dict[str, Gaps] = {}
+    """Short silences of `phone`, `robot` and `server` (control stood still) in the last minute."""
+    warnings: list[str] = []
+    """What somebody who arms should know; refuses nothing."""
 
 
 def expected_of(status: ControlStatus) -> Expected | None:

@@ -24,6 +24,7 @@ from server.control_link import (
     RequestInput,
 )
 from server.estimate import EstimateFields, finite
+from server.gap_log import GapLog
 from server.knobs import Knobs, TuneInput, turned
 from server.seen_input import SeenInput, triple
 from server.tick_rate import TickRate
@@ -33,7 +34,7 @@ PERIOD_S = 0.005
 SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
 STOOD_STILL_S = 1e-6 * SILENCE_US
-"""Between two ticks: the robot has heard nothing for so long and goes to zero by itself."""
+"""Between two ticks: the robot has heard nothing for so long, and coasts."""
 
 
 TooLate = Callable[[float, float], str]
@@ -83,6 +84,9 @@ class Controller:
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = -np.inf
         self._t_tick, self._armed = np.inf, False
+        self._longest_gap_s = config.failsafe.gap
+        silent_s = config.failsafe.silent
+        self._gaps = GapLog({"phone": silent_s, "robot": STOOD_STILL_S, "server": STOOD_STILL_S})
         self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
         self._vertical = Vertical()
         self.omega_bf_in_b = np.zeros(3)
@@ -106,6 +110,7 @@ class Controller:
         messages: Iterable[Input],
         body: Sequence[BodyImu],
         robot_reason: str,
+        robot_gap: str = "",
     ) -> tuple[ThrustCommand, Output]:
         """One control period.
 
@@ -114,6 +119,7 @@ class Controller:
             messages: From the server, oldest first.
             body: The robot's samples on our clock, oldest first.
             robot_reason: Why the robot itself refuses thrust; empty if it doesn't. Ends a flight.
+            robot_gap: Why it does not follow for the moment. Ends no flight, while it is short.
         """
         phone, seen, operator, wishes = self._sort(messages, now)
         for sample in body:
@@ -121,6 +127,7 @@ class Controller:
             self._body_samples.append(
                 (sample.t, *triple(sample.omega_m_bf_in_b), *triple(sample.a_m_bf_in_b))
             )
+        stall_s = now - self._t_tick
         output = self.teleop.step(
             Inputs(
                 t=now,
@@ -130,10 +137,12 @@ class Controller:
                 operator=operator,
                 requests=wishes,
                 refusals=self._why_not(now, robot_reason),
-                fault=self._out_of_time(now) or (robot_reason if self._armed else ""),
+                fault=self._out_of_time(stall_s) or (robot_reason if self._armed else ""),
+                gap=_stood_still(stall_s) or robot_gap,
             )
         )
         self._t_tick, self._armed = now, output.failsafe.mode not in (Mode.DISARMED, Mode.STOPPED)
+        self._note_gaps(output, stall_s, robot_gap)
         if output.relative is not None:
             self.omega_bf_in_b = output.relative.omega_bf_in_b
         for one in seen:
@@ -175,13 +184,21 @@ class Controller:
         late = self._too_late(self._picture_age.value, self._body_age.value)
         return (*self._refusals, *(why for why in (robot_reason, self._unfit, late) if why))
 
-    def _out_of_time(self, now: float) -> str:
+    def _out_of_time(self, stall_s: float) -> str:
         """Said in its own words, or the robot would seem to be what was silent."""
-        gap = now - self._t_tick
-        slow = self._rate.complaint(gap)
-        if gap > STOOD_STILL_S:
-            return f"The server's computer stood still for {gap:.2f} s."
-        return slow
+        slow = self._rate.complaint(stall_s)
+        return _stood_still(stall_s) if stall_s > self._longest_gap_s else slow
+
+    def _note_gaps(self, output: Output, stall_s: float, robot_gap: str) -> None:
+        """Whose silence it was: while control stood still, nobody else could be heard."""
+        ages, stalled = output.ages, stall_s > STOOD_STILL_S
+        robot_s = max(ages.body_imu, STOOD_STILL_S + PERIOD_S if robot_gap else 0.0)
+        silent_s = {
+            "phone": 0.0 if stalled else max(ages.operator, ages.phone_imu),
+            "robot": 0.0 if stalled else robot_s,
+            "server": stall_s,
+        }
+        self._gaps.add(output.t, silent_s)
 
     def status(
         self,
@@ -236,7 +253,17 @@ class Controller:
             knobs=Knobs.of(self._virtual_camera),
             guarding=view.guarding if view else 0.0,
             estimate=EstimateFields.of(self._estimator_name, estimator, health, relative),
+            until_ramp_s=output.until_ramp_s,
+            resumes=output.resumes,
+            gaps=self._gaps.lately(),
+            warnings=self._gaps.warnings(),
         )
+
+
+def _stood_still(stall_s: float) -> str:
+    if stall_s <= STOOD_STILL_S:
+        return ""
+    return f"The server's computer stood still for {stall_s:.2f} s."
 
 
 def _norm(v: Array) -> float:

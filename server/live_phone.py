@@ -146,7 +146,7 @@ class LivePhone:
             await self.client.send(self.script.touch(now))
             if operator.presses != presses:
                 self.score.start(now, self._scored.pose)
-            counted = operator.mode == "TRACK"
+            counted = operator.mode in ("TRACK", "COAST")
             self.score.advance(now - EXPOSED_S, self._scored.pose, counted=counted)
             t += TOUCH_S
             await until(t)

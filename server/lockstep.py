@@ -170,7 +170,9 @@ class Lockstep:
         """What the control process does in a tick, and what its status leads to."""
         inbox, self._inbox = list(filter(is_believable, self.tamper(self._inbox))), []
         felt = self._link.receive(self.t)
-        command, output = self.controller.tick(self.t, inbox, felt, self._link.reason)
+        command, output = self.controller.tick(
+            self.t, inbox, felt, self._link.reason, self._link.gap
+        )
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._sight.expect(self.controller.expected(output))
         self.follower.send(command)

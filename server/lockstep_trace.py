@@ -16,9 +16,11 @@ from pipeline.teleop import Output
 
 @dataclass(slots=True)
 class Trace:
-    """What happened while tracking, one row a tick."""
+    """What happened while tracking, short gaps included, one row a tick."""
 
     t: list[float] = field(default_factory=list)
+    coasts: list[bool] = field(default_factory=list)
+    """In a gap."""
     error_in_f: list[Array] = field(default_factory=list)
     """Body minus intended place, along the controlled axes (3,) [m]."""
     turn: list[Array] = field(default_factory=list)
@@ -51,7 +53,7 @@ class Judge:
     def look(self, t: float, body: Pose, hand: Pose, output: Output) -> None:
         """Take the true poses of body and camera at `t` [s], and what control made of them."""
         trace = self.trace
-        if output.failsafe.mode != Mode.TRACK:
+        if output.failsafe.mode not in (Mode.TRACK, Mode.COAST):
             trace.left = output.failsafe.reason if self._intent is not None else ""
             return
         if self._intent is None:
@@ -59,6 +61,7 @@ class Judge:
         intended = self._intent.step(hand, self._period_s)
         offset_in_f, turn = missed_by(body, intended, self._axes)
         trace.t.append(t)
+        trace.coasts.append(output.failsafe.mode == Mode.COAST)
         trace.error_in_f.append(offset_in_f)
         trace.turn.append(turn)
         trace.intended_in_f.append(intended[1])

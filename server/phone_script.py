@@ -78,7 +78,7 @@ class VirtualOperator:
         if self.leaving or self.mode == "LOST":
             return False
         manners, waited = self._manners, t - self._since
-        if self.mode == "TRACK":
+        if self.mode in ("TRACK", "COAST"):
             return self._held
         if self.mode == "ARMED":
             waited -= manners.press_after_s

@@ -28,6 +28,10 @@ class BodyClock:
         self._excess[:] = np.inf
 
 
+RAMP_BEGUN_S = 0.05
+"""A robot that has just begun to ramp takes commands back: so long it may say so."""
+
+
 class RobotLink:
     """The robot's samples on our clock, and what it says against flying."""
 
@@ -38,7 +42,10 @@ class RobotLink:
         self._boot_id: int | None = None
         self._restarted = False
         self.reason = "The robot has not answered yet."
-        """Why it does not follow and will not by itself; empty while it coasts."""
+        """Why it does not follow and will not by itself; empty while it may."""
+        self.gap = ""
+        """Why it does not follow for the moment."""
+        self._t_ramp = np.inf
 
     def receive(self, now: float) -> list[BodyImu]:
         """The samples that have come since the last call."""
@@ -49,8 +56,20 @@ class RobotLink:
                 self._restarted = True
             self._boot_id = sample.boot_id
         if samples:
-            self.reason = self._reason(samples[-1])
+            self.reason, self.gap = self._reason(samples[-1]), ""
+            self._bear(samples[-1], now)
         return [self._clock.imu(sample, now) for sample in samples]
+
+    def _bear(self, last: BodySample, now: float) -> None:
+        """A robot that coasts, or has only just begun to ramp, may come back."""
+        if last.state != FollowerState.RAMP:
+            self._t_ramp = np.inf
+        elif not self._restarted:
+            self._t_ramp = min(self._t_ramp, now)
+            if now - self._t_ramp < RAMP_BEGUN_S:
+                self.reason, self.gap = "", self.reason
+        if last.state == FollowerState.COAST:
+            self.gap = EXPLANATIONS[Refusal.SILENT]
 
     def _reason(self, last: BodySample) -> str:
         """A robot that restarts refuses what we go on sending: the restart is what went wrong."""

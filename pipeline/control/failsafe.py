@@ -1,9 +1,28 @@
 """The failsafe machine: a pure function over integers, so that it can be searched exhaustively.
 
-DISARMED → ARMED → TRACK ⇄ HOLD → RAMP → DISARMED, and STOPPED from anywhere. Zero thrust is the
-safe state: the suspension carries the robot (a ramp of one pendulum period leaves hardly any swing,
-a cut leaves all of it), or the floor, to which a robot that flies sinks while its thrust goes.
-Three layers stand behind each other: this gate, the robot's own watchdog, a hard-wired power cut.
+| from | to | when |
+|---|---|---|
+| any other | STOPPED | STOP |
+| STOPPED | DISARMED | reset, with the button free |
+| DISARMED | ARMED | arm, and nothing speaks against it |
+| ARMED | TRACK | a press, all good for the recovery time |
+| ARMED | DISARMED | disarm, fault, doubt, silence longer than a gap, idle for too long |
+| TRACK | COAST | no news from phone or robot, or control stood still |
+| TRACK | HOLD | the finger has left, another press, the camera or the estimate is lost |
+| COAST | TRACK | all fresh for a moment, and the same press still held |
+| COAST | HOLD | the finger has left, another press, or longer than the longest gap |
+| HOLD | TRACK | another press, all good for the recovery time |
+| TRACK, COAST, HOLD | RAMP | fault, disarm, no word or no picture for too long |
+| HOLD | RAMP | held for as long as is allowed |
+| RAMP | DISARMED | its end |
+
+*No news* (COAST) is not *the finger has left* (HOLD): a gap ends by itself, a finger must press
+anew. A press is latched: made too early it counts once the recovery time has passed, if still held.
+
+Zero thrust is the safe state: the suspension carries the robot (a ramp of one pendulum period
+leaves hardly any swing, a cut leaves all of it), or the floor, to which a robot that flies sinks
+while its thrust goes. Three layers stand behind each other: this gate, the robot's own watchdog, a
+hard-wired power cut.
 """
 
 from __future__ import annotations
@@ -16,6 +35,7 @@ from pipeline.signals import Mode, Requests
 NO_REQUESTS = Requests()
 FOREVER_MS = 1_000_000
 """Ages and timers saturate here."""
+FLYING = (Mode.TRACK, Mode.COAST, Mode.HOLD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +44,13 @@ class Failsafe:
 
     mode: Mode = Mode.DISARMED
     mode_ms: int = 0
-    """Since the mode was entered."""
+    """Since the mode was entered; of a HOLD that a COAST became, since that began."""
     good_ms: int = 0
     """Since every input has been fresh and healthy without a gap."""
+    bad_ms: int = FOREVER_MS
+    """How long they were not, until they have recovered: 0 then."""
     press: int = 0
-    """The last press of the button that has been seen: only another one counts as new."""
+    """The last press of the button that is over, or led to TRACK: only another one counts."""
     reason: str = "Not armed."
 
 
@@ -45,6 +67,8 @@ class Inputs:
     phone_imu_ms: int
     robot_ms: int
     """Age of the robot's last sample."""
+    gap: str = ""
+    """A short silence that the ages don't show: whose."""
     fault: str = ""
     """Not healthy: why. Ends a flight."""
     doubt: str = ""
@@ -58,49 +82,92 @@ class Inputs:
 class Limits:
     """Timers [ms] of a configuration."""
 
-    hold: int
+    silent: int
+    fresh: int
+    coast: int
+    """The longest gap, less what had passed before COAST began, and what shows that it is over."""
     pose_arm: int
     pose_hold: int
-    ramp_start: int
+    robot_ramp: int
+    phone_ramp: int
     pose_ramp: int
     ramp: int
     hold_max: int
     recover: int
+    recover_short: int
+    short: int
+    """A `Failsafe.bad_ms` up to which `recover_short` is enough."""
     armed_idle: int
 
     @classmethod
-    def of(cls, config: FailsafeConfig, ramp_s: float, coasts: bool = True) -> Limits:
+    def of(
+        cls, config: FailsafeConfig, ramp_s: float, hangs: bool = True, bridges: bool = True
+    ) -> Limits:
         """Rounded to milliseconds.
 
-        `ramp_s` is the robot's; an estimator that `coasts` knows how long it can
-        do without pictures, one that doesn't gets no longer than arming.
+        Args:
+            config: Timers [s].
+            ramp_s: How long the robot's ramp lasts.
+            hangs: The robot hangs. Another one, without word from the phone, hovers by its own
+                sensors for as long as HOLD may last, and lands then.
+            bridges: The estimator knows how long it can do without pictures; one that doesn't gets
+                no longer than arming.
         """
-        ms = {name: round(1e3 * getattr(config, name)) for name in cls.__slots__ if name != "ramp"}
-        if not coasts:
-            ms |= {"pose_hold": ms["pose_arm"], "pose_ramp": ms["pose_arm"] + ms["ramp_start"]}
-        return cls(ramp=round(1e3 * ramp_s), **ms)
+        silent, fresh, gap = _ms(config.silent), _ms(config.fresh), _ms(config.gap)
+        pose_arm = _ms(config.pose_arm)
+        return cls(
+            silent=silent,
+            fresh=fresh,
+            coast=gap - silent + fresh,
+            pose_arm=pose_arm,
+            pose_hold=_ms(config.pose_hold) if bridges else pose_arm,
+            robot_ramp=gap,
+            phone_ramp=gap if hangs else FOREVER_MS,
+            pose_ramp=_ms(config.pose_ramp) if bridges else pose_arm + gap,
+            ramp=_ms(ramp_s),
+            hold_max=_ms(config.hold_max),
+            recover=_ms(config.recover),
+            recover_short=_ms(config.recover_short),
+            short=gap - silent,
+            armed_idle=_ms(config.armed_idle),
+        )
 
 
 def ceiling(state: Failsafe, limits: Limits) -> float:
     """Share of the controller's thrust that may reach the robot."""
-    if state.mode in (Mode.TRACK, Mode.HOLD):
+    if state.mode in FLYING:
         return 1.0
     if state.mode == Mode.RAMP:
         return max(0.0, 1.0 - state.mode_ms / limits.ramp)
     return 0.0
 
 
-def staleness(inputs: Inputs, limits: Limits) -> str:
-    """Which input is too old or unsure to track with, for who can mend it; empty if none."""
-    if inputs.robot_ms > limits.hold:
+def silence(inputs: Inputs, limits: Limits) -> str:
+    """Of whom there is no news; empty if of all. A gap, as long as it is short.
+
+    Who stood still could hear nobody: that is named first.
+    """
+    if inputs.gap:
+        return inputs.gap
+    if inputs.robot_ms > limits.silent:
         return "No word from the robot."
-    if inputs.operator_ms > limits.hold:
+    if inputs.operator_ms > limits.silent:
         return "No word from the phone."
-    if inputs.phone_imu_ms > limits.hold:
+    if inputs.phone_imu_ms > limits.silent:
         return "The phone's motion sensors are silent."
+    return ""
+
+
+def uncertainty(inputs: Inputs, limits: Limits) -> str:
+    """Why the robot's place is not sure enough to track; empty if it is."""
     if inputs.pose_ms > limits.pose_hold:
         return "The camera has lost the robot."
     return inputs.doubt
+
+
+def staleness(inputs: Inputs, limits: Limits) -> str:
+    """Which input is too old or unsure to track with, for who can mend it; empty if none."""
+    return silence(inputs, limits) or uncertainty(inputs, limits)
 
 
 def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]:
@@ -115,11 +182,31 @@ def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]
         why.append(stale or inputs.fault)
     elif inputs.pose_ms > limits.pose_arm:
         why.append("The camera does not see the robot.")
-    elif state.good_ms < limits.recover:
-        why.append("Just recovered: wait half a second.")
+    elif state.bad_ms > 0:
+        why.append("Just recovered: wait a moment.")
     if inputs.held:
         why.append("Let go of the button before arming.")
     return tuple(dict.fromkeys(why))
+
+
+def resumes(state: Failsafe, inputs: Inputs) -> bool:
+    """Whether it will follow again by itself, if news come back in time."""
+    if state.mode == Mode.COAST:
+        return inputs.held and inputs.press == state.press
+    return state.mode == Mode.HOLD and inputs.held and inputs.press != state.press
+
+
+def until_ramp(state: Failsafe, inputs: Inputs, limits: Limits) -> int | None:
+    """Time left [ms] until RAMP if all goes on as it is; None while it can go on for ever."""
+    if state.mode not in (Mode.COAST, Mode.HOLD):
+        return None
+    left = limits.hold_max - state.mode_ms
+    for age, limit in _endings(inputs, limits):
+        if age > limits.silent:
+            left = min(left, limit - age)
+    if inputs.pose_ms > limits.pose_hold:
+        left = min(left, limits.pose_ramp - inputs.pose_ms)
+    return max(0, left)
 
 
 def step(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsafe:
@@ -127,34 +214,53 @@ def step(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsaf
 
     A step longer than an input may be silent has seen nothing of what was good meanwhile.
     """
-    stale = staleness(inputs, limits)
-    good = not stale and not inputs.fault and dt_ms <= limits.hold
-    now = replace(
-        state,
-        mode_ms=min(state.mode_ms + dt_ms, FOREVER_MS),
-        good_ms=min(state.good_ms + dt_ms, FOREVER_MS) if good else 0,
-        press=inputs.press if inputs.held else state.press,
-    )
-    new_press = inputs.held and inputs.press != state.press and now.good_ms >= limits.recover
+    now = _timed(state, inputs, dt_ms, limits)
     if inputs.requests.stop and state.mode != Mode.STOPPED:
-        return _enter(now, Mode.STOPPED, "STOP was pressed.")
+        return _over(_enter(now, Mode.STOPPED, "STOP was pressed."), inputs)
     match state.mode:
         case Mode.STOPPED:
-            return _stopped(now, inputs)
+            return _over(_stopped(now, inputs), inputs)
         case Mode.DISARMED:
-            return _disarmed(now, inputs, limits)
-        case Mode.ARMED:
-            return _armed(now, inputs, limits, new_press, stale)
-        case Mode.TRACK | Mode.HOLD:
-            return _flying(now, inputs, limits, new_press, stale)
+            return _over(_disarmed(now, inputs, limits), inputs)
         case Mode.RAMP:
-            if now.mode_ms >= limits.ramp:
-                return _enter(now, Mode.DISARMED, state.reason)
-    return now
+            return _over(_ramp(now, limits), inputs)
+        case Mode.ARMED:
+            after = _armed(now, inputs, limits)
+        case Mode.TRACK:
+            after = _ending(now, inputs, limits) or _track(now, inputs, limits)
+        case Mode.COAST:
+            after = _ending(now, inputs, limits) or _coast(now, inputs, limits)
+        case Mode.HOLD:
+            after = _ending(now, inputs, limits) or _hold(now, inputs, limits)
+    if after.mode in (Mode.DISARMED, Mode.RAMP) or not inputs.held:
+        return _over(after, inputs)
+    return after
+
+
+def _timed(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsafe:
+    good = not staleness(inputs, limits) and not inputs.fault and dt_ms <= limits.silent
+    good_ms = min(state.good_ms + dt_ms, FOREVER_MS) if good else 0
+    bad_ms = state.bad_ms if good else min(state.bad_ms + max(dt_ms, 1), FOREVER_MS)
+    return replace(
+        state,
+        mode_ms=min(state.mode_ms + dt_ms, FOREVER_MS),
+        good_ms=good_ms,
+        bad_ms=0 if good_ms >= _recovery(state, limits) else bad_ms,
+    )
+
+
+def _recovery(state: Failsafe, limits: Limits) -> int:
+    """For how long all must have been good before a press counts."""
+    return limits.recover_short if state.bad_ms <= limits.short else limits.recover
 
 
 def _enter(state: Failsafe, mode: Mode, reason: str) -> Failsafe:
     return replace(state, mode=mode, mode_ms=0, reason=reason)
+
+
+def _over(state: Failsafe, inputs: Inputs) -> Failsafe:
+    """The button is free, or pressed where that means nothing: that press leads nowhere."""
+    return replace(state, press=inputs.press)
 
 
 def _stopped(now: Failsafe, inputs: Inputs) -> Failsafe:
@@ -169,37 +275,95 @@ def _disarmed(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
     return now
 
 
-def _armed(now: Failsafe, inputs: Inputs, limits: Limits, new_press: bool, stale: str) -> Failsafe:
-    if stale or inputs.fault:
-        return _enter(now, Mode.DISARMED, stale or inputs.fault)
+def _ramp(now: Failsafe, limits: Limits) -> Failsafe:
+    return _enter(now, Mode.DISARMED, now.reason) if now.mode_ms >= limits.ramp else now
+
+
+def _armed(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+    lost = silence(inputs, limits) if _is_lost(inputs, limits.robot_ramp) else ""
+    wrong = inputs.fault or lost or uncertainty(inputs, limits)
+    if wrong:
+        return _enter(now, Mode.DISARMED, wrong)
     if inputs.requests.disarm:
         return _enter(now, Mode.DISARMED, "Disarmed.")
     if now.mode_ms >= limits.armed_idle:
         return _enter(now, Mode.DISARMED, "Armed but not moved for a while.")
-    if new_press:
-        return _enter(now, Mode.TRACK, "Following the phone.")
-    return now
+    return _pressed(now, inputs) or now
 
 
-def _flying(now: Failsafe, inputs: Inputs, limits: Limits, new_press: bool, stale: str) -> Failsafe:
+def _is_lost(inputs: Inputs, limit: int) -> bool:
+    return max(inputs.robot_ms, inputs.operator_ms, inputs.phone_imu_ms) > limit
+
+
+def _pressed(now: Failsafe, inputs: Inputs) -> Failsafe | None:
+    """TRACK, if a press counts now."""
+    if inputs.held and inputs.press != now.press and now.bad_ms == 0:
+        return _enter(_over(now, inputs), Mode.TRACK, "Following the phone.")
+    return None
+
+
+def _endings(inputs: Inputs, limits: Limits) -> tuple[tuple[int, int], ...]:
+    """Ages, and beyond which of them a flight is over."""
+    return (
+        (inputs.robot_ms, limits.robot_ramp),
+        (max(inputs.operator_ms, inputs.phone_imu_ms), limits.phone_ramp),
+    )
+
+
+def _ending(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe | None:
+    """RAMP, if the flight is over."""
     if inputs.fault:
         return _enter(now, Mode.RAMP, inputs.fault)
-    if inputs.robot_ms > limits.hold:
-        return _enter(now, Mode.RAMP, stale)
+    if any(age > limit for age, limit in _endings(inputs, limits)):
+        return _enter(now, Mode.RAMP, silence(inputs, limits))
+    if inputs.pose_ms > limits.pose_ramp:
+        return _enter(now, Mode.RAMP, uncertainty(inputs, limits))
     if inputs.requests.disarm:
         return _enter(now, Mode.RAMP, "Disarmed.")
-    if now.mode == Mode.TRACK:
-        if stale:
-            return _enter(now, Mode.HOLD, stale)
-        if not inputs.held:
-            return _enter(now, Mode.HOLD, "Button released: press again to go on.")
-        return now
-    if max(inputs.operator_ms, inputs.phone_imu_ms) > limits.ramp_start:
-        return _enter(now, Mode.RAMP, stale)
-    if inputs.pose_ms > limits.pose_ramp:
-        return _enter(now, Mode.RAMP, stale)
-    if new_press:
+    return None
+
+
+def _let_go(now: Failsafe, inputs: Inputs) -> Failsafe | None:
+    """HOLD, if the finger has left the button, whether or not it is back."""
+    if not inputs.held:
+        why = "Button released: press again to go on."
+    elif inputs.press != now.press:
+        why = "Pressed again."
+    else:
+        return None
+    kept = now.mode_ms if now.mode == Mode.COAST else 0
+    return replace(_enter(now, Mode.HOLD, why), mode_ms=kept)
+
+
+def _track(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+    let_go = _let_go(now, inputs)
+    if let_go is not None:
+        return let_go
+    gap = silence(inputs, limits)
+    if gap:
+        return _enter(now, Mode.COAST, gap)
+    unsure = uncertainty(inputs, limits)
+    return _enter(now, Mode.HOLD, unsure) if unsure else now
+
+
+def _coast(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+    let_go = _let_go(now, inputs)
+    if let_go is not None:
+        return let_go
+    if now.good_ms >= limits.fresh:
         return _enter(now, Mode.TRACK, "Following the phone.")
-    if now.mode_ms >= limits.hold_max:
-        return _enter(now, Mode.RAMP, f"{now.reason} Held for as long as is allowed.")
+    if now.mode_ms >= limits.coast:
+        reason = staleness(inputs, limits) or now.reason
+        return replace(_enter(now, Mode.HOLD, reason), mode_ms=now.mode_ms)
     return now
+
+
+def _hold(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+    pressed = _pressed(now, inputs)
+    if pressed is None and now.mode_ms >= limits.hold_max:
+        return _enter(now, Mode.RAMP, f"{now.reason} Held for as long as is allowed.")
+    return pressed or now
+
+
+def _ms(seconds: float) -> int:
+    return round(1e3 * seconds)

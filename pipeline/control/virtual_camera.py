@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.config import VirtualCameraConfig
 from pipeline.control import virtual_camera_kernels as kernels
 from pipeline.control.cutoff import cutoff_hz
-from pipeline.frames import Array
+from pipeline.frames import Array, R_from_wxyz
 from pipeline.signals import RelativeState, VirtualView
 
 NO_LIMIT_M_S = 1e4
@@ -88,6 +88,22 @@ class VirtualCamera:
             v_bv_in_v=out[2],
             omega_bf_in_b=relative.omega_bf_in_b,
             guarding=self.guarding,
+        )
+
+    def still(self, relative: RelativeState, R_fc: Array) -> VirtualView:
+        """What it sees while it does not follow c: no step, no motion; call `view` before.
+
+        Its origin stays c's.
+        """
+        R_fv = R_from_wxyz(tuple(self._state[4:8].tolist()))
+        R_vc = R_fv.T @ R_fc
+        return VirtualView(
+            R_fv=R_fv,
+            omega_vf_in_v=NOWHERE,
+            p_bv_in_v=R_vc @ relative.p_bc_in_c,
+            R_vb=R_vc @ relative.R_cb,
+            v_bv_in_v=R_vc @ relative.u_bf_in_c,
+            omega_bf_in_b=relative.omega_bf_in_b,
         )
 
     def follow(

@@ -57,6 +57,9 @@ def control_status(**changes: object) -> ControlStatus:
         "fuse_ms": 90.0,
         "step_ms": 0.7,
         "guarding": 0.0,
+        "resumes": False,
+        "gaps": {},
+        "warnings": [],
     }
     return ControlStatus(**{**values, **changes})  # type: ignore[arg-type]
 

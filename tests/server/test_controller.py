@@ -27,6 +27,7 @@ from server.control_link import (
     server_end,
 )
 from server.controller import SERVER_SILENT_S, Controller
+from server.gap_log import MANY, SIDES
 from server.seen_input import SeenInput
 from server.tick_rate import OVER_S
 from tests.pipeline.seeing import seen_at
@@ -63,7 +64,11 @@ class Rig:
         return [*said, OperatorInput(t - 0.01, self.held, self.press)]
 
     def run(
-        self, seconds: float, extra: Sequence[Input] = (), robot_reason: str = ""
+        self,
+        seconds: float,
+        extra: Sequence[Input] = (),
+        robot_reason: str = "",
+        robot_gap: str = "",
     ) -> list[tuple[ThrustCommand, Output]]:
         """`extra` comes in the first tick."""
         out = []
@@ -72,7 +77,7 @@ class Rig:
             t = 100.0 + 0.005 * self.k
             said = [*self.said(t), *(extra if step == 0 else ())]
             body = [BodyImu(t - 0.003, np.zeros(3), np.array(UP))]
-            out.append(self.controller.tick(t, said, body, robot_reason))
+            out.append(self.controller.tick(t, said, body, robot_reason, robot_gap))
         return out
 
     def track(self) -> None:
@@ -153,10 +158,10 @@ def test_a_silent_server_ends_a_flight_in_a_ramp():
     rig.track()
     rig.said = lambda t: []  # type: ignore[method-assign]
     limits = TeleopConfig().failsafe
-    seconds = limits.ramp_start + ROBOT.ramp_s + 0.2
+    seconds = limits.gap + ROBOT.ramp_s + 0.2
     modes = [output.failsafe.mode for _, output in rig.run(seconds)]
     order = [mode for mode, before in zip(modes, [None, *modes], strict=False) if mode != before]
-    assert order == [Mode.TRACK, Mode.HOLD, Mode.RAMP, Mode.DISARMED]
+    assert order == [Mode.TRACK, Mode.COAST, Mode.RAMP, Mode.DISARMED]
 
 
 def test_a_robot_that_refuses_ends_a_flight_with_its_own_reason():
@@ -191,18 +196,75 @@ def test_a_stall_before_arming_is_a_refusal_that_passes():
     rig.k += 14
     (refused,) = rig.run(0.005)[-1][1].refusals
     assert "stood still" in refused
-    assert rig.run(0.1)[-1][1].refusals == ("Just recovered: wait half a second.",)
+    assert rig.run(0.1)[-1][1].refusals == ("Just recovered: wait a moment.",)
     assert rig.run(0.5)[-1][1].refusals == ()
 
 
-@pytest.mark.parametrize(("ticks", "mode"), [(11, Mode.TRACK), (13, Mode.RAMP), (60, Mode.RAMP)])
-def test_a_server_that_stood_still_longer_than_the_robot_waits_says_so(ticks: int, mode: Mode):
+@pytest.mark.parametrize(
+    ("ticks", "mode", "then"),
+    [
+        (11, Mode.TRACK, Mode.TRACK),
+        (13, Mode.COAST, Mode.TRACK),
+        (180, Mode.COAST, Mode.TRACK),
+        (202, Mode.RAMP, Mode.RAMP),
+    ],
+)
+def test_a_server_that_stood_still_is_borne_as_a_gap_or_ends_the_flight_and_says_so(
+    ticks: int, mode: Mode, then: Mode
+):
     rig = Rig()
     rig.track()
     rig.k += ticks - 1
-    reason = rig.run(0.005)[-1][1].failsafe.reason
-    assert (f"stood still for {0.005 * ticks:.2f} s" in reason) == (mode == Mode.RAMP)
-    assert rig.run(0.1)[-1][1].failsafe.mode == mode
+    state = rig.run(0.005)[-1][1].failsafe
+    assert (f"stood still for {0.005 * ticks:.2f} s" in state.reason) == (mode != Mode.TRACK)
+    assert state.mode == mode
+    fresh = TeleopConfig().failsafe.fresh
+    assert rig.run(fresh - 0.01)[-1][1].failsafe.mode == mode
+    assert rig.run(0.04)[-1][1].failsafe.mode == then
+
+
+def test_a_robot_that_hears_nothing_for_a_moment_is_waited_for():
+    rig = Rig()
+    rig.track()
+    output = rig.run(0.1, robot_gap="The robot coasts.")[-1][1]
+    assert (output.failsafe.mode, output.failsafe.reason) == (Mode.COAST, "The robot coasts.")
+    assert output.resumes
+    assert rig.run(0.2)[-1][1].failsafe.mode == Mode.TRACK
+
+
+def test_a_status_tells_how_long_it_waits_and_whose_gaps_there_were():
+    rig = Rig()
+    rig.track()
+    hears = rig.said
+    rig.said = lambda t: []  # type: ignore[method-assign]
+    status = rig.status(rig.run(0.4)[-1][1])
+    assert status.mode == Mode.COAST
+    assert status.resumes
+    assert status.until_ramp_s == pytest.approx(TeleopConfig().failsafe.gap - 0.4, abs=0.03)
+    rig.said = hears  # type: ignore[method-assign]
+    rig.run(0.1, robot_gap="The robot coasts.")
+    rig.k += 40
+    status = rig.status(rig.run(0.5)[-1][1])
+    assert status.mode == Mode.TRACK
+    assert status.until_ramp_s is None
+    assert not status.resumes
+    assert {side: gaps.count for side, gaps in status.gaps.items()} == dict.fromkeys(SIDES, 1)
+    assert status.gaps["phone"].longest_s == pytest.approx(0.42, abs=0.03)
+    assert status.gaps["server"].longest_s == pytest.approx(0.205)
+    assert status.warnings == []
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
+
+
+def test_a_link_with_six_gaps_a_minute_warns_whoever_arms():
+    rig = Rig()
+    rig.run(1.0)
+    for _ in range(MANY):
+        rig.k += 20
+        status = rig.status(rig.run(0.6)[-1][1])
+    assert status.warnings == [
+        "Control stood still 6 times in the last minute, the longest 0.10 s."
+    ]
+    assert status.refusals == []
 
 
 def test_what_is_no_number_never_reaches_the_state_by_a_datagram(tmp_path):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware.follower import EXPLANATIONS, BodySample, FollowerState, Refusal, ThrustCommand
-from server.robot_link import BodyClock, RobotLink
+from server.robot_link import RAMP_BEGUN_S, BodyClock, RobotLink
 
 
 def sample(
@@ -92,7 +92,28 @@ def test_a_robot_that_restarted_says_so_until_it_is_ready_whatever_else_it_refus
         link.receive(1.0)
         reasons.append(link.reason)
     started = EXPLANATIONS[Refusal.STARTED]
-    assert reasons == ["", started, started, "", EXPLANATIONS[Refusal.SILENT]]
+    assert reasons == ["", started, started, "", ""]
+    assert link.gap == EXPLANATIONS[Refusal.SILENT]
+
+
+def test_a_robot_that_coasts_or_has_only_just_begun_to_ramp_has_nothing_against_flying_on() -> None:
+    follower, told = Script(), []
+    link = RobotLink(follower)
+    silent = EXPLANATIONS[Refusal.SILENT]
+    for state, at in [
+        (FollowerState.COAST, 1.0),
+        (FollowerState.RAMP, 1.2),
+        (FollowerState.RAMP, 1.2 + 0.9 * RAMP_BEGUN_S),
+        (FollowerState.RAMP, 1.2 + 1.1 * RAMP_BEGUN_S),
+        (FollowerState.RUNNING, 2.0),
+        (FollowerState.RAMP, 3.0),
+    ]:
+        refusal = Refusal.NONE if state == FollowerState.RUNNING else Refusal.SILENT
+        follower.next = [sample(1_000, state, refusal)]
+        link.receive(at)
+        told.append((link.reason, link.gap))
+    bears, ended, well = ("", silent), (silent, ""), ("", "")
+    assert told == [bears, bears, bears, ended, well, bears]
 
 
 def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
@@ -104,6 +125,9 @@ def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
         for state in FollowerState:
             follower.next = [sample(1_000, state, refusal)]
             link.receive(1.0)
+            link.receive(1.0 + RAMP_BEGUN_S)
+            follower.next = [sample(1_000, state, refusal)]
+            link.receive(1.0 + RAMP_BEGUN_S)
             refuses = state in (FollowerState.RAMP, FollowerState.REFUSING)
             assert link.reason == (EXPLANATIONS[refusal] if refuses else "")
     follower.next = []

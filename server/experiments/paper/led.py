@@ -79,21 +79,22 @@ class Led:
         self._poses.append((now, self.plant.wxyz_fb, self.plant.p_bf_in_f))
         felt, seen = self._rig.arrivals(before, now, self._robot_at)
         body = self._link.receive(now)
-        tracking = self.tracks
+        held = self._mode in (Mode.ARMED, Mode.TRACK, Mode.COAST)
         inputs = Inputs(
             t=now,
             phone_imu=tuple(felt),
             body_imu=tuple(body),
             seen=tuple(seen),
-            operator=Operator(now, held=self._mode in (Mode.ARMED, Mode.TRACK), press=1),
+            operator=Operator(now, held, press=int(held)),
             requests=Requests(arm=self._ready),
+            gap=self._link.gap,
             refusals=(self._link.reason,) if self._link.reason else (),
             fault=self._link.reason if self._mode is not Mode.DISARMED else "",
         )
         output = self._teleop.step(inputs)
         self._mode = output.failsafe.mode
         self._ready = self._mode is Mode.DISARMED and not output.refusals
-        if tracking and not self.tracks:
+        if self._mode in (Mode.HOLD, Mode.RAMP) and not self.ended:
             self.ended = output.failsafe.reason
         self._follower.send(ThrustCommand(output.thrusts, output.armed))
         offset = self._teleop.estimator.health.time_offset

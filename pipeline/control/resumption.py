@@ -1,0 +1,34 @@
+"""Following again after a gap: from where the robot is, slowly back to where the phone has it."""
+
+from __future__ import annotations
+
+from math import exp as exponential
+
+import numpy as np
+
+from pipeline.config import ResumptionConfig
+from pipeline.control.pid import Reference
+from pipeline.frames import exp, log
+from pipeline.signals import RelativeState
+
+
+def is_near(config: ResumptionConfig, led_to: Reference, relative: RelativeState) -> bool:
+    """Whether the robot is still about where it was led to, seen from the phone as it is now."""
+    offset_in_c = led_to.p_rv_in_v - relative.p_bc_in_c
+    turn = log(relative.R_cb.T @ led_to.R_vr)
+    return bool(
+        float(offset_in_c @ offset_in_c) <= config.max_offset_m**2
+        and float(turn @ turn) <= config.max_offset_rad**2
+    )
+
+
+def toward(
+    config: ResumptionConfig, reference: Reference, led_to: Reference, h: float
+) -> Reference:
+    """The reference after another `h` [s] on its way to `led_to`; no faster than is allowed."""
+    share = 1.0 - exponential(-h / config.settle_s)
+    offset_in_v = led_to.p_rv_in_v - reference.p_rv_in_v
+    turn = log(reference.R_vr.T @ led_to.R_vr)
+    way = min(share, h * config.max_speed_m_s / max(float(np.linalg.norm(offset_in_v)), 1e-9))
+    part = min(share, h * config.max_rate_rad_s / max(float(np.linalg.norm(turn)), 1e-9))
+    return Reference(reference.p_rv_in_v + way * offset_in_v, reference.R_vr @ exp(part * turn))
