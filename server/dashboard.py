@@ -1,7 +1,8 @@
 """The 3D view: control's status → viser. Nothing but this file knows viser.
 
-It only shows. It has no button, listens on the loopback interface, opens no tunnel, and browsers
-reach it through `server.view_proxy` alone.
+It only shows. It has no button, opens no tunnel, and listens at a unix socket: a port of the
+loopback interface would be open to every page in a browser of this machine, for viser asks for no
+Origin. Browsers reach it through `server.view_proxy` alone.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +22,7 @@ from pipeline.frames import Array
 from pipeline.robot import Robot
 from server import scene
 from server.control_link import ControlStatus
+from server.private_listening import listening_at
 from server.scene import BODY, CABLE, LED, PHONE, STALE, STEADY, THRUST, TRAIL, Colour
 
 Thumbnail = npt.NDArray[np.uint8]
@@ -38,19 +41,36 @@ class _Viser(viser.ViserServer):
         return None
 
 
+def start_viser(path: Path) -> _Viser:
+    """A viser that listens at the unix socket `path` alone.
+
+    Raises:
+        RuntimeError: it listens elsewhere; this viser is not the one that was locked.
+    """
+    path.unlink(missing_ok=True)
+    with listening_at(path):
+        started = _Viser(host="127.0.0.1", port=0, label="Lightleash", verbose=False)
+    if not path.is_socket():
+        started.stop()
+        raise RuntimeError(f"viser {viser.__version__} does not listen at {path}")
+    path.chmod(0o600)
+    return started
+
+
 class Dashboard:
     """A scene that follows the status of control, for any number of browsers."""
 
-    def __init__(self, robot: Robot, plant: PlantParameters, start: StartParameters) -> None:
-        """Serve an empty scene on a free `port` of the loopback interface.
+    def __init__(
+        self, robot: Robot, plant: PlantParameters, start: StartParameters, path: Path
+    ) -> None:
+        """Serve an empty scene at the unix socket `path`.
 
         `plant` gives the robot its looks: thrusters, cable, feet. How far below the phone the
         floor is nobody knows: a robot that stands is taken to do so where it would `start`.
         """
         rich.get_console().quiet = True  # only viser speaks through it
         craft = scene.Craft.of(robot, plant)
-        self._viser = _Viser(host="127.0.0.1", port=0, label="Lightleash", verbose=False)
-        self.port = self._viser.get_port()
+        self._viser = start_viser(path)
         self._trail = scene.Trail()
         self._heading = scene.Heading()
         self._craft, self._is_fresh = craft, False

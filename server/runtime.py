@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import IO
 
 RUN_FILE = "lightleash-run.json"
+VIEW_SOCKET = "view.sock"
+"""Of the 3D view."""
 
 
 class BusyError(RuntimeError):

@@ -28,7 +28,7 @@ from server.recorder import Recordings
 from server.recording import ROBOT_KEY, SETTINGS_KEY
 from server.recording_files import recover_all
 from server.rtc.desk import RtcDesk
-from server.runtime import RUN_FILE, write_private
+from server.runtime import RUN_FILE, VIEW_SOCKET, write_private
 from server.security import Doors, Guard
 from server.settings import Settings
 from server.tls import Certificate, certificate, own_addresses, own_names
@@ -69,11 +69,12 @@ async def serve(settings: Settings, given: Given) -> None:
     doors = Doors(given.secret)
     warming = warm_up.begin()
     hub = _hub(settings, given)
-    dashboard = _dashboard(settings, hub)
+    view = given.runtime / VIEW_SOCKET
+    dashboard = _dashboard(settings, hub, view)
     base = base_url(settings.host, given.https.getsockname()[1])
     api = Api(hub, doors, f"{base}/#k={doors.operator_token}", tls.authority)
     desk = RtcDesk(hub, settings.rtc, settings.video.bitrate_bps)
-    routes = [*view_routes(lambda: dashboard.port), *desk.routes()]
+    routes = [*view_routes(view), *desk.routes()]
     app = make_app(api, PageServer(hub, settings.video), routes)
     admission = Admission(limits_for(raise_handles()))
     guarded = Guard(app, doors, [*own_names(), *settings.names], admission)
@@ -115,9 +116,9 @@ def _hub(settings: Settings, given: Given) -> Hub:
     return Hub(given.runtime, robot, cameras, recordings, profiles)
 
 
-def _dashboard(settings: Settings, hub: Hub) -> Dashboard:
+def _dashboard(settings: Settings, hub: Hub, view: Path) -> Dashboard:
     robot_file = load_robot(settings.robot)
-    dashboard = Dashboard(robot_file.robot, robot_file.plant, robot_file.start)
+    dashboard = Dashboard(robot_file.robot, robot_file.plant, robot_file.start, view)
     dashboard.start(lambda: (hub.status, hub.last_thumbnail))
     return dashboard
 

@@ -1,25 +1,27 @@
 """The 3D view under our own door: its page, and a socket that lets only cameras up.
 
-viser has no login, takes every message from everybody and can open a public tunnel. So browsers
-never reach it: they reach `/view/`, behind the app's guard, and of what they send only the pose of
-their own viewpoint goes on, decoded, checked and encoded anew.
+viser has no login, takes every message from everybody and can open a public tunnel. So it listens
+at a unix socket in a private directory, where no browser and no other user reaches it. Browsers
+reach `/view/`, behind the app's guard, and of what they send only the pose of their own viewpoint
+goes on, decoded, checked and encoded anew.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from functools import cache
 from importlib.resources import files
 from math import isfinite
+from pathlib import Path
 
 import msgspec
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
-from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.client import ClientConnection, unix_connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.typing import Subprotocol
 
@@ -59,11 +61,11 @@ _decoder = msgspec.msgpack.Decoder(ViewerCamera)
 _encoder = msgspec.msgpack.Encoder()
 
 
-def routes(port: Callable[[], int]) -> list[BaseRoute]:
-    """Page and socket of the viser server that listens at `port()` on the loopback interface."""
+def routes(viser: Path) -> list[BaseRoute]:
+    """Page and socket of the viser server that listens at the unix socket `viser`."""
 
     async def pipe(socket: WebSocket) -> None:
-        await _pipe(socket, port())
+        await _pipe(socket, viser)
 
     # viser's page drops the slash when it makes its socket's address.
     return [
@@ -97,13 +99,13 @@ def camera_only(data: bytes) -> bytes | None:
     return _encoder.encode(camera)
 
 
-async def _pipe(socket: WebSocket, port: int) -> None:
+async def _pipe(socket: WebSocket, path: Path) -> None:
     offered = [name for name in socket.scope["subprotocols"] if name.startswith(SUBPROTOCOL)]
     if not offered:
         await _deny(socket, 400, f"subprotocol: {SUBPROTOCOL}<version>")
         return
     try:
-        async with _viser(port, Subprotocol(offered[0])) as viser:
+        async with _viser(path, Subprotocol(offered[0])) as viser:
             await socket.accept(subprotocol=viser.subprotocol)
             await _both_ways(socket, viser)
     except (OSError, TimeoutError, WebSocketException):
@@ -111,15 +113,15 @@ async def _pipe(socket: WebSocket, port: int) -> None:
 
 
 @contextlib.asynccontextmanager
-async def _viser(port: int, subprotocol: Subprotocol) -> AsyncIterator[ClientConnection]:
-    """A connection to the loopback server; never through a proxy of the environment."""
-    async with connect(
-        f"ws://127.0.0.1:{port}/",
+async def _viser(path: Path, subprotocol: Subprotocol) -> AsyncIterator[ClientConnection]:
+    """A connection to it."""
+    async with unix_connect(
+        str(path),
+        "ws://viser/",
         subprotocols=[subprotocol],
         compression=None,
         max_size=MAX_DOWN_BYTES,
         max_queue=4,
-        proxy=None,
         open_timeout=OPEN_S,
         close_timeout=CLOSE_S,
         ping_interval=None,

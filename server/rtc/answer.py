@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from ipaddress import ip_address
 
+from server.rtc.candidates import LOCAL_NAME
 from server.wire import WireError
 from server.wire_records import Codec
 
@@ -20,7 +21,6 @@ CANDIDATE = re.compile(
     r"a=candidate:[\w+/=-]{1,64} [12] (?i:udp|tcp) \d{1,10} (\S{1,64}) (\d{1,5}) "
     r"typ (host|srflx|prflx|relay)( .*)?"
 )
-LOCAL_NAME = re.compile(r"[0-9a-fA-F-]{36}\.local")
 CREDENTIAL = re.compile(r"a=ice-(?:ufrag:[\w+/-]{4,64}|pwd:[\w+/-]{22,256})")
 FINGERPRINT = re.compile(r"a=fingerprint:(?i:sha-(?:256|384|512)) [0-9A-Fa-f:]{95,191}")
 SETUP = ("a=setup:active", "a=setup:passive")

@@ -32,6 +32,11 @@ OFF = "WebRTC is switched off (rtc.enabled): use the websockets"
 _ask, _answer = msgspec.json.Decoder(Ask), msgspec.json.Decoder(Answer)
 
 
+def address_of(request: Request) -> str:
+    """Where it came from."""
+    return request.client.host if request.client is not None else ""
+
+
 class RtcDesk:
     """At most one connection: that of the phone that leads."""
 
@@ -84,7 +89,7 @@ class RtcDesk:
         if link is None or link.id != answer.id:
             return refusal(404, "id", "of the newest offer")
         try:
-            await link.peer.answer(answer.sdp)
+            await link.peer.answer(answer.sdp, address_of(request))
         except WireError as error:
             log.warning("an answer is refused: %s", error)
             self._gone(link)

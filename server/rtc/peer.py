@@ -18,13 +18,14 @@ from aiortc import (
 from aiortc.exceptions import InvalidAccessError, InvalidStateError, OperationError
 from aiortc.rtcrtpparameters import RTCRtpCodecCapability
 
+from server.rtc import candidates, stun
 from server.rtc.answer import check_answer
 from server.rtc.bitstream import begins_key
 from server.rtc.intake import Intake
 from server.rtc.jitter import Assembled
 from server.rtc.offer import bitrates, tuned
-from server.rtc.stun import build_wall
 from server.settings import RtcSettings
+from server.tls import own_addresses
 from server.wire import WireError
 from server.wire_records import Codec
 
@@ -40,7 +41,8 @@ AIORTC_REFUSALS = (InvalidStateError, InvalidAccessError, OperationError)
 """What aiortc raises of a description it can't use: it asserts where it should check."""
 for name in ("aiortc", "aioice"):
     logging.getLogger(name).setLevel(logging.ERROR)  # they tell of every packet and candidate
-build_wall()
+stun.build_wall()
+candidates.build_wall()
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,7 @@ class Peer:
         """Nothing is sent before `offer`."""
         self._listener, self._bitrate_bps = listener, bitrate_bps
         self._codecs: dict[int, Codec] = {}
+        self._has_relay = bool(settings.turn_url)
         servers = [RTCIceServer(**server) for server in settings.ice_servers()]
         self._connection = RTCPeerConnection(
             RTCConfiguration(iceServers=servers, bundlePolicy=RTCBundlePolicy.MAX_BUNDLE)
@@ -87,8 +90,8 @@ class Peer:
         await self._connection.setLocalDescription(await self._connection.createOffer())
         return tuned(self._connection.localDescription.sdp, bitrates(self._bitrate_bps))
 
-    async def answer(self, sdp: str) -> None:
-        """Connect to the page that answers so.
+    async def answer(self, sdp: str, source: str) -> None:
+        """Connect to the page that answers so, from the address `source`.
 
         Raises:
             WireError: it is no answer to our offer, or the second one.
@@ -98,6 +101,7 @@ class Peer:
             raise WireError("order", "sdp", "one answer to one offer")
         self._codecs = codecs
         try:
+            sdp = candidates.reachable(sdp, source, own_addresses(), self._has_relay)
             description = RTCSessionDescription(sdp=sdp, type="answer")
             await self._connection.setRemoteDescription(description)
         except (*REFUSALS, *AIORTC_REFUSALS) as error:

@@ -150,7 +150,7 @@ class House:
         self.doors = Doors()
         self.api = Api(self.hub, self.doors, "https://robot.lan:8443/#k=abc", None)
         pages = PageServer(self.hub, VideoSettings())
-        self.inner = make_app(self.api, pages, view_routes(lambda: 9))
+        self.inner = make_app(self.api, pages, view_routes(Path("nowhere")))
         self.app = Guard(self.inner, self.doors, [HOST, "robot.lan", "::1"])
         self.port = 0
 

@@ -52,7 +52,7 @@ class LiveServer:
         self.api = Api(self.hub, self.doors, "https://robot.lan:8443/#k=x", None)
         pages = PageServer(self.hub, VideoSettings())
         desk = RtcDesk(self.hub, RtcSettings(), 3_000_000)
-        self.app = make_app(self.api, pages, [*view_routes(lambda: 1), *desk.routes()])
+        self.app = make_app(self.api, pages, [*view_routes(Path("nowhere")), *desk.routes()])
         self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"])
 
     def close(self) -> None:

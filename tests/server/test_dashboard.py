@@ -149,8 +149,9 @@ def test_meshes_are_closed():
 
 
 @pytest.fixture(scope="module")
-def dashboard():
-    dashboard = Dashboard(AMES.robot, AMES.plant, AMES.start)
+def dashboard(tmp_path_factory):
+    path = tmp_path_factory.mktemp("view") / "view.sock"
+    dashboard = Dashboard(AMES.robot, AMES.plant, AMES.start, path)
     yield dashboard
     dashboard.stop()
 
@@ -168,8 +169,8 @@ def test_the_scene_follows_the_status(dashboard):
     assert dashboard._phone.visible
 
 
-def test_a_robot_without_a_cable_is_shown_with_its_thrusts():
-    dashboard = Dashboard(QUADROTOR.robot, QUADROTOR.plant, QUADROTOR.start)
+def test_a_robot_without_a_cable_is_shown_with_its_thrusts(tmp_path):
+    dashboard = Dashboard(QUADROTOR.robot, QUADROTOR.plant, QUADROTOR.start, tmp_path / "view.sock")
     dashboard.show(status(thrusts=[2.0, 3.0, 4.0, 5.0]), None)
     assert dashboard._robot.visible
     assert dashboard._thrusts.points.shape == (4, 2, 3)
@@ -210,14 +211,13 @@ def test_an_update_is_cheap(dashboard):
     assert (time.thread_time() - start) / len(statuses) < 0.004
 
 
-def test_nobody_looking_costs_nothing_and_the_thread_ends(dashboard, capfd):
-    idle = Dashboard(AMES.robot, AMES.plant, AMES.start)
+def test_nobody_looking_costs_nothing_and_the_thread_ends(dashboard, tmp_path, capfd):
+    idle = Dashboard(AMES.robot, AMES.plant, AMES.start, tmp_path / "view.sock")
     asked = []
     idle.start(lambda: (asked.append(1), None))
     idle.stop()
     assert not asked
     assert not idle._thread.is_alive()
-    assert idle.port != dashboard.port
     assert capfd.readouterr().out == ""
 
 

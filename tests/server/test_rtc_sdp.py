@@ -19,6 +19,7 @@ from server.settings import RtcSettings
 from server.wire import WireError
 from server.wire_records import Codec
 
+SOURCE = "127.0.0.1"
 SILENT = Listener(*[lambda *_: None] * 5)
 
 
@@ -136,9 +137,9 @@ def test_hostile_answers_are_refused_with_a_reason(name, descriptions):
 
 def test_an_offer_is_answered_once():
     async def twice(peer, answer):
-        await peer.answer(answer)
+        await peer.answer(answer, SOURCE)
         with pytest.raises(WireError, match="one answer"):
-            await peer.answer(answer)
+            await peer.answer(answer, SOURCE)
 
     talk(answering=twice)
 
@@ -171,7 +172,7 @@ def test_mutilated_answers_are_taken_or_refused_with_a_reason(descriptions):
         peer = Peer(RtcSettings(), 3_000_000, SILENT)
         try:
             await peer.offer()
-            await peer.answer(sdp)
+            await peer.answer(sdp, SOURCE)
         except WireError:
             return False
         finally:
@@ -203,6 +204,6 @@ def test_a_stun_attribute_shorter_than_its_number_is_refused():
 def test_what_only_aiortc_finds_wrong_is_refused_too():
     async def broken(peer, answer):
         with pytest.raises(WireError, match="an answer to the offer"):
-            await peer.answer(answer.replace("a=mid:0", "a=mid:7"))
+            await peer.answer(answer.replace("a=mid:0", "a=mid:7"), SOURCE)
 
     talk(answering=broken)

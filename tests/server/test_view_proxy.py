@@ -1,8 +1,12 @@
 """Real viser, real uvicorn, real sockets on the loopback interface."""
 
 import asyncio
+import contextlib
+import os
 import socket
+import sys
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import msgspec
@@ -12,11 +16,12 @@ import viser
 from starlette.applications import Starlette
 from starlette.testclient import TestClient
 from viser._messages import GuiUpdateMessage, ShareUrlRequest
-from websockets.asyncio.client import connect
-from websockets.asyncio.server import serve
+from websockets.asyncio.client import connect, unix_connect
+from websockets.asyncio.server import unix_serve
 from websockets.exceptions import InvalidStatus
 
-from server.dashboard import _Viser
+from server import dashboard
+from server.dashboard import start_viser
 from server.view_proxy import MAX_UP_BYTES, camera_only, routes
 
 pytestmark = pytest.mark.slow  # a real viser
@@ -44,16 +49,20 @@ class Rig(SimpleNamespace):
             {"type": "GuiUpdateMessage", "uuid": self.button_uuid, "updates": {"value": True}}
         )
 
-    def open(self, path="/view", port=None, **options):
-        url = f"ws://127.0.0.1:{port or self.port}{path}"
+    def open(self, path="/view", **options):
+        url = f"ws://127.0.0.1:{self.port}{path}"
         return connect(url, **{"subprotocols": [SUBPROTOCOL], "proxy": None} | options)
+
+    def open_inside(self, _path):
+        return unix_connect(str(self.viewer_path), subprotocols=[SUBPROTOCOL])
 
 
 @pytest.fixture(scope="module")
-def rig():
+def rig(tmp_path_factory):
     """A viser with a button, and the proxy before it; keeps what viser hears."""
-    viewer = _Viser(host="127.0.0.1", port=0, verbose=False)
-    rig = Rig(viewer=viewer, heard=[], connected=threading.Event(), cameras=[])
+    path = tmp_path_factory.mktemp("viewer") / "view.sock"
+    viewer = start_viser(path)
+    rig = Rig(viewer_path=path, viewer=viewer, heard=[], connected=threading.Event(), cameras=[])
     rig.button_uuid = viewer.gui.add_button("do not press")._impl.uuid
     for kind in (GuiUpdateMessage, ShareUrlRequest):
         viewer._websock_server.register_handler(
@@ -66,8 +75,8 @@ def rig():
         rig.connected.set()
 
     listening = socket.create_server(("127.0.0.1", 0))
-    rig.port, rig.viewer_port = listening.getsockname()[1], viewer.get_port()
-    app = Starlette(routes=routes(lambda: rig.viewer_port))
+    rig.port = listening.getsockname()[1]
+    app = Starlette(routes=routes(path))
     server = uvicorn.Server(uvicorn.Config(app, log_level="critical"))
     thread = threading.Thread(target=server.run, args=([listening],))
     thread.start()
@@ -80,7 +89,7 @@ def rig():
 
 
 def client():
-    return TestClient(Starlette(routes=routes(lambda: 1)))
+    return TestClient(Starlette(routes=routes(Path("nowhere"))))
 
 
 @pytest.mark.parametrize("path", ["/view", "/view/"])
@@ -136,11 +145,11 @@ def test_a_long_viewpoint_does_not_pass():
     assert camera_only(encode(CAMERA) + bytes(MAX_UP_BYTES)) is None
 
 
-async def forge(rig, port, path):
+async def forge(rig, open_it, path):
     """Send what a viewer must not, then a viewpoint: viser hears messages in order."""
     rig.connected.clear()
     rig.heard.clear()
-    async with rig.open(path, port) as browser:
+    async with open_it(path) as browser:
         assert browser.subprotocol == SUBPROTOCOL
         assert len(await browser.recv()) > 100  # the scene
         await browser.send(rig.press())
@@ -151,14 +160,14 @@ async def forge(rig, port, path):
 
 @pytest.mark.parametrize("path", ["/view", "/view/"])
 def test_viser_hears_a_viewpoint_but_no_button_and_no_wish_for_a_tunnel(rig, path):
-    asyncio.run(forge(rig, rig.port, path))
+    asyncio.run(forge(rig, rig.open, path))
     assert rig.cameras[-1] == tuple(CAMERA["position"])
     assert rig.heard == []
 
 
 def test_without_the_proxy_it_hears_them(rig):
     """Or the test above would prove nothing."""
-    asyncio.run(forge(rig, rig.viewer_port, "/"))
+    asyncio.run(forge(rig, rig.open_inside, "/"))
     assert rig.heard == [GuiUpdateMessage, ShareUrlRequest]
 
 
@@ -184,17 +193,45 @@ def test_a_socket_that_does_not_speak_viser_is_refused(rig):
     assert refused.value.response.status_code == 400
 
 
+def ports_of(pid):
+    """TCP ports at which a process listens."""
+    inodes = set()
+    for link in Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(OSError):
+            inodes.add(str(link.readlink()).removeprefix("socket:[").rstrip("]"))
+    lines = (line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:])
+    return {
+        int(line[1].split(":")[1], 16) for line in lines if line[3] == "0A" and line[9] in inodes
+    }
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="NO /proc, not tested")
+def test_viser_opens_no_port_that_a_web_page_could_reach(tmp_path):
+    before = ports_of(os.getpid())
+    path = tmp_path / "view.sock"
+    viewer = start_viser(path)
+    try:
+        assert ports_of(os.getpid()) == before
+        assert path.stat().st_mode & 0o777 == 0o600
+    finally:
+        viewer.stop()
+
+
+def test_a_viser_that_does_not_listen_there_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setattr(dashboard, "listening_at", lambda _: contextlib.nullcontext())
+    with pytest.raises(RuntimeError, match="does not listen"):
+        start_viser(tmp_path / "view.sock")
+
+
 def test_when_viser_is_gone_the_browser_is_told_so(rig):
     async def talk():
         async with rig.open():
             pass
 
-    with socket.socket() as nobody:
-        nobody.bind(("127.0.0.1", 0))
-        alive, rig.viewer_port = rig.viewer_port, nobody.getsockname()[1]
-        with pytest.raises(InvalidStatus) as refused:
-            asyncio.run(talk())
-        rig.viewer_port = alive
+    away = rig.viewer_path.rename(rig.viewer_path.with_suffix(".away"))
+    with pytest.raises(InvalidStatus) as refused:
+        asyncio.run(talk())
+    away.rename(rig.viewer_path)
     assert refused.value.response.status_code == 503
 
 
@@ -211,18 +248,23 @@ def test_when_viser_hangs_up_the_browser_is_hung_up_on(rig):
     assert asyncio.run(talk()) == 1001
 
 
-def test_when_viser_dies_in_the_middle_the_browser_is_hung_up_on(rig, monkeypatch):
+def test_when_viser_dies_in_the_middle_the_browser_is_hung_up_on(rig):
     async def die(connection):
         await connection.send(b"scene")
         connection.transport.abort()
 
     async def talk():
-        async with serve(die, "127.0.0.1", 0, subprotocols=[SUBPROTOCOL]) as mortal:
-            monkeypatch.setattr(rig, "viewer_port", mortal.sockets[0].getsockname()[1])
-            async with rig.open() as browser, asyncio.timeout(5.0):
-                async for _ in browser:
-                    pass
-            return browser.close_code
+        away = rig.viewer_path.rename(rig.viewer_path.with_suffix(".away"))
+        async with (
+            unix_serve(die, str(rig.viewer_path), subprotocols=[SUBPROTOCOL]),
+            rig.open() as browser,
+            asyncio.timeout(5.0),
+        ):
+            async for _ in browser:
+                pass
+        rig.viewer_path.unlink(missing_ok=True)
+        away.rename(rig.viewer_path)
+        return browser.close_code
 
     assert asyncio.run(talk()) == 1001
 
