@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import signal
 import subprocess
 import sys
 from dataclasses import dataclass, field
+from pathlib import Path
 
 PR_SET_PDEATHSIG = 1
 BACKOFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
@@ -26,6 +28,8 @@ class Child:
     """Beside our own."""
     descriptors: tuple[int, ...] = ()
     """Open files that it inherits."""
+    oom_score: int = 0
+    """See `set_oom_score`."""
     process: subprocess.Popen[bytes] | None = None
     deaths: int = 0
     """In a row."""
@@ -62,13 +66,17 @@ class Child:
         parent = os.getpid()
         self.process = subprocess.Popen(
             [sys.executable, "-m", *self.arguments],
-            preexec_fn=lambda: die_with(parent),
+            preexec_fn=lambda: self._prepare(parent),
             start_new_session=True,
             env={**os.environ, **self.environment},
             pass_fds=self.descriptors,
             stdin=subprocess.DEVNULL,
             stdout=sys.stderr,
         )
+
+    def _prepare(self, parent: int) -> None:
+        die_with(parent)
+        set_oom_score(self.oom_score)
 
     def stop(self) -> None:
         """Ask it to end, and make it end if it doesn't."""
@@ -88,6 +96,15 @@ def die_with(parent: int) -> None:
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:  # it died before we asked
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def set_oom_score(score: int) -> None:
+    """Let Linux kill this process later (down to -1000) or sooner (up to 1000) for its memory.
+
+    Sooner is always permitted, later takes CAP_SYS_RESOURCE: without it things stay as they are.
+    """
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text(str(score))
 
 
 def _ending(code: int) -> str:

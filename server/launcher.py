@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import secrets
 import shutil
 import signal
@@ -29,6 +30,8 @@ MAX_DEATHS = 4
 POLL_S = 0.05
 REMIND_S = 15.0
 """People wait longer for what still speaks."""
+FLIES, SERVES = -900, 300
+"""Who dies first when memory runs out: the server is started anew and nothing falls down."""
 SECRET_VARIABLE = "_LIGHTLEASH_SECRET"
 
 
@@ -141,18 +144,19 @@ def children_of(
     if settings.simulate:
         host, port, truth_port = "127.0.0.1", free_udp_port(), free_udp_port()
         simulated = ["hardware.sim.robot", "--robot", settings.robot, "--port", str(port)]
-        children.append(Child("robot", [*simulated, "--truth-port", str(truth_port)], shared))
+        simulated += ["--truth-port", str(truth_port)]
+        children.append(Child("robot", simulated, shared, oom_score=FLIES))
     control = ["server.control", "--runtime", str(runtime), "--robot", settings.robot]
     control += ["--host", host, "--port", str(port), "--gains", settings.gains]
     control += ["--estimator", settings.estimator, "--epochs", str(epochs)]
     control += [] if settings.simulate else ["--real"]
     knobs = msgspec.json.encode(settings.virtual_camera.knobs).decode()
     control += ["--virtual-camera", knobs]
-    children.append(Child("control", control, shared))
+    children.append(Child("control", control, shared, oom_score=FLIES))
     descriptors = tuple(s.fileno() for s in sockets)
     server = ["server", "_server", str(runtime), str(truth_port), *map(str, descriptors)]
     secret = {SECRET_VARIABLE: secrets.token_hex(32)}
-    children.append(Child("server", [*server, *arguments], secret, descriptors))
+    children.append(Child("server", [*server, *arguments], secret, descriptors, SERVES))
     return children
 
 
@@ -172,6 +176,7 @@ def announce(run: dict[str, object]) -> None:
 
 def main(settings: Settings, arguments: Sequence[str]) -> int:
     """Entry of `lightleash serve`; `arguments` are handed on to the server process."""
+    os.umask(0o077)  # whatever is written, by the children too, is for this user alone
     runtime = runtime_directory()
     try:
         with (

@@ -30,6 +30,7 @@ from mcap.writer import Writer
 
 import server
 from server.control_link import ControlStatus
+from server.runtime import new_private_file
 from server.wire import HEADER, VERSION
 
 Direction = Literal["phone", "server"]
@@ -94,10 +95,10 @@ class Recorder:
         self._closing = threading.Event()
         self._queue: queue.Queue[_Item | None] = queue.Queue(CAPACITY)
         try:
-            directory.mkdir(parents=True, exist_ok=True)
+            directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             if self.path.exists():
                 raise FileExistsError("there is a recording of this name")
-            self._file = part_of(self.path).open("xb")
+            self._file = new_private_file(part_of(self.path))
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise RecordingError(self.path, str(error), "another name or directory") from error

@@ -27,6 +27,7 @@ from server.recording import (
     finish_file,
     start_file,
 )
+from server.runtime import new_private_file
 from server.wire import VERSION
 
 MAX_MCAP_RECORD_BYTES = 64 << 20
@@ -161,7 +162,8 @@ def recover(part: Path) -> Path:
         if source.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise RecordingError(part, "is not an MCAP file", "name a *.mcap.part of a recording")
         source.seek(0)
-        with temporary.open("wb") as target:
+        temporary.unlink(missing_ok=True)
+        with new_private_file(temporary) as target:
             _copy_complete(source, target)
     temporary.rename(path)
     if part != path:

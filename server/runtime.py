@@ -49,10 +49,26 @@ def prepare(directory: Path) -> IO[str]:
     return lock
 
 
+def private_directory(path: Path) -> Path:
+    """`path`, there and for this user alone, also if an older version made it for others."""
+    path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    path.chmod(0o700)
+    return path
+
+
+def new_private_file(path: Path) -> IO[bytes]:
+    """A new file for this user alone.
+
+    Raises:
+        FileExistsError: there is one.
+    """
+    return open(path, "xb", opener=lambda name, flags: os.open(name, flags, 0o600))
+
+
 def write_private(path: Path, text: str) -> None:
     """A whole file at once, for nobody else to read."""
     part = path.with_suffix(".part")
     part.unlink(missing_ok=True)
-    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-        file.write(text)
+    with new_private_file(part) as file:
+        file.write(text.encode())
     part.replace(path)

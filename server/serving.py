@@ -28,7 +28,7 @@ from server.recorder import Recordings
 from server.recording import ROBOT_KEY, SETTINGS_KEY
 from server.recording_files import recover_all
 from server.rtc.desk import RtcDesk
-from server.runtime import RUN_FILE, VIEW_SOCKET, write_private
+from server.runtime import RUN_FILE, VIEW_SOCKET, private_directory, write_private
 from server.security import Doors, Guard
 from server.settings import Settings
 from server.tls import Certificate, certificate, own_addresses, own_names
@@ -106,12 +106,11 @@ async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, 
 
 
 def _hub(settings: Settings, given: Given) -> Hub:
-    folder = settings.state / "recordings"
+    folder = private_directory(private_directory(settings.state) / "recordings")
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
     robot = load_robot(settings.robot).robot
-    profiles = settings.state / PROFILES
-    profiles.mkdir(parents=True, exist_ok=True)
+    profiles = private_directory(settings.state / PROFILES)
     cameras = [*settings.cameras, profiles, CAMERAS]
     return Hub(given.runtime, robot, cameras, recordings, profiles)
 

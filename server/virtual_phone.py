@@ -24,6 +24,7 @@ from hardware.sim.render import Look
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.access import PhoneClientError, access_of, add_access_arguments
+from server.child import set_oom_score
 from server.live_phone import EXPOSED_S, LivePhone, MakeClient
 from server.one_line import Parser
 from server.phone_client import PhoneClient
@@ -32,6 +33,9 @@ from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
 TAKE_OFF_S = 8.0
 """Rest before a robot is lifted from the floor: the button must have been pressed by then."""
+
+FIRST_TO_GO = 800
+"""When memory runs out: nobody needs a virtual phone to come down safely."""
 
 
 def make_script(
@@ -176,6 +180,7 @@ async def _play(arguments: argparse.Namespace) -> LivePhone:
 def main(argv: list[str] | None = None) -> int:
     """Run the command; gives the exit status."""
     arguments = _parser().parse_args(argv)
+    set_oom_score(FIRST_TO_GO)
     try:
         live = asyncio.run(_play(arguments))
     except (PhoneClientError, FollowerError, ValueError, OSError) as error:

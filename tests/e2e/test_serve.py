@@ -127,11 +127,10 @@ def test_its_addresses_answer_and_the_certificate_holds_for_who_trusts_its_autho
     assert json.loads(get(f"{server.http_url}/healthz")[1]) == {"ok": True}
 
 
-def test_what_it_leaves_on_the_disk_is_for_its_user_alone(server: Serving) -> None:
-    assert server.runtime.stat().st_mode & 0o777 == 0o700
-    assert (server.runtime / "lightleash-run.json").stat().st_mode & 0o777 == 0o600
-    modes = {path.stat().st_mode & 0o777 for path in server.state.glob("*key*")}
-    assert modes == {0o600}
+def open_to_others(folder: Path) -> list[str]:
+    """Files and directories, sockets too, that others than their user may do anything with."""
+    found = [folder, *folder.rglob("*")]
+    return [f"{path} {mode:o}" for path in found if (mode := path.stat().st_mode & 0o777) & 0o077]
 
 
 def test_no_secret_is_in_a_command_line(server: Serving) -> None:
@@ -174,6 +173,17 @@ def test_a_virtual_phone_leads_the_robot_by_either_path(
         summary = json.loads(phone.stdout.read().decode().splitlines()[-1])
     assert summary["tracked_s"] > 2.0
     assert summary["rms_mm"] < 100.0
+
+
+def test_what_it_leaves_on_the_disk_is_for_its_user_alone(server: Serving) -> None:
+    server.request("POST", "/api/recording")
+    time.sleep(0.5)
+    assert open_to_others(server.state / "recordings") == []
+    server.request("DELETE", "/api/recording")
+    assert list((server.state / "recordings").glob("*.mcap"))
+    assert {path.name for path in server.runtime.iterdir()} >= {"lightleash-run.json", "view.sock"}
+    assert open_to_others(server.runtime) == []
+    assert open_to_others(server.state) == []
 
 
 def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarmed(

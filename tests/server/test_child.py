@@ -141,3 +141,23 @@ def ignores_term(pid):
     lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     mask = next(line.split()[1] for line in lines if line.startswith("SigIgn"))
     return int(mask, 16) >> (signal.SIGTERM - 1) & 1
+
+
+def oom_score(pid):
+    return int(Path(f"/proc/{pid}/oom_score_adj").read_text())
+
+
+@pytest.mark.skipif(not Path("/proc/self/oom_score_adj").exists(), reason="NO LINUX, not tested")
+def test_when_memory_runs_out_the_server_goes_before_what_flies(program):
+    flies = Child("flies", program(SLEEPER), oom_score=-900)
+    serves = Child("serves", program(SLEEPER), oom_score=300)
+    own = oom_score("self")
+    try:
+        for child in (flies, serves):
+            child.revive(0.0)
+        wait_for(lambda: oom_score(serves.process.pid) == 300)
+        assert oom_score(flies.process.pid) in (-900, own)  # without the right to it: as it was
+        assert oom_score(flies.process.pid) < oom_score(serves.process.pid)
+    finally:
+        for child in (flies, serves):
+            child.stop()
