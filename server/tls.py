@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import ipaddress
-import os
+import logging
 import socket
 import struct
 import sys
@@ -18,10 +18,13 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-LEAF_DAYS = 397
-AUTHORITY_DAYS = 3650
-RENEW_DAYS = 30
+from server.runtime import new_private_file, private_directory
+from server.tls_limits import authority_limits, general_name, is_permitted
+
+LEAF_DAYS, AUTHORITY_DAYS = 397, 729
+RENEW_DAYS, RENEW_AUTHORITY_DAYS = 30, 60
 SIOCGIFADDR = 0x8915
+log = logging.getLogger("lightleash")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,30 +76,62 @@ def _of_interfaces() -> list[str]:
     return found
 
 
+def own_hosts() -> list[str]:
+    """Names of this machine."""
+    host = socket.gethostname().lower()
+    return ["localhost", host, f"{host}.local"]
+
+
 def own_names() -> list[str]:
     """Names and addresses this server answers to."""
-    host = socket.gethostname().lower()
-    return [*own_addresses(), "localhost", host, f"{host}.local"]
+    return [*own_addresses(), *own_hosts()]
 
 
 def certificate(state: Path, names: Iterable[str] = ()) -> Certificate:
-    """The certificate in `state` for this machine and `names`, made or renewed if it must be."""
-    wanted = [*own_names(), *names]
-    state.mkdir(parents=True, exist_ok=True, mode=0o700)
+    """The certificate in `state` for this machine and `names`, made or renewed if it must be.
+
+    So is the authority that signs it, with a word in the log if phones trusted another one. It
+    signs for names and addresses of this machine and for private addresses, nothing else.
+    """
+    addresses, hosts = own_addresses(), [*own_hosts(), *names]
+    private_directory(state)
     paths = {name: state / f"{name}.pem" for name in ("ca", "ca-key", "server", "server-key")}
-    if not (paths["ca"].exists() and paths["ca-key"].exists()):
-        _make_authority(paths)
+    if not _is_good_authority(paths, [addresses[0], *hosts]):
+        if paths["ca"].exists():
+            log.warning(
+                "A new certificate authority: the one before was unlimited, old, or not for this "
+                "machine. Phones that trusted it must install /ca.crt of this server again."
+            )
+        _make_authority(paths, authority_limits([*addresses, *hosts]))
+    permitted = _limits_of(load(paths["ca"])).permitted_subtrees or []
+    wanted = [name for name in (*addresses, *hosts) if is_permitted(name, permitted)]
     if not _is_good(paths, wanted):
         _make_leaf(paths, wanted)
     return Certificate(paths["server"], paths["server-key"], paths["ca"])
 
 
+def _is_good_authority(paths: dict[str, Path], needed: Iterable[str]) -> bool:
+    """Whether it is limited and short-lived, lasts, has its key and may sign for `needed`."""
+    try:
+        authority = load(paths["ca"])
+        key = serialization.load_pem_private_key(paths["ca-key"].read_bytes(), None)
+        permitted = _limits_of(authority).permitted_subtrees or []
+    except (OSError, ValueError, TypeError, x509.ExtensionNotFound):
+        return False
+    life = authority.not_valid_after_utc - authority.not_valid_before_utc
+    return (
+        key.public_key() == authority.public_key()
+        and life.days <= AUTHORITY_DAYS
+        and _days_left(authority) > RENEW_AUTHORITY_DAYS
+        and all(is_permitted(name, permitted) for name in needed)
+    )
+
+
 def _is_good(paths: dict[str, Path], wanted: Iterable[str]) -> bool:
     """Whether the certificate is ours, has its key, lasts, and names all that is wanted."""
     try:
-        leaf = x509.load_pem_x509_certificate(paths["server"].read_bytes())
-        issuer = x509.load_pem_x509_certificate(paths["ca"].read_bytes())
-        leaf.verify_directly_issued_by(issuer)
+        leaf = load(paths["server"])
+        leaf.verify_directly_issued_by(load(paths["ca"]))
         key = serialization.load_pem_private_key(paths["server-key"].read_bytes(), None)
         if key.public_key() != leaf.public_key():
             return False
@@ -104,37 +139,32 @@ def _is_good(paths: dict[str, Path], wanted: Iterable[str]) -> bool:
     except (OSError, ValueError, TypeError, InvalidSignature, x509.ExtensionNotFound):
         return False
     named = {str(name.value) for name in names}
-    left = leaf.not_valid_after_utc - datetime.datetime.now(datetime.UTC)
-    return left.days > RENEW_DAYS and set(wanted) <= named
+    return _days_left(leaf) > RENEW_DAYS and set(wanted) <= named
 
 
-def _make_authority(paths: dict[str, Path]) -> None:
+def _make_authority(paths: dict[str, Path], limits: x509.NameConstraints) -> None:
     key = ec.generate_private_key(ec.SECP256R1())
     name = _name(f"Lightleash on {socket.gethostname()}")
     certificate_ = (
         _builder(name, name, key, AUTHORITY_DAYS)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(limits, critical=True)
         .add_extension(_usage(signs=True), critical=True)
         .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
         .sign(key, hashes.SHA256())
     )
-    _write(paths["ca"], certificate_.public_bytes(serialization.Encoding.PEM), 0o644)
-    _write(paths["ca-key"], _private(key), 0o600)
+    _write(paths["ca"], certificate_.public_bytes(serialization.Encoding.PEM))
+    _write(paths["ca-key"], _private(key))
 
 
 def _make_leaf(paths: dict[str, Path], wanted: Iterable[str]) -> None:
-    authority = x509.load_pem_x509_certificate(paths["ca"].read_bytes())
+    authority = load(paths["ca"])
     authority_key = serialization.load_pem_private_key(paths["ca-key"].read_bytes(), None)
     assert isinstance(authority_key, ec.EllipticCurvePrivateKey)
     key = ec.generate_private_key(ec.SECP256R1())
-    names: list[x509.GeneralName] = []
-    for name in dict.fromkeys(wanted):
-        try:
-            names.append(x509.IPAddress(ipaddress.ip_address(name)))
-        except ValueError:
-            names.append(x509.DNSName(name))
+    names = [general_name(name) for name in dict.fromkeys(wanted)]
     leaf = (
-        _builder(_name("Lightleash"), authority.subject, key, LEAF_DAYS)
+        _builder(_name("Lightleash"), authority.subject, key, min(LEAF_DAYS, _days_left(authority)))
         .add_extension(x509.SubjectAlternativeName(names), critical=False)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(
@@ -145,8 +175,8 @@ def _make_leaf(paths: dict[str, Path], wanted: Iterable[str]) -> None:
         .add_extension(_usage(signs=False), critical=True)
         .sign(authority_key, hashes.SHA256())
     )
-    _write(paths["server"], leaf.public_bytes(serialization.Encoding.PEM), 0o644)
-    _write(paths["server-key"], _private(key), 0o600)
+    _write(paths["server"], leaf.public_bytes(serialization.Encoding.PEM))
+    _write(paths["server-key"], _private(key))
 
 
 def _builder(
@@ -178,6 +208,24 @@ def _usage(signs: bool) -> x509.KeyUsage:
     )
 
 
+def load(path: Path) -> x509.Certificate:
+    """The certificate in a file.
+
+    Raises:
+        OSError: there is no such file.
+        ValueError: it holds no certificate.
+    """
+    return x509.load_pem_x509_certificate(path.read_bytes())
+
+
+def _limits_of(authority: x509.Certificate) -> x509.NameConstraints:
+    return authority.extensions.get_extension_for_class(x509.NameConstraints).value
+
+
+def _days_left(one: x509.Certificate) -> int:
+    return (one.not_valid_after_utc - datetime.datetime.now(datetime.UTC)).days
+
+
 def _name(common: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common[:64])])
 
@@ -190,9 +238,9 @@ def _private(key: ec.EllipticCurvePrivateKey) -> bytes:
     )
 
 
-def _write(path: Path, data: bytes, mode: int) -> None:
+def _write(path: Path, data: bytes) -> None:
     part = path.with_suffix(".part")
     part.unlink(missing_ok=True)
-    with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
+    with new_private_file(part) as file:
         file.write(data)
     part.replace(path)
