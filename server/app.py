@@ -20,10 +20,11 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 
+from pipeline.config import FailsafeConfig
 from server.clock import now
 from server.command_age import refuse_old
 from server.hub import Hub
-from server.link_check import Rules, check
+from server.link_check import check
 from server.link_log import KEPT_S
 from server.messages import Command, decode_message
 from server.metrics import exposition
@@ -166,7 +167,7 @@ class Api:
             return refusal(400, "seconds", f"up to {KEPT_S:g}")
         if phone is None:
             return refusal(409, "phone", "while a phone leads: scan the code first")
-        report = check(phone.link.series(now(), seconds), Rules())
+        report = check(phone.link.series(now(), seconds), FailsafeConfig())
         return Response(msgspec.json.encode(report), media_type="application/json")
 
     async def _certificate(self, _request: Request) -> Response:

@@ -14,7 +14,7 @@ SIDES = ("phone", "robot", "server")
 WORDS = {
     "phone": "The phone's link had {} gaps in the last minute, the longest {:.2f} s.",
     "robot": "The robot's link had {} gaps in the last minute, the longest {:.2f} s.",
-    "server": "Control stood still {} times in the last minute, the longest {:.2f} s.",
+    "server": "The server's computer stood still {} times in a minute, the longest {:.2f} s.",
 }
 
 

@@ -14,6 +14,7 @@ import msgspec
 from msgspec.structs import asdict
 
 from pipeline.robot import Robot
+from server.blame import Blame
 from server.calibrate.desk import Desk
 from server.calibration_messages import Calibrate
 from server.clock import now
@@ -67,7 +68,8 @@ class Hub:
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
         """What the phone saw, for the 3D view."""
-        self.pauses = Pauses()
+        self.blame = Blame()
+        self.pauses = Pauses(on_stall=self.blame.stalled)
         self.unready = ""
         """What the server itself has against arming."""
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 from msgspec.structs import replace
 
+from pipeline.config import FailsafeConfig
 from server.link_log import Arrival, Series
 from server.link_messages import SIDES, Grade, LinkReport, Side
 from server.link_words import advice, lines, title
@@ -26,19 +26,7 @@ SHORTEST_BUSY_S = 0.1
 Span = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Rules:
-    """What the failsafe machine bears [s]."""
-
-    silent: float = 0.150
-    """No news for longer: the robot waits."""
-    fresh: float = 0.100
-    """After it, until it follows again."""
-    gap: float = 1.0
-    """Longer: the flight is over, or the button must be pressed anew."""
-
-
-def check(series: Series, rules: Rules) -> LinkReport:
+def check(series: Series, rules: FailsafeConfig) -> LinkReport:
     """The verdict on a series."""
     seconds = max(series.end - series.begin, 1e-9)
     silences = _silences(series)
@@ -102,7 +90,7 @@ def _ages(arrivals: Sequence[Arrival], series: Series) -> list[Span]:
     return [*spans, (newest, series.end)]
 
 
-def _lost_time(series: Series, rules: Rules) -> float:
+def _lost_time(series: Series, rules: FailsafeConfig) -> float:
     """In which the robot would not follow [s]: each cause on its own, no moment twice."""
     away: list[Span] = []
     for span in (*_silences(series), *_ages(series.motion, series)):

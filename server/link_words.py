@@ -81,7 +81,7 @@ def advice(report: LinkReport) -> list[str]:
         told += [
             "Use a 5 GHz Wi-Fi that nobody else uses, near its access point, or let the phone's "
             "own hotspot be the network.",
-            "Surest is a USB cable. Android: run `adb reverse tcp:8080 tcp:8080` on the computer, "
+            "Surest is a USB cable. Android: run “adb reverse tcp:8080 tcp:8080” on the computer, "
             "open http://localhost:8080 on the phone, and choose the path WebSocket.",
             "Keep the phone awake and on its charger, with power saving, Bluetooth and location "
             "scans off: they put its radio to sleep.",

@@ -106,6 +106,13 @@ class Stream(msgspec.Struct, frozen=True):
     """Superseded, too old or refused, since the start."""
 
 
+class GapCount(msgspec.Struct, frozen=True):
+    """Short silences of one side in the last minute."""
+
+    count: int
+    longest_ms: float
+
+
 class VirtualCamera(msgspec.Struct, frozen=True):
     """The virtual camera in the control process."""
 
@@ -204,6 +211,14 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """As the operator's page says; None: it lets nobody choose."""
     time_ms: int = 0
     """The server's clock when this was made."""
+    until_ramp_ms: float | None = None
+    """In COAST and HOLD: left until RAMP if all goes on as it is."""
+    resumes: bool = False
+    """In COAST and HOLD: it follows again by itself, once all is well."""
+    gaps: dict[str, GapCount] = {}
+    """By side: `phone` (or its link), `robot` (its link), `server` (its computer stood still)."""
+    warnings: list[str] = []
+    """What who arms should know, each in words; refuses nothing."""
     server: dict[str, float] = {}
     """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
     while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections

@@ -59,8 +59,10 @@ class Pauses:
         clock: Callable[[], float] = now,
         cpu: Callable[[], float] = time.process_time,
         thread_cpu: Callable[[], float] = time.thread_time,
+        on_stall: Callable[[float, float], None] | None = None,
     ) -> None:
-        """Clocks [s]."""
+        """Clocks [s]; `on_stall` is told when the loop was late, and by how much [s]."""
+        self._on_stall = on_stall
         self._clock, self._cpu = clock, cpu
         self.garbage = Garbage(thread_cpu)
         self.loop = LoopWatch()
@@ -76,6 +78,8 @@ class Pauses:
             late = max(0.0, t - due)
             stall = Stall(late, min(late, self._cpu() - cpu))
             self.loop.saw(t, stall, self._is_armed)
+            if self._on_stall is not None:
+                self._on_stall(t, late)
 
     def tick(self, armed: bool, idle: bool) -> str:
         """Keep garbage small; gives what people should read, or "".

@@ -8,10 +8,11 @@ from typing import Literal, Protocol, cast
 
 from pipeline.robot import Robot
 from pipeline.signals import Mode
+from server.blame import Blame, warnings
 from server.camera_health import health
 from server.clock import now
 from server.control_link import ControlStatus
-from server.messages import Estimate, Status, Stream, VirtualCamera
+from server.messages import Estimate, GapCount, Status, Stream, VirtualCamera
 from server.meter import Meter
 from server.operator import OperatorPhone
 from server.pauses import Pauses
@@ -31,6 +32,7 @@ class Known(Protocol):
     control_meter: Meter
     recordings: Recordings
     pauses: Pauses
+    blame: Blame
 
     @property
     def events(self) -> Sequence[str]:
@@ -45,6 +47,7 @@ def build(hub: Known) -> Status:
     """From what the hub knows now."""
     t, control, phone = now(), hub.status, hub.phone
     silence = _silence(control, hub.control_meter.age(t))
+    gaps = hub.blame.gaps(control, t) if control is not None else {}
     refusals = [f"{silence}."] if control is None or silence else control.refusals
     sighting = phone.sighting if phone is not None else None
     found = sighting is not None and sighting.pose is not None
@@ -52,7 +55,7 @@ def build(hub: Known) -> Status:
         mode="LOST" if control is None or silence else cast(ModeName, Mode(control.mode).name),
         reason=f"{silence}; the robot stops by its own watchdog."
         if control is None or silence
-        else control.reason,
+        else hub.blame.reason(control, t),
         ready=not refusals,
         refusals=list(refusals),
         robot=hub.robot.name,
@@ -84,6 +87,10 @@ def build(hub: Known) -> Status:
         else None,
         path_choice=phone.path_choice if phone is not None else None,
         time_ms=int(1e3 * t),
+        until_ramp_ms=_rounded(control.until_ramp_s, 0, 1e3) if control and not silence else None,
+        resumes=control is not None and control.resumes,
+        gaps={side: GapCount(one.count, 1e3 * one.longest_s) for side, one in gaps.items()},
+        warnings=warnings(gaps),
         server=hub.pauses.figures(),
     )
 

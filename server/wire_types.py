@@ -48,6 +48,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Refused,
     calibration_messages.Calibration,
     messages.Stream,
+    messages.GapCount,
     knobs.Knobs,
     messages.VirtualCamera,
     messages.Estimate,

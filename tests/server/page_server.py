@@ -20,9 +20,9 @@ def status(mode):
     texts = dict.fromkeys(
         ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""
     )
-    flags = {"ready": True, "saturated": False}
-    tables = {name: {} for name in ("streams", "latency_ms", "control", "server")}
-    tables |= {"refusals": [], "messages": []}
+    flags = {"ready": True, "saturated": False, "resumes": False}
+    tables = {name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")}
+    tables |= {"refusals": [], "messages": [], "warnings": []}
     return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
 
 

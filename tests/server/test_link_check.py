@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.link_check import Rules, check
+from pipeline.config import FailsafeConfig
+from server.link_check import check
 from server.link_log import KEPT_S, LinkLog, Series
 
-RULES = Rules()
+RULES = FailsafeConfig()
 PING_S, RTT_S = 1.0 / 60.0, 0.012
 
 

@@ -10,7 +10,7 @@ const SIGNALS = {
   DISARMED: { vibration: [30], tones: [330] },
   ARMED: { vibration: [40, 60, 40], tones: [440, 554] },
   TRACK: { vibration: [60], tones: [660] },
-  COAST: { vibration: [40], tones: [494] },
+  COAST: { vibration: [25, 60, 25], tones: [370] },
   HOLD: { vibration: [120], tones: [494] },
   RAMP: { vibration: [250], tones: [440, 330, 247] },
   STOPPED: { vibration: [500], tones: [196, 196] },

@@ -150,7 +150,7 @@ export function wordsOf(check, listenedMs) {
     case 'listening': {
       const left = Math.max(0, Math.ceil((LISTEN_MS - listenedMs) / 1000));
       const hint = 'Hold the phone as you will in flight, where you will stand.';
-      const title = `Listening to the link: ${left} s left`;
+      const title = `Listening: ${left} s left`;
       const share = Math.round(100 * listenedMs / LISTEN_MS) / 100;
       return { ...none, title, hint, share, go: 'Enough', mayGo: listenedMs >= LEAST_MS };
     }
@@ -162,6 +162,6 @@ export function wordsOf(check, listenedMs) {
     case 'failed':
       return { ...none, title: '✕ Not checked', hint: check.why, go: 'Check again', mayGo: true };
     default:
-      return { ...none, title: 'Listening to the link', hint: 'One moment…', go: 'Check again', mayGo: false };
+      return { ...none, title: 'Listening', hint: 'One moment…', go: 'Check again', mayGo: false };
   }
 }

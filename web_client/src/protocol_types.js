@@ -109,6 +109,13 @@
  */
 
 /**
+ * Short silences of one side in the last minute.
+ * @typedef {object} GapCount
+ * @property {number} count
+ * @property {number} longest_ms
+ */
+
+/**
  * How the virtual camera smooths the turns of the phone.
  * @typedef {object} Knobs
  * @property {number} cutoff_hz −3 dB of the low pass [Hz].
@@ -195,6 +202,10 @@
  * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
  * @property {PathChoice | null} path_choice As the operator's page says; null: it lets nobody choose.
  * @property {number} time_ms The server's clock when this was made.
+ * @property {number | null} until_ramp_ms In COAST and HOLD: left until RAMP if all goes on as it is.
+ * @property {boolean} resumes In COAST and HOLD: it follows again by itself, once all is well.
+ * @property {Record<string, GapCount>} gaps By side: `phone` (or its link), `robot` (its link), `server` (its computer stood still).
+ * @property {string[]} warnings What who arms should know, each in words; refuses nothing.
  * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
  */
 

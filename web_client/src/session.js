@@ -13,6 +13,10 @@ import { Problem } from './problems.js';
 /** A Status older than this is no news any more [ms]. */
 export const STATUS_LIFE_MS = 500;
 const NOTICE_MS = 5000;
+/** A page that had no time for itself for so long kept the robot waiting, and says that it was no link [ms]. */
+const BUSY_MS = 250;
+/** @type {ShownMode[]} */
+const FLYING = ['TRACK', 'COAST', 'HOLD'];
 /** A STOP that was given up is told of for at least so long [ms]. */
 const STOP_LOST_MS = 8000;
 
@@ -25,6 +29,9 @@ export const INITIAL = Object.freeze({
   linked: false,
   status: null,
   statusAtMs: -Infinity,
+  pressAtMode: 0,
+  leftOfMs: 0,
+  tickedMs: Infinity,
   heard: false,
   held: false,
   visible: true,
@@ -188,7 +195,9 @@ function heardFrom(state, status, now) {
   const stopping = state.stopping && status.mode !== 'STOPPED';
   const stopLost = status.mode === 'STOPPED' ? '' : state.stopLost;
   const asked = state.asked?.mode === status.mode ? state.asked : null;
-  return to({ ...state, status, statusAtMs: now, heard: true, stopping, stopLost, asked });
+  const pressAtMode = state.status?.mode === status.mode ? state.pressAtMode : state.press;
+  const leftOfMs = Math.max(status.until_ramp_ms ?? 0, status.until_ramp_ms === null ? 0 : state.leftOfMs);
+  return to({ ...state, status, statusAtMs: now, heard: true, stopping, stopLost, asked, pressAtMode, leftOfMs });
 }
 
 /**
@@ -225,7 +234,11 @@ function noticed(state, text, now) {
 function ticked(state, now) {
   const heard = state.heard && now - state.statusAtMs <= STATUS_LIFE_MS;
   const notice = state.notice !== null && now < state.notice.untilMs ? state.notice : null;
-  const next = { ...state, heard, notice };
+  const away = now - state.tickedMs;
+  const next = { ...state, heard, notice, tickedMs: now };
+  if (away > BUSY_MS && FLYING.includes(shownMode(state)) && notice === null) {
+    return to(noticed(next, `This phone was too busy for ${(away / 1000).toFixed(1)} s: close other apps.`, now), { type: 'touch' });
+  }
   return state.linked ? to(next, { type: 'touch' }) : to(next);
 }
 
@@ -246,7 +259,7 @@ function released(state) {
  * @param {boolean} visible
  */
 function seen(state, visible) {
-  return to({ ...state, visible, held: state.held && visible }, { type: 'touch' });
+  return to({ ...state, visible, held: state.held && visible, tickedMs: Infinity }, { type: 'touch' });
 }
 
 /**
@@ -258,6 +271,25 @@ export function shownMode(state) {
   if (!state.linked) return 'NO_LINK';
   if (!state.heard || state.status === null) return 'NO_WORD';
   return state.status.mode;
+}
+
+/**
+ * What is left until the thrust fades, if it counts down.
+ * @param {State} state
+ * @returns {{ seconds: number, share: number } | null} Whole seconds, and the share of what there was.
+ */
+export function untilRamp(state) {
+  const ms = state.heard && state.linked ? state.status?.until_ramp_ms ?? null : null;
+  if (ms === null) return null;
+  return { seconds: Math.ceil(ms / 1000), share: state.leftOfMs > 0 ? Math.min(1, ms / state.leftOfMs) : 0 };
+}
+
+/**
+ * Whether the robot follows again without another press. The server does not know yet of one that was just made.
+ * @param {State} state
+ */
+export function goesOn(state) {
+  return state.held && (state.status?.resumes === true || state.press !== state.pressAtMode);
 }
 
 /**

@@ -26,6 +26,9 @@
  * @property {boolean} linked The server has welcomed us.
  * @property {Status | null} status
  * @property {number} statusAtMs When it came.
+ * @property {number} pressAtMode The count of presses when the robot's mode last changed.
+ * @property {number} leftOfMs The most that was left until the ramp since it counts down.
+ * @property {number} tickedMs When the page last had time for itself.
  * @property {boolean} heard It is young enough to be believed.
  * @property {boolean} held
  * @property {boolean} visible

@@ -7,8 +7,7 @@ import { ask } from './pairing.js';
 
 /** What the page says when it has given up, in words for who pressed it. */
 export const STOP_LOST = {
-  unlinked: 'STOP did not reach the robot: there is no link. Press it again, or cut the robot’s power. '
-    + 'Without a link the robot stops by itself.',
+  unlinked: 'STOP did not reach the robot: there is no link. Press it again, or cut the robot’s power.',
   unconfirmed: 'STOP is not confirmed by the robot. Press it again, or cut the robot’s power.',
 };
 

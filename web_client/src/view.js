@@ -5,14 +5,15 @@
 /** @import {Calibrate} from './protocol_types.js' */
 /** @import {PathWish} from './video_paths.js' */
 
-import { MODE_WORDS } from './mode_words.js';
+import { MODE_WORDS, gapWords } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
 import { STOP_LOST, stopWords } from './stop.js';
-import { shownMode, wish } from './session.js';
+import { goesOn, shownMode, untilRamp, wish } from './session.js';
 
 const WISH_WORDS = { arm: 'Arm', disarm: 'Disarm' };
 const MOST_REFUSALS = 4;
+const MOST_WARNINGS = 2;
 
 /**
  * @typedef {object} Wishes
@@ -119,6 +120,7 @@ export class View {
     this.text('mode', name);
     this.text('meaning', meaning);
     this.reasons(state, mode, advice);
+    this.countdown(untilRamp(state));
     this.notice(state);
     this.health(state);
     const { what, enabled } = wish(state);
@@ -141,6 +143,15 @@ export class View {
     this.text('reason', advice?.title ?? own ?? state.status?.reason ?? '');
     const refusals = advice?.steps ?? (mode === 'DISARMED' ? state.status?.refusals ?? [] : []);
     this.list('refusals', refusals, MOST_REFUSALS);
+    this.list('warnings', mode === 'DISARMED' || mode === 'ARMED' ? state.status?.warnings ?? [] : [], MOST_WARNINGS);
+  }
+
+  /** @param {{ seconds: number, share: number } | null} left Until the thrust fades. */
+  countdown(left) {
+    this.show('left', left !== null);
+    if (left === null) return;
+    this.text('left-s', `${left.seconds} s`);
+    this.find('left-arc').style.strokeDasharray = `${Math.round(100 * left.share)} 100`;
   }
 
   /** @param {State} state */
@@ -154,6 +165,7 @@ export class View {
 
   /** @param {State} state */
   health({ health, status, heard }) {
+    this.text('h-gaps', heard && status ? gapWords(status.gaps) : '–');
     this.text('h-leds', heard && status ? String(status.leds) : '–');
     this.text('h-path', health.path);
     this.text('h-fps', `${Math.round(health.fps)} fps${health.eased && ` ${health.eased}`}`);
@@ -168,7 +180,7 @@ export class View {
    * @param {ShownMode} mode
    */
   hold(state, mode) {
-    const { look, title, hint } = holdWords(state.held, mode);
+    const { look, title, hint } = holdWords(state.held, mode, goesOn(state), untilRamp(state)?.seconds ?? null);
     this.data('hold', 'look', look);
     this.find('hold').setAttribute('aria-pressed', String(state.held));
     this.text('hold-title', title);
@@ -233,19 +245,27 @@ function ownReason(state, mode) {
   const last = state.status === null ? '' : ` Last known: ${state.status.mode}.`;
   if (mode === 'NO_LINK') return `Without a link the robot stops by itself.${last}`;
   if (mode === 'NO_WORD') return `No word from the server: what the robot does is not known.${last}`;
-  if (state.motionSilent) return 'This phone’s motion sensors say nothing: it can’t lead the robot.';
+  if (state.motionSilent && mode === 'DISARMED') return 'This phone’s motion sensors say nothing: it can’t lead the robot.';
   return null;
 }
 
 /**
  * @param {boolean} held
  * @param {ShownMode} mode
- * @returns {{ look: 'idle' | 'ready' | 'moving' | 'waiting', title: string, hint: string }}
+ * @param {boolean} goesOn It follows again without another press.
+ * @param {number | null} seconds Until the thrust fades.
+ * @returns {{ look: 'idle' | 'ready' | 'moving' | 'waiting' | 'again', title: string, hint: string }}
  */
-export function holdWords(held, mode) {
+export function holdWords(held, mode, goesOn = false, seconds = null) {
+  const fades = seconds === null ? '' : `Thrust fades in ${seconds} s`;
   if (held && mode === 'TRACK') return { look: 'moving', title: 'Moving', hint: 'Let go to keep still' };
+  if (mode === 'COAST') return held ? { look: 'waiting', title: 'Keep holding', hint: 'It goes on by itself' }
+    : { look: 'ready', title: 'Hold to move', hint: fades };
+  if (held && mode === 'HOLD' && goesOn) return { look: 'waiting', title: 'Keep holding', hint: 'It follows in a moment' };
+  if (held && mode === 'HOLD') return { look: 'again', title: 'Let go and press again', hint: fades };
+  if (held && mode === 'RAMP') return { look: 'waiting', title: 'Let go', hint: 'Thrust fades; arm again after it' };
   if (held) return { look: 'waiting', title: 'Held', hint: 'The robot does not follow yet' };
-  if (mode === 'ARMED' || mode === 'HOLD') return { look: 'ready', title: 'Hold to move', hint: '' };
+  if (mode === 'ARMED' || mode === 'HOLD') return { look: 'ready', title: 'Hold to move', hint: fades };
   if (mode === 'TRACK') return { look: 'ready', title: 'Hold to move', hint: 'Released' };
   const hint = mode === 'DISARMED' ? 'Arm first' : '';
   return { look: 'idle', title: 'Hold to move', hint };

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { age, alarm, metres, number, scaleEnd, streamName } from '../src/dashboard/format.js';
+import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from '../src/dashboard/format.js';
 import { EMPTY, REMEMBERED, reduce, shownMode, wishes } from '../src/dashboard/model.js';
 import { INVITE_LIFE_MS, PhoneCard } from '../src/dashboard/phone_card.js';
 import { niceEnd } from '../src/dashboard/sparkline.js';
@@ -121,4 +121,10 @@ test('a code that could not be had is asked for again soon, not at once', async 
   assert.deepEqual([fetched.count, elements.invite.hidden], [1, true]);
   card.tick(5001);
   assert.equal(fetched.count, 2);
+});
+
+test('gaps of the last minute are told by side, the longest of each', () => {
+  assert.equal(gapLine({}), '');
+  const gaps = { phone: { count: 2, longest_ms: 312 }, robot: { count: 0, longest_ms: 0 }, server: { count: 1, longest_ms: 90 } };
+  assert.equal(gapLine(gaps), 'Gaps in the last minute: phone 2 (0.31 s) · robot 0 · computer 1 (0.09 s)');
 });

@@ -1,7 +1,9 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { INITIAL, STATUS_LIFE_MS, reduce, shownMode, touchOf, wish } from '../src/session.js';
+import { INITIAL, STATUS_LIFE_MS, goesOn, reduce, shownMode, touchOf, untilRamp, wish } from '../src/session.js';
+import { gapWords } from '../src/mode_words.js';
+import { holdWords } from '../src/view.js';
 import { statusOf } from './fakes.js';
 
 /** @import {Effect, Event} from '../src/session_types.js' */
@@ -184,4 +186,51 @@ test('no event is able to hold the button by itself', () => {
   for (const first of others) {
     for (const second of others) assert.equal(after(...UP, first, second).state.held, false);
   }
+});
+
+test('who holds is told truly whether to wait or to press again', () => {
+  /** @param {...Event} more */
+  const words = (...more) => {
+    const { state } = after(...UP, status({ mode: 'TRACK' }), { type: 'press' }, ...more);
+    return holdWords(state.held, shownMode(state), goesOn(state), untilRamp(state)?.seconds ?? null);
+  };
+  const coast = words(status({ mode: 'COAST', resumes: true, until_ramp_ms: 840 }));
+  assert.deepEqual([coast.title, coast.hint], ['Keep holding', 'It goes on by itself']);
+  const hold = status({ mode: 'HOLD', until_ramp_ms: 2500 });
+  const over = words(hold);
+  assert.deepEqual([over.look, over.title, over.hint], ['again', 'Let go and press again', 'Thrust fades in 3 s']);
+  assert.equal(words(hold, { type: 'release' }).title, 'Hold to move');
+  const pressed = words(hold, { type: 'release' }, { type: 'press' });
+  assert.equal(pressed.title, 'Keep holding', 'the server does not know of that press yet');
+  const latched = words(status({ mode: 'HOLD', resumes: true, until_ramp_ms: 900 }));
+  assert.equal(latched.hint, 'It follows in a moment');
+  assert.equal(words(status({ mode: 'RAMP' })).title, 'Let go');
+});
+
+test('the ring empties from the most that was left, through COAST and HOLD, and is full again the next time', () => {
+  const [coast, hold, track] = [
+    status({ mode: 'COAST', until_ramp_ms: 850 }), status({ mode: 'HOLD', until_ramp_ms: 2000 }), status({ mode: 'TRACK' }),
+  ];
+  const half = status({ mode: 'HOLD', until_ramp_ms: 1000 });
+  assert.deepEqual(untilRamp(after(...UP, coast, hold, half).state), { seconds: 1, share: 0.5 });
+  assert.equal(untilRamp(after(...UP, coast, hold, track).state), null);
+  assert.deepEqual(untilRamp(after(...UP, hold, track, half).state), { seconds: 1, share: 1 });
+  assert.equal(untilRamp(after(...UP, hold, { type: 'tick', now: 501 }).state), null, 'old news count nothing down');
+  assert.equal(untilRamp(after(...UP, hold, { type: 'disconnected' }).state), null);
+});
+
+test('a page that was too busy says so, for it was no link; one that was hidden was not busy', () => {
+  /** @param {...Event} more */
+  const notice = (...more) => after(...UP, status({ mode: 'TRACK' }), { type: 'tick', now: 100 }, ...more).state.notice?.text;
+  assert.equal(notice({ type: 'tick', now: 350 }), undefined);
+  assert.equal(notice({ type: 'tick', now: 500 }), 'This phone was too busy for 0.4 s: close other apps.');
+  assert.equal(notice({ type: 'visibility', visible: false }, { type: 'visibility', visible: true }, { type: 'tick', now: 9000 }),
+    undefined);
+});
+
+test('gaps are told by their number and the side of most of them', () => {
+  const gap = (/** @type {number} */ count) => ({ count, longest_ms: 300 * Math.sign(count) });
+  assert.equal(gapWords({}), '0');
+  assert.equal(gapWords({ phone: gap(0), robot: gap(0), server: gap(0) }), '0');
+  assert.equal(gapWords({ phone: gap(1), robot: gap(0), server: gap(4) }), '5 computer');
 });

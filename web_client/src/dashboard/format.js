@@ -1,5 +1,7 @@
 /** Numbers for people: of one width, with a dash for what is not known. */
 
+import { SIDES } from '../mode_words.js';
+
 /**
  * @param {number | null | undefined} value
  * @param {number} decimals
@@ -52,6 +54,18 @@ export function metres(mm) {
  */
 export function scaleEnd(totalMs) {
   return [100, 200, 400, 800, 1600, 3200].find((end) => totalMs <= end) ?? totalMs;
+}
+
+/**
+ * Gaps of the last minute by side, the longest of each behind it.
+ * @param {import('../protocol_types.js').Status['gaps']} gaps
+ */
+export function gapLine(gaps) {
+  const sides = Object.entries(gaps).map(([side, { count, longest_ms: longest }]) => {
+    const most = count > 0 ? ` (${(longest / 1000).toFixed(2)} s)` : '';
+    return `${SIDES[side] ?? side} ${count}${most}`;
+  });
+  return sides.length > 0 ? `Gaps in the last minute: ${sides.join(' · ')}` : '';
 }
 
 /** @type {Record<string, string>} */

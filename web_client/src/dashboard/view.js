@@ -6,7 +6,7 @@
 
 import { Elements, write } from './elements.js';
 import { MODE_WORDS } from '../mode_words.js';
-import { age, alarm, metres, number, scaleEnd, streamName } from './format.js';
+import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from './format.js';
 import { stopWords } from '../stop.js';
 import { drawLines } from './sparkline.js';
 import { REMEMBERED, shownMode, wishes } from './model.js';
@@ -53,6 +53,7 @@ export class BoardView extends Elements {
     this.latency(status.latency_ms);
     this.control(status);
     this.list('events', status.messages);
+    this.text('gaps', gapLine(status.gaps));
   }
 
   /** @param {Board} board */
@@ -62,6 +63,8 @@ export class BoardView extends Elements {
     this.find('status').dataset.mode = mode;
     this.text('mode', name);
     this.text('meaning', meaning);
+    const left = board.heard ? board.status?.until_ramp_ms ?? null : null;
+    this.text('left', left === null ? '' : `Thrust fades in ${Math.ceil(left / 1000)} s`);
     this.text('reason', board.heard ? board.status?.reason ?? '' : '');
     this.text('robot', board.status?.robot ?? '–');
     for (const [what, can] of Object.entries(wishes(board))) {
@@ -74,12 +77,13 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  arming({ ready, refusals, mode }) {
+  arming({ ready, refusals, mode, warnings }) {
     const waiting = mode === 'DISARMED';
     this.text('ready', !waiting ? mode.toLowerCase() : ready ? 'ready' : `${refusals.length} to mend`);
     this.find('ready').className = `badge ${waiting ? (ready ? 'good' : 'bad') : ''}`;
     const fine = refusals.length === 0;
     this.list('refusals', fine ? ['Nothing is in the way'] : refusals);
+    this.list('warnings', warnings);
     this.find('refusals').firstElementChild?.classList.toggle('fine', fine);
   }
 
