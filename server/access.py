@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,29 +36,42 @@ class Access:
     """How the server smooths the phone's turns: its lag is no tracking error."""
 
 
+def run_of(directory: Path | None = None) -> dict[str, object]:
+    """The run file of the server on this machine.
+
+    Raises:
+        PhoneClientError: there is none, or it makes no sense.
+    """
+    path = (directory or runtime_directory()) / RUN_FILE
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, object])
+    except FileNotFoundError as error:
+        why = "no server is running here: start `lightleash serve`, or name one with --url"
+        raise PhoneClientError(why) from error
+    except (OSError, msgspec.MsgspecError) as error:
+        raise PhoneClientError(f"{path}: not a run file of `lightleash serve`: {error}") from error
+
+
 def running_server(directory: Path | None = None) -> Access:
     """The server running on this machine, as its run file tells.
 
     Raises:
         PhoneClientError: there is none, or its run file makes no sense.
     """
-    path = (directory or runtime_directory()) / RUN_FILE
+    run = run_of(directory)
     try:
-        run = json.loads(path.read_text())
         url = run["http_url"] or run["https_url"]
         knobs = run.get("virtual_camera")
         return Access(
             str(url),
             str(run["operator_token"]),
-            int(run.get("truth_port") or 0),
+            int(str(run.get("truth_port") or 0)),
             str(run.get("robot") or "ames"),
             virtual_camera=msgspec.convert(knobs, Knobs).config() if knobs else DEFAULT_CAMERA,
         )
-    except FileNotFoundError as error:
-        why = "no server is running here: start `lightleash serve`, or name one with --url"
+    except (ValueError, LookupError, TypeError, msgspec.MsgspecError) as error:
+        why = f"{RUN_FILE}: not a run file of `lightleash serve`: {error}"
         raise PhoneClientError(why) from error
-    except (OSError, ValueError, LookupError, TypeError, msgspec.MsgspecError) as error:
-        raise PhoneClientError(f"{path}: not a run file of `lightleash serve`: {error}") from error
 
 
 def add_access_arguments(parser: argparse.ArgumentParser) -> None:

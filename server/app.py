@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-import io
-import logging
 import signal
 import subprocess
 import sys
@@ -13,9 +9,8 @@ from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
 import msgspec
-import segno
 from starlette.applications import Starlette
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
@@ -29,23 +24,12 @@ from server.link_log import KEPT_S
 from server.messages import Command, decode_message
 from server.metrics import exposition
 from server.recording import RecordingError
-from server.security import COOKIE, PAIR_TRIES, Doors
+from server.replies import body_of, refusal
 from server.websocket import PageServer
 from server.wire import WireError
 
 CLIENT = Path(__file__).resolve().parents[1] / "web_client"
 LOOKS = sorted((*CLIENT.glob("*.css"), *CLIENT.glob("*.svg")))
-MAX_BODY, BODY_S = 4_096, 5.0
-log = logging.getLogger("lightleash")
-
-
-class Pairing(msgspec.Struct, forbid_unknown_fields=True):
-    """What `/api/pair` is asked."""
-
-    token: str
-
-
-_pairing = msgspec.json.Decoder(Pairing)
 
 
 class VirtualPhone:
@@ -75,21 +59,17 @@ class VirtualPhone:
 class Api:
     """The HTTP side: few requests, each small."""
 
-    def __init__(self, hub: Hub, doors: Doors, invite_url: str, authority: Path | None) -> None:
-        """`invite_url` is what the QR code says."""
-        self._hub, self._doors, self._invite = hub, doors, invite_url
-        self._authority = authority
+    def __init__(self, hub: Hub, authority: Path | None) -> None:
+        """`authority` is the certificate to install on phones."""
+        self._hub, self._authority = hub, authority
         self.phone = VirtualPhone()
 
     def routes(self) -> Sequence[BaseRoute]:
-        """All of `/api/`, and the small ones beside it."""
+        """All of `/api/` that is no person's pairing, and the small ones beside it."""
         return [
-            Route("/api/pair", self._pair, methods=["POST"]),
-            Route("/api/whoami", self._who_am_i),
             Route("/api/stop", self._stop, methods=["POST"]),
             Route("/api/virtual-phone", self._virtual_phone, methods=["POST", "DELETE"]),
             Route("/api/recording", self._recording, methods=["POST", "DELETE"]),
-            Route("/api/invite", self._invitation),
             Route("/api/status", self._status),
             Route("/api/link", self._link),
             Route("/ca.crt", self._certificate),
@@ -97,34 +77,12 @@ class Api:
             Route("/metrics", self._metrics),
         ]
 
-    async def _pair(self, request: Request) -> Response:
-        address = request.client.host if request.client is not None else ""
-        if not self._doors.may_try(address, now()):
-            return refusal(429, "token", f"{PAIR_TRIES} tries a minute")
-        try:
-            pairing = _pairing.decode(await body_of(request))
-        except msgspec.DecodeError:
-            return refusal(400, "token", 'JSON: {"token": "…"}')
-        paired = self._doors.pair(pairing.token)
-        if paired is None:
-            log.warning("pairing refused for %s", address)
-            return refusal(401, "token", "the link of this run: scan the QR code again")
-        role, session = paired
-        secure = request.url.scheme == "https"
-        response = JSONResponse({"role": role})
-        name = f"__Host-{COOKIE}" if secure else COOKIE
-        response.set_cookie(name, session, httponly=True, secure=secure, samesite="strict")
-        return response
-
-    async def _who_am_i(self, request: Request) -> Response:
-        return JSONResponse({"role": request.scope["role"]})
-
     async def _stop(self, request: Request) -> Response:
         try:
             stop = await stop_of(request)
         except WireError as error:
             return refusal(409 if error.code == "age" else 400, error.field, error.allowed)
-        self._hub.wish(stop, str(request.scope["role"]))
+        self._hub.wish(stop, request.scope["member"])
         return JSONResponse({"stopping": True}, 202)
 
     async def _virtual_phone(self, request: Request) -> Response:
@@ -146,13 +104,6 @@ class Api:
             return refusal(507, "recording", str(error))
         self._hub.say(f"Recording {name}.")
         return JSONResponse({"name": name}, 202)
-
-    async def _invitation(self, _request: Request) -> Response:
-        svg = io.BytesIO()
-        segno.make(self._invite, error="m").save(
-            svg, kind="svg", scale=6, border=2, dark="#000", light="#fff", xmldecl=False
-        )
-        return JSONResponse({"url": self._invite, "qr_svg": svg.getvalue().decode()})
 
     async def _status(self, _request: Request) -> Response:
         return Response(self._hub.snapshot(), media_type="application/json")
@@ -182,8 +133,8 @@ class Api:
         return Response(exposition(self._hub), media_type="text/plain; version=0.0.4")
 
 
-def make_app(api: Api, pages: PageServer, view: Sequence[BaseRoute]) -> Starlette:
-    """The application, without its guard."""
+def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> Starlette:
+    """The application, without its guard; `others` are routes of people, WebRTC and 3D view."""
     return Starlette(
         routes=[
             Route("/", _file("index.html")),
@@ -193,7 +144,7 @@ def make_app(api: Api, pages: PageServer, view: Sequence[BaseRoute]) -> Starlett
             WebSocketRoute("/ws/phone", pages.phone),
             WebSocketRoute("/ws/video", pages.video),
             WebSocketRoute("/ws/supervisor", pages.supervisor),
-            *view,
+            *others,
             *(Route(f"/{path.name}", _file(path.name)) for path in LOOKS),
             Mount("/src", StaticFiles(directory=CLIENT / "src")),
         ]
@@ -220,21 +171,3 @@ async def stop_of(request: Request) -> Command:
     if not isinstance(command, Command) or command.what != "stop":
         raise WireError("value", "command.what", "stop")
     return refuse_old(command, now())
-
-
-async def body_of(request: Request, longest: int = MAX_BODY) -> bytes:
-    """The body; empty if it is longer than what we take, or too long in coming."""
-    body = b""
-    with contextlib.suppress(TimeoutError, ClientDisconnect):
-        async with asyncio.timeout(BODY_S):
-            async for part in request.stream():
-                body += part
-                if len(body) > longest:
-                    return b""
-            return body
-    return b""
-
-
-def refusal(status: int, field: str, allowed: str) -> Response:
-    """The answer to a request that can't be taken."""
-    return JSONResponse({"code": "refused", "field": field, "allowed": allowed}, status)

@@ -15,6 +15,7 @@ HELP = f"""lightleash {server.__version__}: move your phone, and the robot follo
 usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
 
   serve        server, control and simulated robot; prints the addresses of the pages
+  invite       a link into the running server: --role viewer, operator or supervisor
   phone        a virtual phone that films the simulated robot and leads it
   replay       push a recorded phone through a server, or through the pipeline alone
   locate       where the robot was in each picture of a folder or film, with its uncertainty
@@ -70,6 +71,12 @@ def _config_of(argv: Sequence[str]) -> tuple[list[str], Path | None]:
     file = Path(arguments[at + 1])
     del arguments[at : at + 2]
     return arguments, file
+
+
+def _invite(argv: Sequence[str]) -> int:
+    from server.invite import main
+
+    return main(list(argv))
 
 
 def _phone(argv: Sequence[str]) -> int:
@@ -134,6 +141,7 @@ def _doctor(argv: Sequence[str]) -> int:
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "serve": _serve,
+    "invite": _invite,
     "phone": _phone,
     "replay": _replay,
     "locate": _locate,

@@ -14,19 +14,25 @@ import msgspec
 from msgspec.structs import asdict
 
 from pipeline.robot import Robot
+from pipeline.signals import Mode
 from server.blame import Blame
 from server.calibrate.desk import Desk
 from server.calibration_messages import Calibrate
 from server.clock import now
 from server.control_link import ControlStatus, Input, ReadyInput, RequestInput, server_end
+from server.handover import Handover
 from server.knobs import TuneInput
 from server.messages import Command, Hello, Status, ToPage, Tune, encode_message
 from server.meter import Meter
 from server.operator import OperatorPhone
 from server.page import Page
+from server.pairings import Member, of_this_machine
 from server.paths import FastPath, PhonePaths
 from server.pauses import Pauses
+from server.people import People
+from server.people_messages import Deed
 from server.recorder import Recordings
+from server.security import Doors
 from server.status import build
 from server.vision import Picture, jpeg
 from server.wire import encode
@@ -34,12 +40,12 @@ from server.wire_records import Record, Thumbnail
 
 log = logging.getLogger("lightleash")
 
-LEASE_S = 2.0
-"""A phone silent for longer may be taken over from."""
 INSIST_S, INSISTS = 0.01, 100
 """How often and how many times a STOP is sent to a control process that can't take it."""
 EVENTS, TICK_S = 12, 0.1
 AT_REST = ("DISARMED", "STOPPED", "LOST")
+GROUNDED = (Mode.DISARMED, Mode.ARMED, Mode.STOPPED)
+PROGRAM = of_this_machine("operator")
 
 
 class Hub:
@@ -52,6 +58,7 @@ class Hub:
         cameras: list[Path],
         recordings: Recordings,
         profiles: Path | None = None,
+        doors: Doors | None = None,
     ) -> None:
         """Listens to control in `runtime`; `profiles` is where new calibrations go."""
         self.robot, self.recordings = robot, recordings
@@ -59,6 +66,8 @@ class Hub:
         self.paths = PhonePaths(lambda data: recordings.record("server", data, now()))
         self._desk = Desk(self.paths.tell)
         self._control = server_end(runtime)
+        self.people = People(doors or Doors(), self._keep_deed)
+        self.handover = Handover(self)
         self.phone: OperatorPhone | None = None
         self.supervisors: set[Page] = set()
         self.status: ControlStatus | None = None
@@ -82,6 +91,7 @@ class Hub:
             while True:
                 await asyncio.sleep(TICK_S)
                 self._tick()
+                await self.handover.expire()
         finally:
             watching.cancel()
             self.pauses.close()
@@ -101,11 +111,15 @@ class Hub:
         log.info("%s", text)
         self.events.appendleft(text)
 
-    def wish(self, command: Command, who: str) -> None:
+    def _keep_deed(self, deed: Deed) -> None:
+        self.recordings.message("server", encode_message(deed), now())
+
+    def wish(self, command: Command, who: Member) -> None:
         """A person's wish, already checked for its role."""
         if command.what == "key_frame":
             return
-        self.say(f"{who}: {command.what}")
+        self.people.note(command.what, who)
+        self.say(f"{who.name}: {command.what}")
         self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
 
     def tune(self, wish: Tune) -> None:
@@ -134,12 +148,14 @@ class Hub:
         else:
             self.say(f"{request.what} did not reach the control process: try again.")
 
-    def greet(self, hello: Hello, page: Page) -> OperatorPhone | None:
-        """Give the lease to a phone; None while another one is alive."""
+    def greet(self, hello: Hello, page: Page, who: Member = PROGRAM) -> OperatorPhone | None:
+        """Give the lease to a phone of `who`; None while another one has it, or shall have it."""
         current = self.phone
+        silent_s = current.silent_for(now()) if current is not None else None
+        if not self.people.lease.is_free_for(who.id, silent_s, now()):
+            return None
         if current is not None:
-            if current.silent_for(now()) < LEASE_S:
-                return None
+            self.people.note("take-over", who, "the phone that led was silent")
             self.part(current)
         soon: Callable[..., Any] = asyncio.get_running_loop().call_soon_threadsafe
         self.phone = OperatorPhone(
@@ -155,8 +171,18 @@ class Hub:
         self.paths.begin(page)
         self.recordings.message("phone", encode_message(hello), now())
         self.to_control(RequestInput("disarm"))  # never go on with another hand
-        self.say(f"{self.phone.device} leads.")
+        self.people.lease.take(who.id)
+        self.people.note("lead", who, self.phone.device)
+        self.say(f"{who.name} leads: {self.phone.device}.")
         return self.phone
+
+    def is_flying(self) -> bool:
+        """Whether the robot may be in the air, as far as is known."""
+        return self.status is None or Mode(self.status.mode) not in GROUNDED
+
+    def disarm(self) -> None:
+        """Bring the robot down, whoever leads."""
+        self._ask(RequestInput("disarm"), INSISTS)
 
     def join_video(self, session: str, page: Page) -> OperatorPhone | None:
         """The video socket of the phone that has the lease; None for anyone else."""
@@ -178,6 +204,8 @@ class Hub:
         if self.phone is phone:
             self.phone = None
             self.paths.close()
+            self.people.note("leave", self.people.named(self.people.lease.holder), phone.device)
+            self.people.lease.free()
             self.say(f"{phone.device} has left.")
             phone.close()
 
@@ -230,9 +258,11 @@ class Hub:
 
     def _tick(self) -> None:
         self.to_control(ReadyInput(self.refusals()))
+        self.handover.make_room(now())
         status = build(self)
         if status.mode != self._last_mode:
             self.say(f"{status.mode}: {status.reason}")
+            self.people.note("mode", why=f"{status.mode}: {status.reason}")
             self._last_mode = status.mode
         self._shown = status
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):

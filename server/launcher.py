@@ -5,20 +5,20 @@ from __future__ import annotations
 import json
 import os
 import secrets
-import shutil
 import signal
 import socket
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
-import segno
 
 from hardware.link_key import KEY_VARIABLE, LinkKeyError, new_key
 from hardware.robot_file import RobotFileError, load_robot
+from server.access import PhoneClientError
 from server.child import Child
+from server.invite import invite, print_code
 from server.robot_key import epoch_file, key_of
 from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.settings import Settings
@@ -84,7 +84,7 @@ class Launcher:
                 self.revive(time.monotonic())
                 if not announced and self._run_file.exists():
                     announced = True
-                    announce(json.loads(self._run_file.read_text()))
+                    self._announce()
                 if not announced and self._is_hopeless():
                     return 1
                 if not announced and time.monotonic() - said > REMIND_S:
@@ -97,6 +97,12 @@ class Launcher:
                 child.stop()
             self._run_file.unlink(missing_ok=True)
         return 0
+
+    def _announce(self) -> None:
+        try:
+            announce(json.loads(self._run_file.read_text()))
+        except (OSError, PhoneClientError) as error:  # the server has just died: it comes back
+            print(f"{error}; `lightleash invite` prints links.", file=sys.stderr, flush=True)
 
     def revive(self, now: float) -> None:
         """Start whoever should run and doesn't."""
@@ -160,15 +166,21 @@ def children_of(
     return children
 
 
-def announce(run: dict[str, object]) -> None:
-    """Print what a newcomer needs: the code to scan and the page to open."""
-    invite = f"{run['https_url']}/#k={run['operator_token']}"
-    columns = shutil.get_terminal_size().columns
-    code = segno.make(invite, error="l")
-    if sys.stdout.isatty() and code.symbol_size(border=2)[0] <= columns:
-        code.terminal(border=2, compact=True)
-    print(f"\nPhone:       {invite}")
-    print(f"Supervisor:  {run['http_url']}/supervisor#k={run['supervisor_token']}")
+def announce(run: Mapping[str, object]) -> None:
+    """Print what a newcomer needs: the code to scan and the page to open.
+
+    Links are for people at a terminal alone: what goes elsewhere is kept in logs.
+    """
+    if sys.stdout.isatty():
+        phone, supervisor = invite(run, "operator"), invite(run, "supervisor")
+        print_code(phone.url)
+        print(f"\nPhone:       {phone.url}")
+        print(f"Supervisor:  {supervisor.here}")
+        print(f"Each opens once, within {phone.lives_s / 60:g} minutes; `lightleash invite`, with")
+        print("--role viewer or supervisor or without, prints another one.")
+    else:
+        print(f"\nPhone:       {run['https_url']}/ by a link of `lightleash invite`")
+        print(f"Supervisor:  {run['http_url']}/supervisor by `lightleash invite --role supervisor`")
     if run["truth_port"]:  # the robot is a simulated one
         print("No phone at hand? Press “Start virtual phone” on the supervisor's page.")
     print("Ctrl-C stops, robot first.", flush=True)

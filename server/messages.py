@@ -15,6 +15,7 @@ from server.calibration_messages import Calibrate, Calibration
 from server.camera_messages import CameraHealth
 from server.knobs import AdaptiveBeta, CutoffHz, Knobs, SpeedLimit
 from server.path_messages import PathChoice
+from server.people_messages import Deed, Person
 from server.wire import MAX_MESSAGE_BYTES, WireError
 
 Text = Annotated[str, Meta(max_length=200)]
@@ -223,10 +224,12 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
     while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections
     while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full."""
+    people: list[Person] = []
+    """Who is paired, in the order they came."""
 
 
 FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log
-ToPage = Welcome | Refused | Status | Command | PathChoice | Calibration
+ToPage = Welcome | Refused | Status | Command | PathChoice | Calibration | Deed
 
 _decoder = msgspec.json.Decoder(FromPage)
 _to_page_decoder = msgspec.json.Decoder(ToPage)

@@ -9,12 +9,17 @@ from typing import Any
 from starlette.routing import Route, WebSocketRoute
 
 from server import ingest, session, wire, wire_records
-from server.app import MAX_BODY, Api
-from server.hub import LEASE_S, TICK_S
+from server.app import Api
+from server.hub import TICK_S
+from server.lease import GIVEN_S, LEASE_S
+from server.pairings import CODE_LETTERS, IDLE_S, KEY_BYTES, LINK_S, WAIT_S
+from server.people_api import PeopleApi
 from server.phone_client import MAX_IN_FLIGHT
+from server.replies import MAX_BODY
+from server.roles import least_of
 from server.rtc import answer, link, trailer
 from server.rtc.desk import OFFERS_HZ, RtcDesk
-from server.security import COOKIE, OPERATOR_PATHS, PAIR_TRIES, PAIR_WINDOW_S, PUBLIC_PATHS
+from server.security import COOKIE, PAIR_TRIES, PAIR_WINDOW_S
 from server.view_proxy import routes as view_routes
 from server.websocket import HELLO_S, PING_S
 from server.wire import Kind
@@ -65,14 +70,18 @@ CODES = {
 """Every code of `Refused` and what it means."""
 
 REQUESTS = {
-    "POST /api/pair": 'body `{"token": "…"}`; answers `{"role": …}` and sets the cookie',
-    "GET /api/whoami": "the role this request has",
+    "POST /api/pair": 'body `{"token": "…", "name": "…"}`; answers as `whoami`, sets the cookie',
+    "GET /api/whoami": "role, state (waiting, in, denied, revoked, expired), name, code, why",
+    "POST /api/people/confirm": 'body `{"id": "…", "code": "…"}`: let in who waits with that code',
+    "POST /api/people/deny": 'body `{"id": "…"}`: turn away who waits',
+    "POST /api/people/revoke": 'body `{"id": "…"}`: end a pairing, and its sockets at once',
+    "POST /api/people/lead": 'body `{"id": "…"}`: give that one the lead; also who leads may',
     "POST /api/stop": "STOP, when the socket is gone or stuck; body: nothing, or the `command`",
     "POST /api/virtual-phone": "start the virtual phone",
     "DELETE /api/virtual-phone": "stop it",
     "POST /api/recording": "start recording",
     "DELETE /api/recording": "stop; answers with the path of the file",
-    "GET /api/invite": "the link for phones and its QR code (SVG)",
+    "POST /api/invite": 'body `{"role": "operator"}` or viewer: a link that opens once, as QR code',
     "GET /api/status": "the last `Status`",
     "GET /api/link": "how it will be to fly with the operator's link: `?seconds=` of the last 60",
     "GET /ca.crt": "the authority to install on phones",
@@ -88,27 +97,24 @@ REQUESTS = {
 """What each address is for; the three pages' sockets are told of above."""
 
 
-def _role(path: str) -> str:
-    if path in PUBLIC_PATHS:
-        return "anyone"
-    return "operator, supervisor" if path in OPERATOR_PATHS else "supervisor"
-
-
 def requests() -> str:
     """The table of requests, in step with the routes.
 
     Raises:
         KeyError: a route has no words.
     """
-    lines = ["| request | role | |", "|---|---|---|"]
-    api, desk = Api.__new__(Api), RtcDesk.__new__(RtcDesk)  # only asked for their routes
-    for route in (*api.routes(), *desk.routes(), *view_routes(Path("nowhere"))):
+    lines = ["| request | least role | |", "|---|---|---|"]
+    api, people = Api.__new__(Api), PeopleApi.__new__(PeopleApi)  # only asked for their routes
+    desk = RtcDesk.__new__(RtcDesk)
+    others = (*people.routes(), *desk.routes(), *view_routes(Path("nowhere")))
+    for route in (*api.routes(), *others):
         assert isinstance(route, (Route, WebSocketRoute))
         methods = ["socket"] if isinstance(route, WebSocketRoute) else sorted(route.methods or ())
         for method in methods:
             if method != "HEAD":
                 request = f"{method} {route.path}"
-                lines.append(f"| `{request}` | {_role(route.path)} | {REQUESTS[request]} |")
+                least = least_of(route.path, is_read=method == "GET")
+                lines.append(f"| `{request}` | {least} | {REQUESTS[request]} |")
     return "\n".join(lines)
 
 
@@ -122,12 +128,12 @@ Version {wire.VERSION}. Generated from `server/wire.py`, `server/wire_records.py
 
 ## Sockets
 
-| websocket | role | page → server | server → page |
+| websocket | least role | page → server | server → page |
 |---|---|---|---|
 | `/ws/phone` | operator | `hello`, `command`, `path`, `calibrate`, `log`; MOTION, TOUCH, PONG | \
 `welcome`, `status`, `refused`, `calibration`, `path`, `command` (`key_frame`); PING |
-| `/ws/video` | video | `hello`, `log`; FRAME | `welcome`, `refused`; CREDIT |
-| `/ws/supervisor` | supervisor | `hello`, `command`, `tune`, `path`, `log` | `welcome`, `status`, \
+| `/ws/video` | operator | `hello`, `log`; FRAME | `welcome`, `refused`; CREDIT |
+| `/ws/supervisor` | viewer | `hello`, `command`, `tune`, `path`, `log` | `welcome`, `status`, \
 `refused`; PICTURE |
 
 A binary websocket message is one *record*, a text message is one JSON *message*. Compression is
@@ -144,11 +150,22 @@ off. Phones come by HTTPS; the HTTP listener is for this machine alone.
 
 ## Authentication
 
-The link shown by `lightleash serve` carries a token of this run behind `#k=`. The page takes it
-out of the address and sends it to `POST /api/pair`, which answers with a cookie: `{COOKIE}` on
-HTTP, `__Host-{COOKIE}` (Secure) on HTTPS; HttpOnly, SameSite=Strict. {PAIR_TRIES} tries in
-{PAIR_WINDOW_S:g} s for each address, then 429. Programs send `Authorization: Bearer <token>`
-instead.
+A link carries a key of {8 * KEY_BYTES} random bits behind `#k=`; it opens once, within
+{LINK_S / 60:g} minutes. The page takes it out of the address and sends it to `POST /api/pair` with
+a name, which answers with a cookie: `{COOKIE}` on HTTP, `__Host-{COOKIE}` (Secure) on HTTPS;
+HttpOnly, SameSite=Strict; each counts on its own kind of connection alone. An operator then waits
+(`state: waiting`) with a `code` of {CODE_LETTERS} letters until a supervisor, who sees the same
+letters, confirms; after {WAIT_S / 60:g} minutes it is turned away. With `pairing.confirm = "self"`
+the link is enough. A pairing lasts as long as the run, or until it is revoked or unused for
+{IDLE_S / 3600:g} h; revoked, its sockets are closed (4403). Wrong links: {PAIR_TRIES} in
+{PAIR_WINDOW_S:g} s for each address (IPv6: each /64), then 429. Programs of the user who runs the
+server send `Authorization: Bearer <key>` instead, with a key of the run file.
+
+Roles are viewer < operator < supervisor; each may do what those before it may. A viewer sees all
+and may STOP. On `/ws/supervisor` viewers and operators may say STOP and nothing else. Who leads, or
+a supervisor, may give the lead to another operator; it is kept for that one for {GIVEN_S:g} s. The
+robot is disarmed whenever the lead changes; in flight only a supervisor may change it, and the
+robot comes down first.
 
 `Host` must be an address of this server (421). Websockets and every request but GET and HEAD must
 come from the server's own pages (403): `Origin` is the server's, and requests carry the header

@@ -11,6 +11,8 @@ from typing import IO
 RUN_FILE = "lightleash-run.json"
 VIEW_SOCKET = "view.sock"
 """Of the 3D view."""
+MEMBERS_FILE = "members.json"
+"""Who has paired, for as long as the run."""
 
 
 class BusyError(RuntimeError):
@@ -45,7 +47,8 @@ def prepare(directory: Path) -> IO[str]:
         raise BusyError(
             f"lightleash runs already in {directory}: stop it, or set XDG_RUNTIME_DIR"
         ) from error
-    (directory / RUN_FILE).unlink(missing_ok=True)
+    for name in (RUN_FILE, MEMBERS_FILE):
+        (directory / name).unlink(missing_ok=True)
     return lock
 
 

@@ -20,15 +20,23 @@ from hardware.robot_file import ROBOTS, load_robot
 from server import bounded_log, warm_up
 from server.admission import Admission, limits_for
 from server.app import Api, make_app
+from server.audit import Audit
 from server.calibrate.camera_yaml import PROFILES
 from server.dashboard import Dashboard
 from server.hub import Hub
 from server.listener import Listener, listener
+from server.people_api import PeopleApi
 from server.recorder import Recordings
 from server.recording import ROBOT_KEY, SETTINGS_KEY
 from server.recording_files import recover_all
 from server.rtc.desk import RtcDesk
-from server.runtime import RUN_FILE, VIEW_SOCKET, private_directory, write_private
+from server.runtime import (
+    MEMBERS_FILE,
+    RUN_FILE,
+    VIEW_SOCKET,
+    private_directory,
+    write_private,
+)
 from server.security import Doors, Guard
 from server.settings import Settings
 from server.tls import Certificate, certificate, own_addresses, own_names
@@ -66,15 +74,18 @@ def base_url(host: str, port: int) -> str:
 async def serve(settings: Settings, given: Given) -> None:
     """Serve until SIGTERM or SIGINT."""
     tls = _certificate(settings)
-    doors = Doors(given.secret)
+    audit = Audit(settings.state)
+    members = given.runtime / MEMBERS_FILE
+    doors = Doors(given.secret, settings.pairing.confirm, members, audit)
     warming = warm_up.begin()
-    hub = _hub(settings, given)
+    hub = _hub(settings, given, doors)
     view = given.runtime / VIEW_SOCKET
     dashboard = _dashboard(settings, hub, view)
     base = base_url(settings.host, given.https.getsockname()[1])
-    api = Api(hub, doors, f"{base}/#k={doors.operator_token}", tls.authority)
+    api = Api(hub, tls.authority)
+    people = PeopleApi(hub, doors, base, http_url(given))
     desk = RtcDesk(hub, settings.rtc, settings.video.bitrate_bps)
-    routes = [*view_routes(view), *desk.routes()]
+    routes = [*people.routes(), *view_routes(view), *desk.routes()]
     app = make_app(api, PageServer(hub, settings.video), routes)
     admission = Admission(limits_for(raise_handles()))
     guarded = Guard(app, doors, [*own_names(), *settings.names], admission)
@@ -90,6 +101,12 @@ async def serve(settings: Settings, given: Given) -> None:
         (given.runtime / RUN_FILE).unlink(missing_ok=True)
         api.phone.stop()
         dashboard.stop()
+        audit.close()
+
+
+def http_url(given: Given) -> str:
+    """Where this machine reaches the server."""
+    return f"http://127.0.0.1:{given.http.getsockname()[1]}"
 
 
 async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, run: str) -> None:
@@ -105,14 +122,14 @@ async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, 
     write_private(run_file, run)
 
 
-def _hub(settings: Settings, given: Given) -> Hub:
+def _hub(settings: Settings, given: Given, doors: Doors) -> Hub:
     folder = private_directory(private_directory(settings.state) / "recordings")
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
     robot = load_robot(settings.robot).robot
     profiles = private_directory(settings.state / PROFILES)
     cameras = [*settings.cameras, profiles, CAMERAS]
-    return Hub(given.runtime, robot, cameras, recordings, profiles)
+    return Hub(given.runtime, robot, cameras, recordings, profiles, doors)
 
 
 def _dashboard(settings: Settings, hub: Hub, view: Path) -> Dashboard:
@@ -125,7 +142,7 @@ def _dashboard(settings: Settings, hub: Hub, view: Path) -> Dashboard:
 def _run(settings: Settings, given: Given, base: str, doors: Doors) -> dict[str, object]:
     """What other programs of this user are told."""
     return {
-        "http_url": f"http://127.0.0.1:{given.http.getsockname()[1]}",
+        "http_url": http_url(given),
         "https_url": base,
         "operator_token": doors.operator_token,
         "supervisor_token": doors.supervisor_token,

@@ -49,9 +49,12 @@ class Bucket:
 class Session:
     """State of one connection: waiting for hello, then open as a role."""
 
-    def __init__(self, path_role: str) -> None:
-        """`path_role` is what the path says: operator, video, supervisor; rtc: a data channel."""
-        self.role = path_role
+    def __init__(self, path_role: str, looks_only: bool = False) -> None:
+        """`path_role` is what the path says: operator, video, supervisor; rtc: a data channel.
+
+        Who `looks_only` on a supervisor's page may say STOP there and nothing else.
+        """
+        self.role, self._looks_only = path_role, looks_only
         self.hello: Hello | None = None
         self.hopeless = False
         """Too many faults."""
@@ -104,6 +107,8 @@ class Session:
             raise WireError("order", "message", "hello first")
         if not isinstance(message, MESSAGES[self.role]):
             raise WireError("role", "message.type", f"not as {self.role}")
+        if self._looks_only and wished != "stop":
+            raise WireError("role", "message.type", "STOP: all else takes a supervisor")
         if wished == "reset" and self.role != "supervisor":
             raise WireError("role", "command.what", "arm, disarm or stop: a supervisor resets")
         return message

@@ -27,6 +27,7 @@ from server.knobs import (
     SLOWEST_HZ,
     Knobs,
 )
+from server.pairings import Confirm
 
 PREFIX = "LIGHTLEASH_"
 
@@ -46,6 +47,17 @@ class VideoSettings(BaseModel):
     height: int = Field(default=720, ge=240, le=1080)
     frame_rate_hz: int = Field(default=30, ge=5, le=60)
     bitrate_bps: int = Field(default=3_000_000, ge=500_000, le=20_000_000)
+
+
+class PairingSettings(BaseModel):
+    """How people are let in."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    confirm: Confirm = Field(
+        default="supervisor",
+        description="who confirms an operator: a supervisor, or the link is enough",
+    )
 
 
 TURN_URL = r"^(turns?:[^\s?]{1,200}(\?transport=(udp|tcp))?)?$"
@@ -153,6 +165,7 @@ class Settings(BaseSettings):
     cameras: list[Path] = Field([], description="folders with calibrations of phones")
     video: VideoSettings = Field(default_factory=VideoSettings)
     rtc: RtcSettings = Field(default_factory=RtcSettings)
+    pairing: PairingSettings = Field(default_factory=PairingSettings)
     virtual_camera: VirtualCameraSettings = Field(default_factory=VirtualCameraSettings)
 
     @classmethod
@@ -171,6 +184,7 @@ class Settings(BaseSettings):
 TABLES: dict[str, type[BaseModel]] = {
     "video": VideoSettings,
     "rtc": RtcSettings,
+    "pairing": PairingSettings,
     "virtual_camera": VirtualCameraSettings,
 }
 Settings.__doc__ = inspect.cleandoc(Settings.__doc__ or "")  # `--help` shows it as it is

@@ -16,6 +16,7 @@ from server.messages import Estimate, GapCount, Status, Stream, VirtualCamera
 from server.meter import Meter
 from server.operator import OperatorPhone
 from server.pauses import Pauses
+from server.people import People
 from server.recorder import Recordings
 
 LOST_S = 0.3
@@ -33,6 +34,7 @@ class Known(Protocol):
     recordings: Recordings
     pauses: Pauses
     blame: Blame
+    people: People
 
     @property
     def events(self) -> Sequence[str]:
@@ -92,6 +94,7 @@ def build(hub: Known) -> Status:
         gaps={side: GapCount(one.count, 1e3 * one.longest_s) for side, one in gaps.items()},
         warnings=warnings(gaps),
         server=hub.pauses.figures(),
+        people=hub.people.present(),
     )
 
 

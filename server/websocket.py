@@ -16,6 +16,7 @@ from server.clock import now
 from server.hub import Hub
 from server.messages import Command, FromPage, Hello, Log, Refused, Tune, Welcome, encode_message
 from server.operator import OperatorPhone
+from server.pairings import Member
 from server.path_messages import PathChoice
 from server.session import Session
 from server.settings import VideoSettings
@@ -122,16 +123,18 @@ class PageServer:
 
     async def _serve(self, socket: WebSocket, role: str) -> None:
         await socket.accept()
-        page, session = Connection(socket), Session(role)
+        member: Member = socket.scope["member"]
+        looks_only = role == "supervisor" and member.role != "supervisor"
+        page, session = Connection(socket), Session(role, looks_only)
         phone: OperatorPhone | None = None
         writer = asyncio.create_task(page.write())
         pinger: asyncio.Task[None] | None = None
         try:
-            phone = await self._greet(page, session)
+            phone = await self._greet(page, session, member)
             if role == "operator":
                 pinger = asyncio.create_task(self._ping(phone))
             while not session.hopeless:
-                await self._listen(page, session, phone)
+                await self._listen(page, session, phone, member)
         except WireError as error:
             log.warning("a page as %s is refused: %s", role, error)
             page.refuse(error, fatal=True)
@@ -146,14 +149,16 @@ class PageServer:
                 self._hub.part(phone)
             await _quietly(page.close(1008 if session.hopeless or session.hello is None else 1000))
 
-    async def _greet(self, page: Connection, session: Session) -> OperatorPhone | None:
+    async def _greet(
+        self, page: Connection, session: Session, member: Member
+    ) -> OperatorPhone | None:
         """Hear hello, answer welcome, take the place; raises WireError if there is none."""
         hello = session.receive(await asyncio.wait_for(page.read(), HELLO_S), now())
         if not isinstance(hello, Hello):
             raise WireError("order", "message", "hello first")
         phone: OperatorPhone | None = None
         if session.role == "operator":
-            phone = self._hub.greet(hello, page)
+            phone = self._hub.greet(hello, page, member)
             if phone is None:
                 raise BUSY
         elif session.role == "video":
@@ -179,7 +184,7 @@ class PageServer:
         return phone
 
     async def _listen(
-        self, page: Connection, session: Session, phone: OperatorPhone | None
+        self, page: Connection, session: Session, phone: OperatorPhone | None, member: Member
     ) -> None:
         """Take one thing the page says; a fault is answered and costs nobody else anything.
 
@@ -199,7 +204,7 @@ class PageServer:
             if isinstance(said, Record) and phone is not None:
                 phone.take(said, t)
             elif isinstance(said, Command):
-                self._hub.wish(said, phone.device if phone is not None else "supervisor")
+                self._hub.wish(said, member)
             elif isinstance(said, Calibrate) and phone is not None:
                 self._hub.calibrate(said)
             elif isinstance(said, Tune):

@@ -26,6 +26,7 @@ from server import (
     knobs,
     link_messages,
     messages,
+    people_messages,
     wire,
     wire_records,
 )
@@ -53,7 +54,9 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.VirtualCamera,
     messages.Estimate,
     camera_messages.CameraHealth,
+    people_messages.Person,
     messages.Status,
+    people_messages.Deed,
     link_messages.LinkReport,
 )
 UNIONS = {"FromPage": messages.FromPage, "ToPage": messages.ToPage}

@@ -96,14 +96,15 @@ class NotingHub(Hub):
 async def serve(host: str, folder: Path) -> None:
     """Serve until SIGTERM."""
     robot = load_robot("ames").robot
-    hub = NotingHub(folder, robot, [CAMERAS], Recordings(folder / "recordings", {}))
-    control = control_end(folder)  # nobody's: what goes there is read and forgotten
     doors = Doors()
+    recordings = Recordings(folder / "recordings", {})
+    hub = NotingHub(folder, robot, [CAMERAS], recordings, doors=doors)
+    control = control_end(folder)  # nobody's: what goes there is read and forgotten
     video = VideoSettings(width=640, height=480, bitrate_bps=1_500_000)
     with listen(host, 0) as bound:
         url = f"http://{host}:{bound.getsockname()[1]}"
         desk = RtcDesk(hub, RtcSettings(), video.bitrate_bps)
-        api = Api(hub, doors, url, None)
+        api = Api(hub, None)
         admission = Admission()
         inner = make_app(api, PageServer(hub, video), desk.routes())
         app = Guard(inner, doors, [host], admission)

@@ -11,9 +11,9 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from server.app import body_of, refusal
 from server.clock import now
 from server.hub import Hub
+from server.replies import body_of, refusal
 from server.rtc.answer import MAX_BYTES
 from server.rtc.link import RtcLink
 from server.rtc.signalling import Answer, Ask, Offer

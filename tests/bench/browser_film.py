@@ -101,7 +101,7 @@ class Studio:
             for script in LACKING[self._speed.path]:
                 page.add_init_script(script)
             _rest(page)
-            page.goto(f"{self._server.local_https}/#k={self._server.operator_token}")
+            page.goto(f"{self._server.local_https}/{self._server.link()}")
             page.tap("#start")
             _wait_for_pictures(page)
             page.wait_for_timeout(1e3 * START_S)

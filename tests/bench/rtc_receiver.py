@@ -94,7 +94,7 @@ class Receiver(RtcHouse):
         self._eyes: Eyes | None = None
         self._calls: list[RTCPeerConnection] = []
         self._reading: set[asyncio.Task[None]] = set()
-        routes = [*view_routes(Path("nowhere")), *self.desk.routes()]
+        routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.desk.routes()]
         routes.append(Route("/stock", self._stock, methods=["POST"]))
         pages = PageServer(self.hub, VideoSettings())
         self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
@@ -151,7 +151,8 @@ async def receive(result: Path) -> None:
         house = Receiver(Path(folder), seen)
         async with house.open():
             watching = asyncio.create_task(house.watch())
-            tokens = (house.doors.operator_token, house.doors.supervisor_token)
+            link = house.doors.pairings.invite("supervisor", now())
+            tokens = (link, house.doors.supervisor_token)
             print(json.dumps({"port": house.port, "tokens": tokens}), flush=True)
             await asyncio.to_thread(sys.stdin.read)
             watching.cancel()

@@ -50,7 +50,7 @@ def calibrate(folder: Path, device: str = DEVICE) -> Path:
 
 def start(phone: ChromiumPhone, server: Serving) -> None:
     """Open the page, tap Start, wait until arming would be granted."""
-    phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+    phone.page.goto(f"{server.local_https}/{server.link()}")
     phone.page.tap("#start")
     phone.play_until(MAY_ARM, 25.0)
 

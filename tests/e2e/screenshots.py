@@ -24,7 +24,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with led_server(executable, folder, "demo", rest_s=10.0) as (server, context, phone):
-            phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+            phone.page.goto(f"{server.local_https}/{server.link()}")
             phone.page.wait_for_selector("#start:visible")
             phone.page.screenshot(path=target / "phone-start.png")
             portrait = {"width": PHONE[0], "height": PHONE[1]}
@@ -45,7 +45,7 @@ def main() -> None:
             assert context.browser is not None
             wide = context.browser.new_context(viewport={"width": DESKTOP[0], "height": DESKTOP[1]})
             board = wide.new_page()
-            board.goto(f"{server.http_url}/supervisor#k={server.supervisor_token}")
+            board.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
             time.sleep(3.0)  # the lease of the phone that left
             board.click("#virtual")
             time.sleep(35.0)  # the 3D view takes its time without a graphics card

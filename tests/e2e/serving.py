@@ -41,10 +41,16 @@ class Serving:
         """HTTPS on the loopback interface."""
         return f"https://127.0.0.1:{self.https_url.rsplit(':', 1)[1]}"
 
-    def request(self, method: str, path: str) -> dict[str, object]:
+    def link(self, role: str = "operator") -> str:
+        """What stands behind a page's address to be let in once: `#k=…`."""
+        told = self.request("POST", "/api/invite", {"role": role})
+        return "#k=" + str(told["url"]).partition("#k=")[2]
+
+    def request(self, method: str, path: str, body: object = None) -> dict[str, object]:
         """A request as supervisor; gives its JSON."""
         headers = {"Authorization": f"Bearer {self.supervisor_token}"}
-        request = urllib.request.Request(self.http_url + path, method=method, headers=headers)
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self.http_url + path, data, headers, method=method)
         with urllib.request.urlopen(request, timeout=5.0) as response:
             answer: dict[str, object] = json.loads(response.read())
             return answer
@@ -52,12 +58,16 @@ class Serving:
 
 @contextlib.contextmanager
 def serving(folder: Path, *arguments: str) -> Iterator[Serving]:
-    """Start it, wait until it answers, end it as a person would."""
+    """Start it, wait until it answers, end it as a person would.
+
+    A link is enough to lead, unless `arguments` say otherwise.
+    """
     runtime, state = folder / "run", folder / "state"
     for path in (runtime, state):
         path.mkdir(mode=0o700, exist_ok=True)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(runtime), "XDG_STATE_HOME": str(state)}
     command = [sys.executable, "-m", "server", "serve", "--https-port", "0", "--http-port", "0"]
+    command += ["--pairing.confirm", "self"]
     log = (folder / "serve.log").open("wb")
     process = subprocess.Popen(
         [*command, *arguments], env=environment, stdout=log, stderr=subprocess.STDOUT

@@ -25,7 +25,7 @@ def test_the_page_guides_through_a_calibration_and_goes_on_with_it(
         browser(chromium, **LANDSCAPE) as context,
     ):
         phone = FilmingPhone(context, Motion(seed=1, tremor=0.0, speed=0.7))
-        phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+        phone.page.goto(f"{server.local_https}/{server.link()}")
         phone.page.tap("#start")
         phone.play_until("#calibrate", 25.0)
         phone.page.tap("#calibrate")

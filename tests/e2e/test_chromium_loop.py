@@ -44,7 +44,7 @@ def test_a_phone_without_a_calibration_is_told_so_on_its_screen(
     with serving(tmp_path) as server, browser(chromium, **LANDSCAPE) as context:
         still = ChromiumPhone(context, make_hand("still"), leds_in_b, server.truth_port)
         with closing(still) as phone:
-            phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+            phone.page.goto(f"{server.local_https}/{server.link()}")
             phone.page.tap("#start")
             phone.play_until("document.body.innerText.includes('not calibrated')", 20.0)
             assert DEVICE in phone.words()

@@ -52,7 +52,7 @@ def test_pictures_become_fewer_then_smaller_and_the_robot_is_seen_at_every_size(
 ) -> None:
     with led_server(chromium, tmp_path, "moving", seed=2, rest_s=0.0) as (server, _, phone):
         phone.page.add_init_script(SLOW)
-        phone.page.goto(f"{server.local_https}/#k={server.operator_token}")
+        phone.page.goto(f"{server.local_https}/{server.link()}")
         phone.page.tap("#start")
         wait_for(server, phone, lambda s: s["video_path"].startswith("WebRTC") and s["leds"] == 5)
         server.request("POST", "/api/recording")

@@ -100,7 +100,7 @@ def filming(
         page = context.new_page()
         for script in (clock_canvas(WIDTH), LISTEN, KEEP_CONNECTIONS, *scripts):
             page.add_init_script(script)
-        page.goto(f"{server.local_https}/#k={server.operator_token}")
+        page.goto(f"{server.local_https}/{server.link()}")
         page.tap("#start")
         yield server, page
 
@@ -184,7 +184,7 @@ def test_a_supervisor_chooses_the_way_and_the_phone_obeys_says_so_and_may_choose
     with filming(chromium, tmp_path) as (server, page):
         path_is(server, page, "WebRTC, H264")
         board = page.context.new_page()
-        board.goto(f"{server.http_url}/supervisor#k={server.supervisor_token}")
+        board.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
         becomes(board, "!document.querySelector('#path-wish').disabled")
         board.select_option("#path-wish", "WebSocket")
         path_is(server, board, "websocket, H264")

@@ -33,7 +33,7 @@ def rig(executable: str, folder: Path, script: str = "") -> Iterator[tuple[Servi
         leds_in_b = load_robot("ames").robot.leds_in_b
         phone = FirefoxPhone(tab, hand, leds_in_b, server.truth_port, script)
         with contextlib.closing(phone), held():
-            phone.open(f"{server.local_https}/#k={server.operator_token}")
+            phone.open(f"{server.local_https}/{server.link()}")
             phone.tap("#start")
             yield server, phone
 

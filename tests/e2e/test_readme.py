@@ -71,8 +71,9 @@ def test_make_run_prints_both_addresses_and_ends_at_ctrl_c(
         os.killpg(process.pid, signal.SIGINT)
         process.wait(30.0)
     text = printed.read_text()
-    assert re.search(r"Phone: +https://\S+/#k=\S+", text)
-    assert re.search(r"Supervisor: +http://127\.0\.0\.1:8080/supervisor#k=\S+", text)
+    assert re.search(r"Phone: +https://\S+/ by a link of `lightleash invite`", text)
+    assert re.search(r"Supervisor: +http://127\.0\.0\.1:8080/supervisor by", text)
+    assert "#k=" not in text  # this is no terminal
     assert "Stopping: robot first." in text
 
 

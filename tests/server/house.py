@@ -15,11 +15,13 @@ from websockets.asyncio.client import ClientConnection, connect
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
 from server.app import Api, make_app
+from server.audit import Audit
 from server.clock import now
 from server.control_link import ControlStatus, Input, RequestInput, control_end
 from server.estimate import EstimateFields
 from server.hub import Hub
 from server.listener import listener
+from server.people_api import PeopleApi
 from server.phone_script import DEVICE
 from server.recorder import Recordings
 from server.security import Doors, Guard
@@ -145,16 +147,20 @@ class House:
     """The server of one test."""
 
     def __init__(self, folder: Path) -> None:
-        self.hub = Hub(folder, ROBOT, [CAMERAS], Recordings(folder / "recordings", {}))
+        self.doors = Doors(audit=Audit(folder))
+        recordings = Recordings(folder / "recordings", {})
+        self.hub = Hub(folder, ROBOT, [CAMERAS], recordings, doors=self.doors)
         self.control = control_end(folder)
-        self.doors = Doors()
-        self.api = Api(self.hub, self.doors, "https://robot.lan:8443/#k=abc", None)
+        self.api = Api(self.hub, None)
+        self.people = PeopleApi(self.hub, self.doors, "https://robot.lan:8443", "http://here")
         pages = PageServer(self.hub, VideoSettings())
-        self.inner = make_app(self.api, pages, view_routes(Path("nowhere")))
+        view = view_routes(Path("nowhere"))
+        self.inner = make_app(self.api, pages, [*self.people.routes(), *view])
         self.app = Guard(self.inner, self.doors, [HOST, "robot.lan", "::1"])
         self.port = 0
 
     def close(self) -> None:
+        self.doors.audit.close()
         for end in (self.control, self.hub._control):
             if end.fileno() >= 0:
                 end.close()

@@ -18,6 +18,7 @@ from server.control_link import ControlStatus, Endpoint, control_end
 from server.hub import Hub
 from server.launcher import listen
 from server.listener import listener
+from server.people_api import PeopleApi
 from server.recorder import Recordings
 from server.rtc.desk import RtcDesk
 from server.security import Doors, Guard
@@ -47,12 +48,14 @@ class LiveServer:
     def __init__(self, folder: Path) -> None:
         self.control: Endpoint = control_end(folder)
         recordings = Recordings(folder / "recordings", {})
-        self.hub = Hub(folder, load_robot("ames").robot, [CAMERAS], recordings)
         self.doors = Doors()
-        self.api = Api(self.hub, self.doors, "https://robot.lan:8443/#k=x", None)
+        self.hub = Hub(folder, load_robot("ames").robot, [CAMERAS], recordings, doors=self.doors)
+        self.api = Api(self.hub, None)
+        people = PeopleApi(self.hub, self.doors, "https://robot.lan:8443")
         pages = PageServer(self.hub, VideoSettings())
         desk = RtcDesk(self.hub, RtcSettings(), 3_000_000)
-        self.app = make_app(self.api, pages, [*view_routes(Path("nowhere")), *desk.routes()])
+        view = view_routes(Path("nowhere"))
+        self.app = make_app(self.api, pages, [*people.routes(), *view, *desk.routes()])
         self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"])
 
     def close(self) -> None:

@@ -22,7 +22,7 @@ def status(mode):
     )
     flags = {"ready": True, "saturated": False, "resumes": False}
     tables = {name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")}
-    tables |= {"refusals": [], "messages": [], "warnings": []}
+    tables |= {"refusals": [], "messages": [], "warnings": [], "people": []}
     return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
 
 

@@ -37,7 +37,7 @@ class RtcHouse(House):
         super().__init__(folder)
         self.desk = RtcDesk(self.hub, settings or RtcSettings(), 3_000_000)
         pages = PageServer(self.hub, VideoSettings())
-        routes = [*view_routes(Path("nowhere")), *self.desk.routes()]
+        routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.desk.routes()]
         self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
 
     @contextlib.asynccontextmanager

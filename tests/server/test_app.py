@@ -73,7 +73,7 @@ def test_a_stop_reaches_control_from_either_role(house, client, role):
     answer = client.post("/api/stop", headers={"Authorization": f"Bearer {token[role]}"})
     assert answer.status_code == 202
     assert any(map(is_request("stop"), house.control.inputs()))
-    assert list(house.hub.events) == [f"{role}: stop"]
+    assert list(house.hub.events) == [f"local program ({role}): stop"]
 
 
 @pytest.mark.parametrize(
@@ -93,10 +93,16 @@ def test_a_stop_that_was_held_back_for_too_long_does_not_end_anybodys_flight(
     assert any(map(is_request("stop"), house.control.inputs())) == (status == 202)
 
 
-def test_the_invitation_holds_the_link_and_its_code(client):
-    invitation = client.get("/api/invite").json()
-    assert invitation["url"] == "https://robot.lan:8443/#k=abc"
-    assert invitation["qr_svg"].startswith("<svg")
+@pytest.mark.parametrize(
+    ("role", "page"), [("operator", "/"), ("viewer", "/supervisor"), ("supervisor", "/supervisor")]
+)
+def test_the_invitation_holds_a_fresh_link_and_its_code(client, role, page):
+    one, other = (client.post("/api/invite", json={"role": role}).json() for _ in range(2))
+    assert one["url"].startswith(f"https://robot.lan:8443{page}#k=")
+    assert one["here"].startswith(f"http://here{page}#k=")
+    assert len(one["url"].partition("#k=")[2]) == 22
+    assert one["url"] != other["url"]
+    assert one["qr_svg"].startswith("<svg")
 
 
 def test_health_is_told_to_everyone_and_tells_nothing(client):
@@ -106,7 +112,7 @@ def test_health_is_told_to_everyone_and_tells_nothing(client):
 def test_the_certificate_of_our_authority_is_given_and_a_foreign_one_is_not(house, tmp_path):
     certificate = tmp_path / "ca.pem"
     certificate.write_text("PEM")
-    own = Api(house.hub, house.doors, "", certificate).routes()
+    own = Api(house.hub, certificate).routes()
     house.inner.router.routes[:0] = [r for r in own if getattr(r, "path", "") == "/ca.crt"]
     answer = TestClient(house.app, base_url=BASE).get("/ca.crt")
     assert answer.headers["content-type"] == "application/x-x509-ca-cert"
@@ -172,6 +178,6 @@ def test_a_pairing_that_is_none_is_refused_by_name(client, body):
 
 
 def test_every_refusal_is_json_that_names_what_is_allowed(client):
-    for path in ("/api/status", "/api/invite"):
+    for path in ("/api/status", "/metrics"):
         answer = client.get(path, headers={"Authorization": ""})
         assert set(json.loads(answer.content)) == {"code", "field", "allowed"}

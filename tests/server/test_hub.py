@@ -10,9 +10,11 @@ import pytest
 from server import hub as hub_module
 from server.clock import now
 from server.control_link import ReadyInput, RequestInput
-from server.hub import EVENTS, LEASE_S
+from server.hub import EVENTS
 from server.knobs import TuneInput
+from server.lease import LEASE_S
 from server.messages import Command, Hello, Tune, encode_message
+from server.pairings import of_this_machine
 from server.wire import VERSION, decode, encode
 from server.wire_records import Codec, Ping, Record
 from tests.server.house import JPEG, control_status, house_in, is_request
@@ -178,12 +180,12 @@ def test_what_the_server_lacks_reaches_control_with_every_tick(house):
 def test_wishes_reach_control_except_those_for_phones(house):
     def scene():
         for what in ("arm", "disarm", "stop", "reset", "key_frame"):
-            house.hub.wish(Command(what), "somebody")
+            house.hub.wish(Command(what), of_this_machine("operator"))
 
     in_loop(scene)
     heard = [m.what for m in house.control.inputs() if isinstance(m, RequestInput)]
     assert heard == ["arm", "disarm", "stop", "reset"]
-    assert house.hub.events[0] == "somebody: reset"
+    assert house.hub.events[0] == "local program (operator): reset"
 
 
 def test_a_turned_knob_reaches_control_and_is_an_event(house):
@@ -208,7 +210,7 @@ def test_a_stop_is_said_again_until_control_can_take_it(house):
     async def scene():
         while house.hub._control.send(ReadyInput([])):
             pass
-        house.hub.wish(Command("stop"), "somebody")
+        house.hub.wish(Command("stop"), of_this_machine("operator"))
         assert not any(map(is_request("stop"), house.control.inputs()))
         heard = []
         for _ in range(1000):

@@ -11,7 +11,9 @@ import pytest
 from hardware.link_key import KEY_VARIABLE, LinkKeyError, new_key, read_key, write_key
 from hardware.robot_file import RobotFileError
 from server import cli, launcher
+from server.access import PhoneClientError
 from server.control import parse
+from server.invite import Invitation
 from server.launcher import SECRET_VARIABLE, Launcher, announce, children_of, listen
 from server.robot_key import key_file
 from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
@@ -143,7 +145,21 @@ def test_a_death_is_told(tmp_path, capsys):
     assert "The server process ended." in capsys.readouterr().err
 
 
-def test_the_newcomer_reads_both_addresses_and_how_to_stop(capsys):
+def at_terminal(monkeypatch):
+    """A terminal, and a server that hands out links."""
+    keys = {"operator": "O" * 22, "supervisor": "S" * 22}
+
+    def invite(run, role):
+        page = "/" if role == "operator" else "/supervisor"
+        urls = (f"{run[f'{way}_url']}{page}#k={keys[role]}" for way in ("https", "http"))
+        return Invitation(*urls, 600.0)
+
+    monkeypatch.setattr(launcher, "invite", invite)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+
+
+def test_the_newcomer_at_a_terminal_reads_both_links_and_how_to_stop(capsys, monkeypatch):
+    at_terminal(monkeypatch)
     announce(RUN)
     said = capsys.readouterr().out
     assert f"https://192.0.2.2:8443/#k={'O' * 22}" in said
@@ -152,16 +168,36 @@ def test_the_newcomer_reads_both_addresses_and_how_to_stop(capsys):
     assert "virtual phone" in said
 
 
+def test_what_is_no_terminal_gets_no_key_but_the_command_that_makes_one(capsys, monkeypatch):
+    monkeypatch.setattr(launcher, "invite", lambda *_: pytest.fail("a link was made"))
+    announce(RUN)
+    said = capsys.readouterr().out
+    assert "#k=" not in said
+    assert RUN["operator_token"] not in said
+    assert RUN["supervisor_token"] not in said
+    assert "lightleash invite --role supervisor" in said
+
+
+def test_a_server_that_has_just_died_is_told_of_and_waited_for(tmp_path, capsys, monkeypatch):
+    def dead(run):
+        raise PhoneClientError("http://127.0.0.1:8080 gives no link")
+
+    monkeypatch.setattr(launcher, "announce", dead)
+    (tmp_path / RUN_FILE).write_text(json.dumps(RUN))
+    Launcher([], tmp_path / RUN_FILE)._announce()
+    assert "gives no link; `lightleash invite`" in capsys.readouterr().err
+
+
 def test_nobody_is_sent_to_a_virtual_phone_that_could_not_see_the_real_robot(capsys):
     announce(RUN | {"truth_port": 0})
     assert "virtual phone" not in capsys.readouterr().out
 
 
 def test_a_terminal_gets_the_code_to_scan_if_it_is_wide_enough(capsys, monkeypatch):
+    at_terminal(monkeypatch)
     lines = []
     for columns in (30, 100):
         monkeypatch.setenv("COLUMNS", str(columns))
-        monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
         announce(RUN)
         lines.append(len(capsys.readouterr().out.splitlines()))
     assert lines[1] > lines[0] + 15

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from starlette.requests import Request
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.testclient import TestClient, WebSocketDenialResponse
 
-from server import app
-from server.security import COOKIE, PAIR_TRIES, PUBLIC_PATHS, Doors, Guard
+from server import replies
+from server.clock import now
+from server.roles import ADDRESSES, RANKS, is_enough
+from server.security import COOKIE, PAIR_TRIES, Doors, Guard
 from tests.server.live_server import LiveServer
 
 BASE = "http://127.0.0.1:8080"
 WS = "ws://127.0.0.1:8080"
 OWN = {"Origin": BASE, "X-Lightleash": "1"}
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS")
-STYLES = ("style", "phone", "supervisor", "calibration", "lens", "board")
+STYLES = (
+    *("style", "phone", "supervisor", "calibration", "lens", "board"),
+    *("pairing", "people", "link"),
+)
 PICTURES = ("icon", "lead", "board")
 FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICTURES)}
 
@@ -35,8 +41,32 @@ def bearer(rig, role):
     return {"Authorization": f"Bearer {rig.token(role)}"}
 
 
-def pair(rig, role, **headers):
-    return rig.client.post("/api/pair", json={"token": rig.token(role)}, headers=OWN | headers)
+def pair(rig, role, client=None, name=""):
+    """Exchange a fresh link, as a page does."""
+    key = rig.doors.pairings.invite(role, now())
+    asked = {"token": key, "name": name}
+    return (client or rig.client).post("/api/pair", json=asked, headers=OWN)
+
+
+def confirm(rig):
+    """Let in whoever waits, as a supervisor's page does."""
+    waiting = [one for one in rig.hub.people.present() if one.state == "waiting"]
+    for one in waiting:
+        body = {"id": one.id, "code": one.code}
+        answer = rig.client.post(
+            "/api/people/confirm", json=body, headers=bearer(rig, "supervisor")
+        )
+        assert answer.status_code == 200
+    return [one.id for one in waiting]
+
+
+def member(rig, role):
+    """A browser that is in."""
+    client = TestClient(rig.guard, base_url=BASE, headers=OWN)
+    assert pair(rig, role, client).status_code == 200
+    confirm(rig)
+    assert client.get("/api/whoami").json()["state"] == "in"
+    return client
 
 
 def refused_socket(rig, path, headers):
@@ -65,14 +95,15 @@ def test_nothing_but_pages_their_files_and_pairing_opens_without_a_role(rig):
     }
     public = {"/", "/supervisor", "/board", "/healthz", *FILES}
     readable = {(method, path) for path in public for method in ("GET", "HEAD")}
-    assert opened == readable | {("POST", "/api/pair")}  # which answers 400: no token
+    assert opened == readable | {("POST", "/api/pair")}  # which answers 400: no link
 
 
 def test_every_route_is_known_to_this_test(rig):
     mounts = [route.path for route in rig.app.routes if isinstance(route, Mount)]
     assert mounts == ["/src"]
     assert set(socket_paths(rig)) >= {"/ws/phone", "/ws/video", "/ws/supervisor", "/view", "/view/"}
-    assert set(http_paths(rig)) >= PUBLIC_PATHS | FILES
+    known = {*http_paths(rig), *socket_paths(rig)}
+    assert known == set(ADDRESSES) | FILES
 
 
 def test_every_websocket_asks_for_a_role(rig):
@@ -103,19 +134,151 @@ def test_nothing_else_of_the_disk_is_served(rig, path):
     assert rig.client.get(path, headers=bearer(rig, "supervisor")).status_code == 404
 
 
-@pytest.mark.parametrize("path", ["/api/status", "/metrics", "/api/invite", "/view/"])
-def test_an_operator_does_not_reach_what_is_the_supervisors(rig, path):
-    assert rig.client.get(path, headers=bearer(rig, "operator")).status_code == 403
-    assert rig.client.get(path, headers=bearer(rig, "supervisor")).status_code == 200
+def every_request(rig):
+    """(method, path) of each route that asks for a role."""
+    for route in rig.app.routes:
+        if isinstance(route, (Route, WebSocketRoute)) and ADDRESSES.get(route.path) in RANKS:
+            is_socket = isinstance(route, WebSocketRoute)
+            for method in ["socket"] if is_socket else sorted(set(route.methods) - {"HEAD"}):
+                yield method, route.path
 
 
-def test_an_operator_can_neither_record_nor_start_phones_nor_watch(rig):
-    headers = OWN | bearer(rig, "operator")
-    for path in ("/api/recording", "/api/virtual-phone"):
-        for method in ("POST", "DELETE"):
-            assert rig.client.request(method, path, headers=headers).status_code == 403
-    assert refused_socket(rig, "/ws/supervisor", headers) == 403
-    assert refused_socket(rig, "/view", headers) == 403
+def turned_away(client, method, path):
+    """The guard's own refusal of a browser: status and field; None if it was let through."""
+    try:
+        if method == "socket":
+            with client.websocket_connect(WS + path, headers=OWN):
+                return None
+        answer = client.request(method, path, headers=OWN)
+    except WebSocketDenialResponse as denied:
+        answer = denied
+    told = answer.json() if "json" in answer.headers.get("content-type", "") else {}
+    is_guards = answer.status_code in (401, 403) and told.get("field") in ("role", "pairing")
+    return (answer.status_code, told["field"]) if is_guards else None
+
+
+@pytest.fixture
+def quiet(rig, monkeypatch):
+    """Neither the virtual phone nor a recording is started."""
+    monkeypatch.setattr(rig.api.phone, "start", lambda: None)
+    monkeypatch.setattr(rig.hub, "start_recording", lambda: "none")
+    return rig
+
+
+@pytest.mark.parametrize("role", ["viewer", "operator", "supervisor"])
+def test_each_role_reaches_what_it_may_and_nothing_else_on_every_route_and_socket(quiet, role):
+    client = member(quiet, role)
+    wrong = []
+    for method, path in every_request(quiet):
+        least = ADDRESSES[path]
+        may = least in ("anyone", "known") or is_enough(role, least)
+        told = turned_away(client, method, path)
+        if (told is None) != may:
+            wrong.append((method, path, told))
+    assert wrong == []
+
+
+def test_a_phone_that_waits_learns_its_code_and_reaches_nothing(quiet):
+    told = pair(quiet, "operator", name="Anna").json()
+    assert (told["state"], told["name"]) == ("waiting", "Anna")
+    assert re.fullmatch("[B-Z]{4}", told["code"])
+    assert quiet.client.get("/api/whoami").json() == told
+    reached = {
+        (method, path)
+        for method, path in every_request(quiet)
+        if turned_away(quiet.client, method, path) is None
+    }
+    assert {path for _, path in reached} == {p for p, r in ADDRESSES.items() if RANKS[r] < 2}
+
+
+def test_a_revoked_cookie_opens_no_route_and_no_socket(quiet):
+    client = member(quiet, "supervisor")
+    (one,) = quiet.hub.people.present()
+    body = {"id": one.id}
+    revoking = bearer(quiet, "supervisor")
+    assert quiet.client.post("/api/people/revoke", json=body, headers=revoking).status_code == 200
+    reached = {
+        path for method, path in every_request(quiet) if turned_away(client, method, path) is None
+    }
+    assert reached == {p for p, r in ADDRESSES.items() if RANKS[r] < 2}
+    told = client.get("/api/whoami").json()
+    assert (told["state"], told["why"]) == ("revoked", "A supervisor has ended this pairing.")
+
+
+def test_an_operator_can_neither_let_in_nor_shut_out_nor_invite(rig):
+    client = member(rig, "operator")
+    for deed in ("confirm", "deny", "revoke"):
+        answer = client.post(f"/api/people/{deed}", json={"id": "x", "code": "BCDF"})
+        assert answer.status_code == 403
+    assert client.post("/api/invite", json={"role": "viewer"}).status_code == 403
+
+
+def test_a_supervisors_page_can_not_make_supervisors(rig):
+    client = member(rig, "supervisor")
+    assert client.post("/api/invite", json={"role": "supervisor"}).status_code == 403
+    assert client.post("/api/invite", json={"role": "viewer"}).status_code == 200
+
+
+def test_a_wrong_match_code_lets_nobody_in(rig):
+    pair(rig, "operator")
+    (one,) = rig.hub.people.present()
+    headers = bearer(rig, "supervisor")
+    for code in ("", "BBBB" if one.code != "BBBB" else "CCCC", one.code.lower(), one.code[:3]):
+        body = {"id": one.id, "code": code}
+        answer = rig.client.post("/api/people/confirm", json=body, headers=headers)
+        assert answer.status_code == 409
+    assert rig.client.get("/api/whoami").json()["state"] == "waiting"
+
+
+def test_who_is_denied_is_told_and_stays_out(rig):
+    pair(rig, "operator")
+    (one,) = rig.hub.people.present()
+    headers, body = bearer(rig, "supervisor"), {"id": one.id}
+    assert rig.client.post("/api/people/deny", json=body, headers=headers).status_code == 200
+    told = rig.client.get("/api/whoami").json()
+    assert told["state"] == "denied"
+    assert "supervisor" in told["why"]
+    body |= {"code": one.code}
+    assert rig.client.post("/api/people/confirm", json=body, headers=headers).status_code == 409
+
+
+def test_of_two_pages_that_race_for_one_link_one_is_let_in(rig):
+    key = rig.doors.pairings.invite("viewer", now())
+    clients = [TestClient(rig.guard, base_url=BASE, headers=OWN) for _ in range(2)]
+    with ThreadPoolExecutor(2) as pool:
+        codes = list(
+            pool.map(lambda c: c.post("/api/pair", json={"token": key}).status_code, clients)
+        )
+    assert sorted(codes) == [200, 401]
+    assert sorted(c.get("/api/whoami").status_code for c in clients) == [200, 401]
+
+
+def test_pairing_never_takes_up_a_cookie_that_was_planted(rig):
+    planted = "A" * 22
+    rig.client.cookies.set(COOKIE, planted)
+    answer = pair(rig, "viewer")
+    assert planted not in answer.headers["set-cookie"]
+    stranger = TestClient(rig.guard, base_url=BASE, cookies={COOKIE: planted})
+    assert stranger.get("/api/whoami").status_code == 401
+
+
+def test_over_tls_a_cookie_counts_only_if_nobody_between_could_have_planted_it(rig):
+    attacker = TestClient(rig.guard, base_url=BASE)
+    pair(rig, "viewer", attacker)
+    planted = attacker.cookies[COOKIE]
+    victim = TestClient(rig.guard, base_url="https://robot.lan", cookies={COOKIE: planted})
+    assert victim.get("/api/whoami").status_code == 401
+    assert attacker.get("/api/whoami").status_code == 200
+
+
+def test_a_browser_that_pairs_anew_leaves_who_it_was(rig):
+    pair(rig, "viewer")
+    old = rig.client.cookies[COOKIE]
+    pair(rig, "supervisor")
+    assert rig.client.get("/api/whoami").json()["role"] == "supervisor"
+    former = TestClient(rig.guard, base_url=BASE, cookies={COOKIE: old})
+    assert former.get("/api/whoami").json()["state"] == "revoked"
+    assert len(rig.hub.people.present()) == 1
 
 
 FOREIGN = [
@@ -131,7 +294,7 @@ FOREIGN = [
 @pytest.mark.parametrize("foreign", FOREIGN, ids=lambda headers: headers.get("Origin", "none"))
 def test_a_foreign_page_with_our_cookie_changes_nothing(rig, foreign):
     assert pair(rig, "supervisor").status_code == 200
-    for path in ("/api/stop", "/api/recording", "/api/virtual-phone", "/api/pair"):
+    for path in (p for p in http_paths(rig) if p.startswith("/api/")):
         assert rig.client.post(path, headers=foreign).status_code == 403
     for path in socket_paths(rig):
         assert refused_socket(rig, path, foreign) == 403
@@ -160,39 +323,46 @@ def test_every_name_of_our_own_is_answered(rig, host):
 
 
 def test_pairing_gives_a_cookie_that_scripts_and_other_sites_do_not_get(rig):
-    response = pair(rig, "operator")
-    assert response.json() == {"role": "operator"}
+    response = pair(rig, "viewer")
     cookie = response.headers["set-cookie"].lower()
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
-    assert rig.client.get("/api/whoami").json() == {"role": "operator"}
+    assert rig.client.get("/api/whoami").json()["role"] == "viewer"
 
 
 def test_over_tls_the_cookie_is_for_this_host_and_tls_alone(rig):
     client = TestClient(rig.guard, base_url="https://robot.lan")
     own = {"Origin": "https://robot.lan", "X-Lightleash": "1"}
-    response = client.post("/api/pair", json={"token": rig.token("operator")}, headers=own)
-    cookie = response.headers["set-cookie"]
+    key = rig.doors.pairings.invite("viewer", now())
+    cookie = client.post("/api/pair", json={"token": key}, headers=own).headers["set-cookie"]
     assert cookie.startswith(f"__Host-{COOKIE}=")
     assert "Secure" in cookie
     assert "Path=/" in cookie
-    assert client.get("/api/whoami").json() == {"role": "operator"}
+    assert client.get("/api/whoami").json()["role"] == "viewer"
 
 
 def test_cookies_of_other_programs_on_this_host_do_not_hide_ours(rig):
-    value = rig.doors.pair(rig.token("operator"))[1]
+    pair(rig, "viewer")
+    value = rig.client.cookies[COOKIE]
+    rig.client.cookies.clear()
     others = 'theme={"a": [1, "x"]}; =; ;; broken"; ' + f"{COOKIE}={value}; z=1"
     assert rig.client.get("/api/whoami", headers={"Cookie": others}).status_code == 200
 
 
+@pytest.mark.parametrize("role", ["operator", "supervisor"])
+def test_a_key_of_the_run_is_no_link(rig, role):
+    asked = {"token": rig.token(role)}
+    assert rig.client.post("/api/pair", json=asked, headers=OWN).status_code == 401
+
+
 def test_a_body_that_never_comes_does_not_hold_its_connection(monkeypatch):
-    monkeypatch.setattr(app, "BODY_S", 0.01)
+    monkeypatch.setattr(replies, "BODY_S", 0.01)
 
     async def never():
         await asyncio.Event().wait()
 
     request = Request({"type": "http", "method": "POST", "headers": []}, receive=never)
-    assert asyncio.run(app.body_of(request)) == b""
+    assert asyncio.run(replies.body_of(request)) == b""
 
 
 def test_a_token_of_half_a_character_is_simply_wrong(rig):
@@ -200,10 +370,15 @@ def test_a_token_of_half_a_character_is_simply_wrong(rig):
     assert response.status_code in (400, 401)
 
 
-def test_tokens_can_not_be_tried_out(rig):
+def test_links_can_not_be_tried_out(rig):
     wrong = {"json": {"token": "x"}, "headers": OWN}
     codes = [rig.client.post("/api/pair", **wrong).status_code for _ in range(PAIR_TRIES + 2)]
     assert codes == [401] * PAIR_TRIES + [429] * 2
+
+
+def test_good_links_are_not_counted_as_tries(rig):
+    codes = {pair(rig, "viewer").status_code for _ in range(PAIR_TRIES + 2)}
+    assert codes == {200}
 
 
 def test_pages_forbid_what_they_do_not_need(rig):

@@ -11,6 +11,7 @@ import { PaceKeeper } from './pace_keeper.js';
 import { WakefulClock, commandOf } from './command.js';
 import { Imu } from './imu.js';
 import { LinkCheck } from './link_check.js';
+import { PairingCard } from './pairing_card.js';
 import { Phone } from './phone.js';
 import { adviceFor, problemOf } from './problems.js';
 import { Rate } from './clock.js';
@@ -117,6 +118,7 @@ const imu = new Imu({
 
 const start = new Start({
   window, performance, fetchHere, dispatch, identity, feedback, camera, video, imu, phone,
+  pairing: new PairingCard(document, navigator, () => window.localStorage),
 });
 
 const lensPanel = new LensPanel(document, platform, performance, camera, (text) => phone.log(text));

@@ -1,16 +1,36 @@
-/** Who is this page to the server? Exchanges the token of the QR code for a cookie, and POSTs wishes. */
+/** Who is this page to the server? Exchanges the key of a link for a cookie, and POSTs wishes. */
 
 import { Problem } from './problems.js';
 
 /** @typedef {'operator' | 'supervisor' | 'viewer'} Role */
 /** @typedef {(input: string, init?: RequestInit) => Promise<Response>} Fetch */
 
+/**
+ * How the server sees this browser.
+ * @typedef {object} Standing
+ * @property {Role} role
+ * @property {'waiting' | 'in' | 'denied' | 'revoked' | 'expired'} state
+ * @property {string} name
+ * @property {string} code Four letters while a supervisor has to confirm.
+ * @property {string} why Why the pairing has ended.
+ */
+
+/**
+ * @typedef {object} Arrival
+ * @property {Fetch} fetch
+ * @property {{ location: Location, history: History }} window
+ * @property {string} name Of the person.
+ * @property {(standing: Standing) => void} onWaiting A supervisor has to confirm; called again and again.
+ * @property {(callback: () => void, ms: number) => unknown} later
+ */
+
 /** Foreign pages can't set it without asking first. */
 export const OWN_HEADERS = Object.freeze({ 'X-Lightleash': '1' });
 const PATIENCE_MS = 2000;
+export const ASK_AGAIN_MS = 1000;
 
 /**
- * The token in an address like `https://host/#k=TOKEN`, or "".
+ * The key in an address like `https://host/#k=KEY`, or "".
  * @param {string} fragment
  */
 export function tokenOf(fragment) {
@@ -18,69 +38,102 @@ export function tokenOf(fragment) {
 }
 
 /**
- * The page's role by its cookie, or null without one.
+ * How the server sees this browser by its cookie; null: it does not know it.
  * @param {Fetch} fetch
- * @returns {Promise<Role | null>}
+ * @returns {Promise<Standing | null>}
  */
 export async function whoAmI(fetch) {
   const response = await reach(fetch, 'api/whoami', { cache: 'no-store' });
   if (response.status === 401) return null;
   if (!response.ok) throw new Problem('server_error', `whoami: ${response.status}`);
-  return (await response.json()).role;
+  return await response.json();
 }
 
 /**
- * The server answers, and does not know this browser.
+ * What is in the way of a browser that was in, if the server answers; null if nothing is.
  * @param {Fetch} fetch
+ * @returns {Promise<Problem | null>}
  */
-export async function isStranger(fetch) {
-  return (await whoAmI(fetch).catch(() => 'not to be reached')) === null;
+export async function exclusion(fetch) {
+  try {
+    const standing = await whoAmI(fetch);
+    return standing === null ? new Problem('not_paired') : endOf(standing);
+  } catch {
+    return null; // the server can't be reached, which the link tells
+  }
+}
+
+/** @param {Standing} standing */
+function endOf({ state, why }) {
+  return state === 'in' || state === 'waiting' ? null : new Problem('shut_out', why);
 }
 
 /**
- * Exchanges a token for a cookie.
+ * Exchanges a link's key for a cookie.
  * @param {Fetch} fetch
  * @param {string} token
- * @returns {Promise<Role>}
+ * @param {string} name
+ * @returns {Promise<Standing>}
  */
-export async function pair(fetch, token) {
+export async function pair(fetch, token, name) {
   const response = await reach(fetch, 'api/pair', {
     method: 'POST',
     headers: { ...OWN_HEADERS, 'Content-Type': 'application/json' },
-    body: JSON.stringify({ token }),
+    body: JSON.stringify({ token, name }),
   });
-  if (response.status === 401) throw new Problem('link_expired');
+  if (response.status === 401) throw new Problem('link_expired', await refusalOf(response, false));
   if (response.status === 429) throw new Problem('too_many_tries');
   if (!response.ok) throw new Problem('server_error', await refusalOf(response));
-  return (await response.json()).role;
+  return await response.json();
 }
 
 /**
- * The page's role: by its token, else by the cookie of an earlier pairing; null without either.
+ * How the server sees this browser: by a link's key, else by the cookie of an earlier pairing; null without either.
  * @param {Fetch} fetch
  * @param {string} token "" for none.
- * @returns {Promise<Role | null>}
+ * @param {string} name
+ * @returns {Promise<Standing | null>}
  */
-export async function roleFrom(fetch, token) {
+export async function standingFrom(fetch, token, name) {
   if (token === '') return whoAmI(fetch);
   try {
-    return await pair(fetch, token);
+    return await pair(fetch, token, name);
   } catch (error) {
-    const role = error instanceof Problem && error.code === 'link_expired' ? await whoAmI(fetch) : null;
-    if (role === null) throw error;
-    return role;
+    const standing = error instanceof Problem && error.code === 'link_expired' ? await whoAmI(fetch) : null;
+    if (standing === null || endOf(standing) !== null) throw error;
+    return standing;
   }
 }
 
 /**
- * The page's role by the token in its address, which is removed: nobody shall find it there.
- * @param {Fetch} fetch
- * @param {{ location: Location, history: History }} window
+ * The page's role by the key in its address, which is removed: nobody shall find it there. Resolves when a supervisor
+ * has confirmed, if one must; null: the server does not know this browser.
+ * @param {Arrival} arrival
+ * @returns {Promise<Role | null>}
  */
-export async function becomeKnown(fetch, { location, history }) {
-  const role = await roleFrom(fetch, tokenOf(location.hash));
-  if (role !== null) history.replaceState(null, '', location.pathname + location.search);
-  return role;
+export async function becomeKnown({ fetch, window: { location, history }, name, onWaiting, later }) {
+  let standing = await standingFrom(fetch, tokenOf(location.hash), name);
+  if (standing !== null) history.replaceState(null, '', location.pathname + location.search);
+  while (standing?.state === 'waiting') {
+    onWaiting(standing);
+    await new Promise((resolve) => { later(() => resolve(null), ASK_AGAIN_MS); });
+    standing = await whoAmI(fetch).catch(() => standing); // a radio has holes
+  }
+  if (standing === null) return null;
+  const end = endOf(standing);
+  if (end !== null) throw end;
+  return standing.role;
+}
+
+/**
+ * What a browser would be called if its holder gives no name.
+ * @param {string} agent
+ */
+export function usualName(agent) {
+  const system = /iPhone|iPad|Android|Windows|Macintosh|Linux/.exec(agent.replace('Linux; Android', 'Android'))?.[0] ?? '';
+  const browser = /Firefox|Edg(?=\/)|Chrome(?!.*Edg\/)|Safari(?!.*Edg\/)/.exec(agent)?.[0]?.replace('Edg', 'Edge') ?? 'Browser';
+  const names = { Macintosh: 'Mac', Android: 'Android phone', '': 'this device' };
+  return `${browser} on ${/** @type {Record<string, string>} */ (names)[system] ?? system}`;
 }
 
 /**
@@ -118,11 +171,12 @@ async function reach(fetch, path, init) {
 /**
  * The server's reason in words.
  * @param {Response} response
+ * @param {boolean} [named] With the name of the field.
  */
-export async function refusalOf(response) {
+export async function refusalOf(response, named = true) {
   try {
     const { field, allowed } = await response.json();
-    if (field && allowed) return `${field}: ${allowed}`;
+    if (field && allowed) return named ? `${field}: ${allowed}` : allowed;
   } catch {
     // The body was not ours; its status will do.
   }

@@ -4,7 +4,7 @@
 
 /**
  * @typedef {'insecure' | 'link_expired' | 'not_paired' | 'too_many_tries' | 'server_unreachable'
- *   | 'server_error' | 'not_supervisor' | 'wrong_role' | 'camera_missing' | 'camera_denied' | 'camera_busy'
+ *   | 'server_error' | 'not_supervisor' | 'shut_out' | 'waiting' | 'wrong_role' | 'camera_missing' | 'camera_denied' | 'camera_busy'
  *   | 'camera_absent' | 'motion_denied' | 'motion_silent' | 'encoder_missing' | 'old_page' | 'taken' | 'refused'} ProblemCode
  */
 
@@ -74,12 +74,26 @@ const ADVICE = {
   }),
   link_expired: () => ({
     title: 'This link has expired: scan the QR code again',
-    steps: ['Each code works once and only for a short time.', RESCAN],
+    steps: [
+      'Each code works once and only for some minutes.',
+      'You have not used it? Tell the supervisor: somebody else may have.',
+      RESCAN,
+    ],
     retry: false,
   }),
   not_paired: () => ({
     title: 'This phone is not paired',
     steps: [RESCAN, 'The code opens this page with a key that lets the server know your phone.'],
+    retry: false,
+  }),
+  waiting: () => ({
+    title: 'Waiting for a supervisor to confirm',
+    steps: ['The same four letters must stand on the supervisor’s screen.'],
+    retry: false,
+  }),
+  shut_out: () => ({
+    title: 'This browser is not let in',
+    steps: ['A new code lets it ask again, and a supervisor decides.', RESCAN],
     retry: false,
   }),
   too_many_tries: () => ({
@@ -103,12 +117,15 @@ const ADVICE = {
   }),
   not_supervisor: () => ({
     title: 'This browser is not known to the server',
-    steps: ['Open the supervisor’s link that the terminal shows when Lightleash starts: it carries a key.'],
+    steps: [
+      'Open the supervisor’s link that the terminal shows when Lightleash starts: it opens once, for some minutes.',
+      'Used or too late? “lightleash invite --role supervisor” prints another one.',
+    ],
     retry: true,
   }),
   wrong_role: () => ({
     title: 'This link is for another page',
-    steps: ['It belongs to a phone. Ask for the supervisor’s link, shown when the server starts.'],
+    steps: ['A viewer watches and may STOP. Ask for a code for phones to lead the robot.'],
     retry: false,
   }),
   camera_missing: (platform) => ({

@@ -172,6 +172,20 @@
  */
 
 /**
+ * Somebody who is paired, or a program that brings the key of the run.
+ * @typedef {object} Person
+ * @property {string} id
+ * @property {string} name
+ * @property {'viewer' | 'operator' | 'supervisor'} role
+ * @property {'waiting' | 'in'} state waiting: a supervisor has to confirm.
+ * @property {string} code The four letters on the screen of who waits, or "".
+ * @property {string} address
+ * @property {number} since_s How long ago it was paired.
+ * @property {boolean} connected
+ * @property {boolean} leads
+ */
+
+/**
  * Server → page, 10 Hz: the truth about the robot, on every screen.
  * @typedef {object} Status
  * @property {'status'} type
@@ -207,6 +221,20 @@
  * @property {Record<string, GapCount>} gaps By side: `phone` (or its link), `robot` (its link), `server` (its computer stood still).
  * @property {string[]} warnings What who arms should know, each in words; refuses nothing.
  * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
+ * @property {Person[]} people Who is paired, in the order they came.
+ */
+
+/**
+ * Not sent to pages: a line of the audit log, as a recording keeps it.
+ * @typedef {object} Deed
+ * @property {'deed'} type
+ * @property {number} t_s On the server's monotonic clock.
+ * @property {string} wall UTC, ISO 8601.
+ * @property {string} what pair, confirm, deny, revoke, lead, leave, hand-over, arm, disarm, stop, reset, mode, …
+ * @property {string} who Name, or "" for the server itself.
+ * @property {string} role
+ * @property {string} address
+ * @property {string} why
  */
 
 /**
@@ -233,6 +261,6 @@
  */
 
 /** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log} FromPage */
-/** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration} ToPage */
+/** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration | Deed} ToPage */
 
 export {};

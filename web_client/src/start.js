@@ -4,6 +4,7 @@
 /** @import {Feedback} from './feedback.js' */
 /** @import {Imu} from './imu.js' */
 /** @import {Fetch} from './pairing.js' */
+/** @import {PairingCard} from './pairing_card.js' */
 /** @import {Phone} from './phone.js' */
 /** @import {Event} from './session_types.js' */
 /** @import {VideoSender} from './video.js' */
@@ -11,7 +12,7 @@
 import { USUAL, deviceName } from './camera.js';
 import { stayAwake } from './display.js';
 import { requestMotionPermission } from './imu.js';
-import { becomeKnown, isStranger, tokenOf } from './pairing.js';
+import { becomeKnown, exclusion, tokenOf } from './pairing.js';
 import { Problem, problemOf } from './problems.js';
 
 /**
@@ -25,6 +26,7 @@ import { Problem, problemOf } from './problems.js';
  * @property {CameraFeed} camera
  * @property {VideoSender} video
  * @property {Imu} imu
+ * @property {PairingCard} pairing
  * @property {Phone} phone
  */
 
@@ -39,20 +41,22 @@ export class Start {
   /** The page is open: what would be in the way of a tap is told at once. */
   async arrive() {
     const { window } = this.surroundings;
-    if (!window.isSecureContext) this.refuse('insecure');
-    else if (tokenOf(window.location.hash) !== '' || !(await this.checkPairing())) this.step('');
+    const hasLink = tokenOf(window.location.hash) !== '';
+    this.surroundings.pairing.askName(hasLink);
+    if (!window.isSecureContext) this.refuse(new Problem('insecure'));
+    else if (hasLink || !(await this.checkPairing())) this.step('');
   }
 
   /** Everything a tap starts; what fails is told with the way to mend it. */
   async begin() {
-    const { window, fetchHere, dispatch, identity, feedback, camera } = this.surroundings;
+    const { window, dispatch, identity, feedback, camera } = this.surroundings;
     const motionAllowed = requestMotionPermission(window); // must come first: it needs the tap itself
     motionAllowed.catch(() => {}); // awaited below
     feedback.unlock();
     dispatch({ type: 'start' });
     try {
       this.step('Pairing with the server…');
-      if ((await becomeKnown(fetchHere, window)) === null) throw new Problem('not_paired');
+      await this.pair();
       this.step('Waiting for your permission: motion sensors…');
       await motionAllowed;
       this.step('Waiting for your permission: camera…');
@@ -78,17 +82,37 @@ export class Start {
     phone.open();
   }
 
-  /** Tells, and gives true, if the server does not know this phone, or not any more. */
-  async checkPairing() {
-    const { fetchHere } = this.surroundings;
-    const isUnknown = await isStranger(fetchHere);
-    if (isUnknown) this.refuse('not_paired');
-    return isUnknown;
+  /** Comes back when this phone may lead. */
+  async pair() {
+    const { window, fetchHere, pairing } = this.surroundings;
+    try {
+      const role = await becomeKnown({
+        fetch: fetchHere,
+        window,
+        name: pairing.name,
+        onWaiting: ({ code }) => {
+          pairing.show(code);
+          this.step('Waiting for a supervisor to confirm…');
+        },
+        later: (callback, ms) => window.setTimeout(callback, ms),
+      });
+      if (role === null) throw new Problem('not_paired');
+      if (role === 'viewer') throw new Problem('wrong_role');
+    } finally {
+      pairing.hide();
+    }
   }
 
-  /** @param {'insecure' | 'not_paired'} code */
-  refuse(code) {
-    this.surroundings.dispatch({ type: 'problem', problem: new Problem(code) });
+  /** Tells, and gives true, if the server does not know this phone, or not any more. */
+  async checkPairing() {
+    const problem = await exclusion(this.surroundings.fetchHere);
+    if (problem !== null) this.refuse(problem);
+    return problem !== null;
+  }
+
+  /** @param {Problem} problem */
+  refuse(problem) {
+    this.surroundings.dispatch({ type: 'problem', problem });
   }
 
   /** @param {string} text */

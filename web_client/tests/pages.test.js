@@ -40,7 +40,8 @@ test('pages have no inline script, style or handler: the policy forbids them', (
 });
 
 test('nothing comes from another host', () => {
-  for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css', 'calibration.css', 'board.css', 'lens.css', 'link.css']) {
+  for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css', 'calibration.css', 'board.css', 'lens.css', 'link.css',
+    'pairing.css', 'people.css']) {
     const addresses = read(path).match(/https?:\/\/[\w.-]+/g) ?? [];
     const foreign = addresses.filter((address) => !/localhost|www\.w3\.org|^https:\/\/host$/.test(address));
     assert.deepEqual(foreign, [], path);
@@ -64,10 +65,10 @@ test('no module is left over', () => {
 
 test('every element the views look for is in their page', () => {
   for (const [page, ...views] of [
-    ['index.html', 'src/view.js', 'src/calibration_view.js', 'src/lens_panel.js', 'src/link_check.js'],
+    ['index.html', 'src/view.js', 'src/calibration_view.js', 'src/lens_panel.js', 'src/link_check.js', 'src/pairing_card.js'],
     ['board.html', 'src/board.js'],
     ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/knobs.js',
-      'src/dashboard/path_select.js', 'src/dashboard/main.js'],
+      'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js'],
   ]) {
     const ids = new Set([...read(page ?? '').matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));
     for (const view of views) {

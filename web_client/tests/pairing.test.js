@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { ask, becomeKnown, pair, roleFrom, tokenOf, whoAmI } from '../src/pairing.js';
+import { ask, becomeKnown, exclusion, pair, standingFrom, tokenOf, usualName, whoAmI } from '../src/pairing.js';
 import { StopPost } from '../src/stop.js';
 
 /** @import {Fetch} from '../src/pairing.js' */
@@ -26,49 +26,106 @@ test('the token is taken from the fragment', () => {
   assert.equal(tokenOf('#other=1'), '');
 });
 
-test('pairing posts the token with our own header and nothing in the address', async () => {
-  const { fetch, asked } = server({ 'api/pair': [200, { role: 'operator' }] });
-  assert.equal(await pair(fetch, 'secret'), 'operator');
+const IN = { role: 'operator', state: 'in', name: 'Anna', code: '', why: '' };
+const WAITING = { ...IN, state: 'waiting', code: 'KBWX' };
+
+/** @param {Fetch} fetch @param {string} hash */
+function arrival(fetch, hash) {
+  /** @type {string[]} */
+  const addresses = [];
+  /** @type {string[]} */
+  const codes = [];
+  return {
+    addresses,
+    codes,
+    arrival: /** @type {any} */ ({
+      fetch,
+      window: {
+        location: { hash, pathname: '/lab/', search: '?x=1' },
+        history: { replaceState: (/** @type {any} */ _, /** @type {any} */ __, /** @type {string} */ url) => addresses.push(url) },
+      },
+      name: 'Anna',
+      onWaiting: (/** @type {any} */ { code }) => codes.push(code),
+      later: (/** @type {() => void} */ callback) => setImmediate(callback),
+    }),
+  };
+}
+
+test('pairing posts the key and a name with our own header and nothing in the address', async () => {
+  const { fetch, asked } = server({ 'api/pair': [200, IN] });
+  assert.deepEqual(await pair(fetch, 'secret', 'Anna'), IN);
   assert.equal(asked[0]?.path, 'api/pair');
   assert.equal(asked[0]?.init.headers['X-Lightleash'], '1');
-  assert.equal(asked[0]?.init.body, '{"token":"secret"}');
+  assert.equal(asked[0]?.init.body, '{"token":"secret","name":"Anna"}');
   assert.equal(asked[0]?.init.credentials, 'same-origin');
 });
 
-test('an expired token says so, unless an earlier pairing still stands', async () => {
-  const expired = server({ 'api/pair': [401, {}], 'api/whoami': [401, {}] });
-  await assert.rejects(roleFrom(expired.fetch, 'old'), { code: 'link_expired' });
-  const known = server({ 'api/pair': [401, {}], 'api/whoami': [200, { role: 'operator' }] });
-  assert.equal(await roleFrom(known.fetch, 'old'), 'operator');
+test('an expired link says so, unless an earlier pairing still stands', async () => {
+  const refused = /** @type {[number, object]} */ ([401, { field: 'token', allowed: 'a link works once' }]);
+  const expired = server({ 'api/pair': refused, 'api/whoami': [401, {}] });
+  await assert.rejects(standingFrom(expired.fetch, 'old', ''), { code: 'link_expired', detail: 'a link works once' });
+  const ended = server({ 'api/pair': refused, 'api/whoami': [200, { ...IN, state: 'revoked' }] });
+  await assert.rejects(standingFrom(ended.fetch, 'old', ''), { code: 'link_expired' });
+  const known = server({ 'api/pair': refused, 'api/whoami': [200, IN] });
+  assert.deepEqual(await standingFrom(known.fetch, 'old', ''), IN);
 });
 
-test('without a token the cookie decides', async () => {
+test('without a link the cookie decides', async () => {
   const { fetch, asked } = server({ 'api/whoami': [401, {}] });
-  assert.equal(await roleFrom(fetch, ''), null);
+  assert.equal(await standingFrom(fetch, '', ''), null);
   assert.deepEqual(asked.map(({ path }) => path), ['api/whoami']);
 });
 
-test('the token leaves the address as soon as it has done its work, and not before', async () => {
+test('the key leaves the address as soon as it has done its work, and not before', async () => {
   for (const [status, left] of /** @type {const} */ ([[200, ['/lab/?x=1']], [401, []]])) {
-    const { fetch } = server({ 'api/pair': [status, { role: 'operator' }], 'api/whoami': [401, {}] });
-    /** @type {string[]} */
-    const addresses = [];
-    const window = /** @type {any} */ ({
-      location: { hash: '#k=t', pathname: '/lab/', search: '?x=1' },
-      history: { replaceState: (/** @type {any} */ _, /** @type {any} */ __, /** @type {string} */ url) => addresses.push(url) },
-    });
-    await becomeKnown(fetch, window).catch(() => {});
+    const { fetch } = server({ 'api/pair': [status, IN], 'api/whoami': [401, {}] });
+    const { addresses, arrival: one } = arrival(fetch, '#k=t');
+    await becomeKnown(one).catch(() => {});
     assert.deepEqual(addresses, left);
   }
 });
 
+test('who has to be confirmed waits with his code, over a hole of the radio, until he is in or not', async () => {
+  for (const [end, outcome] of /** @type {const} */ ([['in', 'operator'], ['denied', 'shut_out'], ['expired', 'shut_out']])) {
+    const answers = [WAITING, null, { ...IN, state: end, why: 'because' }];
+    /** @type {Fetch} */
+    const fetch = async (path) => {
+      const answer = path === 'api/pair' ? WAITING : answers.shift();
+      if (!answer) throw new TypeError('no radio');
+      return new Response(JSON.stringify(answer));
+    };
+    const { codes, arrival: one } = arrival(fetch, '#k=t');
+    const became = await becomeKnown(one).catch(({ code, detail }) => (assert.equal(detail, 'because'), code));
+    assert.equal(became, outcome);
+    assert.deepEqual(codes, ['KBWX', 'KBWX', 'KBWX']);
+  }
+});
+
+test('a page that was hung up on learns whether it is shut out, unknown, or only without a server', async () => {
+  const why = async (/** @type {[number, object]} */ answer) => (await exclusion(server({ 'api/whoami': answer }).fetch))?.code;
+  assert.equal(await why([401, {}]), 'not_paired');
+  assert.equal(await why([200, { ...IN, state: 'revoked' }]), 'shut_out');
+  assert.equal(await why([200, IN]), undefined);
+  assert.equal(await exclusion(() => Promise.reject(new TypeError('failed'))), null);
+});
+
 test('too many tries, a broken server and no server are told apart', async () => {
-  await assert.rejects(pair(server({ 'api/pair': [429, {}] }).fetch, 't'), { code: 'too_many_tries' });
+  await assert.rejects(pair(server({ 'api/pair': [429, {}] }).fetch, 't', ''), { code: 'too_many_tries' });
   await assert.rejects(
-    pair(server({ 'api/pair': [400, { code: 'value', field: 'token', allowed: 'text' }] }).fetch, 't'),
+    pair(server({ 'api/pair': [400, { code: 'value', field: 'token', allowed: 'text' }] }).fetch, 't', ''),
     { code: 'server_error', detail: 'token: text' },
   );
   await assert.rejects(whoAmI(() => Promise.reject(new TypeError('failed'))), { code: 'server_unreachable' });
+});
+
+test('a device has a name that a person would know it by', () => {
+  const names = [
+    'Mozilla/5.0 (Linux; Android 10; K) AppleWebKit/537.36 (KHTML, like Gecko) Chrome/130.0.0.0 Mobile Safari/537.36',
+    'Mozilla/5.0 (iPhone; CPU iPhone OS 18_0 like Mac OS X) AppleWebKit/605.1.15 Version/18.0 Mobile/15E148 Safari/604.1',
+    'Mozilla/5.0 (X11; Linux x86_64; rv:128.0) Gecko/20100101 Firefox/128.0',
+    'x',
+  ].map(usualName);
+  assert.deepEqual(names, ['Chrome on Android phone', 'Safari on iPhone', 'Firefox on Linux', 'Browser on this device']);
 });
 
 test('a wish resolves with the server’s reason when it is refused', async () => {

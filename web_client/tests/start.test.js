@@ -8,11 +8,13 @@ import { FakeTime } from './fakes.js';
 let log = [];
 /** @type {number} */
 let whoami = 200;
+/** What the server says of this phone, one after the other; the last stays. @type {object[]} */
+let standings = [];
 /** @type {any} */
 let surroundings;
 
 beforeEach(() => {
-  [log, whoami] = [[], 200];
+  [log, whoami, standings] = [[], 200, [{ role: 'operator', state: 'in', code: '', why: '' }]];
   surroundings = {
     window: {
       isSecureContext: true,
@@ -21,10 +23,11 @@ beforeEach(() => {
       navigator: { userAgent: 'Android' },
       screen: { width: 412, height: 915 },
       devicePixelRatio: 2,
+      setTimeout: (/** @type {() => void} */ callback) => setImmediate(callback),
       DeviceMotionEvent: { async requestPermission() { log.push('permission'); return 'granted'; } },
     },
     performance: new FakeTime(),
-    fetchHere: async () => new Response('{"role":"operator"}', { status: whoami }),
+    fetchHere: async () => new Response(JSON.stringify(standings.length > 1 ? standings.shift() : standings[0]), { status: whoami }),
     dispatch: (/** @type {any} */ event) => log.push(event.problem?.code ?? event.text ?? event.type),
     identity: { device: '', sensors: '', video: '' },
     feedback: { unlock: () => log.push('unlock') },
@@ -32,6 +35,12 @@ beforeEach(() => {
     video: { encoder: {}, prepare: async () => 'H.264' },
     imu: { source: 'DeviceMotion', stop() {}, start: () => log.push('imu') },
     phone: { open: () => log.push('open') },
+    pairing: {
+      name: 'Anna',
+      askName: (/** @type {boolean} */ wanted) => { if (wanted) log.push('name?'); },
+      show: (/** @type {string} */ code) => log.push(`code ${code}`),
+      hide() {},
+    },
   };
 });
 
@@ -67,5 +76,26 @@ test('a stranger, and a page that is not secure, are told before any tap; who br
   await start.arrive();
   surroundings.window.isSecureContext = false;
   await start.arrive();
-  assert.deepEqual(log, ['', 'not_paired', '', 'insecure']);
+  assert.deepEqual(log, ['', 'not_paired', 'name?', '', 'name?', 'insecure']);
+});
+
+test('who waits for a supervisor sees the four letters until he is let in, and only then the camera opens', async () => {
+  const waiting = { role: 'operator', state: 'waiting', code: 'KBWX', why: '' };
+  standings = [waiting, waiting, { role: 'operator', state: 'in', code: '', why: '' }];
+  await new Start(surroundings).begin();
+  const told = log.filter((one) => /^code|^camera|^open/.test(one));
+  assert.deepEqual(told, ['code KBWX', 'code KBWX', 'camera', 'open']);
+});
+
+test('who is not let in, or is a viewer, is told so and opens nothing', async () => {
+  for (const [standing, code] of /** @type {const} */ ([
+    [{ role: 'operator', state: 'denied', code: '', why: 'A supervisor did not let it in.' }, 'shut_out'],
+    [{ role: 'operator', state: 'revoked', code: '', why: '' }, 'shut_out'],
+    [{ role: 'viewer', state: 'in', code: '', why: '' }, 'wrong_role'],
+  ])) {
+    standings = [standing];
+    await new Start(surroundings).begin();
+    assert.equal(log.at(-1), code);
+  }
+  assert.ok(!log.includes('open'));
 });

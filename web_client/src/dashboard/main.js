@@ -4,6 +4,7 @@
 /** @import {Received} from '../protocol.js' */
 /** @import {Event} from './model.js' */
 /** @import {Invite} from './phone_card.js' */
+/** @import {Role} from '../pairing.js' */
 
 import { browserOf } from '../browser.js';
 import { BoardView } from './view.js';
@@ -13,22 +14,25 @@ import { KnobPanel } from './knobs.js';
 import { ServerTime, WakefulClock, commandOf } from '../command.js';
 import { Link, socketUrl } from '../link.js';
 import { PathSelect } from './path_select.js';
+import { PeopleCard } from './people_card.js';
 import { PhoneCard } from './phone_card.js';
 import { Kind, VERSION } from '../protocol.js';
 import { Problem, adviceFor, problemOf } from '../problems.js';
 import { StopPost } from '../stop.js';
-import { ask, becomeKnown, whoAmI } from '../pairing.js';
+import { OWN_HEADERS, ask, becomeKnown, exclusion, usualName } from '../pairing.js';
 
 const TICK_MS = 100;
 const STOP_TICK_MS = 50;
 
-const { fetchHere, links, platform } = browserOf(window);
+const { fetchHere, later, links, platform } = browserOf(window);
 const clock = new WakefulClock(performance, Date);
 const serverTime = new ServerTime(performance);
 const stopPost = new StopPost(fetchHere);
 let board = EMPTY;
 let shown = false;
 let virtual = false;
+/** @type {Role} */
+let role = 'viewer';
 
 const link = new Link(socketUrl('ws/supervisor', document.baseURI), {
   onOpen: () => {
@@ -60,6 +64,8 @@ const knobs = new KnobPanel(document, (tune) => void link.sendMessage(tune), () 
 const path = new PathSelect(document, (choice) => void link.sendMessage(choice), () => performance.now());
 const estimate = new EstimatePanel(document);
 const card = new PhoneCard(document, URL, fetchInvite);
+const people = new PeopleCard(document, (deed, { id, code }) => void request('POST', `api/people/${deed}`, { id, code }), () => performance.now());
+
 
 /** @param {Event} event */
 function dispatch(event) {
@@ -73,6 +79,7 @@ function dispatch(event) {
     estimate.render(board);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);
     path.take(board.heard ? board.status?.path_choice ?? null : null);
+    people.render(board.status?.people ?? [], role === 'supervisor');
     view.text('virtual', isVirtual() ? 'Stop virtual phone' : 'Start virtual phone');
   });
 }
@@ -81,8 +88,11 @@ function dispatch(event) {
 function take(message) {
   const now = performance.now();
   if (message.type === 'welcome') dispatch({ type: 'welcomed' });
-  if (message.type === 'status') serverTime.heard(message.time_ms);
-  if (message.type === 'status') dispatch({ type: 'status', status: message, now });
+  if (message.type === 'status') {
+    serverTime.heard(message.time_ms);
+    dispatch({ type: 'status', status: message, now });
+    card.paired(message.people.length);
+  }
   if (message.type !== 'refused') return;
   dispatch({ type: 'refused', refused: message, now });
   if (message.fatal) link.close();
@@ -102,9 +112,10 @@ function sendStop() {
 /**
  * @param {'POST' | 'DELETE'} method
  * @param {string} path
+ * @param {object} [body]
  */
-async function request(method, path) {
-  const fault = await ask(fetchHere, method, path);
+async function request(method, path, body) {
+  const fault = await ask(fetchHere, method, path, body);
   if (fault !== '') dispatch({ type: 'notice', text: `Not done: ${fault}`, now: performance.now() });
   return fault === '';
 }
@@ -120,8 +131,11 @@ async function toggleVirtual() {
 
 /** @returns {Promise<Invite | null>} */
 async function fetchInvite() {
+  if (role !== 'supervisor') return null;
   try {
-    const response = await fetchHere('api/invite', { credentials: 'same-origin', cache: 'no-store' });
+    const response = await fetchHere('api/invite', {
+      method: 'POST', headers: OWN_HEADERS, credentials: 'same-origin', body: '{"role":"operator"}',
+    });
     return response.ok ? await response.json() : null;
   } catch {
     return null;
@@ -130,17 +144,24 @@ async function fetchInvite() {
 
 /** The server hung up before welcoming us: perhaps it does not know this page any more. */
 async function checkPairing() {
-  const role = await whoAmI(fetchHere).catch(() => 'supervisor');
-  if (role !== null) return;
+  const problem = await exclusion(fetchHere);
+  if (problem === null) return;
   link.close();
-  dispatch({ type: 'problem', problem: new Problem('not_supervisor') });
+  dispatch({ type: 'problem', problem: problem.code === 'not_paired' ? new Problem('not_supervisor') : problem });
 }
 
 async function arrive() {
   try {
-    const role = await becomeKnown(fetchHere, window);
-    if (role === null) throw new Problem('not_supervisor');
-    if (role !== 'supervisor') throw new Problem('wrong_role');
+    const known = await becomeKnown({
+      fetch: fetchHere,
+      window,
+      name: usualName(navigator.userAgent),
+      onWaiting: ({ code }) => dispatch({ type: 'problem', problem: new Problem('waiting', code) }),
+      later,
+    });
+    if (known === null) throw new Problem('not_supervisor');
+    role = known;
+    document.body.dataset.role = known;
     /** @type {HTMLIFrameElement} */ (view.find('scene')).src = 'view/';
     link.open();
   } catch (error) {

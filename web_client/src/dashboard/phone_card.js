@@ -4,8 +4,8 @@
 
 /** Without a picture for so long the code is shown again [ms]. */
 const PICTURE_LIFE_MS = 3000;
-/** A code works for two minutes. */
-export const INVITE_LIFE_MS = 90_000;
+/** A code opens for ten minutes. */
+export const INVITE_LIFE_MS = 480_000;
 
 export class PhoneCard {
   /**
@@ -26,6 +26,13 @@ export class PhoneCard {
     this.pictureMs = -Infinity;
     this.inviteMs = -Infinity;
     this.wanted = false;
+    this.known = 0;
+  }
+
+  /** Somebody has come, perhaps by the code that is shown: it opens once. @param {number} count */
+  paired(count) {
+    if (count > this.known) this.inviteMs = -Infinity;
+    this.known = count;
   }
 
   /** The person wants to see the code, or not any more. */

@@ -1,0 +1,99 @@
+"""The lead passes from one person to another, or is lost: the robot is disarmed each time."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from server.operator import OperatorPhone
+from server.pairings import Member, PairingError
+from server.people import People
+
+
+class Led(Protocol):
+    """What is led: the hub."""
+
+    phone: OperatorPhone | None
+    people: People
+
+    def is_flying(self) -> bool:
+        """Whether the robot may be in the air, as far as is known."""
+
+    def disarm(self) -> None:
+        """Bring the robot down, whoever leads."""
+
+    def part(self, phone: OperatorPhone) -> None:
+        """A phone has gone."""
+
+    def say(self, text: str) -> None:
+        """An event that people should see."""
+
+
+class Handover:
+    """Changes of who leads, beside those by phones that come and go."""
+
+    def __init__(self, hub: Led) -> None:
+        """Of this hub's lead."""
+        self._hub = hub
+
+    def give(self, to: str, by: Member, now: float) -> None:
+        """Give the lead to the member with that id; a robot in flight comes down first.
+
+        Raises:
+            PairingError: `by` may not, nobody may lead under this id, or the robot flies.
+        """
+        hub, people = self._hub, self._hub.people
+        heir, is_flying = people.named(to), hub.is_flying()
+        if by.role != "supervisor" and by.id != people.lease.holder:
+            raise PairingError("role", "supervisor, or who leads now")
+        if heir is None or heir.role == "viewer":
+            raise PairingError("id", "of an operator who is let in")
+        if heir.id == people.lease.holder:
+            raise PairingError("id", "of somebody else: this one leads already")
+        if by.role != "supervisor" and is_flying:
+            raise PairingError("mode", "while the robot is disarmed: disarm it first")
+        people.note("take-over" if is_flying else "hand-over", by, heir.name)
+        hub.say(f"{by.name} gives the lead to {heir.name}.")
+        people.lease.give(to, now)
+        hub.disarm()
+        self.make_room(now)
+
+    def make_room(self, now: float) -> None:
+        """Who leads goes, when the robot is down, for whom the lead was given to."""
+        hub, lease = self._hub, self._hub.people.lease
+        heir = lease.next_of(now)
+        if not heir or hub.phone is None or lease.holder == heir:
+            return
+        if hub.is_flying():
+            lease.give(heir, now)
+        else:
+            hub.part(hub.phone)
+
+    async def shut_out(self, id: str, why: str, by: Member) -> Member:
+        """End a pairing: its sockets close now, and a robot that it leads comes down.
+
+        Raises:
+            PairingError: nobody is in under this id.
+        """
+        people = self._hub.people
+        member = people.doors.pairings.revoke(id, why)
+        people.doors.save()
+        people.note("revoke", by, f"{member.name}: {why}")
+        self._hub.say(f"{member.name} is shut out. {why}")
+        await self._expel(member)
+        return member
+
+    async def expire(self) -> None:
+        """Those whose time is over go."""
+        for member in self._hub.people.expire():
+            self._hub.say(f"{member.name} is not paired any more. {member.why}")
+            await self._expel(member)
+
+    async def _expel(self, member: Member) -> None:
+        hub, people = self._hub, self._hub.people
+        people.lease.forget(member.id)
+        if people.lease.holder == member.id and hub.phone is not None:
+            hub.disarm()
+            hub.part(hub.phone)
+        await people.doors.sockets.end(member.id)
+        if all(other.address != member.address for other in people.doors.pairings.present()):
+            people.doors.on_gone(member.address)

@@ -1,0 +1,183 @@
+"""Requests by which people come in, are let in or shut out, and hand the lead on."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Annotated, TypeVar
+
+import msgspec
+import segno
+from msgspec import Meta
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import BaseRoute, Route
+
+from server.hub import Hub
+from server.pairings import LINK_S, Member, PairingError
+from server.people import LOCAL
+from server.replies import body_of, refusal
+from server.roles import Role
+from server.security import PAIR_TRIES, Doors, cookie_name
+
+Wanted = TypeVar("Wanted")
+Short = Annotated[str, Meta(max_length=64)]
+
+
+class PairingRequest(msgspec.Struct, forbid_unknown_fields=True):
+    """What `/api/pair` is asked."""
+
+    token: Short
+    name: Short = ""
+
+
+class InviteRequest(msgspec.Struct, forbid_unknown_fields=True):
+    """What `/api/invite` is asked."""
+
+    role: Role = "operator"
+
+
+class PersonRequest(msgspec.Struct, forbid_unknown_fields=True):
+    """Whom a request is about."""
+
+    id: Short
+    code: Short = ""
+
+
+class PeopleApi:
+    """Pairing, confirming, shutting out, handing on."""
+
+    def __init__(self, hub: Hub, doors: Doors, phones: str, here: str = "") -> None:
+        """`phones` is where phones reach this server, `here` where this machine does."""
+        self._hub, self._doors, self._phones, self._here = hub, doors, phones, here
+
+    def routes(self) -> Sequence[BaseRoute]:
+        """All of them."""
+        return [
+            Route("/api/pair", self._pair, methods=["POST"]),
+            Route("/api/whoami", self._who_am_i),
+            Route("/api/invite", self._invite, methods=["POST"]),
+            Route("/api/people/confirm", self._confirm, methods=["POST"]),
+            Route("/api/people/deny", self._deny, methods=["POST"]),
+            Route("/api/people/revoke", self._revoke, methods=["POST"]),
+            Route("/api/people/lead", self._lead, methods=["POST"]),
+        ]
+
+    async def _pair(self, request: Request) -> Response:
+        address = request.client.host if request.client is not None else ""
+        if not self._doors.may_try(address):
+            return refusal(429, "token", f"{PAIR_TRIES} wrong links a minute")
+        asked = await _asked(request, PairingRequest)
+        if asked is None:
+            return refusal(400, "token", 'JSON: {"token": "…", "name": "…"}')
+        doors, secure = self._doors, request.url.scheme == "https"
+        try:
+            member, cookie = doors.pairings.pair(asked.token, asked.name, address, doors.clock())
+        except PairingError as error:
+            doors.tried(address)
+            self._hub.people.note("refusal", why=f"pairing from {address}: {error.allowed}")
+            return refusal(401, error.field, error.allowed)
+        await self._leave_behind(request, secure)
+        doors.save()
+        self._hub.people.note("pair", member, f"as {member.state}")
+        waits = ", waits to be confirmed" if member.state == "waiting" else ""
+        self._hub.say(f"{member.name} has paired as {member.role}{waits}.")
+        response = JSONResponse(_told(member))
+        name = cookie_name(secure)
+        response.set_cookie(name, cookie, httponly=True, secure=secure, samesite="strict")
+        return response
+
+    async def _leave_behind(self, request: Request, secure: bool) -> None:
+        """A browser that pairs anew leaves who it was; its old cookie is of no more use."""
+        value = request.cookies.get(cookie_name(secure), "")
+        former = self._doors.pairings.of_cookie(value, self._doors.clock()) if value else None
+        if former is not None and former.state in ("waiting", "in"):
+            await self._hub.handover.shut_out(former.id, "It has paired anew.", former)
+
+    async def _who_am_i(self, request: Request) -> Response:
+        return JSONResponse(_told(_member(request)))
+
+    async def _invite(self, request: Request) -> Response:
+        asked = await _asked(request, InviteRequest)
+        if asked is None:
+            return refusal(400, "role", 'JSON: {"role": "viewer", "operator" or "supervisor"}')
+        by = _member(request)
+        if asked.role == "supervisor" and not by.id.startswith(LOCAL):
+            return refusal(403, "role", "viewer, operator; lightleash invite makes the other one")
+        key = self._doors.pairings.invite(asked.role, self._doors.clock())
+        self._doors.save()
+        self._hub.people.note("invite", by, asked.role)
+        page = "/" if asked.role == "operator" else "/supervisor"
+        url = f"{self._phones}{page}#k={key}"
+        here = f"{self._here}{page}#k={key}" if self._here else url
+        return JSONResponse({"url": url, "here": here, "qr_svg": _code(url), "lives_s": LINK_S})
+
+    async def _confirm(self, request: Request) -> Response:
+        if (asked := await _asked(request, PersonRequest)) is None:
+            return refusal(400, "id", 'JSON: {"id": "…", "code": "…"}')
+        try:
+            member = self._doors.pairings.confirm(asked.id, asked.code)
+        except PairingError as error:
+            return refusal(409, error.field, error.allowed)
+        self._doors.save()
+        self._hub.people.note("confirm", _member(request), member.name)
+        self._hub.say(f"{_member(request).name} let {member.name} in.")
+        return JSONResponse({"name": member.name})
+
+    async def _deny(self, request: Request) -> Response:
+        if (asked := await _asked(request, PersonRequest)) is None:
+            return refusal(400, "id", 'JSON: {"id": "…"}')
+        try:
+            member = self._doors.pairings.deny(asked.id, "A supervisor did not let it in.")
+        except PairingError as error:
+            return refusal(409, error.field, error.allowed)
+        self._doors.save()
+        self._hub.people.note("deny", _member(request), member.name)
+        self._hub.say(f"{_member(request).name} did not let {member.name} in.")
+        return JSONResponse({"name": member.name})
+
+    async def _revoke(self, request: Request) -> Response:
+        if (asked := await _asked(request, PersonRequest)) is None:
+            return refusal(400, "id", 'JSON: {"id": "…"}')
+        if asked.id.startswith(LOCAL):
+            return refusal(409, "id", "a paired page; end the program on its computer instead")
+        why = "A supervisor has ended this pairing."
+        try:
+            member = await self._hub.handover.shut_out(asked.id, why, _member(request))
+        except PairingError as error:
+            return refusal(409, error.field, error.allowed)
+        return JSONResponse({"name": member.name})
+
+    async def _lead(self, request: Request) -> Response:
+        if (asked := await _asked(request, PersonRequest)) is None:
+            return refusal(400, "id", 'JSON: {"id": "…"}')
+        try:
+            self._hub.handover.give(asked.id, _member(request), self._doors.clock())
+        except PairingError as error:
+            return refusal(409, error.field, error.allowed)
+        return JSONResponse({"leads_next": asked.id}, 202)
+
+
+def _member(request: Request) -> Member:
+    member: Member = request.scope["member"]
+    return member
+
+
+def _told(member: Member) -> dict[str, str]:
+    """What a page may know of its own pairing."""
+    return {field: getattr(member, field) for field in ("role", "state", "name", "code", "why")}
+
+
+async def _asked(request: Request, kind: type[Wanted]) -> Wanted | None:
+    try:
+        return msgspec.json.decode(await body_of(request), type=kind)
+    except msgspec.MsgspecError:
+        return None
+
+
+def _code(url: str) -> str:
+    svg = io.BytesIO()
+    segno.make(url, error="m").save(
+        svg, kind="svg", scale=6, border=2, dark="#000", light="#fff", xmldecl=False
+    )
+    return svg.getvalue().decode()

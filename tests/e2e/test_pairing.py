@@ -1,0 +1,141 @@
+"""People come in by a real browser: four letters, a click, and out again; no secret is written."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from server.runtime import RUN_FILE
+from tests.e2e.chromium_phone import browser
+from tests.e2e.serving import Serving, serving
+from tests.e2e.test_serve import mode, processes, until
+
+pytestmark = pytest.mark.e2e
+SCREEN = {"viewport": {"width": 1280, "height": 720}}
+WAIT_MS = 30_000
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    folder = tmp_path_factory.mktemp("pairing")
+    with serving(folder, "--pairing.confirm", "supervisor") as running:
+        yield running
+
+
+def post(
+    server: Serving, path: str, body: object, cookie: str = ""
+) -> tuple[int, dict[str, object], str]:
+    """As a page on this machine does it; status, JSON, and the cookie that was set."""
+    headers = {"Origin": server.http_url, "X-Lightleash": "1", "Cookie": cookie}
+    data = json.dumps(body).encode()
+    request = urllib.request.Request(server.http_url + path, data, headers, method="POST")
+    try:
+        with urllib.request.urlopen(request, timeout=5.0) as answer:
+            set_cookie = str(answer.headers.get("set-cookie", "")).partition(";")[0]
+            return answer.status, json.loads(answer.read()), set_cookie
+    except urllib.error.HTTPError as error:
+        return error.code, json.loads(error.read()), ""
+
+
+def ids(server: Serving) -> dict[str, str]:
+    """Of those in the list, by name."""
+    people = server.request("GET", "/api/status")["people"]
+    assert isinstance(people, list)
+    return {str(one["name"]): str(one["id"]) for one in people}
+
+
+def test_a_phone_is_let_in_by_one_click_beside_its_letters_and_shut_out_by_two(
+    chromium: str, server: Serving
+) -> None:
+    with browser(chromium, **SCREEN) as context:
+        board, phone = context.new_page(), context.new_page()
+        board.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
+        expect(board.locator("#people li")).to_have_count(1, timeout=WAIT_MS)
+        link = server.link()
+        phone.goto(f"{server.local_https}/{link}")
+        phone.fill("#name", "Anna")
+        phone.click("#start")
+        letters = phone.locator("#match")
+        expect(letters).to_have_text(board.locator(".asking .match").inner_text(), timeout=WAIT_MS)
+        assert link[3:] not in phone.url
+        board.click(".asking .confirm")
+        row = board.locator("#people li", has_text="Anna")
+        expect(row).to_be_visible(timeout=WAIT_MS)
+        expect(phone.locator("#pairing")).to_be_hidden(timeout=WAIT_MS)
+        row.locator(".revoke").click()
+        expect(row.locator(".revoke")).to_have_text("Really?", timeout=WAIT_MS)
+        row.locator(".revoke").click()
+        expect(row).to_have_count(0, timeout=WAIT_MS)
+        phone.reload()
+        expect(phone.locator("#problem-title")).to_have_text(
+            "This browser is not let in", timeout=WAIT_MS
+        )
+
+
+def test_a_viewers_page_shows_all_and_offers_stop_alone(chromium: str, server: Serving) -> None:
+    with browser(chromium, **SCREEN) as context:
+        page = context.new_page()
+        page.goto(f"{server.http_url}/supervisor{server.link('viewer')}")
+        expect(page.locator("#people li")).not_to_have_count(0, timeout=WAIT_MS)
+        buttons = page.locator("button:visible")
+        assert [one.strip() for one in buttons.all_inner_texts()] == ["STOP"]
+
+
+def test_a_server_killed_knows_who_was_in_and_who_was_shut_out(server: Serving) -> None:
+    stays, goes = (
+        post(server, "/api/pair", {"token": server.link("viewer")[3:], "name": name})
+        for name in ("Stays", "Goes")
+    )
+    until(lambda: "Goes" in ids(server), 10.0, "the newcomer in the list")
+    server.request("POST", "/api/people/revoke", {"id": ids(server)["Goes"]})
+    former = processes(server.process.pid)["server"]
+    os.kill(former, signal.SIGKILL)
+    until(
+        lambda: processes(server.process.pid).get("server") not in (None, former), 20.0, "another"
+    )
+    until(lambda: mode(server) != "", 120.0, "an answer")
+    assert post(server, "/api/stop", {"type": "command", "what": "stop"}, stays[2])[0] == 202
+    assert post(server, "/api/stop", {"type": "command", "what": "stop"}, goes[2])[0] == 401
+
+
+def test_no_secret_is_in_anything_that_was_written(server: Serving, tmp_path: Path) -> None:
+    server.request("POST", "/api/recording")
+    secrets = {server.operator_token, server.supervisor_token}
+    for role in ("viewer", "operator", "supervisor"):
+        key = server.link(role)[3:]
+        status, told, cookie = post(server, "/api/pair", {"token": key, "name": role})
+        assert status == 200
+        assert post(server, "/api/pair", {"token": key})[0] == 401
+        secrets |= {key, cookie.partition("=")[2]}
+        assert key not in json.dumps(told)
+    environment = Path(f"/proc/{processes(server.process.pid)['server']}/environ").read_bytes()
+    (secret,) = [
+        one.partition(b"=")[2].decode()
+        for one in environment.split(b"\0")
+        if one.startswith(b"_LIGHTLEASH_SECRET")
+    ]
+    secrets |= {secret, bytes.fromhex(secret).decode("latin-1")}
+    server.request("DELETE", "/api/recording")
+    time.sleep(1.0)
+    root = server.runtime.parent.parent
+    written = [path for path in root.rglob("*") if path.is_file() and path.name != RUN_FILE]
+    names = {path.name for path in written}
+    assert {"serve.log", "audit.jsonl", "members.json"} <= names
+    assert any(path.suffix == ".mcap" for path in written)
+    assert len(secrets) == 10
+    found = {
+        path.name
+        for path in written
+        for one in secrets
+        if one.encode("latin-1") in path.read_bytes()
+    }
+    assert found == set()
