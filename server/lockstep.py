@@ -45,7 +45,7 @@ from server.phone_script import DEVICE, PhoneScript, VirtualOperator
 from server.robot_link import RobotLink
 from server.seen_input import SeenInput
 from server.sight import Sight
-from server.wire import decode, encode
+from server.wire import WireError, decode, encode
 from server.wire_records import Ping, Record, Touch
 
 EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}
@@ -229,7 +229,12 @@ class Lockstep:
 
     def _take(self, record: Record) -> None:
         """What the server does with a record: the bytes, not the object, go on."""
-        match self._ingest.record(decode(encode(record)), self.t):
+        try:
+            signal = self._ingest.record(decode(encode(record)), self.t)
+        except WireError:  # a live server hangs up: of this phone there is no news
+            self.transit.lost += 1
+            return
+        match signal:
             case PhoneImu() as sample:
                 self._feel(sample)
                 self._inbox.append(PhoneImuInput.of(sample))

@@ -22,6 +22,7 @@ EXPERIMENTS: Final = {
     "margins": "what delay, gain and phase the control loops can lose, axis by axis",
     "estimators": "where the robot is now: three estimators on the same data",
     "gaps": "the closed loop against gaps in its links and recorded radio, in virtual time",
+    "faults": "every fault of the hazard table: what follows, when, and how far the robot strays",
     "network": "a phone by WebRTC and by websockets over bad lines; as root on Linux",
     "sweep": "the closed loop over any configuration key and many seeds, on all cores",
 }

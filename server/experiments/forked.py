@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import traceback
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -31,6 +32,8 @@ def forked(work: Callable[[], Result]) -> Result:
             with os.fdopen(writer, "wb") as pipe:
                 pickle.dump(work(), pipe)
             code = 0
+        except BaseException:  # it must not go on as if it were the other one
+            traceback.print_exc()
         finally:
             os._exit(code)
     os.close(writer)

@@ -93,6 +93,15 @@ PARTS: Final[tuple[Part, ...]] = (
         "of a phone that vanishes; in virtual time.",
     ),
     Part(
+        "faults",
+        "faults --seeds 5",
+        "faults --seeds 1 --only STOP",
+        "Faults",
+        "What each fault of the hazard table leads to in virtual time: when control coasts, holds "
+        "and ramps, when the robot does so by itself, when there is no thrust, and how far it "
+        "strays.",
+    ),
+    Part(
         "network",
         "network --seconds 32 --seed 0",
         "network --seconds 8 --seed 0 --scenarios clean",
@@ -131,6 +140,11 @@ CAPTIONS: Final[Mapping[tuple[str, str], str]] = {
     ("gaps", "gaps"): "Share of the time in which the robot follows and the farthest it strays, by "
     "length of gap; recorded minutes; a flight with gaps: where it was, should be and an ideal "
     "camera would have it, shaded while it coasts or holds.",
+    (
+        "faults",
+        "faults",
+    ): "When what followed each fault, at the latest, and how far the robot went "
+    "beyond where the flight led it; red names: a goal was missed.",
     ("network", "network"): "How large a share of the pictures, and of the newest records at any "
     "time, was older than an age, on each line and path.",
 }

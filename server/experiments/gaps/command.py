@@ -49,7 +49,7 @@ COLUMNS: Final = (
     ("behind_mm", "behind mm", "{:.1f}"),
     ("release_m_s", "release m/s", "{:.3f}"),
     ("quiet_m_s", "else m/s", "{:.3f}"),
-    ("moved_mm", "moved mm", "{:.2f}"),
+    ("step_mm", "step mm", "{:.2f}"),
 )
 
 

@@ -72,6 +72,11 @@ class GapFlight:
         self._ideal_in_f = self._due_in_f = np.zeros(3)
         self._mode = Mode.DISARMED
 
+    @property
+    def due_in_f(self) -> Array:
+        """Where the robot should be (3,) [m]."""
+        return self._due_in_f
+
     def take_off(self) -> float:
         """Fly cleanly until the integral has settled; gives the time [s].
 

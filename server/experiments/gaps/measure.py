@@ -48,8 +48,9 @@ class Flight:
     """Fastest reference beyond the ideal's own motion, over 0.1 s, in the second after a gap."""
     quiet_m_s: float
     """The same where nothing is released, p99: the estimate's noise."""
-    moved_mm: float
-    """By how much the reference moved while the robot coasted."""
+    step_mm: float
+    """From the robot to the reference, as that is taken up again after a gap: 0 if it did not move
+    meanwhile but with the robot."""
     reasons: tuple[str, ...]
     """Of each mode but TRACK that was entered."""
 
@@ -84,7 +85,7 @@ def flight_of(log: Log) -> Flight:
         behind_mm=1e3 * float(behind.max(initial=0.0)),
         release_m_s=_largest(released),
         quiet_m_s=float(np.percentile(quiet, 99.0)) if len(quiet) else float("nan"),
-        moved_mm=1e3 * _largest(_drifts(modes, reference, (Mode.COAST,))),
+        step_mm=1e3 * _largest(_steps(modes, reference - body)),
         reasons=tuple(sorted(set(log.reasons))),
     )
 
@@ -100,6 +101,12 @@ def _drifts(modes: Array, places: Array, wanted: tuple[Mode, ...]) -> list[float
     runs = (places[begin:end] for begin, end in spans(np.isin(modes, wanted)))
     known = (run[np.isfinite(run).all(axis=1)] for run in runs)
     return [float(np.linalg.norm(run - run[0], axis=1).max()) for run in known if len(run)]
+
+
+def _steps(modes: Array, away: Array) -> list[float]:
+    """How far the reference was `away` (n, 3) from the robot where tracking was resumed [m]."""
+    resumed = np.flatnonzero((modes[:-1] == Mode.COAST) & (modes[1:] == Mode.TRACK)) + 1
+    return np.linalg.norm(away[resumed], axis=1).tolist() if len(resumed) else []
 
 
 def _speeds(modes: Array, beyond: Array) -> tuple[list[float], list[float]]:
@@ -141,7 +148,7 @@ class Row:
     drift_mm: float
     release_m_s: float
     quiet_m_s: float
-    moved_mm: float
+    step_mm: float
     seeds: int
     reasons: tuple[str, ...]
 
@@ -167,7 +174,7 @@ def row_of(case: Case, flights: Sequence[Flight]) -> Row:
         drift_mm=worst("drift_mm"),
         release_m_s=worst("release_m_s"),
         quiet_m_s=worst("quiet_m_s"),
-        moved_mm=worst("moved_mm"),
+        step_mm=worst("step_mm"),
         seeds=len(flights),
         reasons=tuple(sorted({reason for one in flights for reason in one.reasons})),
         **{

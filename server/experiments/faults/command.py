@@ -1,0 +1,130 @@
+"""The command: let every fault happen to flights of many seeds; print, write JSON, draw."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from pipeline.config import TeleopConfig, VirtualCameraConfig
+from server.control import teleop_config
+from server.experiments import processes
+from server.experiments.faults import picture
+from server.experiments.faults.catalogue import FAULTS
+from server.experiments.faults.fault import Fault, Outcome, suffer
+from server.experiments.faults.measure import Row, row_of
+from server.experiments.forked import forked
+from server.experiments.gaps.flight import GapFlight
+from server.experiments.numbers import whole
+from server.experiments.text import dashed, plain, statements
+
+APART_TICKS: Final = 7
+"""Between two faults in a flight: each meets another moment of it."""
+SHARED: Final = 16
+"""Faults that are tried in one flight."""
+COLUMNS: Final = (
+    ("fault", "fault", "{}"),
+    ("COAST", "COAST s", "{:.3f}"),
+    ("HOLD", "HOLD s", "{:.3f}"),
+    ("RAMP", "RAMP s", "{:.3f}"),
+    ("robot", "robot s", "{:.3f}"),
+    ("zero", "zero s", "{:.2f}"),
+    ("follows", "follows", "{}"),
+    ("excursion_mm", "excursion mm", "{:.0f}"),
+    ("tilt_deg", "tilt °", "{:.1f}"),
+    ("after_zero", "after zero", "{}"),
+    ("missed", "missed", "{}"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Some faults in one flight."""
+
+    robot_file: RobotFile
+    config: TeleopConfig
+    seed: int
+    names: tuple[str, ...]
+
+
+def flown(job: Job) -> list[Outcome]:
+    """Fly once; each fault happens to a copy of the flight.
+
+    Raises:
+        RuntimeError: it never tracked.
+    """
+    flight = GapFlight(job.robot_file, job.config, job.seed)
+    flight.take_off()
+    outcomes = []
+    for fault in (fault for fault in FAULTS if fault.name in job.names):
+        for _ in range(APART_TICKS):
+            flight.advance()
+        outcomes.append(forked(partial(suffer, flight, fault, job.seed)))
+    return outcomes
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fly, print, write, draw; 1 if a goal is missed, 2 if it can't be flown."""
+    try:
+        robot_file = load_robot(arguments.robot)
+    except RobotFileError as error:
+        print(f"lightleash experiments faults: {error}", file=sys.stderr)
+        return 2
+    config = teleop_config(robot_file, arguments.gains, VirtualCameraConfig(), "relative")
+    faults = [fault for fault in FAULTS if arguments.only in fault.name]
+    outcomes = _outcomes(robot_file, config, faults, arguments)
+    rows = [row_of(fault, [o for o in outcomes if o.fault == fault.name]) for fault in faults]
+    holds = goals(rows, arguments.seeds)
+    print(f"{arguments.robot}, gains {arguments.gains}, hand moving; the worst of each")
+    print(dashed(COLUMNS, rows), end="\n\n")
+    print("\n".join(statements(holds)))
+    if arguments.out is not None:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        figures = {"rows": [plain(asdict(row)) for row in rows], "holds": holds}
+        file = arguments.out / "faults.json"
+        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
+        print(f"\nwritten: {file}, {picture.draw(rows, arguments.out / 'faults.png')}")
+    return 0 if all(holds.values()) else 1
+
+
+def _outcomes(
+    robot_file: RobotFile,
+    config: TeleopConfig,
+    faults: Sequence[Fault],
+    arguments: argparse.Namespace,
+) -> list[Outcome]:
+    names = [fault.name for fault in faults]
+    jobs = [
+        Job(robot_file, config, seed, tuple(names[k : k + SHARED]))
+        for seed in range(1, arguments.seeds + 1)
+        for k in range(0, len(names), SHARED)
+    ]
+    outcomes: list[Outcome] = []
+    for some in processes.each(flown, jobs, arguments.workers):
+        outcomes += some
+        print(f"flown: {len(outcomes)} of {len(names) * arguments.seeds}", file=sys.stderr)
+    return sorted(outcomes, key=lambda one: one.seed)
+
+
+def goals(rows: Sequence[Row], seeds: int) -> dict[str, bool]:
+    """What is to be shown, and whether it was."""
+    thrust = sum(row.after_zero for row in rows)
+    told = f"{thrust} samples with thrust after zero, in {len(rows)} faults of {seeds} seeds"
+    held = {told: thrust == 0}
+    return held | {f"{row.fault}: in time, within bounds": not row.missed for row in rows}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")
+    parser.add_argument("--seeds", type=whole(1, 1000), default=25, help="flights of each fault")
+    parser.add_argument("--only", default="", metavar="WORDS", help="faults with these in the name")
+    parser.add_argument("--robot", default="ames", help="name or path of a robot file")
+    parser.add_argument("--gains", default="phone", help="a gain set of the robot file")
+    parser.add_argument("--workers", type=whole(1, 256), default=processes.cores())
