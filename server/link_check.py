@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 from msgspec.structs import replace
@@ -26,12 +27,21 @@ SHORTEST_BUSY_S = 0.1
 Span = tuple[float, float]
 
 
+@dataclass(frozen=True, slots=True)
+class _Wait:
+    """The robot would not follow from `begin` to `end` [s]."""
+
+    begin: float
+    end: float
+    longest: Span
+    """Of the silences that it consists of."""
+
+
 def check(series: Series, rules: FailsafeConfig) -> LinkReport:
     """The verdict on a series."""
     seconds = max(series.end - series.begin, 1e-9)
-    silences = _silences(series)
-    waits = [span for span in silences if _length(span) > rules.silent]
-    ends = [span for span in waits if _length(span) > rules.gap]
+    waits = _waits(series, rules)
+    ends = [wait for wait in waits if _length(wait.longest) > rules.gap]
     trips = sorted(came - asked for asked, came in series.answers)
     answered = {asked for asked, _ in series.answers}
     due = [asked for asked in series.asked if asked < series.end - rules.gap]
@@ -41,10 +51,10 @@ def check(series: Series, rules: FailsafeConfig) -> LinkReport:
         lines=[],
         advice=[],
         seconds=round(seconds, 1),
-        follows=round(1.0 - _lost_time(series, rules) / seconds, 4),
+        follows=round(1.0 - sum(wait.end - wait.begin for wait in waits) / seconds, 4),
         waits=len(waits) - len(ends),
         ends=len(ends),
-        sides={side: sum(side == _side(span, series) for span in waits) for side in SIDES},
+        sides={side: sum(side == _side(wait.longest, series) for wait in waits) for side in SIDES},
         gaps={str(ms): sum(1e3 * _length(span) > ms for span in _gaps(series)) for ms in GAPS_MS},
         longest_ms=round(1e3 * max(map(_length, _gaps(series)), default=0.0), 1),
         rtt_ms=_ms(_quantile(trips, 0.5)),
@@ -74,11 +84,6 @@ def _gaps(series: Series) -> list[Span]:
     return list(pairwise(times))
 
 
-def _silences(series: Series) -> list[Span]:
-    """From when the newest sign of life was asked for until a newer one came."""
-    return _ages(series.answers, series)
-
-
 def _ages(arrivals: Sequence[Arrival], series: Series) -> list[Span]:
     """Each until a newer one came; what comes out of order is no news."""
     spans: list[Span] = []
@@ -90,18 +95,19 @@ def _ages(arrivals: Sequence[Arrival], series: Series) -> list[Span]:
     return [*spans, (newest, series.end)]
 
 
-def _lost_time(series: Series, rules: FailsafeConfig) -> float:
-    """In which the robot would not follow [s]: each cause on its own, no moment twice."""
-    away: list[Span] = []
-    for span in (*_silences(series), *_ages(series.motion, series)):
-        if _length(span) > rules.silent:
-            back = PRESS_S if _length(span) > rules.gap else rules.fresh
-            away.append((span[0] + rules.silent, min(span[1] + back, series.end)))
-    total, until = 0.0, series.begin
-    for begin, end in sorted(away):
-        total += max(0.0, end - max(begin, until))
-        until = max(until, end)
-    return total
+def _waits(series: Series, rules: FailsafeConfig) -> list[_Wait]:
+    """When the robot would not follow: silences of page or motion that run into each other."""
+    silences = [*_ages(series.answers, series), *_ages(series.motion, series)]
+    waits: list[_Wait] = []
+    for silence in sorted(span for span in silences if _length(span) > rules.silent):
+        back = PRESS_S if _length(silence) > rules.gap else rules.fresh
+        wait = _Wait(silence[0] + rules.silent, min(silence[1] + back, series.end), silence)
+        if waits and wait.begin <= waits[-1].end:
+            before = waits.pop()
+            longest = max(before.longest, silence, key=_length)
+            wait = _Wait(before.begin, max(before.end, wait.end), longest)
+        waits.append(wait)
+    return waits
 
 
 def _side(silence: Span, series: Series) -> Side:

@@ -26,9 +26,9 @@ class LinkReport(msgspec.Struct, frozen=True):
     follows: float
     """Share of the time in which the robot would follow."""
     waits: int
-    """Silences in which it would wait, and go on by itself."""
+    """How often it would wait, and go on by itself."""
     ends: int
-    """Silences that would end a flight."""
+    """How often a flight would end."""
     sides: dict[str, int]
     """Of both: how many by `link`, `phone` (too busy) and `server` (its computer too busy)."""
     gaps: dict[str, int]

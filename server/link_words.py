@@ -17,6 +17,8 @@ SPREAD_MS = 40.0
 FEW_PICTURES_HZ, FEW_MOTION_HZ = 20.0, 45.0
 LATE_PICTURES_MS = 150.0
 LONG_WAIT_MS = 500.0
+MOSTLY = 0.5
+"""Of the time following; with less nobody counts how often it waits."""
 SIDES = {
     "link": "the phone's link",
     "phone": "the phone, which was too busy",
@@ -63,6 +65,8 @@ def _waits(report: LinkReport) -> list[str]:
         minutely = report.waits * 60.0 / report.seconds
         often = f"{minutely:.0f} times" if minutely >= 1.5 else "once"
         told.append(f"It would wait for news about {often} a minute; {longest}.")
+    if report.waits and report.follows < MOSTLY:
+        told = [f"It would mostly wait for news; {longest}."]
     if report.ends:
         one = "silence" if report.ends == 1 else "silences"
         told.append(f"{report.ends} {one} would have ended a flight; {longest}.")

@@ -136,6 +136,15 @@ def test_a_slow_link_and_a_sleepy_radio_are_told_what_helps():
     assert any("awake" in step for step in report.advice)
 
 
+def test_answers_that_are_all_late_are_one_wait_not_one_for_each():
+    report = check(fine(rtt=0.2), RULES)
+    assert (report.waits, report.ends) == (1, 0)
+    assert report.follows < 0.05
+    assert any("mostly wait" in line for line in report.lines)
+    twice = silent(silent(fine(), 20.0, 0.3), 30.0, 0.3)
+    assert check(twice, RULES).waits == 2
+
+
 def test_only_the_last_minute_is_remembered_and_no_more_than_there_was():
     log = LinkLog(0.0)
     for k in range(10_000):

@@ -246,8 +246,8 @@
  * @property {string[]} advice What to do about it; empty if there is nothing to do.
  * @property {number} seconds So long was listened to.
  * @property {number} follows Share of the time in which the robot would follow.
- * @property {number} waits Silences in which it would wait, and go on by itself.
- * @property {number} ends Silences that would end a flight.
+ * @property {number} waits How often it would wait, and go on by itself.
+ * @property {number} ends How often a flight would end.
  * @property {Record<string, number>} sides Of both: how many by `link`, `phone` (too busy) and `server` (its computer too busy).
  * @property {Record<string, number>} gaps Silences by length: how many were longer than so many ms.
  * @property {number} longest_ms
