@@ -5,9 +5,12 @@ This is the reference for a real robot's firmware; `deploy/watchdog/` is the sam
    is of the current epoch, echoes a nonce the robot sent at most 40 ms ago, and its thrusts are
    finite, within [0, f_max], at most 200 counters ahead and rise no faster than allowed.
    Everything else changes nothing, except by rule 4.
-2. Nothing taken for 60 ms: thrust falls linearly to zero within one period of the suspension (or
-   the robot file's `ramp_s`), whatever arrives meanwhile; only zero thrust of the current epoch
-   or STOP cuts it short. A robot that flies must keep its attitude by itself meanwhile.
+2. Nothing taken for 60 ms: COAST. Thrust falls linearly, so that it would be zero after one period
+   of the suspension (or the robot file's `ramp_s`); a robot that flies keeps upright by its own
+   gyroscope (`attitude_keeper.py`). 280 ms after the last command taken this is called RAMP; until
+   400 ms after it, the same epoch's next command is taken, and thrust goes to it by steps no
+   larger than the rise allowed (`given_thrusts.py`). Then there is no way back: only zero thrust
+   of the epoch or STOP cuts the ramp short, nothing else that arrives changes it.
 3. After that, and after a start: no thrust until zero thrust of a *later* epoch has been taken for
    500 ms without a gap of 60 ms. So a control process begins with zero, and one that was frozen
    or replaced never comes back. Zero of a later epoch is taken in every state, since the newest
@@ -44,6 +47,7 @@ from math import isfinite
 
 import numpy as np
 
+from hardware.attitude_keeper import AttitudeGains, AttitudeKeeper
 from hardware.datagram import (
     U32,
     Command,
@@ -55,7 +59,9 @@ from hardware.datagram import (
     is_later,
 )
 from hardware.follower import FollowerState, Refusal
+from hardware.given_thrusts import GivenThrusts
 from hardware.robot_file import RobotFile
+from pipeline.config import HoldConfig
 from pipeline.frames import Array
 
 Peer = tuple[str, int]
@@ -63,7 +69,12 @@ Peer = tuple[str, int]
 
 SILENCE_US = 60_000
 """Without a command taken: rule 2."""
+RAMP_AFTER_US = 280_000
+BACK_UNTIL_US = 400_000
+"""After the last command taken: a radio's short gap ends no flight, a dead process does."""
 NONCES_KEPT = 32
+MAX_SAMPLE_S = 0.05
+"""More than that between two samples is a hole, not a motion."""
 FORGET_PEER_US = 5_000_000
 """Nobody is sent samples who was not heard for this long."""
 ROUNDING = 1.0 + 1e-6
@@ -82,10 +93,14 @@ class LinkLimits:
     ramp_us: int
     """From full thrust to zero in silence [µs]: `Robot.ramp_s`."""
     silence_us: int = SILENCE_US
+    ramp_after_us: int = RAMP_AFTER_US
+    back_until_us: int = BACK_UNTIL_US
     max_age_us: int = 40_000
     handshake_us: int = 500_000
     max_jump: int = 200
-    """Of the counter: one forged high number must not make all honest ones old."""
+    """Of the counter of thrust: it may have risen with each of them."""
+    attitude: AttitudeGains | None = None
+    """Of a robot that flies and keeps upright by itself."""
 
     @classmethod
     def of(cls, robot_file: RobotFile) -> LinkLimits:
@@ -96,6 +111,9 @@ class LinkLimits:
             f_max=robot.f_max,
             max_rise=robot_file.link.max_rise,
             ramp_us=round(1e6 * robot.ramp_s),
+            attitude=AttitudeGains.of(robot, HoldConfig())
+            if robot_file.keeps_attitude_in_ramp
+            else None,
         )
 
 
@@ -111,10 +129,15 @@ class RobotEnd:
         self._candidate = 0
         """Epoch in its handshake, 0 none; only while in RAMP or REFUSING."""
         self._counter = self._candidate_counter = 0
-        self._taken_us = self._ramp_us = self._handshake_us = 0
-        self._thrusts = np.zeros(limits.thrusters)
+        self._taken_us = self._shaken_us = self._handshake_us = self._heard_us = 0
+        attitude = limits.attitude
+        self._keeper = AttitudeKeeper(attitude) if attitude is not None else None
+        self._given = GivenThrusts(limits.thrusters, limits.max_rise, limits.ramp_us, self._keeper)
+        self._sampled_us = 0
         self._nonces: deque[tuple[int, int]] = deque(maxlen=NONCES_KEPT)
         self._samples = 0
+        self._replaced = False
+        """A later epoch was taken: the one followed has no way back."""
         self._newest = (0, 0)
         """Epoch and counter of the newest command heard, taken or not."""
         self._challenge = 0
@@ -134,7 +157,7 @@ class RobotEnd:
         why = self._judge(command, now_us)
         self.counts[why] += 1
         if why == Refusal.NONE:
-            self._peer = peer
+            self._peer, self._heard_us = peer, now_us
             self._take(command, now_us)
         elif self.state != FollowerState.RAMP:
             self.refusal = why
@@ -149,10 +172,7 @@ class RobotEnd:
     def setpoint(self, now_us: int) -> Array:
         """Thrusts (m,) [N] the thrusters are to give now."""
         self._advance(now_us)
-        if self.state == FollowerState.RAMP:
-            elapsed_us = max(0, now_us - self._ramp_us)
-            return self._thrusts * (1.0 - elapsed_us / self._limits.ramp_us)
-        return self._thrusts.copy()
+        return self._given.at(now_us)
 
     def halt(self) -> None:
         """Zero at once, then refuse: the robot is being switched off."""
@@ -163,6 +183,10 @@ class RobotEnd:
     ) -> bytes:
         """The next datagram for `recipients`; `nonce` is random and not 0."""
         self._advance(now_us)
+        if self._keeper is not None:
+            h = min(MAX_SAMPLE_S, 1e-6 * (now_us - self._sampled_us))
+            self._keeper.feel(np.array(omega_in_b), np.array(a_in_b), h, not self._given)
+        self._sampled_us = now_us
         self._samples = (self._samples + 1) % U32
         self._nonces.append((nonce, now_us))
         self._answered, self._asking = self._asking, None
@@ -186,7 +210,7 @@ class RobotEnd:
 
     def recipients(self, now_us: int) -> tuple[Peer, ...]:
         """Whom to send the sample just made; nobody if nobody was heard lately."""
-        lately = now_us - self._taken_us <= FORGET_PEER_US
+        lately = now_us - self._heard_us <= FORGET_PEER_US
         both = self._peer if lately else None, self._answered
         return tuple(dict.fromkeys(peer for peer in both if peer is not None))
 
@@ -203,27 +227,34 @@ class RobotEnd:
 
     def _advance(self, now_us: int) -> None:
         """Let time do its work: silence, ramp, abandoned handshakes."""
-        silent = now_us - self._taken_us > self._limits.silence_us
-        if self.state in (FollowerState.RAMP, FollowerState.REFUSING):
-            if self._candidate and silent:
-                self._candidate, self.refusal = 0, Refusal.SILENT
-            ramping = self.state == FollowerState.RAMP
-            if ramping and now_us - self._ramp_us >= self._limits.ramp_us:
-                self._refuse(self._candidate)
-        elif silent:
+        limits, silence_us = self._limits, now_us - self._taken_us
+        if self._candidate and now_us - self._shaken_us > limits.silence_us:
+            self._candidate, self.refusal = 0, Refusal.SILENT
+        following = self.state in (FollowerState.IDLE, FollowerState.RUNNING)
+        if following and silence_us > limits.silence_us:
+            self.state, self.refusal = FollowerState.COAST, Refusal.SILENT
+            self._given.fade(self._taken_us + limits.silence_us)
+        if self.state == FollowerState.COAST and silence_us > limits.ramp_after_us:
             self._leave(now_us)
+        if self.state == FollowerState.RAMP and self._given.has_faded(now_us):
+            self._refuse(self._candidate)
 
     def _leave(self, now_us: int) -> None:
         """Ramp down; at once if there is no thrust."""
-        if self._thrusts.any():
+        if self._given:
             self.state, self.refusal = FollowerState.RAMP, Refusal.SILENT
-            self._ramp_us = now_us
+            self._given.fade(now_us)
         else:
             self._refuse()
 
+    def _may_come_back(self, now_us: int) -> bool:
+        """Whether a command of the epoch may end the ramp: nobody newer, and not too late."""
+        early = now_us - self._taken_us <= self._limits.back_until_us
+        return early and not self._replaced
+
     def _refuse(self, candidate: int = 0) -> None:
         self.state, self.refusal = FollowerState.REFUSING, Refusal.SILENT
-        self._thrusts[:] = 0.0
+        self._given.zero()
         self._candidate = candidate
 
     def _judge(self, command: Command, now_us: int) -> Refusal:
@@ -239,14 +270,14 @@ class RobotEnd:
             return Refusal.NOT_FINITE
         if self._is_later_zero(command):
             return Refusal.NONE
-        return self._judge_thrusts(command)
+        return self._judge_thrusts(command, now_us)
 
     def _is_later_zero(self, command: Command) -> bool:
         """Rule 3: who is newer than who flies now and who is in his handshake."""
         newer = command.epoch > max(self._epoch, self._candidate)
         return newer and not any(command.thrusts)
 
-    def _judge_thrusts(self, command: Command) -> Refusal:
+    def _judge_thrusts(self, command: Command, now_us: int) -> Refusal:
         limits, refusing = self._limits, self.state == FollowerState.REFUSING
         thrusts = np.array(command.thrusts)
         meant = bool(thrusts.any())
@@ -262,41 +293,43 @@ class RobotEnd:
         beyond = bool((thrusts < 0.0).any() or (thrusts > limits.f_max * ROUNDING).any())
         if beyond or (meant and (command.stop or not command.armed)):
             return Refusal.LIMITS
-        if meant and self.state == FollowerState.RAMP:
+        if meant and self.state == FollowerState.RAMP and not self._may_come_back(now_us):
             return Refusal.SILENT
-        if bool((thrusts > (self._thrusts + ahead * limits.max_rise) * ROUNDING).any()):
+        if bool((thrusts > (self._given.commanded + ahead * limits.max_rise) * ROUNDING).any()):
             return Refusal.RISE
         return Refusal.NONE
 
     def _take(self, command: Command, now_us: int) -> None:
         """Act on a command that was judged good."""
-        self._taken_us = now_us
         if command.epoch != self._epoch:
             self._shake_hands(command, now_us)
             return
-        self._counter = command.counter
-        if self.state == FollowerState.RAMP:
+        thrusts = np.array(command.thrusts)
+        running = bool(thrusts.any())
+        self._taken_us, self._counter = now_us, command.counter
+        if self.state == FollowerState.RAMP and not running:
             self._refuse(self._candidate)
         else:
-            self._thrusts = np.array(command.thrusts)
-            running = bool(self._thrusts.any())
+            self._given.follow(thrusts, now_us)
             self.state = FollowerState.RUNNING if running else FollowerState.IDLE
             self.refusal = Refusal.NONE
 
     def _shake_hands(self, command: Command, now_us: int) -> None:
         """Zero of a later epoch: it gets the robot when thrust is zero and time enough is over."""
+        self._replaced = True
         if self.state not in (FollowerState.RAMP, FollowerState.REFUSING):
             self._leave(now_us)
         if command.stop:
             self._refuse(self._candidate)
         if command.epoch != self._candidate:
             self._candidate, self._handshake_us = command.epoch, now_us
-        self._candidate_counter = command.counter
+        self._candidate_counter, self._shaken_us = command.counter, now_us
         self.refusal = Refusal.HANDSHAKE
         shaken = now_us - self._handshake_us >= self._limits.handshake_us
         if shaken and self.state == FollowerState.REFUSING:
             self._epoch, self._counter, self._candidate = command.epoch, command.counter, 0
             self.state, self.refusal = FollowerState.IDLE, Refusal.NONE
+            self._taken_us, self._replaced = now_us, False
 
     def _obey_zero(self, command: Command, newest: bool) -> None:
         """Rule 4: zero without a fresh nonce, which is not taken otherwise."""
@@ -313,5 +346,6 @@ class RobotEnd:
         if self.state == FollowerState.RAMP:
             self._refuse(self._candidate)
         else:
-            self._thrusts[:] = 0.0
-            self.state = FollowerState.IDLE
+            self._given.zero()
+            if self.state == FollowerState.RUNNING:
+                self.state = FollowerState.IDLE

@@ -66,6 +66,8 @@ class RobotFile:
     start: StartParameters
     gains: Mapping[str, Gains]
     link: LinkParameters
+    keeps_attitude_in_ramp: bool
+    """The robot itself, without a word from control."""
 
 
 def load_robot(name_or_path: str | Path) -> RobotFile:
@@ -199,7 +201,12 @@ def _converted(schema: RobotSchema) -> RobotFile:
     }
     link = LinkParameters(schema.link.host, schema.link.port, schema.link.max_rise_per_command_n)
     return RobotFile(
-        robot, plant, StartParameters(start.distance_m, start.above_m, start.lift_m), gains, link
+        robot,
+        plant,
+        StartParameters(start.distance_m, start.above_m, start.lift_m),
+        gains,
+        link,
+        schema.keeps_attitude_in_ramp,
     )
 
 

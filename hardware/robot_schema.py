@@ -147,6 +147,8 @@ class RobotSchema(Section):
     """Controlled, in the body's axes; the others are let alone."""
     ramp_s: Annotated[float, Field(ge=0.05, le=30.0)] | None = None
     """From full thrust to zero; with a suspension its period."""
+    keeps_attitude_in_ramp: bool = False
+    """By its own gyroscope, while its thrust falls in silence: one that flies must."""
     body: Body
     suspension: Suspension | None = None
     stand: Stand | None = None
@@ -168,6 +170,8 @@ def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
             yield "stand", "only without [suspension]: a robot hangs or stands"
         if robot.ramp_s is not None:
             yield "ramp_s", "only without [suspension], whose period it is"
+        if robot.keeps_attitude_in_ramp:
+            yield "keeps_attitude_in_ramp", "only without [suspension], which keeps it"
         return
     if robot.stand is None:
         yield "stand", "[stand], or [suspension] for a robot that hangs"

@@ -41,6 +41,8 @@ STATUS_EVERY = 4
 LATENESS_EVERY = 400
 """Ticks: every 2 s."""
 
+UPRIGHT = "This robot flies, but does not keep its attitude by itself (keeps_attitude_in_ramp)."
+
 
 @dataclass(frozen=True, slots=True)
 class ControlOptions:
@@ -112,6 +114,12 @@ def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate
     return partial(guard.refusal, gains, config.estimator)
 
 
+def never_upright(robot_file: RobotFile) -> str:
+    """Why never to arm a robot that would turn over when this process dies, or ""."""
+    falls = robot_file.robot.weight_to_carry > 0.0 and not robot_file.keeps_attitude_in_ramp
+    return UPRIGHT if falls else ""
+
+
 def _key() -> bytes:
     try:
         return take_key(os.environ)
@@ -131,7 +139,7 @@ def run(options: ControlOptions) -> None:
     controller = Controller(
         robot_file.robot,
         config,
-        f"No real robot with {granted}." if late else "",
+        f"No real robot with {granted}." if late else never_upright(robot_file),
         too_late(robot_file, options.gains, config),
     )
     epoch = next_epoch(options.epochs, unix_ms())

@@ -1,7 +1,7 @@
 /* A whole robot around the watchdog, on Linux: 200 Hz, UDP, but no thrusters and no sensors.
  * Put yours where it says YOURS.
  *
- *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c hmac.c
+ *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c attitude.c hmac.c -lm
  *   ./robot KEY_FILE PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS
  *
  * KEY_FILE is what `lightleash robot key` has made; on a microcontroller the key is in flash.
@@ -142,8 +142,9 @@ int main(int argc, char **argv)
         fprintf(stderr, "%s: no key there, or others may read it: lightleash robot key\n", argv[1]);
         return 2;
     }
+    /* YOURS if it flies: in place of NULL the numbers of hardware/attitude_keeper.py */
     ll_limits limits = {(uint8_t)atoi(argv[3]), atof(argv[4]), atof(argv[5]),
-                        1000 * (int64_t)atoi(argv[6])};
+                        1000 * (int64_t)atoi(argv[6]), NULL};
     struct sockaddr_in own = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(argv[2]))};
     own.sin_addr.s_addr = htonl(INADDR_ANY);
     int fd = socket(AF_INET, SOCK_DGRAM, 0);

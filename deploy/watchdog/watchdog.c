@@ -4,6 +4,7 @@
 #include <string.h>
 
 #define ROUNDING (1.0 + 1e-6) /* thrusts travel as 32-bit floats */
+#define MAX_SAMPLE_S 0.05 /* more between two samples is a hole, not a motion */
 #define COMMAND_BYTES (36u + LL_MAC_BYTES) /* without thrusts */
 
 typedef struct {
@@ -87,40 +88,100 @@ static bool decode(const ll_watchdog *w, const uint8_t *data, size_t size, comma
     return true;
 }
 
+static bool gives(const ll_watchdog *w)
+{
+    for (int i = 0; i < w->limits.thrusters; i++)
+        if (w->base[i] != 0.0)
+            return true;
+    return false;
+}
+
+/* What to give now: faded, and upright if the robot flies. */
+static void given(const ll_watchdog *w, int64_t now_us, double *thrusts)
+{
+    memcpy(thrusts, w->base, sizeof w->base);
+    if (!w->fading)
+        return;
+    double elapsed_us = now_us > w->fading_us ? (double)(now_us - w->fading_us) : 0.0;
+    double share = fmax(0.0, 1.0 - elapsed_us / (double)w->limits.ramp_us);
+    for (int i = 0; i < w->limits.thrusters; i++)
+        thrusts[i] *= share;
+    if (w->limits.attitude)
+        ll_attitude_thrusts(&w->attitude, w->limits.attitude, w->limits.thrusters,
+                            w->limits.f_max, thrusts);
+}
+
+static void fade(ll_watchdog *w, int64_t since_us)
+{
+    if (!w->fading)
+        w->fading_us = since_us;
+    w->fading = true;
+}
+
+/* Give what is commanded; after a silence, go there by steps of the rise allowed. */
+static void follow(ll_watchdog *w, const command *c, int64_t now_us)
+{
+    if (w->fading) {
+        given(w, now_us, w->base);
+        w->catching_up = true;
+        w->fading = false;
+    }
+    bool there = true;
+    for (int i = 0; i < c->thrusters; i++) {
+        double thrust = c->thrusts[i], near = w->limits.max_rise;
+        if (w->catching_up && !c->zero)
+            thrust = fmin(fmax(thrust, w->base[i] - near), w->base[i] + near);
+        there = there && thrust == c->thrusts[i];
+        w->base[i] = thrust;
+        w->commanded[i] = c->thrusts[i];
+    }
+    w->catching_up = w->catching_up && !there;
+}
+
+static void to_zero(ll_watchdog *w)
+{
+    memset(w->base, 0, sizeof w->base);
+    memset(w->commanded, 0, sizeof w->commanded);
+    w->fading = w->catching_up = false;
+}
+
 static void refuse(ll_watchdog *w, uint64_t candidate)
 {
     w->state = LL_REFUSING;
     w->refusal = LL_SILENT;
     w->candidate = candidate;
-    memset(w->thrusts, 0, sizeof w->thrusts);
+    to_zero(w);
 }
 
 /* Ramp down; at once if there is no thrust. */
 static void leave(ll_watchdog *w, int64_t now_us)
 {
-    if (!any(w->thrusts, w->limits.thrusters)) {
+    if (!gives(w)) {
         refuse(w, 0);
         return;
     }
     w->state = LL_RAMP;
     w->refusal = LL_SILENT;
-    w->ramp_us = now_us;
+    fade(w, now_us);
 }
 
 /* Let time do its work: silence, ramp, abandoned handshakes. */
 static void advance(ll_watchdog *w, int64_t now_us)
 {
-    bool silent = now_us - w->taken_us > LL_SILENCE_US;
-    if (w->state == LL_RAMP || w->state == LL_REFUSING) {
-        if (w->candidate && silent) {
-            w->candidate = 0;
-            w->refusal = LL_SILENT;
-        }
-        if (w->state == LL_RAMP && now_us - w->ramp_us >= w->limits.ramp_us)
-            refuse(w, w->candidate);
-    } else if (silent) {
-        leave(w, now_us);
+    int64_t silence_us = now_us - w->taken_us;
+    if (w->candidate && now_us - w->shaken_us > LL_SILENCE_US) {
+        w->candidate = 0;
+        w->refusal = LL_SILENT;
     }
+    if ((w->state == LL_IDLE || w->state == LL_RUNNING) && silence_us > LL_SILENCE_US) {
+        w->state = LL_COAST;
+        w->refusal = LL_SILENT;
+        fade(w, w->taken_us + LL_SILENCE_US);
+    }
+    if (w->state == LL_COAST && silence_us > LL_RAMP_AFTER_US)
+        leave(w, now_us);
+    if (w->state == LL_RAMP && now_us - w->fading_us >= w->limits.ramp_us)
+        refuse(w, w->candidate);
 }
 
 /* Whether nothing newer was heard before; if so, remember it, and echo its challenge. */
@@ -143,7 +204,7 @@ static ll_refusal judge_nonce(const ll_watchdog *w, const command *c, int64_t no
     return LL_NONCE;
 }
 
-static ll_refusal judge_thrusts(const ll_watchdog *w, const command *c)
+static ll_refusal judge_thrusts(const ll_watchdog *w, const command *c, int64_t now_us)
 {
     bool refusing = w->state == LL_REFUSING, rises = false, beyond = false;
     bool shaking = w->candidate != 0 && c->epoch == w->candidate;
@@ -155,13 +216,14 @@ static ll_refusal judge_thrusts(const ll_watchdog *w, const command *c)
     if (!is_later(c->counter, before) || (!c->zero && ahead > LL_MAX_JUMP))
         return LL_COUNTER;
     for (int i = 0; i < c->thrusters; i++) {
-        double thrust = c->thrusts[i], allowed = w->thrusts[i] + ahead * w->limits.max_rise;
+        double thrust = c->thrusts[i], allowed = w->commanded[i] + ahead * w->limits.max_rise;
         beyond = beyond || thrust < 0.0 || thrust > w->limits.f_max * ROUNDING;
         rises = rises || thrust > allowed * ROUNDING;
     }
     if (beyond || (!c->zero && (c->stop || !c->armed)))
         return LL_LIMITS;
-    if (!c->zero && w->state == LL_RAMP)
+    bool back = !w->replaced && now_us - w->taken_us <= LL_BACK_UNTIL_US;
+    if (!c->zero && w->state == LL_RAMP && !back)
         return LL_SILENT;
     return rises ? LL_RISE : LL_NONE;
 }
@@ -178,12 +240,13 @@ static ll_refusal judge(const ll_watchdog *w, const command *c, int64_t now_us)
             return LL_NOT_FINITE;
     if (c->zero && c->epoch > w->epoch && c->epoch > w->candidate)
         return LL_NONE; /* newer than who flies and who is in his handshake */
-    return judge_thrusts(w, c);
+    return judge_thrusts(w, c, now_us);
 }
 
 /* Zero of a later epoch: it gets the robot when thrust is zero and time enough is over. */
 static void shake_hands(ll_watchdog *w, const command *c, int64_t now_us)
 {
+    w->replaced = true;
     if (w->state != LL_RAMP && w->state != LL_REFUSING)
         leave(w, now_us);
     if (c->stop)
@@ -193,6 +256,7 @@ static void shake_hands(ll_watchdog *w, const command *c, int64_t now_us)
         w->handshake_us = now_us;
     }
     w->candidate_counter = c->counter;
+    w->shaken_us = now_us;
     w->refusal = LL_HANDSHAKE;
     if (w->state == LL_REFUSING && now_us - w->handshake_us >= LL_HANDSHAKE_US) {
         w->epoch = c->epoch;
@@ -200,22 +264,24 @@ static void shake_hands(ll_watchdog *w, const command *c, int64_t now_us)
         w->candidate = 0;
         w->state = LL_IDLE;
         w->refusal = LL_NONE;
+        w->taken_us = now_us;
+        w->replaced = false;
     }
 }
 
 static void take(ll_watchdog *w, const command *c, int64_t now_us)
 {
-    w->taken_us = now_us;
     if (c->epoch != w->epoch) {
         shake_hands(w, c, now_us);
         return;
     }
+    w->taken_us = now_us;
     w->counter = c->counter;
-    if (w->state == LL_RAMP) {
+    if (w->state == LL_RAMP && c->zero) {
         refuse(w, w->candidate);
         return;
     }
-    memcpy(w->thrusts, c->thrusts, c->thrusters * sizeof *c->thrusts);
+    follow(w, c, now_us);
     w->state = c->zero ? LL_IDLE : LL_RUNNING;
     w->refusal = LL_NONE;
 }
@@ -237,8 +303,9 @@ static void obey_zero(ll_watchdog *w, const command *c, bool newest)
         refuse(w, w->candidate);
         return;
     }
-    memset(w->thrusts, 0, sizeof w->thrusts);
-    w->state = LL_IDLE;
+    to_zero(w);
+    if (w->state == LL_RUNNING)
+        w->state = LL_IDLE;
 }
 
 void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
@@ -250,6 +317,7 @@ void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
     w->state = LL_REFUSING;
     w->refusal = LL_STARTED;
     ll_hmac_init(&w->hmac, key, LL_KEY_BYTES);
+    ll_attitude_init(&w->attitude);
 }
 
 ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us,
@@ -276,12 +344,11 @@ ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t 
 
 void ll_setpoint(ll_watchdog *w, int64_t now_us, float *thrusts)
 {
+    double now[LL_MAX_THRUSTERS];
     advance(w, now_us);
-    float share = 1.0f;
-    if (w->state == LL_RAMP && now_us > w->ramp_us)
-        share = (float)(1.0 - (double)(now_us - w->ramp_us) / (double)w->limits.ramp_us);
+    given(w, now_us, now);
     for (int i = 0; i < w->limits.thrusters; i++)
-        thrusts[i] = share * w->thrusts[i];
+        thrusts[i] = (float)now[i];
 }
 
 size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyro[3],
@@ -290,6 +357,10 @@ size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyr
     size_t n = w->limits.thrusters, size = 76 + 4 * n;
     uint8_t digest[LL_DIGEST_BYTES];
     advance(w, now_us);
+    if (w->limits.attitude)
+        ll_attitude_feel(&w->attitude, gyro, accelerometer,
+                         fmin(MAX_SAMPLE_S, 1e-6 * (double)(now_us - w->sampled_us)), !gives(w));
+    w->sampled_us = now_us;
     w->samples++;
     w->nonces[w->samples % LL_NONCES].nonce = nonce;
     w->nonces[w->samples % LL_NONCES].sent_us = now_us;

@@ -8,17 +8,19 @@
 #ifndef LIGHTLEASH_WATCHDOG_H
 #define LIGHTLEASH_WATCHDOG_H
 
+#include "attitude.h"
 #include "hmac.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-#define LL_MAX_THRUSTERS 16
 #define LL_MAX_BYTES (92 + 4 * LL_MAX_THRUSTERS)
 #define LL_NONCES 32
 
 #define LL_SILENCE_US 60000
+#define LL_RAMP_AFTER_US 280000
+#define LL_BACK_UNTIL_US 400000
 #define LL_MAX_AGE_US 40000
 #define LL_HANDSHAKE_US 500000
 #define LL_MAX_JUMP 200u
@@ -35,6 +37,7 @@ typedef struct {
     double f_max;      /* [N] */
     double max_rise;   /* per command [N] */
     int64_t ramp_us;   /* one period of the suspension */
+    const ll_attitude_gains *attitude; /* of a robot that flies; else NULL */
 } ll_limits;
 
 typedef struct {
@@ -46,9 +49,13 @@ typedef struct {
     uint64_t epoch;     /* followed now or last, 0 none */
     uint64_t candidate; /* epoch in its handshake, 0 none */
     uint32_t counter, candidate_counter; /* of the newest command taken of either */
-    int64_t taken_us;   /* when the newest was */
-    int64_t ramp_us, handshake_us; /* when they began */
-    float thrusts[LL_MAX_THRUSTERS];
+    bool replaced;      /* a later epoch was taken: the one followed has no way back */
+    int64_t taken_us, shaken_us; /* when that was */
+    int64_t handshake_us, fading_us; /* when they began */
+    bool fading, catching_up;
+    double commanded[LL_MAX_THRUSTERS], base[LL_MAX_THRUSTERS]; /* last command; given, unfaded */
+    ll_attitude attitude;
+    int64_t sampled_us;
     struct { uint64_t nonce; int64_t sent_us; } nonces[LL_NONCES];
     uint32_t samples;
     uint64_t newest_epoch, challenge; /* of the newest command heard, taken or not */

@@ -8,12 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from hardware.datagram import U64, triple
-from hardware.follower import FollowerState
 from hardware.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.robot_file import RobotFile
-from hardware.sim.leveller import Leveller
 from hardware.sim.plant import Plant, PlantOptions
-from pipeline.config import HoldConfig
 from pipeline.frames import Array
 
 TICK_US = 5_000
@@ -49,8 +46,6 @@ class SimulatedRobot:
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
         self._nonces, self._boot_id = nonces, boot_id
         self._setpoint = np.zeros(robot.A.shape[1])
-        self._leveller = Leveller(robot, HoldConfig()) if robot.weight_to_carry > 0.0 else None
-        self._omega_in_b = np.zeros(3)
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
         """A datagram has come from `peer`."""
@@ -59,18 +54,9 @@ class SimulatedRobot:
     def tick(self, now_us: int) -> bytes:
         """Move on to `now_us`, one tick after the last; gives the sample to be sent."""
         self.plant.step(self._setpoint, 1e-6 * TICK_US)
-        self._setpoint = self._levelled(self.end.setpoint(now_us))
+        self._setpoint = self.end.setpoint(now_us)
         self.history.append((now_us, self.plant.wxyz_fb, self.plant.p_bf_in_f))
         return self._sample(now_us, self.plant.thrusts)
-
-    def _levelled(self, setpoint: Array) -> Array:
-        """What the link's end wants; while it ramps, what a flight controller makes of it."""
-        if self._leveller is None:
-            return setpoint
-        if self.end.state != FollowerState.RAMP:
-            self._leveller.start()
-            return setpoint
-        return self._leveller.thrusts(setpoint, self._omega_in_b, 1e-6 * TICK_US)
 
     def restart(self, robot_file: RobotFile, key: bytes) -> None:
         """Start anew, refusing thrust; the body goes on as it was."""
@@ -85,5 +71,4 @@ class SimulatedRobot:
 
     def _sample(self, now_us: int, thrusts: Array) -> bytes:
         omega, a = self.plant.imu()
-        self._omega_in_b = omega
         return self.end.sample(now_us, self._nonces(), triple(omega), triple(a), thrusts)

@@ -20,9 +20,11 @@ def program(tmp_path_factory):
     if shutil.which("gcc") is None:
         pytest.skip("NO COMPILER, not tested: gcc is not installed")
     path = tmp_path_factory.mktemp("watchdog") / "robot"
-    sources = [str(SOURCE / name) for name in ("robot_main.c", "watchdog.c", "hmac.c")]
+    sources = [
+        str(SOURCE / name) for name in ("robot_main.c", "watchdog.c", "attitude.c", "hmac.c")
+    ]
     subprocess.run(
-        ("gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(path), *sources), check=True
+        ("gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(path), *sources, "-lm"), check=True
     )
     return str(path)
 

@@ -83,7 +83,7 @@ class FollowerContract:
     def test_silence_ramps_to_zero_then_refuses_until_a_new_handshake(self, rig: Rig) -> None:
         self.ready(rig)
         self.fly(rig, 2.0, 0.2)
-        rig.advance(0.100)
+        rig.advance(0.450)
         ramp = self.fly(rig, 2.0, 0.3)
         assert ramp[-1].state == FollowerState.RAMP
         assert 1.0 < ramp[-1].thrusts.max() < 2.0
@@ -92,10 +92,19 @@ class FollowerContract:
         assert refused[-1].thrusts.max() < 1e-2
         self.ready(rig)
 
+    def test_a_silence_of_a_tenth_of_a_second_is_coasted_through(self, rig: Rig) -> None:
+        self.ready(rig)
+        self.fly(rig, 2.0, 0.2)
+        rig.advance(0.100)
+        samples = self.fly(rig, 2.0, 0.3)
+        assert FollowerState.COAST in {s.state for s in samples}
+        assert samples[-1].state == FollowerState.RUNNING
+        assert min(s.thrusts.min() for s in samples) > 1.8
+
     def test_a_command_made_of_old_samples_is_not_taken(self, rig: Rig) -> None:
         self.ready(rig)
         self.fly(rig, 1.0, 0.2)
-        for _ in range(30):
+        for _ in range(80):
             rig.follower.send(ThrustCommand(np.full(rig.follower.thrusters, 1.0), armed=True))
             rig.advance(0.005)
         assert rig.follower.receive()[-1].state == FollowerState.RAMP

@@ -69,7 +69,7 @@ def test_a_new_epoch_begins_by_itself_only_when_nothing_is_meant():
 def test_a_link_that_comes_back_during_the_ramp_does_not_stop_it():
     _, follower = flight(1)
     follower.connected = False
-    follower.advance(0.2)
+    follower.advance(0.5)
     follower.connected = True
     exchange(follower, ThrustCommand(np.full(8, 0.9), armed=True))
     states, largest = [], []

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hardware.robot_end import LinkLimits
-from hardware.robot_file import ROBOTS, RobotFileError, load_robot
+from hardware.robot_file import ROBOTS, RobotFileError, load_robot, robot_of, robot_table
 from hardware.robot_physics import positive_null_vector
 from pipeline import gains as sets
 from pipeline.frames import GRAVITY
@@ -260,3 +260,11 @@ def test_all_robots_in_the_folder_load():
         assert robot_file.robot.name == path.stem
         assert robot_file.robot.hangs == (robot_file.plant.suspension is not None)
         assert robot_file.robot.hangs != (robot_file.plant.stand is not None)
+
+
+def test_only_a_robot_that_does_not_hang_says_that_it_keeps_its_attitude():
+    assert load_robot("quadrotor").keeps_attitude_in_ramp
+    assert not load_robot("ames").keeps_attitude_in_ramp
+    table = robot_table(ROBOTS / "ames.toml") | {"keeps_attitude_in_ramp": True}
+    with pytest.raises(RobotFileError, match="keeps_attitude_in_ramp"):
+        robot_of(table, "x.toml")

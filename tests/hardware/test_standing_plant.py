@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from hardware.attitude_keeper import AttitudeGains, AttitudeKeeper
 from hardware.robot_file import load_robot
-from hardware.sim.leveller import Leveller
 from hardware.sim.plant import Plant, PlantOptions
 from pipeline.config import HoldConfig
 from pipeline.frames import GRAVITY, R_from_rpy, rpy_from_R
@@ -53,17 +53,17 @@ def test_standing_the_accelerometer_reads_gravity_upwards_from_the_first_moment(
         plant.step(np.zeros_like(plant.thrusts))
 
 
-def test_its_own_flight_controller_brings_a_flying_robot_down_as_it_was_in_silence():
+def test_its_own_flight_controller_brings_a_flying_robot_down_upright_in_silence():
     robot, plant = QUADROTOR.robot, make(QUADROTOR)
     hover = np.full(4, robot.weight_to_carry / 4.0)
     plant.reset(np.array([0.0, 0.0, 0.8]), R_from_rpy(np.array([0.05, 0.0, 0.0])))
     run(plant, hover + np.array([0.02, -0.02, 0.03, -0.01]), 0.2)  # it has begun to turn
-    leveller, thrusts = Leveller(robot, HoldConfig()), hover
-    leveller.start()
+    keeper, thrusts = AttitudeKeeper(AttitudeGains.of(robot, HoldConfig())), hover
     lift = []
     for k in range(400):
         falling = hover * (1.0 - 0.005 * k / robot.ramp_s)
-        thrusts = leveller.thrusts(falling, plant.imu()[0], 0.005)
+        keeper.feel(*plant.imu(), 0.005, at_rest=False)
+        thrusts = keeper.thrusts(falling)
         lift.append(thrusts.sum() - falling.sum())
         plant.step(thrusts)
         assert plant.R_fb[2, 2] > np.cos(np.deg2rad(12.0))

@@ -15,13 +15,31 @@ from hardware.datagram import Command, encode_command
 from hardware.follower import FollowerState, Refusal
 from hardware.link_key import mac
 from hardware.robot_end import LinkLimits, RobotEnd
+from hardware.robot_file import load_robot
 
 SOURCE = Path(__file__).parents[2] / "deploy" / "watchdog"
 KEY = bytes(range(16))
 VECTORS = json.loads((Path(__file__).parents[1] / "data" / "link_vectors.json").read_text())
+IDLE, RUNNING, RAMP, _, COAST = FollowerState
 LIMITS = LinkLimits(thrusters=3, f_max=3.0, max_rise=1.0, ramp_us=700_000)
-NAMES = ("watchdog.c", "hmac.c")
+NAMES = ("watchdog.c", "attitude.c", "hmac.c")
 GCC = ("gcc", "-std=c99", "-pedantic", "-O2", "-Wall", "-Wextra", "-Werror", "-Wconversion")
+
+
+class CGains(ctypes.Structure):
+    _fields_ = (
+        ("lift_row", ctypes.c_double * 16),
+        ("lift_column", ctypes.c_double * 16),
+        ("gain", ctypes.c_double * 6 * 16),
+    )
+
+    @classmethod
+    def of(cls, gains):
+        c = cls()
+        for i in range(len(gains.lift_row)):
+            c.lift_row[i], c.lift_column[i] = gains.lift_row[i], gains.lift_column[i]
+            c.gain[i][:] = gains.gain[i]
+        return c
 
 
 class CLimits(ctypes.Structure):
@@ -30,6 +48,7 @@ class CLimits(ctypes.Structure):
         ("f_max", ctypes.c_double),
         ("max_rise", ctypes.c_double),
         ("ramp_us", ctypes.c_int64),
+        ("attitude", ctypes.POINTER(CGains)),
     )
 
 
@@ -41,6 +60,9 @@ class CRobotEnd:
         self.memory = ctypes.create_string_buffer(4096)
         self.thrusters = limits.thrusters
         c_limits = CLimits(limits.thrusters, limits.f_max, limits.max_rise, limits.ramp_us)
+        if limits.attitude is not None:
+            self.gains = CGains.of(limits.attitude)
+            c_limits.attitude = ctypes.pointer(self.gains)
         library.ll_init(self.memory, ctypes.byref(c_limits), ctypes.c_uint32(boot_id), key)
         self.answers = False
 
@@ -85,7 +107,8 @@ def library(tmp_path_factory):
 class Traffic:
     """Control processes that mostly behave, drawn from a seed."""
 
-    def __init__(self, seed):
+    def __init__(self, seed, thrusters):
+        self.thrusters = thrusters
         self.random = random.Random(seed)
         self.epoch = self.random.choice((1, 2**40, 2**63))
         self.counter = self.random.choice((0, 2**32 - 100))
@@ -97,7 +120,7 @@ class Traffic:
     def step_us(self):
         if self.often(0.985):
             return 5000
-        return self.random.choice((0, 1, 39_999, 41_000, 60_000, 60_001, 300_000, 1_500_000))
+        return self.random.choice(HOLES_US)
 
     def datagram(self, state, nonce):
         rnd = self.random
@@ -109,7 +132,7 @@ class Traffic:
             self.counter + (1 if self.often(0.98) else rnd.choice((0, 2, 200, 201, -3)))
         ) % 2**32
         thrusting = state != FollowerState.REFUSING and self.often(0.98)
-        thrusts = [rnd.uniform(0.0, 1.9) if thrusting else 0.0] * 3
+        thrusts = [rnd.uniform(0.0, 1.9) if thrusting else 0.0] * self.thrusters
         if self.often(0.01):
             thrusts[1] = rnd.choice((float("nan"), float("inf"), -1.0, 3.5, 3.0, -0.0))
         command = Command(
@@ -126,17 +149,24 @@ class Traffic:
         return self.sent[-1]
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, seed):
-    traffic = Traffic(seed)
-    python, c = RobotEnd(LIMITS, 77, KEY), CRobotEnd(library, LIMITS, 77)
-    now_us, states, answers, peers = 10_000_000, set(), set(), set()
+HOLES_US = (*range(0, 450_000, 50_000), 1, 39_999, 41_000, 60_001, 1_500_000)
+PERIODS = np.array([40.0, 50.0, 60.0])
+QUADROTOR = load_robot("quadrotor")
+HANGS, FLIES = LIMITS, LinkLimits.of(QUADROTOR)
+
+
+def hold_against_each_other(library, seed, limits, seen):
+    """The same traffic for both; adds to `seen` what happened."""
+    traffic = Traffic(seed, limits.thrusters)
+    python, c = RobotEnd(limits, 77, KEY), CRobotEnd(library, limits, 77)
+    now_us = 10_000_000
     for nonce in range(1, 2500):
         now_us += traffic.step_us()
-        values = ((0.1, -0.2, nonce), (1.0, 2.0, 9.8), np.full(3, 0.5))
+        omega = tuple(float(v) for v in np.float32(0.3 * np.sin(nonce / PERIODS)))
+        values = (omega, (0.5, 1.5, 9.75), np.full(limits.thrusters, 0.5))
         a = python.sample(now_us, nonce, *values)
         assert a == c.sample(now_us, nonce, *values)
-        data = traffic.datagram(python.state, nonce)
+        before, data = python.state, traffic.datagram(python.state, nonce)
         now_us += traffic.random.choice((0, 0, 3000))
         peer = ("", nonce)
         why = python.receive(data, peer, now_us)
@@ -144,12 +174,21 @@ def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, seed):
         assert (python._asking == peer) == c.answers
         assert (python._peer == peer) == (why == Refusal.NONE)
         np.testing.assert_allclose(python.setpoint(now_us), c.setpoint(now_us), atol=1e-6)
-        states.add(python.state)
-        answers.add(why)
-        peers.add((why == Refusal.NONE, c.answers))
-    assert states == {*FollowerState} - {FollowerState.COAST}
-    assert len(answers) >= 9
-    assert len(peers) >= 3
+        seen |= {python.state, ("answer", why), (before, python.state)}
+        seen.add((why == Refusal.NONE, c.answers))
+
+
+@pytest.mark.parametrize("limits", [HANGS, FLIES], ids=["hangs", "flies"])
+def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, limits):
+    seen = set()
+    for seed in range(6):
+        hold_against_each_other(library, seed, limits, seen)
+    assert seen >= {*FollowerState}
+    assert seen >= {(state, FollowerState.RUNNING) for state in (COAST, RAMP, RUNNING, IDLE)}
+    assert seen >= {(taken, answered) for taken in (True, False) for answered in (True, False)}
+    others = {Refusal.NONE, Refusal.STARTED, Refusal.HANDSHAKE}
+    others |= {Refusal.RISE} if limits is FLIES else set()  # from 0 to full in two commands
+    assert seen >= {("answer", why) for why in Refusal if why not in others}
 
 
 @pytest.mark.parametrize("kind", ["sha256", "hmac_sha256"])

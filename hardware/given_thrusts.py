@@ -1,0 +1,62 @@
+"""What a robot's thrusters are given: what was commanded, less of it in silence, without a step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hardware.attitude_keeper import AttitudeKeeper
+from pipeline.frames import Array
+
+
+class GivenThrusts:
+    """Thrusts (m,) [N] of a robot, in and after a silence. Times are [µs]."""
+
+    def __init__(
+        self, thrusters: int, max_rise: float, ramp_us: int, keeper: AttitudeKeeper | None
+    ) -> None:
+        """Zero. `keeper`: of a robot that flies."""
+        self.commanded = np.zeros(thrusters)
+        """By the last command."""
+        self._base = np.zeros(thrusters)
+        self._max_rise, self._ramp_us, self._keeper = max_rise, ramp_us, keeper
+        self._fading_since_us: int | None = None
+        self._catching_up = False
+
+    def __bool__(self) -> bool:
+        """Whether there is any thrust."""
+        return bool(self._base.any())
+
+    def at(self, now_us: int) -> Array:
+        """What to give now."""
+        if self._fading_since_us is None:
+            return self._base.copy()
+        elapsed_us = max(0, now_us - self._fading_since_us)
+        faded = self._base * max(0.0, 1.0 - elapsed_us / self._ramp_us)
+        return faded if self._keeper is None else self._keeper.thrusts(faded)
+
+    def fade(self, since_us: int) -> None:
+        """Fall linearly to zero within the ramp's time, a robot that flies upright."""
+        if self._fading_since_us is None:
+            self._fading_since_us = since_us
+
+    def has_faded(self, now_us: int) -> bool:
+        """Whether the ramp is over."""
+        since_us = self._fading_since_us
+        return since_us is not None and now_us - since_us >= self._ramp_us
+
+    def follow(self, thrusts: Array, now_us: int) -> None:
+        """Give what is commanded; after a silence, go there by steps of the rise allowed."""
+        if self._fading_since_us is not None:
+            self._base, self._catching_up = self.at(now_us), True
+            self._fading_since_us = None
+        near = self._base - self._max_rise, self._base + self._max_rise
+        self._catching_up = self._catching_up and bool(thrusts.any())
+        self._base = np.clip(thrusts, *near) if self._catching_up else thrusts.copy()
+        self._catching_up = self._catching_up and bool((self._base != thrusts).any())
+        self.commanded = thrusts
+
+    def zero(self) -> None:
+        """Nothing, at once."""
+        self.commanded = np.zeros_like(self.commanded)
+        self._base = np.zeros_like(self._base)
+        self._fading_since_us, self._catching_up = None, False
