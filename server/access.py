@@ -77,7 +77,7 @@ def running_server(directory: Path | None = None) -> Access:
 def add_access_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that say where the server is."""
     parser.add_argument("--url", help="of the server; default: the one running here")
-    parser.add_argument("--token", help="of an operator; goes with --url")
+    parser.add_argument("--token", help="operator_token of that server's run file; goes with --url")
     parser.add_argument("--ca", type=Path, help="certificate of the server's own authority (PEM)")
 
 

@@ -85,7 +85,12 @@ class Api:
         self._hub.wish(stop, request.scope["member"])
         return JSONResponse({"stopping": True}, 202)
 
+    def _note(self, what: str, request: Request) -> None:
+        begins = request.method == "POST"
+        self._hub.people.note(what, request.scope["member"], "start" if begins else "stop")
+
     async def _virtual_phone(self, request: Request) -> Response:
+        self._note("virtual phone", request)
         if request.method == "POST":
             self.phone.start()
         else:
@@ -93,6 +98,7 @@ class Api:
         return JSONResponse({"running": self.phone.running}, 202)
 
     async def _recording(self, request: Request) -> Response:
+        self._note("recording", request)
         recordings = self._hub.recordings
         if request.method == "DELETE":
             path = recordings.stop()

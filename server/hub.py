@@ -118,7 +118,8 @@ class Hub:
         """A person's wish, already checked for its role."""
         if command.what == "key_frame":
             return
-        self.people.note(command.what, who)
+        lacks = self.status.refusals if command.what == "arm" and self.status is not None else ()
+        self.people.note(command.what, who, f"refused: {'; '.join(lacks)}"[:300] if lacks else "")
         self.say(f"{who.name}: {command.what}")
         self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
 

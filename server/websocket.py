@@ -208,12 +208,15 @@ class PageServer:
             elif isinstance(said, Calibrate) and phone is not None:
                 self._hub.calibrate(said)
             elif isinstance(said, Tune):
+                self._hub.people.note("tune", member)
                 self._hub.tune(said)
             elif isinstance(said, PathChoice):
                 self._choose(said, phone)
             elif isinstance(said, Log):
                 self._hub.say(f"page: {said.text}")
         except WireError as error:
+            if error.code in ("role", "age"):
+                self._hub.people.note("refusal", member, str(error))
             page.refuse(error, fatal=session.hopeless)
 
     def _choose(self, choice: PathChoice, phone: OperatorPhone | None) -> None:

@@ -252,6 +252,34 @@ def test_nobody_gives_away_what_he_has_not_or_to_whom_he_may_not(house):
     play(house, scene)
 
 
+def test_what_somebody_tried_without_the_right_is_written_down_with_his_name(house, tmp_path):
+    async def scene():
+        async with Browser(house, "viewer", "Vera").watching() as page:
+            await page.say(type="command", what="arm")
+            await page.until("refused")
+
+    play(house, scene)
+    house.doors.audit.close()
+    logged = [json.loads(line) for line in (tmp_path / AUDIT_FILE).read_text().splitlines()]
+    (refused,) = [one for one in logged if one["what"] == "refusal"]
+    assert (refused["who"], refused["role"], refused["address"]) == ("Vera", "viewer", HOST)
+    assert "supervisor" in refused["why"]
+
+
+def test_arming_that_can_not_be_granted_is_written_down_with_what_lacks(house, tmp_path):
+    async def scene():
+        async with Browser(house, "operator", "Anna").leading() as page:
+            house.hub.status = control_status(refusals=["The robot is not seen."])
+            await page.say(type="command", what="arm")
+            await house.control_hears(is_request("arm"))
+
+    play(house, scene)
+    house.doors.audit.close()
+    logged = [json.loads(line) for line in (tmp_path / AUDIT_FILE).read_text().splitlines()]
+    (armed,) = [one for one in logged if one["what"] == "arm"]
+    assert armed["why"] == "refused: The robot is not seen."
+
+
 def test_deeds_are_in_the_audit_log_and_in_the_running_recording(house, tmp_path):
     async def scene():
         house.hub.start_recording()
