@@ -168,6 +168,10 @@ def test_a_virtual_phone_leads_the_robot_by_either_path(
         assert isinstance(streams, dict)
         assert streams["phone_imu"]["rate_hz"] > 30.0
         assert streams["pose"]["rate_hz"] > 5.0
+        link = server.request("GET", "/api/link?seconds=4")
+        assert float(str(link["motion_hz"])) > 30.0
+        assert float(str(link["picture_hz"])) > 5.0
+        assert link["rtt_ms"] is not None
         phone.send_signal(signal.SIGINT)
         assert phone.stdout is not None
         summary = json.loads(phone.stdout.read().decode().splitlines()[-1])
