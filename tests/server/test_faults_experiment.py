@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 
 from server.control_link import OperatorInput, PhoneImuInput, ReadyInput, is_believable
 from server.experiments import main
-from server.experiments.faults import tampering
+from server.experiments.faults import hazards, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import goals
 from server.experiments.faults.fault import Fault, Outcome, misses
 from server.experiments.faults.measure import percentile, row_of
 from server.experiments.forked import ForkError, forked
 
+ROOT = Path(__file__).resolve().parents[2]
 DATAGRAMS = st.lists(st.binary(min_size=1, max_size=40), max_size=60)
 
 
@@ -154,3 +155,19 @@ def test_two_faults_are_flown_written_and_drawn(tmp_path: Path) -> None:
     assert all(row["zero"] < 0.25 and row["after_zero"] == 0 for row in told["rows"])
     assert np.isfinite([row["excursion_mm"] for row in told["rows"]]).all()
     assert (tmp_path / "faults.png").stat().st_size > 5_000
+
+
+def test_the_hazard_table_is_as_written_and_each_fault_has_a_hazard() -> None:
+    assert (ROOT / "docs" / "hazards.md").read_text(encoding="utf-8") == hazards.document()
+    numbers = [hazard.number for hazard in hazards.HAZARDS]
+    assert len(set(numbers)) == len(numbers)
+    assert {fault.hazard for fault in FAULTS if fault.hazard != "–"} <= set(numbers)
+
+
+@pytest.mark.parametrize("hazard", hazards.HAZARDS, ids=lambda hazard: hazard.number)
+def test_each_hazard_is_shown_by_a_fault_or_by_a_test_that_exists(hazard: hazards.Hazard) -> None:
+    assert hazard.tests or any(fault.hazard == hazard.number for fault in FAULTS)
+    for test in hazard.tests:
+        path, _, name = test.partition("::")
+        source = (ROOT / "tests" / path).read_text(encoding="utf-8")
+        assert f"def {name}(" in source if name else "def test_" in source
