@@ -18,10 +18,11 @@ HEAD: Final = """\
 What may go wrong, who notices, what happens and by when.
 Written by `python -m server.experiments.faults.hazards`; do not edit.
 
-*Faults* are flown by `lightleash experiments faults` in virtual time, with the bounds in brackets, in
-seconds after the fault: COAST, HOLD, RAMP and STOPPED are modes of control, *robot* is what the robot
-does by itself, *zero* is no thrust. Every fault that ends a flight is asked for no sample with thrust
-after zero; every one for no more than 150 mm beyond where the flight led, and 30° of tilt.
+*Faults* are flown by `lightleash experiments faults` in virtual time, with the bounds in brackets,
+in seconds after the fault: COAST, HOLD, RAMP and STOPPED are modes of control, *robot* is what the
+robot does by itself, *zero* is no thrust. Every fault that ends a flight is asked for no sample
+with thrust after zero; every one for no more than 150 mm beyond where the flight led, and 30° of
+tilt.
 
 | # | hazard | noticed by | what happens | faults and tests |
 |---|---|---|---|---|
