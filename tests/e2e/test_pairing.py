@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import pty
+import re
+import select
 import signal
+import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -16,7 +21,7 @@ from playwright.sync_api import expect
 
 from server.runtime import RUN_FILE
 from tests.e2e.chromium_phone import browser
-from tests.e2e.serving import Serving, serving
+from tests.e2e.serving import START_S, Serving, serving
 from tests.e2e.test_serve import mode, processes, until
 
 pytestmark = pytest.mark.e2e
@@ -139,3 +144,40 @@ def test_no_secret_is_in_anything_that_was_written(server: Serving, tmp_path: Pa
         if one.encode("latin-1") in path.read_bytes()
     }
     assert found == set()
+
+
+def test_a_terminal_is_shown_links_that_open_once_and_the_log_beside_it_is_not(
+    tmp_path: Path,
+) -> None:
+    for name in ("run", "state"):
+        (tmp_path / name).mkdir(mode=0o700)
+    places = {"XDG_RUNTIME_DIR": str(tmp_path / "run"), "XDG_STATE_HOME": str(tmp_path / "state")}
+    terminal, inside = pty.openpty()
+    command = [sys.executable, "-m", "server", "serve", "--https-port", "0", "--http-port", "0"]
+    log = (tmp_path / "log").open("wb")
+    environment = {**os.environ, **places, "COLUMNS": "100"}
+    process = subprocess.Popen(command, env=environment, stdout=inside, stderr=log)
+    try:
+        shown, end = "", time.monotonic() + START_S
+        while "Ctrl-C" not in shown and time.monotonic() < end:
+            if select.select([terminal], [], [], 1.0)[0]:
+                shown += os.read(terminal, 65_536).decode("utf-8", "replace")
+        found = re.search(r"Supervisor: +(http://127\.0\.0\.1:\d+)/supervisor#k=(\S+)", shown)
+        assert found is not None, shown + (tmp_path / "log").read_text()
+        url, key = found.groups()
+        headers = {"Origin": url, "X-Lightleash": "1"}
+        asked = json.dumps({"token": key}).encode()
+        request = urllib.request.Request(f"{url}/api/pair", asked, headers, method="POST")
+        with urllib.request.urlopen(request, timeout=5.0) as answer:
+            assert json.loads(answer.read())["role"] == "supervisor"
+        with pytest.raises(urllib.error.HTTPError, match="401"):
+            urllib.request.urlopen(request, timeout=5.0)
+        assert "█" in shown or "▀" in shown  # the code to scan
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(20.0)
+        log.close()
+        os.close(terminal)
+        os.close(inside)
+    assert key not in (tmp_path / "log").read_text()
+    assert "#k=" not in (tmp_path / "log").read_text()

@@ -183,6 +183,7 @@ def test_a_phone_that_waits_learns_its_code_and_reaches_nothing(quiet):
     assert (told["state"], told["name"]) == ("waiting", "Anna")
     assert re.fullmatch("[B-Z]{4}", told["code"])
     assert quiet.client.get("/api/whoami").json() == told
+    assert turned_away(quiet.client, "socket", "/ws/phone") == (403, "pairing")
     reached = {
         (method, path)
         for method, path in every_request(quiet)
