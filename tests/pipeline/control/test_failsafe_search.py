@@ -1,0 +1,238 @@
+"""The failsafe searched as a whole: all states that inputs at, below and above each limit lead to.
+
+Timers are quantised by the step, and the limits are short multiples of it, in the order of the
+shipped ones: what the machine compares, it compares here, too. A monitor beside it remembers what
+the laws speak of and the machine might not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import pytest
+
+from pipeline.config import FailsafeConfig
+from pipeline.control import failsafe
+from pipeline.control.failsafe import FLYING, FOREVER_MS, NO_REQUESTS, Failsafe, Inputs, Limits
+from pipeline.signals import Mode, Requests
+
+D = 10
+"""Step [ms]."""
+LIMITS = Limits(
+    silent=D,
+    fresh=2 * D,
+    coast=4 * D,
+    pose_arm=D,
+    pose_hold=2 * D,
+    robot_ramp=3 * D,
+    phone_ramp=3 * D,
+    pose_ramp=3 * D,
+    ramp=3 * D,
+    hold_max=6 * D,
+    recover=4 * D,
+    recover_short=3 * D,
+    short=2 * D,
+    armed_idle=7 * D,
+)
+HOVERS = replace(LIMITS, phone_ramp=FOREVER_MS)
+EDGES = {
+    *((mode, Mode.STOPPED) for mode in Mode if mode != Mode.STOPPED),
+    (Mode.STOPPED, Mode.DISARMED),
+    (Mode.DISARMED, Mode.ARMED),
+    (Mode.ARMED, Mode.TRACK),
+    (Mode.ARMED, Mode.DISARMED),
+    (Mode.TRACK, Mode.COAST),
+    (Mode.TRACK, Mode.HOLD),
+    (Mode.COAST, Mode.TRACK),
+    (Mode.COAST, Mode.HOLD),
+    (Mode.HOLD, Mode.TRACK),
+    *((mode, Mode.RAMP) for mode in FLYING),
+    (Mode.RAMP, Mode.DISARMED),
+}
+"""Those of the table in `failsafe`."""
+POWERED = (*FLYING, Mode.RAMP)
+LONGEST_MS = 14 * D
+
+
+def inputs() -> list[Inputs]:
+    """At, below and above each limit; two unusual things at once where both are of consequence."""
+    well = (0, 0, 0, 0)
+    silent, gone, robot = (D + 1, 0, 0, 0), (3 * D + 1, 0, 0, 0), (0, 0, 0, 3 * D + 1)
+    ages = [silent, gone, robot, (D, D, D, D), (3 * D, 0, 0, 0), (D + 1, 0, 0, D + 1)]
+    ages += [(0, p, 0, 0) for p in (D + 1, 2 * D, 2 * D + 1, 3 * D, 3 * D + 1)]
+    ages += [(0, 0, i, 0) for i in (D + 1, 3 * D, 3 * D + 1)]
+    ages += [(0, 0, 0, r) for r in (D + 1, 3 * D)]
+    fine = ("", "", "", ())
+    complaints = [("stood still", "", "", ()), ("", "spins", "", ()), ("", "", "unsure", ())]
+    complaints += [("", "", "", ("no",))]
+    arm, stop = Requests(arm=True), Requests(stop=True)
+    wishes = [arm, Requests(disarm=True), Requests(reset=True), stop]
+    wishes += [Requests(arm=True, disarm=True), Requests(stop=True, reset=True)]
+    told = [(well, fine, NO_REQUESTS)]
+    told += [(age, fine, NO_REQUESTS) for age in ages]
+    told += [(well, complaint, NO_REQUESTS) for complaint in complaints]
+    told += [(well, fine, wish) for wish in wishes]
+    told += [(age, one, NO_REQUESTS) for age in (silent, gone, robot) for one in complaints]
+    told += [(age, fine, wish) for age in (silent, gone, robot) for wish in wishes]
+    told += [(well, one, wish) for one in complaints for wish in wishes]
+    return [
+        Inputs(held, press, *age, *complaint, wish)
+        for held, press in product((False, True), range(2))
+        for age, complaint, wish in told
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Monitor:
+    """What has happened, whatever the machine remembers of it."""
+
+    over: int = 0
+    """The last press that was seen to be over, or that led to TRACK."""
+    lifted: bool = True
+    """Since TRACK was last entered the finger was seen off that press."""
+    coasted_ms: int = 0
+    silent_ms: int = 0
+    """For how long nothing has been good, without a break."""
+
+
+def after(seen: Monitor, inputs: Inputs, before: Failsafe, now: Failsafe, good: bool) -> Monitor:
+    entered = now.mode == Mode.TRACK and before.mode in (Mode.ARMED, Mode.HOLD)
+    flew = before.mode in (Mode.TRACK, Mode.COAST)
+    let_go = not inputs.held or (flew and inputs.press != seen.over)
+    return Monitor(
+        over=inputs.press if entered or not inputs.held else seen.over,
+        lifted=not entered and (seen.lifted or let_go),
+        coasted_ms=min(seen.coasted_ms + D, LONGEST_MS) if now.mode == Mode.COAST else 0,
+        silent_ms=0 if good else min(seen.silent_ms + D, LONGEST_MS),
+    )
+
+
+def canonical(state: Failsafe) -> Failsafe:
+    """Without words, and with timers saturated beyond the last limit that tells them apart."""
+    return replace(
+        state,
+        mode_ms=min(state.mode_ms, LIMITS.armed_idle),
+        good_ms=min(state.good_ms, LIMITS.recover),
+        bad_ms=min(state.bad_ms, LIMITS.short + D),
+        reason="",
+    )
+
+
+def check(
+    before: Failsafe, told: Inputs, now: Failsafe, seen: Monitor, later: Monitor, limits: Limits
+) -> None:
+    """Every law, on one step."""
+    power, wish = failsafe.ceiling(now, limits), told.requests
+    assert (power > 0.0) <= (now.mode in POWERED)
+    assert now.mode == before.mode or (before.mode, now.mode) in EDGES
+    if wish.stop:
+        assert now.mode == Mode.STOPPED
+    if before.mode == Mode.STOPPED and now.mode != Mode.STOPPED:
+        assert wish.reset
+        assert not told.held
+    bad = told.fault or max(told.robot_ms, told.operator_ms, told.phone_imu_ms) > D or told.gap
+    bad = bad or told.doubt or told.pose_ms > limits.pose_hold
+    if now.mode == Mode.TRACK:
+        assert told.held
+        assert not bad
+        assert not later.lifted
+        if before.mode in (Mode.ARMED, Mode.HOLD):
+            assert told.press != seen.over
+            assert before.good_ms + D >= limits.recover_short
+        if before.mode == Mode.COAST:
+            assert told.press == seen.over
+            assert not seen.lifted
+            assert seen.coasted_ms <= limits.coast
+            assert now.good_ms >= limits.fresh
+    if now.mode == Mode.ARMED:
+        assert not told.fault
+        assert not told.doubt
+        if before.mode == Mode.DISARMED:
+            assert wish.arm
+            assert not wish.disarm
+            assert not told.refusals
+            assert not told.held
+            assert before.good_ms + D >= limits.recover_short
+    if before.mode in FLYING and (told.fault or wish.disarm or told.robot_ms > limits.robot_ramp):
+        assert now.mode in (Mode.RAMP, Mode.STOPPED)
+    if before.mode == Mode.TRACK and now.mode == Mode.TRACK:
+        assert not wish.disarm
+    if before.mode == Mode.RAMP:
+        assert power <= failsafe.ceiling(before, limits)
+        assert now.mode != before.mode or power < failsafe.ceiling(before, limits)
+    assert later.coasted_ms <= limits.coast + D
+    if later.silent_ms > limits.hold_max + limits.ramp + 2 * D:
+        assert power == 0.0
+    _check_words(told, now, limits)
+
+
+def _check_words(told: Inputs, now: Failsafe, limits: Limits) -> None:
+    """What the pages are told is true."""
+    left = failsafe.until_ramp(now, told, limits)
+    assert (left is None) == (now.mode not in (Mode.COAST, Mode.HOLD))
+    assert left is None or 0 <= left <= limits.hold_max
+    if failsafe.resumes(now, told):
+        assert told.held
+        assert now.mode in (Mode.COAST, Mode.HOLD)
+
+
+def search(limits: Limits) -> tuple[set[Mode], set[tuple[Mode, Mode]], int]:
+    """Modes and edges visited, and how many states there are."""
+    every = inputs()
+    start = canonical(Failsafe()), Monitor()
+    reached, new = {start}, [start]
+    modes, edges = {Mode.DISARMED}, set[tuple[Mode, Mode]]()
+    while new:
+        waiting, new = new, []
+        for state, seen in waiting:
+            for told, now, later in steps(state, seen, every, limits):
+                check(state, told, now, seen, later, limits)
+                modes.add(now.mode)
+                if now.mode != state.mode:
+                    edges.add((state.mode, now.mode))
+                found = canonical(now), later
+                if found not in reached:
+                    reached.add(found)
+                    new.append(found)
+    return modes, edges, len(reached)
+
+
+def steps(
+    state: Failsafe, seen: Monitor, every: list[Inputs], limits: Limits
+) -> Iterator[tuple[Inputs, Failsafe, Monitor]]:
+    for told in every:
+        now = failsafe.step(state, told, D, limits)
+        yield told, now, after(seen, told, state, now, good=now.good_ms > 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limits", [LIMITS, HOVERS], ids=["hangs", "hovers"])
+def test_every_reachable_state_keeps_every_law_by_the_documented_edges_and_no_others(
+    limits: Limits,
+) -> None:
+    modes, edges, states = search(limits)
+    assert modes == {*Mode}
+    assert edges == EDGES
+    assert states > 1_000
+
+
+def test_the_searched_limits_are_in_the_order_of_the_shipped_ones() -> None:
+    for limits in (LIMITS, Limits.of(FailsafeConfig(), ramp_s=2.3)):
+        assert limits.fresh < limits.recover_short < limits.recover
+        assert limits.silent < limits.robot_ramp == limits.phone_ramp
+        assert limits.silent <= limits.pose_arm < limits.pose_hold < limits.pose_ramp
+        assert limits.short < limits.coast < limits.hold_max < limits.armed_idle
+
+
+def test_the_table_in_the_docstring_and_in_the_architecture_is_the_one_searched() -> None:
+    text = failsafe.__doc__ or ""
+    listed = set[tuple[Mode, Mode]]()
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) == 5 and cells[2] in Mode.__members__:
+            one, to = cells[1], Mode[cells[2]]
+            sources = [m for m in Mode if m != to] if one == "any other" else one.split(", ")
+            listed |= {(Mode[m] if isinstance(m, str) else m, to) for m in sources}
+    assert listed == EDGES
