@@ -180,6 +180,16 @@ class HoldConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class StationConfig:
+    """Keeping station through a gap by the robot's own motion sensors."""
+
+    bias_s: float = 5.0
+    """High pass of the acceleration: bias and tilt error go [s]."""
+    rest_s: float = 2.0
+    """... and of the velocity: hands come to rest [s]."""
+
+
+@dataclass(frozen=True, slots=True)
 class ResumptionConfig:
     """Following again by itself after a gap: the reference goes back to where the phone has it."""
 
@@ -224,5 +234,6 @@ class TeleopConfig:
     gates: GatesConfig = field(default_factory=GatesConfig)
     failsafe: FailsafeConfig = field(default_factory=FailsafeConfig)
     hold: HoldConfig = field(default_factory=HoldConfig)
+    station: StationConfig = field(default_factory=StationConfig)
     resumption: ResumptionConfig = field(default_factory=ResumptionConfig)
     envelope: EnvelopeConfig = field(default_factory=EnvelopeConfig)

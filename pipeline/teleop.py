@@ -12,6 +12,7 @@ from pipeline.control.actuation import Actuation
 from pipeline.control.hold import Hold
 from pipeline.control.judgement import Ages
 from pipeline.control.pid import PoseError, Reference, pose_error
+from pipeline.control.station import StationKeeping
 from pipeline.control.tracking import Situation, Tracking
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.estimation.attitude import Attitude
@@ -90,6 +91,9 @@ class Teleop:
         self._virtual_camera = VirtualCamera(config.virtual_camera)
         self._tracking, self._hold = Tracking(robot, config), Hold(config.hold, robot)
         self._actuation = Actuation(robot, config)
+        self._station = StationKeeping(config.station, config.gains, robot)
+        # what stands on the floor brakes and stays by itself
+        self._keeps_station = robot.hangs or robot.weight_to_carry > 0.0
         self._failsafe = failsafe.Failsafe()
         self._operator = Operator(-np.inf, held=False, press=0)
         self._half_field: tuple[float, float] | None = None
@@ -116,6 +120,7 @@ class Teleop:
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
             self._tracking.feel(known, self._given_in_b, self._h)
+            self._feel_station(known, inputs.t)
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
         error = self._error(known)  # Eq. (14)-(19)
@@ -129,7 +134,7 @@ class Teleop:
         before = self._failsafe.mode
         self._failsafe = failsafe.step(self._failsafe, judged, dt_ms, self._limits)
         if self._failsafe.mode != before:
-            known, error = self._change_mode(before, known)
+            known, error = self._change_mode(before, known, error)
         thrusts, saturated = self._act(known, error)
         self._given_in_b = self._robot.A[:3] @ thrusts - self._actuation.push_in_b[:3]
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
@@ -197,6 +202,8 @@ class Teleop:
     def _error(self, known: Situation | None) -> PoseError | None:
         if known is None or self._reference is None:
             return None
+        if self._failsafe.mode == Mode.COAST:
+            return self._station.error(known.view)
         return pose_error(known.view, self._reference, self._robot.axes)
 
     def _judge(
@@ -222,7 +229,7 @@ class Teleop:
         return "" if near else "Too far from where it was led."
 
     def _change_mode(
-        self, before: Mode, known: Situation | None
+        self, before: Mode, known: Situation | None, error: PoseError | None
     ) -> tuple[Situation | None, PoseError | None]:
         """Bumpless: tracking starts where the robot is, holding starts from what tracking did."""
         mode = self._failsafe.mode
@@ -238,12 +245,32 @@ class Teleop:
             return known, self._error(known)
         if before == Mode.TRACK and known is not None:
             R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
-            self._hold.start(self._force_in_b, R_fb, u_in_f, self._tracking.constant_force_in_f)
+            constant_in_f = self._tracking.constant_force_in_f
+            self._hold.start(self._force_in_b, R_fb, u_in_f, constant_in_f)
+            if error is not None:
+                offset_in_f = known.view.R_fv @ error.e_p_in_v
+                self._station.start(offset_in_f, constant_in_f)
+        if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._keeps_station:
+            self._hold.start(
+                self._force_in_b,
+                self._hold.R_fb,
+                self._station.v_in_f,
+                self._tracking.constant_force_in_f,
+            )
         if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
             self._tracking.reset()
         if mode != Mode.COAST:
             self._reference = self._led_to = None
         return known, None
+
+    def _feel_station(self, known: Situation, t: float) -> None:
+        """Through a gap by the gyroscope alone: what comes after it puts the phone's axes right."""
+        R_fb = known.view.R_fv @ known.view.R_vb
+        if t - self._body.t > LONGEST_STEP_S:
+            self._station.lose()
+            self._hold.R_fb = R_fb
+        coasts = self._failsafe.mode == Mode.COAST
+        self._station.feel(known.relative.f_bf_in_b, self._hold.R_fb if coasts else R_fb, self._h)
 
     def _follow_back(self) -> None:
         """After a gap the reference goes to where it was led before, slowly: nothing jumps."""
@@ -262,12 +289,14 @@ class Teleop:
             self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._h)
         elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
             wrench_in_b = self._hold.wrench(omega_m_bf_in_b, self._h)
+            if mode == Mode.COAST and self._keeps_station:
+                wrench_in_b[:3] = self._station.force_in_b(self._hold.R_fb)
             R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
         else:
             return np.zeros(self._robot.A.shape[1]), False
         given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
         self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
-        if error is not None and known is not None:
+        if mode == Mode.TRACK and error is not None and known is not None:
             self._tracking.learn(error, known.view, given.missing_in_b, self._h)
         if not np.isfinite(given.thrusts).all():
             return np.zeros_like(given.thrusts), True
