@@ -222,8 +222,9 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """What who arms should know, each in words; refuses nothing."""
     server: dict[str, float] = {}
     """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
-    while the robot was armed, armed_stall_ms, armed_stall_cpu_ms of it at work; garbage collections
-    while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full."""
+    while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a
+    processor for armed_stall_waited_ms; garbage collections while it was armed: processor time of
+    the longest, gc_ms, and number of full ones, gc_full."""
     people: list[Person] = []
     """Who is paired, in the order they came."""
 

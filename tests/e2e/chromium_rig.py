@@ -14,6 +14,7 @@ from hardware.sim.hand import make_hand
 from server.bench.write import camera_text
 from server.garbage import held
 from tests.e2e.chromium_phone import ChromiumPhone, browser
+from tests.e2e.flight_log import Flight, FlightLog
 from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone
 from tests.e2e.serving import DEVICE, Serving, serving
 
@@ -27,16 +28,8 @@ LANDSCAPE = {
 MAY_ARM = """
 (({disabled, dataset}) => !disabled && dataset.what === 'arm')(document.querySelector('#wish'))
 """
-STARVED = (
-    "are silent",
-    "No word from the phone",
-    "time stamps are off",
-    "too uncertain",
-)
-"""How the robot says that a machine was too busy for the page's sensors, finger or pictures: a hand
-is told to the page as often as the machine manages, and a tremor told 30 times a second is none."""
-STOPPED = ("No word from the robot", "stood still", "went to zero by itself")
-"""How it says that the machine was not given to anybody for a while."""
+MOST_FLIGHTS = 4
+"""Tried for one that is wanted, on a machine that is proven to have been away each time."""
 
 
 def calibrate(folder: Path, device: str = DEVICE) -> Path:
@@ -55,21 +48,18 @@ def start(phone: ChromiumPhone, server: Serving) -> None:
     phone.play_until(MAY_ARM, 25.0)
 
 
-def lead(phone: PlayedPhone, tries: int = 3) -> None:
-    """Arm and hold; again if a busy machine starved the sensors and the robot was disarmed."""
-    for left in reversed(range(tries)):
-        try:
-            phone.play_until(MAY_ARM, 25.0)
-            phone.tap("#wish")
-            phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
-            phone.play(0.7)
-            phone.hold()
-            phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
-            return
-        except TimeoutError:
-            phone.let_go()
-            if not left:
-                raise
+def lead(phone: PlayedPhone) -> None:
+    """Arm and hold.
+
+    Raises:
+        TimeoutError: it could not be armed, or does not follow; with the words on the page.
+    """
+    phone.play_until(MAY_ARM, 25.0)
+    phone.tap("#wish")
+    phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
+    phone.play(0.7)
+    phone.hold()
+    phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
 
 
 def flight(
@@ -77,21 +67,41 @@ def flight(
     server: Serving,
     seconds: float,
     meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
-    tries: int = 3,
-) -> tuple[list[tuple[float, float]], dict[str, object]]:
-    """Lead for so long: distances as `ChromiumPhone.track` gives them, and the status at the end.
-
-    Once more if the robot was ramped down because a busy machine starved the sensors: as it should.
-    """
-    for left in reversed(range(tries)):
-        lead(phone)
-        distances = phone.track(seconds, meanwhile)
+) -> Flight:
+    """Lead for so long, or until the robot comes down by itself; tried once."""
+    began, never = time.monotonic(), ""
+    distances: list[tuple[float, float]] = []
+    with contextlib.closing(FlightLog(server)) as log:
+        try:
+            lead(phone)
+            distances = phone.track(seconds, meanwhile, lambda: log.is_over)
+        except TimeoutError as error:
+            never = str(error)
         status = server.request("GET", "/api/status")
-        starved = any(words in str(status["reason"]) for words in STARVED + STOPPED)
-        if status["mode"] == "TRACK" or not starved or not left:
-            break
+    return Flight(seconds, distances, status, log.said, phone.holes(began), never)
+
+
+def flown(
+    phone: PlayedPhone,
+    server: Serving,
+    seconds: float,
+    meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
+) -> Flight:
+    """A flight that reached its end: the first one, or the machine's absence is proven.
+
+    Raises:
+        AssertionError: it did not, and the machine was there; or it was away too often.
+    """
+    for left in reversed(range(MOST_FLIGHTS)):
+        one = flight(phone, server, seconds, meanwhile)
+        if not one.ended:
+            return one
+        print(one.account())
         phone.let_go()
-    return distances, status
+        if not one.excuse or not left:
+            break
+        print(f"once more, {left} left, for the machine was away:", *map(str, one.excuse))
+    raise AssertionError(one.account())
 
 
 @contextlib.contextmanager

@@ -32,3 +32,15 @@ window.RTCPeerConnection = class extends RTCPeerConnection {
   }
 };
 """
+TICKER = """
+window.pageHoles = [];
+(() => {
+  let before = performance.now();
+  setInterval(() => {
+    const now = performance.now();
+    if (now - before > 50) pageHoles.push([now, now - before]);
+    before = now;
+  }, 5);
+})();
+"""
+"""Notes when the page's main thread was away, and for how long [ms]."""

@@ -17,7 +17,8 @@ from hardware.sim.truth import Truth, TruthClient
 from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd, exp, log
-from tests.e2e.page_scripts import BE_CAMERA
+from tests.e2e.page_scripts import BE_CAMERA, TICKER
+from tests.e2e.witness import Hole, Witness
 
 STEP_S = 0.01
 """The hand is told so often, where the machine manages."""
@@ -75,7 +76,7 @@ CANVAS = """
 })();
 """
 CANVAS = CANVAS.replace("WIDTH", str(CAMERA.width)).replace("HEIGHT", str(CAMERA.height))
-CANVAS = CANVAS.replace("BE_CAMERA", BE_CAMERA)
+CANVAS = CANVAS.replace("BE_CAMERA", BE_CAMERA) + TICKER
 
 
 class PlayedPhone(ABC):
@@ -90,6 +91,7 @@ class PlayedPhone(ABC):
         self._R_dc = R_cd(screen_angle_deg).T
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
+        self._witness = Witness()
         Intent.warm_up()
 
     @property
@@ -121,8 +123,17 @@ class PlayedPhone(ABC):
         """Take it off."""
 
     def close(self) -> None:
-        """Give the truth's socket back."""
+        """Give the truth's socket back, dismiss the witness."""
+        self._witness.close()
         self._truth.close()
+
+    def holes(self, since: float) -> list[Hole]:
+        """Of the machine and of the page, after a time [s, monotonic]."""
+        page = [
+            Hole("page", self._page_epoch() + 1e-3 * end, 1e-3 * length)
+            for end, length in self.evaluate("pageHoles.splice(0)")
+        ]
+        return [*self._witness.holes(since), *(hole for hole in page if hole.t >= since)]
 
     def step(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Show what the camera would see and feel now; gives the poses of hand and body."""
@@ -197,18 +208,21 @@ class PlayedPhone(ABC):
         return str(self.evaluate("document.body.innerText")).replace("\n", " · ")
 
     def track(
-        self, seconds: float, meanwhile: Iterable[tuple[float, Callable[[], object]]] = ()
+        self,
+        seconds: float,
+        meanwhile: Iterable[tuple[float, Callable[[], object]]] = (),
+        is_over: Callable[[], bool] = lambda: False,
     ) -> list[tuple[float, float]]:
         """Play while the button is held: (time [s], distance from where the hand means it [m]).
 
-        `meanwhile` is what to do when, in order.
+        `meanwhile` is what to do when, in order; no longer than until it `is_over`.
         """
         waiting = deque(meanwhile)
         hand, body = self.step()
         started = before = time.monotonic()
         intent = Intent(VirtualCameraConfig(), hand, body)
         distances: list[tuple[float, float]] = []
-        while (now := time.monotonic()) < started + seconds:
+        while (now := time.monotonic()) < started + seconds and not is_over():
             hand, body = self.step()
             _, p_rf = intent.step(hand, now - before)
             before = now

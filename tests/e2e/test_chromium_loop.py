@@ -10,7 +10,7 @@ import pytest
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from tests.e2e.chromium_phone import ChromiumPhone, browser
-from tests.e2e.chromium_rig import LANDSCAPE, flight, led_server, start
+from tests.e2e.chromium_rig import LANDSCAPE, flown, led_server, start
 from tests.e2e.serving import DEVICE, serving
 
 pytestmark = pytest.mark.e2e
@@ -25,10 +25,9 @@ def test_the_robot_follows_a_chromium_over_tls_and_stops_on_its_stop(
         refused: list[str] = []
         phone.page.on("console", lambda message: refused.append(message.text))
         start(phone, server)
-        distances, status = flight(phone, server, 20.0)
-        assert status["mode"] == "TRACK", status["reason"]
-        assert phone.rms_mm(distances, LEARNT_S) <= 40.0
-        streams = status["streams"]
+        flight = flown(phone, server, 20.0)
+        assert phone.rms_mm(flight.distances, LEARNT_S) <= 40.0
+        streams = flight.status["streams"]
         assert isinstance(streams, dict)
         assert streams["phone_imu"]["rate_hz"] >= 25.0  # 60 on a quiet machine
         assert streams["video"]["rate_hz"] >= 10.0  # 30 on a quiet machine

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import closing
 
 import pytest
 
-from server.pauses import PERIOD_S, WINDOW_S, LoopWatch, Pauses, Stall
+from server.pauses import PERIOD_S, WINDOW_S, LoopWatch, Pauses, RunQueue, Stall
 
 
 class Clock:
@@ -45,12 +46,18 @@ def test_the_longest_stall_of_the_last_minute_is_told() -> None:
 
 def test_what_keeps_the_loop_is_measured_with_its_processor_time() -> None:
     clock, cpu = Clock(), Clock()
-    pauses = Pauses(clock, cpu, lambda: 0.0)
+    pauses = Pauses(clock, cpu, lambda: 0.0, waited=lambda: 0.25 * clock())
     pauses.tick(armed=True, idle=False)
     watched(pauses, [0.015, 0.205, 0.105], clock, cpu)
     figures = pauses.figures()
     assert figures["stall_ms"] == figures["armed_stall_ms"] == pytest.approx(200.0)
     assert figures["armed_stall_cpu_ms"] == pytest.approx(102.5)
+    assert figures["armed_stall_waited_ms"] == pytest.approx(51.2, abs=0.1)
+
+
+def test_waiting_for_a_processor_is_counted_where_the_system_tells() -> None:
+    with closing(RunQueue()) as waited:
+        assert 0.0 <= waited() <= waited() < 1e6
 
 
 def test_stalls_are_said_while_armed_the_longest_and_not_all_the_time() -> None:
@@ -58,12 +65,14 @@ def test_stalls_are_said_while_armed_the_longest_and_not_all_the_time() -> None:
     pauses = Pauses(clock, lambda: 0.0, lambda: 0.0)
 
     def stall(seconds: float) -> str:
-        pauses.loop.saw(clock(), Stall(seconds, 0.5 * seconds), armed=True)
+        pauses.loop.saw(clock(), Stall(seconds, 0.5 * seconds, 0.25 * seconds), armed=True)
         return pauses.tick(armed=True, idle=False)
 
     assert pauses.tick(armed=True, idle=False) == ""
     assert stall(0.019) == ""
-    assert stall(0.041) == "The server stood still for 41 ms while armed, 20 ms of it at work."
+    assert stall(0.041) == (
+        "The server stood still for 41 ms while armed: 20 ms at work, 10 ms without a processor."
+    )
     assert stall(0.3) == ""
     clock.t += 11.0
     assert "300 ms" in pauses.tick(armed=True, idle=False)

@@ -1,0 +1,139 @@
+"""What a server said during a flight, and what became of the flight."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import threading
+import time
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from server.wire import VERSION
+from tests.e2e.serving import Serving
+from tests.e2e.witness import Hole
+
+AT_REST = ("DISARMED", "STOPPED", "LOST")
+BORNE_S = {"machine": 0.06, "others": 0.15, "server": 0.15}
+"""A silent robot link and a silent phone are borne so long; see `Robot` and `FailsafeConfig`. Of
+the server only what it waited for a processor counts."""
+CAUSE_S = 1.0
+"""Between a hole and what it led to."""
+SHOWN_S = 0.05
+WAITED = "armed_stall_waited_ms"
+KEPT = ("mode", "reason", "server")
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """One status."""
+
+    t: float
+    """When it came [s, monotonic]."""
+    mode: str
+    reason: str
+    server: dict[str, float]
+
+
+class FlightLog:
+    """Reads the status as a supervisor's page does, from its own thread."""
+
+    def __init__(self, server: Serving) -> None:
+        """Connected."""
+        headers = {"Authorization": f"Bearer {server.supervisor_token}"}
+        url = f"{server.http_url.replace('http', 'ws')}/ws/supervisor"
+        self._page = connect(url, additional_headers=headers, compression=None, proxy=None)
+        self._page.send(json.dumps({"type": "hello", "version": VERSION, "role": "supervisor"}))
+        self.said: list[Said] = []
+        self._has_followed = False
+        self.is_over = False
+        """Whether the robot came down after it had followed."""
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            for data in self._page:
+                if isinstance(data, bytes):
+                    continue
+                told = json.loads(data)
+                if told["type"] == "status":
+                    self._keep(Said(time.monotonic(), *(told[k] for k in KEPT)))
+
+    def _keep(self, said: Said) -> None:
+        self.said.append(said)
+        self._has_followed |= said.mode == "TRACK"
+        self.is_over = self._has_followed and said.mode in (*AT_REST, "RAMP")
+
+    def close(self) -> None:
+        """Leave."""
+        self._page.close()
+        self._thread.join()
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """One, tried once."""
+
+    planned_s: float
+    distances: list[tuple[float, float]]
+    """As `PlayedPhone.track` gives them."""
+    status: dict[str, object]
+    """At its end."""
+    said: list[Said]
+    holes: list[Hole] = field(default_factory=list)
+    never: str = ""
+    """Why it did not begin."""
+
+    @property
+    def ended(self) -> str:
+        """Why it did not reach the end, or ""."""
+        if self.never:
+            return f"never led: {self.never}"
+        return "" if self.status["mode"] == "TRACK" else str(self.status["reason"])
+
+    @property
+    def following(self) -> float:
+        """Share of the planned time in which the robot followed."""
+        tracked = sum(
+            after.t - before.t for before, after in pairwise(self.said) if before.mode == "TRACK"
+        )
+        return min(1.0, tracked / self.planned_s)
+
+    @property
+    def starved(self) -> list[Hole]:
+        """When the server, in its own words, was longer without a processor than ever before."""
+        told = [(said.t, 1e-3 * said.server.get(WAITED, 0.0)) for said in self.said]
+        grown = pairwise(told)
+        return [Hole("server", t, s) for (_, before), (t, s) in grown if s > before]
+
+    @property
+    def excuse(self) -> list[Hole]:
+        """Holes that prove that it was ended by a machine that was away longer than is borne."""
+        followed = [said.t for said in self.said if said.mode == "TRACK"]
+        left = followed[-1] if followed else (self.said[-1].t if self.said else 0.0)
+        return [
+            hole
+            for hole in (*self.holes, *self.starved)
+            if hole.s >= BORNE_S.get(hole.where, float("inf")) and abs(hole.t - left) <= CAUSE_S
+        ]
+
+    def account(self) -> str:
+        """What happened, in lines."""
+        lines = [f"{self.ended or 'to the end'}; followed {100 * self.following:.1f} %"]
+        began, mode = self.said[0].t if self.said else 0.0, ""
+        for said in self.said:
+            if said.mode != mode:
+                lines.append(f"  {said.t - began:6.1f} s {said.mode}: {said.reason}")
+                mode = said.mode
+        if self.said:
+            lines.append(f"  the server's pauses: {self.said[-1].server}")
+        shown = [hole for hole in (*self.holes, *self.starved) if hole.s >= SHOWN_S]
+        lines += [
+            f"  {hole.t - began:6.1f} s {hole.where} away for {1e3 * hole.s:.0f} ms"
+            for hole in sorted(shown, key=lambda hole: hole.t)
+        ]
+        return "\n".join(lines)

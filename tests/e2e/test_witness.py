@@ -1,0 +1,72 @@
+"""The witness of a flight sees who was away, and excuses what only the machine can have done."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from tests.e2e.flight_log import Flight, Said
+from tests.e2e.witness import Hole, Witness, longest
+
+pytestmark = pytest.mark.e2e
+AWAY_S = 0.3
+
+
+@pytest.fixture
+def witness() -> Iterator[Witness]:
+    one = Witness()
+    yield one
+    one.close()
+
+
+def flight(mode: str, *holes: Hole) -> Flight:
+    """Of ten seconds: TRACK for five, then that mode."""
+    said = [Said(0.1 * n, "TRACK" if n < 50 else mode, "why", {}) for n in range(101)]
+    return Flight(10.0, [], {"mode": mode, "reason": "why"}, said, list(holes))
+
+
+def test_what_stops_a_ticker_is_noted_with_its_length(witness: Witness) -> None:
+    began = time.monotonic()
+    others = witness._processes[1].pid
+    os.kill(others, signal.SIGSTOP)
+    time.sleep(AWAY_S)
+    os.kill(others, signal.SIGCONT)
+    end = time.monotonic() + 5.0
+    while longest(witness.holes(began), "others") < 0.9 * AWAY_S:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    assert longest(witness.holes(time.monotonic()), "others") == 0.0
+
+
+def test_a_flight_is_excused_by_a_hole_longer_than_is_borne_where_it_ended() -> None:
+    assert not flight("TRACK").ended
+    assert flight("RAMP").ended == "why"
+    assert flight("RAMP").following == pytest.approx(0.5)
+    assert not flight("RAMP").excuse
+    assert flight("RAMP", Hole("machine", 4.8, 0.08)).excuse
+    assert flight("RAMP", Hole("others", 4.8, 0.2)).excuse
+    assert not flight("RAMP", Hole("others", 4.8, 0.08)).excuse
+    assert not flight("RAMP", Hole("machine", 2.0, 0.08)).excuse
+    assert not flight("RAMP", Hole("page", 4.8, 2.0)).excuse  # it may be the page's own doing
+
+
+def test_a_server_that_was_given_no_processor_is_an_excuse_and_one_at_work_is_not() -> None:
+    flown = flight("RAMP")
+    for n in range(49, 101):
+        flown.said[n].server["armed_stall_ms"] = 200.0
+    assert not flown.excuse
+    for n in range(49, 101):
+        flown.said[n].server["armed_stall_waited_ms"] = 190.0
+    assert [(hole.where, hole.s) for hole in flown.excuse] == [("server", pytest.approx(0.19))]
+
+
+def test_the_account_tells_modes_reasons_and_holes() -> None:
+    told = flight("RAMP", Hole("page", 4.8, 0.12), Hole("machine", 4.7, 0.03)).account()
+    assert "followed 50.0 %" in told
+    assert "5.0 s RAMP: why" in told
+    assert "4.8 s page away for 120 ms" in told
+    assert "machine" not in told

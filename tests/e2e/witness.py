@@ -1,0 +1,112 @@
+"""What the machine did beside a flight: two tickers in processes of their own, and their holes.
+
+One before everything else (SCHED_FIFO, where that is permitted): what it misses, nobody was given.
+One like everybody else: what it misses though it asks for next to nothing, others took.
+
+    python -m tests.e2e.witness machine|others    # prints "end [s] length [s]" of each hole
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import IO
+
+PERIOD_S = 0.005
+NOTED_S = 0.02
+PRIORITY = 90
+"""Above those of robot and control."""
+WAYS = ("machine", "others")
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """A while in which something did not run."""
+
+    where: str
+    """`machine`, `others`, `page`."""
+    t: float
+    """Its end [s, monotonic]."""
+    s: float
+
+    def __str__(self) -> str:
+        return f"{self.where} {1e3 * self.s:.0f} ms at {self.t:.1f} s"
+
+
+class Witness:
+    """The two processes; they end with `close`, or when this one does."""
+
+    def __init__(self) -> None:
+        """Started, and ticking."""
+        self._holes: list[Hole] = []
+        self._processes = [_start(where) for where in WAYS]
+        self._threads = [
+            threading.Thread(target=self._read, args=(where, process.stdout), daemon=True)
+            for where, process in zip(WAYS, self._processes, strict=True)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def _read(self, where: str, lines: IO[str]) -> None:
+        for line in lines:
+            t, s = map(float, line.split())
+            self._holes.append(Hole(where, t, s))
+
+    def holes(self, since: float = 0.0, longer_s: float = NOTED_S) -> list[Hole]:
+        """Those that ended after `since` [s, monotonic]."""
+        return [hole for hole in self._holes if hole.t >= since and hole.s >= longer_s]
+
+    def close(self) -> None:
+        """End them."""
+        for process in self._processes:
+            assert process.stdin is not None
+            process.stdin.close()
+            process.wait()
+        for thread in self._threads:
+            thread.join()
+        for process in self._processes:
+            assert process.stdout is not None
+            process.stdout.close()
+
+
+def longest(holes: Iterable[Hole], where: str) -> float:
+    """Of one kind [s]; 0 without any."""
+    return max((hole.s for hole in holes if hole.where == where), default=0.0)
+
+
+def _start(where: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "tests.e2e.witness", where]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ticking\n"
+    return process
+
+
+def main() -> None:
+    """Tick until the standard input is closed."""
+    gc.disable()
+    if sys.argv[1] == "machine":
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+    print("ticking", flush=True)
+    before = time.monotonic()
+    while True:
+        time.sleep(PERIOD_S)
+        now = time.monotonic()
+        if now - before - PERIOD_S > NOTED_S:
+            print(f"{now:.4f} {now - before - PERIOD_S:.4f}", flush=True)
+        before = now
+
+
+if __name__ == "__main__":
+    main()
