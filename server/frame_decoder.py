@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hardware.sim.codec import DecodeError, Decoder
 from pipeline.signals import Image
+from server.decoding import AnyDecoder, MakeDecoder
 from server.ingest import EncodedFrame
 from server.wire_records import Codec
 
@@ -13,10 +14,11 @@ CODEC_NAMES = {Codec.JPEG: "jpeg", Codec.H264: "h264", Codec.VP8: "vp8"}
 class FrameDecoder:
     """Decodes what can be decoded, and knows when only a key frame helps."""
 
-    def __init__(self, width: int, height: int) -> None:
-        """For pictures of one size [px]."""
+    def __init__(self, width: int, height: int, make: MakeDecoder = Decoder) -> None:
+        """For pictures of one size [px]; `make` says where they are decoded, by itself here."""
         self._size = width, height
-        self._decoder: Decoder | None = None
+        self._make = make
+        self._decoder: AnyDecoder | None = None
         self.luma: Image | None = None
         """The newest decoded picture; valid until the next."""
         self.undecodable = 0
@@ -35,7 +37,7 @@ class FrameDecoder:
         picture = frame.picture
         name = CODEC_NAMES[picture.codec]
         if self._decoder is None or self._decoder.codec != name:
-            self._decoder = Decoder(name, *self._size)
+            self._decoder = self._make(name, *self._size)
             self.needs_key = True
         if frame.sequence != self._next:
             self.needs_key = (

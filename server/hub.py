@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import asdict
 
+from hardware.sim.codec import Decoder
 from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.blame import Blame
@@ -20,6 +21,7 @@ from server.calibrate.desk import Desk
 from server.calibration_messages import Calibrate
 from server.clock import now
 from server.control_link import ControlStatus, Input, ReadyInput, RequestInput, server_end
+from server.decoding import Decoding
 from server.handover import Handover
 from server.knobs import TuneInput
 from server.messages import Command, Hello, Status, ToPage, Tune, encode_message
@@ -59,10 +61,14 @@ class Hub:
         recordings: Recordings,
         profiles: Path | None = None,
         doors: Doors | None = None,
+        decoding: Decoding | None = None,
     ) -> None:
-        """Listens to control in `runtime`; `profiles` is where new calibrations go."""
+        """Listens to control in `runtime`; `profiles` is where new calibrations go.
+
+        Without `decoding` pictures are decoded in this process.
+        """
         self.robot, self.recordings = robot, recordings
-        self._cameras, self._profiles = cameras, profiles
+        self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
         self.paths = PhonePaths(lambda data: recordings.record("server", data, now()))
         self._desk = Desk(self.paths.tell)
         self._control = server_end(runtime)
@@ -168,6 +174,7 @@ class Hub:
             on_taken=partial(soon, self.paths.taken),
             on_key_wanted=partial(soon, self.paths.want_key),
             profiles=self._profiles,
+            make_decoder=self._decoding.open if self._decoding is not None else Decoder,
         )
         self.paths.begin(page)
         self.recordings.message("phone", encode_message(hello), now())
@@ -268,6 +275,8 @@ class Hub:
         self._shown = status
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
             self.say(paused)
+        if self._decoding is not None and (ended := self._decoding.news(now())):
+            self.say(ended)
         self.broadcast(status)
         self._show_picture()
         self._ask_key()

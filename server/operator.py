@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.camera_file import CameraFileError
+from hardware.sim.codec import Decoder
 from pipeline.camera.lens import Camera
 from pipeline.camera.mounting import SQUARE
 from pipeline.robot import Robot
@@ -26,6 +27,7 @@ from server.control_link import (
     PhoneImuInput,
     expected_of,
 )
+from server.decoding import MakeDecoder
 from server.ingest import EncodedFrame, Ingest
 from server.link_log import LinkLog
 from server.messages import Hello
@@ -56,8 +58,12 @@ class OperatorPhone:
         on_taken: Callable[[int], None],
         on_key_wanted: Callable[[], None],
         profiles: Path | None = None,
+        make_decoder: MakeDecoder = Decoder,
     ) -> None:
-        """`to_control` may be called from the vision thread too; calibrations go to `profiles`."""
+        """`to_control` may be called from the vision thread too; calibrations go to `profiles`.
+
+        `make_decoder` says where pictures are decoded, by itself here.
+        """
         self.id = secrets.token_urlsafe(12)
         self.device, self.hello = hello.device or "a phone", hello
         self.ingest = Ingest(lambda: 1 + secrets.randbits(63))
@@ -67,7 +73,7 @@ class OperatorPhone:
         self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
         self.vision: VisionThread | None = None
         self._shape: Shape | None = None
-        self._profiles = profiles
+        self._profiles, self._make_decoder = profiles, make_decoder
         self.wizard: Wizard | None = None
         """The camera's calibration, while one is under way."""
         self.video_path = ""
@@ -160,7 +166,7 @@ class OperatorPhone:
             return
         self.camera_text = path.read_text(encoding="utf-8")
         self.ingest.mounting = camera.mounting
-        sight = Sight(camera, self._robot, GatesConfig(), self._clock)
+        sight = Sight(camera, self._robot, GatesConfig(), self._clock, self._make_decoder)
         self.vision = VisionThread(
             sight, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
         )
@@ -241,7 +247,8 @@ class OperatorPhone:
         """Begin, or begin again in another orientation."""
         assert self._profiles is not None
         size = (shape.width, shape.height, shape.screen_angle_deg)
-        self.wizard = Wizard(self.device, size, self._profiles, self._on_taken, self._on_key_wanted)
+        callbacks = self._on_taken, self._on_key_wanted
+        self.wizard = Wizard(self.device, size, self._profiles, *callbacks, self._make_decoder)
 
     def calibration(self) -> Calibration:
         """What the page should know of it."""

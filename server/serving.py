@@ -23,6 +23,7 @@ from server.app import Api, make_app
 from server.audit import Audit
 from server.calibrate.camera_yaml import PROFILES
 from server.dashboard import Dashboard
+from server.decoding import Decoding
 from server.hub import Hub
 from server.listener import Listener, listener
 from server.people_api import PeopleApi
@@ -78,7 +79,8 @@ async def serve(settings: Settings, given: Given) -> None:
     members = given.runtime / MEMBERS_FILE
     doors = Doors(given.secret, settings.pairing.confirm, members, audit)
     warming = warm_up.begin()
-    hub = _hub(settings, given, doors)
+    decoding = Decoding()
+    hub = _hub(settings, given, doors, decoding)
     view = given.runtime / VIEW_SOCKET
     dashboard = _dashboard(settings, hub, view)
     base = base_url(settings.host, given.https.getsockname()[1])
@@ -102,6 +104,7 @@ async def serve(settings: Settings, given: Given) -> None:
         api.phone.stop()
         dashboard.stop()
         audit.close()
+        decoding.close()
 
 
 def http_url(given: Given) -> str:
@@ -122,14 +125,14 @@ async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, 
     write_private(run_file, run)
 
 
-def _hub(settings: Settings, given: Given, doors: Doors) -> Hub:
+def _hub(settings: Settings, given: Given, doors: Doors, decoding: Decoding) -> Hub:
     folder = private_directory(private_directory(settings.state) / "recordings")
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
     robot = load_robot(settings.robot).robot
     profiles = private_directory(settings.state / PROFILES)
     cameras = [*settings.cameras, profiles, CAMERAS]
-    return Hub(given.runtime, robot, cameras, recordings, profiles, doors)
+    return Hub(given.runtime, robot, cameras, recordings, profiles, doors, decoding)
 
 
 def _dashboard(settings: Settings, hub: Hub, view: Path) -> Dashboard:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
+from hardware.sim.codec import Decoder
 from pipeline.camera.lens import Camera
 from pipeline.expected import Expected
 from pipeline.frames import Array
@@ -13,6 +14,7 @@ from pipeline.signals import BodyImu, Frame, PhoneImu, StampOffset
 from pipeline.vision.looking import Looking
 from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
+from server.decoding import MakeDecoder
 from server.frame_decoder import FrameDecoder
 from server.ingest import ARRIVAL_S, EncodedFrame
 
@@ -26,9 +28,10 @@ class Sight(FrameDecoder):
         robot: Robot,
         gates: GatesConfig,
         clock: Callable[[], float] = lambda: 0.0,
+        make: MakeDecoder = Decoder,
     ) -> None:
-        """`clock` only times the stages."""
-        super().__init__(camera.width, camera.height)
+        """`clock` only times the stages; `make` says where pictures are decoded."""
+        super().__init__(camera.width, camera.height, make)
         self.camera, self._clock = camera, clock
         self.looking = Looking(camera, robot.leds_in_b, gates, clock)
 

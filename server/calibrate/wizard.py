@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hardware.sim.codec import Decoder
 from pipeline.signals import PhoneImu
 from server.calibrate.board import Board, Detector
 from server.calibrate.camera_yaml import profile_path, store
@@ -20,6 +21,7 @@ from server.calibrate.job import Job, Outcome, Solving
 from server.calibrate.verdict import Verdict
 from server.calibrate.views import look
 from server.calibration_messages import Calibration
+from server.decoding import MakeDecoder
 from server.frame_decoder import FrameDecoder
 from server.frame_thread import FrameThread
 from server.ingest import EncodedFrame
@@ -40,10 +42,11 @@ class Wizard(FrameThread):
         folder: Path,
         on_taken: Callable[[int], None],
         on_key_wanted: Callable[[], None],
+        make: MakeDecoder = Decoder,
     ) -> None:
         """Begins to film pictures of `shape`: width, height [px], angle of the screen [°].
 
-        The profile goes to `folder`. Callbacks run in the thread.
+        The profile goes to `folder`. Callbacks run in the thread. `make` is `FrameDecoder`'s.
         """
         super().__init__("calibration", on_taken)
         size, self.screen_angle_deg = shape[:2], shape[2]
@@ -51,7 +54,7 @@ class Wizard(FrameThread):
         self._device, self._folder, self._on_key_wanted = device, folder, on_key_wanted
         self._board = Board()
         self._detector = Detector(self._board)
-        self._decoder = FrameDecoder(*size)
+        self._decoder = FrameDecoder(*size, make)
         self._guide = Guide(self._board, size)
         self._shown = self._filming("filming")
         self._motion: deque[tuple[float, float, float, float]] = deque(maxlen=MOST_SAMPLES)

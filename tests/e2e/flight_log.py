@@ -12,14 +12,16 @@ from itertools import pairwise
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from pipeline.config import FailsafeConfig
 from server.wire import VERSION
 from tests.e2e.serving import Serving
 from tests.e2e.witness import Hole
 
 AT_REST = ("DISARMED", "STOPPED", "LOST")
-BORNE_S = {"machine": 0.06, "others": 0.15, "server": 0.15}
-"""A silent robot link and a silent phone are borne so long; see `Robot` and `FailsafeConfig`. Of
-the server only what it waited for a processor counts."""
+GAP_S = FailsafeConfig().gap
+BORNE_S = {"machine": 0.06, "others": GAP_S, "server": GAP_S}
+"""So long a silent robot link and a silent phone are borne. Of the
+server only what it waited for a processor counts."""
 CAUSE_S = 1.0
 """Between a hole and what it led to."""
 SHOWN_S = 0.05

@@ -48,7 +48,7 @@ def test_a_flight_is_excused_by_a_hole_longer_than_is_borne_where_it_ended() -> 
     assert flight("RAMP").following == pytest.approx(0.5)
     assert not flight("RAMP").excuse
     assert flight("RAMP", Hole("machine", 4.8, 0.08)).excuse
-    assert flight("RAMP", Hole("others", 4.8, 0.2)).excuse
+    assert flight("RAMP", Hole("others", 4.8, 1.2)).excuse
     assert not flight("RAMP", Hole("others", 4.8, 0.08)).excuse
     assert not flight("RAMP", Hole("machine", 2.0, 0.08)).excuse
     assert not flight("RAMP", Hole("page", 4.8, 2.0)).excuse  # it may be the page's own doing
@@ -57,11 +57,11 @@ def test_a_flight_is_excused_by_a_hole_longer_than_is_borne_where_it_ended() -> 
 def test_a_server_that_was_given_no_processor_is_an_excuse_and_one_at_work_is_not() -> None:
     flown = flight("RAMP")
     for n in range(49, 101):
-        flown.said[n].server["armed_stall_ms"] = 200.0
+        flown.said[n].server["armed_stall_ms"] = 1200.0
     assert not flown.excuse
     for n in range(49, 101):
-        flown.said[n].server["armed_stall_waited_ms"] = 190.0
-    assert [(hole.where, hole.s) for hole in flown.excuse] == [("server", pytest.approx(0.19))]
+        flown.said[n].server["armed_stall_waited_ms"] = 1190.0
+    assert [(hole.where, hole.s) for hole in flown.excuse] == [("server", pytest.approx(1.19))]
 
 
 def test_the_account_tells_modes_reasons_and_holes() -> None:

@@ -1,0 +1,177 @@
+"""The decoder's own process: the same pictures, and an end that costs nobody else anything."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hardware.sim.codec import CODECS, DecodeError, Decoder, Encoder
+from server.decoding import MEMORY_BYTES, Decoding
+from server.frame_decoder import FrameDecoder
+from server.ingest import EncodedFrame
+from server.wire_records import Codec, Picture
+
+WIDTH, HEIGHT = 640, 368
+START_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def decoding() -> Iterator[Decoding]:
+    with contextlib.closing(Decoding()) as one:
+        yield one
+
+
+def luma(seed: int) -> np.ndarray:
+    grey = np.full((HEIGHT, WIDTH), 30, np.uint8)
+    x = 40 + 37 * seed % 500
+    grey[100:120, x : x + 20] = 250
+    return grey
+
+
+def eventually(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + START_S
+    while not condition():
+        assert time.monotonic() < end, "it never came"
+
+
+def children(pid: int) -> list[int]:
+    with contextlib.suppress(OSError):
+        return [int(p) for p in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return []
+
+
+def bomb() -> tuple[bytes, int, int]:
+    """A picture that takes long, with its size; a flat one takes less than a tenth of it."""
+    width, height = 1920, 1088
+    noise = np.random.default_rng(0).integers(0, 255, (height, width)).astype(np.uint8)
+    data, _ = Encoder(width, height, 30.0, 30_000_000).encode(noise)
+    return data * (MEMORY_BYTES // len(data)), width, height
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_the_same_pictures_come_out_as_of_a_decoder_here(decoding: Decoding, codec: str) -> None:
+    encoder = Encoder(WIDTH, HEIGHT, 30.0, 2_000_000, codec)
+    here, there = Decoder(codec, WIDTH, HEIGHT), decoding.open(codec, WIDTH, HEIGHT)
+    assert there.full_range == here.full_range
+    for seed in range(5):
+        data, _ = encoder.encode(luma(seed))
+        assert np.array_equal(there.decode(data), here.decode(data))
+
+
+def test_streams_of_several_owners_do_not_touch_each_other(decoding: Decoding) -> None:
+    encoders = [Encoder(WIDTH, HEIGHT, 30.0, 2_000_000) for _ in range(2)]
+    here = [Decoder("h264", WIDTH, HEIGHT) for _ in range(2)]
+    there = [decoding.open("h264", WIDTH, HEIGHT) for _ in range(2)]
+    kept = []
+    for seed in range(4):
+        data, _ = encoders[seed % 2].encode(luma(seed))
+        kept.append((there[seed % 2].decode(data), here[seed % 2].decode(data).copy()))
+    assert all(np.array_equal(one, other) for one, other in kept)
+
+
+def test_garbage_is_refused_and_the_process_lives(decoding: Decoding) -> None:
+    there = decoding.open("h264", WIDTH, HEIGHT)
+    deaths = decoding.deaths
+    for data in (b"", b"\0" * 100, os.urandom(2_000)):
+        with pytest.raises(DecodeError):
+            there.decode(data)
+    assert decoding.deaths == deaths
+
+
+def test_an_unknown_codec_is_refused_here(decoding: Decoding) -> None:
+    with pytest.raises(ValueError, match="h266"):
+        decoding.open("h266", WIDTH, HEIGHT)
+
+
+def test_a_bomb_ends_the_decoder_alone_by_its_processor_time_and_the_next_key_is_seen() -> None:
+    data, width, height = bomb()
+    with contextlib.closing(Decoding(cpu_s=0.01)) as decoding:
+        pid = decoding.pid
+        eye = FrameDecoder(width, height, decoding.open)
+        grey = np.full((height, width), 90, np.uint8)
+        whole, _ = Encoder(width, height, 30.0, 100_000).encode(grey)
+        pictures = [Picture(Codec.H264, True, width, height, 0, d) for d in (whole, data, whole)]
+        seen = [eye.decoded(EncodedFrame(0.0, 0.0, n, p)) for n, p in enumerate(pictures)]
+        assert [luma is None for luma in seen] == [False, True, False]
+        assert (eye.undecodable, decoding.deaths, decoding.pid) == (1, 1, pid)
+        assert "(1)" in decoding.news(100.0)
+        assert decoding.news(200.0) == ""
+
+
+def test_its_memory_is_limited_and_it_writes_no_files(decoding: Decoding) -> None:
+    decoding.open("jpeg", WIDTH, HEIGHT).decode(
+        Encoder(WIDTH, HEIGHT, 30.0, 1, "jpeg").encode(luma(0))[0]
+    )
+    assert decoding.pid is not None
+    (child,) = children(decoding.pid)
+    lines = Path(f"/proc/{child}/limits").read_text().splitlines()
+    limits = {line[:26].strip(): line[26:].split()[0] for line in lines}
+    assert int(limits["Max address space"]) < 4 << 30
+    assert limits["Max file size"] == limits["Max core file size"] == "0"
+
+
+def test_one_that_is_only_given_no_time_is_waited_for(decoding: Decoding) -> None:
+    there = decoding.open("jpeg", WIDTH, HEIGHT)
+    data, _ = Encoder(WIDTH, HEIGHT, 30.0, 1, "jpeg").encode(luma(0))
+    there.decode(data)
+    assert decoding.pid is not None
+    (child,) = children(decoding.pid)
+    deaths = decoding.deaths
+    os.kill(child, signal.SIGSTOP)
+    with ThreadPoolExecutor(1) as pool:
+        picture = pool.submit(there.decode, data)
+        os.kill(child, signal.SIGCONT)
+        assert picture.result().shape == (HEIGHT, WIDTH)
+    assert decoding.deaths == deaths
+
+
+@pytest.mark.parametrize("which", ["child", "parent"])
+def test_one_that_is_killed_costs_a_picture_at_most_and_no_answer_goes_astray(which: str) -> None:
+    with contextlib.closing(Decoding()) as decoding:
+        there = decoding.open("jpeg", WIDTH, HEIGHT)
+        data = [Encoder(WIDTH, HEIGHT, 30.0, 1, "jpeg").encode(luma(n))[0] for n in range(4)]
+        here = [Decoder("jpeg", WIDTH, HEIGHT).decode(one) for one in data]
+        there.decode(data[0])
+        assert decoding.pid is not None
+        (child,) = children(decoding.pid)
+        os.kill(child if which == "child" else decoding.pid, signal.SIGKILL)
+        lost = 0
+        for one, luma_here in zip(data, here, strict=True):
+            try:
+                assert np.array_equal(there.decode(one), luma_here)
+            except DecodeError:
+                lost += 1
+        assert lost <= 1
+
+
+def test_when_the_server_is_killed_they_end(tmp_path: Path) -> None:
+    script = (
+        "import sys, time; from server.decoding import Decoding; d = Decoding();"
+        "d.open('jpeg', 64, 64); print(d.pid, flush=True); sys.stdin.read()"
+    )
+    command = [sys.executable, "-c", script]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
+        assert server.stdout is not None
+        pid = int(server.stdout.readline())
+        eventually(lambda: bool(children(pid)))
+        both = [pid, *children(pid)]
+        server.kill()
+        eventually(lambda: not any(map(is_running, both)))
+
+
+def is_running(pid: int) -> bool:
+    """Alive, and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
