@@ -138,7 +138,7 @@ class ControlEnd:
     def _is_outdated(self, robot: Sample) -> bool:
         """Whether the robot would never again take our epoch."""
         refusing = robot.state == FollowerState.REFUSING and robot.epoch != 0
-        return refusing and self.epoch <= robot.epoch
+        return refusing and self.epoch <= robot.epoch < U64 - 1  # nothing is later than that
 
     def _renew(self, robot: Sample) -> None:
         self.epoch = robot.epoch + 1
