@@ -23,6 +23,9 @@ READOUTS_S = (-0.1, 0.1)
 """Negative: the picture stands on its head on the sensor, its last row is exposed first."""
 SCREEN_ANGLES_DEG = (0, 90, 180, 270)
 TIME_OFFSETS_S = (-0.5, 0.5)
+YAML_FAULTS = (yaml.YAMLError, ValueError, LookupError, AttributeError)
+"""What the library raises of text that is no YAML, of a 13th month and of `!!bool x`."""
+MOST_NUMBERS = 64
 SKEW = 1e-3
 """What rounding may take from a rotation."""
 
@@ -59,8 +62,10 @@ def _read(path: Path) -> tuple[str, Camera, int | None]:
         raise CameraFileError(str(path), "", error.strerror or str(error)) from error
     except UnicodeDecodeError as error:
         raise CameraFileError(str(path), "", "not a text file in UTF-8") from error
-    except yaml.YAMLError as error:
+    except YAML_FAULTS as error:
         raise CameraFileError(str(path), "", " ".join(str(error).split())) from error
+    except RecursionError as error:
+        raise CameraFileError(str(path), "", "lists within too many others") from error
     if not isinstance(table, dict):
         raise CameraFileError(str(path), "", "a YAML mapping: camera_info or a Kalibr camchain")
     reader = _Reader(str(path), table)
@@ -123,7 +128,7 @@ class _Reader:
 
     def camera_info(self) -> tuple[str, Camera]:
         table = self._table
-        model = str(self._get(table, "distortion_model"))
+        model = self._word(self._get(table, "distortion_model"), "distortion_model")
         K = self._numbers(table, "camera_matrix", 9).reshape(3, 3)
         distortion = self._numbers(table, "distortion_coefficients", None)
         camera = self._camera(
@@ -135,7 +140,7 @@ class _Reader:
             self._readout_s(),
         )
         camera = replace(camera, mounting=self._mounting())
-        return str(table.get("camera_name", Path(self._file).stem)), camera
+        return self._word(table.get("camera_name", Path(self._file).stem), "camera_name"), camera
 
     def kalibr(self, name: str) -> tuple[str, Camera]:
         table = self._table[name]
@@ -143,15 +148,16 @@ class _Reader:
             self._refuse(name, "a mapping")
         if table.get("camera_model", "pinhole") != "pinhole":
             self._refuse(f"{name}.camera_model", "pinhole")
-        model = KALIBR_MODELS.get(str(self._get(table, "distortion_model")))
+        key = f"{name}.distortion_model"
+        model = KALIBR_MODELS.get(self._word(self._get(table, "distortion_model"), key))
         if model is None:
-            self._refuse(f"{name}.distortion_model", ", ".join(KALIBR_MODELS))
+            self._refuse(key, ", ".join(KALIBR_MODELS))
         fu, fv, pu, pv = self._numbers(table, "intrinsics", 4)
         width, height = (self._size(n, "resolution") for n in self._numbers(table, "resolution", 2))
         K = np.array([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]])
         distortion = self._numbers(table, "distortion_coeffs", 4)
         return Path(self._file).stem, self._camera(
-            width, height, K, str(model), distortion, self._line_readout_s(name, height)
+            width, height, K, model, distortion, self._line_readout_s(name, height)
         )
 
     def screen_angle_deg(self) -> int | None:
@@ -173,8 +179,9 @@ class _Reader:
             self._refuse("camera_imu", "a mapping with rotation and time_offset_s")
         key = "camera_imu.rotation"
         R_ci = self._numbers({key: table.get("rotation")}, key, 9).reshape(3, 3)
-        is_rotation = np.allclose(R_ci @ R_ci.T, np.eye(3), atol=SKEW) and np.linalg.det(R_ci) > 0.0
-        if not is_rotation:
+        is_small = np.abs(R_ci).max() <= 1.0 + SKEW
+        is_square = is_small and np.allclose(R_ci @ R_ci.T, np.eye(3), atol=SKEW)
+        if not is_square or np.linalg.det(R_ci) < 0.0:
             self._refuse(key, "a rotation, row by row")
         key = "camera_imu.time_offset_s"
         offset_s = self._number(table.get("time_offset_s", 0.0), key, *TIME_OFFSETS_S)
@@ -214,6 +221,11 @@ class _Reader:
             self._refuse(key, "must be there")
         return table[key]
 
+    def _word(self, value: object, key: str) -> str:
+        if not isinstance(value, (str, int, float)):
+            self._refuse(key, "a word")
+        return str(value)
+
     def _size(self, value: object, key: str) -> int:
         size = self._number(value, key, *SIZES_PX)
         if not size.is_integer():
@@ -236,8 +248,8 @@ class _Reader:
         value = self._get(table, key)
         data = value.get("data") if isinstance(value, dict) else value
         try:
-            numbers = np.array(data, dtype=np.float64)
-        except (TypeError, ValueError):
+            numbers = np.array(data if _is_flat(data) else np.nan, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
             numbers = np.array(np.nan)
         right = numbers.ndim == 1 and (count is None or len(numbers) == count)
         if not right or not bool(np.isfinite(numbers).all()):
@@ -246,3 +258,10 @@ class _Reader:
 
     def _refuse(self, key: str, allowed: str) -> NoReturn:
         raise CameraFileError(self._file, key, allowed)
+
+
+def _is_flat(data: object) -> bool:
+    """Whether it is a short list without others in it: by YAML's aliases they may have no end."""
+    if not isinstance(data, list) or len(data) > MOST_NUMBERS:
+        return False
+    return not any(isinstance(one, (list, dict)) for one in data)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 from pydantic import ValidationError
 
-from hardware.robot_file import RobotFileError, robot_path
+from hardware.robot_file import RobotFileError, robot_path, robot_table
 from hardware.robot_schema import Led
 from pipeline.frames import Array
 
@@ -29,14 +28,7 @@ def load_leds(name_or_path: str | Path) -> tuple[str, Array]:
         RobotFileError: names file, key and what is allowed.
     """
     path = robot_path(name_or_path)
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RobotFileError(str(path), "", error.strerror or str(error)) from error
-    except UnicodeDecodeError as error:
-        raise RobotFileError(str(path), "", "not a text file in UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise RobotFileError(str(path), "", str(error)) from error
+    table = robot_table(path)
     reader = _Reader(str(path))
     name = table.get("name", path.stem)
     return str(name), reader.leds(table)

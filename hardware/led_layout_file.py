@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from math import atan2
 
@@ -11,7 +10,7 @@ from pydantic import ValidationError
 
 from hardware.led_file import load_leds
 from hardware.led_reach import Ball, Box, Reach, Segment
-from hardware.robot_file import RobotFileError, robot_path
+from hardware.robot_file import RobotFileError, robot_path, robot_table
 from hardware.robot_schema import Led, Start
 from pipeline.frames import Array
 
@@ -41,7 +40,7 @@ def load_layout(name_or_path: str) -> Layout:
     """
     name, leds_in_b = load_leds(name_or_path)
     path = robot_path(name_or_path)
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    table = robot_table(path)
     reaches = tuple(
         _reach(str(path), k, Led.model_validate(row), led)
         for k, (row, led) in enumerate(zip(table["leds"], leds_in_b, strict=True))

@@ -88,8 +88,14 @@ def robot_table(path: Path) -> dict[str, Any]:
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except OSError as error:
+        raise RobotFileError(str(path), "", error.strerror or str(error)) from error
+    except UnicodeDecodeError as error:
+        raise RobotFileError(str(path), "", "not a text file in UTF-8") from error
+    except ValueError as error:  # also a number of more digits than Python reads
         raise RobotFileError(str(path), "", str(error)) from error
+    except RecursionError as error:
+        raise RobotFileError(str(path), "", "tables or lists within too many others") from error
 
 
 def robot_of(table: Mapping[str, Any], file: str) -> RobotFile:
