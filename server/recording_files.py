@@ -31,7 +31,16 @@ from server.runtime import new_private_file
 from server.wire import VERSION
 
 MAX_MCAP_RECORD_BYTES = 64 << 20
-_DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, LookupError, MemoryError)
+_DAMAGE = (
+    McapError,
+    zstandard.ZstdError,
+    struct.error,
+    ValueError,
+    LookupError,
+    MemoryError,
+    OverflowError,  # a length of 2^64
+    RuntimeError,  # of LZ4, which our own recordings don't use
+)
 """What the library raises on bytes that make no sense."""
 
 
