@@ -12,14 +12,15 @@ MAX_BODY, BODY_S = 4_096, 5.0
 
 
 async def body_of(request: Request, longest: int = MAX_BODY) -> bytes:
-    """The body; empty if it is longer than what we take, or too long in coming."""
+    """The body; empty if it is no text, longer than what we take, or too long in coming."""
     body = b""
-    with contextlib.suppress(TimeoutError, ClientDisconnect):
+    with contextlib.suppress(TimeoutError, ClientDisconnect, UnicodeDecodeError):
         async with asyncio.timeout(BODY_S):
             async for part in request.stream():
                 body += part
                 if len(body) > longest:
                     return b""
+            body.decode()  # msgspec would raise another error of it than of other faults
             return body
     return b""
 

@@ -14,6 +14,7 @@ MAX_CANDIDATES = 24
 MAX_NAMED_CANDIDATES = 4
 """With a name for this network instead of an address (mDNS); each costs a look-up."""
 MEDIA = ("video", "application")
+MEDIA_LINE = re.compile(r"m=(\w+) \d{1,5} \S+( \S+)+")
 CODECS = {"H264": Codec.H264, "VP8": Codec.VP8}
 OTHERS = ("rtx",)
 PRINTABLE = re.compile(r"[\t\x20-\x7e]*")
@@ -55,8 +56,8 @@ def _lines(sdp: str) -> list[str]:
 def _sections(lines: list[str]) -> list[list[str]]:
     """The lines of the pictures and those of the data channel."""
     starts = [i for i, line in enumerate(lines) if line.startswith("m=")]
-    kinds = tuple(lines[i][2:].split(" ")[0] for i in starts)
-    if kinds != MEDIA:
+    media = [MEDIA_LINE.fullmatch(lines[i]) for i in starts]
+    if tuple(found and found[1] for found in media) != MEDIA:
         raise WireError("value", "sdp.media", f"{' and '.join(MEDIA)}, in this order")
     ends = [*starts[1:], len(lines)]
     return [lines[start:end] for start, end in zip(starts, ends, strict=True)]

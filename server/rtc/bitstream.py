@@ -11,6 +11,8 @@ DELIMITER, PARAMETERS = 9, 7
 """Kinds of H.264 unit that a key picture begins with; sequence parameters tell its size."""
 UNITS_LOOKED_AT = 4
 MAX_PARAMETERS_BYTES = 256
+LARGEST_SIDE = 65_535
+"""[px]; sequence parameters can say any number, also less than nothing."""
 HIGH_PROFILES = (100, 110, 122, 244, 44, 83, 86, 118, 128)
 VP8_KEY = b"\x9d\x01\x2a"
 """Bytes 3 to 5 of a VP8 key frame; its width and height follow."""
@@ -108,7 +110,11 @@ def _size(bits: _Bits) -> tuple[int, int]:
         bits.read(1)
     bits.read(1)
     left, right, top, bottom = bits.numbers(4) if bits.read(1) else (0, 0, 0, 0)
-    return 16 * across - 2 * (left + right), fields * (16 * up - 2 * (top + bottom))
+    width = 16 * across - 2 * (left + right)
+    height = fields * (16 * up - 2 * (top + bottom))
+    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE):
+        raise ValueError("no size of a picture")
+    return width, height
 
 
 def _skip_high(bits: _Bits) -> None:
