@@ -3,6 +3,8 @@
 #: make test    set up for development and run every check: what CI does
 #: make check   the same: lint, import rules, types, web client, all tests
 #: make fast    only the tests that together take less than half a minute
+#: make fuzz    search each parser of outside bytes for 60 s   (FUZZ_SECONDS=600 ARGS=records)
+#: make test-all  test, then fuzz
 #: make bench   only the measurements, on a quiet machine
 #: make lock    write requirements/*.txt anew from pyproject.toml (UPGRADE=1: newest versions)
 #: make clean   remove .venv, node_modules and caches
@@ -10,6 +12,7 @@
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
+.PHONY: fuzz test-all
 .PHONY: lock clean
 
 BIN := .venv/bin
@@ -92,6 +95,15 @@ pytest: dev
 
 fast: dev
 	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench and not slow" $(ARGS)
+
+FUZZ_SECONDS ?= 60
+
+fuzz: dev
+	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) $(ARGS)
+
+test-all:
+	$(MAKE) test
+	$(MAKE) fuzz
 
 bench: dev
 	$(BIN)/lightleash experiments loop

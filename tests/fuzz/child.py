@@ -1,0 +1,58 @@
+"""One target under atheris (libFuzzer), in this process: `python -m tests.fuzz.child NAME …`."""
+
+import sys
+import warnings
+from pathlib import Path
+
+import atheris
+
+INSTRUMENTED = [
+    "aioice.stun",
+    "aiortc.codecs.h264",
+    "aiortc.codecs.vpx",
+    "aiortc.rtp",
+    "aiortc.sdp",
+    "hardware.camera_file",
+    "hardware.control_end",
+    "hardware.datagram",
+    "hardware.link_key",
+    "hardware.led_file",
+    "hardware.led_layout_file",
+    "hardware.robot_end",
+    "hardware.robot_file",
+    "hardware.robot_schema",
+    "hardware.sim.codec",
+    "mcap",
+    "server.app",
+    "server.control_link",
+    "server.frame_decoder",
+    "server.ingest",
+    "server.messages",
+    "server.recorded_setting",
+    "server.recording_files",
+    "server.rtc",
+    "server.seen_input",
+    "server.view_proxy",
+    "server.wire",
+    "tomllib",
+    "yaml",
+]
+"""Modules whose branches are seen; what is compiled (msgspec, FFmpeg, OpenCV) runs unseen."""
+
+
+def main() -> None:
+    with atheris.instrument_imports(include=INSTRUMENTED):
+        from tests.fuzz.planted import PLANTED
+        from tests.fuzz.targets import TARGETS
+    name, *options = sys.argv[1:]
+    target = (TARGETS | PLANTED)[name]
+    corpus = Path(options[-1])
+    for k, data in enumerate([*target.seeds, *(path.read_bytes() for path in target.found())]):
+        (corpus / f"seed-{k}").write_bytes(data[: target.max_bytes])
+    warnings.simplefilter("error", RuntimeWarning)  # as in the tests: NumPy's overflows
+    atheris.Setup([sys.argv[0], f"-max_len={target.max_bytes}", *options], target.check)
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,202 @@
+"""The robot's link: datagrams and both ends, with its key: fuzzed is what lies behind the MAC."""
+
+from math import isfinite
+
+import numpy as np
+
+from hardware.control_end import ControlEnd
+from hardware.datagram import (
+    COMMAND_MAGIC,
+    MAX_THRUSTERS,
+    SAMPLE_MAGIC,
+    Command,
+    LinkError,
+    Sample,
+    decode_command,
+    decode_sample,
+    encode_command,
+    encode_sample,
+)
+from hardware.follower import FollowerState, Refusal, ThrustCommand
+from hardware.link_key import MAC_BYTES, mac
+from hardware.robot_end import LinkLimits, RobotEnd
+from tests.fuzz.sequence import pieces, together
+from tests.fuzz.target import target
+
+KEY = bytes(range(16))
+PEER, STRANGER = ("control", 1), ("stranger", 2)
+STILL = (0.0, 0.0, 0.0)
+LIMITS = LinkLimits(thrusters=2, f_max=3.0, max_rise=1.0, ramp_us=500_000, handshake_us=20_000)
+MOVING = (FollowerState.RUNNING, FollowerState.COAST, FollowerState.RAMP)
+FORGED, SEALED, PATCHED, HONEST, TICK = range(5)
+"""What a piece does: first byte; the second is how many milliseconds later."""
+
+
+def sealed(body: bytes) -> bytes:
+    """A datagram that the MAC vouches for."""
+    return body + mac(KEY, body)
+
+
+def command_seeds():
+    for thrusts in ((1.0,), (0.0, 0.5), (0.1,) * MAX_THRUSTERS, (float("nan"), float("inf"))):
+        command = Command(5, 7, 11, 13, True, thrusts, stop=thrusts[0] == 0.0)
+        yield encode_command(command, KEY)[:-MAC_BYTES]
+
+
+def has_nan(thrusts) -> bool:
+    return any(thrust != thrust for thrust in thrusts)
+
+
+@target("command", command_seeds, (LinkError,), max_bytes=160, mutants=4000)
+def command(data: bytes) -> None:
+    """What is taken is the bytes and nothing else; without the MAC nothing is taken."""
+    try:
+        decode_command(data, KEY)
+        raise AssertionError("taken without the key")
+    except LinkError:
+        pass
+    decoded = decode_command(sealed(data), KEY)
+    assert 1 <= len(decoded.thrusts) <= MAX_THRUSTERS
+    again = encode_command(decoded, KEY)
+    assert again[: len(data)] == data or has_nan(decoded.thrusts)  # a NaN may come out quiet
+    assert data[:4] == COMMAND_MAGIC
+
+
+def sample_seeds():
+    for state in FollowerState:
+        sample = Sample(
+            state, Refusal.NONE, 10**6, 3, 5, 7, 9, 11, 13, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8),
+            (1.0, 2.0),
+        )  # fmt: skip
+        yield encode_sample(sample, KEY)[:-MAC_BYTES]
+
+
+@target("sample", sample_seeds, (LinkError,), max_bytes=180, mutants=4000)
+def sample(data: bytes) -> None:
+    """The same for samples, whose numbers are all finite."""
+    decoded = decode_sample(sealed(data), KEY)
+    assert all(map(isfinite, (*decoded.omega_in_b, *decoded.a_in_b, *decoded.thrusts)))
+    assert 0 <= decoded.t_us < 1 << 60
+    assert encode_sample(decoded, KEY)[: len(data)] == data
+    assert data[:4] == SAMPLE_MAGIC
+
+
+class RobotRig:
+    """A robot's end, and somebody who has its key."""
+
+    def __init__(self):
+        self.end, self.now_us, self.nonce = RobotEnd(LIMITS, 9, KEY), 1_000_000, 0
+        self.counter = 100
+        self.taken_us = 0
+
+    def thrusts(self):
+        thrusts = self.end.setpoint(self.now_us)
+        assert np.isfinite(thrusts).all()
+        assert thrusts.min() >= 0.0
+        assert thrusts.max() <= LIMITS.f_max * (1.0 + 1e-5)
+        if thrusts.any():
+            assert self.end.state in MOVING, "thrust though it refuses"
+            silence = self.now_us - self.taken_us
+            assert silence <= LIMITS.silence_us or self.end.state != FollowerState.RUNNING
+        return thrusts
+
+    def tick(self, dt_ms: int) -> None:
+        self.now_us += 1000 * dt_ms
+        self.nonce += 1
+        data = self.end.sample(self.now_us, self.nonce, STILL, STILL, self.thrusts())
+        assert decode_sample(data, KEY).nonce == self.nonce
+
+    def honest(self, changes: bytes) -> bytes:
+        """The next command of one who means well, with the thrust of the first byte."""
+        self.counter += 1
+        thrust = LIMITS.f_max * (changes[0] if changes else 0) / 255
+        body = Command(5, self.counter, self.nonce, 1, True, (thrust, thrust))
+        return encode_command(body, KEY)[:-MAC_BYTES]
+
+    def step(self, piece: bytes) -> None:
+        kind, dt_ms = (piece + b"\0\0")[:2]
+        self.tick(dt_ms)
+        if kind % 5 != TICK:
+            self.hear(kind % 5, piece[2:])
+
+    def hear(self, kind: int, rest: bytes) -> None:
+        before, state = self.thrusts(), self.end.state
+        if kind == FORGED:
+            assert self.end.receive(rest, STRANGER, self.now_us) == Refusal.MALFORMED
+            assert self.end.state == state
+            assert np.array_equal(self.thrusts(), before)
+            assert STRANGER not in self.end.recipients(self.now_us)
+            return
+        body = rest if kind == SEALED else bytearray(self.honest(rest))
+        if kind == PATCHED and len(rest) > 1:
+            at = rest[1] % len(body)
+            body[at : at + len(rest) - 2] = rest[2:][: len(body) - at]
+        why = self.end.receive(sealed(bytes(body)), PEER, self.now_us)
+        if why == Refusal.NONE:
+            self.taken_us = self.now_us
+        after = self.thrusts()
+        if why != Refusal.NONE or state == FollowerState.REFUSING:
+            assert (after <= before).all(), "what is refused gives thrust"
+
+
+def robot_seeds():
+    def piece(kind, dt_ms=5, rest=b""):
+        return bytes([kind, dt_ms]) + rest
+
+    start = [piece(HONEST)] * 7
+    flight = [piece(HONEST, rest=bytes([level])) for level in (50, 90, 120, 90)]
+    yield together([*start, *flight, piece(TICK, 80), piece(TICK, 250), *start, *flight])
+    yield together([*start, *flight, piece(TICK, 80), *flight])
+    yield together([*start, *flight, piece(PATCHED, 5, b"\0\6\2")])  # flags: stop
+    yield together([*start, piece(PATCHED, 5, b"\0\x08\x09"), *start])  # a later epoch
+    yield together([*start, *flight, piece(SEALED, 5, next(iter(command_seeds())))])
+    yield together([*start, *flight, piece(FORGED, 5, 3 * b"LLcm\2\2\1\0" + 48 * b"\0")])
+
+
+@target("robot_end", robot_seeds, max_bytes=2048, mutants=600)
+def robot_end(data: bytes) -> None:
+    """Whatever who has the key says, and when: thrust within its range, and none unasked for."""
+    rig = RobotRig()
+    for piece in pieces(data):
+        rig.step(piece)
+
+
+def control_seeds():
+    samples = list(sample_seeds())
+    yield together([b"\0" + one for one in samples])
+    yield together([b"\1" + one for one in samples])
+    yield together([b"\2" + samples[0], b"\3" + samples[1], b"\1" + samples[2]])
+    yield together([b"\0" + heard(k) for k in range(1, 8)] + [b"\1" + heard(9)])
+
+
+def heard(counter: int, epoch: int = 9) -> bytes:
+    """A sample of a robot that has heard the first command, and follows a later epoch."""
+    said = Sample(
+        FollowerState.REFUSING, Refusal.EPOCH, 10**6, 3, 5, epoch, 11, counter, 13, STILL, STILL,
+        (0.0, 0.0),
+    )  # fmt: skip
+    return encode_sample(said, KEY)[:-MAC_BYTES]
+
+
+@target("control_end", control_seeds, max_bytes=2048, mutants=600)
+def control_end(data: bytes) -> None:
+    """Whatever a robot says: samples in order, and the next command is one that can be sent."""
+    challenges = iter(range(5, 1 << 20))
+    end = ControlEnd(2, LIMITS.f_max, LIMITS.max_rise, 5, KEY, lambda: next(challenges))
+    last = None
+    for k, piece in enumerate(pieces(data)):
+        now = 0.005 * k
+        armed = piece[:1] == b"\1"
+        said = end.command(ThrustCommand(np.full(2, 2.0 * armed), armed), now)
+        sent = decode_command(said, KEY)
+        assert sent.epoch >= 5
+        assert max(sent.thrusts) <= LIMITS.f_max
+        dropped = end.dropped
+        heard = end.receive(piece[1:] if piece[:1] == b"\2" else sealed(piece[1:]), now)
+        assert end.dropped == dropped + (heard is None)
+        if heard is not None:
+            assert np.isfinite(heard.omega_in_b).all()
+            assert np.isfinite(heard.a_in_b).all()
+            assert heard.round_trip_s is None or 0.0 <= heard.round_trip_s <= now
+            last = heard
+    assert last is None or last.thrusts.shape == (2,)
