@@ -1,0 +1,244 @@
+"""The doors under attack while a virtual phone leads the simulated robot, beside a quiet part.
+
+    python -m tests.bench.bench_attacks [--seconds 20]
+
+Everything stays on the loopback interface and ends by itself. The exit code is 1 if a goal is
+missed. Attackers, server, robot and phone share one machine: what floods cost it counts here, too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+import numpy as np
+
+from hardware.follower import FollowerError
+from hardware.sim.truth import TruthClient
+from server.one_line import Parser
+from tests.bench.attacks import (
+    HOST,
+    Attack,
+    Target,
+    attacked,
+    bombs,
+    careless,
+    datagram_ports,
+    flood_datagrams,
+    flood_http,
+    hostile_sdp,
+    idle_tls,
+    open_from,
+    silent,
+    slow_loris,
+)
+from tests.e2e.serving import Serving, serving
+from tests.e2e.test_serve import processes
+
+PAIRED = "127.0.0.99"
+"""A phone that was paired; its address is that of no attacker."""
+PERIOD_S, START_S, AFTER_S = 0.25, 60.0, 12.0
+MOST_MB, LEFT_MB, LOG_MB, RATIO, STOP_S = 50.0, 15.0, 1.0, 1.1, 1.0
+ZERO_N = 1e-3
+
+
+def everything(scale: float = 1.0) -> list[Attack]:
+    """Every attack, with so many times as many sockets."""
+    many = [silent(int(2_000 * scale)), idle_tls(int(200 * scale)), slow_loris(int(50 * scale))]
+    return [*many, flood_http, flood_datagrams, bombs, hostile_sdp]
+
+
+@dataclass(slots=True)
+class Part:
+    """What was seen in one part of the run."""
+
+    name: str
+    phone_s: list[float] = field(default_factory=list)
+    """How long a paired phone waited for a new TLS connection and an answer."""
+    supervisor_s: list[float] = field(default_factory=list)
+    unanswered: int = 0
+    rss_mb: float = 0.0
+    """The most."""
+    positions: list[np.ndarray] = field(default_factory=list)
+    modes: set[str] = field(default_factory=set)
+
+    def rms_mm(self, where: np.ndarray) -> float:
+        """How far the robot was from where it was meant to be."""
+        if not self.positions:
+            return float("nan")
+        away = np.asarray(self.positions) - where
+        return 1e3 * float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
+
+    def row(self, where: np.ndarray) -> str:
+        waits = [f"{1e3 * np.quantile(one or [np.nan], 0.95):8.0f}" for one in
+                 (self.phone_s, self.supervisor_s)]  # fmt: skip
+        flown = "/".join(sorted(self.modes))
+        return (
+            f"{self.name:9}{' '.join(waits)} {self.unanswered:10d} {self.rss_mb:8.0f}"
+            f" {self.rms_mm(where):8.1f}  {flown}"
+        )
+
+
+HEAD = (
+    "part      phone ms   superv. ms  unanswered   RSS MB   RMS mm  modes   (p95; new connections)"
+)
+
+
+def rss_mb(pid: int) -> float:
+    """Resident memory."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0
+
+
+def ask_as_phone(server: Serving, port: int) -> float:
+    """A new TLS connection and an answer; how long that took [s]."""
+    began = time.monotonic()
+    with careless().wrap_socket(open_from(PAIRED, port, 5.0)) as page:
+        page.sendall(
+            f"GET /api/whoami HTTP/1.1\r\nHost: {HOST}\r\nConnection: close\r\n"
+            f"Authorization: Bearer {server.operator_token}\r\n\r\n".encode()
+        )
+        if b" 200 " not in page.recv(4_096):
+            raise OSError("no answer")
+    return time.monotonic() - began
+
+
+def watch(server: Serving, target: Target, name: str, seconds: float) -> Part:
+    """Ask as phone and as supervisor, and look at the robot."""
+    part, pid = Part(name), processes(server.process.pid)["server"]
+    with contextlib.closing(TruthClient(server.truth_port)) as truth:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            due = time.monotonic() + PERIOD_S
+            try:
+                part.phone_s.append(ask_as_phone(server, target.https))
+            except OSError:
+                part.unanswered += 1
+            try:
+                began = time.monotonic()
+                part.modes.add(str(server.request("GET", "/api/status")["mode"]))
+                part.supervisor_s.append(time.monotonic() - began)
+            except (OSError, urllib.error.URLError):
+                part.unanswered += 1
+            with contextlib.suppress(FollowerError):
+                part.positions.append(truth.latest().p_bf_in_f[-1])
+            part.rss_mb = max(part.rss_mb, rss_mb(pid))
+            time.sleep(max(0.0, due - time.monotonic()))
+    return part
+
+
+def stop_s(server: Serving) -> float:
+    """From STOP as a supervisor to no thrust [s]."""
+    began = time.monotonic()
+    server.request("POST", "/api/stop")
+    with contextlib.closing(TruthClient(server.truth_port)) as truth:
+        while time.monotonic() < began + 5.0:
+            with contextlib.suppress(FollowerError):
+                if float(np.abs(truth.latest().thrusts).sum()) < ZERO_N:
+                    return time.monotonic() - began
+            time.sleep(0.005)
+    return float("inf")
+
+
+def target_of(server: Serving) -> Target:
+    """Its ports; those of its datagrams once a phone leads."""
+    https, http = (int(url.rsplit(":", 1)[1]) for url in (server.https_url, server.http_url))
+    ports = datagram_ports(list(processes(server.process.pid).values()))
+    return Target(https, http, ports, server.operator_token)
+
+
+@contextlib.contextmanager
+def led(server: Serving) -> Iterator[bool]:
+    """A virtual phone leads; whether it got so far as to fly."""
+    words = [sys.executable, "-m", "server", "phone", "--hand", "steady", "--path", "webrtc"]
+    with subprocess.Popen(words, env=server.environment, stdout=subprocess.DEVNULL) as phone:
+        end = time.monotonic() + START_S
+        while time.monotonic() < end and server.request("GET", "/api/status")["mode"] != "TRACK":
+            time.sleep(0.2)
+        yield server.request("GET", "/api/status")["mode"] == "TRACK"
+        phone.send_signal(signal.SIGINT)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Of one run."""
+
+    flew: bool
+    parts: tuple[Part, Part, Part]
+    stop_s: float
+    log_mb: float
+    tally: dict[str, int]
+
+    def goals(self) -> Iterator[tuple[bool, str]]:
+        """(met, words) of each."""
+        quiet, under, after = self.parts
+        grown, left = under.rss_mb - quiet.rss_mb, after.rss_mb - quiet.rss_mb
+        yield under.unanswered == 0, f"unanswered under attack: {under.unanswered}"
+        yield self.stop_s <= STOP_S, f"STOP under attack to no thrust: {self.stop_s:.2f} s"
+        yield grown <= MOST_MB, f"memory +{grown:.0f} MB, at most {MOST_MB:g}"
+        yield left <= LEFT_MB, f"memory after it +{left:.0f} MB, at most {LEFT_MB:g}"
+        yield self.log_mb <= LOG_MB, f"log {self.log_mb:.3f} MB, at most {LOG_MB:g}"
+        where = centre(quiet)
+        ratio = under.rms_mm(where) / max(quiet.rms_mm(where), 1.0)
+        yield self.flew and ratio <= RATIO, f"pose error {ratio:.2f} × the quiet part's, {RATIO}"
+
+
+def centre(part: Part) -> np.ndarray:
+    """Where a steady hand means the robot to be."""
+    return np.median(np.asarray(part.positions or [np.zeros(3)]), axis=0)
+
+
+def run(seconds: float, scale: float = 1.0, flies: bool = True) -> Outcome:
+    """Quiet, under attack, afterwards."""
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as server:
+        phone = led(server) if flies else contextlib.nullcontext(False)
+        with phone as flew:
+            target = target_of(server)
+            ask_as_phone(server, target.https)  # its address is known from now on
+            time.sleep(8.0 if flew else 0.0)  # the integral learns the suspension
+            quiet = watch(server, target, "quiet", seconds)
+            with attacked(target, everything(scale)) as tally:
+                under = watch(server, target, "attacked", seconds)
+                stopped = stop_s(server)
+        pid = processes(server.process.pid)["server"]
+        time.sleep(AFTER_S)
+        after = Part("after", rss_mb=rss_mb(pid))
+        log_mb = (Path(folder) / "serve.log").stat().st_size / 1e6
+        return Outcome(flew, (quiet, under, after), stopped, log_mb, tally.counts)
+
+
+def arguments(argv: Sequence[str] | None = None) -> float:
+    parser = Parser(prog="python -m tests.bench.bench_attacks", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=20.0, help="of each part, at most 120")
+    return min(float(parser.parse_args(argv).seconds), 120.0)
+
+
+def main() -> int:
+    """Fly, attack, tell, judge."""
+    outcome = run(arguments())
+    where = centre(outcome.parts[0])
+    print(HEAD)
+    for part in outcome.parts:
+        print(part.row(where))
+    print(f"load {os.getloadavg()[0]:.1f}; attackers: {outcome.tally}")
+    judgement = list(outcome.goals())
+    for met, words in judgement:
+        print(f"{'met   ' if met else 'MISSED'}  {words}")
+    return 0 if all(met for met, _ in judgement) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

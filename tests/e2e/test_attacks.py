@@ -1,0 +1,16 @@
+"""The attack bench, briefly and without a flight: everybody who may is answered, memory stays."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.bench.bench_attacks import run
+
+pytestmark = pytest.mark.e2e
+
+
+def test_under_attack_phone_and_supervisor_are_answered_stop_works_and_memory_and_log_stay_small():
+    outcome = run(4.0, 0.3, flies=False)
+    *goals, _of_flights = outcome.goals()
+    assert [words for met, words in goals if not met] == []
+    assert outcome.tally["silent sockets"] == 600
