@@ -4,7 +4,7 @@
 #: make check   the same: lint, import rules, types, web client, all tests
 #: make fast    only the tests that together take less than half a minute
 #: make fuzz    search each parser of outside bytes for 60 s   (FUZZ_SECONDS=600 ARGS=records)
-#: make test-all  test, then fuzz
+#: make test-all  test, then fuzz, and the robot's watchdog in C as long
 #: make bench   only the measurements, on a quiet machine
 #: make lock    write requirements/*.txt anew from pyproject.toml (UPGRADE=1: newest versions)
 #: make clean   remove .venv, node_modules and caches
@@ -104,12 +104,13 @@ fuzz: dev
 test-all:
 	$(MAKE) test
 	$(MAKE) fuzz
+	LIGHTLEASH_FUZZ_S=60 $(BIN)/pytest tests/hardware/test_watchdog_fuzz.py
 
 bench: dev
 	$(BIN)/lightleash experiments loop
 	$(BIN)/lightleash experiments loop --live
 	-$(BIN)/lightleash bench vision --jobs 2 --learn 5
-	for name in control control_law ekf estimators relative virtual_camera; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
+	for name in control control_law ekf estimators link relative virtual_camera; do $(BIN)/python -m tests.bench.bench_$$name || exit 1; done
 	-$(BIN)/python -m tests.bench.bench_browser
 	-$(BIN)/python -m tests.bench.bench_rtc
 	-$(BIN)/python -m tests.bench.bench_flights

@@ -1,0 +1,175 @@
+/* Throws anything at the watchdog, mostly with a right MAC, and holds its laws. For a fuzzer:
+ *
+ *   clang -g -O1 -fsanitize=fuzzer,address,undefined -DLIBFUZZER fuzz.c watchdog.c attitude.c hmac.c -lm
+ *
+ * or alone, with numbers of its own, for so many executions from a seed:
+ *
+ *   gcc -g -O1 -fsanitize=address,undefined -o fuzz fuzz.c watchdog.c attitude.c hmac.c -lm
+ *   ./fuzz 1000000 1
+ */
+#include "watchdog.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define N 3
+#define F_MAX 3.0
+#define COMMAND_BYTES (36u + 4u * N)
+
+static const uint8_t KEY[LL_KEY_BYTES] = {1, 2, 3};
+static const ll_attitude_gains GAINS = {
+    {1.0, 1.0, 1.0}, {0.3, 0.3, 0.4}, {{1, 2, 3, 4, 5, 6}, {-1, -2, 3, -4, 5, -6}, {0, 0, -6, 0, -10, 0}}};
+
+static void demand(int holds, const char *law)
+{
+    if (holds)
+        return;
+    fprintf(stderr, "broken: %s\n", law);
+    abort();
+}
+
+static void put(uint8_t *p, uint64_t value, int bytes)
+{
+    for (int i = 0; i < bytes; i++)
+        p[i] = (uint8_t)(value >> (8 * i));
+}
+
+/* One step of 8 bytes: what happens, how much time passes, what is in the datagram. */
+static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *nonce)
+{
+    static const int64_t PASSES[8] = {5000, 5000, 5000, 0, 41000, 61000, 300000, 3000000};
+    uint8_t data[LL_MAX_BYTES + 1] = {0}, digest[LL_DIGEST_BYTES], out[LL_MAX_BYTES];
+    float thrusts[LL_MAX_THRUSTERS], gyro[3], acc[3];
+    *now_us += PASSES[in[0] & 7];
+    for (int i = 0; i < 3; i++) {
+        gyro[i] = (float)(int8_t)in[5 + i % 3] / 8.0f;
+        acc[i] = (float)(int8_t)in[5 + (i + 1) % 3];
+    }
+    ll_setpoint(w, *now_us, thrusts);
+    size_t size = ll_sample(w, *now_us, ++*nonce, gyro, acc, thrusts, out);
+    demand(size == 92 + 4 * N, "a sample has its size");
+    memcpy(data, "LLcm\2", 5);
+    data[5] = (in[1] & 31) == 31 ? in[2] : N;
+    data[6] = in[1] >> 5 & 3;
+    put(data + 8, (uint64_t)(in[2] & 3) + (in[0] >> 7 ? w->epoch : 0), 8);
+    put(data + 16, in[3] & 7 ? *nonce : *nonce - in[3], 8);
+    put(data + 32, (in[4] & 15 ? (uint64_t)w->counter + 1 : in[5]), 4);
+    for (int i = 0; i < N; i++) {
+        float thrust = in[4] >> 7 ? (float)in[5 + i % 3] / 80.0f : 0.0f;
+        memcpy(data + 36 + 4 * i, &thrust, 4);
+        if (in[6] == 255)
+            memset(data + 36 + 4 * i, in[7], 4);
+    }
+    size_t length = COMMAND_BYTES;
+    if (in[7] == 254) /* another length, another word, no right MAC */
+        data[in[5] % LL_MAX_BYTES] ^= in[6];
+    if (in[7] == 253)
+        length = in[5] % (LL_MAX_BYTES - LL_MAC_BYTES);
+    ll_hmac_of(&w->hmac, data, length, digest);
+    memcpy(data + length, digest, LL_MAC_BYTES);
+    if (in[7] == 252)
+        data[length] ^= 1;
+    bool answer;
+    ll_state before = w->state;
+    float given = 0.0f, now = 0.0f;
+    for (int i = 0; i < N; i++)
+        given += thrusts[i];
+    ll_refusal why = ll_receive(w, data, length + LL_MAC_BYTES, *now_us, &answer);
+    demand(in[7] != 252 || why == LL_MALFORMED, "a wrong MAC is refused");
+    ll_setpoint(w, *now_us, thrusts);
+    for (int i = 0; i < N; i++) {
+        demand(isfinite(thrusts[i]) && thrusts[i] >= 0.0f && thrusts[i] <= F_MAX * 1.00001,
+               "thrusts are finite and within their limits");
+        now += thrusts[i];
+    }
+    demand(now == 0.0f || w->state != LL_REFUSING, "who refuses gives nothing");
+    demand(now <= given * 1.00001f + 1e-6f || why == LL_NONE, "only what is taken adds thrust");
+    demand(now == 0.0f || before != LL_REFUSING, "no thrust without a handshake");
+}
+
+#ifdef LIBFUZZER
+static int run(const uint8_t *data, size_t size, bool flies)
+{
+    ll_limits limits = {N, F_MAX, 1.0, 2000000, flies ? &GAINS : NULL};
+    ll_watchdog w;
+    int64_t now_us = 1000000;
+    uint64_t nonce = 1000;
+    ll_init(&w, &limits, 7, KEY);
+    for (; size >= 8; size -= 8, data += 8)
+        step(&w, data, &now_us, &nonce);
+    return 0;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    return size ? run(data + 1, size - 1, data[0] & 1) : 0;
+}
+#else
+/* Whole flights: zeros until it is ready, thrust, holes; and everything else, now and then. */
+static void draw(uint8_t in[8], uint64_t *state, unsigned wildness)
+{
+    for (int i = 0; i < 8; i++) {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        in[i] = (uint8_t)(*state >> 32);
+    }
+    if (in[0] % 64 >= wildness) { /* a good command */
+        in[0] = 0x80;
+        in[1] = 0x20;
+        in[3] = 1;
+        in[4] = (uint8_t)(in[4] | 1);
+        in[6] = in[6] % 128 ? 0 : 255; /* rarely not a number */
+        in[7] = in[6] ? 255 : in[7] & 0x7f;
+    }
+}
+
+int main(int argc, char **argv)
+{
+    if (argc != 3) {
+        fprintf(stderr, "usage: %s EXECUTIONS SEED\n", argv[0]);
+        return 2;
+    }
+    long executions = atol(argv[1]), reached[5] = {0};
+    uint64_t state = 88172645463325252u + (uint64_t)atol(argv[2]);
+    for (long done = 0; done < executions;) {
+        ll_limits limits = {N, F_MAX, 1.0, 2000000, done & 1 ? &GAINS : NULL};
+        ll_watchdog w;
+        int64_t now_us = 1000000;
+        uint64_t nonce = 1000;
+        unsigned wildness = (unsigned)(state % 12);
+        ll_init(&w, &limits, 7, KEY);
+        for (int k = 0; k < 999; k++, done++) {
+            uint8_t in[8];
+            draw(in, &state, wildness);
+            if (w.state == LL_REFUSING) {
+                in[4] &= 0x7f; /* zero first, */
+                in[2] = 1;     /* of a later epoch */
+                if (w.candidate)
+                    in[2] = (uint8_t)(w.candidate - w.epoch);
+            } else if (in[0] == 0x80) {
+                in[2] = 0;
+            }
+            if (w.candidate && in[0] == 0x80) {
+                uint32_t saved = w.counter;
+                w.counter = w.candidate_counter;
+                step(&w, in, &now_us, &nonce);
+                if (w.candidate)
+                    w.counter = saved;
+            } else {
+                step(&w, in, &now_us, &nonce);
+            }
+            reached[w.state]++;
+        }
+    }
+    printf("%ld executions: IDLE %ld, RUNNING %ld, RAMP %ld, REFUSING %ld, COAST %ld\n", executions,
+           reached[0], reached[1], reached[2], reached[3], reached[4]);
+    for (int i = 0; i < 5; i++)
+        if (reached[i] == 0)
+            return 1;
+    return 0;
+}
+#endif
