@@ -22,11 +22,16 @@ from numba.core import caching
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PACKAGES = ("pipeline", "hardware")
 _IS_COMPILED = re.compile(r"^@(?:kernel|numba\.njit)\b", re.MULTILINE)
-_IMPORTS = re.compile(r"^(?:from|import) ((?:pipeline|hardware)[\w.]*)", re.MULTILINE)
+_IMPORTS = re.compile(r"^from ((?:pipeline|hardware)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+_COMPILES_IN = re.compile(r"\b(?:[a-z_]\w*|[A-Z][A-Z0-9_]+)\b")
+"""Functions and constants."""
 
 
 def kernel_sources(root: str = ROOT) -> dict[str, str]:
-    """Text of every module below `root` that has kernels, and of all that these import, by name."""
+    """Text of every module below `root` with kernels, or with functions and constants they use.
+
+    By the modules' names. A class means nothing to a kernel, unless it is a named tuple.
+    """
     texts: dict[str, str] = {}
     for package in PACKAGES:
         for folder, _, files in os.walk(os.path.join(root, package)):
@@ -40,7 +45,11 @@ def kernel_sources(root: str = ROOT) -> dict[str, str]:
         module = new.pop()
         if module in texts and module not in found:
             found.add(module)
-            new += _IMPORTS.findall(texts[module])
+            new += (
+                other
+                for other, names in _IMPORTS.findall(texts[module])
+                if _COMPILES_IN.search(names) or "NamedTuple" in texts.get(other, "")
+            )
     return {module: texts[module] for module in sorted(found)}
 
 

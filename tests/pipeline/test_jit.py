@@ -59,3 +59,7 @@ def test_every_module_with_kernels_is_in_the_stamp_and_takes_numba_from_one_plac
     assert compiled <= set(known)
     direct = {m for m, text in texts.items() if re.search(r"^\s*(import|from) numba", text, re.M)}
     assert direct == {"pipeline.jit"}
+
+
+def test_what_only_gives_types_to_kernels_is_not_in_the_stamp():
+    assert not {"pipeline.signals", "pipeline.frames"} & set(kernel_sources())
