@@ -17,6 +17,7 @@ from server.experiments.faults import hazards, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import goals
 from server.experiments.faults.fault import Fault, Outcome, misses
+from server.experiments.faults.live import LIVE, outcome_of
 from server.experiments.faults.measure import percentile, row_of
 from server.experiments.forked import ForkError, forked
 
@@ -171,3 +172,23 @@ def test_each_hazard_is_shown_by_a_fault_or_by_a_test_that_exists(hazard: hazard
         path, _, name = test.partition("::")
         source = (ROOT / "tests" / path).read_text(encoding="utf-8")
         assert f"def {name}(" in source if name else "def test_" in source
+
+
+def watched(thrust_n: list[float], away_m: float = 0.1) -> np.ndarray:
+    t = 0.1 * np.arange(len(thrust_n))
+    return np.column_stack((t, thrust_n, np.full(len(t), away_m)))
+
+
+def test_a_live_fault_is_judged_by_when_thrust_ends_and_that_it_stays_so() -> None:
+    fault, before = LIVE[0], watched([2.0] * 10)
+    falling = [2.0] * 11 + np.linspace(2.0, 0.0, 20).tolist() + [0.0] * 20
+    down = outcome_of(fault, before, watched(falling, 0.12))
+    assert (down.missed, down.after_zero) == ("", 0)
+    assert down.falls_s == pytest.approx(1.4)
+    assert down.zero_s == pytest.approx(3.0)
+    assert down.excursion_mm == pytest.approx(20.0)
+    back = outcome_of(fault, before, watched([*falling, 1.0]))
+    assert (back.after_zero, back.missed) == (1, "1 samples after zero")
+    assert "met RAMP" in outcome_of(fault, before, watched(falling), "RAMP").missed
+    never = outcome_of(fault, before, watched([2.0] * 60))
+    assert "zero inf" in never.missed

@@ -15,9 +15,10 @@ from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
 from server.control import teleop_config
 from server.experiments import processes
-from server.experiments.faults import picture
+from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.fault import Fault, Outcome, suffer
+from server.experiments.faults.live import LiveOutcome
 from server.experiments.faults.measure import Row, row_of
 from server.experiments.forked import forked
 from server.experiments.gaps.flight import GapFlight
@@ -71,6 +72,8 @@ def flown(job: Job) -> list[Outcome]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fly, print, write, draw; 1 if a goal is missed, 2 if it can't be flown."""
+    if arguments.live:
+        return _live(arguments)
     try:
         robot_file = load_robot(arguments.robot)
     except RobotFileError as error:
@@ -91,6 +94,35 @@ def run(arguments: argparse.Namespace) -> int:
         file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
         print(f"\nwritten: {file}, {picture.draw(rows, arguments.out / 'faults.png')}")
     return 0 if all(holds.values()) else 1
+
+
+def _live(arguments: argparse.Namespace) -> int:
+    """The ones that need real processes."""
+    told = []
+    for one in live.fly(arguments.robot, arguments.gains, arguments.live):
+        told.append(one)
+        print(text_of(one), flush=True)
+    thrust = sum(one.after_zero for one in told)
+    holds = {
+        f"live: {thrust} samples with thrust after zero, in {len(told)} faults": thrust == 0,
+        "live: each in time": not any(one.missed for one in told),
+    }
+    print("\n".join(statements(holds)))
+    if arguments.out is not None:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        figures = {"rows": [plain(asdict(one)) for one in told], "holds": holds}
+        file = arguments.out / "faults_live.json"
+        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
+        print(f"\nwritten: {file}")
+    return 0 if all(holds.values()) else 1
+
+
+def text_of(one: LiveOutcome) -> str:
+    """A line."""
+    return (
+        f"{one.fault:<24} falls after {one.falls_s:5.2f} s, zero after {one.zero_s:5.2f} s, "
+        f"{one.after_zero} samples after, {one.excursion_mm:4.0f} mm  {one.missed}"
+    )
 
 
 def _outcomes(
@@ -124,6 +156,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")
     parser.add_argument("--seeds", type=whole(1, 1000), default=25, help="flights of each fault")
+    parser.add_argument(
+        "--live",
+        type=whole(1, 1000),
+        default=0,
+        metavar="N",
+        help="instead: kill and stop real processes in flight, each N times; Linux",
+    )
     parser.add_argument("--only", default="", metavar="WORDS", help="faults with these in the name")
     parser.add_argument("--robot", default="ames", help="name or path of a robot file")
     parser.add_argument("--gains", default="phone", help="a gain set of the robot file")

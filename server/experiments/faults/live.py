@@ -1,0 +1,219 @@
+"""Faults in real time: real processes are killed or stopped in flight, the robot is watched.
+
+A busy machine adds its own holes to the times; the samples after zero are what counts.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from hardware.follower import FollowerError
+from hardware.sim.truth import TruthClient
+from server import clock, live_loop
+from server.experiments.faults.catalogue import RAMP_S, RAMPED_S, ROBOT_RAMP_S
+from server.experiments.faults.fault import ZERO_N
+from server.runtime import RUN_FILE
+
+MODULES: Final = {"robot": "hardware.sim.robot", "control": "server.control", "server": "_server"}
+FLIES_S: Final = 3.0
+"""Before the fault."""
+WATCHED_S: Final = 6.0
+SLACK_S: Final = 0.3
+"""Of a busy machine."""
+TRACK_S: Final = 180.0
+DOWN_S: Final = 30.0
+LOOK_S: Final = 0.005
+Victim = Literal["phone", "server", "control", "robot"]
+
+
+@dataclass(frozen=True, slots=True)
+class LiveFault:
+    """What happens to which process, and by when there is no thrust."""
+
+    name: str
+    victim: Victim
+    number: signal.Signals
+    zero_s: float
+
+
+LIVE: Final = (
+    LiveFault("phone killed", "phone", signal.SIGKILL, RAMP_S + RAMPED_S),
+    LiveFault("phone stopped", "phone", signal.SIGSTOP, RAMP_S + RAMPED_S),
+    LiveFault("server killed", "server", signal.SIGKILL, RAMP_S + RAMPED_S),
+    LiveFault("server stopped for 2 s", "server", signal.SIGSTOP, RAMP_S + RAMPED_S),
+    LiveFault("control killed", "control", signal.SIGKILL, ROBOT_RAMP_S + RAMPED_S),
+    LiveFault("control stopped for 2 s", "control", signal.SIGSTOP, ROBOT_RAMP_S + RAMPED_S),
+    LiveFault("robot killed", "robot", signal.SIGKILL, 0.1),
+)
+STOPPED_S: Final = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class LiveOutcome:
+    """What followed."""
+
+    fault: str
+    falls_s: float
+    """Until thrust is below four fifths of what it was, for good."""
+    zero_s: float
+    after_zero: int
+    excursion_mm: float
+    """Beyond the farthest before."""
+    missed: str
+
+
+class Rig:
+    """A running `lightleash serve` and who asks it."""
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        """It has written its run file."""
+        self._environment = dict(environment)
+        folder = Path(environment["XDG_RUNTIME_DIR"]) / "lightleash"
+        self._run = json.loads((folder / RUN_FILE).read_text())
+        self.truth = TruthClient(int(self._run["truth_port"]))
+
+    def mode(self) -> str:
+        """As the server says; "" while it says nothing."""
+        headers = {"Authorization": f"Bearer {self._run['supervisor_token']}"}
+        request = urllib.request.Request(f"{self._run['http_url']}/api/status", headers=headers)
+        try:
+            with urllib.request.urlopen(request, timeout=2.0) as answer:
+                return str(json.loads(answer.read())["mode"])
+        except (OSError, ValueError, KeyError):
+            return ""
+
+    def until(self, condition: Callable[[], bool], seconds: float, what: str) -> None:
+        """Wait for it.
+
+        Raises:
+            RuntimeError: it took longer.
+        """
+        end = clock.now() + seconds
+        while not condition():
+            if clock.now() > end:
+                raise RuntimeError(f"after {seconds:g} s still not: {what}")
+            time.sleep(0.05)
+
+    @contextlib.contextmanager
+    def phone(self, seed: int) -> Iterator[subprocess.Popen[bytes]]:
+        """A virtual phone that leads."""
+        command = [sys.executable, "-m", "server.virtual_phone", "--hand", "moving"]
+        phone = subprocess.Popen(
+            [*command, "--seed", str(seed)],
+            env=self._environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            self.until(lambda: self.mode() == "TRACK", TRACK_S, "TRACK")
+            yield phone
+        finally:
+            phone.kill()
+            phone.wait()
+            self.until(lambda: self.mode() == "DISARMED", DOWN_S, "DISARMED")
+
+    def look(self) -> tuple[float, float]:
+        """Largest thrust [N] and distance from rest [m]; none while the robot is dead."""
+        try:
+            truth = self.truth.latest()
+        except FollowerError:
+            return 0.0, 0.0
+        return float(truth.thrusts.max()), float(np.linalg.norm(truth.p_bf_in_f[-1]))
+
+
+def children(launcher: int) -> dict[str, int]:
+    """The launcher's processes by name; on Linux."""
+    found: dict[str, int] = {}
+    for pid in Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split():
+        with contextlib.suppress(OSError):
+            words = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+            found |= {name: int(pid) for name, module in MODULES.items() if module in words}
+    return found
+
+
+def fly(robot: str, gains: str, repeats: int) -> Iterator[LiveOutcome]:
+    """Each fault so often, in one server's life.
+
+    Raises:
+        RuntimeError: it did not start, or did not come back.
+    """
+    with live_loop.server(robot, gains) as environment:
+        rig = Rig(environment)
+        (launcher,) = (int(p) for p in _launchers())
+        for repeat in range(repeats):
+            for fault in LIVE:
+                yield _suffered(rig, launcher, fault, repeat)
+
+
+def _launchers() -> list[str]:
+    """Our child that is the launcher."""
+    own = os.getpid()
+    pids = Path(f"/proc/{own}/task/{own}/children").read_text().split()
+    words = {pid: Path(f"/proc/{pid}/cmdline").read_text().split("\0") for pid in pids}
+    return [pid for pid, said in words.items() if "serve" in said]
+
+
+def _suffered(rig: Rig, launcher: int, fault: LiveFault, seed: int) -> LiveOutcome:
+    with rig.phone(seed) as phone:
+        before = _watch(rig, FLIES_S)
+        mode = rig.mode()
+        pid = phone.pid if fault.victim == "phone" else children(launcher)[fault.victim]
+        os.kill(pid, fault.number)
+        if fault.victim != "phone":
+            phone.send_signal(signal.SIGSTOP)  # it would arm again
+        wakes = fault.number == signal.SIGSTOP and fault.victim != "phone"
+        after = _watch(rig, STOPPED_S if wakes else WATCHED_S)
+        if wakes:
+            os.kill(pid, signal.SIGCONT)
+            rest = _watch(rig, WATCHED_S - STOPPED_S)
+            rest[:, 0] += STOPPED_S
+            after = np.concatenate((after, rest))
+    return outcome_of(fault, before, after, mode)
+
+
+def _watch(rig: Rig, seconds: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """(n, 3): time [s], largest thrust [N], distance from rest [m]."""
+    begin, rows = clock.now(), []
+    while (t := clock.now() - begin) < seconds:
+        rows.append((t, *rig.look()))
+        time.sleep(LOOK_S)
+    return np.array(rows)
+
+
+def outcome_of(
+    fault: LiveFault,
+    before: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+    after: np.ndarray[tuple[int, int], np.dtype[np.float64]],
+    mode: str = "TRACK",
+) -> LiveOutcome:
+    """Judge what was watched before and after a fault that met this mode, rows as of `_watch`."""
+    t, thrust, away = after.T
+    usual = float(np.median(before[:, 1]))
+    high = np.flatnonzero(thrust >= 0.8 * usual)
+    zero = np.flatnonzero(thrust < ZERO_N)
+    zero_s = float(t[zero[0]]) if len(zero) else float("inf")
+    again = int(np.sum(thrust[zero[0] :] >= ZERO_N)) if len(zero) else 0
+    missed = [f"zero {zero_s:.2f} s"] * (zero_s > fault.zero_s + SLACK_S)
+    missed += [f"met {mode or 'no answer'}"] * (mode != "TRACK")
+    missed += [f"{again} samples after zero"] * (again > 0)
+    return LiveOutcome(
+        fault=fault.name,
+        falls_s=float(t[high[-1]]) if len(high) else 0.0,
+        zero_s=zero_s,
+        after_zero=again,
+        excursion_mm=1e3 * max(0.0, float(away.max() - before[:, 2].max())),
+        missed="; ".join(missed),
+    )
