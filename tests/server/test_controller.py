@@ -262,7 +262,7 @@ def test_a_link_with_six_gaps_a_minute_warns_whoever_arms():
         rig.k += 20
         status = rig.status(rig.run(0.6)[-1][1])
     assert status.warnings == [
-        "Control stood still 6 times in the last minute, the longest 0.10 s."
+        "The server's computer stood still 6 times in a minute, the longest 0.10 s."
     ]
     assert status.refusals == []
 
