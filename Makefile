@@ -6,14 +6,14 @@
 #: make fuzz    search each parser of outside bytes for 60 s   (FUZZ_SECONDS=600 ARGS=records)
 #: make test-all  test, then fuzz, and the robot's watchdog in C as long
 #: make bench   only the measurements, on a quiet machine
+#: make mutants do tests notice small changes in what keeps a robot safe?  (ARGS="FILE --all")
 #: make lock    write requirements/*.txt anew from pyproject.toml (UPGRADE=1: newest versions)
 #: make clean   remove .venv, node_modules and caches
 #: Needs Python 3.11 or later and make; uses uv where there is one. PYTHON=... picks the Python.
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
-.PHONY: fuzz test-all
-.PHONY: lock clean
+.PHONY: fuzz test-all mutants lock clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -114,6 +114,10 @@ bench: dev
 	-$(BIN)/python -m tests.bench.bench_browser
 	-$(BIN)/python -m tests.bench.bench_rtc
 	-$(BIN)/python -m tests.bench.bench_flights
+
+# Needs gcc for the watchdog in C.
+mutants: dev
+	$(BIN)/python -m tests.mutants $(ARGS)
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt

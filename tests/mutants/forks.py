@@ -1,0 +1,127 @@
+"""Tests run in forked processes: what is imported, is imported once for all mutants."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import pytest
+from hypothesis import HealthCheck, Phase, settings
+
+CPU_FACTOR, CPU_SPARE_S = 5, 5
+"""A mutant has this many times the CPU time of the unchanged file, and some more."""
+WALL_FACTOR = 20
+"""... and this many times that by the clock, for one that waits for ever."""
+MEMORY_BYTES = 8 << 30
+
+
+class Outcome(Enum):
+    """What tests make of a mutant."""
+
+    KILLED = "killed"
+    SURVIVED = "survived"
+    ENDLESS = "endless"
+    """Killed by its time limit."""
+
+
+class HarnessError(Exception):
+    """The tests could not be asked."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Of one process."""
+
+    outcome: Outcome
+    cpu_s: float
+
+
+class _NoShrinking:
+    """Hypothesis draws the same examples each time, and does not look for smaller ones."""
+
+    def pytest_sessionstart(self) -> None:
+        settings.register_profile(
+            "mutants",
+            deadline=None,
+            derandomize=True,
+            phases=(Phase.explicit, Phase.generate),
+            suppress_health_check=list(HealthCheck),
+        )
+        settings.load_profile("mutants")
+
+
+def each_in_a_fork(
+    bodies: Iterable[Callable[[], int]], jobs: int, cpu_s: int
+) -> Iterator[tuple[int, Result]]:
+    """Run `bodies`, `jobs` at a time; (index, result) as they end.
+
+    Raises:
+        HarnessError: pytest had no tests to run, or could not.
+    """
+    running: dict[int, int] = {}
+    waiting = enumerate(bodies)
+    while True:
+        for index, body in waiting:
+            running[_fork(body, cpu_s)] = index
+            if len(running) >= jobs:
+                break
+        if not running:
+            return
+        pid, status, usage = os.wait4(-1, 0)
+        if pid in running:
+            yield running.pop(pid), _result(status, usage.ru_utime + usage.ru_stime)
+
+
+def run_pytest(arguments: Iterable[str], plugins: Iterable[object] = ()) -> int:
+    """Exit status of pytest in this process, up to the first failure; nothing is printed."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    os.dup2(1, 2)
+    quick = (
+        "-x",
+        "-q",
+        "--tb=no",
+        "-W",
+        "ignore::pytest.PytestAssertRewriteWarning",
+        "-p",
+        "no:cacheprovider",
+        "-p",
+        "no:xdist",
+    )
+    return int(pytest.main([*quick, *arguments], plugins=[_NoShrinking(), *plugins]))
+
+
+def _fork(body: Callable[[], int], cpu_s: int) -> int:
+    sys.stdout.flush()
+    pid = os.fork()
+    if pid:
+        return pid
+    status = 70
+    try:
+        resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        signal.alarm(WALL_FACTOR * cpu_s)
+        status = body()
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(status)
+
+
+def _result(status: int, cpu_s: float) -> Result:
+    if os.WIFSIGNALED(status):
+        timed = os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGALRM, signal.SIGKILL)
+        return Result(Outcome.ENDLESS if timed else Outcome.KILLED, cpu_s)
+    code = os.WEXITSTATUS(status)
+    if code == pytest.ExitCode.OK:
+        return Result(Outcome.SURVIVED, cpu_s)
+    # A module that cannot even be imported interrupts pytest while it collects.
+    if code in (pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED):
+        return Result(Outcome.KILLED, cpu_s)
+    raise HarnessError(f"pytest ended with status {code}")
