@@ -101,7 +101,7 @@ def _fork(body: Callable[[], int], cpu_s: int) -> int:
     pid = os.fork()
     if pid:
         return pid
-    status = 70
+    status, errors = 70, os.fdopen(os.dup(2), "w")  # pytest's own are not shown
     try:
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
@@ -109,7 +109,8 @@ def _fork(body: Callable[[], int], cpu_s: int) -> int:
         signal.alarm(WALL_FACTOR * cpu_s)
         status = body()
     except BaseException:
-        traceback.print_exc()
+        traceback.print_exc(file=errors)
+        errors.flush()
     finally:
         os._exit(status)
 
