@@ -163,9 +163,13 @@ def test_it_says_how_long_it_waits_and_whether_it_follows_again() -> None:
     for state, inputs, left, resumes in [
         (tracking(), HELD, None, False),
         (run(tracking(), lost, 200), lost, 600, True),
+        (run(tracking(), lost, 200), replace(lost, held=False), 600, False),
+        (run(tracking(), lost, 200), replace(lost, press=2), 600, False),
         (run(tracking(), replace(HELD, gap="x"), 205), HELD, 2_800, True),
         (run(tracking(), LIFTED, 105), GOOD, 2_900, False),
         (run(tracking(), LIFTED, 105), lost, 600, False),
+        (run(tracking(), LIFTED, 105), replace(GOOD, operator_ms=150), 2_900, False),
+        (run(tracking(), LIFTED, 105), replace(GOOD, pose_ms=2_500), 2_900, False),
         (run(tracking(), LIFTED, 105), replace(HELD, press=2), 2_900, True),
         (run(tracking(), LIFTED, 105), replace(GOOD, pose_ms=3_000), 1_000, False),
         (run(tracking(), replace(HELD, fault="x"), 5), HELD, None, False),
@@ -199,3 +203,94 @@ def test_an_estimator_that_cannot_bridge_holds_as_soon_as_the_picture_is_old() -
 def test_nobody_takes_off_with_a_robot_that_the_camera_does_not_see() -> None:
     unseen = replace(GOOD, pose_ms=301)
     assert "not see" in failsafe.refusals(run(Failsafe(), unseen, 600), unseen, LIMITS)[0]
+
+
+STARTED = Failsafe(bad_ms=0)
+ALREADY = dict.fromkeys((Mode.ARMED, Mode.TRACK, Mode.COAST, Mode.HOLD), ("Already armed.",))
+REFUSED: dict[Mode, tuple[str, ...]] = {
+    Mode.DISARMED: (),
+    Mode.STOPPED: ("Stopped: a supervisor must reset first.",),
+    Mode.RAMP: ("Wait for the end of the ramp.",),
+    **ALREADY,
+}
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_every_mode_but_disarmed_refuses_arming_in_its_own_words(mode: Mode) -> None:
+    assert failsafe.refusals(replace(STARTED, mode=mode), GOOD, LIMITS) == REFUSED[mode]
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"fault": "spins"}, "spins"),
+        ({"doubt": "unsure"}, "unsure"),
+        ({"gap": "stood still", "fault": "spins"}, "stood still"),
+        ({"robot_ms": 151, "operator_ms": 151}, "No word from the robot."),
+        ({"operator_ms": 151, "phone_imu_ms": 151}, "No word from the phone."),
+        ({"phone_imu_ms": 151, "pose_ms": 9_999}, "The phone's motion sensors are silent."),
+        ({"pose_ms": 2_501, "doubt": "unsure"}, "The camera has lost the robot."),
+        ({"held": True}, "Let go of the button before arming."),
+        ({"refusals": ("no", "no")}, "no"),
+    ],
+)
+def test_arming_is_refused_once_for_what_somebody_can_mend_first(
+    change: dict[str, object], why: str
+) -> None:
+    inputs = replace(GOOD, **change)  # type: ignore[arg-type]
+    assert failsafe.refusals(STARTED, inputs, LIMITS) == (why,)
+
+
+def test_the_camera_must_see_the_robot_to_arm_up_to_the_limit_and_not_beyond() -> None:
+    at, beyond = (replace(GOOD, pose_ms=LIMITS.pose_arm + more) for more in (0, 1))
+    assert failsafe.refusals(STARTED, at, LIMITS) == ()
+    assert failsafe.refusals(STARTED, beyond, LIMITS) == ("The camera does not see the robot.",)
+
+
+@pytest.mark.parametrize(
+    ("bad_ms", "recovery_ms"),
+    [
+        (1, LIMITS.recover_short),
+        (LIMITS.short, LIMITS.recover_short),
+        (LIMITS.short + 1, LIMITS.recover),
+        (failsafe.FOREVER_MS, LIMITS.recover),
+    ],
+)
+def test_what_was_bad_for_longer_than_a_gap_must_be_good_for_longer(
+    bad_ms: int, recovery_ms: int
+) -> None:
+    state, ms = Failsafe(bad_ms=bad_ms), 0
+    while state.bad_ms:
+        assert failsafe.refusals(state, GOOD, LIMITS) == ("Just recovered: wait a moment.",)
+        state, ms = failsafe.step(state, GOOD, 1, LIMITS), ms + 1
+        assert state.good_ms == ms
+    assert ms == recovery_ms
+
+
+@pytest.mark.parametrize("dt_ms", [0, 1, 5])
+def test_something_bad_counts_however_short_it_was(dt_ms: int) -> None:
+    state = failsafe.step(STARTED, replace(GOOD, fault="x"), dt_ms, LIMITS)
+    assert (state.bad_ms, state.good_ms) == (max(1, dt_ms), 0)
+
+
+def test_a_step_longer_than_a_silence_has_seen_nothing_good() -> None:
+    assert failsafe.step(STARTED, GOOD, LIMITS.silent, LIMITS).good_ms == LIMITS.silent
+    assert failsafe.step(STARTED, GOOD, LIMITS.silent + 1, LIMITS).bad_ms == LIMITS.silent + 1
+
+
+def test_a_hold_counts_from_where_the_coast_before_it_began() -> None:
+    assert run(tracking(), LIFTED, 5).mode_ms == 0
+    coasting = run(tracking(), replace(HELD, operator_ms=400), 205)
+    assert coasting.mode_ms == 200
+    for lifted in (LIFTED, replace(HELD, press=2)):
+        held = failsafe.step(coasting, lifted, 5, LIMITS)
+        assert (held.mode, held.mode_ms) == (Mode.HOLD, 205)
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_thrust_is_whole_in_flight_falls_in_the_ramp_and_is_zero_otherwise(mode: Mode) -> None:
+    flying = mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
+    for mode_ms in (0, 500, 2_000, 3_000):
+        share = max(0.0, 1 - mode_ms / 2_000) if mode == Mode.RAMP else float(flying)
+        state = Failsafe(mode=mode, mode_ms=mode_ms)
+        assert failsafe.ceiling(state, LIMITS) == pytest.approx(share)
