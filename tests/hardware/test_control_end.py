@@ -12,13 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware import control_end
-from hardware.control_end import SENT_KEPT, ControlEnd, random_u64
+from hardware.control_end import ControlEnd, random_u64
 from hardware.datagram import U32, U64, Command, Sample, decode_command, encode_sample
 from hardware.follower import FollowerState, Refusal, ThrustCommand
 
 KEY = bytes(range(16))
 THRUSTERS, F_MAX, MAX_RISE, EPOCH = 3, 4.0, 0.5, 10
 REFUSING = FollowerState.REFUSING
+SENT_KEPT = 256
+"""Commands within which an answer must come."""
 
 
 class Bench:
@@ -175,6 +177,8 @@ def test_before_any_command_was_counted_there_is_no_round_trip() -> None:
     [
         (REFUSING, EPOCH, (), True),
         (REFUSING, EPOCH + 5, (), True),
+        (REFUSING, U64 - 2, (), True),
+        (REFUSING, U64 - 1, (), False),
         (REFUSING, EPOCH - 1, (), False),
         (REFUSING, 0, (), False),
         (FollowerState.RAMP, EPOCH + 5, (), False),

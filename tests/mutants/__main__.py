@@ -64,8 +64,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scores = []
     for file in asked.files or targets:
         score = _score(asked, file, targets[file], [one for one in listed if one["file"] == file])
-        for mutant in score.survivors:
-            print(mutant.diff(), end="\n\n")
         scores.append(score)
     _print_table(scores)
     return int(any(score.share < asked.floor for score in scores))
@@ -93,6 +91,7 @@ def _score(
             score.cpu_s += result.cpu_s
             if result.outcome is Outcome.SURVIVED:
                 score.survivors.append(drawn[index])
+                print(drawn[index].diff(), end="\n\n", flush=True)
             else:
                 score.killed += 1
             if sys.stderr.isatty():
