@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,8 @@ import pytest
 
 from hardware.dynamics import dynamics_of
 from hardware.robot_file import load_robot
-from pipeline.config import MarginsConfig, TeleopConfig
-from pipeline.control.latency_guard import LatencyGuard
+from pipeline.config import EstimatorName, MarginsConfig, TeleopConfig
+from pipeline.control.latency_guard import BODY_AGES_S, NEVER, Bearable, LatencyGuard
 from pipeline.control.margins import Loop, Sensing, axis_margins
 
 
@@ -89,3 +90,74 @@ def test_experiments_may_fly_what_fails() -> None:
 def test_an_unknown_gain_set_is_an_error(ames: LatencyGuard) -> None:
     with pytest.raises(KeyError):
         ames.refusal("sport", "relative", 0.09, 0.005)
+
+
+def test_between_two_ages_of_the_body_what_holds_for_the_older_counts() -> None:
+    latencies = tuple(0.01 * k for k in range(len(BODY_AGES_S)))
+    bearable = Bearable(latencies)
+    assert bearable.latency(0.0) == latencies[0]
+    for age, latency, older in zip(BODY_AGES_S, latencies, (*latencies[1:], NEVER), strict=True):
+        for rounding in (-1e-9, 0.0, 1e-9):
+            assert bearable.latency(age + rounding) == latency
+        assert bearable.latency(age + 1e-4) == older
+        assert bearable.latency(age + 0.0024) == older
+
+
+def bears(ames: LatencyGuard, **latencies: float) -> LatencyGuard:
+    """One whose gain set `set` bears so much with the filter `relative` or `none`, at any age."""
+    guard = copy.copy(ames)
+    guard.bearable = {
+        (name, kind): Bearable((latencies.get(f"{name}_{kind}", NEVER),) * len(BODY_AGES_S))
+        for name in ("a", "b", "c")
+        for kind in ("relative", "none")
+    }
+    return guard
+
+
+@pytest.mark.parametrize(
+    ("latencies", "estimator", "words"),
+    [
+        (
+            {"a_relative": 0.05},
+            "relative",
+            "Pictures are 90 ms old; gains 'a' bear no more than 50 ms. "
+            "Would do: none of the gain sets.",
+        ),
+        (
+            {"a_none": 0.05, "b_none": 0.09, "c_none": 0.1},
+            "none",
+            "Pictures are 90 ms old; gains 'a' without a filter bear no more than 50 ms. "
+            "Would do: gains 'b', or gains 'c'.",
+        ),
+        (
+            {"a_none": 0.0, "a_relative": 0.1, "b_relative": 0.1},
+            "none",
+            "Pictures are 90 ms old; gains 'a' without a filter bear no delay at all. "
+            "Would do: estimator 'relative'.",
+        ),
+        (
+            {"b_relative": 0.1, "c_relative": 0.1},
+            "none",
+            "Pictures are 90 ms old; gains 'a' without a filter bear no delay at all. "
+            "Would do: estimator 'relative' with gains 'b'.",
+        ),
+        (
+            {"b_relative": 0.1, "c_none": 0.1},
+            "paper",
+            "The robot's motion is felt 20 ms late, too late for gains 'a'. Would do: gains 'b'.",
+        ),
+        (
+            {"a_relative": 0.0},
+            "relative",
+            "Pictures are 90 ms old; gains 'a' bear no delay at all. "
+            "Would do: none of the gain sets.",
+        ),
+        ({"a_relative": 0.09}, "relative", ""),
+        ({"a_relative": 0.09}, "paper", ""),
+        ({"a_none": 0.09}, "none", ""),
+    ],
+)
+def test_it_says_what_is_wrong_how_much_is_borne_and_the_least_change_that_would_do(
+    ames: LatencyGuard, latencies: dict[str, float], estimator: EstimatorName, words: str
+) -> None:
+    assert bears(ames, **latencies).refusal("a", estimator, 0.09, 0.02) == words
