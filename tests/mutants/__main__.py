@@ -9,6 +9,7 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 # Before numpy is imported; Hypothesis draws the same examples each time.
@@ -74,7 +75,7 @@ def _score(
 ) -> Score:
     source = (asked.root / file).read_text()
     with tempfile.TemporaryDirectory() as directory:
-        mutants, run = _made(asked.root, file, source, entry, Path(directory))
+        mutants, run, differs = _made(asked.root, file, source, entry, Path(directory))
         different = [m for m in mutants if not any(_is_that(m, one) for one in listed)]
         for one in listed:
             if not any(_is_that(mutant, one) for mutant in mutants):
@@ -84,8 +85,8 @@ def _score(
         if first.outcome is not Outcome.SURVIVED:
             raise HarnessError(f"the tests of {file} fail without a mutant")
         cpu_s = round(CPU_FACTOR * first.cpu_s) + CPU_SPARE_S
-        drawn = sorted(different, key=lambda mutant: mutant.order)
-        drawn = drawn if asked.all else drawn[: asked.sample]
+        shuffled = filter(differs, sorted(different, key=lambda mutant: mutant.order))
+        drawn = list(islice(shuffled, None if asked.all else asked.sample))
         bodies = ((lambda m=mutant: run(m.mutated)) for mutant in drawn)
         for done, (index, result) in enumerate(each_in_a_fork(bodies, asked.jobs, cpu_s), 1):
             score.cpu_s += result.cpu_s
@@ -101,17 +102,20 @@ def _score(
 
 def _made(
     root: Path, file: str, source: str, entry: Mapping[str, object], directory: Path
-) -> tuple[list[Mutant], Callable[[str], int]]:
-    """All mutants of a file, and what runs its tests with another text of it."""
+) -> tuple[list[Mutant], Callable[[str], int], Callable[[Mutant], bool]]:
+    """All mutants of a file, what runs its tests with another text, and what is worth a run."""
     tests = entry["tests"]
     assert isinstance(tests, list)
     if file.endswith(".py"):
         python = PythonTarget(root, file, tests)
-        return python_mutants(file, source, python.enums), python.run
+        return python_mutants(file, source, python.enums), python.run, lambda mutant: True
     c = CTarget(root, file, tests, str(entry["sources"]), str(entry["compiler"]))
     same = (None, c.compiled(source))
-    mutants = [m for m in c_mutants(file, source, c.headers) if c.compiled(m.mutated) not in same]
-    return mutants, lambda text: c.run(text, Path(tempfile.mkdtemp(dir=directory)))
+
+    def run(text: str) -> int:
+        return c.run(text, Path(tempfile.mkdtemp(dir=directory)))
+
+    return c_mutants(file, source, c.headers), run, lambda m: c.compiled(m.mutated) not in same
 
 
 def _is_that(mutant: Mutant, one: Mapping[str, str]) -> bool:

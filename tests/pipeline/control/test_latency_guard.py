@@ -95,6 +95,7 @@ def test_an_unknown_gain_set_is_an_error(ames: LatencyGuard) -> None:
 def test_between_two_ages_of_the_body_what_holds_for_the_older_counts() -> None:
     latencies = tuple(0.01 * k for k in range(len(BODY_AGES_S)))
     bearable = Bearable(latencies)
+    assert (len(BODY_AGES_S), BODY_AGES_S[-1]) == (32, pytest.approx(0.08))
     assert bearable.latency(0.0) == latencies[0]
     for age, latency, older in zip(BODY_AGES_S, latencies, (*latencies[1:], NEVER), strict=True):
         for rounding in (-1e-9, 0.0, 1e-9):
