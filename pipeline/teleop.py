@@ -84,7 +84,7 @@ class Teleop:
         self.estimator = make_estimator(config, robot.leds_in_b)
         self.attitude = Attitude()
         self._config, self._robot = config, robot
-        self._h, self._t_step = period, np.nan
+        self._h, self._t_step, self._stood_still = period, np.nan, False
         self._limits = failsafe.Limits.of(
             config.failsafe, robot.ramp_s, robot.hangs, bridges=config.estimator != "none"
         )
@@ -164,6 +164,7 @@ class Teleop:
         if before != before:
             return 0
         self._h = min(max(round(t - before, 6), SHORTEST_STEP_S), LONGEST_STEP_S)
+        self._stood_still = t - before > LONGEST_STEP_S
         return max(0, round(1e3 * t) - round(1e3 * before))
 
     def _fuse(self, inputs: Inputs) -> None:
@@ -203,7 +204,7 @@ class Teleop:
         if known is None or self._reference is None:
             return None
         if self._failsafe.mode == Mode.COAST:
-            return self._station.error(known.view)
+            return self._station.error(known.view) if self._keeps_station else None
         return pose_error(known.view, self._reference, self._robot.axes)
 
     def _judge(
@@ -266,7 +267,8 @@ class Teleop:
     def _feel_station(self, known: Situation, t: float) -> None:
         """Through a gap by the gyroscope alone: what comes after it puts the phone's axes right."""
         R_fb = known.view.R_fv @ known.view.R_vb
-        if t - self._body.t > LONGEST_STEP_S:
+        # after a stall all samples come at once, but a step counts for no more than its longest
+        if self._stood_still or t - self._body.t > LONGEST_STEP_S:
             self._station.lose()
             self._hold.R_fb = R_fb
         coasts = self._failsafe.mode == Mode.COAST

@@ -82,7 +82,7 @@ class Controller:
         self._virtual_camera = config.virtual_camera
         self._estimator_name = config.estimator
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
-        self._t_ready = -np.inf
+        self._t_ready = self._t_robot_gap = -np.inf
         self._t_tick, self._armed = np.inf, False
         self._longest_gap_s = config.failsafe.gap
         silent_s = config.failsafe.silent
@@ -192,7 +192,10 @@ class Controller:
     def _note_gaps(self, output: Output, stall_s: float, robot_gap: str) -> None:
         """Whose silence it was: while control stood still, nobody else could be heard."""
         ages, stalled = output.ages, stall_s > STOOD_STILL_S
-        robot_s = max(ages.body_imu, STOOD_STILL_S + PERIOD_S if robot_gap else 0.0)
+        if not robot_gap:
+            self._t_robot_gap = output.t
+        deaf_s = STOOD_STILL_S + PERIOD_S + output.t - self._t_robot_gap if robot_gap else 0.0
+        robot_s = max(ages.body_imu, deaf_s)
         silent_s = {
             "phone": 0.0 if stalled else max(ages.operator, ages.phone_imu),
             "robot": 0.0 if stalled else robot_s,

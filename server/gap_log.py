@@ -33,7 +33,9 @@ class _Side:
 
     def add(self, now: float, silent_s: float) -> None:
         """It has been silent for so long."""
-        if self._least_s < silent_s <= LATELY_S:
+        if silent_s > LATELY_S:  # gone, or never there: that is no gap
+            self._open_s = 0.0
+        elif silent_s > self._least_s:
             self._open_s = max(self._open_s, silent_s)
         elif self._open_s > 0.0:
             self._over.append((now, self._open_s))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState, Refusal
+from hardware.robot_end import BACK_UNTIL_US, RAMP_AFTER_US
 from pipeline.signals import BodyImu
 
 
@@ -28,7 +29,7 @@ class BodyClock:
         self._excess[:] = np.inf
 
 
-RAMP_BEGUN_S = 0.05
+RAMP_BEGUN_S = 1e-6 * (BACK_UNTIL_US - RAMP_AFTER_US)
 """A robot that has just begun to ramp takes commands back: so long it may say so."""
 
 
@@ -49,16 +50,17 @@ class RobotLink:
 
     def receive(self, now: float) -> list[BodyImu]:
         """The samples that have come since the last call."""
-        samples = self._follower.receive()
+        samples, dated = self._follower.receive(), []
         for sample in samples:
             if self._boot_id is not None and sample.boot_id != self._boot_id:
                 self._clock.forget()
                 self._restarted = True
             self._boot_id = sample.boot_id
+            dated.append(self._clock.imu(sample, now))
         if samples:
             self.reason, self.gap = self._reason(samples[-1]), ""
             self._bear(samples[-1], now)
-        return [self._clock.imu(sample, now) for sample in samples]
+        return dated
 
     def _bear(self, last: BodySample, now: float) -> None:
         """A robot that coasts, or has only just begun to ramp, may come back."""

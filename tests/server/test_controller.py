@@ -26,7 +26,7 @@ from server.control_link import (
     expected_of,
     server_end,
 )
-from server.controller import SERVER_SILENT_S, Controller
+from server.controller import SERVER_SILENT_S, STOOD_STILL_S, Controller
 from server.gap_log import MANY, SIDES
 from server.seen_input import SeenInput
 from server.tick_rate import OVER_S
@@ -251,6 +251,7 @@ def test_a_status_tells_how_long_it_waits_and_whose_gaps_there_were():
     assert {side: gaps.count for side, gaps in status.gaps.items()} == dict.fromkeys(SIDES, 1)
     assert status.gaps["phone"].longest_s == pytest.approx(0.42, abs=0.03)
     assert status.gaps["server"].longest_s == pytest.approx(0.205)
+    assert status.gaps["robot"].longest_s == pytest.approx(STOOD_STILL_S + 0.1, abs=0.006)
     assert status.warnings == []
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
 

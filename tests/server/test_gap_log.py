@@ -32,6 +32,10 @@ def test_who_was_never_heard_and_who_is_gone_has_no_gap() -> None:
     assert after(float("inf"), 0.02).lately()["phone"] == Gaps(0, 0.0)
 
 
+def test_who_was_gone_for_good_and_comes_back_had_no_gap_of_a_minute() -> None:
+    assert after(0.2, LATELY_S, LATELY_S + 0.1, 0.02).lately()["phone"] == Gaps(0, 0.0)
+
+
 def test_after_a_minute_it_is_forgotten() -> None:
     log = after(0.2, 0.02)
     log.add(LATELY_S, WELL)

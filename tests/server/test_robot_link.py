@@ -77,6 +77,15 @@ def test_a_robot_that_restarts_has_another_clock() -> None:
     assert imu.t == pytest.approx(101.0)
 
 
+def test_samples_of_before_a_restart_that_come_with_those_after_it_do_not_date_them() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    follower.next = [sample(50_000_000), sample(5_000, boot_id=2), sample(10_000, boot_id=2)]
+    _, first, second = link.receive(101.0)
+    assert second.t == pytest.approx(101.0)
+    assert first.t == pytest.approx(second.t, abs=0.006)
+
+
 def test_a_robot_that_restarted_says_so_until_it_is_ready_whatever_else_it_refuses() -> None:
     follower = Script()
     link = RobotLink(follower)
