@@ -1,5 +1,6 @@
 """One target under atheris (libFuzzer), in this process: `python -m tests.fuzz.child NAME …`."""
 
+import logging
 import sys
 import warnings
 from pathlib import Path
@@ -49,6 +50,7 @@ def main() -> None:
     corpus = Path(options[-1])
     for k, data in enumerate([*target.seeds, *(path.read_bytes() for path in target.found())]):
         (corpus / f"seed-{k}").write_bytes(data[: target.max_bytes])
+    logging.disable()  # a line for each refusal would be slower than what is fuzzed
     warnings.simplefilter("error", RuntimeWarning)  # as in the tests: NumPy's overflows
     atheris.Setup([sys.argv[0], f"-max_len={target.max_bytes}", *options], target.check)
     atheris.Fuzz()

@@ -1,7 +1,6 @@
 """Bodies of HTTP requests, through the whole application but its sockets."""
 
 import asyncio
-import logging
 import tempfile
 from pathlib import Path
 
@@ -28,7 +27,6 @@ def house() -> RtcHouse:
     if not HOUSE:
         HOUSE.append(RtcHouse(Path(FOLDER.name)))
         HOUSE[0].doors.may_try = lambda *_: True
-        logging.getLogger("lightleash").setLevel(logging.CRITICAL)
     return HOUSE[0]
 
 
