@@ -95,7 +95,7 @@ class Pairings:
         """`confirm` says who confirms an operator; nobody has come yet, or those in `book`."""
         self._confirm, self._random = confirm, random
         self.book = book or Book()
-        self._used = dict.fromkeys(self.book.members, -float("inf"))
+        self._used: dict[str, float] = {}
 
     def _key(self) -> str:
         return base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode()
@@ -194,14 +194,17 @@ class Pairings:
         return self._put(replace(self._one(id, "waiting", "in"), state="revoked", code="", why=why))
 
     def expire(self, now: float, busy: Iterable[str] = ()) -> list[Member]:
-        """End those who waited or were idle for too long; who is `busy` is not. Gives them."""
+        """End those who waited or were idle for too long; who is `busy` is not. Gives them.
+
+        When somebody of the book was last here is not kept: a server started anew counts from then.
+        """
         for id in busy:
             self._used[id] = now
         late = []
         for one in self.present():
             if one.state == "waiting" and now >= one.since + WAIT_S:
                 late.append(replace(one, state="expired", code="", why="Nobody confirmed it."))
-            elif one.state == "in" and now >= max(one.since, self._used[one.id]) + IDLE_S:
+            elif one.state == "in" and now >= self._used.setdefault(one.id, now) + IDLE_S:
                 late.append(replace(one, state="expired", why="It was not used for long."))
         return [self._put(one) for one in late]
 
@@ -217,7 +220,8 @@ class Pairings:
         members[member.id] = member
         ended = [m.id for m in members.values() if m.state not in ("waiting", "in")]
         for id in ended[: max(0, len(ended) - MAX_ENDED)]:
-            del members[id], self._used[id]
+            del members[id]
+            self._used.pop(id, None)
         return member
 
 

@@ -145,3 +145,15 @@ def test_a_session_ends_when_nobody_uses_it_for_long_and_not_while_it_is_used():
     assert [one.id for one in doors.pairings.expire(clock.t)] == [idle.id]
     clock.t += IDLE_S
     assert doors.pairings.expire(clock.t, busy=[used.id]) == []
+
+
+def test_a_server_started_anew_late_in_a_run_shuts_nobody_out_who_was_here(tmp_path):
+    store = tmp_path / "members"
+    member, _ = enter(Doors(store=store, clock=(clock := Clock())))
+    clock.t += 2.0 * IDLE_S
+    after = Doors(store=store, clock=clock)
+    assert after.pairings.expire(clock.t) == []
+    clock.t += 0.9 * IDLE_S
+    assert after.pairings.expire(clock.t) == []
+    clock.t += 0.2 * IDLE_S
+    assert [one.id for one in after.pairings.expire(clock.t)] == [member.id]
