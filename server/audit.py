@@ -26,7 +26,10 @@ MAX_BYTES, FILES = 1_000_000, 5
 CAPACITY = 1_000
 """Lines that wait for the disk."""
 SAME_S = 1.0
-"""The same deed of the same person within this is one: a page says STOP 20 times a second."""
+"""The same deed of the same person for the same reason within this is one.
+
+A page says STOP 20 times a second: of STOP the reason does not count.
+"""
 REFUSALS, REFUSALS_S = 30, 60.0
 """So many refusals in that time have a line each; the others are counted."""
 
@@ -51,7 +54,7 @@ class Audit:
         t = self._clock()
         if what == "refusal" and not self._may_refuse(t):
             return None
-        key = (what, f"{who} {address} {why if what in ('refusal', 'mode') else ''}")
+        key = (what, f"{who} {address} {why if what != 'stop' else ''}")
         if t - self._newest.get(key, -SAME_S) < SAME_S:
             return None
         if len(self._newest) > CAPACITY:

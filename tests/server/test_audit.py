@@ -89,6 +89,13 @@ def test_a_stop_that_is_said_twenty_times_a_second_is_one_deed():
     assert log.note("stop", "Anna") is not None
 
 
+@pytest.mark.parametrize("what", ["revoke", "confirm", "deny", "invite", "arm", "hand-over"])
+def test_deeds_that_concern_different_people_are_all_kept(what):
+    log = Audit(clock=Clock())
+    kept = [log.note(what, "Sue", "supervisor", "", whom) for whom in ("Anna", "Bert", "Anna")]
+    assert [one is not None for one in kept] == [True, True, False]
+
+
 def test_a_flood_of_refusals_leaves_a_few_lines_and_their_count():
     log = Audit(clock=(clock := Clock()))
     kept = [log.note("refusal", why=str(n)) for n in range(1000)]
