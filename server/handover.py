@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Protocol
 
 from server.operator import OperatorPhone
@@ -76,24 +77,36 @@ class Handover:
         """
         people = self._hub.people
         member = people.doors.pairings.revoke(id, why)
-        people.doors.save()
         people.note("revoke", by, f"{member.name}: {why}")
         self._hub.say(f"{member.name} is shut out. {why}")
-        await self._expel(member)
+        await self._expel([member])
         return member
 
     async def expire(self) -> None:
         """Those whose time is over go."""
-        for member in self._hub.people.expire():
+        over = self._hub.people.expire()
+        for member in over:
             self._hub.say(f"{member.name} is not paired any more. {member.why}")
-            await self._expel(member)
+        if over:
+            await self._expel(over)
 
-    async def _expel(self, member: Member) -> None:
+    async def _expel(self, members: list[Member]) -> None:
+        """The robot comes down before anybody waits for a disk or a page."""
+        doors = self._hub.people.doors
+        for member in members:
+            self._take_the_lead_from(member)
+        try:
+            await asyncio.gather(*(doors.sockets.end(member.id) for member in members))
+        finally:
+            if not doors.save():
+                self._hub.say("The disk takes nothing: a server started anew would let them in.")
+        for member in members:
+            if all(other.address != member.address for other in doors.pairings.present()):
+                doors.on_gone(member.address)
+
+    def _take_the_lead_from(self, member: Member) -> None:
         hub, people = self._hub, self._hub.people
         people.lease.forget(member.id)
         if people.lease.holder == member.id and hub.phone is not None:
             hub.disarm()
             hub.part(hub.phone)
-        await people.doors.sockets.end(member.id)
-        if all(other.address != member.address for other in people.doors.pairings.present()):
-            people.doors.on_gone(member.address)

@@ -67,6 +67,4 @@ class People:
         over = self.doors.pairings.expire(self.doors.clock(), busy)
         for one in over:
             self.note("expire", one, one.why)
-        if over:
-            self.doors.save()
         return over

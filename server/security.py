@@ -77,10 +77,18 @@ class Doors:
         """Called when nobody of an address is in any more."""
         self._tries: dict[str, list[float]] = {}
 
-    def save(self) -> None:
-        """Keep who is here: as long as the run, for nobody else to read."""
-        if self._store is not None:
-            write_private(self._store, msgspec.json.encode(self.pairings.book).decode())
+    def save(self) -> bool:
+        """Keep who is here: as long as the run, for nobody else to read. False if it can't be kept.
+
+        A disk that is full keeps nobody in, and ends no server.
+        """
+        try:
+            if self._store is not None:
+                write_private(self._store, msgspec.json.encode(self.pairings.book).decode())
+        except OSError as error:
+            log.error("who is paired can't be written down: %s", error)
+            return False
+        return True
 
     def _sign(self, text: str) -> str:
         """128 bits that nobody else can make."""

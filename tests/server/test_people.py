@@ -8,6 +8,7 @@ import json
 
 import pytest
 from mcap.reader import make_reader
+from msgspec.structs import replace
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidStatus
 
@@ -15,7 +16,7 @@ from pipeline.signals import Mode
 from server.audit import AUDIT_FILE
 from server.clock import now
 from server.messages import Deed, decode_from_server
-from server.pairings import PairingError
+from server.pairings import WAIT_S, PairingError
 from server.recording import SERVER_MESSAGES
 from server.security import COOKIE
 from server.sockets import REVOKED
@@ -170,6 +171,27 @@ def test_a_leader_who_is_shut_out_is_disarmed_and_leads_no_more(house, mode):
             await house.control_hears(is_request("disarm"))
 
     play(house, scene)
+
+
+def test_a_full_disk_keeps_nobody_in_who_was_shut_out_and_ends_no_server(house, tmp_path, caplog):
+    async def scene():
+        anna, gone = Browser(house, "operator", "Anna"), Browser(house, "viewer", "Gone")
+        house.doors._store = tmp_path / "nowhere" / "members"
+        house.doors.pairings.book.members[gone.member.id] = replace(gone.member, state="waiting")
+        async with anna.leading() as page:
+            house.control.inputs()
+            in_mode(house, Mode.TRACK)
+            sup = house.hub.people.named("local-supervisor")
+            await house.hub.handover.shut_out(anna.member.id, "stolen", sup)
+            assert await page.closed() == REVOKED
+            await house.control_hears(is_request("disarm"))
+        assert "The disk takes nothing" in house.hub.events[0]
+        house.doors.clock = lambda: now() + WAIT_S
+        await house.hub.handover.expire()
+        assert not people(house)
+
+    play(house, scene)
+    assert "can't be written down" in caplog.text
 
 
 def test_on_the_ground_the_lead_is_handed_on_at_once_and_the_robot_disarmed(house):
