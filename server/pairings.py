@@ -49,6 +49,8 @@ class Link(msgspec.Struct):
     expires: float
     """[s]"""
     used: bool = False
+    by: str = ""
+    """Id of whoever made it."""
 
 
 class Member(msgspec.Struct, frozen=True):
@@ -100,10 +102,10 @@ class Pairings:
     def _key(self) -> str:
         return base64.urlsafe_b64encode(self._random(KEY_BYTES)).rstrip(b"=").decode()
 
-    def invite(self, role: Role, now: float) -> str:
-        """A new link's key: opens once, within `LINK_S`."""
+    def invite(self, role: Role, now: float, by: str = "") -> str:
+        """A new link's key, made by the member with that id: opens once, within `LINK_S`."""
         key, links = self._key(), self.book.links
-        links[digest_of(key)] = Link(role, now + LINK_S)
+        links[digest_of(key)] = Link(role, now + LINK_S, by=by)
         while len(links) > MAX_LINKS:
             del links[next(iter(links))]
         return key
@@ -186,12 +188,16 @@ class Pairings:
         return self._put(replace(self._one(id, "waiting"), state="denied", code="", why=why))
 
     def revoke(self, id: str, why: str) -> Member:
-        """End a session: its cookie opens nothing any more.
+        """End a session: its cookie opens nothing any more, nor do unused links that it made.
 
         Raises:
             PairingError: nobody is in, or waits, under this id.
         """
-        return self._put(replace(self._one(id, "waiting", "in"), state="revoked", code="", why=why))
+        ended = replace(self._one(id, "waiting", "in"), state="revoked", code="", why=why)
+        links = self.book.links
+        for digest in [key for key, link in links.items() if link.by == id and not link.used]:
+            del links[digest]
+        return self._put(ended)
 
     def expire(self, now: float, busy: Iterable[str] = ()) -> list[Member]:
         """End those who waited or were idle for too long; who is `busy` is not. Gives them.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Annotated, TypeVar
 
 import msgspec
@@ -20,7 +20,8 @@ from server.replies import body_of, refusal
 from server.roles import Role
 from server.security import PAIR_TRIES, Doors, cookie_name
 
-Wanted = TypeVar("Wanted")
+Wanted = TypeVar("Wanted", bound=msgspec.Struct)
+Answer = Callable[[Wanted, Member], Awaitable[Response]]
 Short = Annotated[str, Meta(max_length=64)]
 
 
@@ -53,14 +54,16 @@ class PeopleApi:
 
     def routes(self) -> Sequence[BaseRoute]:
         """All of them."""
+        roles = '{"role": "viewer", "operator" or "supervisor"}'
+        id, code = '{"id": "…"}', '{"id": "…", "code": "…"}'
         return [
             Route("/api/pair", self._pair, methods=["POST"]),
             Route("/api/whoami", self._who_am_i),
-            Route("/api/invite", self._invite, methods=["POST"]),
-            Route("/api/people/confirm", self._confirm, methods=["POST"]),
-            Route("/api/people/deny", self._deny, methods=["POST"]),
-            Route("/api/people/revoke", self._revoke, methods=["POST"]),
-            Route("/api/people/lead", self._lead, methods=["POST"]),
+            self._of_a_member("/api/invite", InviteRequest, roles, self._invite),
+            self._of_a_member("/api/people/confirm", PersonRequest, code, self._confirm),
+            self._of_a_member("/api/people/deny", PersonRequest, id, self._deny),
+            self._of_a_member("/api/people/revoke", PersonRequest, id, self._revoke),
+            self._of_a_member("/api/people/lead", PersonRequest, id, self._lead),
         ]
 
     async def _pair(self, request: Request) -> Response:
@@ -75,7 +78,7 @@ class PeopleApi:
             member, cookie = doors.pairings.pair(asked.token, asked.name, address, doors.clock())
         except PairingError as error:
             doors.tried(address)
-            self._hub.people.note("refusal", why=f"pairing from {address}: {error.allowed}")
+            doors.audit.note("refusal", address=address, why=f"pairing: {error.allowed}")
             return refusal(401, error.field, error.allowed)
         await self._leave_behind(request, secure)
         doors.save()
@@ -97,14 +100,28 @@ class PeopleApi:
     async def _who_am_i(self, request: Request) -> Response:
         return JSONResponse(_told(_member(request)))
 
-    async def _invite(self, request: Request) -> Response:
-        asked = await _asked(request, InviteRequest)
-        if asked is None:
-            return refusal(400, "role", 'JSON: {"role": "viewer", "operator" or "supervisor"}')
-        by = _member(request)
+    def _of_a_member(
+        self, path: str, kind: type[Wanted], needs: str, answer: Answer[Wanted]
+    ) -> Route:
+        """A request with a body; `needs` says which, as JSON."""
+
+        async def endpoint(request: Request) -> Response:
+            asked, by = await _asked(request, kind), _member(request)
+            if self._hub.people.named(by.id) is None:  # shut out while its body was on the way
+                return refusal(401, "role", "pair anew: this pairing has ended")
+            if asked is None:
+                return refusal(400, kind.__struct_fields__[0], f"JSON: {needs}")
+            try:
+                return await answer(asked, by)
+            except PairingError as error:
+                return refusal(409, error.field, error.allowed)
+
+        return Route(path, endpoint, methods=["POST"])
+
+    async def _invite(self, asked: InviteRequest, by: Member) -> Response:
         if asked.role == "supervisor" and not by.id.startswith(LOCAL):
             return refusal(403, "role", "viewer, operator; lightleash invite makes the other one")
-        key = self._doors.pairings.invite(asked.role, self._doors.clock())
+        key = self._doors.pairings.invite(asked.role, self._doors.clock(), by.id)
         self._doors.save()
         self._hub.people.note("invite", by, asked.role)
         page = "/" if asked.role == "operator" else "/supervisor"
@@ -112,49 +129,29 @@ class PeopleApi:
         here = f"{self._here}{page}#k={key}" if self._here else url
         return JSONResponse({"url": url, "here": here, "qr_svg": _code(url), "lives_s": LINK_S})
 
-    async def _confirm(self, request: Request) -> Response:
-        if (asked := await _asked(request, PersonRequest)) is None:
-            return refusal(400, "id", 'JSON: {"id": "…", "code": "…"}')
-        try:
-            member = self._doors.pairings.confirm(asked.id, asked.code)
-        except PairingError as error:
-            return refusal(409, error.field, error.allowed)
+    async def _confirm(self, asked: PersonRequest, by: Member) -> Response:
+        member = self._doors.pairings.confirm(asked.id, asked.code)
         self._doors.save()
-        self._hub.people.note("confirm", _member(request), member.name)
-        self._hub.say(f"{_member(request).name} let {member.name} in.")
+        self._hub.people.note("confirm", by, member.name)
+        self._hub.say(f"{by.name} let {member.name} in.")
         return JSONResponse({"name": member.name})
 
-    async def _deny(self, request: Request) -> Response:
-        if (asked := await _asked(request, PersonRequest)) is None:
-            return refusal(400, "id", 'JSON: {"id": "…"}')
-        try:
-            member = self._doors.pairings.deny(asked.id, "A supervisor did not let it in.")
-        except PairingError as error:
-            return refusal(409, error.field, error.allowed)
+    async def _deny(self, asked: PersonRequest, by: Member) -> Response:
+        member = self._doors.pairings.deny(asked.id, "A supervisor did not let it in.")
         self._doors.save()
-        self._hub.people.note("deny", _member(request), member.name)
-        self._hub.say(f"{_member(request).name} did not let {member.name} in.")
+        self._hub.people.note("deny", by, member.name)
+        self._hub.say(f"{by.name} did not let {member.name} in.")
         return JSONResponse({"name": member.name})
 
-    async def _revoke(self, request: Request) -> Response:
-        if (asked := await _asked(request, PersonRequest)) is None:
-            return refusal(400, "id", 'JSON: {"id": "…"}')
+    async def _revoke(self, asked: PersonRequest, by: Member) -> Response:
         if asked.id.startswith(LOCAL):
             return refusal(409, "id", "a paired page; end the program on its computer instead")
         why = "A supervisor has ended this pairing."
-        try:
-            member = await self._hub.handover.shut_out(asked.id, why, _member(request))
-        except PairingError as error:
-            return refusal(409, error.field, error.allowed)
+        member = await self._hub.handover.shut_out(asked.id, why, by)
         return JSONResponse({"name": member.name})
 
-    async def _lead(self, request: Request) -> Response:
-        if (asked := await _asked(request, PersonRequest)) is None:
-            return refusal(400, "id", 'JSON: {"id": "…"}')
-        try:
-            self._hub.handover.give(asked.id, _member(request), self._doors.clock())
-        except PairingError as error:
-            return refusal(409, error.field, error.allowed)
+    async def _lead(self, asked: PersonRequest, by: Member) -> Response:
+        self._hub.handover.give(asked.id, by, self._doors.clock())
         return JSONResponse({"leads_next": asked.id}, 202)
 
 

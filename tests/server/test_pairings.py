@@ -49,6 +49,21 @@ def test_a_link_opens_once():
         pairings.pair(key, "", "", 1.0)
 
 
+def test_links_of_whoever_is_revoked_open_nothing_and_those_of_others_do():
+    pairings = Pairings()
+    (sue, _), (tom, _) = (enter(pairings, "supervisor", name) for name in ("Sue", "Tom"))
+    hers, his = (pairings.invite("operator", 0.0, by=one.id) for one in (sue, tom))
+    used = pairings.invite("viewer", 0.0, by=sue.id)
+    guest, _ = pairings.pair(used, "", "", 1.0)
+    pairings.revoke(sue.id, "lost")
+    with pytest.raises(PairingError, match="newest"):
+        pairings.pair(hers, "", "", 1.0)
+    with pytest.raises(PairingError, match="once"):
+        pairings.pair(used, "", "", 1.0)
+    assert pairings.pair(his, "", "", 1.0)
+    assert guest in pairings.present()
+
+
 @pytest.mark.parametrize("role", ROLES)
 def test_a_link_opens_until_its_time_is_over(role):
     pairings = Pairings()

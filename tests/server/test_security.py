@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 from concurrent.futures import ThreadPoolExecutor
 
@@ -12,6 +13,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.testclient import TestClient, WebSocketDenialResponse
 
 from server import replies
+from server.audit import AUDIT_FILE, Audit
 from server.clock import now
 from server.roles import ADDRESSES, RANKS, is_enough
 from server.security import COOKIE, PAIR_TRIES, Doors, Guard
@@ -204,6 +206,45 @@ def test_a_revoked_cookie_opens_no_route_and_no_socket(quiet):
     assert reached == {p for p, r in ADDRESSES.items() if RANKS[r] < 2}
     told = client.get("/api/whoami").json()
     assert (told["state"], told["why"]) == ("revoked", "A supervisor has ended this pairing.")
+
+
+@pytest.mark.parametrize("deed", ["invite", "people/confirm", "people/revoke", "people/lead"])
+def test_who_is_revoked_while_a_body_is_on_the_way_does_nothing_by_it(rig, deed):
+    client = member(rig, "supervisor")
+    (sue,) = rig.hub.people.present()
+    pair(rig, "operator")
+    before = rig.hub.people.present()[1:]
+
+    def body():
+        yield b'{"role": "viewer"}' if deed == "invite" else b'{"id": '
+        rig.doors.pairings.revoke(sue.id, "lost")
+        yield (
+            b" " if deed == "invite" else f'"{before[0].id}", "code": "{before[0].code}"}}'.encode()
+        )
+
+    assert client.post(f"/api/{deed}", content=body()).status_code == 401
+    assert [(one.id, one.state) for one in rig.hub.people.present()] == [(before[0].id, "waiting")]
+    assert all(link.used for link in rig.doors.pairings.book.links.values())
+
+
+def test_a_link_made_by_a_page_goes_when_that_page_is_revoked(rig):
+    client = member(rig, "supervisor")
+    (sue,) = rig.hub.people.present()
+    url = client.post("/api/invite", json={"role": "viewer"}).json()["url"]
+    answer = rig.client.post(
+        "/api/people/revoke", json={"id": sue.id}, headers=bearer(rig, "supervisor")
+    )
+    assert answer.status_code == 200
+    asked = {"token": url.partition("#k=")[2]}
+    assert rig.client.post("/api/pair", json=asked, headers=OWN).status_code == 401
+
+
+def test_a_wrong_link_is_written_down_with_the_address_it_came_from(rig, tmp_path):
+    rig.doors.audit = Audit(tmp_path)
+    rig.client.post("/api/pair", json={"token": "guess"}, headers=OWN)
+    rig.doors.audit.close()
+    (line,) = (tmp_path / AUDIT_FILE).read_text().splitlines()
+    assert {"what": "refusal", "address": "127.0.0.1"}.items() <= json.loads(line).items()
 
 
 def test_an_operator_can_neither_let_in_nor_shut_out_nor_invite(rig):
