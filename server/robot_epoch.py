@@ -6,6 +6,9 @@ from pathlib import Path
 
 from server.runtime import write_private
 
+RENEWALS = 1 << 20
+"""Epochs between two processes: a process counts on by itself (`ControlEnd`), unseen by the file."""
+
 
 def next_epoch(file: Path, unix_ms: int) -> int:
     """The epoch of a control process that starts at `unix_ms`; the last one is kept in `file`.
@@ -17,7 +20,9 @@ def next_epoch(file: Path, unix_ms: int) -> int:
         last = int(file.read_text())
     except (OSError, ValueError):
         last = 0
-    epoch = max(1, unix_ms, last + 1)
+    if not 0 <= last <= 1 << 63:
+        last = 0
+    epoch = max(1, unix_ms, last + RENEWALS)
     file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     write_private(file, f"{epoch}\n")
     return epoch
