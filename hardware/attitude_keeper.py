@@ -58,11 +58,13 @@ class AttitudeKeeper:
         self.up_in_b = self._level_in_b = np.array([0.0, 0.0, 1.0])
         self._omega_in_b, self._bias = np.zeros(3), np.zeros(3)
 
-    def feel(self, omega_in_b: Array, a_in_b: Array, h: float, at_rest: bool) -> None:
-        """Take a sample of the body's sensors, `h` [s] after the last: [rad/s], [m/s²].
+    def add_imu(self, omega_in_b: Array, a_in_b: Array, h: float, at_rest: bool) -> None:
+        """Take a sample of the body's sensors, `h` >= 0 [s] after the last: [rad/s], [m/s²].
 
-        `at_rest`: the thrusters have been off since then.
+        `at_rest`: the thrusters have been off since then. A sample that is no number is skipped.
         """
+        if not (np.isfinite(omega_in_b).all() and np.isfinite(a_in_b).all()):
+            return
         if at_rest and float(omega_in_b @ omega_in_b) < AT_REST_RAD_S**2:
             self._bias = self._bias + h * LEARNT_PER_S * (omega_in_b - self._bias)
         omega = omega_in_b - self._bias
@@ -77,9 +79,10 @@ class AttitudeKeeper:
         self._omega_in_b = omega
 
     def thrusts(self, falling: Array) -> Array:
-        """(m,) [N]: the lift of `falling`, and torques against tilt and turning."""
+        """(m,) [N], within [0, f_max]: the lift of `falling`, torques against tilt and turning."""
         gains = self._gains
-        level = gains.lift_column * max(0.0, float(gains.lift_row @ falling))
+        lift = max(0.0, float(gains.lift_row @ falling))
+        level = np.clip(gains.lift_column * lift, 0.0, gains.f_max)
         to_upright = cross(self._level_in_b, self.up_in_b)
         torque = gains.gain @ np.concatenate((to_upright, self._omega_in_b))
         room = np.where(torque < 0.0, level, gains.f_max - level)

@@ -184,8 +184,8 @@ class RobotEnd:
         """The next datagram for `recipients`; `nonce` is random and not 0."""
         self._advance(now_us)
         if self._keeper is not None:
-            h = min(MAX_SAMPLE_S, 1e-6 * (now_us - self._sampled_us))
-            self._keeper.feel(np.array(omega_in_b), np.array(a_in_b), h, not self._given)
+            h = max(0.0, min(MAX_SAMPLE_S, 1e-6 * (now_us - self._sampled_us)))
+            self._keeper.add_imu(np.array(omega_in_b), np.array(a_in_b), h, not self._given)
         self._sampled_us = now_us
         self._samples = (self._samples + 1) % U32
         self._nonces.append((nonce, now_us))

@@ -7,7 +7,7 @@ from pathlib import Path
 from server.runtime import write_private
 
 RENEWALS = 1 << 20
-"""Epochs between two processes: a process counts on by itself (`ControlEnd`), unseen by the file."""
+"""Epochs between two processes: each counts on by itself (`ControlEnd`), unseen by the file."""
 
 
 def next_epoch(file: Path, unix_ms: int) -> int:

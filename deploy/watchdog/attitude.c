@@ -25,13 +25,15 @@ void ll_attitude_init(ll_attitude *a)
     a->up[2] = a->level[2] = 1.0;
 }
 
-void ll_attitude_feel(ll_attitude *a, const float gyro[3], const float accelerometer[3], double h,
-                      bool at_rest)
+void ll_attitude_add_imu(ll_attitude *a, const float gyro[3], const float accelerometer[3],
+                         double h, bool at_rest)
 {
     const double read[3] = {gyro[0], gyro[1], gyro[2]};
-    const double felt[3] = {accelerometer[0], accelerometer[1], accelerometer[2]};
-    double turned[3], force = norm(felt), drawn = at_rest ? DRAWN_AT_REST_PER_S : DRAWN_PER_S;
+    const double force[3] = {accelerometer[0], accelerometer[1], accelerometer[2]};
+    double turned[3], size = norm(force), drawn = at_rest ? DRAWN_AT_REST_PER_S : DRAWN_PER_S;
     bool learns = at_rest && norm(read) < AT_REST_RAD_S;
+    if (!isfinite(norm(read)) || !isfinite(size))
+        return;
     for (int i = 0; i < 3; i++) {
         if (learns)
             a->bias[i] += h * LEARNT_PER_S * (read[i] - a->bias[i]);
@@ -40,8 +42,8 @@ void ll_attitude_feel(ll_attitude *a, const float gyro[3], const float accelerom
     cross(a->rate, a->up, turned);
     for (int i = 0; i < 3; i++) {
         a->up[i] -= h * turned[i];
-        if (force > 1.0)
-            a->up[i] += h * drawn * (felt[i] / force - a->up[i]);
+        if (size > 1.0)
+            a->up[i] += h * drawn * (force[i] / size - a->up[i]);
     }
     double length = norm(a->up);
     for (int i = 0; i < 3; i++) {
@@ -62,7 +64,7 @@ void ll_attitude_thrusts(const ll_attitude *a, const ll_attitude_gains *g, uint8
         torque[i] = 0.0;
         for (int k = 0; k < 3; k++)
             torque[i] += g->gain[i][k] * upright[k] + g->gain[i][k + 3] * a->rate[k];
-        thrusts[i] = g->lift_column[i] * fmax(0.0, lift);
+        thrusts[i] = fmin(fmax(g->lift_column[i] * fmax(0.0, lift), 0.0), f_max);
         double room = torque[i] < 0.0 ? thrusts[i] : f_max - thrusts[i];
         if (fabs(torque[i]) > room)
             share = fmin(share, room / fabs(torque[i]));

@@ -21,11 +21,13 @@ typedef struct {
 
 void ll_attitude_init(ll_attitude *a);
 
-/* Take a sample [rad/s], [m/s2], h seconds after the last; `at_rest`: thrusters off since then. */
-void ll_attitude_feel(ll_attitude *a, const float gyro[3], const float accelerometer[3], double h,
-                      bool at_rest);
+/* Take a sample [rad/s], [m/s2], h >= 0 seconds after the last; `at_rest`: thrusters off since
+ * then. One that is no number is skipped. */
+void ll_attitude_add_imu(ll_attitude *a, const float gyro[3], const float accelerometer[3],
+                         double h, bool at_rest);
 
-/* From the thrusts of the ramp: their lift, and torques against tilt and turning. In place. */
+/* From the thrusts of the ramp: their lift, and torques against tilt and turning. In place, within
+ * [0, f_max]. */
 void ll_attitude_thrusts(const ll_attitude *a, const ll_attitude_gains *g, uint8_t n, double f_max,
                          double *thrusts);
 

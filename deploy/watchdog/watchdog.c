@@ -357,9 +357,10 @@ size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyr
     size_t n = w->limits.thrusters, size = 76 + 4 * n;
     uint8_t digest[LL_DIGEST_BYTES];
     advance(w, now_us);
-    if (w->limits.attitude)
-        ll_attitude_feel(&w->attitude, gyro, accelerometer,
-                         fmin(MAX_SAMPLE_S, 1e-6 * (double)(now_us - w->sampled_us)), !gives(w));
+    if (w->limits.attitude) {
+        double h = fmax(0.0, fmin(MAX_SAMPLE_S, 1e-6 * (double)(now_us - w->sampled_us)));
+        ll_attitude_add_imu(&w->attitude, gyro, accelerometer, h, !gives(w));
+    }
     w->sampled_us = now_us;
     w->samples++;
     w->nonces[w->samples % LL_NONCES].nonce = nonce;

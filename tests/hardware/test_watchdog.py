@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import math
 import random
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ from hardware.follower import FollowerState, Refusal
 from hardware.link_key import mac
 from hardware.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
+from tests.hardware.test_attitude_keeper import asymmetric, turned
 
 SOURCE = Path(__file__).parents[2] / "deploy" / "watchdog"
 KEY = bytes(range(16))
@@ -149,7 +151,7 @@ class Traffic:
         return self.sent[-1]
 
 
-HOLES_US = (*range(0, 450_000, 50_000), 1, 39_999, 41_000, 60_001, 1_500_000)
+HOLES_US = (*range(0, 450_000, 50_000), -20_000, 1, 39_999, 41_000, 60_001, 1_500_000)
 PERIODS = np.array([40.0, 50.0, 60.0])
 QUADROTOR = load_robot("quadrotor")
 HANGS, FLIES = LIMITS, LinkLimits.of(QUADROTOR)
@@ -163,6 +165,8 @@ def hold_against_each_other(library, seed, limits, seen):
     for nonce in range(1, 2500):
         now_us += traffic.step_us()
         omega = tuple(float(v) for v in np.float32(0.3 * np.sin(nonce / PERIODS)))
+        if traffic.often(0.002):
+            omega = (*omega[:2], traffic.random.choice((math.nan, math.inf, -math.inf)))
         values = (omega, (0.5, 1.5, 9.75), np.full(limits.thrusters, 0.5))
         a = python.sample(now_us, nonce, *values)
         assert a == c.sample(now_us, nonce, *values)
@@ -189,6 +193,17 @@ def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, limits):
     others = {Refusal.NONE, Refusal.STARTED, Refusal.HANDSHAKE}
     others |= {Refusal.RISE} if limits is FLIES else set()  # from 0 to full in two commands
     assert seen >= {("answer", why) for why in Refusal if why not in others}
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_c_and_python_agree_on_torques_whatever_the_rotors(library, seed):
+    gains, falling, random = asymmetric(seed)
+    keeper, c_gains = turned(gains, random), CGains.of(gains)
+    attitude = (ctypes.c_double * 12)(*keeper.up_in_b, 0.0, 0.0, 1.0, *keeper._omega_in_b)
+    thrusts = (ctypes.c_double * 16)(*falling)
+    n, f_max = ctypes.c_uint8(len(falling)), ctypes.c_double(gains.f_max)
+    library.ll_attitude_thrusts(attitude, ctypes.byref(c_gains), n, f_max, thrusts)
+    np.testing.assert_allclose(thrusts[: len(falling)], keeper.thrusts(falling), atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["sha256", "hmac_sha256"])
