@@ -10,7 +10,8 @@ This is the reference for a real robot's firmware; `deploy/watchdog/` is the sam
    gyroscope (`attitude_keeper.py`). 280 ms after the last command taken this is called RAMP; until
    400 ms after it, the same epoch's next command is taken, and thrust goes to it by steps no
    larger than the rise allowed (`given_thrusts.py`). Then there is no way back: only zero thrust
-   of the epoch or STOP cuts the ramp short, nothing else that arrives changes it.
+   of the epoch or STOP cuts the ramp short, nothing else that arrives changes it. Who gives no
+   thrust has nothing to ramp: COAST lasts those 400 ms.
 3. After that, and after a start: no thrust until zero thrust of a *later* epoch has been taken for
    500 ms without a gap of 60 ms. So a control process begins with zero, and one that was frozen
    or replaced never comes back. Zero of a later epoch is taken in every state, since the newest
@@ -234,7 +235,8 @@ class RobotEnd:
         if following and silence_us > limits.silence_us:
             self.state, self.refusal = FollowerState.COAST, Refusal.SILENT
             self._given.fade(self._taken_us + limits.silence_us)
-        if self.state == FollowerState.COAST and silence_us > limits.ramp_after_us:
+        coast_us = limits.ramp_after_us if self._given else limits.back_until_us
+        if self.state == FollowerState.COAST and silence_us > coast_us:
             self._leave(now_us)
         if self.state == FollowerState.RAMP and self._given.has_faded(now_us):
             self._refuse(self._candidate)

@@ -178,7 +178,7 @@ static void advance(ll_watchdog *w, int64_t now_us)
         w->refusal = LL_SILENT;
         fade(w, w->taken_us + LL_SILENCE_US);
     }
-    if (w->state == LL_COAST && silence_us > LL_RAMP_AFTER_US)
+    if (w->state == LL_COAST && silence_us > (gives(w) ? LL_RAMP_AFTER_US : LL_BACK_UNTIL_US))
         leave(w, now_us);
     if (w->state == LL_RAMP && now_us - w->fading_us >= w->limits.ramp_us)
         refuse(w, w->candidate);

@@ -232,11 +232,22 @@ def test_after_a_long_silence_nothing_brings_it_back(flying, silence_us):
     assert flying.end.state == FollowerState.RAMP
 
 
-def test_a_gap_without_thrust_is_borne_too(ready):
-    ready.tick(250_000)
+@pytest.mark.parametrize("silence_us", [61_000, 250_000, 281_000, 400_000])
+@pytest.mark.parametrize("thrust", [0.0, 0.9])
+def test_a_gap_without_thrust_is_borne_as_long_as_one_with_it(ready, silence_us, thrust):
+    ready.tick(silence_us)
     assert ready.end.state == FollowerState.COAST
-    assert ready.send(ready.command()) == Refusal.NONE
-    assert ready.end.state == FollowerState.IDLE
+    assert ready.send(ready.command(thrust, thrust)) == Refusal.NONE
+    assert ready.end.state == (FollowerState.RUNNING if thrust else FollowerState.IDLE)
+
+
+def test_after_a_zero_without_a_nonce_the_way_back_is_as_long(flying):
+    flying.tick(100_000)
+    assert flying.send(flying.command(armed=False, nonce=0)) == Refusal.NONCE
+    flying.counter += 1
+    flying.tick(300_000)
+    assert flying.end.state == FollowerState.COAST
+    assert flying.send(flying.command(0.9, 0.9)) == Refusal.NONE
 
 
 def test_no_other_process_brings_it_back_nor_its_own_after_another_was_taken(flying):
@@ -340,7 +351,7 @@ def test_after_silence_only_a_later_epoch_is_heard(flying, epoch, why):
 
 
 def test_silence_without_thrust_needs_no_ramp_but_a_new_epoch(ready):
-    ready.tick(281_000)
+    ready.tick(401_000)
     assert ready.end.state == FollowerState.REFUSING
     assert ready.send(ready.command()) == Refusal.EPOCH
 
