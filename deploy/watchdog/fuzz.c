@@ -100,7 +100,7 @@ static int run(const uint8_t *data, size_t size, bool flies)
     ll_watchdog w;
     int64_t now_us = 1000000;
     uint64_t nonce = 1000;
-    ll_init(&w, &limits, 7, KEY);
+    demand(ll_init(&w, &limits, 7, KEY), "good limits are taken");
     for (; size >= 8; size -= 8, data += 8)
         step(&w, data, &now_us, &nonce);
     return 0;
@@ -145,7 +145,7 @@ int main(int argc, char **argv)
         int64_t now_us = 1000000;
         uint64_t nonce = 1000;
         unsigned wildness = (unsigned)(state % 12);
-        ll_init(&w, &limits, 7, KEY);
+        demand(ll_init(&w, &limits, 7, KEY), "good limits are taken");
         for (int k = 0; k < 999; k++, done++) {
             uint8_t in[8];
             draw(in, &state, wildness);

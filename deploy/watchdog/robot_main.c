@@ -10,6 +10,7 @@
 #include "watchdog.h"
 
 #include <arpa/inet.h>
+#include <ctype.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -49,16 +50,30 @@ static uint64_t random_u64(void)
     return value;
 }
 
-/* 32 hexadecimal digits that nobody else may read. */
+static unsigned hex_value(char digit)
+{
+    return (unsigned)(digit <= '9' ? digit - '0' : (digit | 32) - 'a' + 10);
+}
+
+/* 32 hexadecimal digits that nobody else may read; blanks around them, nothing else. */
 static bool read_key(const char *path, uint8_t key[LL_KEY_BYTES])
 {
     struct stat about;
+    char text[1024], *digits = text;
     FILE *file = fopen(path, "r");
     bool good = file && fstat(fileno(file), &about) == 0 && (about.st_mode & 077) == 0;
-    for (int i = 0; good && i < LL_KEY_BYTES; i++)
-        good = fscanf(file, "%2hhx", &key[i]) == 1;
+    size_t size = good ? fread(text, 1, sizeof text, file) : 0;
     if (file)
         fclose(file);
+    for (; size > 0 && isspace((unsigned char)digits[size - 1]); size--)
+        ;
+    for (; size > 0 && isspace((unsigned char)*digits); size--)
+        digits++;
+    good = size == 2 * LL_KEY_BYTES;
+    for (size_t i = 0; good && i < size; i++) {
+        good = isxdigit((unsigned char)digits[i]);
+        key[i / 2] = (uint8_t)(key[i / 2] << 4 | hex_value(digits[i]));
+    }
     return good;
 }
 
@@ -132,7 +147,7 @@ static void tick(int fd, ll_watchdog *w, recipients *to)
 
 int main(int argc, char **argv)
 {
-    uint8_t key[LL_KEY_BYTES];
+    uint8_t key[LL_KEY_BYTES] = {0};
     if (argc != 7 || atoi(argv[3]) < 1 || atoi(argv[3]) > LL_MAX_THRUSTERS) {
         fprintf(stderr, "usage: %s KEY_FILE PORT THRUSTERS(1-%d) F_MAX_N MAX_RISE_N RAMP_MS\n",
                 argv[0], LL_MAX_THRUSTERS);
@@ -145,6 +160,11 @@ int main(int argc, char **argv)
     /* YOURS if it flies: in place of NULL the numbers of hardware/attitude_keeper.py */
     ll_limits limits = {(uint8_t)atoi(argv[3]), atof(argv[4]), atof(argv[5]),
                         1000 * (int64_t)atoi(argv[6]), NULL};
+    ll_watchdog w;
+    if (!ll_init(&w, &limits, (uint32_t)random_u64(), key)) {
+        fprintf(stderr, "F_MAX_N, MAX_RISE_N and RAMP_MS must be finite and above 0\n");
+        return 2;
+    }
     struct sockaddr_in own = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(argv[2]))};
     own.sin_addr.s_addr = htonl(INADDR_ANY);
     int fd = socket(AF_INET, SOCK_DGRAM, 0);
@@ -154,8 +174,6 @@ int main(int argc, char **argv)
     }
     signal(SIGTERM, stop);
     signal(SIGINT, stop);
-    ll_watchdog w;
-    ll_init(&w, &limits, (uint32_t)random_u64(), key);
     recipients to = {0};
     struct pollfd readable = {.fd = fd, .events = POLLIN};
     for (int64_t next_us = clock_us(); !stopping;) {

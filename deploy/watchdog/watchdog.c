@@ -103,7 +103,7 @@ static void given(const ll_watchdog *w, int64_t now_us, double *thrusts)
     if (!w->fading)
         return;
     double elapsed_us = now_us > w->fading_us ? (double)(now_us - w->fading_us) : 0.0;
-    double share = fmax(0.0, 1.0 - elapsed_us / (double)w->limits.ramp_us);
+    double share = fmin(1.0, fmax(0.0, 1.0 - elapsed_us / (double)w->limits.ramp_us));
     for (int i = 0; i < w->limits.thrusters; i++)
         thrusts[i] *= share;
     if (w->limits.attitude)
@@ -308,16 +308,25 @@ static void obey_zero(ll_watchdog *w, const command *c, bool newest)
         w->state = LL_IDLE;
 }
 
-void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
+static bool is_above_zero(double value)
+{
+    return isfinite(value) && value > 0.0;
+}
+
+bool ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
              const uint8_t key[LL_KEY_BYTES])
 {
     memset(w, 0, sizeof *w);
-    w->limits = *limits;
     w->boot_id = boot_id;
     w->state = LL_REFUSING;
     w->refusal = LL_STARTED;
     ll_hmac_init(&w->hmac, key, LL_KEY_BYTES);
     ll_attitude_init(&w->attitude);
+    if (limits->thrusters < 1 || limits->thrusters > LL_MAX_THRUSTERS || limits->ramp_us <= 0 ||
+        !is_above_zero(limits->f_max) || !is_above_zero(limits->max_rise))
+        return false; /* no thrusters: no command fits */
+    w->limits = *limits;
+    return true;
 }
 
 ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us,

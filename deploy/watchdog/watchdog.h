@@ -62,8 +62,10 @@ typedef struct {
     uint32_t newest_counter;
 } ll_watchdog;
 
-/* Refusing, until zero thrust has been seen for long enough. `boot_id`: another one each start. */
-void ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
+/* Refusing, until zero thrust has been seen for long enough. `boot_id`: another one each start.
+ * False, and refusing everything for ever: unless 1 to LL_MAX_THRUSTERS thrusters, and f_max,
+ * max_rise and ramp_us finite and above 0. */
+bool ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
              const uint8_t key[LL_KEY_BYTES]);
 
 /* Take or refuse a datagram; LL_NONE if it was taken: from now on samples go to its sender.

@@ -14,7 +14,7 @@ import pytest
 
 from hardware.datagram import Command, encode_command
 from hardware.follower import FollowerState, Refusal
-from hardware.link_key import mac
+from hardware.link_key import LinkKeyError, mac, read_key
 from hardware.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
 from tests.hardware.test_attitude_keeper import asymmetric, turned
@@ -65,7 +65,9 @@ class CRobotEnd:
         if limits.attitude is not None:
             self.gains = CGains.of(limits.attitude)
             c_limits.attitude = ctypes.pointer(self.gains)
-        library.ll_init(self.memory, ctypes.byref(c_limits), ctypes.c_uint32(boot_id), key)
+        self.started = library.ll_init(
+            self.memory, ctypes.byref(c_limits), ctypes.c_uint32(boot_id), key
+        )
         self.answers = False
 
     def receive(self, data, _peer, now_us):
@@ -103,6 +105,7 @@ def library(tmp_path_factory):
     subprocess.run((*GCC, *sources), check=True)
     library = ctypes.CDLL(str(path))
     library.ll_sample.restype = ctypes.c_size_t
+    library.ll_init.restype = ctypes.c_bool
     return library
 
 
@@ -193,6 +196,67 @@ def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, limits):
     others = {Refusal.NONE, Refusal.STARTED, Refusal.HANDSHAKE}
     others |= {Refusal.RISE} if limits is FLIES else set()  # from 0 to full in two commands
     assert seen >= {("answer", why) for why in Refusal if why not in others}
+
+
+BAD_LIMITS = (
+    *({"thrusters": n} for n in (0, 17)),
+    *({"ramp_us": ramp_us} for ramp_us in (0, -1)),
+    *({name: bad} for name in ("f_max", "max_rise") for bad in (0, -1, math.nan, math.inf)),
+)
+
+
+@pytest.mark.parametrize("bad", BAD_LIMITS, ids=str)
+def test_limits_that_limit_nothing_are_refused_and_then_no_command_is_taken(library, bad):
+    assert CRobotEnd(library, LIMITS, 77).started
+    robot = CRobotEnd(library, replace(LIMITS, **bad), 77)
+    assert not robot.started
+    for nonce, now_us in enumerate(range(1_000_000, 2_000_000, 5000), 1):
+        robot.sample(now_us, nonce, (0.0,) * 3, (0.0,) * 3, np.zeros(3))
+        command = Command(5, nonce, nonce, nonce, False, (0.0,) * 3)
+        assert robot.receive(encode_command(command, KEY), None, now_us) == Refusal.THRUSTERS
+
+
+def run_robot(path, key_text, *numbers):
+    """The program of a robot, which must refuse to start."""
+    program, key_file = path / "robot", path / "robot.key"
+    key_file.write_text(key_text)
+    key_file.chmod(0o600)
+    words = (str(program), str(key_file), "0", "3", *numbers)
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=20.0)
+
+
+@pytest.fixture(scope="module")
+def program_path(library, tmp_path_factory):
+    path = tmp_path_factory.mktemp("robot")
+    sources = [str(SOURCE / name) for name in ("robot_main.c", *NAMES)]
+    words = ("gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(path / "robot"))
+    subprocess.run((*words, *sources, "-lm"), check=True)
+    return path
+
+
+HEX = KEY.hex()
+NO_KEYS = ("", HEX[:-1], HEX + "0", HEX + "\n00", HEX[:16] + " " + HEX[16:], "0x" + HEX[:-2])
+NO_KEYS += (HEX[:-1] + "g", "+1" + HEX[2:], "x" + HEX)
+
+
+@pytest.mark.parametrize("text", NO_KEYS)
+def test_the_program_refuses_what_python_refuses_as_a_key(program_path, text):
+    done = run_robot(program_path, text, "3.0", "1.0", "2000")
+    assert (done.returncode, "no key" in done.stderr) == (2, True)
+    with pytest.raises(LinkKeyError):
+        read_key(program_path / "robot.key")
+
+
+BAD_NUMBERS = (("nan", "1", "9"), ("3", "nan", "9"), ("3", "1", "-9"), ("3", "1", "0"))
+
+
+@pytest.mark.parametrize("numbers", BAD_NUMBERS)
+@pytest.mark.parametrize("key_text", [HEX, f" \n{HEX.upper()}\n\n"])
+def test_the_program_reads_the_key_and_refuses_numbers_that_limit_nothing(
+    program_path, key_text, numbers
+):
+    done = run_robot(program_path, key_text, *numbers)
+    assert (done.returncode, "above 0" in done.stderr) == (2, True)
 
 
 @pytest.mark.parametrize("seed", range(100))
