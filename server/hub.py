@@ -156,10 +156,18 @@ class Hub:
             self.say(f"{request.what} did not reach the control process: try again.")
 
     def greet(self, hello: Hello, page: Page, who: Member = PROGRAM) -> OperatorPhone | None:
-        """Give the lease to a phone of `who`; None while another one has it, or shall have it."""
+        """Give the lease to a phone of `who`; None while another one has it, or shall have it.
+
+        A robot that somebody else has left in flight comes down first: None until it has.
+        """
         current = self.phone
         silent_s = current.silent_for(now()) if current is not None else None
         if not self.people.lease.is_free_for(who.id, silent_s, now()):
+            return None
+        if self.is_flying() and self.people.lease.is_of_another(who.id):
+            self.people.note("take-over", who, "the robot comes down first")
+            self.say(f"{who.name} leads once the robot is down.")
+            self.disarm()
             return None
         if current is not None:
             self.people.note("take-over", who, "the phone that led was silent")
@@ -178,7 +186,7 @@ class Hub:
         )
         self.paths.begin(page)
         self.recordings.message("phone", encode_message(hello), now())
-        self.to_control(RequestInput("disarm"))  # never go on with another hand
+        self.disarm()  # never go on with another hand
         self.people.lease.take(who.id)
         self.people.note("lead", who, self.phone.device)
         self.say(f"{who.name} leads: {self.phone.device}.")

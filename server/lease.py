@@ -15,6 +15,7 @@ class Lease:
         """Nobody's."""
         self.holder = ""
         """Id of the session that leads, or ""."""
+        self._last = ""
         self._next, self._until = "", 0.0
 
     def next_of(self, now: float) -> str:
@@ -30,9 +31,13 @@ class Lease:
         is_taken = silent_s is not None and silent_s < LEASE_S
         return not is_taken and self.next_of(now) in ("", who)
 
+    def is_of_another(self, who: str) -> bool:
+        """Whether somebody else than `who` has led last, and may have left the robot in the air."""
+        return self._last not in ("", who)
+
     def take(self, who: str) -> None:
         """`who` leads."""
-        self.holder = who
+        self.holder = self._last = who
         if who == self._next:
             self._next = ""
 

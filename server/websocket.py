@@ -31,7 +31,9 @@ control bears; and a phone's radio falls asleep after some 75 ms in which nothin
 MAX_UNSENT = 16
 """Of one page; a page that does not read loses the oldest."""
 HELLO_S = 5.0
-BUSY = WireError("role", "hello.role", "one phone at a time, and another one leads the robot now")
+BUSY = WireError(
+    "role", "hello.role", "one phone at a time: another one leads, or has left the robot in flight"
+)
 
 
 class Connection:

@@ -41,3 +41,13 @@ def test_who_was_shut_out_blocks_nobody(to, other):
     lease.give(to, 0.0)
     lease.forget(to)
     assert lease.is_free_for(other, None, 1.0)
+
+
+@given(WHO, WHO)
+def test_who_led_last_is_remembered_when_he_has_gone(holder, other):
+    lease = Lease()
+    assert not lease.is_of_another(other)
+    lease.take(holder)
+    lease.free()
+    lease.forget(holder)
+    assert lease.is_of_another(other) == (other != holder)

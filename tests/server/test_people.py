@@ -252,6 +252,47 @@ def test_in_flight_the_leader_gives_nothing_away_and_a_supervisor_brings_the_rob
     play(house, scene)
 
 
+@pytest.mark.parametrize("mode", [Mode.TRACK, Mode.HOLD, Mode.COAST, Mode.RAMP])
+def test_a_robot_left_in_flight_comes_down_before_somebody_else_leads(house, mode):
+    async def scene():
+        anna, bert = (Browser(house, "operator", name) for name in ("Anna", "Bert"))
+        in_mode(house, mode)
+        async with anna.leading():
+            pass
+        await eventually(lambda: house.hub.phone is None)
+        house.control.inputs()
+        async with bert.page("/ws/phone") as page:
+            assert (await page.hello("operator", device="other"))["code"] == "role"
+        await house.control_hears(is_request("disarm"))
+        async with anna.leading():
+            pass
+        await eventually(lambda: house.hub.phone is None)
+        in_mode(house, Mode.DISARMED)
+        async with bert.leading():
+            assert people(house)["Bert"].leads
+
+    play(house, scene)
+
+
+def test_a_new_lead_disarms_also_when_control_could_take_nothing_at_first(house, monkeypatch):
+    async def scene():
+        anna, heard = Browser(house, "operator", "Anna"), []
+        in_mode(house, Mode.DISARMED)
+        send = house.hub._control.send
+
+        def full_at_first(message):
+            if is_request("disarm")(message):
+                heard.append(message)
+                return len(heard) > 3 and send(message)
+            return send(message)
+
+        monkeypatch.setattr(house.hub._control, "send", full_at_first)
+        async with anna.leading():
+            await house.control_hears(is_request("disarm"))
+
+    play(house, scene)
+
+
 def test_nobody_gives_away_what_he_has_not_or_to_whom_he_may_not(house):
     async def scene():
         anna, bert = (Browser(house, "operator", name) for name in ("Anna", "Bert"))
