@@ -30,18 +30,23 @@ export class WakefulClock {
   }
 }
 
-/** What time it is at the server, as its newest Status tells: late by the way of that one, never early. */
+/**
+ * What time it is at the server, as that Status tells which was least late: late by the way of that one, never
+ * early. A later one that a slow link held back must not make a STOP look older than it is.
+ */
 export class ServerTime {
-  /** @param {{ now(): number }} clock */
+  /** @param {WakefulClock} clock */
   constructor(clock) {
     this.clock = clock;
     /** @type {number | null} */
     this.aheadMs = null;
+    this.offsetMs = clock.offsetMs;
   }
 
   /** @param {number} timeMs Of a Status that has just come. */
   heard(timeMs) {
-    this.aheadMs = timeMs - this.clock.now();
+    const aheadMs = timeMs - this.here();
+    this.aheadMs = Math.max(this.aheadMs ?? -Infinity, aheadMs);
   }
 
   forget() {
@@ -50,7 +55,16 @@ export class ServerTime {
 
   /** [ms], or null while nothing was heard. */
   now() {
-    return this.aheadMs === null ? null : Math.floor(this.clock.now() + this.aheadMs);
+    const ms = this.here();
+    return this.aheadMs === null ? null : Math.max(0, Math.floor(ms + this.aheadMs));
+  }
+
+  /** The page's time; what was known does not outlive a sleep, which is measured by the wall's clock alone. */
+  here() {
+    const ms = this.clock.now();
+    if (this.clock.offsetMs !== this.offsetMs) this.forget();
+    this.offsetMs = this.clock.offsetMs;
+    return ms;
   }
 }
 

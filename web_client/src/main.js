@@ -43,6 +43,7 @@ let shown = false;
 const phone = new Phone({
   base: document.baseURI,
   performance,
+  clock,
   links,
   dispatch,
   identity: () => identity,
@@ -216,7 +217,7 @@ function reportHealth() {
 
 /** @param {string} text */
 function notice(text) {
-  dispatch({ type: 'notice', text, now: performance.now() });
+  dispatch({ type: 'notice', text, now: clock.now() });
 }
 
 document.addEventListener('visibilitychange', () => {
@@ -229,7 +230,7 @@ window.addEventListener('unhandledrejection', (event) => phone.log(`page: ${even
 window.addEventListener('error', (event) => phone.log(`page: ${event.message}`));
 view.sound(feedback.sound);
 void start.arrive().then(() => {
-  window.setInterval(() => dispatch({ type: 'tick', now: performance.now() }), TICK_MS);
+  window.setInterval(() => dispatch({ type: 'tick', now: clock.now() }), TICK_MS);
   window.setInterval(() => dispatch({ type: 'stop_tick', now: clock.now() }), STOP_TICK_MS);
   window.setInterval(reportHealth, HEALTH_MS);
 });

@@ -5,6 +5,7 @@
 /** @import {Surroundings as LinkSurroundings} from './link.js' */
 /** @import {Event} from './session_types.js' */
 /** @import {VideoSender} from './video.js' */
+/** @import {WakefulClock} from './command.js' */
 
 /**
  * A faster way for records that may be lost.
@@ -27,6 +28,7 @@ const NEWEST_TOUCH_MS = 100;
  * @typedef {object} Surroundings
  * @property {string} base Address of the page.
  * @property {{ now(): number }} performance
+ * @property {WakefulClock} clock Of what people ask for and are told.
  * @property {LinkSurroundings} links
  * @property {(event: Event) => void} dispatch
  * @property {() => Identity} identity
@@ -48,7 +50,7 @@ export class Phone {
     this.due = null;
     /** @type {{ touch: Touch | null, tMs: number }} */
     this.newest = { touch: null, tMs: -Infinity };
-    this.serverTime = new ServerTime(surroundings.performance);
+    this.serverTime = new ServerTime(surroundings.clock);
     /** @type {VideoSender | null} */
     this.video = null;
     /** @type {FastRecords | null} */
@@ -100,8 +102,8 @@ export class Phone {
 
   /** @param {ToPage} message */
   take(message) {
-    const { dispatch, performance } = this.surroundings;
-    const now = performance.now();
+    const { dispatch, clock } = this.surroundings;
+    const now = clock.now();
     switch (message.type) {
       case 'welcome':
         this.welcomed(message);

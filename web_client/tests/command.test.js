@@ -23,11 +23,33 @@ test('the clock of wishes goes on while the device sleeps, and never back', () =
 
 test('a wish says how old it is and what time it is at the server, as far as it is known', () => {
   const time = new FakeTime();
-  const server = new ServerTime(time);
+  const server = new ServerTime(new WakefulClock(time, time));
   assert.deepEqual(commandOf('arm', 0, server), { type: 'command', what: 'arm', age_ms: 0, server_ms: null });
   server.heard(77_000);
   time.advance(250.7);
   assert.deepEqual(commandOf('stop', 12.4, server), { type: 'command', what: 'stop', age_ms: 12, server_ms: 77_250 });
   server.forget();
   assert.equal(commandOf('stop', 12.4, server).server_ms, null);
+});
+
+test('a Status that was held back makes no wish older than it is', () => {
+  const time = new FakeTime();
+  const server = new ServerTime(new WakefulClock(time, time));
+  server.heard(77_000);
+  time.advance(6000);
+  server.heard(78_000); // five seconds on its way
+  assert.equal(server.now(), 83_000);
+  server.forget(); // another server, perhaps
+  server.heard(500);
+  assert.equal(server.now(), 500);
+});
+
+test('what time it is at the server is not known after a sleep until it is heard again', () => {
+  const [page, wall] = [new FakeTime(), new FakeTime()];
+  const server = new ServerTime(new WakefulClock(page, wall));
+  server.heard(77_000);
+  wall.advance(120_000);
+  assert.equal(server.now(), null);
+  server.heard(197_000);
+  assert.equal(server.now(), 197_000);
 });

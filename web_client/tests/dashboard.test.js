@@ -62,6 +62,8 @@ test('a fatal refusal blocks the page, another passes by', () => {
   assert.equal(after(refused('value', true)).problem?.code, 'refused');
   assert.equal(after(refused('rate', false)).notice?.text, 'Not taken: hello: supervisors');
   assert.equal(after(refused('rate', false), { type: 'tick', now: 5000 }).notice, null);
+  assert.equal(after({ type: 'stop', now: 0 }, refused('age', false)).notice, null); // STOP is said again
+  assert.match(after(refused('age', false)).notice?.text ?? '', /Not taken/);
 });
 
 test('numbers read well and have a dash for the unknown', () => {

@@ -1,8 +1,9 @@
 import assert from 'node:assert/strict';
 import { beforeEach, test } from 'node:test';
 
+import { WakefulClock } from '../src/command.js';
 import { Phone } from '../src/phone.js';
-import { FakeSocket, FakeTime, fakeWebSocket, pingOf } from './fakes.js';
+import { FakeSocket, FakeTime, fakeWebSocket, pingOf, statusOf } from './fakes.js';
 
 /** @type {string[]} */
 let log = [];
@@ -16,6 +17,7 @@ beforeEach(() => {
   phone = new Phone({
     base: 'https://robot:8443/',
     performance: time,
+    clock: new WakefulClock(time, time),
     links: { WebSocket: fakeWebSocket(), setTimeout: time.setTimeout, clearTimeout: time.clearTimeout },
     dispatch: (event) => log.push(event.type),
     identity: () => ({ device: 'Pixel 7', sensors: 'DeviceMotion', video: 'H.264' }),
@@ -255,4 +257,16 @@ test('a PING that comes by both ways is answered once, by the first; a new sessi
   main?.says({ ...WELCOME, session: 's2' });
   ping(1, 'fast');
   assert.deepEqual(answers, ['1 fast', '2 slow', '1 fast']);
+});
+
+test('what the server says is told at the time of the clock that goes on while the phone sleeps', () => {
+  const wall = new FakeTime();
+  const told = /** @type {(number | undefined)[]} */ ([]);
+  const { surroundings } = phone;
+  surroundings.clock = new WakefulClock(time, wall);
+  surroundings.dispatch = (event) => void told.push('now' in event ? event.now : undefined);
+  wall.advance(60_000);
+  phone.take({ type: 'refused', code: 'rate', field: 'message', allowed: 'less', fatal: false });
+  phone.take(statusOf());
+  assert.deepEqual(told, [60_000, 60_000]);
 });

@@ -26,7 +26,7 @@ const STOP_TICK_MS = 50;
 
 const { fetchHere, later, links, platform } = browserOf(window);
 const clock = new WakefulClock(performance, Date);
-const serverTime = new ServerTime(performance);
+const serverTime = new ServerTime(clock);
 const stopPost = new StopPost(fetchHere);
 let board = EMPTY;
 let shown = false;
@@ -86,7 +86,7 @@ function dispatch(event) {
 
 /** @param {ToPage} message */
 function take(message) {
-  const now = performance.now();
+  const now = clock.now();
   if (message.type === 'welcome') dispatch({ type: 'welcomed' });
   if (message.type === 'status') {
     serverTime.heard(message.time_ms);
@@ -116,7 +116,7 @@ function sendStop() {
  */
 async function request(method, path, body) {
   const fault = await ask(fetchHere, method, path, body);
-  if (fault !== '') dispatch({ type: 'notice', text: `Not done: ${fault}`, now: performance.now() });
+  if (fault !== '') dispatch({ type: 'notice', text: `Not done: ${fault}`, now: clock.now() });
   return fault === '';
 }
 
@@ -175,7 +175,7 @@ void arrive().then(() => {
       card.tick(performance.now());
       knobs.tick();
     }
-    dispatch({ type: 'tick', now: performance.now() });
+    dispatch({ type: 'tick', now: clock.now() });
   }, TICK_MS);
   window.setInterval(() => {
     if (!board.stopping) return;

@@ -127,6 +127,7 @@ function refused(board, refusal, now) {
     const code = refusal.code === 'version' ? 'old_page' : refusal.code === 'role' ? 'wrong_role' : 'refused';
     return reduce(board, { type: 'problem', problem: new Problem(code, words) });
   }
+  if (refusal.code === 'age' && board.stopping) return board; // it is said again
   return reduce(board, { type: 'notice', text: `Not taken: ${words}`, now });
 }
 
