@@ -20,6 +20,7 @@ from server.wire import MAX_MESSAGE_BYTES, WireError
 
 Text = Annotated[str, Meta(max_length=200)]
 AgeMs = Annotated[int, Meta(ge=0, le=3_600_000)]
+ServerMs = Annotated[int, Meta(ge=0, le=2**53)]
 Side = Annotated[int, Meta(ge=16, le=4096)]
 
 
@@ -49,9 +50,9 @@ class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=
     what: Literal["arm", "disarm", "stop", "reset", "key_frame"]
     age_ms: AgeMs = 0
     """Since the person asked, by the page's own clock."""
-    server_ms: int | None = None
-    """The server's clock when this was sent, as far as the page knows: `time_ms` of the newest
-    `status` and what has passed since that came; None: it has heard none."""
+    server_ms: ServerMs | None = None
+    """The server's clock when this was sent, as far as the page knows: `time_ms` of the `status`
+    that was least late and what has passed since that came; None: it has heard none."""
 
 
 class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):

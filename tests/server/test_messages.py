@@ -23,6 +23,8 @@ def test_roundtrip() -> None:
         ("[]", "value", "message"),
         ('{"type":"nonsense"}', "value", "$.type"),
         ('{"type":"command","what":"explode"}', "value", "$.what"),
+        ('{"type":"command","what":"stop","server_ms":-1}', "value", "$.server_ms"),
+        ('{"type":"command","what":"stop","server_ms":9007199254740993}', "value", "$.server_ms"),
         ('{"type":"hello","version":1,"role":"operator","x":1}', "value", "message"),
         ('{"type":"hello","version":"1","role":"operator"}', "value", "$.version"),
         ('{"type":"hello","version":NaN,"role":"operator"}', "type", "message"),

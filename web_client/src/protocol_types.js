@@ -21,7 +21,7 @@
  * @property {'command'} type
  * @property {'arm' | 'disarm' | 'stop' | 'reset' | 'key_frame'} what
  * @property {number} age_ms Since the person asked, by the page's own clock.
- * @property {number | null} server_ms The server's clock when this was sent, as far as the page knows: `time_ms` of the newest `status` and what has passed since that came; null: it has heard none.
+ * @property {number | null} server_ms The server's clock when this was sent, as far as the page knows: `time_ms` of the `status` that was least late and what has passed since that came; null: it has heard none.
  */
 
 /**
