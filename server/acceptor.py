@@ -116,7 +116,7 @@ class Acceptor:
         guest.on_close = lambda: self._admission.leave(place)
         guest.handshake = task = self._loop.create_task(self._welcome(guest, place))
         self._handshakes.add(task)
-        task.add_done_callback(self._handshakes.discard)
+        task.add_done_callback(lambda done: self._settle(done, guest))
 
     async def _welcome(self, guest: Guest, place: Place) -> None:
         """From the first byte to a protocol that takes over."""
@@ -131,13 +131,17 @@ class Acceptor:
                     ssl_shutdown_timeout=GOODBYE_S if self._tls else None,
                 )
         except (OSError, TimeoutError):  # whoever came has left, was late or spoke no TLS
+            return
+        guest.transport = transport
+        self._loop.call_later(STRANGER_S, _end_a_stranger, guest, place)
+
+    def _settle(self, done: asyncio.Task[None], guest: Guest) -> None:
+        """Whatever ended the handshake, even before its first step: its handle is free again."""
+        self._handshakes.discard(done)
+        if guest.transport is None:
             guest.close()
-        except asyncio.CancelledError:
-            guest.close()
-            raise
-        else:
-            guest.transport = transport
-            self._loop.call_later(STRANGER_S, _end_a_stranger, guest, place)
+        if not done.cancelled() and (error := done.exception()) is not None:
+            log.error("port %d: a handshake failed", self._door, exc_info=error)
 
     async def _first_byte(self, guest: Guest) -> None:
         came = asyncio.Event()

@@ -7,6 +7,7 @@ import contextlib
 import errno
 import gc
 import logging
+import select
 import socket
 import ssl
 from types import SimpleNamespace
@@ -186,6 +187,40 @@ def test_a_strangers_connection_ends_however_it_talks(monkeypatch):
                 one.transport.abort()
 
     asyncio.run(run())
+
+
+def test_one_that_is_ended_before_its_handshake_begins_leaves_no_handle():
+    async def run():
+        async with door() as here:
+            client = knock(here.port, STRANGER)
+            select.select([here.bound], [], [], 4.0)
+            here.acceptor._accept()  # the handshake is yet to take its first step
+            assert len(here.admission) == 1
+            (place,) = here.admission._places.values()
+            guest = place.end.__self__
+            place.end()
+            await eventually(lambda: guest.fileno() == -1)
+            assert len(here.admission) == 0
+            client.close()
+
+    asyncio.run(run())
+
+
+def test_a_fault_in_a_handshake_is_told_and_its_place_given_back(caplog):
+    def broken():
+        raise ZeroDivisionError("no protocol")
+
+    async def run():
+        async with door() as here:
+            here.acceptor._protocol = broken
+            reader, writer = await come(here.port)
+            writer.write(b"hello")
+            assert await ends(reader) == b""
+            await eventually(lambda: len(here.admission) == 0)
+            writer.close()
+
+    asyncio.run(run())
+    assert "no protocol" in caplog.text
 
 
 class Poor:
