@@ -113,6 +113,7 @@ def listener(app: ASGIApp, tls: Certificate | None, admission: Admission | None 
             log_config=None,
             access_log=False,
             server_header=False,
+            proxy_headers=False,  # who asks is who connected, whatever programs of this machine say
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,
             ssl_certfile=tls.cert if tls else None,

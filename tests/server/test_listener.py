@@ -38,9 +38,9 @@ async def app(scope, receive, send):
 
 
 @contextlib.asynccontextmanager
-async def listening() -> AsyncIterator[SimpleNamespace]:
+async def listening(served=app) -> AsyncIterator[SimpleNamespace]:
     with socket.create_server(("127.0.0.1", 0)) as bound:
-        server = impatient.listener(app, None)
+        server = impatient.listener(served, None)
         task = asyncio.create_task(server.serve(sockets=[bound]))
         try:
             await eventually(lambda: server.started)
@@ -151,3 +151,19 @@ def test_signals_are_left_to_their_owner():
             assert [signal.getsignal(number) for number in owned] == before
 
     asyncio.run(run())
+
+
+def test_nobody_comes_from_elsewhere_by_saying_so():
+    told = []
+
+    async def tell(scope, receive, send):
+        told.append((scope["client"][0], scope["scheme"]))
+        await app(scope, receive, send)
+
+    async def run():
+        async with listening(tell) as here:
+            claim = b"X-Forwarded-For: 192.0.2.7\r\nX-Forwarded-Proto: https\r\n\r\n"
+            await speak(here.port, LAST[:-2] + claim)
+
+    asyncio.run(run())
+    assert told == [("127.0.0.1", "http")]
