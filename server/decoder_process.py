@@ -19,6 +19,7 @@ import signal
 import socket
 import struct
 import sys
+import traceback
 from collections import OrderedDict
 from pathlib import Path
 from typing import NoReturn
@@ -27,7 +28,7 @@ import cv2
 import numpy as np
 
 from hardware.sim.codec import CODECS, DecodeError, Decoder
-from server.child import die_with
+from server.child import die_with, set_oom_score
 
 REQUEST = struct.Struct("<IIBHHI")
 """Number, stream, codec, width, height [px], bytes of the coded picture."""
@@ -38,6 +39,8 @@ MEMORY_BYTES = 256 << 20
 """Beyond what the process has before its first picture."""
 STREAMS = 4
 """Decoders that are kept."""
+FIRST_TO_GO = 500
+"""For Linux, when memory is short: it is started anew, and nobody else is hurt."""
 
 
 def main() -> None:
@@ -45,6 +48,7 @@ def main() -> None:
     descriptor, memory_descriptor, size = map(int, sys.argv[1:4])
     cpu_s = float(sys.argv[4])
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    set_oom_score(FIRST_TO_GO)
     channel = socket.socket(fileno=descriptor)
     memory = mmap.mmap(memory_descriptor, size)
     cv2.setNumThreads(1)  # a forked process has none but the thread that forked it
@@ -78,6 +82,10 @@ def _decode_for_ever(
             signal.setitimer(signal.ITIMER_PROF, 0.0)
             channel.sendall(ANSWER.pack(number, became))
         code = 0
+    except ConnectionError:  # the server has gone meanwhile
+        code = 0
+    except Exception:
+        traceback.print_exc()
     finally:
         os._exit(code)  # nothing of the parent's is to be tidied up here
 

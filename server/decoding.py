@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import mmap
 import os
 import select
@@ -19,6 +20,8 @@ import numpy as np
 
 from hardware.sim.codec import CODECS, DecodeError
 from pipeline.signals import Image
+from server.child import BACKOFF_S, STEADY_S
+from server.clock import now
 from server.decoder_process import ANSWER, DECODED, DIED, REQUEST
 from server.wire import MAX_PIXELS, MAX_RECORD_BYTES
 
@@ -29,7 +32,10 @@ for long is ended by its processor time."""
 PICTURE_CPU_S = 0.25
 """One of two megapixels takes a tenth of it."""
 SAY_AGAIN_S = 5.0
+AGAIN_S = (0.0, *BACKOFF_S)
+"""One that was steady costs a picture and no more: the first start anew is at once."""
 MAX_NUMBER = 0xFFFFFFFF
+log = logging.getLogger("lightleash")
 
 
 class AnyDecoder(Protocol):
@@ -52,12 +58,15 @@ class _Running:
     """One process, with its socket and memory."""
 
     def __init__(self, cpu_s: float) -> None:
-        self.channel, theirs = socket.socketpair()
-        self.channel.settimeout(START_S)
-        with tempfile.TemporaryFile() as file, theirs:
-            descriptor = _memory(file.fileno())
+        """OSError: there are no handles, or there is no memory, for it."""
+        with contextlib.ExitStack() as theirs, contextlib.ExitStack() as ours:
+            self.channel, other = socket.socketpair()
+            ours.callback(self.channel.close)
+            theirs.callback(other.close)
+            self.channel.settimeout(START_S)
+            descriptor = _memory(theirs)
             self.memory = mmap.mmap(descriptor, MEMORY_BYTES)
-            numbers = theirs.fileno(), descriptor
+            numbers = other.fileno(), descriptor
             command = [sys.executable, "-m", "server.decoder_process"]
             self.process = subprocess.Popen(
                 [*command, *map(str, (*numbers, MEMORY_BYTES, cpu_s))],
@@ -66,8 +75,7 @@ class _Running:
                 stdin=subprocess.DEVNULL,
                 stdout=sys.stderr,
             )
-            if descriptor != file.fileno():
-                os.close(descriptor)
+            ours.pop_all()
 
     def ask(self, request: bytes, number: int, data: bytes) -> int:
         """What became of a picture.
@@ -100,20 +108,25 @@ class _Running:
         self.process.wait()
 
 
-def _memory(file: int) -> int:
-    """A descriptor of shared memory; of a file where the system has no other."""
+def _memory(until: contextlib.ExitStack) -> int:
+    """A descriptor of shared memory, open `until` then; of a file where there is no other."""
     if hasattr(os, "memfd_create"):
-        file = os.memfd_create("lightleash-pictures")
-    os.ftruncate(file, MEMORY_BYTES)
-    return file
+        descriptor = os.memfd_create("lightleash-pictures")
+        until.callback(os.close, descriptor)
+    else:
+        file = until.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
+        descriptor = file.fileno()
+    os.ftruncate(descriptor, MEMORY_BYTES)
+    return descriptor
 
 
 class Decoding:
     """A process that decodes for everybody, one picture at a time; started anew when it ends."""
 
-    def __init__(self, cpu_s: float = PICTURE_CPU_S) -> None:
+    def __init__(self, cpu_s: float = PICTURE_CPU_S, clock: Callable[[], float] = now) -> None:
         """Started, to be ready when pictures come; `cpu_s` is the processor time of one [s]."""
-        self._cpu_s = cpu_s
+        self._cpu_s, self._clock = cpu_s, clock
+        self._failures, self._started, self._due = 0, clock(), 0.0
         self._lock = threading.Lock()
         self._streams = self._asked = 0
         self._running: _Running | None = _Running(cpu_s)
@@ -151,8 +164,9 @@ class Decoding:
         if len(data) > MEMORY_BYTES or width * height > MAX_PIXELS:
             return None
         with self._lock:
-            if self._running is None:
-                self._running = _Running(self._cpu_s)
+            if self._running is None and not self._start():
+                return None
+            assert self._running is not None
             self._asked = self._asked % MAX_NUMBER + 1
             request = REQUEST.pack(self._asked, stream, codec, width, height, len(data))
             try:
@@ -160,11 +174,33 @@ class Decoding:
             except OSError:  # it has gone, or stands still
                 self._running.close()
                 self._running, became = None, DIED
+                self._wait_to_start()
             self.deaths += became == DIED
             if self._running is None or became != DECODED:
                 return None
             luma = np.frombuffer(self._running.memory, np.uint8, width * height)
             return luma.reshape(height, width).copy()  # the next picture will lie there
+
+    def _start(self) -> bool:
+        """Whether it is started anew: one that ends each time, or can't begin, waits longer."""
+        t = self._clock()
+        if t < self._due:
+            return False
+        self._started = t
+        try:
+            self._running = _Running(self._cpu_s)
+        except OSError as error:
+            log.error("can't start the decoder of pictures: %s; trying again", error.strerror)
+            self._wait_to_start()
+            return False
+        return True
+
+    def _wait_to_start(self) -> None:
+        t = self._clock()
+        if t - self._started > STEADY_S:
+            self._failures = 0
+        self._due = t + AGAIN_S[min(self._failures, len(AGAIN_S) - 1)]
+        self._failures += 1
 
     def close(self) -> None:
         """End the process."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import subprocess
@@ -16,6 +17,8 @@ import numpy as np
 import pytest
 
 from hardware.sim.codec import CODECS, DecodeError, Decoder, Encoder
+from server import decoding as decoding_module
+from server.decoder_process import FIRST_TO_GO
 from server.decoding import MEMORY_BYTES, Decoding
 from server.frame_decoder import FrameDecoder
 from server.ingest import EncodedFrame
@@ -152,6 +155,72 @@ def test_one_that_is_killed_costs_a_picture_at_most_and_no_answer_goes_astray(wh
             except DecodeError:
                 lost += 1
         assert lost <= 1
+
+
+class Starts:
+    """Processes that can't be started, or end at once."""
+
+    def __init__(self) -> None:
+        self.t, self.at = 0.0, list[float]()
+        self.error: OSError | None = None
+
+    def __call__(self, cpu_s: float) -> Starts:
+        self.at.append(self.t)
+        if self.error is not None:
+            raise self.error
+        return self
+
+    def ask(self, *request: object) -> int:
+        raise ConnectionError("the decoder has gone")
+
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize("error", [None, OSError(errno.EMFILE, "Too many open files")])
+def test_one_that_ends_each_time_or_can_not_begin_is_started_ever_more_seldom(
+    monkeypatch: pytest.MonkeyPatch, error: OSError | None
+) -> None:
+    starts = Starts()
+    monkeypatch.setattr(decoding_module, "_Running", starts)
+    decoding = Decoding(clock=lambda: starts.t)
+    starts.error = error
+    there = decoding.open("jpeg", WIDTH, HEIGHT)
+    for tenth in range(200):
+        starts.t = 0.1 * tenth
+        with pytest.raises(DecodeError):
+            there.decode(b"x")
+    waits = np.diff(starts.at[1:])
+    assert waits == pytest.approx([0.2, 0.5, 1.0, 2.0, 5.0, 5.0, 5.0], abs=0.21)
+
+
+def test_a_start_without_file_handles_leaves_none_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    def poor(*arguments: object, **options: object) -> None:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(subprocess, "Popen", poor)
+    before = os.listdir("/proc/self/fd")
+    with pytest.raises(OSError, match="Too many"):
+        decoding_module._Running(1.0)
+    assert len(os.listdir("/proc/self/fd")) == len(before)
+
+
+def test_what_ends_the_decoder_but_is_no_fault_of_a_picture_is_told() -> None:
+    script = (
+        "import mmap, os, socket; from server import decoder_process as d;"
+        "a, b = socket.socketpair(); a.sendall(d.REQUEST.pack(1, 1, 99, 64, 64, 0));"
+        "d._decode_for_ever(os.getppid(), b, mmap.mmap(-1, 4096), 1.0)"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=START_S)
+    assert ended.returncode == 1
+    assert b"IndexError" in ended.stderr
+
+
+def test_when_memory_is_short_it_goes_first(decoding: Decoding) -> None:
+    decoding.open("jpeg", WIDTH, HEIGHT).decode(
+        Encoder(WIDTH, HEIGHT, 30.0, 1, "jpeg").encode(luma(0))[0]
+    )
+    own = int(Path("/proc/self/oom_score_adj").read_text())
+    assert int(Path(f"/proc/{decoding.pid}/oom_score_adj").read_text()) == FIRST_TO_GO > own
 
 
 def test_when_the_server_is_killed_they_end(tmp_path: Path) -> None:
