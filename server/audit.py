@@ -11,6 +11,7 @@ import os
 import queue
 import threading
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from msgspec.structs import asdict
@@ -20,7 +21,8 @@ from server.people_messages import Deed
 
 log = logging.getLogger("lightleash")
 
-AUDIT_FILE = "audit.jsonl"
+AUDIT_FILE, STRANGERS_FILE = "audit.jsonl", "refusals.jsonl"
+"""Deeds and refusals of members; refusals of people who are none, who can't push those out."""
 MAX_BYTES, FILES = 1_000_000, 5
 """Of one file, and how many are kept."""
 CAPACITY = 1_000
@@ -31,28 +33,31 @@ SAME_S = 1.0
 A page says STOP 20 times a second: of STOP the reason does not count.
 """
 REFUSALS, REFUSALS_S = 30, 60.0
-"""So many refusals in that time have a line each; the others are counted."""
+"""So many refusals of members, and of strangers, in that time have a line each.
+
+The others are counted in the next line of the same file.
+"""
 
 
 class Audit:
     """The log; without a directory it keeps nothing."""
 
     def __init__(self, directory: Path | None = None, clock: Callable[[], float] = now) -> None:
-        """Appends to `audit.jsonl` in `directory`."""
-        self._path = directory / AUDIT_FILE if directory is not None else None
+        """Appends to `audit.jsonl` and `refusals.jsonl` in `directory`."""
+        self._directory = directory
         self._clock = clock
         self._newest: dict[tuple[str, str], float] = {}
-        self._refusals: list[float] = []
-        self._left_out = 0
-        self._queue: queue.Queue[Deed | None] = queue.Queue(CAPACITY)
+        self._refusals: dict[str, list[float]] = {AUDIT_FILE: [], STRANGERS_FILE: []}
+        self._left_out = dict.fromkeys(self._refusals, 0)
+        self._queue: queue.Queue[tuple[str, Deed] | None] = queue.Queue(CAPACITY)
         self._thread: threading.Thread | None = None
 
     def note(
         self, what: str, who: str = "", role: str = "", address: str = "", why: str = ""
     ) -> Deed | None:
         """Keep a deed; None if it only repeats the one before, or there are too many."""
-        t = self._clock()
-        if what == "refusal" and not self._may_refuse(t):
+        t, file = self._clock(), STRANGERS_FILE if what == "refusal" and not who else AUDIT_FILE
+        if what == "refusal" and not self._may_refuse(file, t):
             return None
         key = (what, f"{who} {address} {why if what != 'stop' else ''}")
         if t - self._newest.get(key, -SAME_S) < SAME_S:
@@ -60,30 +65,32 @@ class Audit:
         if len(self._newest) > CAPACITY:
             self._newest.clear()
         self._newest[key] = t
-        if self._left_out:
-            why, self._left_out = f"{why} ({self._left_out} more left out)", 0
+        if left_out := self._left_out[file]:
+            why, self._left_out[file] = f"{why} ({left_out} more left out)", 0
         deed = Deed(round(t, 6), wall(), what, who, role, address, why)
-        self._keep(deed)
+        self._keep(file, deed)
         return deed
 
-    def _may_refuse(self, t: float) -> bool:
-        self._refusals = [one for one in self._refusals if one > t - REFUSALS_S]
-        if len(self._refusals) >= REFUSALS:
-            self._left_out += 1
+    def _may_refuse(self, file: str, t: float) -> bool:
+        recent = [one for one in self._refusals[file] if one > t - REFUSALS_S]
+        self._refusals[file] = recent
+        if len(recent) >= REFUSALS:
+            self._left_out[file] += 1
             return False
-        self._refusals.append(t)
+        recent.append(t)
         return True
 
-    def _keep(self, deed: Deed) -> None:
-        if self._path is None:
+    def _keep(self, file: str, deed: Deed) -> None:
+        if self._directory is None:
             return
         if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="audit", daemon=True)
+            writing = partial(self._run, self._directory)
+            self._thread = threading.Thread(target=writing, name="audit", daemon=True)
             self._thread.start()
         try:
-            self._queue.put_nowait(deed)
+            self._queue.put_nowait((file, deed))
         except queue.Full:
-            self._left_out += 1
+            self._left_out[file] += 1
 
     def close(self) -> None:
         """Write what waits."""
@@ -92,11 +99,11 @@ class Audit:
             self._thread.join()
             self._thread = None
 
-    def _run(self) -> None:
-        assert self._path is not None
-        while (deed := self._queue.get()) is not None:
+    def _run(self, directory: Path) -> None:
+        while (kept := self._queue.get()) is not None:
+            file, deed = kept
             try:
-                append(self._path, line_of(deed))
+                append(directory / file, line_of(deed))
             except OSError as error:
                 log.warning("the audit log can't be written: %s", error)
 

@@ -101,7 +101,24 @@ def test_a_flood_of_refusals_leaves_a_few_lines_and_their_count():
     kept = [log.note("refusal", why=str(n)) for n in range(1000)]
     assert len([one for one in kept if one is not None]) == REFUSALS
     clock.t += REFUSALS_S
-    assert "(970 more left out)" in log.note("arm", "Anna").why
+    assert "(970 more left out)" in log.note("refusal", why="next").why
+
+
+def test_refusals_of_strangers_push_out_no_deed_and_use_up_no_member_s_refusals(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(audit, "MAX_BYTES", 1_000)
+    log = Audit(tmp_path, clock := Clock())
+    log.note("revoke", "Sue", "supervisor", "", "Anna")
+    for n in range(100):
+        clock.t += REFUSALS_S / REFUSALS
+        log.note("refusal", "", "", "192.0.2.1", str(n))
+    for n in range(REFUSALS):
+        log.note("refusal", "", "", "192.0.2.2", str(n))
+    assert log.note("refusal", "Vera", "viewer", "192.0.2.3", "arm").why == "arm"
+    log.close()
+    assert [one["what"] for one in lines(tmp_path)] == ["revoke", "refusal"]
+    assert len(list(tmp_path.glob("refusals*.jsonl"))) == FILES
 
 
 def test_a_disk_that_takes_nothing_stops_nobody(tmp_path, caplog):

@@ -13,7 +13,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.testclient import TestClient, WebSocketDenialResponse
 
 from server import replies
-from server.audit import AUDIT_FILE, Audit
+from server.audit import STRANGERS_FILE, Audit
 from server.clock import now
 from server.roles import ADDRESSES, RANKS, is_enough
 from server.security import COOKIE, PAIR_TRIES, Doors, Guard
@@ -243,7 +243,7 @@ def test_a_wrong_link_is_written_down_with_the_address_it_came_from(rig, tmp_pat
     rig.doors.audit = Audit(tmp_path)
     rig.client.post("/api/pair", json={"token": "guess"}, headers=OWN)
     rig.doors.audit.close()
-    (line,) = (tmp_path / AUDIT_FILE).read_text().splitlines()
+    (line,) = (tmp_path / STRANGERS_FILE).read_text().splitlines()
     assert {"what": "refusal", "address": "127.0.0.1"}.items() <= json.loads(line).items()
 
 
