@@ -70,7 +70,7 @@ class Dashboard:
         """
         rich.get_console().quiet = True  # only viser speaks through it
         craft = scene.Craft.of(robot, plant)
-        self._viser = start_viser(path)
+        self._path, self._viser = path, start_viser(path)
         self._trail = scene.Trail()
         self._heading = scene.Heading()
         self._craft, self._is_fresh = craft, False
@@ -96,6 +96,7 @@ class Dashboard:
         if self._thread is not None:
             self._thread.join(STOP_S)
         self._viser.stop()
+        self._path.unlink(missing_ok=True)  # asyncio does so since Python 3.13 only
 
     def _run(self, latest: Latest) -> None:
         shown: ControlStatus | None = None
