@@ -29,6 +29,7 @@ class BodyClock:
         self._excess[:] = np.inf
 
 
+DEAF = "The robot hears nothing for the moment."
 RAMP_BEGUN_S = 1e-6 * (BACK_UNTIL_US - RAMP_AFTER_US)
 """A robot that has just begun to ramp takes commands back: so long it may say so."""
 
@@ -69,9 +70,9 @@ class RobotLink:
         elif not self._restarted:
             self._t_ramp = min(self._t_ramp, now)
             if now - self._t_ramp < RAMP_BEGUN_S:
-                self.reason, self.gap = "", self.reason
+                self.reason, self.gap = "", DEAF
         if last.state == FollowerState.COAST:
-            self.gap = EXPLANATIONS[Refusal.SILENT]
+            self.gap = DEAF
 
     def _reason(self, last: BodySample) -> str:
         """A robot that restarts refuses what we go on sending: the restart is what went wrong."""

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware.follower import EXPLANATIONS, BodySample, FollowerState, Refusal, ThrustCommand
-from server.robot_link import RAMP_BEGUN_S, BodyClock, RobotLink
+from server.robot_link import DEAF, RAMP_BEGUN_S, BodyClock, RobotLink
 
 
 def sample(
@@ -102,7 +102,7 @@ def test_a_robot_that_restarted_says_so_until_it_is_ready_whatever_else_it_refus
         reasons.append(link.reason)
     started = EXPLANATIONS[Refusal.STARTED]
     assert reasons == ["", started, started, "", ""]
-    assert link.gap == EXPLANATIONS[Refusal.SILENT]
+    assert link.gap == DEAF
 
 
 def test_a_robot_that_coasts_or_has_only_just_begun_to_ramp_has_nothing_against_flying_on() -> None:
@@ -121,7 +121,7 @@ def test_a_robot_that_coasts_or_has_only_just_begun_to_ramp_has_nothing_against_
         follower.next = [sample(1_000, state, refusal)]
         link.receive(at)
         told.append((link.reason, link.gap))
-    bears, ended, well = ("", silent), (silent, ""), ("", "")
+    bears, ended, well = ("", DEAF), (silent, ""), ("", "")
     assert told == [bears, bears, bears, ended, well, bears]
 
 
