@@ -120,7 +120,7 @@ class Teleop:
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
             self._tracking.feel(known, self._given_in_b, self._h)
-            self._feel_station(known, inputs.t)
+            self._propagate_station(known, inputs.t)
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
         error = self._error(known)  # Eq. (14)-(19)
@@ -264,15 +264,17 @@ class Teleop:
             self._reference = self._led_to = None
         return known, None
 
-    def _feel_station(self, known: Situation, t: float) -> None:
+    def _propagate_station(self, known: Situation, t: float) -> None:
         """Through a gap by the gyroscope alone: what comes after it puts the phone's axes right."""
         R_fb = known.view.R_fv @ known.view.R_vb
         # after a stall all samples come at once, but a step counts for no more than its longest
         if self._stood_still or t - self._body.t > LONGEST_STEP_S:
-            self._station.lose()
+            self._station.reset()
             self._hold.R_fb = R_fb
         coasts = self._failsafe.mode == Mode.COAST
-        self._station.feel(known.relative.f_bf_in_b, self._hold.R_fb if coasts else R_fb, self._h)
+        self._station.propagate(
+            known.relative.f_bf_in_b, self._hold.R_fb if coasts else R_fb, self._h
+        )
 
     def _follow_back(self) -> None:
         """After a gap the reference goes to where it was led before, slowly: nothing jumps."""

@@ -22,7 +22,7 @@ from pipeline.signals import VirtualView
 
 
 class StationKeeping:
-    """Call `feel` every period; `start` when a gap is noticed, `force` while it lasts."""
+    """Call `propagate` every period, `start` when a gap is noticed, `force_in_b` while it lasts."""
 
     def __init__(self, config: StationConfig, gains: Gains, robot: Robot) -> None:
         """At rest."""
@@ -33,7 +33,7 @@ class StationKeeping:
         """Velocity of the body [m/s]."""
         self._offset_in_f, self._constant_force_in_f = np.zeros(3), np.zeros(3)
 
-    def feel(self, f_bf_in_b: Array, R_fb: Array, h: float) -> None:
+    def propagate(self, f_bf_in_b: Array, R_fb: Array, h: float) -> None:
         """Carry velocity and place on by `h` [s] of specific force (3,) [m/s²]."""
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         self._a_slow_in_f = self._a_slow_in_f + (1.0 - exponential(-h / self._config.bias_s)) * (
@@ -52,7 +52,7 @@ class StationKeeping:
         """
         self._offset_in_f, self._constant_force_in_f = offset_in_f, constant_force_in_f
 
-    def lose(self) -> None:
+    def reset(self) -> None:
         """Nothing was felt for a while: where it is now is as good as any place."""
         self.v_in_f, self._offset_in_f = np.zeros(3), np.zeros(3)
 

@@ -25,7 +25,7 @@ def swayed(seconds: float, bias: Array) -> tuple[StationKeeping, Array, Array]:
     keeps, omega = station(), 2.0 * np.pi * 0.3
     for k in range(round(seconds / H)):
         a = np.array([0.0, -0.1 * omega**2 * np.sin(omega * k * H), 0.0])
-        keeps.feel(UP + a + bias, np.eye(3), H)
+        keeps.propagate(UP + a + bias, np.eye(3), H)
     v = np.array([0.0, 0.1 * omega * np.cos(omega * seconds), 0.0])
     return keeps, v, np.zeros(3)
 
@@ -37,7 +37,7 @@ def test_a_moving_robot_is_braked_within_centimetres_and_stays() -> None:
     farthest = 0.0
     for _ in range(round(1.0 / H)):
         a = keeps.force_in_b(np.eye(3)) / ROBOT.mass
-        keeps.feel(UP + a + (0.0, 0.02, 0.0), np.eye(3), H)
+        keeps.propagate(UP + a + (0.0, 0.02, 0.0), np.eye(3), H)
         v, x = v + H * a, x + H * v
         farthest = max(farthest, float(np.linalg.norm(x)))
     assert farthest < 0.05
@@ -49,7 +49,7 @@ def test_at_rest_it_asks_for_nothing_but_what_it_takes_to_stay_in_any_attitude()
     for R_fb in (np.eye(3), exp(np.array([0.1, -0.2, 0.3]))):
         keeps.start(np.zeros(3), force_in_f)
         for _ in range(200):
-            keeps.feel(R_fb.T @ UP, R_fb, H)
+            keeps.propagate(R_fb.T @ UP, R_fb, H)
         np.testing.assert_allclose(R_fb @ keeps.force_in_b(R_fb), force_in_f, atol=1e-9)
 
 
@@ -62,5 +62,5 @@ def test_it_goes_to_the_place_it_is_given() -> None:
 def test_who_felt_nothing_for_a_while_stays_where_he_is() -> None:
     keeps, _, _ = swayed(5.0, bias=np.zeros(3))
     keeps.start(np.array([0.05, 0.0, 0.0]), np.zeros(3))
-    keeps.lose()
+    keeps.reset()
     np.testing.assert_array_equal(keeps.force_in_b(np.eye(3)), np.zeros(3))
