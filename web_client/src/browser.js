@@ -22,6 +22,8 @@ export function browserOf(window) {
   };
   const canWork = scope.VideoFrame !== undefined && scope.Worker !== undefined;
   const frameWorker = new URL('./frame_worker.js', import.meta.url);
+  const canCompress = scope.OffscreenCanvas !== undefined && scope.Worker !== undefined;
+  const jpegWorker = new URL('./jpeg_worker.js', import.meta.url);
   const rtcWorker = new URL('./rtc_worker.js', import.meta.url);
   return {
     scope,
@@ -30,6 +32,7 @@ export function browserOf(window) {
     links,
     platform: platformOf(window.navigator),
     screenAngle: () => screenAngleOf(window.screen, scope.orientation),
+    startJpegWorker: canCompress ? () => new Worker(jpegWorker, { type: 'module' }) : undefined,
     startRtcWorker: scope.Worker !== undefined ? () => new Worker(rtcWorker, { type: 'module' }) : undefined,
     startWorker: canWork ? () => new Worker(frameWorker, { type: 'module' }) : undefined,
   };

@@ -1,9 +1,9 @@
 /** Frames to bytes: H.264 where the browser can, else JPEG. */
 
 /** @import {Frame} from './frame_source.js' */
+/** @import {JpegAnswer} from './jpeg_worker.js' */
 /** @import {Wanted} from './camera.js' */
 
-import { Problem } from './problems.js';
 import { shrunkSize } from './pace.js';
 import { Codec, MAX_RECORD_BYTES } from './protocol.js';
 
@@ -166,62 +166,85 @@ export class H264Encoder {
   }
 }
 
-/** @implements {Encoder} */
+/** Compresses in a worker, whatever the page is busy with. @implements {Encoder} */
 export class JpegEncoder {
   name = 'JPEG';
   shrunk = 0;
   waiting = 0;
 
   /**
-   * @param {new (width: number, height: number) => OffscreenCanvas} Canvas
+   * @param {() => Worker} startWorker Starts `jpeg_worker.js`.
    * @param {Outlet} outlet
    */
-  constructor(Canvas, outlet) {
-    this.canvas = new Canvas(16, 16);
-    this.context = this.canvas.getContext('2d', { alpha: false });
+  constructor(startWorker, outlet) {
     this.outlet = outlet;
     this.quality = JPEG_QUALITY;
     this.newestUs = -Infinity;
-    if (this.context === null) throw new Problem('encoder_missing');
+    this.id = 0;
+    /** Frames in the worker. @type {Map<number, About>} */
+    this.inside = new Map();
+    this.worker = startWorker();
+    this.worker.onmessage = ({ data }) => this.output(data);
+    this.worker.onerror = () => outlet.onFailure(new Error('its worker did not start'));
   }
 
   /** @param {Frame} frame */
   encode(frame) {
-    const { canvas } = this;
     const about = aboutOf(frame, this.shrunk);
-    const { width, height } = about;
-    if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
-      canvas.height = height;
-    }
-    this.context?.drawImage(frame.image, 0, 0, width, height);
-    frame.close();
-    void this.compress(about);
+    this.id += 1;
+    this.inside.set(this.id, about);
+    void this.hand(frame, this.id, about);
   }
 
-  /** @param {About} about */
-  async compress(about) {
+  /**
+   * @param {Frame} frame
+   * @param {number} id
+   * @param {About} about
+   */
+  async hand(frame, id, { width, height }) {
     try {
-      const blob = await this.canvas.convertToBlob({ type: 'image/jpeg', quality: this.quality });
-      const data = new Uint8Array(await blob.arrayBuffer());
-      if (data.byteLength + HEADERS_BYTES > MAX_RECORD_BYTES) {
-        this.quality = Math.max(0.3, this.quality - 0.1);
-        this.outlet.onLost();
-      } else if (about.captureUs < this.newestUs) { // overtaken by a later one
-        this.outlet.onLost();
-      } else {
-        this.newestUs = about.captureUs;
-        this.outlet.onEncoded({ codec: Codec.JPEG, key: true, about, data });
-      }
+      const image = await handed(frame);
+      this.worker.postMessage({ id, image, width, height, quality: this.quality }, [image]);
     } catch (error) {
+      this.output({ id, error: String(error) });
+    } finally {
+      frame.close();
+    }
+  }
+
+  /** @param {JpegAnswer} answer */
+  output({ id, data, error }) {
+    const about = this.inside.get(id);
+    this.inside.delete(id);
+    if (about === undefined) return;
+    if (data === undefined) {
       this.outlet.onLost();
-      this.outlet.onFailure(error);
+      this.outlet.onFailure(new Error(error));
+    } else if (data.byteLength + HEADERS_BYTES > MAX_RECORD_BYTES) {
+      this.quality = Math.max(0.3, this.quality - 0.1);
+      this.outlet.onLost();
+    } else if (about.captureUs < this.newestUs) { // overtaken by a later one
+      this.outlet.onLost();
+    } else {
+      this.newestUs = about.captureUs;
+      this.outlet.onEncoded({ codec: Codec.JPEG, key: true, about, data: new Uint8Array(data) });
     }
   }
 
   requestKey() {} // every JPEG is one
 
-  close() {}
+  close() {
+    this.worker.terminate();
+  }
+}
+
+/**
+ * A frame's picture as a worker may own it: a video element can't be handed over.
+ * @param {Frame} frame
+ * @returns {Promise<VideoFrame | ImageBitmap>}
+ */
+async function handed({ image }) {
+  return 'videoWidth' in image ? createImageBitmap(image) : image;
 }
 
 /**

@@ -78,7 +78,7 @@ export class LinkCheck {
   /** @param {State} state */
   mayBegin(state) {
     const mode = shownMode(state);
-    return (mode === 'DISARMED' || mode === 'STOPPED' || mode === 'LOST')
+    return state.linked && (mode === 'DISARMED' || mode === 'STOPPED' || mode === 'LOST')
       && (state.calibration === null || state.calibration.phase === 'needed');
   }
 

@@ -136,7 +136,7 @@ export class Phone {
     this.due = null;
     this.videoLink.failures = 0;
     this.videoLink.open();
-    this.surroundings.dispatch({ type: 'welcomed' });
+    this.surroundings.dispatch({ type: 'welcomed', you: welcome.you });
     this.surroundings.onWelcome(welcome);
   }
 

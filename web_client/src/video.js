@@ -20,7 +20,7 @@ export const HELD_MS = 1500;
  * @property {(record: ArrayBuffer) => boolean} send Whether the record went out.
  * @property {(text: string) => void} log
  * @property {typeof VideoEncoder | undefined} VideoEncoder
- * @property {(new (width: number, height: number) => OffscreenCanvas) | undefined} OffscreenCanvas
+ * @property {(() => Worker) | undefined} startJpegWorker
  */
 
 export class VideoSender {
@@ -82,8 +82,8 @@ export class VideoSender {
   }
 
   jpegEncoder() {
-    const Canvas = this.surroundings.OffscreenCanvas;
-    return Canvas === undefined ? null : new JpegEncoder(Canvas, this.outlet());
+    const { startJpegWorker } = this.surroundings;
+    return startJpegWorker === undefined ? null : new JpegEncoder(startJpegWorker, this.outlet());
   }
 
   /** A new connection: nothing is under way on it, and its first picture must be a key. */

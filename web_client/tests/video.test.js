@@ -2,7 +2,8 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { Credits, MAX_UNDER_WAY } from '../src/credits.js';
-import { H264Encoder, h264Candidates, supportedH264 } from '../src/encoder.js';
+import { H264Encoder, JpegEncoder, h264Candidates, supportedH264 } from '../src/encoder.js';
+import { MAX_RECORD_BYTES } from '../src/protocol.js';
 import { HELD_MS, VideoSender } from '../src/video.js';
 import { FakeTime } from './fakes.js';
 
@@ -54,6 +55,23 @@ class FakeEncoder {
   }
 }
 
+/** The worker that compresses, as far as a page sees it: it answers by and by. */
+class FakeJpegWorker {
+  /** @type {((event: { data: any }) => void) | null} */
+  onmessage = null;
+  ended = false;
+
+  /** @param {{ id: number, width: number }} wish @param {unknown[]} handed */
+  postMessage({ id }, handed) {
+    assert.equal(handed.length, 1);
+    setImmediate(() => this.onmessage?.({ data: { id, data: new Uint8Array([0xff, 0xd8, 1]).buffer } }));
+  }
+
+  terminate() {
+    this.ended = true;
+  }
+}
+
 const STREAM = { width: 1280, height: 720, frame_rate_hz: 30, bitrate_bps: 4e6 };
 
 /** @param {boolean} [h264] */
@@ -63,22 +81,12 @@ async function senderOf(h264 = true) {
   const state = { open: true, closed: 0, captureUs: 0 };
   /** @type {ArrayBuffer[]} */
   const sent = [];
-  class Canvas {
-    width = 0;
-    height = 0;
-    getContext() {
-      return { drawImage() {} };
-    }
-    async convertToBlob() {
-      return new Blob([new Uint8Array([0xff, 0xd8, 1])]);
-    }
-  }
   const sender = new VideoSender({
     performance: time,
     send: (record) => state.open && sent.push(record) > 0,
     log: () => {},
     VideoEncoder: /** @type {any} */ (FakeEncoder),
-    OffscreenCanvas: /** @type {any} */ (Canvas),
+    startJpegWorker: () => /** @type {any} */ (new FakeJpegWorker()),
   });
   await sender.prepare(STREAM);
   /** @param {Partial<Frame>} [parts] */
@@ -281,4 +289,72 @@ test('an encoder that holds its first pictures back is given up for good, one th
   offer();
   assert.equal(sender.encoder?.name, 'JPEG');
   assert.equal(await sender.prepare(STREAM), 'JPEG');
+});
+
+test('JPEGs that fail, are too large or were overtaken count as lost, and a worker that fails is given up', async () => {
+  /** @type {string[]} */
+  const log = [];
+  const worker = new FakeJpegWorker();
+  worker.postMessage = () => {}; // answers below, one by one
+  const encoder = new JpegEncoder(() => /** @type {any} */ (worker), {
+    onEncoded: ({ about }) => log.push(`encoded ${about.captureUs}`),
+    onLost: () => log.push('lost'),
+    onFailure: (error) => log.push(`${error}`),
+  });
+  for (const captureUs of [1, 2, 3, 4]) {
+    const frame = { image: /** @type {any} */ ({}), width: 16, height: 16, captureUs, close: () => {} };
+    encoder.encode({ ...frame, screenAngle: 0 });
+  }
+  const { quality } = encoder;
+  const small = new ArrayBuffer(9);
+  worker.onmessage?.({ data: { id: 2, data: small } });
+  worker.onmessage?.({ data: { id: 1, data: small } });
+  worker.onmessage?.({ data: { id: 3, data: new ArrayBuffer(MAX_RECORD_BYTES) } });
+  worker.onmessage?.({ data: { id: 4, error: 'no canvas' } });
+  worker.onmessage?.({ data: { id: 4, data: small } }); // it was answered before
+  assert.deepEqual(log, ['encoded 2', 'lost', 'lost', 'lost', 'Error: no canvas']);
+  assert.ok(encoder.quality < quality);
+  encoder.close();
+  assert.ok(worker.ended);
+});
+
+test('the worker draws what it is handed, closes it, and hands the bytes back', async () => {
+  const scope = /** @type {any} */ (globalThis);
+  /** @type {any[]} */
+  const log = [];
+  scope.OffscreenCanvas = class {
+    /** @param {number} width @param {number} height */
+    constructor(width, height) {
+      Object.assign(this, { width, height });
+      log.push(`canvas ${width}×${height}`);
+    }
+
+    getContext() {
+      return { drawImage: (/** @type {any} */ image, /** @type {number[]} */ ...to) => log.push(image.name, to.join()) };
+    }
+
+    async convertToBlob(/** @type {{ type: string, quality: number }} */ { type, quality }) {
+      log.push(`${type} ${quality}`);
+      if (quality === 0) throw new Error('no memory');
+      return new Blob([new Uint8Array([0xff, 0xd8])]);
+    }
+  };
+  /** @type {any[]} */
+  const answers = [];
+  scope.postMessage = (/** @type {any} */ answer, /** @type {any[]} */ handed = []) => answers.push([answer, handed]);
+  await import('../src/jpeg_worker.js');
+  const image = { name: 'picture', close: () => log.push('closed') };
+  const wish = { image, width: 480, height: 270 };
+  await scope.onmessage({ data: { ...wish, id: 7, quality: 0.7 } });
+  await scope.onmessage({ data: { ...wish, id: 8, quality: 0 } });
+  assert.deepEqual(log, [
+    'canvas 480×270', 'picture', '0,0,480,270', 'closed', 'image/jpeg 0.7',
+    'picture', '0,0,480,270', 'closed', 'image/jpeg 0',
+  ]);
+  const [[first, handed], [second]] = answers;
+  assert.deepEqual([first.id, [...new Uint8Array(first.data)], handed], [7, [0xff, 0xd8], [first.data]]);
+  assert.deepEqual([second.id, second.error], [8, 'Error: no memory']);
+  delete scope.OffscreenCanvas;
+  delete scope.postMessage;
+  delete scope.onmessage;
 });
