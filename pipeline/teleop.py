@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from pipeline.control.tracking import Situation, Tracking
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.estimation.attitude import Attitude
 from pipeline.estimation.estimators import make_estimator
+from pipeline.estimation.gyro_bridge import GyroBridge
 from pipeline.frames import Array
 from pipeline.robot import Robot
 from pipeline.signals import (
@@ -51,6 +53,8 @@ class Inputs:
     """What they have against flying on."""
     gap: str = ""
     """A short silence that the ages don't show: the robot heard nothing, or control stood still."""
+    robot_left_s: float = inf
+    """Until the robot ramps down by itself, if it goes on as it is [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +68,8 @@ class Output:
     failsafe: failsafe.Failsafe
     refusals: tuple[str, ...]
     until_ramp_s: float | None
-    """Left until RAMP if all goes on as it is [s]; None where it may for ever."""
+    """Left until a ramp, control's or the robot's own, if all goes on as it is [s]; None where it
+    may for ever."""
     resumes: bool
     """It will follow again by itself, if news come back in time."""
     relative: RelativeState | None
@@ -82,7 +87,7 @@ class Teleop:
     def __init__(self, robot: Robot, config: TeleopConfig, period: float = 0.005) -> None:
         """For one robot; `period` [s] is what the first `step` counts for."""
         self.estimator = make_estimator(config, robot.leds_in_b)
-        self.attitude = Attitude()
+        self.attitude, self._bridge = Attitude(), GyroBridge()
         self._config, self._robot = config, robot
         self._h, self._t_step, self._stood_still = period, np.nan, False
         self._limits = failsafe.Limits.of(
@@ -184,10 +189,19 @@ class Teleop:
             self._operator = inputs.operator
 
     def _R_fc_now(self, relative: RelativeState | None) -> Array | None:
-        """Phone attitude carried on by the rotation that carried p, R, u on: errors cancel."""
-        if self.attitude.R_fc is None or relative is None:
+        """Attitude of the phone, if need be by way of the robot; None before the first sample."""
+        if relative is None or self._is_deaf(relative.t):
+            self._bridge.reset()
+        if relative is None:
             return self.attitude.R_fc
-        return self.attitude.R_fc @ relative.R_ic
+        return self._bridge.step(self.attitude, relative, self._h)
+
+    def _is_deaf(self, t: float) -> bool:
+        """The robot's turns since the last step are not known.
+
+        After a stall all samples come at once, but a step counts for no more than its longest.
+        """
+        return self._stood_still or t - self._body.t > LONGEST_STEP_S
 
     def _look(self, relative: RelativeState | None, R_fc: Array | None) -> Situation | None:
         """The robot from the virtual camera, a period later."""
@@ -219,6 +233,7 @@ class Teleop:
             doubt=judgement.doubt(limits, known, self.estimator.complaint) or self._astray(known),
             refusals=inputs.refusals,
             requests=inputs.requests,
+            robot_left_ms=judgement.saturated_ms(inputs.robot_left_s),
             **ages.in_ms(),
         )
 
@@ -267,8 +282,7 @@ class Teleop:
     def _propagate_station(self, known: Situation, t: float) -> None:
         """Through a gap by the gyroscope alone: what comes after it puts the phone's axes right."""
         R_fb = known.view.R_fv @ known.view.R_vb
-        # after a stall all samples come at once, but a step counts for no more than its longest
-        if self._stood_still or t - self._body.t > LONGEST_STEP_S:
+        if self._is_deaf(t):
             self._station.reset()
             self._hold.R_fb = R_fb
         coasts = self._failsafe.mode == Mode.COAST

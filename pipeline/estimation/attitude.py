@@ -7,6 +7,8 @@ magnetometer does, comes in steps of 0.1°, and would cost centimetres: it is no
 
 from __future__ import annotations
 
+from math import inf, sqrt, tanh
+
 import numpy as np
 
 from pipeline.frames import GRAVITY, Array, R_fc_level_from_specific_force, cross, exp
@@ -17,8 +19,17 @@ GAIN = 0.15
 it is faster: one over the time since the start, the mean of all that was felt."""
 BIAS_GAIN = 0.01
 """[1/s²]."""
-MAX_GAP_S = 0.2
-"""Longer without samples: what was integrated is worth nothing, start anew."""
+HAND_VARIANCE = 0.005
+"""Density of the tilt that a hand's acceleration adds to gravity [rad² s]: 1.5 m/s² for 0.2 s. A
+gain g [1/s] is that of a Kalman filter whose tilt has the variance g `HAND_VARIANCE`."""
+SAMPLE_S = 0.02
+"""What one sample of the accelerometer counts for after a gap."""
+GAP_S = 0.1
+"""Longer without samples: what the gyroscope would have felt is inferred from both ends."""
+MAX_GAP_S = 3.0
+"""Longer: what was integrated is worth nothing, start anew."""
+HAND_RATE, HAND_RATE_S = 0.5, 0.2
+"""A hand's angular rate, one axis [rad/s], and its correlation time."""
 
 
 class Attitude:
@@ -30,6 +41,7 @@ class Attitude:
         self._bias = np.zeros(3)
         self._omega = np.zeros(3)
         self._t = self._t_start = -np.inf
+        self._is_lost = False
         self._turn: Array = np.eye(3)
         self.resets = 0
 
@@ -48,6 +60,27 @@ class Attitude:
         """Opposite of gravity in camera axes, or None before the first sample."""
         return None if self._R_fc is None else self._R_fc[2]
 
+    @property
+    def t(self) -> float:
+        """Of the last sample [s]; -inf before the first."""
+        return self._t
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of its tilt at the last sample [rad]; inf before the first."""
+        if self._R_fc is None:
+            return inf
+        age = self._t - self._t_start
+        return sqrt(HAND_VARIANCE * max(GAIN, 1.0 / max(age, SAMPLE_S)))
+
+    def correct(self, R_fc: Array, sigma: float) -> None:
+        """Somebody else knows the attitude at the last sample, (3, 3), by `sigma` [rad].
+
+        No turn of f (`take_turn`): it is the camera's motion in a gap that was not known.
+        """
+        self._R_fc, self._turn = R_fc, np.eye(3)
+        self._set_variance(sigma * sigma)
+
     def take_turn(self) -> Array:
         """How the axes of f were turned since the last call, (3, 3), to put its vertical right.
 
@@ -65,22 +98,41 @@ class Attitude:
         self._t = imu.t
         force = imu.a_m_cf_in_c
         norm = float(np.sqrt(force @ force))
-        if self._R_fc is None or dt > MAX_GAP_S:
+        self._is_lost = self._is_lost or dt > MAX_GAP_S
+        if self._R_fc is None or self._is_lost:
             if norm > 0.5 * GRAVITY:
                 self._begin(imu.t, force)
             return
-        R_fc = self._R_fc @ exp((omega - self._bias) * dt)
+        turn = (omega - self._bias) * dt
+        if dt > GAP_S:
+            turn = turn * self._bridge(dt)
+        R_fc = self._R_fc @ exp(turn)
         if 0.7 * GRAVITY < norm < 1.3 * GRAVITY:
+            h = dt if dt <= GAP_S else SAMPLE_S
             tilt = cross(force / norm, R_fc[2])
-            gain = max(GAIN, 1.0 / (imu.t - self._t_start + dt))
-            turn = exp(min(1.0, gain * dt) * (R_fc @ tilt))
+            gain = max(GAIN, 1.0 / (imu.t - self._t_start + h))
+            turn = exp(min(1.0, gain * h) * (R_fc @ tilt))
             R_fc, self._turn = turn @ R_fc, turn @ self._turn
-            self._bias = self._bias - BIAS_GAIN * dt * tilt
+            self._bias = self._bias - BIAS_GAIN * h * tilt
         self._R_fc = R_fc
+
+    def _bridge(self, dt: float) -> float:
+        """Grow the variance by a gap of `dt` [s]; gives how far the mean rate of its ends counts.
+
+        Mean and variance of the turn between two known rates, for rates that are an
+        Ornstein-Uhlenbeck process.
+        """
+        known_s = 2.0 * HAND_RATE_S * tanh(0.5 * dt / HAND_RATE_S)
+        self._set_variance(self.sigma**2 + 2.0 * HAND_RATE**2 * HAND_RATE_S * (dt - known_s))
+        return known_s / dt
+
+    def _set_variance(self, variance: float) -> None:
+        """The gain falls as one over the time since the start: so long ago it would have begun."""
+        self._t_start = self._t - HAND_VARIANCE / variance
 
     def _begin(self, t: float, force_in_c: Array) -> None:
         """Level, by one sample; the yaw of an earlier attitude is kept."""
         R_fc = np.eye(3) if self._R_fc is None else self._R_fc
         self.resets += self._R_fc is not None
         self._R_fc = R_fc_level_from_specific_force(R_fc @ force_in_c) @ R_fc
-        self._t_start = t
+        self._t_start, self._is_lost = t, False

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from pipeline.estimation.attitude import Attitude
+from pipeline.estimation.attitude import HAND_RATE, HAND_RATE_S, MAX_GAP_S, Attitude
 from pipeline.frames import GRAVITY, exp, log, rotation_about_z
 from pipeline.signals import PhoneImu
 
@@ -53,13 +54,63 @@ def test_free_fall_and_shocks_do_not_tilt_it() -> None:
     np.testing.assert_allclose(attitude.up_in_c, UP, atol=1e-9)
 
 
-def test_old_samples_are_ignored_and_a_gap_starts_anew() -> None:
+def test_old_samples_are_ignored_and_a_long_gap_starts_anew() -> None:
     attitude = Attitude()
     attitude.add(sample(1.0, np.eye(3), np.zeros(3)))
     attitude.add(sample(0.5, rotation_about_z(1.0), np.array([9.0, 9.0, 9.0])))
     np.testing.assert_allclose(attitude.R_fc, np.eye(3), atol=1e-12)
-    attitude.add(sample(2.0, exp(np.array([0.5, 0.0, 0.0])), np.zeros(3)))
+    turned = exp(np.array([0.5, 0.0, 0.0]))
+    attitude.add(PhoneImu(1.1 + MAX_GAP_S, np.zeros(3), np.zeros(3)))  # falls: says no tilt
+    np.testing.assert_allclose(attitude.R_fc, np.eye(3), atol=1e-12)
+    attitude.add(sample(1.2 + MAX_GAP_S, turned, np.zeros(3)))
     assert attitude.resets == 1
+    np.testing.assert_allclose(attitude.up_in_c, turned.T @ UP, atol=1e-12)
+
+
+def rested(seconds: float) -> Attitude:
+    attitude = Attitude()
+    for k in range(round(seconds / DT) + 1):
+        attitude.add(sample(k * DT, np.eye(3), np.zeros(3)))
+    return attitude
+
+
+def test_a_gaps_first_sample_of_a_hand_that_accelerates_is_not_believed_alone() -> None:
+    attitude = rested(10.0)
+    attitude.add(PhoneImu(10.5, np.zeros(3), np.array([3.0, 0.0, GRAVITY])))
+    assert attitude.up_in_c is not None
+    assert np.linalg.norm(attitude.up_in_c - UP) < 0.03
+    assert attitude.sigma > 0.05
+
+
+def test_a_turn_in_a_gap_is_inferred_from_both_ends() -> None:
+    attitude = Attitude()
+    for k in range(61):
+        attitude.add(sample(k * DT, rotation_about_z(k * DT), np.array([0.0, 0.0, 1.0])))
+    attitude.add(sample(1.12, rotation_about_z(1.12), np.array([0.0, 0.0, 1.0])))
+    assert attitude.R_fc is not None
+    assert np.linalg.norm(log(attitude.R_fc.T @ rotation_about_z(1.12))) < 0.01
+
+
+@pytest.mark.parametrize("gap_s", [0.25, 0.5, 0.9])
+def test_its_sigma_is_that_of_its_tilt_after_a_gap(gap_s: float) -> None:
+    """A hand as it is assumed to be: rates and accelerations, each with its correlation time."""
+    rng, h, squares = np.random.default_rng(3), 0.005, []
+    for _ in range(150):
+        attitude, R_fc, t = Attitude(), np.eye(3), 0.0
+        omega, a_in_f = HAND_RATE * rng.normal(size=3), 1.5 * rng.normal(size=3)
+        while t < 3.3 + gap_s:
+            if t < 3.0 or t > 3.0 + gap_s:
+                attitude.add(PhoneImu(t, omega, R_fc.T @ (GRAVITY * UP + a_in_f)))
+            if attitude.up_in_c is not None and t > 3.0 + gap_s:
+                off = attitude.up_in_c - R_fc.T @ UP
+                squares.append(float(off @ off) / (2.0 * attitude.sigma**2))
+                break
+            R_fc, t = R_fc @ exp(omega * h), t + h
+            keep = np.exp(-h / HAND_RATE_S)
+            fresh = np.sqrt(1.0 - keep * keep)
+            omega = keep * omega + fresh * HAND_RATE * rng.normal(size=3)
+            a_in_f = keep * a_in_f + fresh * 1.5 * rng.normal(size=3)
+    assert 0.5 < np.mean(squares) < 1.5
 
 
 def test_a_changing_rate_is_followed_to_second_order() -> None:
@@ -99,13 +150,24 @@ def test_what_the_accelerometer_turns_is_told_apart_from_what_the_gyroscope_felt
     np.testing.assert_array_equal(attitude.take_turn(), np.eye(3))
 
 
-def test_after_a_gap_the_heading_stays() -> None:
+def test_after_a_long_gap_the_heading_stays() -> None:
     attitude = Attitude()
     rate = np.array([0.0, 0.0, 1.0])
     R_fc = np.eye(3)
     for k in range(61):
         R_fc = rotation_about_z(k * DT)
         attitude.add(sample(k * DT, R_fc, rate))
-    attitude.add(sample(3.0, R_fc @ exp(np.array([0.1, 0.0, 0.0])), np.zeros(3)))
+    later = R_fc @ exp(np.array([0.1, 0.0, 0.0]))
+    attitude.add(sample(1.1 + MAX_GAP_S, later, np.zeros(3)))
     assert attitude.R_fc is not None
-    assert np.linalg.norm(log(attitude.R_fc.T @ R_fc @ exp(np.array([0.1, 0.0, 0.0])))) < 0.01
+    assert np.linalg.norm(log(attitude.R_fc.T @ later)) < 0.01
+
+
+def test_who_knows_better_after_a_gap_is_believed_as_far_as_he_knows() -> None:
+    attitude = rested(10.0)
+    before, R_fc = attitude.sigma, exp(np.array([0.2, -0.1, 0.3]))
+    attitude.add(sample(10.5, R_fc, np.zeros(3)))
+    attitude.correct(R_fc, before)
+    np.testing.assert_array_equal(attitude.R_fc, R_fc)
+    assert attitude.sigma == pytest.approx(before)
+    np.testing.assert_array_equal(attitude.take_turn(), np.eye(3))
