@@ -90,6 +90,18 @@ class UserWide(caching.UserWideCacheLocator):
         return super().get_source_stamp(), kernel_stamp()
 
 
+class Index(caching.IndexDataCacheFile):
+    """A kernel's index; one that names modules that are gone, after an upgrade, counts as none."""
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            found: dict[Any, str] = super()._load_index()
+        except (ImportError, AttributeError):
+            return {}
+        return found
+
+
+vars(caching).update(IndexDataCacheFile=Index)
 vars(numba.config).update(
     CACHE_LOCATOR_CLASSES=",".join(
         f"{__name__}.{locator.__name__}" for locator in (UserProvided, InTree, UserWide)

@@ -33,12 +33,18 @@ def run(tree: Path) -> tuple[float, int]:
     return float(value), int(hits)
 
 
-@pytest.mark.slow
-def test_an_edited_kernel_changes_the_next_process_also_through_its_callers(tmp_path):
-    package = tmp_path / "pipeline"
+def package_in(folder):
+    """A copy of what compiles kernels, for a caller beside it."""
+    package = folder / "pipeline"
     package.mkdir()
     for name in ("__init__", "frames", "jit", "so3_kernels"):
         (package / f"{name}.py").write_text((Path(ROOT) / "pipeline" / f"{name}.py").read_text())
+    return package
+
+
+@pytest.mark.slow
+def test_an_edited_kernel_changes_the_next_process_also_through_its_callers(tmp_path):
+    package = package_in(tmp_path)
     (package / "caller.py").write_text(CALLER)
     first, hits = run(tmp_path)
     assert first == pytest.approx(0.8775826)
@@ -63,3 +69,33 @@ def test_every_module_with_kernels_is_in_the_stamp_and_takes_numba_from_one_plac
 
 def test_what_only_gives_types_to_kernels_is_not_in_the_stamp():
     assert not {"pipeline.signals", "pipeline.frames"} & set(kernel_sources())
+
+
+SUMMER = """
+from pipeline.so3_kernels import kernel
+from pipeline.{module} import Pair
+
+@kernel
+def total(pair):
+    return pair.a + pair.b
+
+print(total(Pair(0.25, 0.75)), sum(total.stats.cache_hits.values()))
+"""
+PAIR = """
+from typing import NamedTuple
+
+class Pair(NamedTuple):
+    a: float
+    b: float
+"""
+
+
+@pytest.mark.slow
+def test_a_cached_kernel_that_names_a_module_that_is_gone_is_compiled_anew(tmp_path):
+    package = package_in(tmp_path)
+    (package / "before.py").write_text(PAIR)
+    (package / "caller.py").write_text(SUMMER.format(module="before"))
+    assert run(tmp_path) == (1.0, 0)
+    (package / "before.py").rename(package / "after.py")
+    (package / "caller.py").write_text(SUMMER.format(module="after"))
+    assert run(tmp_path) == (1.0, 0)
