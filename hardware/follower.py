@@ -140,7 +140,10 @@ class Follower(Protocol):
         """Command zero thrust at once, several times; never raises for a lost link."""
 
     def close(self) -> None:
-        """Stop, then give the link back. May be called twice."""
+        """Give the link back, without a word: a robot that gives thrust comes down by itself.
+
+        May be called twice.
+        """
 
 
 def check_command(command: ThrustCommand, thrusters: int, f_max: float) -> None:

@@ -84,8 +84,7 @@ class UdpFollower:
             self._send(ThrustCommand.zero(self.thrusters))
 
     def close(self) -> None:
-        """Stop and close."""
-        self.stop()
+        """Close. See `Follower`."""
         self._closed = True
         self._socket.close()
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from hardware.control_end import ControlEnd
 from hardware.dynamics import dynamics_of
+from hardware.follower import ThrustCommand
 from hardware.link_key import LinkKeyError, take_key
 from hardware.robot_file import RobotFile, load_robot
 from hardware.udp_link import UdpFollower
@@ -128,7 +129,11 @@ def _key() -> bytes:
 
 
 def run(options: ControlOptions) -> None:
-    """Keep the schedule until SIGTERM or SIGINT, then stop the robot."""
+    """Keep the schedule until SIGTERM or SIGINT.
+
+    However it ends, a robot that gives thrust then hears nothing any more and comes down by its own
+    ramp, upright if it flies: zeros would let it fall.
+    """
     robot_file, key = load_robot(options.robot), _key()
     config = teleop_config(
         robot_file, options.gains, options.virtual_camera.config(), options.estimator
@@ -162,15 +167,17 @@ def _loop(
     granted: str,
     stopping: list[int],
 ) -> None:
-    """Tick until told to stop."""
+    """Tick until told to stop; who gives no thrust then says so to the end."""
     schedule, link = realtime.Schedule(PERIOD_S), RobotLink(follower)
     lateness: dict[str, float] = {}
-    cpu_ms = np.zeros(LATENESS_EVERY)
+    cpu_ms, command = np.zeros(LATENESS_EVERY), ThrustCommand.zero(follower.thrusters)
     while not stopping:
         now = schedule.wait()
         cpu = time.thread_time()
         body = link.receive(now)
-        command, output = controller.tick(now, endpoint.inputs(), body, link.reason, link.gap)
+        command, output = controller.tick(
+            now, endpoint.inputs(), body, link.reason, link.gap, link.left_s
+        )
         follower.send(command)
         cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (time.thread_time() - cpu)
         if schedule.ticks % LATENESS_EVERY == 0:
@@ -186,6 +193,8 @@ def _loop(
                     dropped=endpoint.dropped + follower.dropped,
                 )
             )
+    if not command.armed:
+        follower.stop()
 
 
 if __name__ == "__main__":

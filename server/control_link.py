@@ -145,7 +145,7 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """0 to 1: how much the virtual camera hurries to keep the robot in the picture."""
     estimate: EstimateFields | None = None
     until_ramp_s: float | None = None
-    """In COAST and HOLD: left until RAMP if all goes on as it is."""
+    """In COAST and HOLD: left until control or the robot ramps down, if all goes on as it is."""
     resumes: bool = False
     """It will follow again by itself, if news come back in time."""
     gaps: dict[str, Gaps] = {}

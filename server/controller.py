@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from math import inf
 
 import numpy as np
 
@@ -111,6 +112,7 @@ class Controller:
         body: Sequence[BodyImu],
         robot_reason: str,
         robot_gap: str = "",
+        robot_left_s: float = inf,
     ) -> tuple[ThrustCommand, Output]:
         """One control period.
 
@@ -120,6 +122,7 @@ class Controller:
             body: The robot's samples on our clock, oldest first.
             robot_reason: Why the robot itself refuses thrust; empty if it doesn't. Ends a flight.
             robot_gap: Why it does not follow for the moment. Ends no flight, while it is short.
+            robot_left_s: Until it ramps down by itself, if it goes on as it is [s].
         """
         phone, seen, operator, wishes = self._sort(messages, now)
         for sample in body:
@@ -139,6 +142,7 @@ class Controller:
                 refusals=self._why_not(now, robot_reason),
                 fault=self._out_of_time(stall_s) or (robot_reason if self._armed else ""),
                 gap=_stood_still(stall_s) or robot_gap,
+                robot_left_s=robot_left_s,
             )
         )
         self._t_tick, self._armed = now, output.failsafe.mode not in (Mode.DISARMED, Mode.STOPPED)

@@ -171,7 +171,7 @@ class Lockstep:
         inbox, self._inbox = list(filter(is_believable, self.tamper(self._inbox))), []
         felt = self._link.receive(self.t)
         command, output = self.controller.tick(
-            self.t, inbox, felt, self._link.reason, self._link.gap
+            self.t, inbox, felt, self._link.reason, self._link.gap, self._link.left_s
         )
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._sight.expect(self.controller.expected(output))

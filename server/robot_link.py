@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 
 from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState, Refusal
-from hardware.robot_end import BACK_UNTIL_US, RAMP_AFTER_US
+from hardware.robot_end import BACK_UNTIL_US, RAMP_AFTER_US, SILENCE_US
 from pipeline.signals import BodyImu
 
 
@@ -30,6 +32,7 @@ class BodyClock:
 
 
 DEAF = "The robot hears nothing for the moment."
+SILENCE_S, RAMP_AFTER_S = 1e-6 * SILENCE_US, 1e-6 * RAMP_AFTER_US
 RAMP_BEGUN_S = 1e-6 * (BACK_UNTIL_US - RAMP_AFTER_US)
 """A robot that has just begun to ramp takes commands back: so long it may say so."""
 
@@ -47,7 +50,10 @@ class RobotLink:
         """Why it does not follow and will not by itself; empty while it may."""
         self.gap = ""
         """Why it does not follow for the moment."""
-        self._t_ramp = np.inf
+        self._t_ramp = self._t_deaf = np.inf
+        self._t_sample = -np.inf
+        self.left_s = inf
+        """Until the robot ramps down by itself, if it goes on as it is [s]."""
 
     def receive(self, now: float) -> list[BodyImu]:
         """The samples that have come since the last call."""
@@ -61,7 +67,16 @@ class RobotLink:
         if samples:
             self.reason, self.gap = self._reason(samples[-1]), ""
             self._bear(samples[-1], now)
+            self._t_sample = now
+        self.left_s = self._left(now)
         return dated
+
+    def _left(self, now: float) -> float:
+        """A robot that we don't hear coasts, too: commands must echo its newest samples."""
+        deaf_since = self._t_deaf
+        if now - self._t_sample > SILENCE_S:
+            deaf_since = min(deaf_since, self._t_sample)
+        return max(0.0, deaf_since + RAMP_AFTER_S - now)
 
     def _bear(self, last: BodySample, now: float) -> None:
         """A robot that coasts, or has only just begun to ramp, may come back."""
@@ -73,6 +88,10 @@ class RobotLink:
                 self.reason, self.gap = "", DEAF
         if last.state == FollowerState.COAST:
             self.gap = DEAF
+        if last.state not in (FollowerState.COAST, FollowerState.RAMP):
+            self._t_deaf = np.inf
+        else:
+            self._t_deaf = min(self._t_deaf, now - SILENCE_S)
 
     def _reason(self, last: BodySample) -> str:
         """A robot that restarts refuses what we go on sending: the restart is what went wrong."""

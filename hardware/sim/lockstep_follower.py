@@ -97,8 +97,7 @@ class LockstepFollower:
             self._send(ThrustCommand.zero(self.thrusters))
 
     def close(self) -> None:
-        """Stop and close."""
-        self.stop()
+        """Close. See `Follower`."""
         self._closed = True
 
     def _check_open(self) -> None:

@@ -76,6 +76,8 @@ class Inputs:
     refusals: tuple[str, ...] = ()
     """What else speaks against arming."""
     requests: Requests = NO_REQUESTS
+    robot_left_ms: int = FOREVER_MS
+    """Until the robot ramps down by itself, if it goes on as it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,10 +199,13 @@ def resumes(state: Failsafe, inputs: Inputs) -> bool:
 
 
 def until_ramp(state: Failsafe, inputs: Inputs, limits: Limits) -> int | None:
-    """Time left [ms] until RAMP if all goes on as it is; None while it can go on for ever."""
+    """Time left [ms] until a ramp if all goes on as it is; None while it can go on for ever.
+
+    Whoever begins it: this machine, or the robot by itself.
+    """
     if state.mode not in (Mode.COAST, Mode.HOLD):
         return None
-    left = limits.hold_max - state.mode_ms
+    left = min(limits.hold_max - state.mode_ms, inputs.robot_left_ms)
     for age, limit in _endings(inputs, limits):
         if age > limits.silent:
             left = min(left, limit - age)

@@ -24,10 +24,10 @@ class Ages:
     def in_ms(self) -> dict[str, int]:
         """By the names of `failsafe.Inputs`, saturated."""
         return {
-            "operator_ms": _ms(self.operator),
-            "pose_ms": _ms(self.pose),
-            "phone_imu_ms": _ms(self.phone_imu),
-            "robot_ms": _ms(self.body_imu),
+            "operator_ms": saturated_ms(self.operator),
+            "pose_ms": saturated_ms(self.pose),
+            "phone_imu_ms": saturated_ms(self.phone_imu),
+            "robot_ms": saturated_ms(self.body_imu),
         }
 
 
@@ -64,6 +64,6 @@ def _outside(limits: EnvelopeConfig, error: PoseError, view: VirtualView) -> str
     return ""
 
 
-def _ms(age: float) -> int:
-    """Milliseconds, saturated; an age that is not a number is for ever."""
+def saturated_ms(age: float) -> int:
+    """Milliseconds of seconds, saturated; an age that is not a number is for ever."""
     return int(min(max(1e3 * age, 0.0), failsafe.FOREVER_MS)) if age == age else failsafe.FOREVER_MS

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
 
 from hardware import udp_link
-from hardware.link_key import KEY_VARIABLE
+from hardware.link_key import KEY_VARIABLE, write_key
 from hardware.robot_file import load_robot
 
+WATCHDOG = Path(__file__).parents[2] / "deploy" / "watchdog"
 AMES = load_robot("ames")
 KEY = bytes(range(16))
 ENVIRONMENT = {**os.environ, KEY_VARIABLE: KEY.hex()}
@@ -67,6 +72,27 @@ def simulated_robot() -> RealTimeRig:
     assert ready[0] == "ready"
     ports = dict(word.split("=") for word in ready[1:])
     return RealTimeRig(process, int(ports["port"]), int(ports["truth_port"]))
+
+
+def compiled_watchdog(directory: Path) -> Path:
+    """The program of a robot in C; skips the test where there is no compiler."""
+    if shutil.which("gcc") is None:
+        pytest.skip("NO COMPILER, not tested: gcc is not installed")
+    program, names = directory / "robot", ("robot_main.c", "watchdog.c", "attitude.c", "hmac.c")
+    words = ("gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(program))
+    subprocess.run((*words, *(str(WATCHDOG / name) for name in names), "-lm"), check=True)
+    return program
+
+
+def watchdog_robot(program: Path) -> RealTimeRig:
+    """A robot in C, with the key and limits of the AMES."""
+    key_file, port = program.with_name("robot.key"), free_port()
+    write_key(key_file, KEY, force=True)
+    ramp_ms = round(1e3 * AMES.robot.ramp_s)
+    numbers = (port, 8, AMES.robot.f_max, AMES.link.max_rise, ramp_ms)
+    rig = RealTimeRig(start((str(program), str(key_file), *map(str, numbers))), port)
+    rig.advance(0.05)
+    return rig
 
 
 @contextlib.contextmanager

@@ -125,6 +125,21 @@ def test_a_new_control_process_has_samples_at_once_and_the_robot_after_its_ramp(
     old.close()
 
 
+def test_closed_in_flight_the_robot_comes_down_by_itself(loopback):
+    run(loopback, ZERO, 120)
+    run(loopback, FLYING, 20)
+    loopback.follower.close()
+    end, states = loopback.robot.end, []
+    while end.state != FollowerState.REFUSING:
+        loopback.advance(0.005)
+        states.append(end.state)
+    order = list(dict.fromkeys(states))
+    coast_s = 0.005 * states.index(FollowerState.RAMP)
+    assert order == [FollowerState[s] for s in ("RUNNING", "COAST", "RAMP", "REFUSING")]
+    assert coast_s == pytest.approx(0.28, abs=0.011)
+    assert 0.005 * len(states) == pytest.approx(0.06 + AMES.robot.ramp_s, abs=0.011)
+
+
 def test_a_control_process_frozen_for_long_is_answered_when_it_thaws(loopback):
     run(loopback, ZERO, 120)
     run(loopback, FLYING, 20)

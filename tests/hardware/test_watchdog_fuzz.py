@@ -19,10 +19,14 @@ EXECUTIONS = 50_000
 SECONDS = float(os.environ.get("LIGHTLEASH_FUZZ_S", "0"))
 
 
-@pytest.fixture(scope="module")
-def fuzz(tmp_path_factory):
+@pytest.fixture(scope="module", autouse=True)
+def compiler():
     if shutil.which("gcc") is None:
         pytest.skip("NO COMPILER, not tested: gcc is not installed")
+
+
+@pytest.fixture(scope="module")
+def fuzz(tmp_path_factory):
     path = tmp_path_factory.mktemp("fuzz") / "fuzz"
     sources = [str(SOURCE / name) for name in NAMES]
     words = ("gcc", "-std=c99", "-g", "-O1", "-Wall", "-Wextra", "-Werror", *SANITIZED)
@@ -33,6 +37,11 @@ def fuzz(tmp_path_factory):
         pytest.skip("NO SANITIZERS, not tested: libasan, libubsan are not installed")
     assert done.returncode == 0, done.stderr
     return path
+
+
+def test_the_entry_for_a_fuzzer_compiles_too():
+    words = ("gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-DLIBFUZZER", "-fsyntax-only")
+    subprocess.run((*words, str(SOURCE / "fuzz.c")), check=True)
 
 
 def run(fuzz, executions, seed):

@@ -11,7 +11,7 @@ import pytest
 
 from hardware.follower import ThrustCommand
 from hardware.robot_file import load_robot
-from pipeline.config import TeleopConfig
+from pipeline.config import TeleopConfig, VirtualCameraMode
 from pipeline.frames import GRAVITY
 from pipeline.signals import BodyImu, Mode
 from pipeline.teleop import Output
@@ -26,8 +26,9 @@ from server.control_link import (
     expected_of,
     server_end,
 )
-from server.controller import SERVER_SILENT_S, STOOD_STILL_S, Controller
+from server.controller import STOOD_STILL_S, Controller, Mean, TooLate, never_too_late
 from server.gap_log import MANY, SIDES
+from server.knobs import TuneInput
 from server.seen_input import SeenInput
 from server.tick_rate import OVER_S
 from tests.pipeline.seeing import seen_at
@@ -46,8 +47,8 @@ def picture(t: float) -> SeenInput:
 class Rig:
     """A phone at rest that sees a robot at rest; time passes as `run` says."""
 
-    def __init__(self) -> None:
-        self.controller = Controller(ROBOT, TeleopConfig())
+    def __init__(self, unfit: str = "", too_late: TooLate = never_too_late) -> None:
+        self.controller = Controller(ROBOT, TeleopConfig(), unfit, too_late)
         self.k = 0
         self.held = False
         self.press = 0
@@ -111,10 +112,10 @@ def test_it_is_armed_by_request_follows_a_press_and_stops_at_once():
     assert not rig.run(1.0)[-1][0].armed
     rig.track()
     command, output = rig.run(0.1)[-1]
-    assert command.armed
+    assert (command.armed, command.stop) == (True, False)
     command, output = rig.run(0.005, [RequestInput("stop")])[-1]
     assert output.failsafe.mode == Mode.STOPPED
-    assert not command.armed
+    assert (command.armed, command.stop) == (False, True)
     assert not command.thrusts.any()
 
 
@@ -140,7 +141,7 @@ def test_before_the_server_has_spoken_and_when_it_falls_silent_arming_is_refused
     rig.ready = []
     assert rig.run(0.01)[-1][1].refusals == ()
     rig.ready = None
-    assert rig.run(SERVER_SILENT_S - 0.02)[-1][1].refusals == ()
+    assert rig.run(0.48)[-1][1].refusals == ()
     assert rig.run(0.04)[-1][1].refusals == ("The server is silent.",)
     assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
 
@@ -151,6 +152,70 @@ def test_what_server_and_robot_have_against_arming_is_all_told():
     output = rig.run(1.0, robot_reason="The robot ramps.")[-1][1]
     assert output.refusals[:2] == ("No pictures.", "The robot ramps.")
     assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+def test_a_process_that_is_unfit_never_arms_and_says_why():
+    rig = Rig(unfit="No real-time priority.")
+    assert rig.run(1.0)[-1][1].refusals == ("No real-time priority.",)
+    assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+def test_how_old_pictures_and_body_samples_are_lately_is_asked_before_arming():
+    asked: list[tuple[float, float]] = []
+
+    def too_late(picture_age: float, body_age: float) -> str:
+        asked.append((picture_age, body_age))
+        return "Too late." if body_age > 0.003 + 1e-6 else ""
+
+    rig = Rig(too_late=too_late)
+    assert rig.run(1.0)[-1][1].refusals == ()
+    assert asked[0] == (0.0, 0.0)
+    assert asked[-1] == pytest.approx((0.05, 0.003))
+    t = 100.0 + 0.005 * (rig.k + 1)
+    body = [BodyImu(t - age, np.zeros(3), np.array(UP)) for age in (0.004, 0.001, 0.0035)]
+    rig.controller.tick(t, rig.said(t), body, "")
+    output = rig.controller.tick(t + 0.005, rig.said(t), body[:0], "")[1]
+    assert asked[-1][1] == pytest.approx(0.003 + 0.0005 / 50)
+    assert output.refusals == ("Too late.",)
+
+
+def test_a_mean_is_exact_of_the_first_values_and_forgets_them_within_some_dozens():
+    values, mean = np.random.default_rng(0).normal(size=50), Mean()
+    assert mean.value == 0.0
+    for n, value in enumerate(values, 1):
+        mean.add(value)
+        assert mean.value == pytest.approx(values[:n].mean())
+    for _ in range(50):
+        before, _ = mean.value, mean.add(10.0)
+        assert mean.value - before == pytest.approx((10.0 - before) / 50)
+
+
+def test_what_is_refused_before_anything_was_armed_is_no_reason_of_a_flights_end():
+    output = Rig().run(0.005, robot_reason="The robot ramps.")[0][1]
+    assert (output.failsafe.mode, output.failsafe.reason) == (Mode.DISARMED, "Not armed.")
+
+
+def turned_by(mode: VirtualCameraMode) -> float:
+    """How far the view turns with a phone within 0.2 s [rad], by a knob turned in flight."""
+    rig = Rig()
+    rig.track()
+    said = rig.said
+
+    def turning(t: float) -> list[Input]:
+        phone = PhoneImuInput(t - 0.02, (0.0, 0.0, 0.5), UP)
+        return [one for one in said(t) if not isinstance(one, PhoneImuInput | SeenInput)] + [phone]
+
+    rig.said = turning  # type: ignore[method-assign]
+    rig.run(0.1, [TuneInput(mode=mode, cutoff_hz=0.1)])
+    outputs = [output for _, output in rig.run(0.2)]
+    knobs = rig.status(outputs[-1]).knobs
+    assert (knobs.mode, knobs.cutoff_hz) == (mode, pytest.approx(0.1, rel=0.01))
+    views = [output.view.R_fv for output in outputs if output.view is not None]
+    return float(np.arccos((np.trace(views[0].T @ views[-1]) - 1.0) / 2.0))
+
+
+def test_a_knob_that_is_turned_in_flight_is_told_and_turns_the_view():
+    assert turned_by("off") > 3.0 * turned_by("full")
 
 
 def test_a_silent_server_ends_a_flight_in_a_ramp():
@@ -256,6 +321,18 @@ def test_a_status_tells_how_long_it_waits_and_whose_gaps_there_were():
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
 
 
+@pytest.mark.parametrize("heard", [OperatorInput, PhoneImuInput])
+def test_a_phone_of_which_only_half_is_heard_has_a_gap(heard: type):
+    rig = Rig()
+    rig.track()
+    everything = rig.said
+    rig.said = lambda t: [one for one in everything(t) if isinstance(one, heard)]  # type: ignore[method-assign]
+    rig.run(0.4)
+    rig.said = everything  # type: ignore[method-assign]
+    gaps = rig.status(rig.run(0.1)[-1][1]).gaps
+    assert gaps["phone"].longest_s == pytest.approx(0.42, abs=0.03)
+
+
 def test_a_link_with_six_gaps_a_minute_warns_whoever_arms():
     rig = Rig()
     rig.run(1.0)
@@ -299,6 +376,7 @@ def test_a_status_tells_everything_once_and_survives_the_link():
     rig = Rig()
     first = rig.status(rig.run(0.005)[-1][1])
     assert first.p_bc_in_c is None
+    assert (first.fuse_ms, first.guarding, first.omega_b) == (0.0, 0.0, (0.0, 0.0, 0.0))
     assert first.mode == Mode.DISARMED
     rig.track()
     rig.status(rig.run(0.1)[-1][1])

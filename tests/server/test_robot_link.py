@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware.follower import EXPLANATIONS, BodySample, FollowerState, Refusal, ThrustCommand
-from server.robot_link import DEAF, RAMP_BEGUN_S, BodyClock, RobotLink
+from server.robot_link import (
+    DEAF,
+    RAMP_AFTER_S,
+    RAMP_BEGUN_S,
+    SILENCE_S,
+    BodyClock,
+    RobotLink,
+)
 
 
 def sample(
@@ -143,3 +150,23 @@ def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
     before = link.reason
     link.receive(2.0)
     assert link.reason == before
+
+
+def test_it_says_when_the_robot_will_ramp_by_itself() -> None:
+    script = Script()
+    link = RobotLink(script)
+    left = {}
+    for k in range(200):
+        t = 0.005 * k
+        coasts = 0.3 <= t < 0.4 or t >= 0.7
+        state = FollowerState.COAST if coasts else FollowerState.RUNNING
+        state = FollowerState.RAMP if t >= 0.92 else state
+        script.next = [] if 0.5 < t < 0.65 else [sample(5000 * k, state)]
+        link.receive(t)
+        left[round(t, 3)] = link.left_s
+    assert left[0.2] == left[0.45] == left[0.55] == left[0.65] == np.inf
+    assert left[0.3] == pytest.approx(RAMP_AFTER_S - SILENCE_S)
+    assert left[0.395] == pytest.approx(RAMP_AFTER_S - SILENCE_S - 0.095)
+    assert left[0.6] == pytest.approx(RAMP_AFTER_S - 0.1)
+    assert left[0.8] == pytest.approx(RAMP_AFTER_S - SILENCE_S - 0.1)
+    assert left[0.95] == 0.0

@@ -77,7 +77,8 @@ def inputs() -> list[Inputs]:
     told += [(age, one, NO_REQUESTS) for age in (silent, gone, robot) for one in complaints]
     told += [(age, fine, wish) for age in (silent, gone, robot) for wish in wishes]
     told += [(well, one, wish) for one in complaints for wish in wishes]
-    return [
+    coasts = [Inputs(True, 1, *well, "deaf", robot_left_ms=left) for left in (0, D)]
+    return coasts + [
         Inputs(held, press, *age, *complaint, wish)
         for held, press in product((False, True), range(2))
         for age, complaint, wish in told
@@ -172,7 +173,7 @@ def _check_words(told: Inputs, now: Failsafe, limits: Limits) -> None:
     """What the pages are told is true."""
     left = failsafe.until_ramp(now, told, limits)
     assert (left is None) == (now.mode not in (Mode.COAST, Mode.HOLD))
-    assert left is None or 0 <= left <= limits.hold_max
+    assert left is None or 0 <= left <= min(limits.hold_max, told.robot_left_ms)
     if failsafe.resumes(now, told):
         assert told.held
         assert now.mode in (Mode.COAST, Mode.HOLD)
@@ -219,9 +220,13 @@ def test_every_reachable_state_keeps_every_law_by_the_documented_edges_and_no_ot
 
 
 def test_the_searched_limits_are_in_the_order_of_the_shipped_ones() -> None:
-    for limits in (LIMITS, Limits.of(FailsafeConfig(), ramp_s=2.3)):
+    hangs, hovers = (Limits.of(FailsafeConfig(), 2.3, hangs=one) for one in (True, False))
+    assert LIMITS.robot_ramp == LIMITS.phone_ramp
+    assert hangs.robot_ramp == hangs.phone_ramp
+    assert HOVERS.phone_ramp == hovers.phone_ramp == FOREVER_MS
+    for limits in (LIMITS, HOVERS, hangs, hovers):
         assert limits.fresh < limits.recover_short < limits.recover
-        assert limits.silent < limits.robot_ramp == limits.phone_ramp
+        assert limits.silent < limits.robot_ramp
         assert limits.silent <= limits.pose_arm < limits.pose_hold < limits.pose_ramp
         assert limits.short < limits.coast < limits.hold_max < limits.armed_idle
 

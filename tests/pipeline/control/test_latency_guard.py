@@ -60,20 +60,42 @@ def test_slower_robots_bear_some_delay_without_a_filter() -> None:
     assert ground.refusal("phone", "none", 0.08, 0.005) != ""
 
 
-def test_what_is_allowed_leaves_the_stated_margin_and_no_more_is_allowed() -> None:
-    robot_file, config = load_robot("ground"), TeleopConfig()
-    allowed = guard("ground").bearable["phone", "none"].latency(0.005)
+USUAL = MarginsConfig()
+MARGINS = {
+    "both": TeleopConfig(),
+    "delay": TeleopConfig(margins=replace(USUAL, min_phase_rad=0.0)),
+    "phase": TeleopConfig(margins=replace(USUAL, min_delay_s=0.0)),
+    "no feed-forward": TeleopConfig(feedforward=replace(TeleopConfig().feedforward, enabled=False)),
+}
+
+
+@pytest.mark.parametrize("which", MARGINS)
+@pytest.mark.parametrize("kind", ["none", "relative"])
+def test_what_is_allowed_leaves_the_stated_margin_and_no_more_is_allowed(
+    which: str, kind: EstimatorName
+) -> None:
+    robot_file, config, age = load_robot("ground"), MARGINS[which], BODY_AGES_S[5]
+    worked_out = guard("ground", config).bearable["phone", kind]
+    allowed = worked_out.latency(age)
     dynamics = dynamics_of(robot_file.robot, robot_file.plant)
     ahead = config.feedforward if config.feedforward.enabled else None
     loop = Loop(dynamics, robot_file.gains["phone"], config.margins, config.no_filter, ahead)
 
-    def is_sound(latency: float) -> bool:
-        found = [axis_margins(loop, axis, Sensing("none", latency)) for axis in (0, 1, 5)]
+    def is_sound(latency: float, body_age: float = age) -> bool:
+        sensing = Sensing(kind, latency, *((body_age,) if kind == "relative" else ()))
+        found = [axis_margins(loop, axis, sensing) for axis in (0, 1, 5)]
         delay, phase = min(m.delay for m in found), min(m.phase for m in found)
         return delay >= config.margins.min_delay_s and phase >= config.margins.min_phase_rad
 
+    assert 0.0 < allowed <= config.margins.max_latency_s
     assert is_sound(allowed)
-    assert not is_sound(allowed + 0.003)
+    if allowed < config.margins.max_latency_s:
+        assert not is_sound(allowed + 0.002)
+    if kind == "relative":
+        for late, latency in zip(BODY_AGES_S, worked_out.latencies, strict=True):
+            assert (latency == NEVER) == (not is_sound(0.0, late))
+    else:
+        assert set(worked_out.latencies) == {allowed}
 
 
 def test_what_nobody_measured_yet_is_refused(ames: LatencyGuard) -> None:
@@ -100,6 +122,7 @@ def test_between_two_ages_of_the_body_what_holds_for_the_older_counts() -> None:
     for age, latency, older in zip(BODY_AGES_S, latencies, (*latencies[1:], NEVER), strict=True):
         for rounding in (-1e-9, 0.0, 1e-9):
             assert bearable.latency(age + rounding) == latency
+        assert bearable.latency(age + 1.5e-6) == older
         assert bearable.latency(age + 1e-4) == older
         assert bearable.latency(age + 0.0024) == older
 
