@@ -16,6 +16,9 @@ BACKOFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
 STEADY_S = 10.0
 """A process that has lived so long starts with the first back-off again."""
 GRACE_S = 3.0
+PROMPT_NICENESS = -10
+"""Of what hears the phone: before a build or a browser, which would keep it from a processor for
+tens of milliseconds; behind control, which has SCHED_FIFO."""
 
 
 @dataclass(slots=True)
@@ -30,6 +33,8 @@ class Child:
     """Open files that it inherits."""
     oom_score: int = 0
     """See `set_oom_score`."""
+    niceness: int = 0
+    """See `set_niceness`."""
     process: subprocess.Popen[bytes] | None = None
     deaths: int = 0
     """In a row."""
@@ -65,7 +70,7 @@ class Child:
         self._started, self._due = now, None
         parent = os.getpid()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", *self.arguments],
+            [sys.executable, "-m", *watched(self.arguments, parent)],
             preexec_fn=lambda: self._prepare(parent),
             start_new_session=True,
             env={**os.environ, **self.environment},
@@ -77,6 +82,7 @@ class Child:
     def _prepare(self, parent: int) -> None:
         die_with(parent)
         set_oom_score(self.oom_score)
+        set_niceness(self.niceness)
 
     def stop(self) -> None:
         """Ask it to end, and make it end if it doesn't."""
@@ -91,9 +97,25 @@ class Child:
             self.process.wait()
 
 
+def kernel_ends_orphans() -> bool:
+    """Whether a process can ask for its end with its parent's: on Linux alone."""
+    return sys.platform == "linux"
+
+
+def watched(arguments: list[str], parent: int) -> list[str]:
+    """Arguments of `python -m` for a process that ends with `parent`, if need be by watching it."""
+    if kernel_ends_orphans():
+        return arguments
+    return ["server.parent_watch", str(parent), *arguments]
+
+
 def die_with(parent: int) -> None:
-    """Let this process end when its parent, which is that one, does."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    """Let this process end when its parent, which is that one, does.
+
+    Without Linux only a parent that has gone already counts: see `watched`.
+    """
+    if kernel_ends_orphans():
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:  # it died before we asked
         os.kill(os.getpid(), signal.SIGTERM)
 
@@ -105,6 +127,23 @@ def set_oom_score(score: int) -> None:
     """
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(str(score))
+
+
+def set_niceness(niceness: int) -> None:
+    """Let this process run before ordinary ones (down to -20) or behind them (up to 19).
+
+    For the leader of a session. Where Linux groups processes by session (`autogroup`), groups take
+    equal turns whatever the niceness of those within, so the group is told, too. Behind is always
+    permitted, before takes CAP_SYS_NICE: without it things stay as they are.
+    """
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, niceness)
+        Path("/proc/self/autogroup").write_text(str(niceness))
+
+
+def raise_niceness(least: int) -> None:
+    """Let this process run no sooner than so, whatever it inherited: a server's own goes before."""
+    os.nice(max(0, least - os.getpriority(os.PRIO_PROCESS, 0)))
 
 
 def _ending(code: int) -> str:

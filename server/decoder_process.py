@@ -28,7 +28,7 @@ import cv2
 import numpy as np
 
 from hardware.sim.codec import CODECS, DecodeError, Decoder
-from server.child import die_with, set_oom_score
+from server.child import PROMPT_NICENESS, die_with, set_niceness, set_oom_score
 
 REQUEST = struct.Struct("<IIBHHI")
 """Number, stream, codec, width, height [px], bytes of the coded picture."""
@@ -49,6 +49,7 @@ def main() -> None:
     cpu_s = float(sys.argv[4])
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     set_oom_score(FIRST_TO_GO)
+    set_niceness(PROMPT_NICENESS)
     channel = socket.socket(fileno=descriptor)
     memory = mmap.mmap(memory_descriptor, size)
     cv2.setNumThreads(1)  # a forked process has none but the thread that forked it
@@ -71,8 +72,7 @@ def _decode_for_ever(
     """In the child: ends with 0 when the server has gone, or as a picture would have it."""
     code = 1
     try:
-        with contextlib.suppress(AttributeError):  # of Linux alone
-            die_with(parent)
+        die_with(parent)
         _limit()
         decoders: OrderedDict[int, Decoder] = OrderedDict()
         while len(request := channel.recv(REQUEST.size, socket.MSG_WAITALL)) == REQUEST.size:

@@ -17,7 +17,7 @@ import msgspec
 from hardware.link_key import KEY_VARIABLE, LinkKeyError, new_key
 from hardware.robot_file import RobotFileError, load_robot
 from server.access import PhoneClientError
-from server.child import Child
+from server.child import PROMPT_NICENESS, Child
 from server.invite import invite, print_code
 from server.robot_key import epoch_file, key_of
 from server.runtime import RUN_FILE, BusyError, prepare, runtime_directory
@@ -162,7 +162,8 @@ def children_of(
     descriptors = tuple(s.fileno() for s in sockets)
     server = ["server", "_server", str(runtime), str(truth_port), *map(str, descriptors)]
     secret = {SECRET_VARIABLE: secrets.token_hex(32)}
-    children.append(Child("server", [*server, *arguments], secret, descriptors, SERVES))
+    server += arguments
+    children.append(Child("server", server, secret, descriptors, SERVES, PROMPT_NICENESS))
     return children
 
 

@@ -24,7 +24,7 @@ from hardware.sim.render import Look
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.access import PhoneClientError, access_of, add_access_arguments
-from server.child import set_oom_score
+from server.child import raise_niceness, set_oom_score
 from server.live_phone import EXPOSED_S, LivePhone, MakeClient
 from server.one_line import Parser
 from server.phone_client import PhoneClient
@@ -181,6 +181,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command; gives the exit status."""
     arguments = _parser().parse_args(argv)
     set_oom_score(FIRST_TO_GO)
+    raise_niceness(0)  # the server, whose button may have started it, goes before
     try:
         live = asyncio.run(_play(arguments))
     except (PhoneClientError, FollowerError, ValueError, OSError) as error:

@@ -12,7 +12,7 @@ import sys
 import threading
 
 from pipeline.vision.looking import warm_up
-from server.child import die_with
+from server.child import die_with, raise_niceness, watched
 
 NICE = 10
 
@@ -25,12 +25,13 @@ def begin() -> threading.Thread:
 
 
 def _prepare() -> None:
-    command = [sys.executable, "-m", "server.warm_up", str(os.getpid())]
+    arguments = watched(["server.warm_up", str(os.getpid())], os.getpid())
+    command = [sys.executable, "-m", *arguments]
     subprocess.run(command, stdin=subprocess.DEVNULL, stdout=sys.stderr, check=False)
     warm_up()  # from the cache by now; if none can be written, here after all
 
 
 if __name__ == "__main__":
     die_with(int(sys.argv[1]))
-    os.nice(NICE)
+    raise_niceness(NICE)
     warm_up()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
@@ -15,6 +14,7 @@ from server.calibrate.lens import COEFFICIENTS
 from server.calibrate.solve import Solution, solve
 from server.calibrate.verdict import TOO_FEW, Verdict, judge, judge_views
 from server.calibrate.views import View
+from server.child import raise_niceness
 
 KINDER = 10
 """Less urgent than what keeps a robot flying: `nice`."""
@@ -109,5 +109,5 @@ class Solving:
 
 
 def _work(job: Job, answer: Connection) -> None:
-    os.nice(KINDER)
+    raise_niceness(KINDER)
     answer.send(run(job))

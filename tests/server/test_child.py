@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from server.child import BACKOFF_S, STEADY_S, Child
+from server.child import BACKOFF_S, STEADY_S, Child, die_with
 
 ROOT = Path(__file__).resolve().parents[2]
 NAME = "lightleash_test_program"
@@ -26,7 +26,8 @@ for descriptor in ({given}, {kept}):
         pass
 """
 PARENT = f"""
-import time
+import sys, time
+sys.platform = sys.argv[1]
 from server.child import Child
 child = Child("c", ["{NAME}"])
 child.revive(0.0)
@@ -114,14 +115,30 @@ def test_what_never_started_and_what_has_ended_can_be_stopped(program):
     child.stop()
 
 
-def test_it_ends_with_its_parent_however_that_ends(program):
+@pytest.mark.parametrize("platform", ["linux", "darwin"])
+def test_it_ends_with_its_parent_however_that_ends_and_whatever_the_kernel_does(program, platform):
     program(SLEEPER)
-    command = [sys.executable, "-c", PARENT]
+    command = [sys.executable, "-c", PARENT, platform]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as parent:
         stat = Path(f"/proc/{int(parent.stdout.readline())}/stat")
         assert stat.exists()
         parent.kill()
     wait_for(lambda: not stat.exists() or stat.read_text().split()[2] == "Z")
+
+
+def test_where_the_kernel_ends_no_orphans_a_process_watches_its_parent_and_is_what_it_would_be(
+    program, monkeypatch, capfd
+):
+    def no_prctl(name):
+        raise AssertionError("prctl is of Linux alone")
+
+    monkeypatch.setattr("sys.platform", "darwin")
+    monkeypatch.setattr("ctypes.CDLL", no_prctl)
+    text = "import sys; print(__name__, sys.argv[1:], file=sys.stderr); raise SystemExit(7)"
+    said = die(Child("c", [*program(text), "--word", "x"]), 0.0)
+    assert "exit code 7" in said
+    assert capfd.readouterr().err == "__main__ ['--word', 'x']\n"
+    die_with(os.getppid())
 
 
 def test_it_inherits_the_files_and_words_it_is_given_and_no_other_files(program):
@@ -161,3 +178,41 @@ def test_when_memory_runs_out_the_server_goes_before_what_flies(program):
     finally:
         for child in (flies, serves):
             child.stop()
+
+
+def may_go_before():
+    """Whether this process may lower its niceness, asked of a process that is then gone."""
+    command = [sys.executable, "-c", "import os; os.setpriority(os.PRIO_PROCESS, 0, -10)"]
+    return subprocess.run(command, stderr=subprocess.DEVNULL, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("niceness", [-10, 5])
+def test_what_hears_the_phone_runs_before_others_where_that_is_permitted(program, niceness):
+    child = Child("listens", program(SLEEPER), niceness=niceness)
+    own = os.getpriority(os.PRIO_PROCESS, 0)
+    got = niceness if niceness >= own or may_go_before() else own
+    group = Path(f"/proc/{os.getpid()}/autogroup")
+    try:
+        child.revive(0.0)
+        pid = child.process.pid
+        wait_for(lambda: os.getpriority(os.PRIO_PROCESS, pid) == got)
+        if group.exists() and "nice" in group.read_text():
+            words = Path(f"/proc/{pid}/autogroup")
+            wait_for(lambda: int(words.read_text().split()[-1]) == got)
+    finally:
+        child.stop()
+
+
+@pytest.mark.parametrize("inherited", [-10, 0, 15])
+def test_what_only_computes_runs_behind_others_whatever_it_inherited(inherited):
+    lines = [
+        "import contextlib, os",
+        "from server.child import raise_niceness",
+        "with contextlib.suppress(PermissionError):",
+        f"    os.setpriority(os.PRIO_PROCESS, 0, {inherited})",
+        "raise_niceness(10)",
+        "print(os.getpriority(os.PRIO_PROCESS, 0))",
+    ]
+    command = [sys.executable, "-c", "\n".join(lines)]
+    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert int(said) == max(10, inherited, os.getpriority(os.PRIO_PROCESS, 0))
