@@ -78,9 +78,9 @@ class VisionThread(FrameThread):
             self._sight.needs_key = True
         sighting = self._sight.see(frames, *self._prior)
         if sighting is None:
-            self._on_key_wanted()
+            self._tell(self._on_key_wanted)
             return
-        self._on_sighting(sighting, frames[-1])
+        self._tell(lambda: self._on_sighting(sighting, frames[-1]))
         now = time.monotonic()
         if self.watched and now - self._t_thumbnail > THUMBNAIL_S and self._sight.luma is not None:
             self._t_thumbnail = now

@@ -93,13 +93,19 @@ class Wizard(FrameThread):
             if luma is not None:
                 self._guide.add(frame.t, look(luma, frame.t, self._board, self._detector))
         if luma is None:
-            self._on_key_wanted()
+            self._tell(self._on_key_wanted)
             return
         if self._guide.enough:
             self._shown = self._filming("solving")
-            self._solving = Solving(self._job())
+            self._solve(Solving(self._job()))
         else:
             self._shown = self._filming("filming")
+
+    def _solve(self, solving: Solving) -> None:
+        """In the thread: who was stopped meanwhile solves nothing."""
+        self._tell(lambda: setattr(self, "_solving", solving))
+        if self._solving is not solving:
+            solving.stop()
 
     def _job(self) -> Job:
         guide = self._guide

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,6 +14,7 @@ import pytest
 from pipeline.signals import Match, Spots
 from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.sighting import Sighting
+from server import frame_thread
 from server.frame_thread import MAX_WAITING
 from server.ingest import EncodedFrame
 from server.vision import THUMBNAIL_WIDTH, VisionThread, draw, jpeg
@@ -78,6 +81,7 @@ def rig() -> Iterator[Rig]:
     for _ in range(50):
         made.eyes.may.release()
     made.thread.stop()
+    made.thread._thread.join(5.0)
 
 
 def eventually(condition: Callable[[], bool]) -> None:
@@ -146,6 +150,78 @@ def test_a_thread_that_dies_says_why(rig):
     rig.eyes.may.release()
     eventually(lambda: rig.thread.failed != "")
     assert "no light" in rig.thread.failed
+
+
+def test_who_stops_a_thread_waits_for_nobody_and_hears_no_more_of_it(rig, monkeypatch):
+    rig.thread.offer(frame(1, key=True))
+    rig.begin_look()
+    with monkeypatch.context() as patched:
+        patched.delattr(threading.Thread, "join")
+        rig.thread.stop()
+    assert rig.thread in frame_thread._alive
+    taken = list(rig.taken)
+    rig.eyes.may.release()
+    rig.thread._thread.join(5.0)
+    assert (rig.seen, rig.taken, rig.keys_wanted) == ([], taken, 0)
+    assert rig.thread not in frame_thread._alive
+
+
+def test_phones_that_come_and_go_leave_no_threads_behind_even_if_each_leaves_a_long_look():
+    before, rigs = threading.active_count(), []
+    for _ in range(100):
+        rigs.append(Rig())
+        rigs[-1].thread.offer(frame(1, key=True))
+        if rigs[-1].thread._has_begun:
+            rigs[-1].begin_look()
+        rigs[-1].thread.stop()
+        assert threading.active_count() <= before + frame_thread.MAX_ENDING
+    for one in rigs:
+        one.eyes.may.release()
+    eventually(lambda: threading.active_count() == before)
+    assert not frame_thread._alive
+    assert not any(one.seen for one in rigs)
+
+
+def test_a_phone_that_comes_while_many_threads_end_is_seen_once_there_is_room():
+    rigs = [Rig() for _ in range(frame_thread.MAX_ENDING)]
+    for one in rigs:
+        one.thread.offer(frame(1, key=True))
+        one.begin_look()
+        one.thread.stop()
+    newest = Rig()
+    newest.thread.offer(frame(1, key=True))
+    assert not newest.thread._has_begun
+    for one in rigs:
+        one.eyes.may.release()
+    eventually(lambda: not frame_thread._alive)
+    newest.thread.offer(frame(2))
+    newest.begin_look()
+    newest.eyes.may.release()
+    eventually(lambda: newest.seen == [2])
+    newest.thread.stop()
+
+
+LOOKS_LONG = """
+import threading, time
+from server.frame_thread import FrameThread
+looks = threading.Event()
+class Eyes(FrameThread):
+    def _look(self, frames, has_gap):
+        looks.set()
+        time.sleep(0.3)
+        print("has looked", flush=True)
+eyes = Eyes("eyes", lambda n: None)
+eyes.start()
+eyes.offer(type("Frame", (), {"sequence": 1}))
+looks.wait()
+eyes.stop()
+"""
+
+
+def test_the_interpreter_ends_after_the_last_look():
+    words = [sys.executable, "-c", LOOKS_LONG]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
+    assert (done.stdout, done.stderr) == ("has looked\n", "")
 
 
 def test_found_lights_and_others_are_circled_in_different_colours():
