@@ -7,7 +7,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import get_args
 
@@ -16,68 +16,13 @@ import numpy as np
 from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
-from pipeline.frames import Array
 from server.control import teleop_config
 from server.experiments import text
 from server.lockstep import Lockstep, Scene
+from server.lockstep_figures import Result, result_of, rows_of
 from server.lockstep_trace import Trace
 
 Hidden = tuple[float, float, tuple[int, ...]]
-SETTLE_S = 2.0
-"""After the press, before tracking counts: the integral must first learn the spring."""
-
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """Figures of one flight; lengths in mm, angles in degrees."""
-
-    hand: str
-    seed: int
-    tracked_s: float
-    rms_mm: float
-    """Of the body's distance from the intended place."""
-    max_mm: float
-    rms_deg: float
-    estimate_rms_mm: float
-    chatter_n: float
-    """RMS change of a thrust from one period to the next."""
-    saturated_pct: float
-    found_pct: float
-    """Pictures in which the robot was found."""
-    cpu_s: float
-    ended: str
-    """Why tracking ended early, or ""."""
-
-
-def result_of(trace: Trace, scene: Scene, cpu_s: float, settle_s: float = SETTLE_S) -> Result:
-    """Figures of a trace, without the first seconds of tracking."""
-    skip = round(settle_s / 0.005)
-    errors = _rows(trace.error_in_f)[skip:]
-    distance = np.linalg.norm(errors, axis=1)
-    steps = np.diff(_rows(trace.thrusts)[skip:], axis=0)
-    return Result(
-        hand=scene.hand,
-        seed=scene.seed,
-        tracked_s=round(0.005 * len(errors), 2),
-        rms_mm=1e3 * _rms(distance),
-        max_mm=1e3 * float(distance.max(initial=0.0)),
-        rms_deg=float(np.rad2deg(_rms(np.linalg.norm(_rows(trace.turn)[skip:], axis=1)))),
-        estimate_rms_mm=1e3 * _rms(np.linalg.norm(_rows(trace.estimate_error_in_c)[skip:], axis=1)),
-        chatter_n=_rms(steps.ravel()),
-        saturated_pct=100.0 * float(np.mean(trace.saturated[skip:] or [False])),
-        found_pct=100.0 * trace.poses / max(1, trace.pictures),
-        cpu_s=cpu_s,
-        ended=trace.left,
-    )
-
-
-def _rows(values: Sequence[Array]) -> Array:
-    return np.array(values) if values else np.zeros((0, 3))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
-
 
 HEADINGS = (
     ("hand", "hand", "{:<9}"),
@@ -113,7 +58,7 @@ def draw(traces: Sequence[tuple[Result, Trace]], path: Path) -> None:
     )
     for column, (result, trace) in enumerate(traces):
         t = np.array(trace.t)
-        intended, body = 1e3 * _rows(trace.intended_in_f), 1e3 * _rows(trace.body_in_f)
+        intended, body = 1e3 * rows_of(trace.intended_in_f), 1e3 * rows_of(trace.body_in_f)
         top, bottom = rows[0][column], rows[1][column]
         for axis, name in enumerate("xyz"):
             colour = f"C{axis}"
@@ -123,7 +68,7 @@ def draw(traces: Sequence[tuple[Result, Trace]], path: Path) -> None:
         top.set_title(f"hand: {result.hand}  (dashed: intended)")
         top.set_ylabel("displacement [mm]")
         top.legend(loc="upper right")
-        bottom.plot(t, 1e3 * np.linalg.norm(_rows(trace.error_in_f), axis=1), color="C3", lw=0.8)
+        bottom.plot(t, 1e3 * np.linalg.norm(rows_of(trace.error_in_f), axis=1), color="C3", lw=0.8)
         bottom.axhline(result.rms_mm, color="k", lw=0.8, ls=":")
         bottom.set_ylabel("tracking error [mm]")
         bottom.set_xlabel("time [s]")

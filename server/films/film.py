@@ -16,7 +16,7 @@ from av.video.stream import VideoStream
 
 from pipeline.signals import Image
 from server.films.errors import InputError
-from server.films.frames import Shot
+from server.films.shot import Shot
 
 LUMA_FIRST = ("yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12", "gray")
 """Formats whose first plane is 8 bit luma."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from pipeline.signals import Image
 from server.films.errors import InputError
+from server.films.shot import Shot
 from server.films.tables import load_times
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -20,21 +20,6 @@ FPS = 30.0
 """Without any times."""
 DEEP = 4096
 """Grey levels of a 12 bit sensor."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shot:
-    """One frame."""
-
-    name: str
-    t: float
-    """When its middle row was taken [s]."""
-    luma: Image | None
-    """(height, width), valid until the next; None: it can't be read."""
-    full_range: bool = True
-    """False: video luma, black at 16 and white at 235."""
-    problem: str = ""
-    """Why it can't be read."""
 
 
 class Frames(Protocol):

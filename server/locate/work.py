@@ -16,7 +16,8 @@ from pipeline.vision.looking import Looking
 from pipeline.vision.sighting import Sighting
 from pipeline.vision_config import GatesConfig
 from server.films.errors import InputError
-from server.films.frames import Frames, Shot
+from server.films.frames import Frames
+from server.films.shot import Shot
 
 AHEAD_S = 0.2
 """So much later than a frame, motion samples are known when it is looked at: as live ones are."""

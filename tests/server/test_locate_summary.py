@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.camera.fit import CameraFacts
 from pipeline.camera.lens import Camera
 from pipeline.signals import RelativePose
-from server.films.frames import Shot
+from server.films.shot import Shot
 from server.locate.history import History
 from server.locate.summary import camera_lines, summary
 from server.locate.work import Located

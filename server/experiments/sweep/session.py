@@ -17,9 +17,9 @@ from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.gains import Gains
 from server.controller import PERIOD_S
-from server.experiments.loop import result_of
 from server.experiments.sweep.keys import ROWS, Value
 from server.lockstep import Lockstep, Scene
+from server.lockstep_figures import result_of
 
 T = TypeVar("T")
 Settings = tuple[tuple[str, Value], ...]
