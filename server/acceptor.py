@@ -39,10 +39,15 @@ class Guest(socket.socket):
     handshake: asyncio.Task[None] | None = None
     transport: asyncio.Transport | None = None
     """Once hands were shaken."""
+    patience: asyncio.TimerHandle | None = None
+    """Ends a stranger who stays for long."""
 
     def close(self) -> None:
-        """Close, and say so once."""
+        """Close, and say so once; what is left of it keeps no memory of TLS."""
         super().close()
+        if self.patience is not None:
+            self.patience.cancel()
+        self.transport = self.patience = None
         said, self.on_close = self.on_close, None
         if said is not None:
             said()
@@ -132,8 +137,9 @@ class Acceptor:
                 )
         except (OSError, TimeoutError):  # whoever came has left, was late or spoke no TLS
             return
-        guest.transport = transport
-        self._loop.call_later(STRANGER_S, _end_a_stranger, guest, place)
+        if guest.fileno() >= 0:
+            guest.transport = transport
+            guest.patience = self._loop.call_later(STRANGER_S, _end_a_stranger, guest, place)
 
     def _settle(self, done: asyncio.Task[None], guest: Guest) -> None:
         """Whatever ended the handshake, even before its first step: its handle is free again."""

@@ -15,21 +15,23 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 
-from pipeline.config import FailsafeConfig
 from server.clock import now
 from server.command_age import refuse_old
 from server.hub import Hub
-from server.link_check import check
 from server.link_log import KEPT_S
+from server.link_reports import LinkReports
 from server.messages import Command, decode_message
 from server.metrics import exposition
 from server.recording import RecordingError
 from server.replies import body_of, refusal
+from server.status import mode_of
 from server.websocket import PageServer
 from server.wire import WireError
 
 CLIENT = Path(__file__).resolve().parents[1] / "web_client"
 LOOKS = sorted((*CLIENT.glob("*.css"), *CLIENT.glob("*.svg")))
+METRICS_S = 1.0
+"""So old they may be: they cost some milliseconds."""
 
 
 class VirtualPhone:
@@ -63,6 +65,8 @@ class Api:
         """`authority` is the certificate to install on phones."""
         self._hub, self._authority = hub, authority
         self.phone = VirtualPhone()
+        self._reports = LinkReports(now)
+        self._t_metrics, self._exposed = -float("inf"), b""
 
     def routes(self) -> Sequence[BaseRoute]:
         """All of `/api/` that is no person's pairing, and the small ones beside it."""
@@ -83,7 +87,8 @@ class Api:
         except WireError as error:
             return refusal(409 if error.code == "age" else 400, error.field, error.allowed)
         self._hub.wish(stop, request.scope["member"])
-        return JSONResponse({"stopping": True}, 202)
+        mode, _ = mode_of(self._hub, now())
+        return JSONResponse({"stopping": True, "mode": mode}, 202)
 
     def _note(self, what: str, request: Request) -> None:
         begins = request.method == "POST"
@@ -124,7 +129,7 @@ class Api:
             return refusal(400, "seconds", f"up to {KEPT_S:g}")
         if phone is None:
             return refusal(409, "phone", "while a phone leads: scan the code first")
-        report = check(phone.link.series(now(), seconds), FailsafeConfig())
+        report = await self._reports.of(phone.link, seconds)
         return Response(msgspec.json.encode(report), media_type="application/json")
 
     async def _certificate(self, _request: Request) -> Response:
@@ -136,7 +141,9 @@ class Api:
         return JSONResponse({"ok": True})
 
     async def _metrics(self, _request: Request) -> Response:
-        return Response(exposition(self._hub), media_type="text/plain; version=0.0.4")
+        if now() - self._t_metrics >= METRICS_S:
+            self._t_metrics, self._exposed = now(), exposition(self._hub)
+        return Response(self._exposed, media_type="text/plain; version=0.0.4")
 
 
 def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> Starlette:

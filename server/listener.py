@@ -41,9 +41,10 @@ class Patience(H11Protocol):
             self._head_is_whole()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the clock."""
+        """Stop all clocks: a timer would keep what TLS has buffered, a megabyte of a large page."""
         self._head_is_whole()
         super().connection_lost(exc)
+        self._unset_keepalive_if_required()
 
     def _expect_head(self) -> None:
         self._head_due = self.loop.call_later(HEAD_S, self._late)

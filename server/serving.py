@@ -18,15 +18,18 @@ from starlette.types import ASGIApp
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
 from server import bounded_log, warm_up
-from server.admission import Admission, limits_for
+from server.admission import Admission
 from server.app import Api, make_app
 from server.audit import Audit
 from server.calibrate.camera_yaml import PROFILES
 from server.dashboard import Dashboard
 from server.decoding import Decoding
+from server.frame_thread import join_all
+from server.guard import Guard
 from server.hub import Hub
 from server.listener import Listener, listener
 from server.people_api import PeopleApi
+from server.places import limits_for
 from server.recorder import Recordings
 from server.recording import ROBOT_KEY, SETTINGS_KEY
 from server.recording_files import recover_all
@@ -38,7 +41,7 @@ from server.runtime import (
     private_directory,
     write_private,
 )
-from server.security import Doors, Guard
+from server.security import Doors
 from server.settings import Settings
 from server.tls import Certificate, certificate, own_addresses, own_names
 from server.view_proxy import routes as view_routes
@@ -104,6 +107,7 @@ async def serve(settings: Settings, given: Given) -> None:
         api.phone.stop()
         dashboard.stop()
         audit.close()
+        await asyncio.to_thread(join_all)
         decoding.close()
 
 

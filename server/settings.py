@@ -27,7 +27,7 @@ from server.knobs import (
     SLOWEST_HZ,
     Knobs,
 )
-from server.pairings import Confirm
+from server.roles import Confirm
 
 PREFIX = "LIGHTLEASH_"
 

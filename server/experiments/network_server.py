@@ -21,13 +21,14 @@ from server.admission import Admission
 from server.app import Api, make_app
 from server.clock import now
 from server.control_link import Input, OperatorInput, control_end
+from server.guard import Guard
 from server.hub import Hub
 from server.launcher import listen
 from server.listener import listener
 from server.operator import OperatorPhone
 from server.recorder import Recordings
 from server.rtc.desk import RtcDesk
-from server.security import Doors, Guard
+from server.security import Doors
 from server.settings import RtcSettings, VideoSettings
 from server.websocket import PageServer
 from server.wire import HEADER, MAGIC

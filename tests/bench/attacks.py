@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import random
+import re
 import socket
 import ssl
 import struct
@@ -24,6 +25,8 @@ from server.wire_records import Codec, Picture, Record
 HOST = "127.0.0.1"
 STRANGERS = [f"127.0.0.{n}" for n in range(2, 22)]
 """Loopback too, and not the address that the programs of this machine have."""
+MEMBER = "127.0.0.90"
+"""One that somebody who was let in has."""
 DATAGRAMS_HZ = 2_000.0
 """To each port: what a flood costs is the machine's, which attacker and server share here."""
 JPEG_BOMB = (
@@ -43,7 +46,8 @@ class Target:
     http: int
     datagrams: tuple[int, ...]
     operator_token: str
-    session: str = ""
+    links: tuple[str, ...] = ()
+    """Keys of links for viewers, each for one attacker who was let in."""
 
 
 @dataclass(slots=True)
@@ -100,7 +104,7 @@ def idle_tls(n: int) -> Attack:
             with contextlib.suppress(OSError):
                 one = open_from(STRANGERS[k % len(STRANGERS)], target.https)
                 held.append(one)
-                shake_hands(context, one)
+                Tls(context, one)
                 tally.add("idle TLS")
             tally.add("TLS tried")
             time.sleep(0.01)
@@ -111,26 +115,44 @@ def idle_tls(n: int) -> Attack:
     return attack
 
 
-def shake_hands(context: ssl.SSLContext, plain: socket.socket) -> None:
-    """TLS by hand: `wrap_socket` leaves a socket open where the other end has gone by then.
+class Tls:
+    """TLS by hand: `wrap_socket` leaves a socket open where the other end has gone by then."""
 
-    Raises:
-        OSError: the other end refuses, or goes.
-    """
-    incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
-    tls = context.wrap_bio(incoming, outgoing)
-    while True:
-        try:
-            tls.do_handshake()
-        except ssl.SSLWantReadError:
-            plain.sendall(outgoing.read())
-            heard = plain.recv(16_384)
-            if not heard:
-                raise ConnectionResetError("closed in the handshake") from None
-            incoming.write(heard)
-        else:
-            plain.sendall(outgoing.read())
-            return
+    def __init__(self, context: ssl.SSLContext, plain: socket.socket) -> None:
+        """Hands are shaken; OSError if the other end refuses, or goes."""
+        self._plain = plain
+        self._incoming, self._outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
+        self._tls = context.wrap_bio(self._incoming, self._outgoing)
+        while True:
+            try:
+                self._tls.do_handshake()
+            except ssl.SSLWantReadError:
+                plain.sendall(self._outgoing.read())
+                if not self._hear():
+                    raise ConnectionResetError("closed in the handshake") from None
+            else:
+                plain.sendall(self._outgoing.read())
+                return
+
+    def _hear(self) -> bool:
+        heard = self._plain.recv(16_384)
+        self._incoming.write(heard)
+        return bool(heard)
+
+    def sendall(self, data: bytes) -> None:
+        self._tls.write(data)
+        self._plain.sendall(self._outgoing.read())
+
+    def recv(self, most: int) -> bytes:
+        """Some of what comes; empty at the end."""
+        while True:
+            try:
+                return self._tls.read(most)
+            except ssl.SSLWantReadError:
+                if not self._hear():
+                    return b""
+            except ssl.SSLZeroReturnError:
+                return b""
 
 
 def careless() -> ssl.SSLContext:
@@ -140,16 +162,60 @@ def careless() -> ssl.SSLContext:
     return context
 
 
-def flood_http(target: Target, over: threading.Event, tally: Tally) -> None:
-    """Requests as fast as one stranger gets answers, on both ports."""
-    request = f"GET / HTTP/1.1\r\nHost: {HOST}\r\n\r\n".encode()
-    while not over.wait(0.005):
-        with contextlib.suppress(OSError), open_from(STRANGERS[0], target.http) as one:
-            while not over.wait(0.002):
-                one.sendall(request)
-                if not one.recv(65_536):
-                    break
-                tally.add("requests")
+def flood_http(secure: bool) -> Attack:
+    """Requests as fast as one stranger gets answers, over TLS or not."""
+
+    def attack(target: Target, over: threading.Event, tally: Tally) -> None:
+        source, port = STRANGERS[secure], target.https if secure else target.http
+        while not over.wait(0.005):
+            with contextlib.suppress(OSError), spoken(source, port, secure) as one:
+                while not over.wait(0.002):
+                    one.sendall(get("/"))
+                    if not one.recv(65_536):
+                        break
+                    tally.add("requests")
+
+    return attack
+
+
+def flood_as_member(target: Target, over: threading.Event, tally: Tally) -> None:
+    """Somebody who was let in asks what costs most, as fast as he is answered."""
+    cookie = pair(MEMBER, target.https, target.links[0])
+    paths = ("/api/link?seconds=60", "/metrics", "/view/", "/api/status")
+    while not over.wait(0.01):
+        with contextlib.suppress(OSError), spoken(MEMBER, target.https, True) as one:
+            for path in paths:
+                one.sendall(get(path, f"Cookie: {cookie}\r\n"))
+                refused = b" 429 " in one.recv(65_536)
+                tally.add("members' requests refused" if refused else "members' requests")
+
+
+@contextlib.contextmanager
+def spoken(source: str, port: int, secure: bool) -> Iterator[socket.socket | Tls]:
+    """A connection that has shaken hands, if it must."""
+    with open_from(source, port) as plain:
+        yield Tls(careless(), plain) if secure else plain
+
+
+def get(path: str, more: str = "") -> bytes:
+    """A request."""
+    return f"GET {path} HTTP/1.1\r\nHost: {HOST}\r\n{more}\r\n".encode()
+
+
+def pair(source: str, port: int, key: str) -> str:
+    """Let somebody in by a link, from an address; the cookie as it is sent back."""
+    body = f'{{"token": "{key}", "name": "bench"}}'.encode()
+    with spoken(source, port, True) as page:
+        page.sendall(
+            f"POST /api/pair HTTP/1.1\r\nHost: {HOST}\r\nOrigin: https://{HOST}\r\n"
+            f"X-Lightleash: 1\r\nContent-Length: {len(body)}\r\n\r\n".encode()
+            + body
+        )
+        head = page.recv(65_536).decode("latin-1")
+    cookie = re.search(r"set-cookie: ([^;]+)", head, re.IGNORECASE)
+    if cookie is None:
+        raise OSError(f"not paired: {head[:60]}")
+    return cookie[1]
 
 
 def slow_loris(n: int) -> Attack:

@@ -30,35 +30,39 @@ from hardware.follower import FollowerError
 from hardware.sim.truth import TruthClient
 from server.one_line import Parser
 from tests.bench.attacks import (
-    HOST,
     Attack,
     Target,
     attacked,
     bombs,
-    careless,
     datagram_ports,
+    flood_as_member,
     flood_datagrams,
     flood_http,
+    get,
     hostile_sdp,
     idle_tls,
-    open_from,
+    pair,
     silent,
     slow_loris,
+    spoken,
 )
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import processes
 
 PAIRED = "127.0.0.99"
 """A phone that was paired; its address is that of no attacker."""
-PERIOD_S, START_S, AFTER_S = 0.25, 60.0, 12.0
+PERIOD_S, TRUTH_S, START_S, AFTER_S = 0.25, 0.02, 60.0, 12.0
 MOST_MB, LEFT_MB, LOG_MB, RATIO, STOP_S = 50.0, 15.0, 1.0, 1.1, 1.0
 ZERO_N = 1e-3
+FOLLOWS = {"TRACK", "COAST"}
+"""In any other mode a robot that hangs is where it hangs, which says nothing of its error."""
 
 
 def everything(scale: float = 1.0) -> list[Attack]:
     """Every attack, with so many times as many sockets."""
     many = [silent(int(2_000 * scale)), idle_tls(int(200 * scale)), slow_loris(int(50 * scale))]
-    return [*many, flood_http, flood_datagrams, bombs, hostile_sdp]
+    floods = [flood_http(True), flood_http(False), flood_as_member, flood_datagrams]
+    return [*many, *floods, bombs, hostile_sdp]
 
 
 @dataclass(slots=True)
@@ -103,20 +107,17 @@ def rss_mb(pid: int) -> float:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0
 
 
-def ask_as_phone(server: Serving, port: int) -> float:
+def ask_as_phone(port: int, cookie: str) -> float:
     """A new TLS connection and an answer; how long that took [s]."""
     began = time.monotonic()
-    with careless().wrap_socket(open_from(PAIRED, port, 5.0)) as page:
-        page.sendall(
-            f"GET /api/whoami HTTP/1.1\r\nHost: {HOST}\r\nConnection: close\r\n"
-            f"Authorization: Bearer {server.operator_token}\r\n\r\n".encode()
-        )
+    with spoken(PAIRED, port, True) as page:
+        page.sendall(get("/api/whoami", f"Connection: close\r\nCookie: {cookie}\r\n"))
         if b" 200 " not in page.recv(4_096):
             raise OSError("no answer")
     return time.monotonic() - began
 
 
-def watch(server: Serving, target: Target, name: str, seconds: float) -> Part:
+def watch(server: Serving, target: Target, cookie: str, name: str, seconds: float) -> Part:
     """Ask as phone and as supervisor, and look at the robot."""
     part, pid = Part(name), processes(server.process.pid)["server"]
     with contextlib.closing(TruthClient(server.truth_port)) as truth:
@@ -124,7 +125,7 @@ def watch(server: Serving, target: Target, name: str, seconds: float) -> Part:
         while time.monotonic() < end:
             due = time.monotonic() + PERIOD_S
             try:
-                part.phone_s.append(ask_as_phone(server, target.https))
+                part.phone_s.append(ask_as_phone(target.https, cookie))
             except OSError:
                 part.unanswered += 1
             try:
@@ -133,10 +134,11 @@ def watch(server: Serving, target: Target, name: str, seconds: float) -> Part:
                 part.supervisor_s.append(time.monotonic() - began)
             except (OSError, urllib.error.URLError):
                 part.unanswered += 1
-            with contextlib.suppress(FollowerError):
-                part.positions.append(truth.latest().p_bf_in_f[-1])
             part.rss_mb = max(part.rss_mb, rss_mb(pid))
-            time.sleep(max(0.0, due - time.monotonic()))
+            while time.monotonic() < due:
+                with contextlib.suppress(FollowerError):
+                    part.positions.append(truth.latest().p_bf_in_f[-1])
+                time.sleep(TRUTH_S)
     return part
 
 
@@ -157,7 +159,12 @@ def target_of(server: Serving) -> Target:
     """Its ports; those of its datagrams once a phone leads."""
     https, http = (int(url.rsplit(":", 1)[1]) for url in (server.https_url, server.http_url))
     ports = datagram_ports(list(processes(server.process.pid).values()))
-    return Target(https, http, ports, server.operator_token)
+    return Target(https, http, ports, server.operator_token, (key_of(server),))
+
+
+def key_of(server: Serving) -> str:
+    """Of a link for a viewer."""
+    return server.link("viewer").removeprefix("#k=")
 
 
 @contextlib.contextmanager
@@ -193,7 +200,10 @@ class Outcome:
         yield self.log_mb <= LOG_MB, f"log {self.log_mb:.3f} MB, at most {LOG_MB:g}"
         where = centre(quiet)
         ratio = under.rms_mm(where) / max(quiet.rms_mm(where), 1.0)
-        yield self.flew and ratio <= RATIO, f"pose error {ratio:.2f} × the quiet part's, {RATIO}"
+        modes = quiet.modes | under.modes
+        follows = self.flew and modes <= FOLLOWS
+        yield follows, f"led all the time: {'/'.join(sorted(modes)) or 'never'}"
+        yield follows and ratio <= RATIO, f"pose error {ratio:.2f} × the quiet part's, {RATIO}"
 
 
 def centre(part: Part) -> np.ndarray:
@@ -207,11 +217,11 @@ def run(seconds: float, scale: float = 1.0, flies: bool = True) -> Outcome:
         phone = led(server) if flies else contextlib.nullcontext(False)
         with phone as flew:
             target = target_of(server)
-            ask_as_phone(server, target.https)  # its address is known from now on
+            cookie = pair(PAIRED, target.https, key_of(server))  # its address is known from now on
             time.sleep(8.0 if flew else 0.0)  # the integral learns the suspension
-            quiet = watch(server, target, "quiet", seconds)
+            quiet = watch(server, target, cookie, "quiet", seconds)
             with attacked(target, everything(scale)) as tally:
-                under = watch(server, target, "attacked", seconds)
+                under = watch(server, target, cookie, "attacked", seconds)
                 stopped = stop_s(server)
         pid = processes(server.process.pid)["server"]
         time.sleep(AFTER_S)

@@ -11,6 +11,6 @@ pytestmark = pytest.mark.e2e
 
 def test_under_attack_phone_and_supervisor_are_answered_stop_works_and_memory_and_log_stay_small():
     outcome = run(4.0, 0.3, flies=False)
-    *goals, _of_flights = outcome.goals()
+    *goals, _led, _error = outcome.goals()
     assert [words for met, words in goals if not met] == []
     assert outcome.tally["silent sockets"] == 600

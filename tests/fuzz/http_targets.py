@@ -15,6 +15,7 @@ PATHS = (
     "/api/people/deny",
     "/api/people/revoke",
     "/api/people/lead",
+    "/api/people/keep",
     "/api/stop",
 )
 FOLDER = tempfile.TemporaryDirectory(prefix="lightleash-fuzz-")

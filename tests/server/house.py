@@ -19,12 +19,13 @@ from server.audit import Audit
 from server.clock import now
 from server.control_link import ControlStatus, Input, RequestInput, control_end
 from server.estimate import EstimateFields
+from server.guard import Guard
 from server.hub import Hub
 from server.listener import listener
 from server.people_api import PeopleApi
 from server.phone_script import DEVICE
 from server.recorder import Recordings
-from server.security import Doors, Guard
+from server.security import Doors
 from server.settings import VideoSettings
 from server.view_proxy import routes as view_routes
 from server.websocket import PageServer

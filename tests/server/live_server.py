@@ -15,18 +15,22 @@ from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
 from server.app import Api, make_app
 from server.control_link import ControlStatus, Endpoint, control_end
+from server.guard import Guard
 from server.hub import Hub
 from server.launcher import listen
 from server.listener import listener
 from server.people_api import PeopleApi
+from server.quotas import QUOTAS, Quota, Quotas
 from server.recorder import Recordings
 from server.rtc.desk import RtcDesk
-from server.security import Doors, Guard
+from server.security import Doors
 from server.settings import RtcSettings, VideoSettings
 from server.view_proxy import routes as view_routes
 from server.websocket import PageServer
 
 HOST = "127.0.0.1"
+UNLIMITED = dict.fromkeys(QUOTAS, Quota(1e9, 1e9, 10**6, 10**6))
+"""For tests that ask every route in every way."""
 
 
 def control_status(**changes: object) -> ControlStatus:
@@ -45,7 +49,7 @@ class LiveServer:
 
     port = 0
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, quotas: Quotas | None = None) -> None:
         self.control: Endpoint = control_end(folder)
         recordings = Recordings(folder / "recordings", {})
         self.doors = Doors()
@@ -56,7 +60,7 @@ class LiveServer:
         desk = RtcDesk(self.hub, RtcSettings(), 3_000_000)
         view = view_routes(Path("nowhere"))
         self.app = make_app(self.api, pages, [*people.routes(), *view, *desk.routes()])
-        self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"])
+        self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"], quotas=quotas)
 
     def close(self) -> None:
         """Give the sockets back."""

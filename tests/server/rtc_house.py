@@ -15,11 +15,11 @@ from hardware.sim.codec import Encoder
 from server.access import Access
 from server.app import make_app
 from server.clock import now
+from server.guard import Guard
 from server.messages import Status
 from server.phone_script import CODECS, DEVICE
 from server.rtc.client import RtcPhoneClient
 from server.rtc.desk import RtcDesk
-from server.security import Guard
 from server.settings import RtcSettings, VideoSettings
 from server.view_proxy import routes as view_routes
 from server.websocket import PageServer

@@ -10,18 +10,16 @@ from server.admission import (
     KNOWN_S,
     MAX_KNOWN,
     MAX_NETWORKS,
-    OWN_HANDLES,
     Admission,
-    Limits,
     Peer,
-    limits_for,
     network_of,
 )
+from server.places import OWN_HANDLES, Limits, limits_for
 
 LIMITS = Limits()
 DOOR = 8443
 PHONE = "192.0.2.7"
-FEW = Limits(strangers=6, per_stranger=3, known=8, per_known=4)
+FEW = Limits(strangers=6, per_stranger=3, known=8, per_known=4, here=4)
 
 
 class Street:
@@ -84,6 +82,40 @@ def test_strangers_take_no_place_of_a_paired_phone_nor_of_this_machine():
     assert all(street.flood([PHONE, "127.0.0.1", "::1"], 32))
 
 
+def test_phones_and_this_machine_take_no_place_of_each_other_even_when_each_shows_a_role():
+    street = Street()
+    phones = [f"192.0.2.{n}" for n in range(LIMITS.known // LIMITS.per_known + 1)]
+    for host in phones:
+        street.admission.may_ask(Peer(host, 5, DOOR), True, 0.0)
+    for place in filter(None, street.flood(phones, LIMITS.per_known)):
+        street.admission.may_ask(place.peer, True, 0.0)
+    assert street.come(phones[-1]) is None
+    here = street.flood(["127.0.0.1", "::1"], LIMITS.here // 2)
+    assert all(here)
+    for place in here:
+        street.admission.may_ask(place.peer, True, 0.0)
+    assert street.come("127.0.0.1") is None
+    street.admission.leave(here[0])
+    assert street.come("::1") is not None
+
+
+@pytest.mark.parametrize(
+    ("host", "hz"),
+    [(PHONE, LIMITS.per_known_connections_hz), ("127.0.0.1", LIMITS.here_connections_hz)],
+)
+def test_connections_of_who_is_known_are_bounded_in_time_and_each_by_itself(host, hz):
+    street, other, taken = Street(), "192.0.2.8", 0
+    for known in (PHONE, other):
+        street.admission.may_ask(Peer(known, 5, DOOR), True, 0.0)
+    for tick in range(5000):
+        place = street.come(host, 0.001 * tick)
+        if place is not None:
+            taken += 1
+            street.admission.leave(place)
+    assert hz * 4.0 <= taken <= hz * (5.0 + LIMITS.burst_s)
+    assert street.come(other, 5.0) is not None
+
+
 def test_who_holds_most_gives_way_so_that_a_new_phone_gets_in():
     street = Street(Limits(strangers=12, per_stranger=4))
     assert all(street.flood(attackers(3), 4))
@@ -117,7 +149,7 @@ def test_connections_of_strangers_are_bounded_in_time_too():
 
 
 def test_of_one_known_address_the_oldest_without_a_role_gives_way():
-    street = Street(Limits(per_known=4))
+    street = Street(Limits(here=4))
     first, second, *_ = street.flood(["127.0.0.1"], 4)
     street.admission.may_ask(first.peer, True, 0.0)
     assert street.come("127.0.0.1") is not None
@@ -125,7 +157,7 @@ def test_of_one_known_address_the_oldest_without_a_role_gives_way():
 
 
 def test_a_connection_that_showed_a_role_is_never_displaced():
-    street = Street(Limits(per_known=4))
+    street = Street(Limits(here=4))
     for place in street.flood(["127.0.0.1"], 4):
         street.admission.may_ask(place.peer, True, 0.0)
     assert street.come("127.0.0.1") is None

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
+from pipeline.signals import Mode
 from server import app
 from server.app import CLIENT, Api
+from server.clock import now
 from tests.server.house import control_status, house_in, is_request
 
 BASE = "http://127.0.0.1:8080"
@@ -74,6 +76,14 @@ def test_a_stop_reaches_control_from_either_role(house, client, role):
     assert answer.status_code == 202
     assert any(map(is_request("stop"), house.control.inputs()))
     assert list(house.hub.events) == [f"local program ({role}): stop"]
+
+
+def test_a_stop_by_request_is_told_what_the_robot_does(house, client):
+    assert client.post("/api/stop").json()["mode"] == "LOST"
+    for mode in (Mode.TRACK, Mode.STOPPED):
+        house.hub.status = control_status(mode=int(mode))
+        house.hub.control_meter.tick(now(), now())
+        assert client.post("/api/stop").json()["mode"] == mode.name
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from server import security
 from server.pairings import IDLE_S
-from server.security import COOKIE, MAX_ADDRESSES, PAIR_TRIES, PAIR_WINDOW_S, Doors
+from server.security import COOKIE, MAX_ADDRESSES, PAIR_TRIES, PAIR_WINDOW_S, SAVE_AGAIN_S, Doors
 
 
 class Clock:
@@ -56,6 +56,35 @@ def test_what_was_revoked_or_used_stays_so_when_the_server_is_started_anew(tmp_p
     after = Doors(secret, store=store)
     assert who(after, {"cookie": f"{COOKIE}={cookie}"}).state == "revoked"
     assert [link.used for link in after.pairings.book.links.values()] == [True]
+
+
+def test_when_the_disk_takes_nothing_a_server_started_anew_lets_nobody_in_who_was_shut_out(
+    tmp_path,
+):
+    store = tmp_path / "members"
+    doors = Doors(store=store, clock=(clock := Clock()))
+    member, headers = enter(doors)
+    other, _ = enter(doors)
+    store.with_suffix(".part").mkdir()  # in the way of whatever is written
+    doors.pairings.revoke(member.id, "stolen")
+    assert not doors.save()
+    assert doors.is_unsaved
+    assert who(doors, headers).state == "revoked"
+    assert who(Doors(store=store), headers) is None
+    tries = 0
+    for _ in range(100):  # ten seconds
+        clock.t += 0.1
+        tried = doors._t_saved
+        assert not doors.save_again()
+        tries += doors._t_saved != tried
+    assert 9 <= tries <= 10
+    store.with_suffix(".part").rmdir()
+    clock.t += SAVE_AGAIN_S
+    assert doors.save_again()
+    assert not doors.save_again()
+    after = Doors(store=store)
+    assert who(after, headers).state == "revoked"
+    assert [one.id for one in after.pairings.present()] == [other.id]
 
 
 def test_what_is_kept_is_private_and_opens_nothing(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from server import hub as hub_module
 from server.clock import now
 from server.control_link import ReadyInput, RequestInput
-from server.hub import EVENTS
+from server.events import EVENTS
 from server.knobs import TuneInput
 from server.lease import LEASE_S
 from server.messages import Command, Hello, Tune, encode_message

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import signal
 import socket
+import ssl
+from asyncio.sslproto import SSLProtocol
 from collections.abc import AsyncIterator
 from types import SimpleNamespace
 
@@ -15,6 +18,7 @@ from websockets.exceptions import ConnectionClosed
 
 from server import acceptor
 from server import listener as impatient
+from server.tls import certificate
 from server.wire import MAX_RECORD_BYTES
 from tests.server.house import eventually
 
@@ -38,9 +42,9 @@ async def app(scope, receive, send):
 
 
 @contextlib.asynccontextmanager
-async def listening(served=app) -> AsyncIterator[SimpleNamespace]:
+async def listening(served=app, tls=None) -> AsyncIterator[SimpleNamespace]:
     with socket.create_server(("127.0.0.1", 0)) as bound:
-        server = impatient.listener(served, None)
+        server = impatient.listener(served, tls)
         task = asyncio.create_task(server.serve(sockets=[bound]))
         try:
             await eventually(lambda: server.started)
@@ -167,3 +171,42 @@ def test_nobody_comes_from_elsewhere_by_saying_so():
 
     asyncio.run(run())
     assert told == [("127.0.0.1", "http")]
+
+
+def leave_early(port, n):
+    """Ask over TLS for something large, `n` times, and go after its beginning."""
+    careless = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    careless.check_hostname, careless.verify_mode = False, ssl.CERT_NONE
+    for _ in range(n):
+        with (
+            socket.create_connection(("127.0.0.1", port)) as plain,
+            careless.wrap_socket(plain) as tls,
+        ):
+            tls.sendall(OK)
+            tls.recv(1_000)
+
+
+async def large(scope, receive, send):
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": bytes(800_000)})
+
+
+def test_who_has_left_keeps_no_memory_of_tls_until_a_timer_or_a_full_collection(tmp_path):
+    def kept():
+        gc.collect(1)
+        return sum(isinstance(one, SSLProtocol) for one in gc.get_objects())
+
+    async def play():
+        async with listening(large, certificate(tmp_path)) as here:
+            gc.collect()
+            gc.disable()
+            before = kept()
+            await asyncio.to_thread(leave_early, here.port, 10)
+            await eventually(lambda: not here.server.server_state.connections)
+            await eventually(lambda: not here.server.server_state.tasks)
+            assert kept() == before
+
+    try:
+        asyncio.run(play())
+    finally:
+        gc.enable()

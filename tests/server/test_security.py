@@ -15,9 +15,11 @@ from starlette.testclient import TestClient, WebSocketDenialResponse
 from server import replies
 from server.audit import STRANGERS_FILE, Audit
 from server.clock import now
+from server.guard import Guard
+from server.quotas import Quotas
 from server.roles import ADDRESSES, RANKS, is_enough
-from server.security import COOKIE, PAIR_TRIES, Doors, Guard
-from tests.server.live_server import LiveServer
+from server.security import COOKIE, PAIR_TRIES, Doors
+from tests.server.live_server import UNLIMITED, LiveServer
 
 BASE = "http://127.0.0.1:8080"
 WS = "ws://127.0.0.1:8080"
@@ -33,7 +35,7 @@ FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICT
 
 @pytest.fixture
 def rig(tmp_path):
-    server = LiveServer(tmp_path)
+    server = LiveServer(tmp_path, Quotas(UNLIMITED))
     server.client = TestClient(server.guard, base_url=BASE, client=("127.0.0.1", 50_000))
     yield server
     server.close()
@@ -227,6 +229,26 @@ def test_who_is_revoked_while_a_body_is_on_the_way_does_nothing_by_it(rig, deed)
     assert all(link.used for link in rig.doors.pairings.book.links.values())
 
 
+def test_no_route_acts_for_who_is_shut_out_while_its_body_is_on_the_way(quiet):
+    client, reading = member(quiet, "supervisor"), set()
+    for method, path in [(m, p) for m, p in every_request(quiet) if m in ("POST", "DELETE")]:
+        (me,) = quiet.hub.people.present()
+        people = dict(quiet.doors.pairings.book.members)
+
+        def body(path=path, me=me):
+            yield b"{"
+            reading.add(path)
+            quiet.doors.pairings.revoke(me.id, "lost")
+            yield b"}"
+
+        answer = client.request(method, path, content=body())
+        if path in reading - {"/api/stop", "/api/pair"}:
+            assert (answer.status_code, answer.json()["field"]) == (401, "role"), path
+        quiet.doors.pairings.book.members.update(people)
+    acts_at_once = {"/api/recording", "/api/virtual-phone"}
+    assert reading == {p for m, p in every_request(quiet) if m == "POST"} - acts_at_once
+
+
 def test_a_link_made_by_a_page_goes_when_that_page_is_revoked(rig):
     client = member(rig, "supervisor")
     (sue,) = rig.hub.people.present()
@@ -321,6 +343,30 @@ def test_a_browser_that_pairs_anew_leaves_who_it_was(rig):
     former = TestClient(rig.guard, base_url=BASE, cookies={COOKIE: old})
     assert former.get("/api/whoami").json()["state"] == "revoked"
     assert len(rig.hub.people.present()) == 1
+
+
+@pytest.mark.parametrize(
+    ("held", "offered", "waits"),
+    [
+        ("supervisor", "operator", True),
+        ("supervisor", "viewer", False),
+        ("operator", "viewer", False),
+        ("operator", "operator", True),
+    ],
+)
+def test_no_link_takes_from_a_browser_what_it_may_unless_it_says_so(rig, held, offered, waits):
+    browser = member(rig, held)
+    key = rig.doors.pairings.invite(offered, now())
+    refused = browser.post("/api/pair", json={"token": key, "name": "Anna"})
+    assert refused.status_code == 409
+    told = {name: refused.json()[name] for name in ("held", "offered", "waits")}
+    assert told == {"held": held, "offered": offered, "waits": waits}
+    standing = browser.get("/api/whoami").json()
+    assert (standing["role"], standing["state"]) == (held, "in")
+    taken = browser.post("/api/pair", json={"token": key, "name": "Anna", "replace": True})
+    assert taken.status_code == 200, "the link was not used up by the question"
+    standing = browser.get("/api/whoami").json()
+    assert (standing["role"], standing["state"]) == (offered, "waiting" if waits else "in")
 
 
 FOREIGN = [
