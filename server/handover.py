@@ -8,6 +8,7 @@ from typing import Protocol
 from server.operator import OperatorPhone
 from server.pairings import Member, PairingError
 from server.people import People
+from server.security import UNSAVED
 
 
 class Led(Protocol):
@@ -58,6 +59,22 @@ class Handover:
         hub.disarm()
         self.make_room(now)
 
+    def keep(self, id: str, by: Member, now: float) -> None:
+        """Keep the lead no longer for the member with that id.
+
+        Raises:
+            PairingError: it is not kept for that one, or is none of the business of `by`.
+        """
+        people, lease = self._hub.people, self._hub.people.lease
+        if lease.next_of(now) != id:
+            raise PairingError("id", "of whom the lead is kept for")
+        if by.role != "supervisor" and by.id != id and lease.is_of_another(by.id):
+            raise PairingError("role", "supervisor, who gave it, or whom it is kept for")
+        heir = people.named(id)
+        people.note("hand-over", by, f"ended before {heir.name if heir else id} took it")
+        self._hub.say(f"{by.name} ends the hand-over to {heir.name if heir else id}.")
+        lease.forget(id)
+
     def make_room(self, now: float) -> None:
         """Who leads goes, when the robot is down, for whom the lead was given to."""
         hub, lease = self._hub, self._hub.people.lease
@@ -83,7 +100,9 @@ class Handover:
         return member
 
     async def expire(self) -> None:
-        """Those whose time is over go."""
+        """Those whose time is over go; who has gone is written down, if that could not be done."""
+        if self._hub.people.doors.save_again():
+            self._hub.say("Who is paired is written down again.")
         over = self._hub.people.expire()
         for member in over:
             self._hub.say(f"{member.name} is not paired any more. {member.why}")
@@ -99,7 +118,7 @@ class Handover:
             await asyncio.gather(*(doors.sockets.end(member.id) for member in members))
         finally:
             if not doors.save():
-                self._hub.say("The disk takes nothing: a server started anew would let them in.")
+                self._hub.say(UNSAVED)
         for member in members:
             if all(other.address != member.address for other in doors.pairings.present()):
                 doors.on_gone(member.address)

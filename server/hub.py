@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from server.calibration_messages import Calibrate
 from server.clock import now
 from server.control_link import ControlStatus, Input, ReadyInput, RequestInput, server_end
 from server.decoding import Decoding
+from server.events import Events
 from server.handover import Handover
 from server.knobs import TuneInput
 from server.messages import Command, Hello, Status, ToPage, Tune, encode_message
@@ -44,7 +44,7 @@ log = logging.getLogger("lightleash")
 
 INSIST_S, INSISTS = 0.01, 100
 """How often and how many times a STOP is sent to a control process that can't take it."""
-EVENTS, TICK_S = 12, 0.1
+TICK_S = 0.1
 AT_REST = ("DISARMED", "STOPPED", "LOST")
 GROUNDED = (Mode.DISARMED, Mode.ARMED, Mode.STOPPED)
 PROGRAM = of_this_machine("operator")
@@ -78,7 +78,7 @@ class Hub:
         self.supervisors: set[Page] = set()
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
-        self.events: deque[str] = deque(maxlen=EVENTS)
+        self._events = Events()
         self._last_mode = ""
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
@@ -111,11 +111,15 @@ class Hub:
         """Hand something to the control process."""
         self._control.send(message)
 
-    def say(self, text: str) -> None:
-        """An event that people should see, and the log keep; control characters are taken out."""
-        text = "".join(c if c.isprintable() else "·" for c in text)
-        log.info("%s", text)
-        self.events.appendleft(text)
+    @property
+    def events(self) -> Sequence[str]:
+        """What people should see, newest first."""
+        return self._events.shown
+
+    def say(self, text: str, of: str = "") -> None:
+        """An event that people should see, and the log keep; see `Events.add`."""
+        if said := self._events.add(text, of, now()):
+            log.info("%s", said)
 
     def _keep_deed(self, deed: Deed) -> None:
         self.recordings.message("server", encode_message(deed), now())
@@ -126,7 +130,7 @@ class Hub:
             return
         lacks = self.status.refusals if command.what == "arm" and self.status is not None else ()
         self.people.note(command.what, who, f"refused: {'; '.join(lacks)}"[:300] if lacks else "")
-        self.say(f"{who.name}: {command.what}")
+        self.say(said := f"{who.name}: {command.what}", of=said)
         self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
 
     def tune(self, wish: Tune) -> None:
@@ -136,7 +140,7 @@ class Hub:
             return
         told = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
         if self._control.send(TuneInput(**knobs)):
-            self.say(f"supervisor: {told}")
+            self.say(f"supervisor: {told}", of="virtual camera")
         else:
             self.say(f"{told} did not reach the control process: try again.")
 
@@ -144,7 +148,7 @@ class Hub:
         """The operator's phone begins to calibrate its camera, or leaves it; see `Desk.wish`."""
         if (phone := self.phone) is not None:
             self._desk.wish(phone, wish, self.status)
-            self.say(f"{phone.device}: calibration, {wish.what}")
+            self.say(f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration")
 
     def _ask(self, request: RequestInput, insists: int) -> None:
         """Nobody may be there, or the queue may be full: what stops the robot is said again."""
@@ -275,6 +279,8 @@ class Hub:
     def _tick(self) -> None:
         self.to_control(ReadyInput(self.refusals()))
         self.handover.make_room(now())
+        for said in self._events.count_up(now()):
+            log.info("%s", said)
         status = build(self)
         if status.mode != self._last_mode:
             self.say(f"{status.mode}: {status.reason}")

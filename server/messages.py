@@ -86,6 +86,8 @@ class Welcome(msgspec.Struct, tag="welcome", frozen=True):
     height: Side
     frame_rate_hz: int
     bitrate_bps: int
+    you: str = ""
+    """Id of this page's pairing, as in `people` of a status."""
 
 
 class Refused(msgspec.Struct, tag="refused", frozen=True):
@@ -214,7 +216,7 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     time_ms: int = 0
     """The server's clock when this was made."""
     until_ramp_ms: float | None = None
-    """In COAST and HOLD: left until RAMP if all goes on as it is."""
+    """In COAST and HOLD: left until control or the robot ramps down, if all goes on as it is."""
     resumes: bool = False
     """In COAST and HOLD: it follows again by itself, once all is well."""
     gaps: dict[str, GapCount] = {}

@@ -15,10 +15,9 @@ from typing import Literal
 import msgspec
 from msgspec.structs import replace
 
-from server.roles import Role
+from server.roles import Confirm, Role
 
 State = Literal["waiting", "in", "denied", "revoked", "expired"]
-Confirm = Literal["supervisor", "self"]
 LINK_S = 600.0
 """A link opens for so long."""
 WAIT_S = 300.0
@@ -110,12 +109,16 @@ class Pairings:
             del links[next(iter(links))]
         return key
 
-    def pair(self, key: str, name: str, address: str, now: float) -> tuple[Member, str]:
-        """Exchange a link's key for a session and the value of its cookie.
+    def opens(self, key: str, now: float) -> tuple[Role, bool]:
+        """The role that a link gives, and whether a supervisor has to confirm it.
 
         Raises:
-            PairingError: never handed out, used, expired, or too many are here.
+            PairingError: never handed out, used, or expired.
         """
+        role = self._link(key, now).role
+        return role, role == "operator" and self._confirm == "supervisor"
+
+    def _link(self, key: str, now: float) -> Link:
         link = self.book.links.get(digest_of(key))
         if link is None:
             raise PairingError("token", "a link of this run: scan the newest code")
@@ -123,10 +126,18 @@ class Pairings:
             raise PairingError("token", "a link works once, and this one was used: scan a new code")
         if now >= link.expires:
             raise PairingError("token", f"a link lives {LINK_S / 60:g} minutes: scan a new code")
+        return link
+
+    def pair(self, key: str, name: str, address: str, now: float) -> tuple[Member, str]:
+        """Exchange a link's key for a session and the value of its cookie.
+
+        Raises:
+            PairingError: never handed out, used, expired, or too many are here.
+        """
+        link, (_, waits) = self._link(key, now), self.opens(key, now)
         if len(self.present()) >= MAX_MEMBERS:
             raise PairingError("token", f"at most {MAX_MEMBERS} at a time: revoke somebody")
         link.used = True
-        waits = link.role == "operator" and self._confirm == "supervisor"
         cookie = self._key()
         member = Member(
             id=self._key()[:8],

@@ -33,6 +33,7 @@ class People:
     def present(self) -> list[Person]:
         """For every screen: those who are paired, and programs that are connected."""
         t, connected = self.doors.clock(), set(self.doors.sockets.ids())
+        heir = self.lease.next_of(t)
         members = [*self.doors.pairings.present(), *self._programs(connected, t)]
         return [
             Person(
@@ -45,6 +46,7 @@ class People:
                 since_s=round(t - one.since, 1),
                 connected=one.id in connected,
                 leads=one.id == self.lease.holder,
+                offered=one.id == heir,
             )
             for one in members
         ]

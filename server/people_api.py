@@ -17,7 +17,7 @@ from server.hub import Hub
 from server.pairings import LINK_S, Member, PairingError
 from server.people import LOCAL
 from server.replies import body_of, refusal
-from server.roles import Role
+from server.roles import Role, is_enough
 from server.security import PAIR_TRIES, Doors, cookie_name
 
 Wanted = TypeVar("Wanted", bound=msgspec.Struct)
@@ -30,6 +30,8 @@ class PairingRequest(msgspec.Struct, forbid_unknown_fields=True):
 
     token: Short
     name: Short = ""
+    replace: bool = False
+    """Give up for it what this browser may already."""
 
 
 class InviteRequest(msgspec.Struct, forbid_unknown_fields=True):
@@ -64,6 +66,7 @@ class PeopleApi:
             self._of_a_member("/api/people/deny", PersonRequest, id, self._deny),
             self._of_a_member("/api/people/revoke", PersonRequest, id, self._revoke),
             self._of_a_member("/api/people/lead", PersonRequest, id, self._lead),
+            self._of_a_member("/api/people/keep", PersonRequest, id, self._keep),
         ]
 
     async def _pair(self, request: Request) -> Response:
@@ -74,28 +77,32 @@ class PeopleApi:
         if asked is None:
             return refusal(400, "token", 'JSON: {"token": "…", "name": "…"}')
         doors, secure = self._doors, request.url.scheme == "https"
+        former = self._former(request, secure)
         try:
+            role, must_wait = doors.pairings.opens(asked.token, doors.clock())
+            if not asked.replace and former is not None and _loses(former, role, must_wait):
+                return _told_of_less(former, role, must_wait)
             member, cookie = doors.pairings.pair(asked.token, asked.name, address, doors.clock())
         except PairingError as error:
             doors.tried(address)
             doors.audit.note("refusal", address=address, why=f"pairing: {error.allowed}")
             return refusal(401, error.field, error.allowed)
-        await self._leave_behind(request, secure)
+        if former is not None:  # its old cookie is of no more use
+            await self._hub.handover.shut_out(former.id, "It has paired anew.", former)
         doors.save()
         self._hub.people.note("pair", member, f"as {member.state}")
-        waits = ", waits to be confirmed" if member.state == "waiting" else ""
-        self._hub.say(f"{member.name} has paired as {member.role}{waits}.")
+        unconfirmed = ", waits to be confirmed" if member.state == "waiting" else ""
+        self._hub.say(f"{member.name} has paired as {member.role}{unconfirmed}.")
         response = JSONResponse(_told(member))
         name = cookie_name(secure)
         response.set_cookie(name, cookie, httponly=True, secure=secure, samesite="strict")
         return response
 
-    async def _leave_behind(self, request: Request, secure: bool) -> None:
-        """A browser that pairs anew leaves who it was; its old cookie is of no more use."""
+    def _former(self, request: Request, secure: bool) -> Member | None:
+        """Who a browser that pairs anew has been until now."""
         value = request.cookies.get(cookie_name(secure), "")
         former = self._doors.pairings.of_cookie(value, self._doors.clock()) if value else None
-        if former is not None and former.state in ("waiting", "in"):
-            await self._hub.handover.shut_out(former.id, "It has paired anew.", former)
+        return former if former is not None and former.state in ("waiting", "in") else None
 
     async def _who_am_i(self, request: Request) -> Response:
         return JSONResponse(_told(_member(request)))
@@ -107,8 +114,6 @@ class PeopleApi:
 
         async def endpoint(request: Request) -> Response:
             asked, by = await _asked(request, kind), _member(request)
-            if self._hub.people.named(by.id) is None:  # shut out while its body was on the way
-                return refusal(401, "role", "pair anew: this pairing has ended")
             if asked is None:
                 return refusal(400, kind.__struct_fields__[0], f"JSON: {needs}")
             try:
@@ -153,6 +158,29 @@ class PeopleApi:
     async def _lead(self, asked: PersonRequest, by: Member) -> Response:
         self._hub.handover.give(asked.id, by, self._doors.clock())
         return JSONResponse({"leads_next": asked.id}, 202)
+
+    async def _keep(self, asked: PersonRequest, by: Member) -> Response:
+        self._hub.handover.keep(asked.id, by, self._doors.clock())
+        return JSONResponse({"leads_next": ""}, 202)
+
+
+def _loses(former: Member, role: Role, waits: bool) -> bool:
+    """Whether `former` would do less under a link of `role`, now or once it is confirmed."""
+    return former.state == "in" and (
+        not is_enough(role, former.role) or (waits and role == former.role)
+    )
+
+
+def _told_of_less(former: Member, role: Role, waits: bool) -> Response:
+    body = {
+        "code": "paired",
+        "field": "replace",
+        "allowed": f"true, to give up being paired as {former.role}",
+        "held": former.role,
+        "offered": role,
+        "waits": waits,
+    }
+    return JSONResponse(body, 409)
 
 
 def _member(request: Request) -> Member:

@@ -24,6 +24,8 @@ class Person(msgspec.Struct, frozen=True):
     """How long ago it was paired."""
     connected: bool
     leads: bool
+    offered: bool = False
+    """The lead is kept for this one alone, and not yet taken."""
 
 
 class Deed(msgspec.Struct, tag="deed", frozen=True):

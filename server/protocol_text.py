@@ -70,13 +70,18 @@ CODES = {
 """Every code of `Refused` and what it means."""
 
 REQUESTS = {
-    "POST /api/pair": 'body `{"token": "…", "name": "…"}`; answers as `whoami`, sets the cookie',
+    "POST /api/pair": 'body `{"token": "…", "name": "…"}`; answers as `whoami`, sets the cookie; '
+    "or 409 with `held`, `offered`, `waits`: this browser may do more already, and gives that up "
+    'with `"replace": true`',
     "GET /api/whoami": "role, state (waiting, in, denied, revoked, expired), name, code, why",
     "POST /api/people/confirm": 'body `{"id": "…", "code": "…"}`: let in who waits with that code',
     "POST /api/people/deny": 'body `{"id": "…"}`: turn away who waits',
     "POST /api/people/revoke": 'body `{"id": "…"}`: end a pairing, and its sockets at once',
-    "POST /api/people/lead": 'body `{"id": "…"}`: give that one the lead; also who leads may',
-    "POST /api/stop": "STOP, when the socket is gone or stuck; body: nothing, or the `command`",
+    "POST /api/people/keep": 'body `{"id": "…"}`: end that; who gave it, who was to have it, '
+    "or a supervisor",
+    "POST /api/people/lead": 'body `{"id": "…"}`: keep the lead for that one; also who leads may',
+    "POST /api/stop": "STOP, when the socket is gone or stuck; body: nothing, or the `command`; "
+    "answers with the robot's `mode` as it was then",
     "POST /api/virtual-phone": "start the virtual phone",
     "DELETE /api/virtual-phone": "stop it",
     "POST /api/recording": "start recording",
@@ -163,7 +168,8 @@ server send `Authorization: Bearer <key>` instead, with a key of the run file.
 
 Roles are viewer < operator < supervisor; each may do what those before it may. A viewer sees all
 and may STOP. On `/ws/supervisor` viewers and operators may say STOP and nothing else. Who leads, or
-a supervisor, may give the lead to another operator; it is kept for that one for {GIVEN_S:g} s. The
+a supervisor, may give the lead to another operator; it is kept for that one for {GIVEN_S:g} s,
+during which nobody leads, and pages ask the person before they say `hello` as the new leader. The
 robot is disarmed whenever the lead changes; in flight only a supervisor may change it, and the
 robot comes down first.
 

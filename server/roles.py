@@ -6,6 +6,8 @@ from typing import Literal, get_args
 
 Role = Literal["viewer", "operator", "supervisor"]
 """Each may do what those before it may."""
+Confirm = Literal["supervisor", "self"]
+"""Who confirms an operator: a supervisor, or his link is enough."""
 Least = Literal["anyone", "known", "viewer", "operator", "supervisor"]
 """known: has exchanged a link, and may still wait for a supervisor or have been refused."""
 
@@ -19,6 +21,7 @@ ADDRESSES: dict[str, Least] = {
     **dict.fromkeys(("/view", "/view/", "/ws/supervisor"), "viewer"),
     **dict.fromkeys(("/ws/phone", "/ws/video"), "operator"),
     **dict.fromkeys(("/api/rtc", "/api/rtc/answer", "/api/people/lead"), "operator"),
+    "/api/people/keep": "operator",
     **dict.fromkeys(("/api/recording", "/api/virtual-phone", "/api/invite"), "supervisor"),
     **dict.fromkeys((f"/api/people/{d}" for d in ("confirm", "deny", "revoke")), "supervisor"),
 }

@@ -18,6 +18,7 @@ from server.operator import OperatorPhone
 from server.pauses import Pauses
 from server.people import People
 from server.recorder import Recordings
+from server.security import UNSAVED
 
 LOST_S = 0.3
 """A control process silent for longer is lost."""
@@ -48,13 +49,13 @@ class Known(Protocol):
 def build(hub: Known) -> Status:
     """From what the hub knows now."""
     t, control, phone = now(), hub.status, hub.phone
-    silence = _silence(control, hub.control_meter.age(t))
+    mode, silence = mode_of(hub, t)
     gaps = hub.blame.gaps(control, t) if control is not None else {}
     refusals = [f"{silence}."] if control is None or silence else control.refusals
     sighting = phone.sighting if phone is not None else None
     found = sighting is not None and sighting.pose is not None
     return Status(
-        mode="LOST" if control is None or silence else cast(ModeName, Mode(control.mode).name),
+        mode=mode,
         reason=f"{silence}; the robot stops by its own watchdog."
         if control is None or silence
         else hub.blame.reason(control, t),
@@ -92,10 +93,19 @@ def build(hub: Known) -> Status:
         until_ramp_ms=_rounded(control.until_ramp_s, 0, 1e3) if control and not silence else None,
         resumes=control is not None and control.resumes,
         gaps={side: GapCount(one.count, 1e3 * one.longest_s) for side, one in gaps.items()},
-        warnings=warnings(gaps),
+        warnings=[*warnings(gaps), *([UNSAVED] if hub.people.doors.is_unsaved else [])],
         server=hub.pauses.figures(),
         people=hub.people.present(),
     )
+
+
+def mode_of(hub: Known, t: float) -> tuple[ModeName, str]:
+    """The robot's mode at `t` [s], and why it is LOST, or ""."""
+    control = hub.status
+    silence = _silence(control, hub.control_meter.age(t))
+    if control is None or silence:
+        return "LOST", silence
+    return cast(ModeName, Mode(control.mode).name), ""
 
 
 def _silence(control: ControlStatus | None, age: float) -> str:

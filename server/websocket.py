@@ -180,6 +180,7 @@ class PageServer:
                     height=video.height,
                     frame_rate_hz=video.frame_rate_hz,
                     bitrate_bps=video.bitrate_bps,
+                    you=member.id,
                 )
             )
         )
@@ -215,7 +216,7 @@ class PageServer:
             elif isinstance(said, PathChoice):
                 self._choose(said, phone)
             elif isinstance(said, Log):
-                self._hub.say(f"page: {said.text}")
+                self._hub.say(f"page: {said.text}", of=f"page of {member.name}")
         except WireError as error:
             if error.code in ("role", "age"):
                 self._hub.people.note("refusal", member, str(error))
@@ -235,7 +236,7 @@ class PageServer:
             return
         if choice.by and choice != phone.path_choice:
             way = "the best way" if choice.wish == "auto" else choice.wish
-            self._hub.say(f"pictures by {way}: chosen by the {choice.by}")
+            self._hub.say(f"pictures by {way}: chosen by the {choice.by}", of="pictures")
         phone.path_choice = choice
 
     def _is_straggler(self, said: FromPage | Record) -> bool:

@@ -77,6 +77,11 @@ class RtcDesk:
         if former is not None:
             self._gone(former)
         sdp = await link.peer.offer()
+        if (
+            link.is_closing or self._hub.phone is not phone
+        ):  # meanwhile it was shut out, or asked anew
+            self._gone(link)
+            return refusal(403, "session", "the session of the phone that leads")
         offer = Offer(link.id, sdp, self._settings.ice_servers())
         return Response(msgspec.json.encode(offer), media_type="application/json")
 
@@ -94,7 +99,7 @@ class RtcDesk:
             log.warning("an answer is refused: %s", error)
             self._gone(link)
             return refusal(400, error.field, error.allowed)
-        if self._hub.join_fast(link.session, link) is None:
+        if link.is_closing or self._hub.join_fast(link.session, link) is None:
             self._gone(link)
             return refusal(403, "session", "the session of the phone that leads")
         return JSONResponse({"connecting": True}, 202)

@@ -86,6 +86,49 @@ def test_a_phone_is_let_in_by_one_click_beside_its_letters_and_shut_out_by_two(
         )
 
 
+def test_a_page_that_is_shut_out_or_too_old_keeps_stop_and_says_what_became_of_it(
+    chromium: str, server: Serving
+) -> None:
+    with browser(chromium, **SCREEN) as context:
+        phone = context.new_page()
+        refuse = {"type": "refused", "code": "version", "field": "version", "allowed": "3"}
+        phone.route_web_socket(
+            re.compile("/ws/phone"), lambda ws: ws.send(json.dumps({**refuse, "fatal": True}))
+        )
+        phone.goto(f"{server.local_https}/{server.link('supervisor')}")
+        expect(phone.locator("#last-stop")).to_be_hidden()
+        phone.fill("#name", "Olga")
+        phone.click("#start")
+        expect(phone.locator("#problem-title")).to_have_text(
+            "The server has been updated", timeout=WAIT_MS
+        )
+        phone.click("#last-stop-button")
+        words = phone.locator("#last-stop-words")
+        expect(words).to_contain_text("STOPPED", timeout=WAIT_MS)
+        until(lambda: mode(server) == "STOPPED", 5.0, "STOPPED")  # a status is 100 ms old
+        server.request("POST", "/api/people/revoke", {"id": ids(server)["Olga"]})
+        phone.click("#last-stop-button")
+        expect(words).to_contain_text("STOP was refused", timeout=WAIT_MS)
+        expect(words).to_contain_text("A supervisor has ended this pairing")
+        with phone.expect_request("**/api/stop"):
+            phone.click("#last-stop-button")
+
+
+def test_a_supervisors_browser_that_opens_a_lesser_link_is_asked_and_may_keep_what_it_is(
+    chromium: str, server: Serving
+) -> None:
+    with browser(chromium, **SCREEN) as context:
+        page = context.new_page()
+        page.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
+        expect(page.locator("#people li")).not_to_have_count(0, timeout=WAIT_MS)
+        for answer, role in (("keep", "supervisor"), ("take", "viewer")):
+            other = context.new_page()
+            other.goto(f"{server.http_url}/supervisor{server.link('viewer')}")
+            expect(other.locator("#choice-title")).to_contain_text("it supervises", timeout=WAIT_MS)
+            other.click(f"#choice-{answer}")
+            expect(other.locator("body")).to_have_attribute("data-role", role, timeout=WAIT_MS)
+
+
 def test_a_viewers_page_shows_all_and_offers_stop_alone(chromium: str, server: Serving) -> None:
     with browser(chromium, **SCREEN) as context:
         page = context.new_page()

@@ -148,12 +148,15 @@ def test_a_copy_that_fails_is_an_error_here() -> None:
 @pytest.mark.slow
 def test_two_faults_are_flown_written_and_drawn(tmp_path: Path) -> None:
     words = ["faults", "--seeds", "1", "--workers", "1", "--out", str(tmp_path)]
-    code = main([*words, "--only", "STOP while it"])
+    code = main([*words, "--only", "STOP while it", "--vanish", "2"])
     told = json.loads((tmp_path / "faults.json").read_text())
     assert code == 0
     assert all(told["holds"].values())
     assert len(told["rows"]) == 4
     assert all(row["zero"] < 0.25 and row["after_zero"] == 0 for row in told["rows"])
+    at_any_moment = [one for one in told["times"] if one["fault"].startswith("phone vanishes")]
+    assert [(one["event"], one["n"]) for one in at_any_moment] == [("COAST", 2), ("RAMP", 2)]
+    assert all(one["p50"] <= one["p99"] <= one["p99_9"] for one in told["times"])
     assert np.isfinite([row["excursion_mm"] for row in told["rows"]]).all()
     assert (tmp_path / "faults.png").stat().st_size > 5_000
 

@@ -18,8 +18,9 @@ from server.clock import now
 from server.messages import Deed, decode_from_server
 from server.pairings import WAIT_S, PairingError
 from server.recording import SERVER_MESSAGES
-from server.security import COOKIE
+from server.security import COOKIE, Doors
 from server.sockets import REVOKED
+from server.status import build
 from tests.server.house import (
     DEADLINE_S,
     HOST,
@@ -185,13 +186,31 @@ def test_a_full_disk_keeps_nobody_in_who_was_shut_out_and_ends_no_server(house, 
             await house.hub.handover.shut_out(anna.member.id, "stolen", sup)
             assert await page.closed() == REVOKED
             await house.control_hears(is_request("disarm"))
-        assert "The disk takes nothing" in house.hub.events[0]
+        assert any("The disk takes nothing" in event for event in house.hub.events)
+        assert any("The disk takes nothing" in text for text in build(house.hub).warnings)
         house.doors.clock = lambda: now() + WAIT_S
         await house.hub.handover.expire()
         assert not people(house)
 
     play(house, scene)
     assert "can't be written down" in caplog.text
+
+
+def test_a_revocation_that_could_not_be_written_down_is_written_once_the_disk_takes_it(
+    house, tmp_path
+):
+    async def scene():
+        anna = Browser(house, "operator", "Anna")
+        store = house.doors._store = tmp_path / "nowhere" / "members"
+        sup = house.hub.people.named("local-supervisor")
+        await house.hub.handover.shut_out(anna.member.id, "stolen", sup)
+        store.parent.mkdir()
+        await eventually(store.exists)
+        assert Doors(store=store).pairings.book.members[anna.member.id].state == "revoked"
+        await eventually(lambda: "written down again" in house.hub.events[0])
+        assert not build(house.hub).warnings
+
+    play(house, scene)
 
 
 def test_on_the_ground_the_lead_is_handed_on_at_once_and_the_robot_disarmed(house):
@@ -208,6 +227,28 @@ def test_on_the_ground_the_lead_is_handed_on_at_once_and_the_robot_disarmed(hous
                 await hers.say(type="command", what="arm")
                 assert (await hers.until("refused", fatal=True))["code"] == "role"
         assert not any(map(is_request("arm"), house.control.inputs()))
+
+    play(house, scene)
+
+
+def test_a_lead_is_kept_no_longer_when_giver_or_heir_says_so_and_nobody_else(house):
+    async def scene():
+        anna, bert, cleo = (Browser(house, "operator", n) for n in ("Anna", "Bert", "Cleo"))
+        keep = house.hub.handover.keep
+        for by in (anna, bert):
+            async with anna.leading():
+                in_mode(house, Mode.DISARMED)
+                give(house, bert.member.id, anna.member)
+            assert [name for name, one in people(house).items() if one.offered] == ["Bert"]
+            with pytest.raises(PairingError, match="who gave it"):
+                keep(bert.member.id, cleo.member, now())
+            with pytest.raises(PairingError, match="kept for"):
+                keep(cleo.member.id, anna.member, now())
+            keep(bert.member.id, by.member, now())
+            assert not any(one.offered for one in people(house).values())
+            async with anna.leading():
+                assert people(house)["Anna"].leads
+            await eventually(lambda: house.hub.phone is None)
 
     play(house, scene)
 

@@ -9,8 +9,10 @@ from starlette.responses import PlainTextResponse
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.testclient import TestClient, WebSocketDenialResponse
 
-from server.security import COOKIE, Guard
-from tests.server.live_server import LiveServer
+from server.guard import Guard
+from server.quotas import Quotas
+from server.security import COOKIE
+from tests.server.live_server import UNLIMITED, LiveServer
 
 HOST = "127.0.0.1:8080"
 REACHED = 299
@@ -41,6 +43,7 @@ TABLE = {
     "/api/people/deny": (POST, SUPERVISOR),
     "/api/people/revoke": (POST, SUPERVISOR),
     "/api/people/lead": (POST, OPERATOR),
+    "/api/people/keep": (POST, OPERATOR),
     "/api/status": (READ, VIEWER),
     "/metrics": (READ, VIEWER),
     "/view": (READ, VIEWER),
@@ -77,7 +80,7 @@ async def reached(scope, receive, send):
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
     server = LiveServer(tmp_path_factory.mktemp("routes"))
-    guard = Guard(reached, server.doors, ["127.0.0.1"])
+    guard = Guard(reached, server.doors, ["127.0.0.1"], quotas=Quotas(UNLIMITED))
     server.client = TestClient(guard, base_url=f"http://{HOST}", client=("127.0.0.1", 5000))
     yield server
     server.close()

@@ -5,10 +5,12 @@
 
 import { browserOf } from './browser.js';
 import { CameraFeed } from './camera_feed.js';
+import { ChoiceCard } from './choice_card.js';
 import { Feedback } from './feedback.js';
 import { LensPanel } from './lens_panel.js';
 import { PaceKeeper } from './pace_keeper.js';
 import { WakefulClock, commandOf } from './command.js';
+import { HandoverCard } from './handover_card.js';
 import { Imu } from './imu.js';
 import { LinkCheck } from './link_check.js';
 import { PairingCard } from './pairing_card.js';
@@ -17,6 +19,7 @@ import { adviceFor, problemOf } from './problems.js';
 import { Rate } from './clock.js';
 import { stayAwake, toggleFullScreen } from './display.js';
 import { Start } from './start.js';
+import { Watch } from './standby.js';
 import { StopPost } from './stop.js';
 import { joinPaths } from './join_paths.js';
 import { VideoSender } from './video.js';
@@ -31,9 +34,9 @@ const WHOLE = ['filming', 'solving'];
 const SILENT_MOTION_MS = 3000;
 
 const here = browserOf(window);
-const { scope, platform, fetchHere, links, screenAngle, startWorker, later } = here;
+const { scope, platform, fetchHere, links, screenAngle, startJpegWorker, startWorker, later } = here;
 const clock = new WakefulClock(performance, Date);
-const stopPost = new StopPost(fetchHere);
+const stopPost = new StopPost(fetchHere, (answer) => dispatch({ type: 'stop_answer', answer, now: clock.now() }));
 const feedback = new Feedback(navigator, window.AudioContext, platform !== 'android');
 const motionRate = new Rate();
 const identity = { device: '', sensors: '', video: '' };
@@ -47,9 +50,16 @@ const phone = new Phone({
   links,
   dispatch,
   identity: () => identity,
-  onWelcome: (welcome) => void welcomed(welcome),
+  onWelcome: (welcome) => {
+    watch.close();
+    void welcomed(welcome);
+  },
   onPath: ({ wish }) => choosePath(wish, 'supervisor'),
   onUnwelcome: () => void start.checkPairing(), // it hung up: perhaps it does not know this phone any more
+});
+
+const watch = new Watch({
+  base: document.baseURI, links, clock, serverTime: phone.serverTime, dispatch, onUnwelcome: () => void start.checkPairing(),
 });
 
 const view = new View(document, window, {
@@ -74,7 +84,7 @@ const video = new VideoSender({
   send: (record) => phone.sendFrame(record),
   log: (text) => phone.log(text),
   VideoEncoder: scope.VideoEncoder,
-  OffscreenCanvas: scope.OffscreenCanvas,
+  startJpegWorker,
 });
 phone.video = video;
 
@@ -120,9 +130,12 @@ const imu = new Imu({
 const start = new Start({
   window, performance, fetchHere, dispatch, identity, feedback, camera, video, imu, phone,
   pairing: new PairingCard(document, navigator, () => window.localStorage),
+  choice: new ChoiceCard(document),
 });
 
 const lensPanel = new LensPanel(document, platform, performance, camera, (text) => phone.log(text));
+
+const handover = new HandoverCard(document, fetchHere, { onTake: () => dispatch({ type: 'take_lead' }), tell: notice });
 
 const linkCheck = new LinkCheck(document, performance, fetchHere);
 
@@ -142,8 +155,9 @@ function show() {
   shown = false;
   const { problem } = state;
   view.render(state, problem === null ? null : adviceFor(problem, platform, window.location.port));
-  lensPanel.render(state);
+  lensPanel.render(state.standby ? { ...state, status: null } : state); // it is another phone’s camera
   linkCheck.render(state);
+  handover.render(state);
 }
 
 /** @param {Effect} effect */
@@ -154,6 +168,7 @@ function perform(effect) {
       break;
     case 'command':
       phone.command(effect.what, effect.ageMs);
+      if (effect.what === 'stop') watch.send(commandOf('stop', effect.ageMs, phone.serverTime));
       break;
     case 'post_stop':
       stopPost.send(commandOf('stop', effect.ageMs, phone.serverTime));
@@ -164,7 +179,16 @@ function perform(effect) {
     case 'calibrate':
       phone.calibrate(effect.what);
       break;
+    case 'stand_by':
+      phone.close();
+      paths.end();
+      watch.open();
+      break;
+    case 'ask_lead':
+      phone.open();
+      break;
     case 'close_link':
+      watch.close();
       phone.close();
       paths.end();
   }

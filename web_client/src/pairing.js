@@ -16,17 +16,26 @@ import { Problem } from './problems.js';
  */
 
 /**
+ * What a link would take from this browser; it stays good until it is taken.
+ * @typedef {object} Less
+ * @property {Role} held What the browser is paired as.
+ * @property {Role} offered What the link makes it.
+ * @property {boolean} waits Until a supervisor has confirmed it.
+ */
+
+/**
  * @typedef {object} Arrival
  * @property {Fetch} fetch
  * @property {{ location: Location, history: History }} window
  * @property {string} name Of the person.
  * @property {(standing: Standing) => void} onWaiting A supervisor has to confirm; called again and again.
+ * @property {(less: Less) => Promise<boolean>} onLess Whether to take a link that gives less than this browser has.
  * @property {(callback: () => void, ms: number) => unknown} later
  */
 
 /** Foreign pages can't set it without asking first. */
 export const OWN_HEADERS = Object.freeze({ 'X-Lightleash': '1' });
-const PATIENCE_MS = 2000;
+export const PATIENCE_MS = 2000;
 export const ASK_AGAIN_MS = 1000;
 
 /**
@@ -73,15 +82,17 @@ function endOf({ state, why }) {
  * @param {Fetch} fetch
  * @param {string} token
  * @param {string} name
- * @returns {Promise<Standing>}
+ * @param {boolean} [replace] Give up for it what this browser may already.
+ * @returns {Promise<Standing | Less>}
  */
-export async function pair(fetch, token, name) {
+export async function pair(fetch, token, name, replace = false) {
   const response = await reach(fetch, 'api/pair', {
     method: 'POST',
     headers: { ...OWN_HEADERS, 'Content-Type': 'application/json' },
-    body: JSON.stringify({ token, name }),
+    body: JSON.stringify({ token, name, ...(replace ? { replace } : {}) }),
   });
   if (response.status === 401) throw new Problem('link_expired', await refusalOf(response, false));
+  if (response.status === 409) return await response.json();
   if (response.status === 429) throw new Problem('too_many_tries');
   if (!response.ok) throw new Problem('server_error', await refusalOf(response));
   return await response.json();
@@ -92,12 +103,16 @@ export async function pair(fetch, token, name) {
  * @param {Fetch} fetch
  * @param {string} token "" for none.
  * @param {string} name
+ * @param {Arrival['onLess']} onLess
  * @returns {Promise<Standing | null>}
  */
-export async function standingFrom(fetch, token, name) {
+export async function standingFrom(fetch, token, name, onLess) {
   if (token === '') return whoAmI(fetch);
   try {
-    return await pair(fetch, token, name);
+    const answer = await pair(fetch, token, name);
+    if (!('held' in answer)) return answer;
+    if (!await onLess(answer)) return await whoAmI(fetch);
+    return /** @type {Standing} */ (await pair(fetch, token, name, true));
   } catch (error) {
     const standing = error instanceof Problem && error.code === 'link_expired' ? await whoAmI(fetch) : null;
     if (standing === null || endOf(standing) !== null) throw error;
@@ -111,8 +126,8 @@ export async function standingFrom(fetch, token, name) {
  * @param {Arrival} arrival
  * @returns {Promise<Role | null>}
  */
-export async function becomeKnown({ fetch, window: { location, history }, name, onWaiting, later }) {
-  let standing = await standingFrom(fetch, tokenOf(location.hash), name);
+export async function becomeKnown({ fetch, window: { location, history }, name, onWaiting, onLess, later }) {
+  let standing = await standingFrom(fetch, tokenOf(location.hash), name, onLess);
   if (standing !== null) history.replaceState(null, '', location.pathname + location.search);
   while (standing?.state === 'waiting') {
     onWaiting(standing);

@@ -5,7 +5,7 @@
 /**
  * @typedef {'insecure' | 'link_expired' | 'not_paired' | 'too_many_tries' | 'server_unreachable'
  *   | 'server_error' | 'not_supervisor' | 'shut_out' | 'waiting' | 'wrong_role' | 'camera_missing' | 'camera_denied' | 'camera_busy'
- *   | 'camera_absent' | 'motion_denied' | 'motion_silent' | 'encoder_missing' | 'old_page' | 'taken' | 'refused'} ProblemCode
+ *   | 'camera_absent' | 'motion_denied' | 'motion_silent' | 'encoder_missing' | 'old_page' | 'refused'} ProblemCode
  */
 
 /** Something the person has to mend. */
@@ -195,11 +195,6 @@ const ADVICE = {
     title: 'The server has been updated',
     steps: ['Reload this page to get the version that fits.'],
     retry: true,
-  }),
-  taken: () => ({
-    title: 'Another phone is leading',
-    steps: ['Only one phone may lead. This one goes on asking until the other one leaves.'],
-    retry: false,
   }),
   refused: () => ({
     title: 'The server did not take this',

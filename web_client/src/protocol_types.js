@@ -68,6 +68,7 @@
  * @property {number} height
  * @property {number} frame_rate_hz
  * @property {number} bitrate_bps
+ * @property {string} you Id of this page's pairing, as in `people` of a status.
  */
 
 /**
@@ -183,6 +184,7 @@
  * @property {number} since_s How long ago it was paired.
  * @property {boolean} connected
  * @property {boolean} leads
+ * @property {boolean} offered The lead is kept for this one alone, and not yet taken.
  */
 
 /**
@@ -216,7 +218,7 @@
  * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
  * @property {PathChoice | null} path_choice As the operator's page says; null: it lets nobody choose.
  * @property {number} time_ms The server's clock when this was made.
- * @property {number | null} until_ramp_ms In COAST and HOLD: left until RAMP if all goes on as it is.
+ * @property {number | null} until_ramp_ms In COAST and HOLD: left until control or the robot ramps down, if all goes on as it is.
  * @property {boolean} resumes In COAST and HOLD: it follows again by itself, once all is well.
  * @property {Record<string, GapCount>} gaps By side: `phone` (or its link), `robot` (its link), `server` (its computer stood still).
  * @property {string[]} warnings What who arms should know, each in words; refuses nothing.

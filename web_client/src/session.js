@@ -9,6 +9,8 @@
 
 import { GIVE_UP_MS } from './command.js';
 import { Problem } from './problems.js';
+import { AGAIN_MS, FREE_MS, isFree, isLed } from './standby.js';
+import { endOf, hasStopped, weigh } from './stop.js';
 
 /** A Status older than this is no news any more [ms]. */
 export const STATUS_LIFE_MS = 500;
@@ -17,8 +19,8 @@ const NOTICE_MS = 5000;
 const BUSY_MS = 250;
 /** @type {ShownMode[]} */
 const FLYING = ['TRACK', 'COAST', 'HOLD'];
-/** A STOP that was given up is told of for at least so long [ms]. */
-const STOP_LOST_MS = 8000;
+/** How a STOP ended is told of for at least so long [ms]. */
+const STOP_END_MS = 8000;
 
 /** @type {State} */
 export const INITIAL = Object.freeze({
@@ -39,7 +41,13 @@ export const INITIAL = Object.freeze({
   nonce: 0n,
   stopping: false,
   stopAtMs: -Infinity,
-  stopLost: /** @type {const} */ (''),
+  stopAnswer: null,
+  stopEnd: /** @type {const} */ (''),
+  known: false,
+  standby: false,
+  led: false,
+  freeMs: Infinity,
+  you: '',
   asked: null,
   motionSilent: false,
   health: { path: /** @type {const} */ ('–'), fps: 0, eased: '', rttMs: null, imuHz: 0, kbps: 0 },
@@ -55,7 +63,7 @@ export const INITIAL = Object.freeze({
 export function reduce(state, event) {
   const outcome = transition(state, event);
   const mode = shownMode(outcome.state);
-  const news = mode !== shownMode(state) && outcome.state.phase === 'operating';
+  const news = mode !== shownMode(state) && outcome.state.phase === 'operating' && !outcome.state.standby;
   return news
     ? { state: outcome.state, effects: [...outcome.effects, { type: 'feel', mode }] }
     : outcome;
@@ -70,6 +78,8 @@ function transition(state, event) {
   switch (event.type) {
     case 'start':
       return to({ ...state, phase: 'starting', step: '', problem: null });
+    case 'paired':
+      return to({ ...state, known: true });
     case 'step':
       return to({ ...state, step: event.text });
     case 'problem':
@@ -77,8 +87,13 @@ function transition(state, event) {
     case 'started':
       return to({ ...state, phase: 'operating', step: '' });
     case 'welcomed':
-      return to({ ...state, linked: true, problem: null }, { type: 'touch' });
+      return to({ ...state, linked: true, standby: false, led: true, problem: null, you: event.you ?? state.you }, { type: 'touch' });
+    case 'watching':
+      return to({ ...state, you: event.you });
+    case 'take_lead':
+      return to({ ...state, freeMs: Infinity }, { type: 'ask_lead' });
     case 'disconnected':
+      if (state.standby) return to(state, { type: 'stand_by' }); // it asks again by itself when it may
       return to({ ...state, linked: false, heard: false, held: false, nonce: 0n, calibration: null });
     case 'status':
       return heardFrom(state, event.status, event.now);
@@ -98,6 +113,8 @@ function transition(state, event) {
       return seen(state, event.visible);
     case 'stop':
       return stopped(state, event.now);
+    case 'stop_answer':
+      return answered(state, event.answer, event.now);
     case 'stop_tick':
       return insisted(state, event.now);
     case 'ask':
@@ -123,7 +140,7 @@ function stops(ageMs) {
  * @param {number} now
  */
 function stopped(state, now) {
-  return to({ ...state, stopping: true, stopAtMs: now, stopLost: '', held: false }, ...stops(0), { type: 'touch' });
+  return to({ ...state, stopping: true, stopAtMs: now, stopAnswer: null, stopEnd: '', held: false }, ...stops(0), { type: 'touch' });
 }
 
 /**
@@ -137,11 +154,23 @@ function insisted(state, now) {
   const ageMs = now - state.stopAtMs;
   if (state.stopping && ageMs <= GIVE_UP_MS) return to(state, ...stops(ageMs));
   if (state.stopping) {
-    const stopLost = state.heard ? 'unconfirmed' : 'unlinked';
-    return to({ ...state, stopping: false, stopAtMs: now, stopLost }, { type: 'feel', mode: 'STOP_LOST' });
+    const stopEnd = endOf(state.heard, state.stopAnswer);
+    return to({ ...state, stopping: false, stopAtMs: now, stopEnd }, { type: 'feel', mode: 'STOP_LOST' });
   }
-  if (state.stopLost !== '' && state.heard && ageMs > STOP_LOST_MS) return to({ ...state, stopLost: '' });
+  if (state.stopEnd !== '' && state.heard && ageMs > STOP_END_MS) return to({ ...state, stopEnd: '' });
   return unanswered(state, now);
+}
+
+/**
+ * What the server says beside the socket counts as much as a Status where none comes.
+ * @param {State} state
+ * @param {import('./stop.js').StopAnswer} answer
+ * @param {number} now
+ */
+function answered(state, answer, now) {
+  if (!state.stopping) return to(state);
+  if (hasStopped(answer) && !state.heard) return to({ ...state, stopping: false, stopAtMs: now, stopEnd: 'stopped' });
+  return to({ ...state, stopAnswer: weigh(state.stopAnswer, answer) });
 }
 
 /**
@@ -182,7 +211,7 @@ function to(state, ...effects) {
  */
 function blocked(state, problem) {
   /** @type {State} */
-  const back = { ...state, phase: 'welcome', step: '', problem, linked: false, heard: false, held: false, calibration: null };
+  const back = { ...state, phase: 'welcome', step: '', problem, linked: false, standby: false, heard: false, held: false, calibration: null };
   return to(back, { type: 'close_link' });
 }
 
@@ -193,11 +222,11 @@ function blocked(state, problem) {
  */
 function heardFrom(state, status, now) {
   const stopping = state.stopping && status.mode !== 'STOPPED';
-  const stopLost = status.mode === 'STOPPED' ? '' : state.stopLost;
+  const stopEnd = status.mode === 'STOPPED' ? '' : state.stopEnd;
   const asked = state.asked?.mode === status.mode ? state.asked : null;
   const pressAtMode = state.status?.mode === status.mode ? state.pressAtMode : state.press;
   const leftOfMs = Math.max(status.until_ramp_ms ?? 0, status.until_ramp_ms === null ? 0 : state.leftOfMs);
-  return to({ ...state, status, statusAtMs: now, heard: true, stopping, stopLost, asked, pressAtMode, leftOfMs });
+  return to({ ...state, status, statusAtMs: now, heard: true, stopping, stopEnd, asked, pressAtMode, leftOfMs });
 }
 
 /**
@@ -209,7 +238,7 @@ function refused(state, refusal, now) {
   const words = `${refusal.field}: ${refusal.allowed}`;
   if (refusal.fatal && refusal.code === 'version') return blocked(state, new Problem('old_page', words));
   if (refusal.fatal && refusal.code === 'role') {
-    return to({ ...state, problem: new Problem('taken', words) });
+    return to({ ...state, linked: false, held: false, nonce: 0n, calibration: null, standby: true, freeMs: Infinity }, { type: 'stand_by' });
   }
   if (refusal.code === 'age' && state.stopping) return to(state); // it is said again
   if (refusal.code === 'age') return to(noticed(state, 'It came too late and was not done: press again.', now));
@@ -235,8 +264,11 @@ function ticked(state, now) {
   const heard = state.heard && now - state.statusAtMs <= STATUS_LIFE_MS;
   const notice = state.notice !== null && now < state.notice.untilMs ? state.notice : null;
   const away = now - state.tickedMs;
-  const next = { ...state, heard, notice, tickedMs: now };
-  if (away > BUSY_MS && FLYING.includes(shownMode(state)) && notice === null) {
+  const free = state.standby && isFree({ ...state, heard });
+  const freeMs = free ? Math.min(state.freeMs, now) : Infinity;
+  const next = { ...state, heard, notice, tickedMs: now, freeMs, led: state.led && !isLed({ ...state, heard }) };
+  if (now - freeMs > (next.led ? AGAIN_MS : FREE_MS)) return to({ ...next, freeMs: now }, { type: 'ask_lead' });
+  if (away > BUSY_MS && state.linked && FLYING.includes(shownMode(state)) && notice === null) {
     return to(noticed(next, `This phone was too busy for ${(away / 1000).toFixed(1)} s: close other apps.`, now), { type: 'touch' });
   }
   return state.linked ? to(next, { type: 'touch' }) : to(next);
@@ -268,7 +300,7 @@ function seen(state, visible) {
  * @returns {ShownMode}
  */
 export function shownMode(state) {
-  if (!state.linked) return 'NO_LINK';
+  if (!state.linked && !state.standby) return 'NO_LINK';
   if (!state.heard || state.status === null) return 'NO_WORD';
   return state.status.mode;
 }
@@ -308,6 +340,7 @@ export function touchOf(state) {
  */
 export function wish(state) {
   const mode = shownMode(state);
+  if (state.standby) return { what: 'arm', enabled: false };
   if (mode === 'ARMED' || mode === 'TRACK' || mode === 'COAST' || mode === 'HOLD') return { what: 'disarm', enabled: true };
   const ready = mode === 'DISARMED' && state.status?.ready === true;
   return { what: 'arm', enabled: ready && !state.held };

@@ -2,6 +2,7 @@
 
 /** @import {Calibrate, Calibration, Refused, Status} from './protocol_types.js' */
 /** @import {Problem} from './problems.js' */
+/** @import {StopAnswer, StopEnd} from './stop.js' */
 
 /** @typedef {Status['mode'] | 'NO_LINK' | 'NO_WORD'} ShownMode */
 
@@ -35,8 +36,14 @@
  * @property {number} press Counts presses.
  * @property {bigint} nonce The newest one of a PING.
  * @property {boolean} stopping STOP was asked for and not yet confirmed.
- * @property {number} stopAtMs When it was asked for, or given up.
- * @property {'' | 'unlinked' | 'unconfirmed'} stopLost It was given up, and why.
+ * @property {number} stopAtMs When it was asked for, or ended.
+ * @property {StopAnswer | null} stopAnswer What the server said to it beside the socket.
+ * @property {StopEnd} stopEnd How it ended, without a Status that shows it.
+ * @property {boolean} standby Another phone leads: this one watches, and may ask.
+ * @property {boolean} led This phone led, and nobody else since.
+ * @property {number} freeMs Since when the lead is free to ask for; Infinity: it is not.
+ * @property {string} you Id of this browser's pairing.
+ * @property {boolean} known The server has let this browser in, at least once.
  * @property {Asked | null} asked Arm or disarm, while nothing shows that it was heard.
  * @property {boolean} motionSilent No motion sensor has answered.
  * @property {Health} health
@@ -44,8 +51,8 @@
  */
 
 /**
- * @typedef {{ type: 'start' } | { type: 'step', text: string } | { type: 'problem', problem: Problem }
- *   | { type: 'started' } | { type: 'welcomed' } | { type: 'disconnected' }
+ * @typedef {{ type: 'start' } | { type: 'paired' } | { type: 'stop_answer', answer: StopAnswer, now: number } | { type: 'step', text: string } | { type: 'problem', problem: Problem }
+ *   | { type: 'started' } | { type: 'welcomed', you?: string } | { type: 'watching', you: string } | { type: 'take_lead' } | { type: 'disconnected' }
  *   | { type: 'status', status: Status, now: number } | { type: 'refused', refused: Refused, now: number }
  *   | { type: 'notice', text: string, now: number } | { type: 'ping', nonce: bigint }
  *   | { type: 'tick', now: number } | { type: 'press' } | { type: 'release' }
@@ -57,7 +64,7 @@
 
 /**
  * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop', ageMs: number }
- *   | { type: 'post_stop', ageMs: number } | { type: 'feel', mode: ShownMode | 'STOP_LOST' } | { type: 'close_link' }
+ *   | { type: 'post_stop', ageMs: number } | { type: 'feel', mode: ShownMode | 'STOP_LOST' } | { type: 'close_link' } | { type: 'stand_by' } | { type: 'ask_lead' }
  *   | { type: 'calibrate', what: Calibrate['what'] }} Effect
  */
 

@@ -1,6 +1,7 @@
 /** From an opened page to a phone that is known, allowed its sensors, and connected. */
 
 /** @import {CameraFeed} from './camera_feed.js' */
+/** @import {ChoiceCard} from './choice_card.js' */
 /** @import {Feedback} from './feedback.js' */
 /** @import {Imu} from './imu.js' */
 /** @import {Fetch} from './pairing.js' */
@@ -27,6 +28,7 @@ import { Problem, problemOf } from './problems.js';
  * @property {VideoSender} video
  * @property {Imu} imu
  * @property {PairingCard} pairing
+ * @property {ChoiceCard} choice
  * @property {Phone} phone
  */
 
@@ -84,7 +86,7 @@ export class Start {
 
   /** Comes back when this phone may lead. */
   async pair() {
-    const { window, fetchHere, pairing } = this.surroundings;
+    const { window, fetchHere, pairing, choice } = this.surroundings;
     try {
       const role = await becomeKnown({
         fetch: fetchHere,
@@ -94,9 +96,11 @@ export class Start {
           pairing.show(code);
           this.step('Waiting for a supervisor to confirm…');
         },
+        onLess: (less) => choice.ask(less),
         later: (callback, ms) => window.setTimeout(callback, ms),
       });
       if (role === null) throw new Problem('not_paired');
+      this.surroundings.dispatch({ type: 'paired' });
       if (role === 'viewer') throw new Problem('wrong_role');
     } finally {
       pairing.hide();

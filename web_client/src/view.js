@@ -8,7 +8,8 @@
 import { MODE_WORDS, gapWords } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
-import { STOP_LOST, stopWords } from './stop.js';
+import { standbyWords } from './standby.js';
+import { endWords, stopWords } from './stop.js';
 import { goesOn, shownMode, untilRamp, wish } from './session.js';
 
 const WISH_WORDS = { arm: 'Arm', disarm: 'Disarm' };
@@ -51,7 +52,9 @@ export class View {
     find('reload').addEventListener('click', wishes.onReload);
     this.wish.addEventListener('click', wishes.onWish);
     find('sound').addEventListener('click', wishes.onSound);
-    for (const type of ['pointerdown', 'click']) find('stop').addEventListener(type, wishes.onStop);
+    for (const type of ['pointerdown', 'click']) {
+      for (const id of ['stop', 'last-stop-button']) find(id).addEventListener(type, wishes.onStop);
+    }
     const path = /** @type {HTMLSelectElement} */ (find('path-wish'));
     path.addEventListener('change', () => wishes.onPath(/** @type {PathWish} */ (path.value)));
     const { onFull } = wishes;
@@ -107,6 +110,21 @@ export class View {
     this.start.disabled = starting;
     this.text('start', starting ? 'Starting…' : advice === null ? 'Start' : 'Try again');
     this.text('step', state.step);
+    this.lastStop(state, advice);
+  }
+
+  /**
+   * Whoever was let in keeps STOP, whatever has sent the page back.
+   * @param {State} state
+   * @param {Advice | null} advice
+   */
+  lastStop(state, advice) {
+    this.show('last-stop', state.known && (advice !== null || state.status !== null));
+    this.find('last-stop-button').classList.toggle('asked', state.stopping);
+    const text = stopText(state);
+    this.show('last-stop-words', text !== '');
+    this.text('last-stop-words', text);
+    this.data('last-stop-words', 'grave', String(isGrave(state)));
   }
 
   /**
@@ -141,9 +159,9 @@ export class View {
   reasons(state, mode, advice) {
     const own = ownReason(state, mode);
     this.text('reason', advice?.title ?? own ?? state.status?.reason ?? '');
-    const refusals = advice?.steps ?? (mode === 'DISARMED' ? state.status?.refusals ?? [] : []);
+    const refusals = advice?.steps ?? (mode === 'DISARMED' && !state.standby ? state.status?.refusals ?? [] : []);
     this.list('refusals', refusals, MOST_REFUSALS);
-    this.list('warnings', mode === 'DISARMED' || mode === 'ARMED' ? state.status?.warnings ?? [] : [], MOST_WARNINGS);
+    this.list('warnings', !state.standby && (mode === 'DISARMED' || mode === 'ARMED') ? state.status?.warnings ?? [] : [], MOST_WARNINGS);
   }
 
   /** @param {{ seconds: number, share: number } | null} left Until the thrust fades. */
@@ -156,17 +174,16 @@ export class View {
 
   /** @param {State} state */
   notice(state) {
-    const lost = state.stopLost === '' ? null : STOP_LOST[state.stopLost];
-    const text = state.stopping ? stopWords(state.heard) : lost ?? state.notice?.text ?? '';
-    this.data('notice', 'grave', String(lost !== null));
+    const text = stopText(state) || (state.notice?.text ?? '');
+    this.data('notice', 'grave', String(isGrave(state)));
     this.show('notice', text !== '');
     this.text('notice', text);
   }
 
   /** @param {State} state */
-  health({ health, status, heard }) {
+  health({ health, status, heard, linked }) {
     this.text('h-gaps', heard && status ? gapWords(status.gaps) : '–');
-    this.text('h-leds', heard && status ? String(status.leds) : '–');
+    this.text('h-leds', linked && heard && status ? String(status.leds) : '–');
     this.text('h-path', health.path);
     this.text('h-fps', `${Math.round(health.fps)} fps${health.eased && ` ${health.eased}`}`);
     this.data('h-fps', 'eased', health.eased);
@@ -180,6 +197,12 @@ export class View {
    * @param {ShownMode} mode
    */
   hold(state, mode) {
+    if (state.standby) {
+      this.data('hold', 'look', 'idle');
+      this.text('hold-title', 'This phone does not lead');
+      this.text('hold-hint', '');
+      return;
+    }
     const { look, title, hint } = holdWords(state.held, mode, goesOn(state), untilRamp(state)?.seconds ?? null);
     this.data('hold', 'look', look);
     this.find('hold').setAttribute('aria-pressed', String(state.held));
@@ -236,12 +259,24 @@ export class View {
   }
 }
 
+/** What became of STOP, or "". @param {State} state */
+function stopText({ stopping, stopEnd, stopAnswer, heard }) {
+  if (stopping) return stopWords(heard, stopAnswer);
+  return stopEnd === '' ? '' : endWords(stopEnd, stopAnswer);
+}
+
+/** @param {State} state */
+function isGrave({ stopping, stopEnd }) {
+  return !stopping && stopEnd !== '' && stopEnd !== 'stopped';
+}
+
 /**
  * What the page knows better than the server.
  * @param {State} state
  * @param {ShownMode} mode
  */
 function ownReason(state, mode) {
+  if (state.standby) return standbyWords(state);
   const last = state.status === null ? '' : ` Last known: ${state.status.mode}.`;
   if (mode === 'NO_LINK') return `Without a link the robot stops by itself.${last}`;
   if (mode === 'NO_WORD') return `No word from the server: what the robot does is not known.${last}`;

@@ -4,6 +4,7 @@ import { test } from 'node:test';
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from '../src/dashboard/format.js';
 import { EMPTY, REMEMBERED, reduce, shownMode, wishes } from '../src/dashboard/model.js';
 import { INVITE_LIFE_MS, PhoneCard } from '../src/dashboard/phone_card.js';
+import { Problem } from '../src/problems.js';
 import { niceEnd } from '../src/dashboard/sparkline.js';
 import { statusOf } from './fakes.js';
 
@@ -24,6 +25,17 @@ test('the mode shown is never older than half a second', () => {
 test('STOP is asked for until the robot has stopped', () => {
   assert.equal(after({ type: 'stop', now: 0 }, status({ mode: 'TRACK' })).stopping, true);
   assert.equal(after({ type: 'stop', now: 0 }, status({ mode: 'STOPPED' })).stopping, false);
+});
+
+test('a page that was shut out keeps STOP, and says what became of it', () => {
+  /** @type {Event[]} */
+  const out = [{ type: 'paired' }, { type: 'problem', problem: new Problem('shut_out') }, { type: 'stop', now: 0 }];
+  /** @param {boolean} taken @param {string} mode @returns {Event} */
+  const answer = (taken, mode) => ({ type: 'stop_answer', answer: { taken, why: 'pair anew', mode } });
+  assert.equal(after(...out).known, true);
+  assert.match(after(...out, answer(true, 'STOPPED')).notice?.text ?? '', /^STOPPED/);
+  const refused = after(...out, answer(false, ''), { type: 'stop_tick', now: 3001 });
+  assert.match(refused.notice?.text ?? '', /^STOP was refused \(pair anew\)/);
 });
 
 test('a STOP without a link is given up after three seconds, and said until the robot is seen at rest', () => {

@@ -48,12 +48,12 @@ test('nothing comes from another host', () => {
   }
 });
 
-test('every file a page names is there, and a page weighs less than 84 kB on the wire', () => {
+test('every file a page names is there, and a page weighs less than 92 kB on the wire', () => {
   for (const page of PAGES) {
     const paths = needed(page);
     for (const path of paths) assert.ok(existsSync(resolve(ROOT, path)), `${page} needs ${path}`);
     const bytes = paths.reduce((sum, path) => sum + gzipSync(read(path)).byteLength, 0);
-    assert.ok(bytes < 84_000, `${page}: ${bytes} bytes`);
+    assert.ok(bytes < 92_000, `${page}: ${bytes} bytes`);
   }
 });
 
@@ -65,10 +65,11 @@ test('no module is left over', () => {
 
 test('every element the views look for is in their page', () => {
   for (const [page, ...views] of [
-    ['index.html', 'src/view.js', 'src/calibration_view.js', 'src/lens_panel.js', 'src/link_check.js', 'src/pairing_card.js'],
+    ['index.html', 'src/view.js', 'src/calibration_view.js', 'src/lens_panel.js', 'src/link_check.js', 'src/pairing_card.js', 'src/choice_card.js',
+      'src/handover_card.js'],
     ['board.html', 'src/board.js'],
     ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/knobs.js',
-      'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js'],
+      'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js', 'src/choice_card.js'],
   ]) {
     const ids = new Set([...read(page ?? '').matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));
     for (const view of views) {

@@ -27,6 +27,8 @@ test('the token is taken from the fragment', () => {
 });
 
 const IN = { role: 'operator', state: 'in', name: 'Anna', code: '', why: '' };
+/** Nothing is lost, so nobody is asked. @returns {Promise<boolean>} */
+const never = () => { throw new Error('asked'); };
 const WAITING = { ...IN, state: 'waiting', code: 'KBWX' };
 
 /** @param {Fetch} fetch @param {string} hash */
@@ -46,6 +48,7 @@ function arrival(fetch, hash) {
       },
       name: 'Anna',
       onWaiting: (/** @type {any} */ { code }) => codes.push(code),
+      onLess: never,
       later: (/** @type {() => void} */ callback) => setImmediate(callback),
     }),
   };
@@ -63,16 +66,16 @@ test('pairing posts the key and a name with our own header and nothing in the ad
 test('an expired link says so, unless an earlier pairing still stands', async () => {
   const refused = /** @type {[number, object]} */ ([401, { field: 'token', allowed: 'a link works once' }]);
   const expired = server({ 'api/pair': refused, 'api/whoami': [401, {}] });
-  await assert.rejects(standingFrom(expired.fetch, 'old', ''), { code: 'link_expired', detail: 'a link works once' });
+  await assert.rejects(standingFrom(expired.fetch, 'old', '', never), { code: 'link_expired', detail: 'a link works once' });
   const ended = server({ 'api/pair': refused, 'api/whoami': [200, { ...IN, state: 'revoked' }] });
-  await assert.rejects(standingFrom(ended.fetch, 'old', ''), { code: 'link_expired' });
+  await assert.rejects(standingFrom(ended.fetch, 'old', '', never), { code: 'link_expired' });
   const known = server({ 'api/pair': refused, 'api/whoami': [200, IN] });
-  assert.deepEqual(await standingFrom(known.fetch, 'old', ''), IN);
+  assert.deepEqual(await standingFrom(known.fetch, 'old', '', never), IN);
 });
 
 test('without a link the cookie decides', async () => {
   const { fetch, asked } = server({ 'api/whoami': [401, {}] });
-  assert.equal(await standingFrom(fetch, '', ''), null);
+  assert.equal(await standingFrom(fetch, '', '', never), null);
   assert.deepEqual(asked.map(({ path }) => path), ['api/whoami']);
 });
 
@@ -143,7 +146,7 @@ test('a STOP by POST says how old it is, and a request without a body has none',
     sent.push(init);
     return new Response('{}', { status: 202 });
   };
-  new StopPost(fetch).send({ type: 'command', what: 'stop', age_ms: 70, server_ms: 9000 });
+  new StopPost(fetch, () => {}).send({ type: 'command', what: 'stop', age_ms: 70, server_ms: 9000 });
   await ask(fetch, 'POST', 'api/recording');
   assert.deepEqual(JSON.parse(String(sent[0]?.body)), { type: 'command', what: 'stop', age_ms: 70, server_ms: 9000 });
   assert.equal(sent[1]?.body, undefined);
@@ -152,7 +155,7 @@ test('a STOP by POST says how old it is, and a request without a body has none',
 test('one STOP is under way at a time, and the next may go when it has ended, well or not', async () => {
   /** @type {(() => void)[]} */
   const waiting = [];
-  const post = new StopPost(() => new Promise((_, reject) => { waiting.push(() => reject(new Error('lost'))); }));
+  const post = new StopPost(() => new Promise((_, reject) => { waiting.push(() => reject(new Error('lost'))); }), () => {});
   /** @type {import('../src/protocol_types.js').Command} */
   const stop = { type: 'command', what: 'stop', age_ms: 0, server_ms: null };
   post.send(stop);
@@ -162,4 +165,50 @@ test('one STOP is under way at a time, and the next may go when it has ended, we
   await new Promise((resolve) => { setImmediate(resolve); });
   post.send(stop);
   assert.equal(waiting.length, 2);
+});
+
+test('what the server says to a STOP is told, and one of another version is asked in no words', async () => {
+  const answers = [
+    [() => new Response('{"stopping": true, "mode": "TRACK"}', { status: 202 })],
+    [() => new Response('{"field": "role", "allowed": "pair anew"}', { status: 401 })],
+    [() => new Response('{"field": "message", "allowed": "other fields"}', { status: 400 }), () => new Response('{}', { status: 202 })],
+    [() => { throw new TypeError('no radio'); }],
+  ];
+  /** @type {object[]} */
+  const told = [];
+  /** @type {unknown[]} */
+  const bodies = [];
+  for (const replies of answers) {
+    const post = new StopPost(async (_, init) => {
+      bodies.push(init?.body ?? null);
+      return /** @type {() => Response} */ (replies.shift())();
+    }, (answer) => told.push(answer));
+    post.send({ type: 'command', what: 'stop', age_ms: 0, server_ms: null });
+    await new Promise((resolve) => { setTimeout(resolve); });
+  }
+  assert.deepEqual(told, [
+    { taken: true, why: '', mode: 'TRACK' }, { taken: false, why: 'pair anew', mode: '' }, { taken: true, why: '', mode: '' },
+  ]);
+  assert.deepEqual(bodies.map((body) => body === null), [false, false, false, true, false]);
+});
+
+test('a link that gives less than this browser has is taken only when its holder says so', async () => {
+  const less = { code: 'paired', held: 'supervisor', offered: 'operator', waits: true };
+  for (const take of [false, true]) {
+    /** @type {string[]} */
+    const bodies = [];
+    /** @type {Fetch} */
+    const fetch = async (path, init) => {
+      if (path === 'api/whoami') return new Response(JSON.stringify({ ...IN, role: 'supervisor' }));
+      bodies.push(String(init?.body));
+      const replaces = JSON.parse(String(init?.body)).replace === true;
+      return new Response(JSON.stringify(replaces ? WAITING : less), { status: replaces ? 200 : 409 });
+    };
+    const standing = await standingFrom(fetch, 'k', 'Anna', async (asked) => {
+      assert.deepEqual([asked.held, asked.offered, asked.waits], ['supervisor', 'operator', true]);
+      return take;
+    });
+    assert.deepEqual([standing?.role, standing?.state], take ? ['operator', 'waiting'] : ['supervisor', 'in']);
+    assert.deepEqual(bodies, ['{"token":"k","name":"Anna"}', '{"token":"k","name":"Anna","replace":true}'].slice(0, take ? 2 : 1));
+  }
 });

@@ -57,7 +57,7 @@ const document = /** @type {any} */ ({
 function person(parts) {
   return {
     id: 'a1', name: 'Anna', role: 'operator', state: 'in', code: '', address: '192.0.2.7', since_s: 5, connected: true,
-    leads: false, ...parts,
+    leads: false, offered: false, ...parts,
   };
 }
 

@@ -3,6 +3,10 @@ import { test } from 'node:test';
 
 import { INITIAL, STATUS_LIFE_MS, goesOn, reduce, shownMode, touchOf, untilRamp, wish } from '../src/session.js';
 import { gapWords } from '../src/mode_words.js';
+import { Problem } from '../src/problems.js';
+import { endWords } from '../src/stop.js';
+import { FREE_MS, standbyWords } from '../src/standby.js';
+import { cardOf, mayGive } from '../src/handover_card.js';
 import { holdWords } from '../src/view.js';
 import { statusOf } from './fakes.js';
 
@@ -85,19 +89,19 @@ test('a STOP without a link is tried for three seconds, then given up, felt and 
   const late = after(...pressed, tick(4000));
   assert.deepEqual(late.effects, [{ type: 'command', what: 'stop', ageMs: 3000 }, { type: 'post_stop', ageMs: 3000 }]);
   const lost = after(...pressed, tick(4001));
-  assert.deepEqual([lost.state.stopping, lost.state.stopLost], [false, 'unlinked']);
+  assert.deepEqual([lost.state.stopping, lost.state.stopEnd], [false, 'unlinked']);
   assert.deepEqual(lost.effects, [{ type: 'feel', mode: 'STOP_LOST' }]);
   const minutes = after(...pressed, tick(4001), tick(4051), { type: 'welcomed' }, status({ mode: 'TRACK' }), tick(300_000));
   assert.deepEqual(minutes.effects, [], 'never to somebody else’s flight');
   const again = after(...pressed, tick(4001), { type: 'stop', now: 9000 });
-  assert.deepEqual([again.state.stopLost, again.kinds], ['', ['command', 'post_stop', 'touch']]);
+  assert.deepEqual([again.state.stopEnd, again.kinds], ['', ['command', 'post_stop', 'touch']]);
 });
 
 test('that STOP did not arrive is said until the server is heard again, and for at least eight seconds', () => {
   /** @param {...Event} more */
   const lost = (...more) => after(
     ...UP, { type: 'disconnected' }, { type: 'stop', now: 0 }, { type: 'stop_tick', now: 3001 }, ...more,
-  ).state.stopLost;
+  ).state.stopEnd;
   assert.equal(lost({ type: 'stop_tick', now: 60_000 }), 'unlinked');
   /** @type {Event[]} */
   const back = [{ type: 'welcomed' }, status({ mode: 'TRACK' })];
@@ -108,7 +112,32 @@ test('that STOP did not arrive is said until the server is heard again, and for 
 
 test('a STOP that the robot does not confirm is given up too, in other words', () => {
   const { state } = after(...UP, { type: 'stop', now: 0 }, status({ mode: 'LOST' }), { type: 'stop_tick', now: 3001 });
-  assert.deepEqual([state.stopping, state.stopLost], [false, 'unconfirmed']);
+  assert.deepEqual([state.stopping, state.stopEnd], [false, 'unconfirmed']);
+});
+
+test('a STOP that is taken beside the socket is believed when the robot shows it, and no sooner', () => {
+  /** @param {string} mode @param {boolean} taken @returns {Event} */
+  const answer = (mode, taken = true) => ({ type: 'stop_answer', answer: { taken, why: taken ? '' : 'pair anew', mode }, now: 90 });
+  /** @type {Event[]} */
+  const pressed = [...UP, { type: 'problem', problem: new Problem('shut_out') }, { type: 'stop', now: 0 }];
+  const late = { type: /** @type {const} */ ('stop_tick'), now: 3001 };
+  const confirmed = after(...pressed, answer('TRACK'), answer('STOPPED'));
+  assert.deepEqual([confirmed.state.stopping, confirmed.state.stopEnd], [false, 'stopped']);
+  assert.equal(after(...pressed, answer('TRACK')).state.stopping, true);
+  assert.equal(after(...pressed, answer('TRACK'), late).state.stopEnd, 'unseen');
+  assert.equal(after(...pressed, answer('TRACK'), answer('', false), late).state.stopEnd, 'unseen', 'taken once is taken');
+  const refused = after(...pressed, answer('', false), late).state;
+  assert.deepEqual([refused.stopEnd, refused.stopAnswer?.why], ['refused', 'pair anew']);
+  assert.equal(after(...pressed, late).state.stopEnd, 'unlinked');
+  assert.equal(after(...pressed, late, answer('STOPPED')).state.stopEnd, 'unlinked', 'an answer to what was given up');
+  assert.equal(after(...UP, { type: 'stop', now: 0 }, answer('STOPPED')).state.stopping, true, 'who hears a Status believes that');
+});
+
+test('a fatal fault leaves STOP at work', () => {
+  const fault = { type: /** @type {const} */ ('problem'), problem: new Problem('shut_out') };
+  const { state, kinds } = after(...UP, fault, { type: 'stop', now: 0 }, { type: 'stop_tick', now: 50 });
+  assert.deepEqual([state.phase, kinds], ['welcome', ['command', 'post_stop']]);
+  assert.match(endWords('refused', { taken: false, why: 'pair anew', mode: '' }), /^STOP was refused \(pair anew\)\. .* coasts, then ramps down by itself/);
 });
 
 test('an arm that nobody hears is given up and said; one that is heard is not told of again', () => {
@@ -171,7 +200,7 @@ test('a refusal is a passing remark, a fatal one ends or explains', () => {
   const old = after(...UP, refused('version', true));
   assert.deepEqual([old.state.phase, old.state.problem?.code, old.kinds], ['welcome', 'old_page', ['close_link']]);
   const taken = after(...UP, refused('role', true));
-  assert.deepEqual([taken.state.phase, taken.state.problem?.code], ['operating', 'taken']);
+  assert.deepEqual([taken.state.phase, taken.state.standby, taken.kinds], ['operating', true, ['stand_by']]);
   assert.equal(after(...UP, refused('role', true), { type: 'disconnected' }, { type: 'welcomed' }).state.problem, null);
 });
 
@@ -233,4 +262,59 @@ test('gaps are told by their number and the side of most of them', () => {
   assert.equal(gapWords({}), '0');
   assert.equal(gapWords({ phone: gap(0), robot: gap(0), server: gap(0) }), '0');
   assert.equal(gapWords({ phone: gap(1), robot: gap(0), server: gap(4) }), '5 computer');
+});
+
+/** @param {string} id @param {object} parts */
+const person = (id, parts = {}) => ({
+  id, name: id, role: /** @type {const} */ ('operator'), state: /** @type {const} */ ('in'), code: '', address: '', since_s: 0,
+  connected: true, leads: false, offered: false, ...parts,
+});
+/** @type {Event[]} */
+const ASIDE = [{ type: 'start' }, { type: 'started' },
+  { type: 'refused', refused: { type: 'refused', code: 'role', field: 'hello', allowed: '', fatal: true }, now: 0 }, { type: 'watching', you: 'me' }];
+
+test('a phone that does not lead shows the robot’s true mode, may STOP, and neither arms nor holds', () => {
+  const aside = after(...ASIDE, status({ mode: 'ARMED', ready: true, people: [person('Anna', { leads: true }), person('me')] }), { type: 'press' });
+  assert.equal(shownMode(aside.state), 'ARMED');
+  assert.deepEqual([wish(aside.state).enabled, aside.state.held, standbyWords(aside.state).slice(0, 11)], [false, false, 'Anna leads.']);
+  assert.deepEqual(after(...ASIDE, { type: 'stop', now: 0 }).kinds, ['command', 'post_stop', 'touch']);
+});
+
+test('it asks for the lead when nobody has had it for a while, and never for one that is kept for somebody', () => {
+  /** @param {object[]} people @param {number[]} ticks */
+  const asks = (people, ...ticks) => after(...ASIDE, ...ticks.flatMap((now) => [
+    status({ people: /** @type {any} */ (people) }, now), { type: /** @type {const} */ ('tick'), now },
+  ])).kinds.includes('ask_lead');
+  assert.equal(asks([person('me')], 0, FREE_MS), false);
+  assert.equal(asks([person('me')], 0, FREE_MS + 1), true);
+  assert.equal(asks([person('me', { leads: true })], 0, FREE_MS + 1), true, 'this browser’s own page, which may be gone');
+  for (const other of [person('Anna', { leads: true }), person('Anna', { offered: true })]) {
+    assert.equal(asks([person('me'), other], 0, FREE_MS + 1), false);
+  }
+  assert.equal(asks([person('me', { offered: true })], 0, FREE_MS + 1), false, 'that takes a tap');
+  /** @type {Event[]} */
+  const gave = [...UP, ...ASIDE.slice(2), status({ people: [person('me')] }), { type: 'tick', now: 0 }, { type: 'tick', now: 501 }];
+  assert.ok(after(...gave.slice(0, -1), status({ people: [person('me')] }, 501), { type: 'tick', now: 501 }).kinds.includes('ask_lead'), 'who led last is first');
+  assert.deepEqual(after(...ASIDE, { type: 'take_lead' }).kinds, ['ask_lead']);
+  assert.deepEqual(after(...ASIDE, { type: 'disconnected' }).kinds, ['stand_by'], 'no asking by the link itself');
+});
+
+test('the lead is handed to another operator who is there, while the robot is disarmed', () => {
+  const people = [person('me', { leads: true }), person('Ben'), person('Cleo', { connected: false }), person('Dan', { role: 'viewer' }),
+    person('Eve', { state: 'waiting' })];
+  /** @type {Event[]} */
+  const mine = [{ type: 'start' }, { type: 'started' }, { type: 'welcomed', you: 'me' }];
+  const led = after(...mine, status({ people })).state;
+  assert.deepEqual(cardOf(led, true, '').names, [{ id: 'Ben', name: 'Ben' }], 'nothing in it that changes under a finger');
+  assert.equal(cardOf(led, false, '').phase, 'off');
+  assert.equal(mayGive(led), true);
+  assert.equal(mayGive(after(...mine, status({ mode: 'TRACK', people })).state), false);
+  assert.equal(mayGive(after(...mine, status({ people: people.slice(0, 1) })).state), false);
+  /** @param {string} heir @param {boolean} led */
+  const aside = (heir, led) => after(...ASIDE, status({ people: [person('me', { offered: heir === 'me' }), person('Ben', { offered: heir === 'Ben' }),
+    person('Anna', { leads: led })] })).state;
+  assert.deepEqual([cardOf(aside('me', false), false, '').phase, cardOf(aside('me', false), false, '').mayGo], ['offered', true]);
+  assert.equal(cardOf(aside('me', true), false, '').mayGo, false, 'the robot comes down first');
+  assert.equal(cardOf(aside('Ben', false), false, 'Ben').phase, 'given');
+  assert.equal(cardOf(aside('Ben', false), false, '').phase, 'off');
 });

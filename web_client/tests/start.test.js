@@ -35,6 +35,7 @@ beforeEach(() => {
     video: { encoder: {}, prepare: async () => 'H.264' },
     imu: { source: 'DeviceMotion', stop() {}, start: () => log.push('imu') },
     phone: { open: () => log.push('open') },
+    choice: { ask: async () => { throw new Error('asked'); } },
     pairing: {
       name: 'Anna',
       askName: (/** @type {boolean} */ wanted) => { if (wanted) log.push('name?'); },
@@ -49,7 +50,7 @@ test('a tap asks for the motion sensors before all else, and comes to an open li
   const begun = start.begin();
   assert.deepEqual(log.slice(0, 2), ['permission', 'unlock'], 'within the tap itself');
   await begun;
-  assert.deepEqual(log.filter((one) => !one.endsWith('…')), ['permission', 'unlock', 'start', 'camera', 'imu', 'started', 'open']);
+  assert.deepEqual(log.filter((one) => !one.endsWith('…')), ['permission', 'unlock', 'start', 'paired', 'camera', 'imu', 'started', 'open']);
   assert.deepEqual(surroundings.identity, { device: 'Android 412x915@2 / back', sensors: 'DeviceMotion', video: 'H.264' });
   assert.equal(start.startedAtMs, surroundings.performance.now());
 });

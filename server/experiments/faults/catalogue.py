@@ -62,12 +62,12 @@ def open_ended(name: str, hazard: str, happens: Happening) -> Fault:
 
 def motion(change: tampering.Change) -> Happening:
     """The phone's motion sensors say something else."""
-    return h.told(tampering.motion(change))
+    return h.tampered(tampering.motion(change))
 
 
 def stops(name: str, at: float = 0.0, before: Happening | None = None) -> Fault:
     """STOP: no thrust at once, whatever goes on."""
-    return ends(name, "38", h.wished("stop", at, before), {"STOPPED": TICK_S, "zero": 0.25})
+    return ends(name, "38", h.requested("stop", at, before), {"STOPPED": TICK_S, "zero": 0.25})
 
 
 LOST: Final[Times] = {"COAST": COAST_S, "RAMP": RAMP_S}
@@ -84,7 +84,7 @@ PHONE: Final = (
     gone("page frozen for 3 s, then all at once", "17", h.selective(h.FROM_PHONE, 3.0, holds=True)),
     gone("page hears nothing", "18", h.selective(("ping",), FOR_EVER)),
     gone("signs of life stop", "17", h.selective(h.SIGNS, FOR_EVER)),
-    gone("one touch again and again", "20", h.told_anew(tampering.stale_touch)),
+    gone("one touch again and again", "20", h.tampered_with_memory(tampering.stale_touch)),
     gone("motion sensors silent", "9", h.selective(("motion",), FOR_EVER)),
     borne(
         "motion sensors silent for 0.4 s", "9", h.selective(("motion",), 0.4), {"COAST": COAST_S}
@@ -92,7 +92,9 @@ PHONE: Final = (
     gone("rates are no numbers", "27", motion(tampering.no_number)),
     gone("a force without end", "27", motion(tampering.infinite)),
     open_ended(
-        "motion sensors stuck", "10", h.told_anew(lambda: tampering.motion(tampering.stuck()))
+        "motion sensors stuck",
+        "10",
+        h.tampered_with_memory(lambda: tampering.motion(tampering.stuck())),
     ),
     open_ended("motion sensors' axes turned", "10", motion(tampering.turned_axes)),
     open_ended("accelerations turned round", "10", motion(tampering.turned_sign)),
@@ -103,13 +105,19 @@ PICTURES: Final = (
     ends("pictures stop", "1", h.selective(("picture",), FOR_EVER), BLIND),
     borne("pictures stop for 1 s", "1", h.selective(("picture",), 1.0)),
     borne("pictures 0.2 s later", "2", h.slow_pictures(0.2)),
-    open_ended("pictures frozen", "3", h.told_anew(lambda: tampering.pictures(tampering.frozen()))),
-    open_ended("pictures' times 0.1 s wrong", "2", h.told(tampering.pictures(tampering.too_old))),
-    open_ended("LEDs mixed up", "7", h.told(tampering.pictures(tampering.mixed_up))),
+    open_ended(
+        "pictures frozen",
+        "3",
+        h.tampered_with_memory(lambda: tampering.pictures(tampering.frozen())),
+    ),
+    open_ended(
+        "pictures' times 0.1 s wrong", "2", h.tampered(tampering.pictures(tampering.too_old))
+    ),
+    open_ended("LEDs mixed up", "7", h.tampered(tampering.pictures(tampering.mixed_up))),
     ends(
         "places that are no numbers",
         "27",
-        h.told(tampering.pictures(tampering.beside_itself)),
+        h.tampered(tampering.pictures(tampering.beside_itself)),
         BLIND,
     ),
 )
@@ -175,9 +183,9 @@ PEOPLE: Final = (
     stops("STOP while it follows"),
     stops("STOP while it coasts", 0.25, h.dark(FOR_EVER)),
     stops("STOP while it holds", 0.5, h.lifted(0.0)),
-    stops("STOP while it ramps", 0.3, h.wished("disarm")),
-    ramps("disarmed while it follows", "38", h.wished("disarm"), TICK_S),
-    borne("asked to arm all the time", "39", h.asks("arm")),
+    stops("STOP while it ramps", 0.3, h.requested("disarm")),
+    ramps("disarmed while it follows", "38", h.requested("disarm"), TICK_S),
+    borne("asked to arm all the time", "39", h.requested_every_tick("arm")),
 )
 BODY: Final = (
     open_ended("body's rates are no numbers", "27", h.body_imu("nan")),

@@ -19,9 +19,11 @@ from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.fault import Fault, Outcome, suffer
 from server.experiments.faults.live import LiveOutcome
-from server.experiments.faults.measure import Row, row_of
+from server.experiments.faults.measure import Row, row_of, times_of, vanish_times
 from server.experiments.forked import forked
+from server.experiments.gaps import vanish
 from server.experiments.gaps.flight import GapFlight
+from server.experiments.gaps.vanish import Vanished
 from server.experiments.numbers import whole
 from server.experiments.text import dashed, plain, statements
 
@@ -41,6 +43,16 @@ COLUMNS: Final = (
     ("tilt_deg", "tilt °", "{:.1f}"),
     ("after_zero", "after zero", "{}"),
     ("missed", "missed", "{}"),
+)
+
+
+TIMES: Final = (
+    ("fault", "fault", "{}"),
+    ("event", "event", "{}"),
+    ("n", "n", "{}"),
+    ("p50", "p50 s", "{:.3f}"),
+    ("p99", "p99 s", "{:.3f}"),
+    ("p99_9", "p99.9 s", "{:.3f}"),
 )
 
 
@@ -83,13 +95,22 @@ def run(arguments: argparse.Namespace) -> int:
     faults = [fault for fault in FAULTS if arguments.only in fault.name]
     outcomes = _outcomes(robot_file, config, faults, arguments)
     rows = [row_of(fault, [o for o in outcomes if o.fault == fault.name]) for fault in faults]
-    holds = goals(rows, arguments.seeds)
+    times = times_of(faults, outcomes)
+    vanished = vanish.fly(robot_file, config, arguments.vanish, arguments.workers)
+    if vanished:
+        times += vanish_times(vanished)
+    holds = goals(rows, arguments.seeds, vanished)
     print(f"{arguments.robot}, gains {arguments.gains}, hand moving; the worst of each")
     print(dashed(COLUMNS, rows), end="\n\n")
+    print(dashed(TIMES, times), end="\n\n")
     print("\n".join(statements(holds)))
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        figures = {"rows": [plain(asdict(row)) for row in rows], "holds": holds}
+        figures = {
+            "rows": [plain(asdict(row)) for row in rows],
+            "times": [plain(asdict(one)) for one in times],
+            "holds": holds,
+        }
         file = arguments.out / "faults.json"
         file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
         print(f"\nwritten: {file}, {picture.draw(rows, arguments.out / 'faults.png')}")
@@ -98,19 +119,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _live(arguments: argparse.Namespace) -> int:
     """The ones that need real processes."""
-    told = []
+    outcomes = []
     for one in live.fly(arguments.robot, arguments.gains, arguments.live):
-        told.append(one)
+        outcomes.append(one)
         print(text_of(one), flush=True)
-    thrust = sum(one.after_zero for one in told)
+    thrust = sum(one.after_zero for one in outcomes)
     holds = {
-        f"live: {thrust} samples with thrust after zero, in {len(told)} faults": thrust == 0,
-        "live: each in time": not any(one.missed for one in told),
+        f"live: {thrust} samples with thrust after zero, in {len(outcomes)} faults": thrust == 0,
+        "live: each in time": not any(one.missed for one in outcomes),
     }
     print("\n".join(statements(holds)))
     if arguments.out is not None:
         arguments.out.mkdir(parents=True, exist_ok=True)
-        figures = {"rows": [plain(asdict(one)) for one in told], "holds": holds}
+        figures = {"rows": [plain(asdict(one)) for one in outcomes], "holds": holds}
         file = arguments.out / "faults_live.json"
         file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
         print(f"\nwritten: {file}")
@@ -144,12 +165,13 @@ def _outcomes(
     return sorted(outcomes, key=lambda one: one.seed)
 
 
-def goals(rows: Sequence[Row], seeds: int) -> dict[str, bool]:
+def goals(rows: Sequence[Row], seeds: int, vanished: Sequence[Vanished] = ()) -> dict[str, bool]:
     """What is to be shown, and whether it was."""
     thrust = sum(row.after_zero for row in rows)
-    told = f"{thrust} samples with thrust after zero, in {len(rows)} faults of {seeds} seeds"
-    held = {told: thrust == 0}
-    return held | {f"{row.fault}: in time, within bounds": not row.missed for row in rows}
+    silent = f"{thrust} samples with thrust after zero, in {len(rows)} faults of {seeds} seeds"
+    held = {silent: thrust == 0}
+    held |= {f"{row.fault}: in time, within bounds": not row.missed for row in rows}
+    return held | vanish.goals(vanished)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -162,6 +184,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0,
         metavar="N",
         help="instead: kill and stop real processes in flight, each N times; Linux",
+    )
+    parser.add_argument(
+        "--vanish", type=whole(0, 100_000), default=1000, help="phones that vanish for good"
     )
     parser.add_argument("--only", default="", metavar="WORDS", help="faults with these in the name")
     parser.add_argument("--robot", default="ames", help="name or path of a robot file")

@@ -152,20 +152,22 @@ class _Watch:
 
 def misses(fault: Fault, one: Outcome) -> list[str]:
     """Which of its goals an outcome misses, in words."""
-    told = [
+    missed = [
         f"{event} {one.first.get(event, float('inf')):.3f} s > {limit:g}"
         for event, limit in fault.by.items()
         if not one.first.get(event, np.inf) <= limit
     ]
-    told += [f"{event} at {one.first[event]:.3f} s" for event in fault.never if event in one.first]
+    missed += [
+        f"{event} at {one.first[event]:.3f} s" for event in fault.never if event in one.first
+    ]
     if one.excursion_mm > fault.excursion_mm:
-        told.append(f"excursion {one.excursion_mm:.0f} mm")
+        missed.append(f"excursion {one.excursion_mm:.0f} mm")
     if one.tilt_deg > TILT_DEG:
-        told.append(f"tilt {one.tilt_deg:.0f}°")
+        missed.append(f"tilt {one.tilt_deg:.0f}°")
     if fault.end == "flies" and not one.follows:
-        told.append(f"does not follow: {one.words}")
+        missed.append(f"does not follow: {one.words}")
     if fault.end == "zero" and (one.thrust_n >= ZERO_N or one.after_zero):
-        told.append(
+        missed.append(
             f"{one.after_zero} samples with thrust after zero, {one.thrust_n:.2f} N at last"
         )
-    return told
+    return missed

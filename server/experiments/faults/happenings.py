@@ -94,8 +94,8 @@ def lifted(at: float, dark_s: float = 0.0, *, again: float = FOR_EVER_S) -> Happ
     return happen
 
 
-def told(inputs: Inputs) -> Happening:
-    """Control is told something else from now on."""
+def tampered(inputs: Inputs) -> Happening:
+    """Control's inputs are replaced from now on."""
 
     def happen(world: World) -> None:
         world.loop.tamper = inputs
@@ -103,7 +103,7 @@ def told(inputs: Inputs) -> Happening:
     return happen
 
 
-def told_anew(make: Callable[[], Inputs]) -> Happening:
+def tampered_with_memory(make: Callable[[], Inputs]) -> Happening:
     """The same, for what has a memory of its own: `make` gives it."""
 
     def happen(world: World) -> None:
@@ -171,28 +171,28 @@ def control(every: int, seconds: float = FOR_EVER_S) -> Happening:
     return happen
 
 
-def wished(what: str, at: float = 0.0, before: Happening | None = None) -> Happening:
+def requested(what: str, at: float = 0.0, before: Happening | None = None) -> Happening:
     """Somebody asks for something, while `before` goes on."""
 
     def happen(world: World) -> None:
-        def wish() -> None:
+        def request() -> None:
             world.begin = world.loop.t
             world.loop.wish(what)
 
         if before is None:
-            wish()
+            request()
             return
         before(world)
         until = world.loop.t + at
         while world.loop.t < until:
             world.advance()
-        wish()
+        request()
 
     return happen
 
 
-def asks(what: str) -> Happening:
-    """The same wish with each tick."""
+def requested_every_tick(what: str) -> Happening:
+    """The same request with each tick, for a second."""
 
     def happen(world: World) -> None:
         for k in range(200):
@@ -225,7 +225,7 @@ def body_imu(spoil: str) -> Happening:
 
 
 def thruster(health: float) -> Happening:
-    """One gives less than it is told."""
+    """One gives less than is commanded."""
 
     def happen(world: World) -> None:
         world.loop.follower.plant.thruster_health[2] = health

@@ -271,13 +271,13 @@ def document() -> str:
 
 def _rows() -> Iterator[str]:
     for hazard in HAZARDS:
-        faults = [_told(fault) for fault in FAULTS if fault.hazard == hazard.number]
+        faults = [_described(fault) for fault in FAULTS if fault.hazard == hazard.number]
         shown = "; ".join([*faults, *(f"`tests/{test}`" for test in hazard.tests)])
         cells = hazard.number, hazard.what, hazard.noticed_by, hazard.then, shown
         yield f"| {' | '.join(cells)} |"
 
 
-def _told(fault: Fault) -> str:
+def _described(fault: Fault) -> str:
     times = [f"{event} {fault.by[event]:g}" for event in EVENTS if event in fault.by]
     if fault.end == "flies":
         times.append("follows")

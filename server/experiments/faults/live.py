@@ -55,6 +55,7 @@ LIVE: Final = (
     LiveFault("server killed", "server", signal.SIGKILL, RAMP_S + RAMPED_S),
     LiveFault("server stopped for 2 s", "server", signal.SIGSTOP, RAMP_S + RAMPED_S),
     LiveFault("control killed", "control", signal.SIGKILL, ROBOT_RAMP_S + RAMPED_S),
+    LiveFault("control ended", "control", signal.SIGTERM, ROBOT_RAMP_S + RAMPED_S),
     LiveFault("control stopped for 2 s", "control", signal.SIGSTOP, ROBOT_RAMP_S + RAMPED_S),
     LiveFault("robot killed", "robot", signal.SIGKILL, 0.1),
 )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from server.experiments.faults.fault import Fault, Outcome, misses
+from server.experiments.gaps.vanish import Vanished
 
 EVENTS = ("COAST", "HOLD", "RAMP", "robot", "zero")
 
@@ -58,3 +59,40 @@ def percentile(outcomes: Sequence[Outcome], event: str, percent: float) -> float
     """When an event followed [s]; infinite if it did not often enough; NaN of none."""
     times = [one.first.get(event, float("inf")) for one in outcomes]
     return float(np.percentile(times, percent, method="higher")) if times else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """When an event followed a fault [s]; infinite where it did not often enough."""
+
+    fault: str
+    event: str
+    n: int
+    p50: float
+    p99: float
+    p99_9: float
+
+
+def times_of(faults: Sequence[Fault], outcomes: Sequence[Outcome]) -> list[Times]:
+    """Of each fault, the events that it is to lead to."""
+    found = []
+    for fault in faults:
+        some = [one for one in outcomes if one.fault == fault.name]
+        for event in (event for event in EVENTS if event in fault.by):
+            found.append(_times(fault.name, event, some))
+    return found
+
+
+def vanish_times(vanished: Sequence[Vanished]) -> list[Times]:
+    """Of phones that vanish at many moments."""
+    name = "phone vanishes, at any moment"
+    outcomes = [
+        Outcome(name, 0, {"COAST": one.coast_s, "RAMP": one.ramp_s}, 0.0, 0.0, 0, False, 0.0, "")
+        for one in vanished
+    ]
+    return [_times(name, event, outcomes) for event in ("COAST", "RAMP")]
+
+
+def _times(fault: str, event: str, outcomes: Sequence[Outcome]) -> Times:
+    p50, p99, p99_9 = (percentile(outcomes, event, percent) for percent in (50.0, 99.0, 99.9))
+    return Times(fault, event, len(outcomes), p50, p99, p99_9)

@@ -1,4 +1,4 @@
-"""What faults do to datagrams and to what control is told; repeatable for a seed."""
+"""What faults do to datagrams and to control's inputs; repeatable for a seed."""
 
 from __future__ import annotations
 

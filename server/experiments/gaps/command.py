@@ -102,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
         for seed in range(1, arguments.seeds + 1)
     ]
     rows, log = _rows(jobs, arguments.workers)
-    gone = _vanished(robot_file, config, arguments)
+    gone = vanish.fly(robot_file, config, arguments.vanish, arguments.workers)
     holds = goals(rows, gone)
     print(f"{arguments.robot}, gains {arguments.gains}, hand moving, the button held; {_about()}")
     print(dashed(COLUMNS, rows), end="\n\n")
@@ -132,16 +132,6 @@ def _rows(jobs: list[Job], workers: int) -> tuple[list[Row], Log | None]:
     by_seed = sorted(found, key=lambda one: one[1])  # the same whatever the workers
     rows = [row_of(case, [found[one] for one in by_seed if one[0] == case]) for case in ordered]
     return rows, shown
-
-
-def _vanished(
-    robot_file: RobotFile, config: TeleopConfig, arguments: argparse.Namespace
-) -> list[Vanished]:
-    flights = max(1, round(arguments.vanish / 40))
-    each = -(-arguments.vanish // flights)
-    jobs = [vanish.Job(robot_file, config, seed, each) for seed in range(100, 100 + flights)]
-    jobs = jobs if arguments.vanish else []
-    return [one for some in processes.each(vanish.vanish, jobs, arguments.workers) for one in some]
 
 
 def _write(

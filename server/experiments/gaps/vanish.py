@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Final
@@ -11,10 +12,15 @@ import numpy as np
 from hardware.robot_file import RobotFile
 from pipeline.config import TeleopConfig
 from pipeline.signals import Mode
+from server.experiments import processes
 from server.experiments.forked import forked
 from server.experiments.gaps.flight import GapFlight
 from server.experiments.gaps.schedule import Gaps, WebRtcLine
 
+COAST_S: Final = 0.17
+RAMP_S: Final = 1.1
+A_FLIGHT: Final = 40
+"""Phones that vanish in one flight."""
 WATCHED_S: Final = 1.5
 """From the last word on."""
 FOR_EVER_S: Final = 1e6
@@ -68,3 +74,25 @@ def _watch(flight: GapFlight) -> Vanished:
         first.setdefault(mode, flight.loop.t - begin)
     coast_s = min(first.get(Mode.COAST, np.inf), first.get(Mode.HOLD, np.inf))
     return Vanished(coast_s, first.get(Mode.RAMP, np.inf))
+
+
+def fly(robot_file: RobotFile, config: TeleopConfig, phones: int, workers: int) -> list[Vanished]:
+    """About so many phones vanish, in flights of their own seeds."""
+    flights = max(1, round(phones / A_FLIGHT)) if phones else 0
+    each = -(-phones // max(1, flights))
+    jobs = [Job(robot_file, config, seed, each) for seed in range(100, 100 + flights)]
+    return [one for some in processes.each(vanish, jobs, workers) for one in some]
+
+
+def goals(vanished: Sequence[Vanished]) -> dict[str, bool]:
+    """What is to be shown, and whether it was; nothing is said of what was not flown."""
+    if not vanished:
+        return {}
+    coast, ramp = (
+        float(np.percentile([getattr(one, name) for one in vanished], 99.9, method="higher"))
+        for name in ("coast_s", "ramp_s")
+    )
+    return {
+        f"vanished phone: COAST {coast:.3f} s p99.9, within {COAST_S:g} s": coast <= COAST_S,
+        f"vanished phone: RAMP {ramp:.3f} s p99.9, within {RAMP_S:g} s": ramp <= RAMP_S,
+    }

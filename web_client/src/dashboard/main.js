@@ -8,6 +8,7 @@
 
 import { browserOf } from '../browser.js';
 import { BoardView } from './view.js';
+import { ChoiceCard } from '../choice_card.js';
 import { EstimatePanel } from './estimate.js';
 import { EMPTY, reduce } from './model.js';
 import { KnobPanel } from './knobs.js';
@@ -27,7 +28,7 @@ const STOP_TICK_MS = 50;
 const { fetchHere, later, links, platform } = browserOf(window);
 const clock = new WakefulClock(performance, Date);
 const serverTime = new ServerTime(clock);
-const stopPost = new StopPost(fetchHere);
+const stopPost = new StopPost(fetchHere, (answer) => dispatch({ type: 'stop_answer', answer }));
 let board = EMPTY;
 let shown = false;
 let virtual = false;
@@ -63,6 +64,7 @@ const view = new BoardView(document, {
 const knobs = new KnobPanel(document, (tune) => void link.sendMessage(tune), () => performance.now());
 const path = new PathSelect(document, (choice) => void link.sendMessage(choice), () => performance.now());
 const estimate = new EstimatePanel(document);
+const choice = new ChoiceCard(document);
 const card = new PhoneCard(document, URL, fetchInvite);
 const people = new PeopleCard(document, (deed, { id, code }) => void request('POST', `api/people/${deed}`, { id, code }), () => performance.now());
 
@@ -157,10 +159,12 @@ async function arrive() {
       window,
       name: usualName(navigator.userAgent),
       onWaiting: ({ code }) => dispatch({ type: 'problem', problem: new Problem('waiting', code) }),
+      onLess: (less) => choice.ask(less),
       later,
     });
     if (known === null) throw new Problem('not_supervisor');
     role = known;
+    dispatch({ type: 'paired' });
     document.body.dataset.role = known;
     /** @type {HTMLIFrameElement} */ (view.find('scene')).src = 'view/';
     link.open();

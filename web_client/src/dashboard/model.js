@@ -2,10 +2,11 @@
 
 /** @import {Refused, Status} from '../protocol_types.js' */
 /** @import {ShownMode} from '../session_types.js' */
+/** @import {StopAnswer} from '../stop.js' */
 
 import { GIVE_UP_MS } from '../command.js';
 import { Problem } from '../problems.js';
-import { STOP_LOST } from '../stop.js';
+import { endOf, endWords, hasStopped, weigh } from '../stop.js';
 import { STATUS_LIFE_MS } from '../session.js';
 
 /** Twenty seconds of Status at 10 Hz. */
@@ -27,13 +28,15 @@ const AT_REST = ['DISARMED', 'STOPPED'];
  * @property {number} statusAtMs
  * @property {boolean} stopping STOP was asked for and not yet confirmed.
  * @property {number} stopAtMs When it was asked for.
+ * @property {StopAnswer | null} stopAnswer What the server said to it beside the socket.
+ * @property {boolean} known The server has let this browser in, at least once.
  * @property {readonly Sample[]} history Oldest first.
  * @property {{ text: string, untilMs: number } | null} notice
  * @property {Problem | null} problem
  */
 
 /**
- * @typedef {{ type: 'welcomed' } | { type: 'disconnected' } | { type: 'problem', problem: Problem }
+ * @typedef {{ type: 'welcomed' } | { type: 'paired' } | { type: 'stop_answer', answer: StopAnswer } | { type: 'disconnected' } | { type: 'problem', problem: Problem }
  *   | { type: 'status', status: Status, now: number } | { type: 'refused', refused: Refused, now: number }
  *   | { type: 'notice', text: string, now: number } | { type: 'tick', now: number }
  *   | { type: 'stop', now: number } | { type: 'stop_tick', now: number }} Event
@@ -47,6 +50,8 @@ export const EMPTY = Object.freeze({
   statusAtMs: -Infinity,
   stopping: false,
   stopAtMs: -Infinity,
+  stopAnswer: null,
+  known: false,
   history: [],
   notice: null,
   problem: null,
@@ -61,6 +66,8 @@ export function reduce(board, event) {
   switch (event.type) {
     case 'welcomed':
       return { ...board, linked: true, problem: null };
+    case 'paired':
+      return { ...board, known: true };
     case 'disconnected':
       return { ...board, linked: false, heard: false };
     case 'problem':
@@ -72,7 +79,9 @@ export function reduce(board, event) {
     case 'notice':
       return { ...board, notice: { text: event.text, untilMs: event.now + NOTICE_MS } };
     case 'stop':
-      return { ...board, stopping: true, stopAtMs: event.now, notice: null };
+      return { ...board, stopping: true, stopAtMs: event.now, stopAnswer: null, notice: null };
+    case 'stop_answer':
+      return answered(board, event.answer);
     case 'stop_tick':
       return insisted(board, event.now);
     case 'tick':
@@ -111,7 +120,27 @@ function heardFrom(board, status, now) {
  */
 function insisted(board, now) {
   if (!board.stopping || now - board.stopAtMs <= GIVE_UP_MS) return board;
-  const text = STOP_LOST[board.heard ? 'unconfirmed' : 'unlinked'];
+  return stopEnded(board, endOf(board.heard, board.stopAnswer));
+}
+
+/**
+ * @param {Board} board
+ * @param {StopAnswer} answer
+ * @returns {Board}
+ */
+function answered(board, answer) {
+  if (!board.stopping) return board;
+  if (hasStopped(answer) && !board.heard) return stopEnded(board, 'stopped');
+  return { ...board, stopAnswer: weigh(board.stopAnswer, answer) };
+}
+
+/**
+ * @param {Board} board
+ * @param {import('../stop.js').StopEnd} end
+ * @returns {Board}
+ */
+function stopEnded(board, end) {
+  const text = end === '' ? '' : endWords(end, board.stopAnswer);
   return { ...board, stopping: false, notice: { text, untilMs: Infinity } };
 }
 

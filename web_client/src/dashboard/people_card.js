@@ -70,7 +70,7 @@ export class PeopleCard {
     row.classList.toggle('away', !person.connected);
     const name = this.make('b', person.name);
     name.className = 'clip';
-    const what = person.leads ? 'leads' : person.connected ? ROLES[person.role] : 'away';
+    const what = person.leads ? 'leads' : person.offered ? 'has the lead offered' : person.connected ? ROLES[person.role] : 'away';
     const words = this.make('span', `${what} · ${since(person.since_s)}`);
     words.className = person.leads ? 'badge good' : 'quiet';
     row.title = `${person.name}, ${person.role}, ${person.address || 'on this computer'}`;

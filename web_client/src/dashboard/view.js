@@ -27,7 +27,9 @@ export class BoardView extends Elements {
     for (const what of /** @type {const} */ (['arm', 'disarm', 'reset'])) {
       this.find(what).addEventListener('click', () => handlers.onWish(what));
     }
-    for (const type of ['pointerdown', 'click']) this.find('stop').addEventListener(type, handlers.onStop);
+    for (const type of ['pointerdown', 'click']) {
+      for (const id of ['stop', 'last-stop-button']) this.find(id).addEventListener(type, handlers.onStop);
+    }
     this.find('virtual').addEventListener('click', handlers.onVirtual);
     this.find('record').addEventListener('click', handlers.onRecord);
     this.find('code').addEventListener('click', handlers.onCode);
@@ -70,10 +72,13 @@ export class BoardView extends Elements {
     for (const [what, can] of Object.entries(wishes(board))) {
       /** @type {HTMLButtonElement} */ (this.find(what)).disabled = !can;
     }
-    this.find('stop').classList.toggle('asked', board.stopping);
-    const text = board.stopping ? stopWords(board.heard) : board.notice?.text ?? '';
-    this.show('notice', text !== '');
-    this.text('notice', text);
+    this.show('last-stop', board.known);
+    const text = board.stopping ? stopWords(board.heard, board.stopAnswer) : board.notice?.text ?? '';
+    for (const id of ['stop', 'last-stop-button']) this.find(id).classList.toggle('asked', board.stopping);
+    for (const id of ['notice', 'last-stop-words']) {
+      this.show(id, text !== '');
+      this.text(id, text);
+    }
   }
 
   /** @param {Status} status */

@@ -1,0 +1,72 @@
+"""The lead passes between two phones' pages in two browsers that know nothing of each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import BrowserContext, Page, expect
+
+from tests.e2e.chromium_phone import browser
+from tests.e2e.serving import Serving, serving
+from tests.e2e.test_serve import until
+
+pytestmark = pytest.mark.e2e
+PERMISSIONS = ["camera", "accelerometer", "gyroscope", "magnetometer"]
+PHONE = {"viewport": {"width": 412, "height": 915}}
+WAIT_MS = 30_000
+
+
+def joined(context: BrowserContext, server: Serving, name: str) -> Page:
+    """A phone's page that has come as far as it may by a link and a tap."""
+    page = context.new_page()
+    page.goto(f"{server.local_https}/{server.link()}")
+    page.fill("#name", name)
+    page.click("#start")
+    page.wait_for_selector("#operate:visible", timeout=WAIT_MS)
+    return page
+
+
+def leaders(server: Serving) -> list[str]:
+    people = server.request("GET", "/api/status")["people"]
+    assert isinstance(people, list)
+    return [str(one["name"]) for one in people if one["leads"]]
+
+
+def standing_by(pages: dict[str, Page]) -> int:
+    """How many of them show that somebody else leads."""
+    return sum(" leads. " in page.locator("#reason").inner_text() for page in pages.values())
+
+
+def test_a_leader_hands_over_and_nobody_arms_before_the_other_has_taken_it(
+    chromium: str, tmp_path: Path
+) -> None:
+    with serving(tmp_path) as server, browser(chromium, **PHONE) as first:
+        assert first.browser is not None
+        second = first.browser.new_context(
+            ignore_https_errors=True, permissions=PERMISSIONS, **PHONE
+        )
+        # a page that is busy while another one starts may lose the lead: either may give
+        pages = {"Anna": joined(first, server, "Anna"), "Ben": joined(second, server, "Ben")}
+        until(lambda: len(leaders(server)) == 1 == standing_by(pages), 30.0, "a leader")
+        giver = leaders(server)[0]
+        heir = next(name for name in pages if name != giver)
+        mine, other = pages[giver], pages[heir]
+        expect(other.locator("#reason")).to_contain_text(f"{giver} leads")
+        expect(other.locator("#mode")).to_have_text("DISARMED")
+        for answer in ("handover-leave", "handover-take"):
+            mine.click("#handover-start")
+            mine.locator("#handover-people button", has_text=heir).click()
+            expect(mine.locator("#handover-title")).to_have_text(
+                f"Offered to {heir}", timeout=WAIT_MS
+            )
+            expect(other.locator("#handover-take")).to_be_enabled(timeout=WAIT_MS)
+            status = server.request("GET", "/api/status")
+            assert (status["phones"], status["ready"], leaders(server)) == (0, False, [])
+            other.click(f"#{answer}")
+            leads, waits = (mine, other) if answer == "handover-leave" else (other, mine)
+            expect(leads.locator("#handover-start")).to_be_visible(timeout=WAIT_MS)
+            expect(waits.locator("#reason")).to_contain_text("leads.", timeout=WAIT_MS)
+        assert leaders(server) == [heir]
+        mine.click("#stop")
+        expect(mine.locator("#mode")).to_have_text("STOPPED", timeout=WAIT_MS)
