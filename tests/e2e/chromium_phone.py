@@ -11,7 +11,8 @@ import numpy as np
 from playwright.sync_api import BrowserContext, Page, sync_playwright
 
 from hardware.sim.hand import Hand
-from tests.e2e.chromium_channel import SENSORS, Channel, evaluation, feeling, reading, value_of
+from tests.e2e.chromium_channel import Channel, evaluation, value_of
+from tests.e2e.fed_sensors import FedSensors
 from tests.e2e.played_phone import CANVAS, PlayedPhone
 
 FLAGS = [
@@ -71,11 +72,12 @@ class ChromiumPhone(PlayedPhone):
         self.page.add_init_script(CANVAS)
         self._channel = Channel(context, self.page)
         self._touches = False
-        self._channel.orders(*map(feeling, SENSORS))
+        self._sensors = FedSensors(Channel(context, self.page), self._felt)
 
     def close(self) -> None:
         """Give the sockets back."""
         super().close()
+        self._sensors.close()
         self._channel.close()
 
     @property
@@ -88,13 +90,8 @@ class ChromiumPhone(PlayedPhone):
         (answer,) = self._channel.orders(evaluation(script))
         return value_of(answer)
 
-    def _tell(self, shown: str, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
-        answer, *_ = self._channel.orders(
-            evaluation(shown),
-            reading("accelerometer", force),
-            reading("linear-acceleration", linear),
-            reading("gyroscope", omega),
-        )
+    def _show(self, spots: str) -> None:
+        (answer,) = self._channel.orders(evaluation(spots))
         value_of(answer)
 
     def tap(self, selector: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Iterator, Sequence
+from itertools import count
 from pathlib import Path
 
 from playwright.sync_api import BrowserContext
@@ -28,6 +29,9 @@ LANDSCAPE = {
 MAY_ARM = """
 (({disabled, dataset}) => !disabled && dataset.what === 'arm')(document.querySelector('#wish'))
 """
+IS_ARMED = r"/\bARMED\b/.test(document.body.innerText)"
+MOST_TAPS = 3
+"""On Arm: a page that has just begun stutters, and a robot is not armed on a stutter."""
 MOST_FLIGHTS = 4
 """Tried for one that is wanted, on a machine that is proven to have been away each time."""
 
@@ -48,18 +52,31 @@ def start(phone: ChromiumPhone, server: Serving) -> None:
     phone.play_until(MAY_ARM, 25.0)
 
 
-def lead(phone: PlayedPhone) -> None:
-    """Arm and hold.
+def lead(phone: PlayedPhone) -> int:
+    """Arm and hold; gives how many taps arming took.
 
     Raises:
         TimeoutError: it could not be armed, or does not follow; with the words on the page.
     """
-    phone.play_until(MAY_ARM, 25.0)
-    phone.tap("#wish")
-    phone.play_until("document.body.innerText.includes('ARMED')", 3.0)
+    taps = _arm(phone)
     phone.play(0.7)
     phone.hold()
     phone.play_until("document.body.innerText.includes('TRACK')", 3.0)
+    return taps
+
+
+def _arm(phone: PlayedPhone) -> int:
+    """Tap as a person does who reads why it was refused, and taps again."""
+    for tap in count(1):
+        phone.play_until(MAY_ARM, 25.0)
+        phone.tap("#wish")
+        try:
+            phone.play_until(IS_ARMED, 3.0)
+            break
+        except TimeoutError:
+            if tap == MOST_TAPS:
+                raise
+    return tap
 
 
 def flight(
@@ -69,16 +86,16 @@ def flight(
     meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
 ) -> Flight:
     """Lead for so long, or until the robot comes down by itself; tried once."""
-    began, never = time.monotonic(), ""
+    began, never, taps = time.monotonic(), "", MOST_TAPS
     distances: list[tuple[float, float]] = []
     with contextlib.closing(FlightLog(server)) as log:
         try:
-            lead(phone)
+            taps = lead(phone)
             distances = phone.track(seconds, meanwhile, lambda: log.is_over)
         except TimeoutError as error:
             never = str(error)
         status = server.request("GET", "/api/status")
-    return Flight(seconds, distances, status, log.said, phone.holes(began), never)
+    return Flight(seconds, distances, status, log.said, phone.holes(began), never, taps)
 
 
 def flown(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from typing import Any
 
 import numpy as np
@@ -48,14 +49,15 @@ class FirefoxPhone(PlayedPhone):
         """The value of a JavaScript expression."""
         return self.tab.evaluate(script)
 
-    def _tell(self, shown: str, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
+    def _show(self, spots: str) -> None:
+        now = self._felt(time.monotonic())
         felt = {
-            "accelerationIncludingGravity": _named("xyz", force),
-            "acceleration": _named("xyz", linear),
-            "rotationRate": _named(("alpha", "beta", "gamma"), np.degrees(omega)),
+            "accelerationIncludingGravity": _named("xyz", now["accelerometer"]),
+            "acceleration": _named("xyz", now["linear-acceleration"]),
+            "rotationRate": _named(("alpha", "beta", "gamma"), np.degrees(now["gyroscope"])),
             "interval": 16,
         }
-        self.evaluate(f"({shown}, window.felt = {json.dumps(felt)}, null)")
+        self.evaluate(f"({spots}, window.felt = {json.dumps(felt)}, null)")
 
     def tap(self, selector: str) -> None:
         """Touch an element shortly."""

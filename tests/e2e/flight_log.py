@@ -89,6 +89,8 @@ class Flight:
     holes: list[Hole] = field(default_factory=list)
     never: str = ""
     """Why it did not begin."""
+    taps: int = 1
+    """On Arm, until it was granted."""
 
     @property
     def ended(self) -> str:
@@ -126,6 +128,8 @@ class Flight:
     def account(self) -> str:
         """What happened, in lines."""
         lines = [f"{self.ended or 'to the end'}; followed {100 * self.following:.1f} %"]
+        if self.taps > 1:
+            lines.append(f"  armed by tap {self.taps}")
         began, mode = self.said[0].t if self.said else 0.0, ""
         for said in self.said:
             if said.mode != mode:

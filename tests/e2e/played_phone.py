@@ -21,7 +21,7 @@ from tests.e2e.page_scripts import BE_CAMERA, TICKER
 from tests.e2e.witness import Hole, Witness
 
 STEP_S = 0.01
-"""The hand is told so often, where the machine manages."""
+"""The hand is told so often, to the page where that manages."""
 FORETOLD_S = np.array((0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.12, 0.16, 0.2))
 """When the lights are told from now on: a page that is told late still shows where the hand is."""
 RECENT_S = 0.02
@@ -104,11 +104,8 @@ class PlayedPhone(ABC):
         """The value of a JavaScript expression."""
 
     @abstractmethod
-    def _tell(self, shown: str, force: np.ndarray, linear: np.ndarray, omega: np.ndarray) -> None:
-        """Run `shown`, a JavaScript expression, and let the sensors feel from now on.
-
-        Each (3,) in d: specific force, the same without gravity [m/s²], turn rate [rad/s].
-        """
+    def _show(self, spots: str) -> None:
+        """Run a JavaScript expression that paints the lights from now on."""
 
     @abstractmethod
     def tap(self, selector: str) -> None:
@@ -136,17 +133,27 @@ class PlayedPhone(ABC):
         return [*self._witness.holes(since), *(hole for hole in page if hole.t >= since)]
 
     def step(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Show what the camera would see and feel now; gives the poses of hand and body."""
+        """Show what the camera would see now; gives the poses of hand and body."""
         time.sleep(max(0.0, self._stepped + STEP_S - time.monotonic()))
         truth = self._truth.latest()
-        now = time.monotonic()
-        t_felt, self._stepped = now + 0.5 * (now - self._stepped), now  # what is set is read on
-        force_in_d = self._R_dc @ self._hand.specific_force_in_c(t_felt)
-        up_in_d = self._R_dc @ self._hand.pose(t_felt)[0][2] * GRAVITY
-        omega_in_d = self._R_dc @ self._hand.omega_in_c(t_felt)
-        self._tell(self._shown(truth), force_in_d, force_in_d - up_in_d, omega_in_d)
+        self._stepped = time.monotonic()
+        self._show(self._shown(truth))
         t = float(truth.t[-1])
         return self._hand.pose(t), truth.at(t)
+
+    def _felt(self, t: float) -> dict[str, np.ndarray]:
+        """What the sensors feel at `t` [s], in d: force with and without gravity, turn rate.
+
+        By the names of the Generic Sensor API, each (3,) [m/s², m/s², rad/s].
+        """
+        force_in_d = self._R_dc @ self._hand.specific_force_in_c(t)
+        up_in_d = self._R_dc @ self._hand.pose(t)[0][2] * GRAVITY
+        omega_in_d = self._R_dc @ self._hand.omega_in_c(t)
+        return {
+            "accelerometer": force_in_d,
+            "gyroscope": omega_in_d,
+            "linear-acceleration": force_in_d - up_in_d,
+        }
 
     def _shown(self, truth: Truth) -> str:
         """The expression that paints the lights from now on."""

@@ -104,8 +104,8 @@ def flight(server: Serving, *options: str) -> Iterator[subprocess.Popen[bytes]]:
         until(lambda: mode(server) == "DISARMED", 20.0, "DISARMED")
 
 
-def kill(server: Serving, name: str) -> int:
-    os.kill(pid := processes(server.process.pid)[name], signal.SIGKILL)
+def kill(server: Serving, name: str, number: signal.Signals = signal.SIGKILL) -> int:
+    os.kill(pid := processes(server.process.pid)[name], number)
     return pid
 
 
@@ -190,14 +190,18 @@ def test_what_it_leaves_on_the_disk_is_for_its_user_alone(server: Serving) -> No
     assert open_to_others(server.state) == []
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "ended"])
 def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarmed(
-    server: Serving,
+    server: Serving, number: signal.Signals
 ) -> None:
     with closing(TruthClient(server.truth_port)) as truth, flight(server) as phone:
-        assert thrust(truth) > 1.0
-        pid = kill(server, "control")
+        before = thrust(truth)
+        assert before > 1.0
+        pid = kill(server, "control", number)
         phone.send_signal(signal.SIGSTOP)  # it would arm again
         try:
+            until(lambda: thrust(truth) < 0.7 * before, RAMP_S, "less thrust")
+            assert thrust(truth) > 0.4 * before  # on a ramp of seconds, not cut
             until(lambda: mode(server) == "LOST", 3.0, "LOST")
             until(lambda: thrust(truth) < ZERO_N, RAMP_S, "no thrust")
             until(lambda: mode(server) == "DISARMED", 10.0, "DISARMED")

@@ -1,4 +1,5 @@
-"""A stranger's process on the robot's port, for the whole life of control: it gets nothing at all.
+"""A stranger's process on the robot's port, for the whole life of control: it gets nothing at all,
+neither of the robot in Python nor of the program in C.
 
 It floods the port with noise, with commands under a key of its own and with what it has recorded of
 an earlier control process, while control starts, flies, is frozen, dies and is started anew.
@@ -13,7 +14,14 @@ import numpy as np
 import pytest
 
 from hardware.follower import FollowerState, ThrustCommand
-from tests.e2e.robot_rig import AMES, connect, priority, simulated_robot
+from tests.e2e.robot_rig import (
+    AMES,
+    compiled_watchdog,
+    connect,
+    priority,
+    simulated_robot,
+    watchdog_robot,
+)
 from tests.hardware.follower_contract import FollowerContract, exchange
 
 pytestmark = pytest.mark.e2e
@@ -77,10 +85,11 @@ def ended(process):
     process.stdout.close()
 
 
-@pytest.fixture
-def robot():
+@pytest.fixture(params=["python", "c"])
+def robot(request, tmp_path):
+    program = compiled_watchdog(tmp_path) if request.param == "c" else None
     with priority():
-        rig = simulated_robot()
+        rig = simulated_robot() if program is None else watchdog_robot(program)
         yield rig
         rig.close()
 
@@ -103,6 +112,7 @@ def stranger(robot, tmp_path):
     contract = FollowerContract()
     contract.ready(robot)
     contract.fly(robot, 1.0, 0.2)
+    robot.follower.stop()
     robot.follower.close()
     robot.advance(0.5)
     (tmp_path / "recorded").write_text("\n".join(sent))

@@ -110,6 +110,25 @@ def test_a_robot_that_hears_nothing_ends_the_flight_with_its_reason_when_it_ramp
     assert thrust > 0.0
 
 
+@pytest.mark.parametrize("lost", ["commands", "samples", "both"])
+def test_the_countdown_is_the_robots_own_where_that_ends_first(lost: str) -> None:
+    """Its thrust fades 280 ms after its last command, whatever else could wait for longer."""
+    loop = tracking()
+    if lost != "samples":
+        loop.follower.to_robot = lambda _data: ()
+    if lost != "commands":
+        loop.follower.to_control = lambda _data: ()
+    ends, begin = [], loop.t
+    while loop.follower.state != FollowerState.RAMP:
+        output = loop.advance()
+        if output.until_ramp_s is not None:
+            ends.append(loop.t + output.until_ramp_s)
+    assert loop.t - begin < 0.35
+    assert len(ends) > 20
+    assert loop.t - 0.05 <= min(ends)  # without samples: its last nonce is good for 40 ms more
+    assert max(ends) <= loop.t + 0.011
+
+
 def test_leds_hidden_for_a_second_are_flown_through() -> None:
     """The IMUs bridge it: still tracking, and hardly farther from the reference."""
     everything = tuple(range(len(ROBOT.robot.leds_in_b)))
