@@ -141,7 +141,8 @@ def main() -> int:
     for n, way in product(range(told.flights), told.by):
         one = flown_by(way, executable, told.seconds)
         rows.append(_row(way, one))
-        print(f"{way} {n + 1}, load {os.getloadavg()[0]:.1f}: {one.account()}", flush=True)
+        seen = f"{rows[-1].rms_mm:.1f} mm RMS, load {os.getloadavg()[0]:.1f}"
+        print(f"{way} {n + 1}, {seen}: {one.account()}", flush=True)
     print(f"\n{flights(COLUMNS, rows)}")
     judgement = list(goals(rows))
     for met, words in judgement:

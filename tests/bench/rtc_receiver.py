@@ -25,9 +25,9 @@ from server.app import body_of, make_app
 from server.clock import now
 from server.frame_decoder import FrameDecoder
 from server.frame_thread import FrameThread
+from server.guard import Guard
 from server.ingest import EncodedFrame
 from server.operator import OperatorPhone
-from server.security import Guard
 from server.serving import SWITCH_S
 from server.settings import VideoSettings
 from server.view_proxy import routes as view_routes
