@@ -122,4 +122,4 @@ class Ingest:
         t = self.clock.local(record.t_us * 1e-6)
         if t > now + FUTURE_S:
             raise WireError("value", field, "not later than its arrival")
-        return t
+        return min(t, now)  # clocks are known to a millisecond, captures told late by a few

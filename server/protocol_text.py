@@ -255,7 +255,8 @@ None waits behind another: of those that could not leave the newest goes. The pa
 once (PINGs that come together, as after a gap, are answered by the first and the newest), stamped
 with its own clock; of the last answers the one with the shortest round trip gives the offset
 between the clocks (NTP's rule). MOTION and FRAME are dated by that; before it is known they are
-dropped, and dated more than {1e3 * ingest.FUTURE_S:g} ms after their arrival they are refused.
+dropped. Dated after their arrival they count as taken then, by more than
+{1e3 * ingest.FUTURE_S:g} ms they are refused.
 
 TOUCH is made by the page's main thread and returns the newest nonce. The operator's age is that of
 the nonce, so old bytes, a hung page or a proxy that answers pings can't keep the robot flying. Of

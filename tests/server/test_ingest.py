@@ -227,3 +227,13 @@ def test_the_browsers_own_attitude_is_not_used() -> None:
         assert isinstance(north, PhoneImu)
         np.testing.assert_array_equal(sample.omega_m_cf_in_c, north.omega_m_cf_in_c)
         np.testing.assert_array_equal(sample.a_m_cf_in_c, north.a_m_cf_in_c)
+
+
+def test_what_is_dated_a_little_after_its_arrival_was_taken_when_it_arrived() -> None:
+    ingest = synchronised()
+    sample = ingest.record(Record(1, at(1.02), FLAT), 1.0)
+    assert isinstance(sample, PhoneImu)
+    assert sample.t == 1.0
+    frame = ingest.record(Record(1, at(1.02), Picture(Codec.H264, True, 64, 64, 0, b"x")), 1.0)
+    assert isinstance(frame, EncodedFrame)
+    assert frame.t == 1.0
