@@ -14,6 +14,7 @@ import { MinimumDelayClock, eventUs, nowUs } from './clock.js';
  * @property {number} width As seen upright.
  * @property {number} height
  * @property {number} captureUs On the page's clock.
+ * @property {number} lateUs So much later than it was taken that may be [µs].
  * @property {ScreenAngle} screenAngle When it was taken.
  * @property {() => void} close
  */
@@ -33,6 +34,11 @@ import { MinimumDelayClock, eventUs, nowUs } from './clock.js';
  * @property {() => ScreenAngle} screenAngle
  * @property {OnFrame} onFrame
  */
+
+/** Clocks are read late [µs]. */
+const READ_LATE_US = 2000;
+/** A video element tells of a frame on its way to the screen: one turn of the display, 60 a second [µs]. */
+const SHOWN_LATE_US = 17_000;
 
 /**
  * Starts the best way of getting frames.
@@ -123,6 +129,7 @@ function fromVideo({ video, performance, screenAngle, onFrame }) {
       width: metadata.width,
       height: metadata.height,
       captureUs,
+      lateUs: metadata.captureTime === undefined ? SHOWN_LATE_US : READ_LATE_US,
       screenAngle: screenAngle(),
       close: () => {
         if (image !== video) /** @type {VideoFrame} */ (image).close();
@@ -142,7 +149,7 @@ function fromVideo({ video, performance, screenAngle, onFrame }) {
 function frameOf(raw, captureUs, screenAngle) {
   const image = upright(raw);
   const { displayWidth: width, displayHeight: height } = image;
-  return { image, width, height, captureUs, screenAngle, close: () => image.close() };
+  return { image, width, height, captureUs, lateUs: READ_LATE_US, screenAngle, close: () => image.close() };
 }
 
 /**

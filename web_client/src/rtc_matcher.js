@@ -10,6 +10,7 @@
  * @typedef {object} Capture
  * @property {number} captureUs On the page's clock.
  * @property {number} stampUs On the camera's.
+ * @property {number} lateUs So much later than it was taken `captureUs` may be [µs].
  * @property {ScreenAngle} screenAngle
  */
 
@@ -25,8 +26,6 @@ const ENOUGH = 5;
 const OLD_US = 200_000;
 /** A capture further from where it should be is another picture's, its own was skipped [µs]. */
 const FAR_US = 5000;
-/** No frame leaves before it was taken, but clocks are read late [µs]. */
-const EARLY_US = 2000;
 /** Where cameras are too regular to tell, the quicker encoder is believed: a period costs half a ms. */
 const DELAY_COST = 0.015;
 /** Between a capture and its way out of a quick encoder, where nothing is known of captures [µs]. */
@@ -44,6 +43,10 @@ export class CaptureMatcher {
     this.lastStamp = null;
     this.ticks = 0;
     this.lastUs = -Infinity;
+    /** No frame leaves before it was taken, but captures are told late: so much later they may be, [µs] */
+    this.lateUs = 0;
+    /** and so much later they are, by the quickest frame. */
+    this.foundLateUs = 0;
     /** @type {ScreenAngle} */
     this.screenAngle = 0;
   }
@@ -52,6 +55,7 @@ export class CaptureMatcher {
   captured(capture) {
     this.captures.push(capture);
     this.screenAngle = capture.screenAngle;
+    this.lateUs = capture.lateUs;
     if (this.captures.length > KEPT_CAPTURES) this.captures.shift();
   }
 
@@ -69,7 +73,7 @@ export class CaptureMatcher {
     const found = this.aheadUs === null
       ? { captureUs: nowUs - USUAL_US, screenAngle: this.screenAngle }
       : this.taken(stampUs - this.aheadUs);
-    const captureUs = Math.max(found.captureUs, this.lastUs + 1);
+    const captureUs = Math.max(found.captureUs - this.foundLateUs, this.lastUs + 1);
     this.lastUs = captureUs;
     return { captureUs, screenAngle: found.screenAngle };
   }
@@ -93,14 +97,14 @@ export class CaptureMatcher {
     const last = frames.at(-1);
     if (last === undefined) return null;
     const tried = this.captures
-      .filter(({ captureUs }) => captureUs <= last.outUs + EARLY_US && captureUs > last.outUs - OLD_US)
+      .filter(({ captureUs }) => captureUs <= last.outUs + this.lateUs && captureUs > last.outUs - OLD_US)
       .map(({ stampUs }) => last.stampUs - stampUs);
     if (this.aheadUs !== null) tried.push(this.aheadUs);
     let best = this.aheadUs;
     let least = Infinity;
     for (const rough of tried) {
-      const { aheadUs, misfit } = this.fit(rough, frames);
-      if (misfit < least) [best, least] = [aheadUs, misfit];
+      const { aheadUs, delayUs, misfit } = this.fit(rough, frames);
+      if (misfit < least) [best, least, this.foundLateUs] = [aheadUs, misfit, Math.max(0, -delayUs)];
     }
     return best;
   }
@@ -119,7 +123,7 @@ export class CaptureMatcher {
       misfit += Math.min(Math.abs(offset(this.captures, wayUs)), FAR_US) / frames.length;
       delayUs = Math.min(delayUs, outUs - this.taken(wayUs).captureUs);
     }
-    return { aheadUs, misfit: delayUs < -EARLY_US ? Infinity : misfit + DELAY_COST * delayUs };
+    return { aheadUs, delayUs, misfit: delayUs < -this.lateUs ? Infinity : misfit + DELAY_COST * delayUs };
   }
 
   /** @param {number} rtpTimestamp */

@@ -140,10 +140,10 @@ export class RtcPictures {
    * The camera has given a frame: the track sends it, the record says when it was taken.
    * @param {Frame} frame
    */
-  captured({ image, captureUs, screenAngle, width, height }) {
+  captured({ image, captureUs, lateUs, screenAngle, width, height }) {
     const stampUs = 'timestamp' in image ? image.timestamp : captureUs;
     this.captures.add(this.surroundings.performance.now());
-    this.tell({ type: 'capture', capture: { captureUs, stampUs, screenAngle }, size: { width, height } });
+    this.tell({ type: 'capture', capture: { captureUs, stampUs, lateUs, screenAngle }, size: { width, height } });
     if (this.worker !== null) return;
     this.isFlowing = this.sender !== null; // nobody tells of its pictures
     this.frames.add(this.surroundings.performance.now());

@@ -164,11 +164,11 @@ test('a browser that does not know what to give up last is told by the track', a
 
 test('the worker is told when pictures were taken, how the phone is turned, and the page’s clock', async () => {
   await opened();
-  rtc.pictures.captured(/** @type {any} */ ({ image: { timestamp: 7 }, captureUs: 12, screenAngle: 90, width: 1280, height: 720, close() {} }));
+  rtc.pictures.captured(/** @type {any} */ ({ image: { timestamp: 7 }, captureUs: 12, lateUs: 2000, screenAngle: 90, width: 1280, height: 720, close() {} }));
   rtc.pictures.turned([1, 0, 0, 0]);
   assert.deepEqual(told, [
     { type: 'origin', timeOrigin: 5000 },
-    { type: 'capture', capture: { captureUs: 12, stampUs: 7, screenAngle: 90 }, size: { width: 1280, height: 720 } },
+    { type: 'capture', capture: { captureUs: 12, stampUs: 7, lateUs: 2000, screenAngle: 90 }, size: { width: 1280, height: 720 } },
     { type: 'attitude', orientation: [1, 0, 0, 0] },
   ]);
 });

@@ -94,7 +94,7 @@ async function senderOf(h264 = true) {
     state.captureUs += 33_333;
     const image = /** @type {any} */ ({ timestamp: state.captureUs });
     sender.offer({
-      image, width: 1280, height: 720, captureUs: state.captureUs, screenAngle: 0,
+      image, width: 1280, height: 720, captureUs: state.captureUs, lateUs: 2000, screenAngle: 0,
       close: () => { state.closed += 1; }, ...parts,
     });
   };
@@ -245,7 +245,7 @@ test('an encoder that throws frees the frame and is given up', () => {
     onEncoded: () => {}, onLost: () => log.push('lost'), onFailure: () => log.push('failure'),
   });
   encoder.encode({
-    image: /** @type {any} */ ({ timestamp: 1 }), width: 16, height: 16, captureUs: 1, screenAngle: 0,
+    image: /** @type {any} */ ({ timestamp: 1 }), width: 16, height: 16, captureUs: 1, lateUs: 2000, screenAngle: 0,
     close: () => log.push('closed'),
   });
   assert.deepEqual(log, ['lost', 'failure', 'closed']);
@@ -302,7 +302,7 @@ test('JPEGs that fail, are too large or were overtaken count as lost, and a work
     onFailure: (error) => log.push(`${error}`),
   });
   for (const captureUs of [1, 2, 3, 4]) {
-    const frame = { image: /** @type {any} */ ({}), width: 16, height: 16, captureUs, close: () => {} };
+    const frame = { image: /** @type {any} */ ({}), width: 16, height: 16, captureUs, lateUs: 2000, close: () => {} };
     encoder.encode({ ...frame, screenAngle: 0 });
   }
   const { quality } = encoder;
