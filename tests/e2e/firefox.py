@@ -33,6 +33,22 @@ PREFS = {
     "remote.prefs.recommended": True,
 }
 """Permissions without asking, and no word to anyone else."""
+REST_S = 10.0
+MIDDLE = """
+(async () => {
+  const box = () => {
+    const {x, y, width, height} = document.querySelector(SELECTOR).getBoundingClientRect();
+    return [x + width / 2, y + height / 2];
+  };
+  const before = box();
+  await new Promise((resolve) => setTimeout(resolve, 100));
+  const [x, y] = box();
+  const there = document.elementFromPoint(x, y)?.closest(SELECTOR);
+  return x === before[0] && y === before[1] && there && !there.disabled ? [x, y] : null;
+})()
+"""
+"""Of an element [px]; null while it moves, is covered or can't be used: a page still grows when it
+learns who it is."""
 LISTENING = re.compile(r"WebDriver BiDi listening on (ws://\S+)")
 
 
@@ -105,12 +121,16 @@ class Firefox:
         )
 
     def press(self, selector: str) -> None:
-        """Put the finger on the middle of an element, and leave it there."""
-        box = self.evaluate(
-            f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])"
-            f"(document.querySelector({selector!r}).getBoundingClientRect())"
-        )
-        x, y = map(round, box)
+        """Put the finger on the middle of an element that rests, and leave it there.
+
+        Raises:
+            FirefoxError: it moves on, or something lies over it.
+        """
+        end = time.monotonic() + REST_S
+        while (middle := self.evaluate(MIDDLE.replace("SELECTOR", json.dumps(selector)))) is None:
+            if time.monotonic() > end:
+                raise FirefoxError(f"{selector} does not come to rest in {REST_S:g} s")
+        x, y = map(round, middle)
         self.touch(
             {"type": "pointerMove", "x": x, "y": y, "duration": 0},
             {"type": "pointerDown", "button": 0},

@@ -11,14 +11,29 @@ import numpy as np
 from hardware.sim.hand import Hand
 from tests.e2e.firefox import Firefox
 from tests.e2e.page_scripts import LENS
-from tests.e2e.played_phone import CANVAS, PlayedPhone
+from tests.e2e.played_phone import CANVAS, FORETOLD_S, PlayedPhone
 
 WIDTH, HEIGHT = 915, 412
 FEEL = """
-window.felt = null;
-setInterval(() => {
-  if (window.felt) window.dispatchEvent(new DeviceMotionEvent('devicemotion', window.felt));
-}, 16);
+(() => {
+  // An event has the reading of its own moment, from what was told of the future: a page that is
+  // told late would else feel what was long ago.
+  let told = null;
+  window.tellFelt = (times, felt) => { told = {times, felt}; };
+  const feel = ({times, felt}) => {
+    const t = Math.min(performance.now(), times.at(-1));
+    const next = Math.max(1, times.findIndex((later) => later >= t));
+    const share = (t - times[next - 1]) / (times[next] - times[next - 1]);
+    const [a, l, w] = felt[next - 1].map((from, k) =>
+      from.map((value, i) => value + share * (felt[next][k][i] - value)));
+    const xyz = ([x, y, z]) => ({x, y, z});
+    window.dispatchEvent(new DeviceMotionEvent('devicemotion', {
+      accelerationIncludingGravity: xyz(a), acceleration: xyz(l),
+      rotationRate: {alpha: w[0], beta: w[1], gamma: w[2]}, interval: 16,
+    }));
+  };
+  setInterval(() => { if (told) feel(told); }, 16);
+})();
 """
 NO_MOTION = "delete window.DeviceMotionEvent;"
 
@@ -50,14 +65,20 @@ class FirefoxPhone(PlayedPhone):
         return self.tab.evaluate(script)
 
     def _show(self, spots: str) -> None:
-        now = self._felt(time.monotonic())
-        felt = {
-            "accelerationIncludingGravity": _named("xyz", now["accelerometer"]),
-            "acceleration": _named("xyz", now["linear-acceleration"]),
-            "rotationRate": _named(("alpha", "beta", "gamma"), np.degrees(now["gyroscope"])),
-            "interval": 16,
-        }
-        self.evaluate(f"({spots}, window.felt = {json.dumps(felt)}, null)")
+        now = time.monotonic()
+        times = (1e3 * (now - self._page_epoch() + FORETOLD_S)).tolist()
+        felt = [self._reading(now + ahead) for ahead in FORETOLD_S]
+        self.evaluate(f"({spots}, tellFelt({json.dumps(times)}, {json.dumps(felt)}), null)")
+
+    def _reading(self, t: float) -> list[list[float]]:
+        """Of an event: force with and without gravity [m/s²], turn rate [°/s]."""
+        felt = self._felt(t)
+        turn_rate = np.degrees(felt["gyroscope"])
+        return [
+            felt["accelerometer"].tolist(),
+            felt["linear-acceleration"].tolist(),
+            turn_rate.tolist(),
+        ]
 
     def tap(self, selector: str) -> None:
         """Touch an element shortly."""
@@ -76,7 +97,3 @@ def device_of(tab: Firefox) -> str:
     """What the page will call itself there."""
     width, height, ratio = tab.evaluate("[screen.width, screen.height, devicePixelRatio]")
     return f"Linux {min(width, height)}x{max(width, height)}@{ratio:g} / {LENS}"
-
-
-def _named(names: Any, values: np.ndarray) -> dict[str, float]:
-    return dict(zip(names, map(float, values), strict=True))

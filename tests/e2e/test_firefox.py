@@ -20,6 +20,8 @@ from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
 WAIT_S, LEAD_S = 60.0, 8.0
+REST_S = 5.0
+"""The hand moves before the page is led: what is dated wrongly shows."""
 
 
 @contextlib.contextmanager
@@ -29,7 +31,7 @@ def rig(executable: str, folder: Path, script: str = "") -> Iterator[tuple[Servi
         firefox(executable) as tab,
         serving(folder, "--cameras", str(calibrate(folder, device_of(tab)))) as server,
     ):
-        hand = make_hand("moving", seed=2, t_start=time.monotonic() + WAIT_S)
+        hand = make_hand("moving", seed=2, t_start=time.monotonic() + REST_S)
         leds_in_b = load_robot("ames").robot.leds_in_b
         phone = FirefoxPhone(tab, hand, leds_in_b, server.truth_port, script)
         with contextlib.closing(phone), held():
