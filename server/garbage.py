@@ -20,6 +20,9 @@ NEVER = 1_000_000
 MOST_FROZEN_LATELY = 200_000
 """Objects, since all were visited. Beyond it, and when nobody leads, all are visited again: some of
 what was frozen will have become garbage."""
+IDLE_TICKS = 20
+"""So often idle after use all are visited, too: few objects may hold much memory outside Python, as
+those of a WebRTC connection its ciphers (0.2 MB)."""
 
 
 class Garbage:
@@ -30,6 +33,7 @@ class Garbage:
         self._cpu = cpu
         self._began = 0.0
         self._frozen_lately, self._most_old = 0, MOST_NEW
+        self._idle_ticks = IDLE_TICKS
         self.counts = False
         """Whether a robot is armed: of other times nothing is kept."""
         self.longest_s = 0.0
@@ -69,7 +73,9 @@ class Garbage:
         """
         if self._former is None:
             return
-        if idle and self._frozen_lately > MOST_FROZEN_LATELY:
+        self._idle_ticks = self._idle_ticks + 1 if idle else 0
+        has_left = self._idle_ticks == IDLE_TICKS
+        if idle and (has_left or self._frozen_lately > MOST_FROZEN_LATELY):
             self.settle()
             return
         if _old() <= self._most_old:

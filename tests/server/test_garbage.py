@@ -6,8 +6,9 @@ import gc
 import json
 import subprocess
 import sys
+import weakref
 
-from server.garbage import Garbage, held
+from server.garbage import IDLE_TICKS, Garbage, held
 
 FLIGHT = """
 import gc, json, time
@@ -69,6 +70,28 @@ def test_when_nobody_leads_all_is_visited_and_what_was_frozen_too_early_goes() -
     told = flown(ticks=1_500, maxlen=early, idle=True)
     assert told["frozen"] > 0
     assert told["grown"] < 300_000  # of 600 000
+
+
+def test_what_the_last_leader_left_goes_once_nobody_has_led_for_two_seconds() -> None:
+    class Connection:
+        """Few objects, in a circle."""
+
+    garbage = Garbage(lambda: 0.0)
+    garbage.settle()
+    try:
+        connection = Connection()
+        connection.own = connection  # type: ignore[attr-defined]
+        left = weakref.ref(connection)
+        gc.collect(1)  # it grows old
+        garbage.tick(idle=False)
+        del connection
+        for _ in range(IDLE_TICKS - 1):
+            garbage.tick(idle=True)
+        assert left() is not None
+        garbage.tick(idle=True)
+        assert left() is None
+    finally:
+        garbage.close()
 
 
 def test_python_goes_its_own_way_before_and_afterwards() -> None:
