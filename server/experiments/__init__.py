@@ -1,6 +1,6 @@
 """`lightleash experiments`: what the project claims, measured, as tables and pictures.
 
-One file per experiment, loaded only when asked for.
+Each is loaded only when asked for.
 """
 
 from __future__ import annotations
@@ -26,11 +26,25 @@ EXPERIMENTS: Final = {
     "network": "a phone by WebRTC and by websockets over bad lines; as root on Linux",
     "sweep": "the closed loop over any configuration key and many seeds, on all cores",
 }
-"""Name of the file, what it measures."""
+"""Name, what it measures."""
+MODULES: Final = {
+    "all": "server.experiments.all.command",
+    "paper": "server.experiments.paper.command",
+    "contact": "server.experiments.contact.command",
+    "loop": "server.experiments.loop",
+    "tremor": "server.experiments.tremor",
+    "margins": "server.experiments.margins",
+    "estimators": "server.experiments.estimators",
+    "gaps": "server.experiments.gaps.command",
+    "faults": "server.experiments.faults.command",
+    "network": "server.experiments.network",
+    "sweep": "server.experiments.sweep.command",
+}
+"""Where each one is: a module with what `Experiment` says."""
 
 
 class Experiment(Protocol):
-    """What such a file has."""
+    """What such a module has."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Declare the options."""
@@ -49,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name, measures in EXPERIMENTS.items():
         one = kinds.add_parser(name, help=measures, description=measures)
         if words[:1] == [name]:
-            experiment = cast(Experiment, import_module(f"server.experiments.{name}"))
+            experiment = cast(Experiment, import_module(MODULES[name]))
             experiment.add_arguments(one)
             one.set_defaults(run=experiment.run)
     arguments = parser.parse_args(words)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from server.experiments import EXPERIMENTS, main
+from server.experiments import EXPERIMENTS, MODULES, main
 from server.experiments.all import command, facts, running
 from server.experiments.all.parts import CAPTIONS, LEFT_OUT, PARTS, Part
 
@@ -217,6 +217,7 @@ def test_a_folder_that_cannot_be_written_or_is_not_ours_is_told_in_one_line(
 def test_every_experiment_is_a_part_or_is_left_out_with_a_reason() -> None:
     flown = {part.words(quick)[0] for part in PARTS for quick in (False, True)}
     assert flown | set(LEFT_OUT) == set(EXPERIMENTS)
+    assert set(MODULES) == set(EXPERIMENTS)
     assert not flown & set(LEFT_OUT)
     assert all(LEFT_OUT.values())
     assert {name for name, _ in CAPTIONS} <= flown
@@ -228,7 +229,7 @@ def test_every_experiment_is_a_part_or_is_left_out_with_a_reason() -> None:
 def test_each_part_is_a_command_that_names_its_seeds(part: Part, quick: bool, tmp_path) -> None:
     experiment, *words = part.words(quick)
     parser = argparse.ArgumentParser(exit_on_error=False)
-    import_module(f"server.experiments.{experiment}").add_arguments(parser)
+    import_module(MODULES[experiment]).add_arguments(parser)
     given = parser.parse_args([*words, "--out", str(tmp_path)])
     assert given.out == tmp_path
     for option in {"--seed", "--seeds"} & set(parser._option_string_actions):

@@ -4,9 +4,3 @@
 it, `results` reads the files it wrote, `tables` makes tables of them, `markup` and `page` the page;
 `facts` is what it all ran on.
 """
-
-from __future__ import annotations
-
-from server.experiments.all.command import add_arguments, run
-
-__all__ = ["add_arguments", "run"]

@@ -3,7 +3,3 @@
 `published` is what the paper says; `leader` and `flight` are the set-up, one file per experiment
 flies it, one draws it as the paper does; `assumptions` is what the paper leaves open.
 """
-
-from server.experiments.paper.command import add_arguments, run
-
-__all__ = ["add_arguments", "run"]

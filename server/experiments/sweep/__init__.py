@@ -5,9 +5,3 @@ the filter. One file per idea: `keys` what can be swept, `sweep_file` reading an
 `session` one of them, `workers` who flies, `results` what is kept, `summary` and `picture` what
 is shown.
 """
-
-from __future__ import annotations
-
-from server.experiments.sweep.command import add_arguments, run
-
-__all__ = ["add_arguments", "run"]
