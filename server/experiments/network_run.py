@@ -77,10 +77,12 @@ class Rig:
         """
         self._link = link
         with contextlib.ExitStack() as started:
-            self._server = _start(link.near, "network_server", link.near.address)
+            self._server = _start(link.near, "server.experiments.network_server", link.near.address)
             started.callback(_end, self._server)
             place = msgspec.json.decode(_line(self._server, START_S), type=Place)
-            self._phone = _start(link.far, "network_phone", place.url, place.token)
+            self._phone = _start(
+                link.far, "server.experiments.network_phone", place.url, place.token
+            )
             started.callback(_end, self._phone)
             _line(self._phone, START_S)
             for process in (self._server, self._phone):
@@ -176,7 +178,7 @@ def _arrivals(heard: Heard, kinds: tuple[Kind, ...], after_s: float = 0.0) -> Ar
 def _start(inside: Namespace, module: str, *arguments: str) -> subprocess.Popen[bytes]:
     """A process of ours in a network; it ends with us."""
     return subprocess.Popen(
-        [sys.executable, "-m", f"server.experiments.{module}", *arguments],
+        [sys.executable, "-m", module, *arguments],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         preexec_fn=inside.enter_for_life,
