@@ -76,7 +76,7 @@ def test_offsets_add_up_to_the_size():
 
 def test_every_code_of_a_refusal_is_explained_and_none_is_left_over():
     used = set()
-    for path in (ROOT / "server").glob("*.py"):
+    for path in (ROOT / "server").rglob("*.py"):
         used |= set(re.findall(r'WireError\(\s*"(\w+)"', path.read_text(encoding="utf-8")))
     assert used == set(protocol_text.CODES)
 
