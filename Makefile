@@ -104,7 +104,7 @@ fuzz: dev
 test-all:
 	$(MAKE) test
 	$(MAKE) fuzz
-	LIGHTLEASH_FUZZ_S=60 $(BIN)/pytest tests/hardware/test_watchdog_fuzz.py
+	LIGHTLEASH_FUZZ_S=60 $(BIN)/pytest tests/hardware/link/test_watchdog_fuzz.py
 
 bench: dev
 	$(BIN)/lightleash experiments loop

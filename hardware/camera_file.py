@@ -12,8 +12,8 @@ from typing import Any, NoReturn
 import numpy as np
 import yaml
 
+from pipeline.camera.extrinsics import SQUARE, Mounting
 from pipeline.camera.lens import MODELS, Camera
-from pipeline.camera.mounting import SQUARE, Mounting
 from pipeline.frames import Array
 
 CAMERAS = Path(__file__).parent / "cameras"

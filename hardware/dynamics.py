@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hardware.sim.parameters import PlantParameters
+from hardware.plant_parameters import PlantParameters
 from pipeline.control.dynamics import Dynamics
 from pipeline.frames import GRAVITY
 from pipeline.robot import Robot

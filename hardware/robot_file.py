@@ -17,15 +17,15 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from hardware.robot_physics import allocation_matrix, faults
-from hardware.robot_schema import AXES, BodyImuSection, RobotSchema, Stand, Suspension, clashes
-from hardware.sim.parameters import (
+from hardware.plant_parameters import (
     BodyImuParameters,
     PlantParameters,
     StandParameters,
     StartParameters,
     SuspensionParameters,
 )
+from hardware.robot_physics import allocation_matrix, faults
+from hardware.robot_schema import AXES, BodyImuSection, RobotSchema, Stand, Suspension, clashes
 from pipeline.frames import GRAVITY
 from pipeline.gains import Gains
 from pipeline.robot import Robot

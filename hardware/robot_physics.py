@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import lsq_linear, nnls
 
+from hardware.plant_parameters import PlantParameters, StandParameters, SuspensionParameters
 from hardware.robot_schema import AXES
-from hardware.sim.parameters import PlantParameters, StandParameters, SuspensionParameters
 from pipeline.frames import Array
 from pipeline.robot import Robot
 

@@ -8,10 +8,10 @@ from math import inf
 import numpy as np
 
 from pipeline.config import TeleopConfig, VirtualCameraConfig
-from pipeline.control import failsafe, judgement, resumption
+from pipeline.control import failsafe, flight_envelope, resumption
 from pipeline.control.actuation import Actuation
+from pipeline.control.flight_envelope import Ages
 from pipeline.control.hold import Hold
-from pipeline.control.judgement import Ages
 from pipeline.control.pid import PoseError, Reference, pose_error
 from pipeline.control.station import StationKeeping
 from pipeline.control.tracking import Situation, Tracking
@@ -228,12 +228,13 @@ class Teleop:
         return failsafe.Inputs(
             held=self._operator.held,
             press=self._operator.press,
-            fault=inputs.fault or judgement.fault(limits, is_tracking, known, error),
+            fault=inputs.fault or flight_envelope.fault(limits, is_tracking, known, error),
             gap=inputs.gap,
-            doubt=judgement.doubt(limits, known, self.estimator.complaint) or self._astray(known),
+            doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
+            or self._astray(known),
             refusals=inputs.refusals,
             requests=inputs.requests,
-            robot_left_ms=judgement.saturated_ms(inputs.robot_left_s),
+            robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
             **ages.in_ms(),
         )
 

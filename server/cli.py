@@ -30,8 +30,8 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
 
 
 def _serve(argv: Sequence[str]) -> int:
-    from server import launcher
-    from server.settings import SettingsError, load
+    from server.common.settings import SettingsError, load
+    from server.process import launcher
 
     try:
         settings = load(*_config_of(argv))
@@ -43,19 +43,19 @@ def _serve(argv: Sequence[str]) -> int:
 
 def _server(argv: Sequence[str]) -> int:
     """The server process, as the launcher starts it."""
-    from server import serving
-    from server.launcher import SECRET_VARIABLE
-    from server.settings import load
+    from server.common.settings import load
+    from server.process import server_process
+    from server.process.launcher import SECRET_VARIABLE
 
     runtime, truth_port, https, http, *rest = argv
-    given = serving.Given(
+    given = server_process.Given(
         Path(runtime),
         int(truth_port),
         socket.socket(fileno=int(https)),
         socket.socket(fileno=int(http)),
         bytes.fromhex(os.environ.pop(SECRET_VARIABLE)),
     )
-    return serving.main(load(*_config_of(rest)), given)
+    return server_process.main(load(*_config_of(rest)), given)
 
 
 def _config_of(argv: Sequence[str]) -> tuple[list[str], Path | None]:
@@ -64,7 +64,7 @@ def _config_of(argv: Sequence[str]) -> tuple[list[str], Path | None]:
     if "--config" not in arguments:
         return arguments, None
     at = arguments.index("--config")
-    from server.settings import SettingsError
+    from server.common.settings import SettingsError
 
     if at + 1 >= len(arguments):
         raise SettingsError("--config: a TOML file must follow")
@@ -74,25 +74,25 @@ def _config_of(argv: Sequence[str]) -> tuple[list[str], Path | None]:
 
 
 def _invite(argv: Sequence[str]) -> int:
-    from server.invite import main
+    from server.process.invite import main
 
     return main(list(argv))
 
 
 def _phone(argv: Sequence[str]) -> int:
-    from server.virtual_phone import main
+    from server.virtual_phone.command import main
 
     return main(list(argv))
 
 
 def _replay(argv: Sequence[str]) -> int:
-    from server.replay import main
+    from server.replay.command import main
 
     return main(list(argv))
 
 
 def _locate(argv: Sequence[str]) -> int:
-    from server.locate import main
+    from server.tools.locate import main
 
     return main(list(argv))
 
@@ -104,37 +104,37 @@ def _experiments(argv: Sequence[str]) -> int:
 
 
 def _bench(argv: Sequence[str]) -> int:
-    from server.bench import main
+    from server.experiments.vision import main
 
     return main(list(argv))
 
 
 def _calibrate(argv: Sequence[str]) -> int:
-    from server.calibrate.command import main
+    from server.tools.calibrate.command import main
 
     return main(list(argv))
 
 
 def _robot(argv: Sequence[str]) -> int:
-    from server.robot_leds import main
+    from server.tools.led_layout.command import main
 
     return main(list(argv))
 
 
 def _tune(argv: Sequence[str]) -> int:
-    from server.tune import main
+    from server.tools.tune.command import main
 
     return main(list(argv))
 
 
 def _survey(argv: Sequence[str]) -> int:
-    from server.survey.command import main
+    from server.tools.survey.command import main
 
     return main(list(argv))
 
 
 def _doctor(argv: Sequence[str]) -> int:
-    from server.doctor import main
+    from server.tools.doctor import main
 
     return main(list(argv))
 

@@ -1,7 +1,7 @@
 /* Robot's end of the Lightleash link: gate, watchdog and ramp, for firmware.
  *
- * The same rules as hardware/robot_end.py, the same bytes as hardware/datagram.py; both are held
- * against each other by tests/hardware/test_watchdog.py. No heap, no clock, no I/O, no globals:
+ * The same rules as hardware/link/robot_end.py, the same bytes as hardware/link/datagram.py; both are held
+ * against each other by tests/hardware/link/test_watchdog.py. No heap, no clock, no I/O, no globals:
  * the firmware brings datagrams, time (one monotonic clock, in microseconds) and random numbers.
  * Call everything from one task.
  */

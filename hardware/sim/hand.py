@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
+from hardware.plant_parameters import StartParameters
 from hardware.sim.hand_parts import Keyed, Part, Waves, lift
-from hardware.sim.parameters import StartParameters
 from pipeline.frames import GRAVITY, Array, R_from_rpy, S_in_b, rotation_about_z
 
 REST_S = 2.0

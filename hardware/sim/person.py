@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from hardware.sim.intent import Pose
-from hardware.sim.laser_task import Laser, Tube
+from hardware.sim.plant.laser_task import Laser, Tube
+from hardware.sim.reference_trajectory import Pose
 from pipeline.frames import Array, cross
 
 SLANT_RAD: Final = radians(1.0)

@@ -1,8 +1,8 @@
 """The simulated robot as a process of its own: `python -m hardware.sim.robot --robot ames`.
 
-It is reached as a real one is, over UDP (`udp_link.py`), and lives on when the server or the
-control process dies. Its key comes by the environment (`link_key.py`). Prints one line when ready:
-`ready port=47001 truth_port=47002`.
+It is reached as a real one is, over UDP (`link/udp.py`), and lives on when the server or the
+control process dies. Its key comes by the environment (`link/link_key.py`). Prints one line when
+ready: `ready port=47001 truth_port=47002`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ import sys
 import time
 from collections.abc import Sequence
 
-from hardware.control_end import random_u64
-from hardware.datagram import MAX_BYTES
-from hardware.link_key import LinkKeyError, take_key
+from hardware.link.control_end import random_u64
+from hardware.link.datagram import MAX_BYTES
+from hardware.link.link_key import LinkKeyError, take_key
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from hardware.sim.simulated import TICK_US, SimulatedRobot
 from hardware.sim.truth import REQUEST_BYTES, encode_truth

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hardware.datagram import U64, triple
-from hardware.robot_end import LinkLimits, Peer, RobotEnd
+from hardware.link.datagram import U64, triple
+from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.robot_file import RobotFile
-from hardware.sim.plant import Plant, PlantOptions
+from hardware.sim.plant.plant import Plant, PlantOptions
 from pipeline.frames import Array
 
 TICK_US = 5_000

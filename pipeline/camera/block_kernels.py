@@ -8,7 +8,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.camera.watch_kernels import GLOBAL, LOCAL, add_picture, put_rows, put_turns, whiten
+from pipeline.camera.calibration_monitor_kernels import (
+    GLOBAL,
+    LOCAL,
+    add_picture,
+    put_rows,
+    put_turns,
+    whiten,
+)
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel, multiply, put_exp, turn
 

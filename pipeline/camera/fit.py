@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.camera.watch_kernels import (
+from pipeline.camera.calibration_monitor_kernels import (
     FOCAL,
     GLOBAL,
     HELD,

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.camera.extrinsics import SQUARE, Mounting
 from pipeline.camera.lens_kernels import LENS, put_normalised, put_pixels, put_slopes
-from pipeline.camera.mounting import SQUARE, Mounting
 from pipeline.frames import Array
 
 MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}

@@ -20,7 +20,7 @@ import numpy as np
 
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.imu_history import BODY, PHONE
-from pipeline.estimation.late_fusion import LateFusion, SeenPose, initial_variances
+from pipeline.estimation.out_of_sequence import LateFusion, SeenPose, initial_variances
 from pipeline.estimation.paper_ekf_kernels import MIN_COS_PITCH
 from pipeline.estimation.paper_ekf_replay import seen_pose
 from pipeline.estimation.relative_model import N, States, pose_covariance_in_rpy

@@ -1,4 +1,4 @@
-"""LEDs as a picture saw them, compiled: gate each one, fuse those that pass. `u_form.seen_at`."""
+"""LEDs as a picture saw them, compiled: gate each, fuse those that pass. `gravity_free.seen_at`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The default estimator: LED rays and two IMUs in an error-state filter on SO(3), 22 states.
 
-`u_form` says what moves, `relative_track` when each picture is fused, this file what to believe:
-where to start, which pictures to refuse, when to begin again, and how much is known.
+`gravity_free` says what moves, `relative_track` when each picture is fused, this file what to
+believe: where to start, which pictures to refuse, when to begin again, and how much is known.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.estimation.adaptive_noise import SensorDoubt
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.imu_history import ImuHistory
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
@@ -24,7 +25,6 @@ from pipeline.estimation.relative_start import (
 )
 from pipeline.estimation.relative_track import Anchor, RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_felt
-from pipeline.estimation.sensor_doubt import SensorDoubt
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.estimation.hand_kernels import TAPS, foresee, learn
-from pipeline.estimation.sample_kernels import put_noise, sample_at
-from pipeline.estimation.u_form_kernels import step
+from pipeline.estimation.gravity_free_kernels import step
+from pipeline.estimation.hand_motion_kernels import TAPS, foresee, learn
+from pipeline.estimation.imu_interpolation_kernels import put_noise, sample_at
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel, put_exp
 
@@ -133,8 +133,8 @@ def transit(
 
     `noise` (2, 3, 2) by (body, phone) and (gyroscope, accelerometer): standard deviation of a
     sample, density by which the truth wanders between and after samples, its drift after the last
-    one. `hand` (6,): see `hand_kernels`. R_ic (3, 3) goes on gathering the camera's rotation since
-    the phone's last sample. Gives the count of steps.
+    one. `hand` (6,): see `hand_motion_kernels`. R_ic (3, 3) goes on gathering the camera's rotation
+    since the phone's last sample. Gives the count of steps.
     """
     F[:], G[:], Q[:] = 0.0, 0.0, 0.0
     for k in range(MOVING):

@@ -16,7 +16,7 @@ def noise_of(c: RelativeConfig) -> Array:
 
 
 def hand_of(c: HandConfig) -> Array:
-    """(6,), see `hand_kernels.covariance`."""
+    """(6,), see `hand_motion_kernels.covariance`."""
     return np.array((c.slow, c.length_s, c.tremor, c.tremor_hz, c.coherence_s, c.noise))
 
 

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.hand_kernels import TAPS
+from pipeline.estimation.hand_motion_kernels import TAPS
 from pipeline.estimation.imu_history import ImuHistory
 from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound
 from pipeline.estimation.relative_kernels import (

@@ -9,7 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.frames import Array, log
-from pipeline.identification.start_kernels import CHANCE, COUNT, NAMES, PLACE, SUM, TILT, TURN
+from pipeline.identification.initialisation_kernels import (
+    CHANCE,
+    COUNT,
+    NAMES,
+    PLACE,
+    SUM,
+    TILT,
+    TURN,
+)
 from pipeline.signals import Match
 
 SURE, WEAK = np.log(1e-4), np.log(1e-2)

@@ -7,7 +7,7 @@ from math import acos, cos, sqrt
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.identification.naming_kernels import NEAR_M, Integers, Lights, place
+from pipeline.identification.association_kernels import NEAR_M, Integers, Lights, place
 from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel, multiply, put_exp
 

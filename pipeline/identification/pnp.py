@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, exp
 from pipeline.identification import pnp_kernels
-from pipeline.identification.claim_kernels import put_covariance
+from pipeline.identification.reported_covariance_kernels import put_covariance
 from pipeline.signals import Match, RelativePose, Spots
 
 BELIEF = 4.0

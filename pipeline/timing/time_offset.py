@@ -18,7 +18,7 @@ import numpy.typing as npt
 from pipeline.estimator_config import TimeOffsetConfig
 from pipeline.frames import Array, R_from_wxyz, wxyz_from_R
 from pipeline.signals import BodyImu, PhoneImu
-from pipeline.timing.turns import Turns, conjugate, matrices, product, small_vectors
+from pipeline.timing.attitude_buffer import Turns, conjugate, matrices, product, small_vectors
 
 PARAMETERS: Final = 7
 """Constant attitude, bias of the body's gyroscope, offset."""

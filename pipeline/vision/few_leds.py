@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens import Camera
-from pipeline.expected import Expected
 from pipeline.frames import Array
+from pipeline.prediction import Expected
 from pipeline.signals import Match, Spots
 from pipeline.vision_config import IdentifyConfig
 

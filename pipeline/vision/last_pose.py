@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.expected import Expected
 from pipeline.frames import Array, exp, log
+from pipeline.prediction import Expected
 from pipeline.signals import RelativePose
 
 FORGET_MISSES = 3

@@ -8,20 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.camera.lens import Camera
-from pipeline.camera.rolling import Motion, unrolled
+from pipeline.camera.rolling_shutter import Motion, unrolled
 from pipeline.frames import Array
 from pipeline.identification import pnp
-from pipeline.identification.leaning import Leaning
+from pipeline.identification.initialisation import Starting
 from pipeline.identification.pnp import Naming
-from pipeline.identification.search import Hints
-from pipeline.identification.starting import Starting
+from pipeline.identification.relocalisation import Hints
+from pipeline.identification.tilt_bias import Leaning
 from pipeline.signals import Frame, Match, RelativePose, Spots
 from pipeline.spots import leds
 from pipeline.vision import few_leds
-from pipeline.vision.follow import Follower
+from pipeline.vision.detection import Prior, Sighting
 from pipeline.vision.last_pose import LastPose, Place
+from pipeline.vision.led_tracker import Follower
 from pipeline.vision.rays import NO_RAYS, rays_of
-from pipeline.vision.sighting import Prior, Sighting
 from pipeline.vision_config import IdentifyConfig, LedsConfig
 
 __all__ = ["Prior", "Sighting", "Vision", "warm_up"]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Final, Protocol, cast
 
-from server.one_line import Parser
+from server.common.options import Parser
 
 EXPERIMENTS: Final = {
     "all": "every one below, as one page that stands by itself",
@@ -32,12 +32,12 @@ MODULES: Final = {
     "paper": "server.experiments.paper.command",
     "contact": "server.experiments.contact.command",
     "loop": "server.experiments.loop",
-    "tremor": "server.experiments.tremor",
+    "tremor": "server.experiments.tremor.command",
     "margins": "server.experiments.margins",
-    "estimators": "server.experiments.estimators",
+    "estimators": "server.experiments.estimators.command",
     "gaps": "server.experiments.gaps.command",
     "faults": "server.experiments.faults.command",
-    "network": "server.experiments.network",
+    "network": "server.experiments.network.command",
     "sweep": "server.experiments.sweep.command",
 }
 """Where each one is: a module with what `Experiment` says."""

@@ -16,11 +16,11 @@ import numpy as np
 from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
-from server.control import teleop_config
-from server.experiments import text
-from server.lockstep import Lockstep, Scene
-from server.lockstep_figures import Result, result_of, rows_of
-from server.lockstep_trace import Trace
+from server.common import text
+from server.control.process import teleop_config
+from server.simulation.figures import Result, result_of, rows_of
+from server.simulation.trace import Trace
+from server.simulation.virtual_time import Lockstep, Scene
 
 Hidden = tuple[float, float, tuple[int, ...]]
 
@@ -129,7 +129,7 @@ def hidden(wishes: Sequence[Sequence[str]], leds: int) -> tuple[Hidden, ...]:
 
 def live(arguments: argparse.Namespace) -> int:
     """The same flights in real time, through a server of its own on this machine."""
-    from server import live_loop
+    from server.virtual_phone import live_loop
 
     robot, gains, estimator = arguments.robot, arguments.gains, arguments.estimator
     with live_loop.server(robot, gains, estimator) as environment:

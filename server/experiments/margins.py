@@ -17,7 +17,7 @@ from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.control.margins import OMEGA, Complex, Loop, Sensing, axis_margins
-from server.experiments import text
+from server.common import text
 
 ESTIMATORS = ("relative", "paper", "none")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from ipaddress import ip_address
 
+from server.protocol.wire import WireError
+from server.protocol.wire_records import Codec
 from server.rtc.candidates import LOCAL_NAME
-from server.wire import WireError
-from server.wire_records import Codec
 
 MAX_BYTES, MAX_LINES, MAX_LINE = 16_384, 400, 1_024
 MAX_CANDIDATES = 24

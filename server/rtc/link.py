@@ -6,20 +6,20 @@ import asyncio
 import secrets
 from collections.abc import Callable
 
-from server.clock import now
-from server.hub import Hub
-from server.messages import Refused, encode_message
-from server.operator import OperatorPhone
-from server.rtc import trailer
-from server.rtc.bitstream import size_of_key
-from server.rtc.dating import Dating
-from server.rtc.jitter import Assembled
+from server.common.clock import now
+from server.common.settings import RtcSettings
+from server.phone.phone_session import OperatorPhone
+from server.protocol.messages import Refused, encode_message
+from server.protocol.session import Session
+from server.protocol.wire import WireError, encode
+from server.protocol.wire_records import Codec, Motion, Picture, Pong, Record, Stamp
 from server.rtc.peer import Listener, Peer
-from server.rtc.round_trip import RoundTrip
-from server.session import Session
-from server.settings import RtcSettings
-from server.wire import WireError, encode
-from server.wire_records import Codec, Motion, Picture, Pong, Record, Stamp
+from server.rtc.receiving import metadata_trailer
+from server.rtc.receiving.bitstream import size_of_key
+from server.rtc.receiving.frame_timestamping import Dating
+from server.rtc.receiving.jitter import Assembled
+from server.rtc.receiving.round_trip import RoundTrip
+from server.web.session_manager import Hub
 
 VIDEO_S = 0.5
 """Pictures come this way if one came within this time."""
@@ -146,7 +146,7 @@ class RtcLink:
 
     def _dated(self, codec: Codec, frame: Assembled, t: float) -> Record | None:
         """The picture as it would have come by websocket; None if nobody can say when it was."""
-        data, said = trailer.split(frame.data)
+        data, said = metadata_trailer.split(frame.data)
         if frame.key:
             self._size = size_of_key(codec, data)
         if self._size is None:

@@ -18,16 +18,16 @@ from aiortc import (
 from aiortc.exceptions import InvalidAccessError, InvalidStateError, OperationError
 from aiortc.rtcrtpparameters import RTCRtpCodecCapability
 
+from server.common.settings import RtcSettings
+from server.protocol.wire import WireError
+from server.protocol.wire_records import Codec
 from server.rtc import candidates, stun
 from server.rtc.answer import check_answer
-from server.rtc.bitstream import begins_key
-from server.rtc.intake import Intake
-from server.rtc.jitter import Assembled
 from server.rtc.offer import bitrates, tuned
-from server.settings import RtcSettings
-from server.tls import own_addresses
-from server.wire import WireError
-from server.wire_records import Codec
+from server.rtc.receiver_adapter import Intake
+from server.rtc.receiving.bitstream import begins_key
+from server.rtc.receiving.jitter import Assembled
+from server.security.tls import own_addresses
 
 log = logging.getLogger("lightleash")
 

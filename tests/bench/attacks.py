@@ -19,8 +19,8 @@ from pathlib import Path
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
-from server.wire import VERSION, encode
-from server.wire_records import Codec, Picture, Record
+from server.protocol.wire import VERSION, encode
+from server.protocol.wire_records import Codec, Picture, Record
 
 HOST = "127.0.0.1"
 STRANGERS = [f"127.0.0.{n}" for n in range(2, 22)]

@@ -31,7 +31,7 @@ import numpy as np
 
 from hardware.follower import FollowerError
 from hardware.sim.truth import TruthClient
-from server.one_line import Parser
+from server.common.options import Parser
 from tests.bench.attacks import (
     Attack,
     Target,

@@ -19,12 +19,12 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from hardware.sim.scenes import FIRST_REPORTING_SEED, HD, SCENES, at_reference
-from hardware.sim.scenes_film import Film
-from pipeline.vision.looking import warm_up
-from server.bench.verdicts import REFERENCE
-from server.experiments.text import table
-from server.settings import VideoSettings
+from hardware.sim.scenes.scene import FIRST_REPORTING_SEED, HD, SCENES, at_reference
+from hardware.sim.scenes.video import Film
+from pipeline.vision.visual_front_end import warm_up
+from server.common.settings import VideoSettings
+from server.common.text import table
+from server.experiments.vision.verdicts import REFERENCE
 from tests.bench.browser_eyes import CHROMIUM, RAW, WAYS, Row, Seen, look, row
 from tests.bench.browser_film import Speed, Studio, studio
 from tests.e2e.conftest import find_chromium

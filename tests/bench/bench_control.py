@@ -24,9 +24,9 @@ from pathlib import Path
 from websockets.asyncio.client import connect
 
 from pipeline.config import VirtualCameraConfig
-from server.messages import Hello, encode_message
-from server.runtime import RUN_FILE
-from server.wire import VERSION
+from server.common.runtime import RUN_FILE
+from server.protocol.messages import Hello, encode_message
+from server.protocol.wire import VERSION
 from tests.e2e.serving import serving
 
 SUPERVISORS = 4
@@ -60,7 +60,7 @@ def load(run: dict[str, str], environment: dict[str, str], seconds: float) -> di
         [
             sys.executable,
             "-m",
-            "server.virtual_phone",
+            "server.virtual_phone.command",
             "--hand",
             "moving",
             "--seconds",
@@ -118,17 +118,17 @@ def thread_server(folder: Path) -> Iterator[dict[str, str]]:
 
 def serve_with_thread(folder: Path) -> None:
     """Server in the main thread, the control loop in another."""
-    from hardware.control_end import ControlEnd
-    from hardware.link_key import KEY_VARIABLE, new_key
+    from hardware.link.control_end import ControlEnd
+    from hardware.link.link_key import KEY_VARIABLE, new_key
+    from hardware.link.udp import UdpFollower
     from hardware.robot_file import load_robot
-    from hardware.udp_link import UdpFollower
     from pipeline.estimation.estimators import warm_up
-    from server import control
-    from server import serving as server_process
-    from server.control_link import control_end
-    from server.controller import Controller
-    from server.launcher import free_udp_port, listen
-    from server.settings import load as load_settings
+    from server.common.settings import load as load_settings
+    from server.control import process
+    from server.control.controller import Controller
+    from server.control.ipc import control_end
+    from server.process import server_process
+    from server.process.launcher import free_udp_port, listen
 
     runtime = folder / "lightleash"
     runtime.mkdir(mode=0o700)
@@ -146,11 +146,11 @@ def serve_with_thread(folder: Path) -> None:
         env={**os.environ, KEY_VARIABLE: key.hex()},
     )
     robot_file = load_robot("ames")
-    config = control.teleop_config(robot_file, "phone", VirtualCameraConfig())
+    config = process.teleop_config(robot_file, "phone", VirtualCameraConfig())
     warm_up()
     stopping: list[int] = []
     loop = threading.Thread(
-        target=control._loop,
+        target=process._loop,
         args=(
             Controller(robot_file.robot, config),
             UdpFollower("127.0.0.1", port, ControlEnd.of(robot_file, key, 1)),

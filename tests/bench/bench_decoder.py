@@ -14,8 +14,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from hardware.sim.codec import CODECS, Decoder, Encoder
-from server.decoding import Decoding
+from hardware.codec import CODECS, Decoder, Encoder
+from server.media.decoding import Decoding
 
 WIDTH, HEIGHT, PICTURES, KINDS = 1280, 720, 300, 8
 MOST_MS = 1.0

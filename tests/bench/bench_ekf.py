@@ -1,8 +1,8 @@
 """Cost and accuracy of the 30-state filter: `python -m tests.bench.bench_ekf [seeds]`.
 
 Cost: medians of wall time, and the ratio to the same arithmetic in plain numpy in the same run.
-Accuracy of what is special to this filter: `hardware/sim/world.py`, 20 s each, the first 5 s not
-judged; the rest is in `bench_estimators`.
+Accuracy of what is special to this filter: `hardware/sim/world/world.py`, 20 s each, the first 5 s
+not judged; the rest is in `bench_estimators`.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from hardware.sim import judge, scores
-from hardware.sim.world import Occlusion, Setup, World
-from hardware.sim.world_sensors import feed
+from hardware.sim.world import evaluator, metrics
+from hardware.sim.world.sensors import feed
+from hardware.sim.world.world import Occlusion, Setup, World
 from pipeline.estimation import paper_ekf_replay as compiled
 from pipeline.estimation.estimators import warm_up
 from pipeline.estimation.imu_history import BODY, PHONE
-from pipeline.estimation.late_fusion import imu_variances, walk_densities
+from pipeline.estimation.out_of_sequence import imu_variances, walk_densities
 from pipeline.estimation.paper_ekf import PaperEkf
 from pipeline.estimation.paper_ekf_kernels import workspace
 from pipeline.estimation.relative_model import H_BODY, H_PHONE, H_POSE
@@ -125,12 +125,12 @@ def cold_start():
 
 def one(job):
     config, setup = job
-    return judge.run(PaperEkf(config), World(setup))
+    return evaluator.run(PaperEkf(config), World(setup))
 
 
 def row(name, pool, seeds, config=CONFIG, **setup):
     jobs = [(config, Setup(seed=FIRST_HELD_OUT_SEED + k, **setup)) for k in range(seeds)]
-    s = scores.judge(pool.map(one, jobs))
+    s = metrics.judge(pool.map(one, jobs))
     figures = (s.now_mm, s.now_deg, s.u_mm_s, s.nees, s.held_mm)
     print(name.ljust(34), "".join(f"{v:9.3f}" for v in figures))
 

@@ -1,8 +1,8 @@
 """What an estimator must show: `python -m tests.bench.bench_estimators [NAME] [--seeds 25]`.
 
-NAME: relative, paper or none. Worlds: `hardware/sim/world.py`, 20 s each, the first 5 s not judged,
-seeds on which nothing was tuned. The first table holds for the whole time, the second for the last
-tick before the LEDs are seen again, the third for a time offset between pictures and IMU.
+NAME: relative, paper or none. Worlds: `hardware/sim/world/world.py`, 20 s each, the first 5 s not
+judged, seeds on which nothing was tuned. The first table holds for the whole time, the second for
+the last tick before the LEDs are seen again, the third for a time offset between pictures and IMU.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from hardware.sim import judge, scores
-from hardware.sim.bound import bound, rms
-from hardware.sim.world import LEDS_IN_B, Occlusion, Setup, World
+from hardware.sim.world import evaluator, metrics
+from hardware.sim.world.pcrb import bound, rms
+from hardware.sim.world.world import LEDS_IN_B, Occlusion, Setup, World
 from pipeline.config import TeleopConfig
 from pipeline.estimation.estimators import make_estimator
 
@@ -50,7 +50,7 @@ class Job:
 
 @dataclass
 class Done:
-    track: judge.Track
+    track: evaluator.Track
     now: list = field(default_factory=list)
     captured: list = field(default_factory=list)
     at_return: np.ndarray | None = None
@@ -60,14 +60,14 @@ def work(job):
     config = replace(TeleopConfig(), estimator=job.name)
     world = World(job.setup)
     try:
-        done = Done(judge.run(make_estimator(config, LEDS_IN_B), world))
+        done = Done(evaluator.run(make_estimator(config, LEDS_IN_B), world))
     except Exception as error:
         return f"seed {job.setup.seed}: {error!r}"
     if job.wants == "bound":
         limit = bound(world)
         done.now, done.captured = limit.now, limit.captured
     if job.stop < inf:
-        done.at_return = scores.at_return(done.track, world, job.stop)
+        done.at_return = metrics.at_return(done.track, world, job.stop)
     return done
 
 
@@ -94,7 +94,7 @@ class Bench:
     def whole(self, title, limit=True, **options):
         """A line of the first table; gives (score, its ratios to the bound)."""
         _, done = self.run("bound" if limit else "", **options)
-        score = scores.judge([d.track for d in done])
+        score = metrics.judge([d.track for d in done])
         ratios = (np.nan,) * 4
         if limit:
             best = (
@@ -119,7 +119,7 @@ class Bench:
             stop=10.0 + seconds, duration=10.5 + seconds, occlusions=gap, wants="return"
         )
         e = np.array([d.at_return for d in done])
-        mm, deg = scores.size(e)
+        mm, deg = metrics.size(e)
         worst = 1e3 * np.linalg.norm(e[:, :3], axis=1).max()
         nees = np.concatenate([d.track.now.during(10.1, 10.05 + seconds).nees() for d in done])
         print(f"{title:<34}{mm:9.2f}{deg:8.3f}{worst:9.1f}{nees.mean():9.2f}", flush=True)
@@ -129,8 +129,8 @@ class Bench:
         """A line of the third table; gives (score, what is known of the offset)."""
         setups, done = self.run(alternate=True, time_offset=1e-3 * ms, **options)
         tracks = [d.track for d in done]
-        score = scores.judge(tracks)
-        told = scores.judge_offset(tracks, [s.time_offset for s in setups], start=2.3)
+        score = metrics.judge(tracks)
+        told = metrics.judge_offset(tracks, [s.time_offset for s in setups], start=2.3)
         print(
             f"{f'±{ms} ms, {title}':<34}{score.now_mm:9.2f}{score.now_deg:8.3f}"
             f"{told.rms_ms:9.3f}{told.largest_ms:9.3f}{told.locked_wrong:8d}{score.nees:9.2f}"

@@ -23,8 +23,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from server.experiments.text import flights
-from server.one_line import Parser
+from server.common.options import Parser
+from server.common.text import flights
 from tests.e2e.chromium_rig import flight, led_server, start
 from tests.e2e.conftest import find_chromium
 from tests.e2e.flight_log import SHOWN_S, Flight

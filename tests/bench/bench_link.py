@@ -6,8 +6,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from hardware.datagram import Command, decode_command, encode_command
-from hardware.link_key import mac
+from hardware.link.datagram import Command, decode_command, encode_command
+from hardware.link.link_key import mac
 
 SOURCE = Path(__file__).parents[2] / "deploy" / "watchdog"
 KEY, ROUNDS, TRIES = bytes(range(16)), 20_000, 5

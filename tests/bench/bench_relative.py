@@ -18,9 +18,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from hardware.sim.world import LEDS_IN_B, Occlusion, Setup, World
-from hardware.sim.world_sensors import events, give
-from pipeline.estimation import u_form
+from hardware.sim.world.sensors import events, give
+from hardware.sim.world.world import LEDS_IN_B, Occlusion, Setup, World
+from pipeline.estimation import gravity_free
 from pipeline.estimation.estimators import warm_up
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
@@ -70,16 +70,16 @@ def main():
     span = now - track.newest.t
     steps = round(span / 0.005)
     here = track.newest
-    felt = u_form.Felt(*track.inputs_now().reshape(4, 3))
+    felt = gravity_free.Felt(*track.inputs_now().reshape(4, 3))
 
     def plain():
-        x = u_form.Motion(here.x[0:3], here.R, here.x[3:6])
+        x = gravity_free.Motion(here.x[0:3], here.R, here.x[3:6])
         P = here.P[:9, :9].copy()
         for _ in range(steps):
-            F, G = u_form.error_jacobian(x, felt)
+            F, G = gravity_free.error_jacobian(x, felt)
             Phi = np.eye(9) + 0.005 * F
             P = Phi @ P @ Phi.T + 0.005 * G @ G.T
-            x = u_form.step(x, felt, 0.005)
+            x = gravity_free.step(x, felt, 0.005)
 
     fast, slow = median_us(whole, 1000), median_us(plain, 50)
     print(f"state(now) {1e3 * span:.0f} ms after the last picture: {fast:.0f} µs;", end=" ")

@@ -28,8 +28,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 from playwright.sync_api import BrowserContext, Page
 
-from server.experiments.text import table
-from server.settings import VideoSettings
+from server.common.settings import VideoSettings
+from server.common.text import table
 from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
 from tests.e2e.chromium_channel import SENSORS, Channel, feeling, reading
 from tests.e2e.chromium_phone import browser

@@ -28,8 +28,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from server.experiments.text import table
-from server.one_line import Parser
+from server.common.options import Parser
+from server.common.text import table
 from tests.e2e.flight_log import FlightLog
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import processes

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hardware.sim.scenes_film import Film, Shot
+from hardware.sim.scenes.video import Film, Shot
 from pipeline.signals import Frame
-from pipeline.vision.felt import Felt
-from pipeline.vision.looking import Looking
+from pipeline.vision.imu_buffer import Felt
+from pipeline.vision.visual_front_end import Looking
 from pipeline.vision_config import GatesConfig
-from server.bench.channel import Wire
-from server.bench.errors import MEDIAN_CHI2_6, Error, is_wrong, measured
-from server.settings import VideoSettings
+from server.common.settings import VideoSettings
+from server.experiments.vision.channel import Wire
+from server.experiments.vision.errors import MEDIAN_CHI2_6, Error, is_wrong, measured
 from tests.bench.browser_film import Delivered
 from tests.bench.y4m_camera import VIDEO
 

@@ -16,14 +16,14 @@ import av
 import numpy as np
 from playwright.sync_api import Page
 
-from hardware.sim.scenes_film import RATE_HZ
+from hardware.sim.scenes.video import RATE_HZ
 from pipeline.signals import Image
-from server.bench.write import camera_text
-from server.frame_decoder import FrameDecoder
-from server.ingest import EncodedFrame
-from server.recording_files import read
-from server.wire import decode
-from server.wire_records import Codec, Picture
+from server.experiments.vision.write import camera_text
+from server.phone.decoder import FrameDecoder
+from server.phone.ingest import EncodedFrame
+from server.protocol.wire import decode
+from server.protocol.wire_records import Codec, Picture
+from server.recording.reader import read
 from tests.bench.y4m_camera import number_of, write_y4m
 from tests.e2e.chromium_channel import feeling, reading
 from tests.e2e.chromium_phone import browser

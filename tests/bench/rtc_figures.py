@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from server.settings import VideoSettings
+from server.common.settings import VideoSettings
 
 RATE_HZ = 30.0
 CLOCK_MS = 2.0

@@ -21,20 +21,20 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from pipeline.signals import Image
-from server.app import body_of, make_app
-from server.clock import now
-from server.frame_decoder import FrameDecoder
-from server.frame_thread import FrameThread
-from server.guard import Guard
-from server.ingest import EncodedFrame
-from server.operator import OperatorPhone
-from server.serving import SWITCH_S
-from server.settings import VideoSettings
-from server.view_proxy import routes as view_routes
-from server.websocket import PageServer
+from server.common.clock import now
+from server.common.settings import VideoSettings
+from server.phone.decoder import FrameDecoder
+from server.phone.frame_worker import FrameThread
+from server.phone.ingest import EncodedFrame
+from server.phone.phone_session import OperatorPhone
+from server.process.server_process import SWITCH_S
+from server.security.request_guard import Guard
+from server.view.viser_proxy import routes as view_routes
+from server.web.app import body_of, make_app
+from server.web.websocket import PageServer
 from tests.e2e.clock_canvas import painted_ms
 from tests.server.house import HOST
-from tests.server.rtc_house import RtcHouse
+from tests.server.rtc.rtc_house import RtcHouse
 
 WATCH_S = 0.1
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.sim.codec import BLACK, WHITE
+from hardware.codec import BLACK, WHITE
 from pipeline.signals import Image
 
 BITS, BLOCK_PX = 9, 32

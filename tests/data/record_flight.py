@@ -6,12 +6,12 @@ from pathlib import Path
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
 from pipeline.config import TeleopConfig
-from server.lockstep import Lockstep, Scene
-from server.messages import Hello, encode_message
-from server.phone_script import DEVICE
-from server.recording import CAMERA_KEY, DEVICE_KEY, ROBOT_KEY, SETTINGS_KEY, Recorder
-from server.wire import VERSION, encode
-from server.wire_records import Ping
+from server.protocol.messages import Hello, encode_message
+from server.protocol.wire import VERSION, encode
+from server.protocol.wire_records import Ping
+from server.recording.writer import CAMERA_KEY, DEVICE_KEY, ROBOT_KEY, SETTINGS_KEY, Recorder
+from server.simulation.virtual_time import Lockstep, Scene
+from server.virtual_phone.phone_script import DEVICE
 
 SCENE = Scene(hand="demo", seed=11, frame_rate_hz=20.0, bitrate_bps=450_000)
 SECONDS = 5.5

@@ -13,7 +13,7 @@ from playwright.sync_api import BrowserContext, CDPSession, Page
 from pipeline.frames import GRAVITY, R_cd, R_co
 from tests.e2e.chromium_channel import SENSORS, feeling, reading
 from tests.e2e.page_scripts import BE_CAMERA
-from tests.server.filming import Motion, Phone, Studio, omega_cf_in_o, scaled
+from tests.server.calibration.filming import Motion, Phone, Studio, omega_cf_in_o, scaled
 
 FILM_FPS, FILM_S = 15.0, 30.0
 PHONE = scaled(Phone(readout_s=0.0), 640)

@@ -12,8 +12,8 @@ from playwright.sync_api import BrowserContext
 
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
-from server.bench.write import camera_text
-from server.garbage import held
+from server.diagnostics.garbage import held
+from server.experiments.vision.write import camera_text
 from tests.e2e.chromium_phone import ChromiumPhone, browser
 from tests.e2e.flight_log import Flight, FlightLog
 from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone

@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from pipeline.config import FailsafeConfig
-from server.wire import VERSION
+from server.protocol.wire import VERSION
 from tests.e2e.serving import Serving
 from tests.e2e.witness import Hole
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hardware.sim.hand import Hand
-from hardware.sim.intent import Intent, Pose
+from hardware.sim.reference_trajectory import Intent, Pose
 from hardware.sim.truth import Truth, TruthClient
 from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from hardware import udp_link
-from hardware.link_key import KEY_VARIABLE, write_key
+from hardware.link import udp
+from hardware.link.link_key import KEY_VARIABLE, write_key
 from hardware.robot_file import load_robot
 
 WATCHDOG = Path(__file__).parents[2] / "deploy" / "watchdog"
@@ -49,8 +49,8 @@ class RealTimeRig:
             self.process.stdout.close()
 
 
-def connect(port: int, epoch: int = 1, key: bytes = KEY) -> udp_link.UdpFollower:
-    return udp_link.connect(AMES, key, epoch, "127.0.0.1", port)
+def connect(port: int, epoch: int = 1, key: bytes = KEY) -> udp.UdpFollower:
+    return udp.connect(AMES, key, epoch, "127.0.0.1", port)
 
 
 def free_port() -> int:

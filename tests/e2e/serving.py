@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.runtime import RUN_FILE
+from server.common.runtime import RUN_FILE
 
 START_S = 180.0
 """The kernels may have to be compiled first, on a busy machine."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hardware.sim.scenes import HD, SCENES, at_reference
-from hardware.sim.scenes_film import Film
-from pipeline.vision.looking import warm_up
-from server.settings import VideoSettings
+from hardware.sim.scenes.scene import HD, SCENES, at_reference
+from hardware.sim.scenes.video import Film
+from pipeline.vision.visual_front_end import warm_up
+from server.common.settings import VideoSettings
 from tests.bench.browser_eyes import CHROMIUM, RAW, WAYS, Seen, look, row
 from tests.bench.browser_film import Speed, studio
 from tests.bench.y4m_camera import BITS, number_of, numbered

@@ -11,7 +11,7 @@ from tests.e2e.board_film import PHONE, FilmingPhone
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.serving import DEVICE, serving
-from tests.server.filming import Motion
+from tests.server.calibration.filming import Motion
 
 pytestmark = pytest.mark.e2e
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from server.offline import run_offline
-from server.recording_files import read
-from server.wire import decode
-from server.wire_records import Picture
+from server.protocol.wire import decode
+from server.protocol.wire_records import Picture
+from server.recording.reader import read
+from server.replay.offline import run_offline
 from tests.e2e.chromium_phone import ChromiumPhone
 from tests.e2e.chromium_rig import led_server
 from tests.e2e.serving import Serving

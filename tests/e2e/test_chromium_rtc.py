@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, Route
 
-from hardware.sim.codec import Decoder
-from server.frame_decoder import CODEC_NAMES
-from server.recording_files import read
-from server.wire import decode
-from server.wire_records import Codec, Picture, Record, Touch
+from hardware.codec import Decoder
+from server.phone.decoder import CODEC_NAMES
+from server.protocol.wire import decode
+from server.protocol.wire_records import Codec, Picture, Record, Touch
+from server.recording.reader import read
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE, calibrate, flown, led_server, start
 from tests.e2e.clock_canvas import clock_canvas, painted_ms

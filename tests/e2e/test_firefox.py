@@ -12,7 +12,7 @@ import pytest
 
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
-from server.garbage import held
+from server.diagnostics.garbage import held
 from tests.e2e.chromium_rig import calibrate, flown
 from tests.e2e.firefox import firefox
 from tests.e2e.firefox_phone import NO_MOTION, FirefoxPhone, device_of

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from hardware.sim.link import Link
-from hardware.sim.link_emulator import CLEAN, Conditions
-from hardware.sim.namespace import Namespace, NamespaceError
+from hardware.sim.network.channel import CLEAN, Conditions
+from hardware.sim.network.emulated_link import Link
+from hardware.sim.network.netns import Namespace, NamespaceError
 
 pytestmark = pytest.mark.e2e
 PORT = 5000
@@ -142,7 +142,7 @@ def test_a_process_starts_inside_and_sees_that_network_alone(link: Link) -> None
 
 HOLDER = """
 import subprocess, sys
-from hardware.sim.link import Link
+from hardware.sim.network.emulated_link import Link
 with Link() as link:
     inside = subprocess.Popen(["sleep", "600"], preexec_fn=link.far.enter_for_life)
     print(inside.pid, flush=True)
@@ -189,7 +189,9 @@ def named_namespaces() -> list[str]:
 
 
 def test_without_rights_it_says_what_it_takes() -> None:
-    script = "from hardware.sim.link import Link; import os; os.setuid(65534); Link()"
+    script = (
+        "from hardware.sim.network.emulated_link import Link; import os; os.setuid(65534); Link()"
+    )
     if os.geteuid() != 0:
         pytest.skip("not root: the rest of these tests is skipped, with the reason")
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)

@@ -8,11 +8,11 @@ from math import isfinite
 
 import pytest
 
-from hardware.sim.link import Link
-from hardware.sim.namespace import NamespaceError
-from server.experiments.network import row_of
-from server.experiments.network_run import Rig
-from server.experiments.network_scenarios import SCENARIOS
+from hardware.sim.network.emulated_link import Link
+from hardware.sim.network.netns import NamespaceError
+from server.experiments.network.command import row_of
+from server.experiments.network.run import Rig
+from server.experiments.network.scenarios import SCENARIOS
 
 pytestmark = pytest.mark.e2e
 SECONDS, MANY_SECONDS = 6.0, 15.0

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from server.runtime import RUN_FILE
+from server.common.runtime import RUN_FILE
 from tests.e2e.chromium_phone import browser
 from tests.e2e.serving import START_S, Serving, serving
 from tests.e2e.test_serve import mode, processes, until

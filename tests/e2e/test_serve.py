@@ -22,11 +22,11 @@ from websockets.sync.client import connect
 
 from hardware.follower import FollowerError
 from hardware.sim.truth import TruthClient
-from server.wire import VERSION
+from server.protocol.wire import VERSION
 from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
-MODULES = {"robot": "hardware.sim.robot", "control": "server.control", "server": "_server"}
+MODULES = {"robot": "hardware.sim.robot", "control": "server.control.process", "server": "_server"}
 ZERO_N = 1e-3
 RAMP_S = 6.0
 """A ramp of one period of the suspension, with the failsafe's waits before it."""
@@ -120,7 +120,7 @@ def test_its_addresses_answer_and_the_certificate_holds_for_who_trusts_its_autho
     _, authority = get(f"{server.http_url}/ca.crt")
     trusting = ssl.create_default_context(cadata=authority.decode())
     for base in (server.https_url, server.local_https):
-        assert b"src/main.js" in get(f"{base}/", trusting)[1]
+        assert b"src/app/main.js" in get(f"{base}/", trusting)[1]
     with pytest.raises(urllib.error.URLError, match="CERTIFICATE"):
         get(f"{server.https_url}/")
     assert b"src/dashboard/main.js" in get(f"{server.http_url}/supervisor")[1]

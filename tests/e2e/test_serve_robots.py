@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from server import live_loop
+from server.virtual_phone import live_loop
 
 pytestmark = pytest.mark.e2e
 

@@ -28,7 +28,7 @@ pytestmark = pytest.mark.e2e
 
 STRANGER = """
     import os, select, socket, sys
-    from hardware.control_end import ControlEnd
+    from hardware.link.control_end import ControlEnd
     from hardware.follower import ThrustCommand
     from hardware.robot_file import load_robot
     import numpy as np

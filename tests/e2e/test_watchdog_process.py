@@ -5,7 +5,7 @@ import subprocess
 import pytest
 
 from hardware.follower import FollowerState, ThrustCommand
-from hardware.link_key import write_key
+from hardware.link.link_key import write_key
 from tests.e2e.robot_rig import KEY, compiled_watchdog, priority, watchdog_robot
 from tests.hardware.follower_contract import FollowerContract, exchange
 

@@ -13,19 +13,14 @@ from mcap.writer import CompressionType, Writer
 
 from hardware.camera_file import CAMERAS, CameraFileError, load_camera
 from hardware.led_file import COUNTS, load_leds
-from hardware.led_layout_file import load_layout
+from hardware.led_layout.file import load_layout
 from hardware.robot_file import ROBOTS, RobotFileError, load_robot
-from server.recorded_setting import (
-    body_samples,
-    first_shape,
-    recorded_camera,
-    recorded_robot,
-)
-from server.recording import CAMERA_KEY, DEVICE_KEY, ENCODINGS, ROBOT_KEY, RecordingError
-from server.recording_files import device_of, read, recover
-from server.replay import timed
-from server.wire import VERSION, encode
-from server.wire_records import Codec, Picture, Pong, Record, Touch
+from server.protocol.wire import VERSION, encode
+from server.protocol.wire_records import Codec, Picture, Pong, Record, Touch
+from server.recording.reader import device_of, read, recover
+from server.recording.writer import CAMERA_KEY, DEVICE_KEY, ENCODINGS, ROBOT_KEY, RecordingError
+from server.replay.command import timed
+from server.replay.setting import body_samples, first_shape, recorded_camera, recorded_robot
 from tests.fuzz.target import target
 
 FOLDER = Path(tempfile.mkdtemp(prefix="lightleash-fuzz-"))
@@ -115,7 +110,7 @@ def camera_file(data: bytes) -> None:
 
 
 def recorded(compression: CompressionType) -> bytes:
-    """A small recording in the layout of `server.recording`."""
+    """A small recording in the layout of `server.recording.writer`."""
     stream = io.BytesIO()
     writer = Writer(stream, chunk_size=600, compression=compression)
     writer.start(profile="lightleash", library="lightleash")

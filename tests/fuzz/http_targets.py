@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 from tests.fuzz.target import target
-from tests.server.rtc_house import RtcHouse
+from tests.server.rtc.rtc_house import RtcHouse
 
 PATHS = (
     "/api/rtc",

@@ -4,8 +4,9 @@ from math import isfinite
 
 import numpy as np
 
-from hardware.control_end import ControlEnd
-from hardware.datagram import (
+from hardware.follower import FollowerState, Refusal, ThrustCommand
+from hardware.link.control_end import ControlEnd
+from hardware.link.datagram import (
     COMMAND_MAGIC,
     MAX_THRUSTERS,
     SAMPLE_MAGIC,
@@ -17,9 +18,8 @@ from hardware.datagram import (
     encode_command,
     encode_sample,
 )
-from hardware.follower import FollowerState, Refusal, ThrustCommand
-from hardware.link_key import MAC_BYTES, mac
-from hardware.robot_end import LinkLimits, RobotEnd
+from hardware.link.link_key import MAC_BYTES, mac
+from hardware.link.robot_end import LinkLimits, RobotEnd
 from tests.fuzz.sequence import pieces, together
 from tests.fuzz.target import target
 

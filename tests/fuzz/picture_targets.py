@@ -1,9 +1,9 @@
 """Encoded pictures, whole streams of them, as the server decodes them."""
 
-from hardware.sim.codec import MAX_SCANS, DecodeError, Decoder, jpeg_size
-from server.frame_decoder import FrameDecoder
-from server.ingest import EncodedFrame
-from server.wire_records import Codec, Picture
+from hardware.codec import MAX_SCANS, DecodeError, Decoder, jpeg_size
+from server.phone.decoder import FrameDecoder
+from server.phone.ingest import EncodedFrame
+from server.protocol.wire_records import Codec, Picture
 from tests.fuzz.pictures import HEIGHT, WIDTH, encoded
 from tests.fuzz.sequence import pieces, together
 from tests.fuzz.target import target

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from hardware.sim.codec import Encoder
+from hardware.codec import Encoder
 
 WIDTH, HEIGHT = 64, 48
 

@@ -1,7 +1,7 @@
 """A parser with a bug put into it, to show that it is found. Not among the targets."""
 
-from server.wire import WireError, decode
-from server.wire_records import Picture
+from server.protocol.wire import WireError, decode
+from server.protocol.wire_records import Picture
 from tests.fuzz.records_targets import record_seeds
 from tests.fuzz.target import Target
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from server.control_link import (
+from server.common.runtime_parameters import TuneInput
+from server.control.ipc import (
     LARGEST,
     MAX_DATAGRAM,
     ControlStatus,
@@ -19,8 +20,7 @@ from server.control_link import (
     expected_of,
     server_end,
 )
-from server.knobs import TuneInput
-from server.seen_input import LedFields, PoseFields, SeenInput
+from server.control.ipc_vision import LedFields, PoseFields, SeenInput
 from tests.fuzz.target import target
 from tests.server.house import control_status
 

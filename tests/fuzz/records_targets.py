@@ -5,12 +5,10 @@ from pathlib import Path
 
 import msgspec
 
-from server import messages, view_proxy, wire
-from server.ingest import EncodedFrame, Ingest
-from server.recording import PHONE_MESSAGES, PHONE_RECORDS, SERVER_MESSAGES, SERVER_RECORDS
-from server.recording_files import read
-from server.wire import MAX_MESSAGE_BYTES, MAX_PIXELS, MAX_RECORD_BYTES, WireError
-from server.wire_records import (
+from server.phone.ingest import EncodedFrame, Ingest
+from server.protocol import messages, wire
+from server.protocol.wire import MAX_MESSAGE_BYTES, MAX_PIXELS, MAX_RECORD_BYTES, WireError
+from server.protocol.wire_records import (
     Codec,
     Credit,
     Motion,
@@ -22,6 +20,9 @@ from server.wire_records import (
     Thumbnail,
     Touch,
 )
+from server.recording.reader import read
+from server.recording.writer import PHONE_MESSAGES, PHONE_RECORDS, SERVER_MESSAGES, SERVER_RECORDS
+from server.view import viser_proxy
 from tests.fuzz.sequence import pieces, together
 from tests.fuzz.target import target
 
@@ -166,7 +167,7 @@ def decode_from_server(data: bytes) -> None:
 
 
 def viewpoint_seeds():
-    camera = view_proxy.ViewerCamera(
+    camera = viser_proxy.ViewerCamera(
         (1.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.8, 0.01, 1000.0, 600, 800,
         (0.0, 0.0, 0.0), (0.0, 0.0, 1.0),
     )  # fmt: skip
@@ -177,15 +178,15 @@ def viewpoint_seeds():
 @target("viewpoint", viewpoint_seeds, max_bytes=2200, mutants=4000)
 def camera_only(data: bytes) -> None:
     """Nothing but a viewpoint goes on to viser, of finite numbers and in our own bytes."""
-    onward = view_proxy.camera_only(data)
+    onward = viser_proxy.camera_only(data)
     if onward is None:
         return
     said = msgspec.msgpack.decode(onward)
     assert said.pop("type") == "ViewerCameraMessage"
-    assert set(said) == set(view_proxy.ViewerCamera.__struct_fields__)
+    assert set(said) == set(viser_proxy.ViewerCamera.__struct_fields__)
     assert all(
         isfinite(number)
         for value in said.values()
         for number in (value if isinstance(value, list) else [value])
     )
-    assert view_proxy.camera_only(onward) == onward
+    assert viser_proxy.camera_only(onward) == onward

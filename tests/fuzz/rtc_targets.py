@@ -24,11 +24,12 @@ from aiortc.rtp import (
 )
 from aiortc.sdp import SessionDescription
 
-from server.rtc import bitstream, jitter, nack, peer, trailer
+from server.protocol.wire import MAX_RECORD_BYTES, WireError, decode, encode
+from server.protocol.wire_records import Codec, Picture, Record
+from server.rtc import peer
 from server.rtc.answer import check_answer
-from server.rtc.dating import Dating
-from server.wire import MAX_RECORD_BYTES, WireError, decode, encode
-from server.wire_records import Codec, Picture, Record
+from server.rtc.receiving import bitstream, jitter, metadata_trailer, nack
+from server.rtc.receiving.frame_timestamping import Dating
 from tests.fuzz.pictures import encoded
 from tests.fuzz.sequence import pieces, together
 from tests.fuzz.target import target
@@ -253,23 +254,27 @@ def size_of_key(data: bytes) -> None:
 
 def trailer_seeds():
     half = (0.5, -0.5, 0.5, -0.5)
-    yield trailer.append(b"\0\0\0\1\x65picture", trailer.FrameRecord(7, 123_456_789, 90, half, 2))
-    yield trailer.append(b"x", trailer.FrameRecord(2**32 - 1, 2**60 - 1, 270, None))
+    yield metadata_trailer.append(
+        b"\0\0\0\1\x65picture", metadata_trailer.FrameRecord(7, 123_456_789, 90, half, 2)
+    )
+    yield metadata_trailer.append(
+        b"x", metadata_trailer.FrameRecord(2**32 - 1, 2**60 - 1, 270, None)
+    )
 
 
 @target("trailer", trailer_seeds, (WireError,), max_bytes=128, mutants=4000)
 def split(data: bytes) -> None:
-    picture, said = trailer.split(data)
+    picture, said = metadata_trailer.split(data)
     if said is None:
         assert picture == data
         return
     assert data.startswith(picture)
-    assert len(data) == len(picture) + trailer.TRAILER_BYTES
+    assert len(data) == len(picture) + metadata_trailer.TRAILER_BYTES
     assert 0 <= said.t_us < 1 << 60
     assert said.shrunk in (0, 1, 2)
     if said.orientation_wxyz is not None:
         assert abs(sum(q * q for q in said.orientation_wxyz) - 1.0) < 1e-9
-    again, repeated = trailer.split(trailer.append(picture, said))
+    again, repeated = metadata_trailer.split(metadata_trailer.append(picture, said))
     assert again == picture
     assert (repeated.sequence, repeated.t_us) == (said.sequence, said.t_us)
     assert (repeated.screen_angle_deg, repeated.shrunk) == (said.screen_angle_deg, said.shrunk)

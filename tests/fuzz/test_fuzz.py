@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from hardware.follower import FollowerState, Refusal
-from hardware.robot_end import RobotEnd
-from server import wire
+from hardware.link.robot_end import RobotEnd
+from server.protocol import wire
 from tests.fuzz.link_targets import RobotRig
 from tests.fuzz.mutate import mutants
 from tests.fuzz.planted import PLANTED

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import socket
 
-from hardware.control_end import ControlEnd
+from hardware.link.control_end import ControlEnd
+from hardware.link.udp import UdpFollower
 from hardware.robot_file import RobotFile
-from hardware.sim.lockstep_follower import LockstepFollower
 from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
-from hardware.udp_link import UdpFollower
+from hardware.sim.virtual_time_follower import LockstepFollower
 
 KEY = bytes(range(16))
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hardware.attitude_keeper import AttitudeGains, AttitudeKeeper
-from hardware.robot_end import LinkLimits, RobotEnd
+from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
 from pipeline.config import HoldConfig
 

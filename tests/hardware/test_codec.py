@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hardware.sim.codec import CODECS, DecodeError, Decoder, Encoder, jpeg_size
+from hardware.codec import CODECS, DecodeError, Decoder, Encoder, jpeg_size
 
 W, H = 320, 240
 VIDEO = ("h264", "vp8")

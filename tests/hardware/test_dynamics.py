@@ -9,7 +9,7 @@ import pytest
 
 from hardware.dynamics import dynamics_of
 from hardware.robot_file import load_robot
-from hardware.sim.plant import Plant
+from hardware.sim.plant.plant import Plant
 
 AMES = load_robot("ames")
 

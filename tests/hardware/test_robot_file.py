@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware.robot_end import LinkLimits
+from hardware.link.robot_end import LinkLimits
 from hardware.robot_file import ROBOTS, RobotFileError, load_robot, robot_of, robot_table
 from hardware.robot_physics import positive_null_vector
 from pipeline import gains as sets

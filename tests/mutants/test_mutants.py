@@ -123,7 +123,7 @@ def test_a_mutant_is_known_by_its_change_wherever_it_stands():
 
 
 def test_python_mutants_are_python_and_none_is_the_original():
-    for file in ("pipeline/control/failsafe.py", "hardware/robot_end.py"):
+    for file in ("pipeline/control/failsafe.py", "hardware/link/robot_end.py"):
         source = (ROOT / file).read_text()
         for mutant in python_mutants(file, source):
             assert mutant.mutated != source

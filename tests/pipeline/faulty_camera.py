@@ -6,12 +6,12 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
-from hardware.sim.rotations import exp_each, rpy_each, skew_each
-from hardware.sim.world import GRID_S, LEDS_IN_B
-from hardware.sim.world_sensors import body_samples, phone_samples, tangents_by_place
+from hardware.sim.world.rotations import exp_each, rpy_each, skew_each
+from hardware.sim.world.sensors import body_samples, phone_samples, tangents_by_place
+from hardware.sim.world.world import GRID_S, LEDS_IN_B
 from pipeline.camera.block import Look
+from pipeline.camera.calibration_monitor import CameraWatch
 from pipeline.camera.lens import Camera
-from pipeline.camera.watch import CameraWatch
 from pipeline.signals import StampOffset
 
 FOCAL = 900.0

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hardware.sim.world import LEDS_IN_B
-from hardware.sim.world_sensors import give
+from hardware.sim.world.sensors import give
+from hardware.sim.world.world import LEDS_IN_B
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
 from pipeline.signals import Seen

@@ -11,7 +11,7 @@ from hardware.robot_file import load_robot
 from hardware.sim.render import Look, render
 from pipeline.frames import R_from_rpy, exp, log
 from pipeline.signals import Frame, LedRays, RelativePose, Seen
-from pipeline.vision.sighting import Prior
+from pipeline.vision.detection import Prior
 
 CAMERA = find_camera("lightleash-virtual-phone", 1280, 720)
 LEDS_IN_B = load_robot(Path(hardware.__file__).parent / "robots" / "ames.toml").robot.leds_in_b

@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.frames import exp
 from pipeline.identification.explanations import SURE, rivals
-from pipeline.identification.search import Hints, Search
+from pipeline.identification.relocalisation import Hints, Search
 from pipeline.signals import Spots
 from pipeline.vision_config import IdentifyConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, is_wrong

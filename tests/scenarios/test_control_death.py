@@ -8,7 +8,7 @@ import pytest
 from hardware.follower import FollowerState
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
-from server.lockstep import Lockstep, Scene
+from server.simulation.virtual_time import Lockstep, Scene
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hardware.sim import judge, scores
-from hardware.sim.bound import bound, rms
-from hardware.sim.world import LEDS_IN_B, Occlusion, Setup, World
+from hardware.sim.world import evaluator, metrics
+from hardware.sim.world.pcrb import bound, rms
+from hardware.sim.world.world import LEDS_IN_B, Occlusion, Setup, World
 from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import NoFilterConfig, RelativeConfig
@@ -27,12 +27,12 @@ def worlds(duration=12.0, **options):
 
 
 def tracks(there):
-    return [judge.run(RelativeFilter(RelativeConfig(), LEDS_IN_B), world) for world in there]
+    return [evaluator.run(RelativeFilter(RelativeConfig(), LEDS_IN_B), world) for world in there]
 
 
 def test_it_is_nearly_as_good_as_anybody_could_be_and_honest():
     there = worlds(tremor_relaxation=FADING)
-    score = scores.judge(tracks(there))
+    score = metrics.judge(tracks(there))
     limits = [bound(world) for world in there]
     now_mm, _ = rms(np.concatenate([limit.now for limit in limits]))
     captured_mm, captured_deg = rms(np.concatenate([limit.captured for limit in limits]))
@@ -47,7 +47,7 @@ def test_it_is_nearly_as_good_as_anybody_could_be_and_honest():
 def test_nobody_beats_the_bound_and_no_filter_least_of_all():
     there = worlds()
     limits = [bound(world) for world in there]
-    score = scores.judge([judge.run(NoFilter(NoFilterConfig()), world) for world in there])
+    score = metrics.judge([evaluator.run(NoFilter(NoFilterConfig()), world) for world in there])
     now_mm, now_deg = rms(np.concatenate([limit.now for limit in limits]))
     captured_mm, captured_deg = rms(np.concatenate([limit.captured for limit in limits]))
     assert score.now_mm > 8.0 * now_mm
@@ -60,14 +60,14 @@ def test_nobody_beats_the_bound_and_no_filter_least_of_all():
 @pytest.mark.parametrize(("visible", "limit_mm"), [((), 100.0), ((0, 2, 4), 12.0), ((1,), 50.0)])
 def test_two_seconds_with_few_leds_or_none_are_bridged(visible, limit_mm):
     there = worlds(9.0, occlusions=(Occlusion(6.0, 8.0, visible),))
-    e = np.array([scores.at_return(t, w, 8.0) for t, w in zip(tracks(there), there, strict=True)])
-    assert scores.size(e)[0] < limit_mm
+    e = np.array([metrics.at_return(t, w, 8.0) for t, w in zip(tracks(there), there, strict=True)])
+    assert metrics.size(e)[0] < limit_mm
     assert np.isfinite(e).all()
 
 
 @cache
 def usual():
-    return scores.judge(tracks(worlds(8.0)))
+    return metrics.judge(tracks(worlds(8.0)))
 
 
 @pytest.mark.parametrize(
@@ -80,13 +80,13 @@ def usual():
     ],
 )
 def test_what_goes_wrong_in_the_world_costs_little(options):
-    worse = scores.judge(tracks(worlds(8.0, **options)))
+    worse = metrics.judge(tracks(worlds(8.0, **options)))
     assert worse.now_mm < 1.35 * usual().now_mm
     assert worse.known_pct == 100.0
 
 
 def test_a_time_offset_is_learnt():
     there = worlds(8.0, time_offset=-0.02)
-    told = scores.judge_offset(tracks(there), [-0.02] * len(there), start=4.0)
+    told = metrics.judge_offset(tracks(there), [-0.02] * len(there), start=4.0)
     assert told.rms_ms < 1.0
     assert told.locked_wrong == 0

@@ -14,11 +14,11 @@ import pytest
 
 from hardware.follower import EXPLANATIONS, FollowerState, Refusal
 from hardware.robot_file import load_robot
-from hardware.sim.lockstep_follower import whole
+from hardware.sim.virtual_time_follower import whole
 from pipeline.config import TeleopConfig
 from pipeline.signals import Mode
-from server.lockstep import Lockstep, Scene
-from server.robot_link import RAMP_BEGUN_S
+from server.control.robot_clock import RAMP_BEGUN_S
+from server.simulation.virtual_time import Lockstep, Scene
 
 pytestmark = pytest.mark.slow
 ROBOT = load_robot("ames")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
-from pipeline.camera.mounting import Mounting
+from pipeline.camera.extrinsics import Mounting
 from pipeline.config import TeleopConfig
 from pipeline.frames import exp
-from server.lockstep import Lockstep, Scene
+from server.simulation.virtual_time import Lockstep, Scene
 
 pytestmark = pytest.mark.slow
 ASKEW = Mounting(exp(np.deg2rad([2.0, -3.0, 2.5])), time_offset_s=0.015)

@@ -15,7 +15,7 @@ from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
-from server.lockstep import Lockstep, Scene
+from server.simulation.virtual_time import Lockstep, Scene
 
 pytestmark = pytest.mark.slow
 QUADROTOR, GROUND = load_robot("quadrotor"), load_robot("ground")

@@ -14,23 +14,23 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
-from server.app import Api, make_app
-from server.audit import Audit
-from server.clock import now
-from server.control_link import ControlStatus, Input, RequestInput, control_end
-from server.estimate import EstimateFields
-from server.guard import Guard
-from server.hub import Hub
-from server.listener import listener
-from server.people_api import PeopleApi
-from server.phone_script import DEVICE
-from server.recorder import Recordings
-from server.security import Doors
-from server.settings import VideoSettings
-from server.view_proxy import routes as view_routes
-from server.websocket import PageServer
-from server.wire import VERSION, decode, encode
-from server.wire_records import Body, Codec, Picture, Ping, Pong, Record, Touch
+from server.common.clock import now
+from server.common.settings import VideoSettings
+from server.control.ipc import ControlStatus, Input, RequestInput, control_end
+from server.control.ipc_estimate import EstimateFields
+from server.protocol.wire import VERSION, decode, encode
+from server.protocol.wire_records import Body, Codec, Picture, Ping, Pong, Record, Touch
+from server.recording.control import Recordings
+from server.security.audit import Audit
+from server.security.listener import listener
+from server.security.request_guard import Guard
+from server.security.security import Doors
+from server.view.viser_proxy import routes as view_routes
+from server.virtual_phone.phone_script import DEVICE
+from server.web.app import Api, make_app
+from server.web.people_api import PeopleApi
+from server.web.session_manager import Hub
+from server.web.websocket import PageServer
 
 HOST = "127.0.0.1"
 DEADLINE_S = 5.0

@@ -13,20 +13,20 @@ from websockets.asyncio.client import connect
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
-from server.app import Api, make_app
-from server.control_link import ControlStatus, Endpoint, control_end
-from server.guard import Guard
-from server.hub import Hub
-from server.launcher import listen
-from server.listener import listener
-from server.people_api import PeopleApi
-from server.quotas import QUOTAS, Quota, Quotas
-from server.recorder import Recordings
-from server.rtc.desk import RtcDesk
-from server.security import Doors
-from server.settings import RtcSettings, VideoSettings
-from server.view_proxy import routes as view_routes
-from server.websocket import PageServer
+from server.common.settings import RtcSettings, VideoSettings
+from server.control.ipc import ControlStatus, Endpoint, control_end
+from server.process.launcher import listen
+from server.recording.control import Recordings
+from server.rtc.signalling_endpoint import RtcDesk
+from server.security.listener import listener
+from server.security.quotas import QUOTAS, Quota, Quotas
+from server.security.request_guard import Guard
+from server.security.security import Doors
+from server.view.viser_proxy import routes as view_routes
+from server.web.app import Api, make_app
+from server.web.people_api import PeopleApi
+from server.web.session_manager import Hub
+from server.web.websocket import PageServer
 
 HOST = "127.0.0.1"
 UNLIMITED = dict.fromkeys(QUOTAS, Quota(1e9, 1e9, 10**6, 10**6))

@@ -4,11 +4,11 @@ import json
 
 from websockets.asyncio.server import serve
 
-from server.access import Access
-from server.messages import Command, Status, Welcome
-from server.phone_client import PhoneClient
-from server.wire import decode, encode
-from server.wire_records import Codec, Credit, Picture, Pong, Record
+from server.common.access import Access
+from server.protocol.messages import Command, Status, Welcome
+from server.protocol.wire import decode, encode
+from server.protocol.wire_records import Codec, Credit, Picture, Pong, Record
+from server.virtual_phone.phone_client import PhoneClient
 
 WELCOME = Welcome("s1", 1, "ames", 1280, 720, 30, 4_000_000)
 JPEG = b"\xff\xd8" + bytes(30)

@@ -41,10 +41,10 @@ def test_help_loads_nothing_heavy():
 @pytest.mark.parametrize(
     ("name", "module"),
     [
-        ("phone", "server.virtual_phone"),
-        ("replay", "server.replay"),
+        ("phone", "server.virtual_phone.command"),
+        ("replay", "server.replay.command"),
         ("experiments", "server.experiments"),
-        ("doctor", "server.doctor"),
+        ("doctor", "server.tools.doctor"),
     ],
 )
 def test_each_command_gets_its_own_words(name, module, monkeypatch):

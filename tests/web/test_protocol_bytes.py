@@ -1,4 +1,4 @@
-"""The page's bytes are the server's bytes: `protocol.js` against `server.wire`, both ways."""
+"""The page's bytes are the server's: `protocol.js` against `server.protocol.wire`, both ways."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from server import wire, wire_records
-from server.messages import Command, Hello, Log, Welcome, decode_message, encode_message
-from server.wire_records import Record
+from server.protocol import wire, wire_records
+from server.protocol.messages import Command, Hello, Log, Welcome, decode_message, encode_message
+from server.protocol.wire_records import Record
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(
@@ -48,7 +48,7 @@ console.log(JSON.stringify({
 
 
 def in_node(encode: list[Any] | None = None, decode: list[str] | None = None) -> dict[str, Any]:
-    script = DRIVER % json.dumps((SOURCES / "protocol.js").as_uri())
+    script = DRIVER % json.dumps((SOURCES / "wire" / "protocol.js").as_uri())
     done = subprocess.run(
         [str(NODE), "--input-type=module", "--eval", script],
         input=json.dumps({"encode": encode or [], "decode": decode or []}),

@@ -10,13 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from server.rtc.trailer import FrameRecord, append, split
+from server.rtc.receiving.metadata_trailer import FrameRecord, append, split
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(
     NODE is None, reason="!!! no node: the page's bytes are NOT checked"
 )
-SOURCE = Path(__file__).resolve().parents[2] / "web_client" / "src" / "rtc_trailer.js"
+SOURCE = (
+    Path(__file__).resolve().parents[2] / "web_client" / "src" / "video" / "metadata_trailer.js"
+)
 DRIVER = f"""
 import {{ withTrailer }} from {json.dumps(SOURCE.as_uri())};
 let text = '';

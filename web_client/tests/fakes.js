@@ -1,6 +1,6 @@
 /** Stand-ins for what a browser gives: a clock with timers, a websocket, a server. */
 
-/** @import {Estimate, Status} from '../src/protocol_types.js' */
+/** @import {Estimate, Status} from '../src/wire/protocol_types.js' */
 
 /** A clock that moves only when told, and its timers. */
 export class FakeTime {

@@ -59,17 +59,17 @@ test('every file a page names is there, and a page weighs less than 92 kB on the
 
 test('no module is left over', () => {
   const used = new Set(PAGES.flatMap(needed));
-  const onlyTypes = ['src/protocol_types.js', 'src/session_types.js'];
+  const onlyTypes = ['src/wire/protocol_types.js', 'src/ui/session_types.js'];
   assert.deepEqual(MODULES.filter((path) => !used.has(path) && !onlyTypes.includes(path)), []);
 });
 
 test('every element the views look for is in their page', () => {
   for (const [page, ...views] of [
-    ['index.html', 'src/view.js', 'src/calibration_view.js', 'src/lens_panel.js', 'src/link_check.js', 'src/pairing_card.js', 'src/choice_card.js',
-      'src/handover_card.js'],
-    ['board.html', 'src/board.js'],
-    ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/knobs.js',
-      'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js', 'src/choice_card.js'],
+    ['index.html', 'src/ui/view.js', 'src/ui/calibration_view.js', 'src/ui/constraints_panel.js', 'src/ui/link_check.js', 'src/ui/pairing_card.js', 'src/ui/choice_card.js',
+      'src/ui/handover_card.js'],
+    ['board.html', 'src/app/board.js'],
+    ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/runtime_parameters.js',
+      'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js', 'src/ui/choice_card.js'],
   ]) {
     const ids = new Set([...read(page ?? '').matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));
     for (const view of views) {

@@ -2,5 +2,5 @@
 
 `parts` lists what is flown, `running` flies each in a process of its own and keeps what became of
 it, `results` reads the files it wrote, `tables` makes tables of them, `markup` and `page` the page;
-`facts` is what it all ran on.
+`provenance` is what it all ran on.
 """

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from hardware.robot_file import load_robot
-from server.experiments.all import facts, results, running
+from server.experiments.all import provenance, results, running
 from server.experiments.all.page import Chapter, Ending, page
 from server.experiments.all.parts import PARTS, Part
 from server.experiments.all.running import FINISHED, FolderError, Record
@@ -58,7 +58,7 @@ class Report:
         """`only` names the parts to fly; all, if there are none."""
         self._folder, self._only, self._quick = folder, only, quick
         self._wanted = [part for part in PARTS if not only or part.name in only]
-        self._versions, self._machine = facts.versions(), facts.machine()
+        self._versions, self._machine = provenance.versions(), provenance.machine()
         self._assumptions = assumptions()
 
     def make(self, fresh: bool) -> int:
@@ -143,9 +143,9 @@ class Report:
 
 def assumptions() -> list[dict[str, str]]:
     """Of the paper's experiments with the AMES."""
-    from server.experiments.paper import assumptions as paper
-    from server.experiments.paper.leader import PAPER
-    from server.experiments.paper.measure import Setup
+    from server.experiments.paper.setup import assumptions as paper
+    from server.experiments.paper.setup.measure import Setup
+    from server.simulation.sensors import PAPER
 
     return paper.json(paper.of(Setup(load_robot("ames"), PAPER, (1,))))
 

@@ -22,8 +22,8 @@ from typing import Final, Literal, NoReturn
 
 import msgspec
 
-from server.clock import now
-from server.experiments.all.facts import ROOT
+from server.common.clock import now
+from server.experiments.all.provenance import ROOT
 
 Status = Literal["begun", "done", "missed", "refused", "failed"]
 FINISHED: Final = ("done", "missed")

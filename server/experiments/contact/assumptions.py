@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from hardware.sim.obstacle import Obstacle
-from hardware.sim.parameters import PlantParameters
+from hardware.plant_parameters import PlantParameters
+from hardware.sim.plant.obstacle import Obstacle
 from server.experiments.contact.measure import IMPACT_S, LOST_MS, SETTLE_S, SMOOTH_S
 from server.experiments.contact.setting import (
     AIM_M,
@@ -17,12 +17,12 @@ from server.experiments.contact.setting import (
     Scene,
     spring_n_m,
 )
-from server.experiments.paper.assumption import Assumption
-from server.experiments.paper.assumptions import json as json
-from server.experiments.paper.assumptions import lines as lines
-from server.experiments.paper.assumptions import phone_sensors, sensors
-from server.experiments.paper.assumptions import plant as plant_parts
-from server.experiments.paper.leader import PAPER, Leader
+from server.experiments.paper.setup.assumption import Assumption
+from server.experiments.paper.setup.assumptions import json as json
+from server.experiments.paper.setup.assumptions import lines as lines
+from server.experiments.paper.setup.assumptions import phone_sensors, sensors
+from server.experiments.paper.setup.assumptions import plant as plant_parts
+from server.simulation.sensors import PAPER, Leader
 
 
 def of(

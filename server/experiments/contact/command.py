@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Final
 
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
-from hardware.sim.obstacle import Socket
+from hardware.sim.plant.obstacle import Socket
+from server.common.ranges import number, whole
+from server.common.text import plain, statements
 from server.experiments.contact import assumptions, picture
 from server.experiments.contact.flight import Trace, fly
 from server.experiments.contact.free import NEAR, Free, free_flights, free_table
 from server.experiments.contact.measure import Row, row_of, table_of
 from server.experiments.contact.setting import LEAST_N, Scene, Way, foretold_n
-from server.experiments.numbers import number, whole
-from server.experiments.paper.leader import PAPER, Leader, phone
-from server.experiments.paper.variants import check_gains
-from server.experiments.text import plain, statements
+from server.experiments.paper.setup.variants import check_gains
+from server.simulation.sensors import PAPER, Leader, phone
 
 STIFF: Final = Way("stiff", None)
 IN_BAND_PCT: Final = 95.0

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.robot_file import RobotFile
-from hardware.sim.plant import PlantOptions
+from hardware.sim.plant.plant import PlantOptions
 from pipeline.frames import Array
 from server.experiments.contact.setting import FLIGHT_S, HOVER_S, Scene, Way
-from server.experiments.paper.leader import Leader
-from server.experiments.paper.led import PERIOD_S, Led
+from server.simulation.led_robot import PERIOD_S, Led
+from server.simulation.sensors import Leader
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 
 from hardware.robot_file import RobotFile
+from server.common.text import Column, dashed
 from server.experiments.contact.setting import Way
-from server.experiments.paper.flight import Flight
-from server.experiments.paper.leader import Leader
-from server.experiments.paper.measure import rms
-from server.experiments.text import Column, dashed
+from server.experiments.paper.setup.flight import Flight
+from server.experiments.paper.setup.measure import rms
+from server.simulation.sensors import Leader
 
 NEAR: Final = "moving"
 """About ±6 cm at 0.3 Hz: the suspension pulls by up to 1.6 N."""

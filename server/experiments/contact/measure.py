@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.frames import Array
+from server.common.text import Column, flights
 from server.experiments.contact.flight import PER_PERIOD, Trace
 from server.experiments.contact.setting import BAND_N, FULL, GO_S, STAY_S, Scene, Way
-from server.experiments.paper.led import PERIOD_S
-from server.experiments.paper.measure import rms
-from server.experiments.text import Column, flights
+from server.experiments.paper.setup.measure import rms
+from server.simulation.led_robot import PERIOD_S
 
 SETTLE_S: Final = 2.0
 """After the hand has arrived; from then on until it goes back the force is to be in the band."""

@@ -7,15 +7,15 @@ from typing import Final
 
 import numpy as np
 
+from hardware.plant_parameters import PlantParameters
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import Hand, MovingHand, steady_wander, tremor
 from hardware.sim.hand_parts import Stroke
-from hardware.sim.obstacle import Obstacle, Socket
-from hardware.sim.parameters import PlantParameters
+from hardware.sim.plant.obstacle import Obstacle, Socket
 from pipeline.config import ComplianceConfig, TeleopConfig, VirtualCameraConfig
 from pipeline.frames import GRAVITY
-from server.experiments.paper.leader import Leader
-from server.experiments.paper.variants import Wishes, config_of, ours
+from server.experiments.paper.setup.variants import Wishes, config_of, ours
+from server.simulation.sensors import Leader
 
 HOVER_S: Final = 4.0
 """From switching on to the hand's move."""

@@ -13,8 +13,10 @@ from typing import Final
 
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
-from server.control import teleop_config
-from server.experiments import processes
+from server.common import processes
+from server.common.ranges import whole
+from server.common.text import dashed, plain, statements
+from server.control.process import teleop_config
 from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.fault import Fault, Outcome, suffer
@@ -24,8 +26,6 @@ from server.experiments.forked import forked
 from server.experiments.gaps import vanish
 from server.experiments.gaps.flight import GapFlight
 from server.experiments.gaps.vanish import Vanished
-from server.experiments.numbers import whole
-from server.experiments.text import dashed, plain, statements
 
 APART_TICKS: Final = 7
 """Between two faults in a flight: each meets another moment of it."""

@@ -13,7 +13,7 @@ from pipeline.frames import Array
 from server.experiments.faults.fault import Happening, World
 from server.experiments.faults.tampering import Datagrams, Inputs
 from server.experiments.gaps.schedule import Gaps, WebRtcLine
-from server.lockstep_line import CleanLine, Kind
+from server.simulation.line import CleanLine, Kind
 
 FOR_EVER_S: Final = 1e6
 

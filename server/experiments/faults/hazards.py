@@ -64,7 +64,7 @@ HAZARDS: Final = (
         "size and angle with each picture; gravity; reprojection",
         "not believed; another size is looked up anew",
         (
-            "server/test_operator.py::"
+            "server/phone/test_phone_session.py::"
             "test_pictures_of_a_size_nobody_calibrated_are_refused_until_the_size_is_right_again",
         ),
     ),
@@ -74,7 +74,7 @@ HAZARDS: Final = (
         "LEDs against both gyroscopes",
         "no arming",
         (
-            "server/test_operator.py::test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed",
+            "server/phone/test_phone_session.py::test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed",
         ),
     ),
     Hazard(
@@ -89,7 +89,7 @@ HAZARDS: Final = (
         "LEDs mixed up, lamps, reflections",
         "reprojection, gravity, each LED's innovation",
         "not believed; as 1",
-        ("pipeline/vision/test_gates.py",),
+        ("pipeline/vision/test_gating.py",),
     ),
     Hazard("9", "The phone's motion sensors are silent", "their age", "COAST; RAMP after 1 s"),
     Hazard(
@@ -97,21 +97,23 @@ HAZARDS: Final = (
         "The phone's motion sensors lie",
         "gravity test at the start; pictures against gyroscope",
         "no arming; in flight the filter trusts them less, or HOLD",
-        ("server/test_sensor_check.py::test_the_sign_of_ios_is_refused_and_named",),
+        ("server/phone/test_sensor_check.py::test_the_sign_of_ios_is_refused_and_named",),
     ),
     Hazard(
         "11",
         "The phone's compass jumps",
         "nobody needs to",
         "nothing: the browser's attitude is not used",
-        ("server/test_sensor_check.py::test_a_jump_of_the_magnetometer_moves_nothing",),
+        ("server/phone/test_sensor_check.py::test_a_jump_of_the_magnetometer_moves_nothing",),
     ),
     Hazard(
         "12",
         "The phone's clock is wrong or jumps",
         "ours alone counts; a time in the future is refused",
         "COAST, until its offset is known again",
-        ("server/test_ingest.py::test_after_a_jump_of_the_clock_dates_are_right_within_a_second",),
+        (
+            "server/phone/test_ingest.py::test_after_a_jump_of_the_clock_dates_are_right_within_a_second",
+        ),
     ),
     Hazard(
         "15",
@@ -121,7 +123,7 @@ HAZARDS: Final = (
         (
             "pipeline/control/test_failsafe.py::"
             "test_a_finger_that_left_during_a_gap_holds_with_the_first_word",
-            "server/test_operator.py::test_a_hidden_page_holds_no_button",
+            "server/phone/test_phone_session.py::test_a_hidden_page_holds_no_button",
         ),
     ),
     Hazard(
@@ -141,7 +143,7 @@ HAZARDS: Final = (
         "A gap in the phone's link: roaming, scan, loss",
         "as 16",
         "COAST, and follows again by itself on the same press; as 16 after 1 s",
-        ("server/test_gaps_experiment.py::test_it_flies_writes_and_draws",),
+        ("server/experiments/test_gaps.py::test_it_flies_writes_and_draws",),
     ),
     Hazard(
         "19",
@@ -149,7 +151,7 @@ HAZARDS: Final = (
         "one place, taken at hello",
         "the second is refused; who leads and leaves is told",
         (
-            "server/test_websocket.py::"
+            "server/web/test_websocket.py::"
             "test_a_second_operator_is_refused_while_the_first_lives_and_led_by_when_it_has_gone",
         ),
     ),
@@ -159,8 +161,8 @@ HAZARDS: Final = (
         "a keyed code, epoch, counter and a fresh number in each datagram; the phone's nonces",
         "refused; the flight goes on",
         (
-            "hardware/test_robot_end.py::test_refuses_what_it_has_taken_before",
-            "server/test_ingest.py::test_invented_and_repeated_nonces_are_refused",
+            "hardware/link/test_robot_end.py::test_refuses_what_it_has_taken_before",
+            "server/phone/test_ingest.py::test_invented_and_repeated_nonces_are_refused",
         ),
     ),
     Hazard(
@@ -168,7 +170,7 @@ HAZARDS: Final = (
         "A foreign web page reaches the server",
         "origin, host, cookie",
         "refused",
-        ("server/test_security.py::test_a_foreign_page_with_our_cookie_changes_nothing",),
+        ("server/security/test_security.py::test_a_foreign_page_with_our_cookie_changes_nothing",),
     ),
     Hazard(
         "22",
@@ -188,7 +190,7 @@ HAZARDS: Final = (
         "The robot's computer restarts",
         "its boot number",
         "no thrust until a new control process began with zero; RAMP",
-        ("server/test_robot_link.py::test_a_robot_that_restarts_has_another_clock",),
+        ("server/control/test_robot_clock.py::test_a_robot_that_restarts_has_another_clock",),
     ),
     Hazard(
         "25",
@@ -196,7 +198,7 @@ HAZARDS: Final = (
         "the robot: silence; control: its own clock",
         "the robot comes down by itself; a fault of its own: RAMP",
         (
-            "server/test_controller.py::"
+            "server/control/test_controller.py::"
             "test_control_that_runs_slowly_ends_a_flight_with_its_own_words",
             "e2e/test_serve.py::"
             "test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarmed",
@@ -218,7 +220,7 @@ HAZARDS: Final = (
         "each boundary",
         "dropped: as if it had not come",
         (
-            "server/test_controller.py::test_what_is_no_number_never_reaches_the_state_by_a_datagram",
+            "server/control/test_controller.py::test_what_is_no_number_never_reaches_the_state_by_a_datagram",
         ),
     ),
     Hazard(
@@ -243,14 +245,16 @@ HAZARDS: Final = (
         "The disk is full or slow",
         "the recorder",
         "the recording ends and says so; the flight does not notice",
-        ("server/test_recording.py::test_a_full_disk_ends_the_recording_and_says_so",),
+        ("server/recording/test_recording.py::test_a_full_disk_ends_the_recording_and_says_so",),
     ),
     Hazard(
         "38",
         "STOP, or disarming, while anything else goes on",
         "control, in the same tick",
         "no thrust at once, in every mode; disarming ramps",
-        ("server/test_controller.py::test_a_stop_wins_over_every_other_wish_of_the_same_tick",),
+        (
+            "server/control/test_controller.py::test_a_stop_wins_over_every_other_wish_of_the_same_tick",
+        ),
     ),
     Hazard(
         "39",

@@ -22,12 +22,17 @@ import numpy as np
 
 from hardware.follower import FollowerError
 from hardware.sim.truth import TruthClient
-from server import clock, live_loop
+from server.common import clock
+from server.common.runtime import RUN_FILE
 from server.experiments.faults.catalogue import RAMP_S, RAMPED_S, ROBOT_RAMP_S
 from server.experiments.faults.fault import ZERO_N
-from server.runtime import RUN_FILE
+from server.virtual_phone import live_loop
 
-MODULES: Final = {"robot": "hardware.sim.robot", "control": "server.control", "server": "_server"}
+MODULES: Final = {
+    "robot": "hardware.sim.robot",
+    "control": "server.control.process",
+    "server": "_server",
+}
 FLIES_S: Final = 3.0
 """Before the fault."""
 WATCHED_S: Final = 6.0
@@ -111,7 +116,7 @@ class Rig:
     @contextlib.contextmanager
     def phone(self, seed: int) -> Iterator[subprocess.Popen[bytes]]:
         """A virtual phone that leads."""
-        command = [sys.executable, "-m", "server.virtual_phone", "--hand", "moving"]
+        command = [sys.executable, "-m", "server.virtual_phone.command", "--hand", "moving"]
         phone = subprocess.Popen(
             [*command, "--seed", str(seed)],
             env=self._environment,

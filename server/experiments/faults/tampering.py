@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import msgspec
 import numpy as np
 
-from server.control_link import Input, OperatorInput, PhoneImuInput
-from server.seen_input import SeenInput
+from server.control.ipc import Input, OperatorInput, PhoneImuInput
+from server.control.ipc_vision import SeenInput
 
 Datagrams = Callable[[bytes], Sequence[bytes]]
 Inputs = Callable[[list[Input]], list[Input]]

@@ -12,16 +12,16 @@ from typing import Final
 
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
-from server.control import teleop_config
-from server.experiments import processes
+from server.common import processes
+from server.common.ranges import number, whole
+from server.common.text import dashed, plain, statements
+from server.control.process import teleop_config
 from server.experiments.gaps import picture, vanish
 from server.experiments.gaps.flight import Case, Log, fly
 from server.experiments.gaps.goals import goals
 from server.experiments.gaps.measure import Flight, Row, flight_of, row_of
 from server.experiments.gaps.traces import MINUTE_S, minutes
 from server.experiments.gaps.vanish import Vanished
-from server.experiments.numbers import number, whole
-from server.experiments.text import dashed, plain, statements
 
 GAPS_MS: Final = (40.0, 90.0, 160.0, 250.0, 400.0, 700.0, 1000.0)
 USUAL_S: Final = 5.0

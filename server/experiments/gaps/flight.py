@@ -9,17 +9,17 @@ from typing import Final, Literal
 import numpy as np
 
 from hardware.robot_file import RobotFile
-from hardware.sim.intent import Intent
+from hardware.sim.reference_trajectory import Intent
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
 from pipeline.teleop import Output
-from server.controller import PERIOD_S
+from server.control.controller import PERIOD_S
 from server.experiments.gaps.person import Holder
 from server.experiments.gaps.schedule import Gaps, WebRtcLine, WebSocketLine
 from server.experiments.gaps.traces import minutes
-from server.lockstep import Lockstep, Scene
-from server.lockstep_line import CleanLine, PhoneLine
+from server.simulation.line import CleanLine, PhoneLine
+from server.simulation.virtual_time import Lockstep, Scene
 
 LED_NOISE_PX: Final = 0.02
 """As vision's of rendered pictures."""

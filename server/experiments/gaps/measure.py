@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 from pipeline.signals import Mode
-from server.controller import PERIOD_S
+from server.control.controller import PERIOD_S
 from server.experiments.gaps.flight import Case, Log
 
 WINDOW_TICKS: Final = 20

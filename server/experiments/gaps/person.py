@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from server.phone_script import VirtualOperator
+from server.virtual_phone.phone_script import VirtualOperator
 
 NOTICES_S: Final = 1.0
 """In HOLD, until the person has read that the button must be pressed anew."""

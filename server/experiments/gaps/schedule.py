@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import floor
 from typing import Final
 
-from server.lockstep_line import Kind
+from server.simulation.line import Kind
 
 KEY_S: Final = 0.100
 """By WebRTC a picture after lost ones can be decoded only once a key picture was asked for: two

@@ -11,25 +11,13 @@ from typing import Final, Protocol, get_args
 
 from hardware.robot_file import RobotFileError, load_robot
 from pipeline.config import EstimatorName, VirtualCameraMode
-from server.experiments import processes
-from server.experiments.numbers import number, whole
-from server.experiments.paper import (
-    assumptions,
-    beaten,
-    disturbance,
-    published,
-    table_1,
-    table_3,
-    table_4,
-)
-from server.experiments.paper.leader import PAPER, Leader, Pictures, phone
-from server.experiments.paper.measure import Setup
-from server.experiments.paper.variants import (
-    Variant,
-    Wishes,
-    check_gains,
-    ours,
-)
+from server.common import processes
+from server.common.ranges import number, whole
+from server.experiments.paper import comparison, disturbance, table_1, table_3, table_4
+from server.experiments.paper.setup import assumptions, published
+from server.experiments.paper.setup.measure import Setup
+from server.experiments.paper.setup.variants import Variant, Wishes, check_gains, ours
+from server.simulation.sensors import PAPER, Leader, Pictures, phone
 
 
 class Outcome(Protocol):
@@ -59,7 +47,7 @@ EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
     table_3.NAME: (table_3.measure, "off"),
     table_4.NAME: (table_4.measure, "selective"),
     disturbance.NAME: (disturbance.measure, "selective"),
-    beaten.NAME: (beaten.measure, "selective"),
+    comparison.NAME: (comparison.measure, "selective"),
 }
 """Each with the virtual camera that ours has in it unless another is wished."""
 

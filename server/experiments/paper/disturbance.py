@@ -11,12 +11,12 @@ from typing import Final
 import numpy as np
 
 from pipeline.frames import Array
-from server.experiments.paper import published
-from server.experiments.paper.flight import Push, Trace
-from server.experiments.paper.measure import Setup
+from server.common.text import Column, flights, plain, statements
 from server.experiments.paper.picture import figure_9
-from server.experiments.paper.variants import WITH_VCI, Variant
-from server.experiments.text import Column, flights, plain, statements
+from server.experiments.paper.setup import published
+from server.experiments.paper.setup.flight import Push, Trace
+from server.experiments.paper.setup.measure import Setup
+from server.experiments.paper.setup.variants import WITH_VCI, Variant
 
 NAME: Final = "disturbance"
 TITLE: Final = (

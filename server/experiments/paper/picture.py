@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from hardware.sim.hand import STEP_M
-from server.experiments.paper import published
-from server.experiments.paper.flight import Trace
+from server.experiments.paper.setup import published
+from server.experiments.paper.setup.flight import Trace
 
 if TYPE_CHECKING:  # loaded only when something is drawn
     from matplotlib.axes import Axes

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from server.experiments.paper import published
 from server.experiments.paper.picture import COLOURS, TIME, panels, save
-from server.experiments.paper.task import PEOPLE, Attempt
+from server.experiments.paper.setup import published
+from server.experiments.paper.setup.task import PEOPLE, Attempt
 
 SHOWN_MM: Final = (-60.0, 20.0)
 """Of the clearance."""

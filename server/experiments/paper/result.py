@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from server.experiments.paper.measure import Cell, table_of
-from server.experiments.text import plain, statements
+from server.common.text import plain, statements
+from server.experiments.paper.setup.measure import Cell, table_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 
-from server.experiments.paper import published
-from server.experiments.paper.flight import Trace
-from server.experiments.paper.measure import Cell, Setup, cell_of
 from server.experiments.paper.picture import figure_6
 from server.experiments.paper.result import Result
-from server.experiments.paper.variants import WITH_EKF, WITHOUT_EKF, Variant
+from server.experiments.paper.setup import published
+from server.experiments.paper.setup.flight import Trace
+from server.experiments.paper.setup.measure import Cell, Setup, cell_of
+from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Variant
 
 NAME = "table_1"
 TITLE = "Table I, Fig. 6: 3 cm in 0.3 s along each axis, RMS in mm"

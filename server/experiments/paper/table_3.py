@@ -16,14 +16,14 @@ from typing import Final
 
 import numpy as np
 
-from server.experiments.paper import published
-from server.experiments.paper.measure import Setup
+from server.common.progress import Progress
+from server.common.text import Column, dashed, plain, statements
 from server.experiments.paper.picture_task import figure_beam, figure_times
-from server.experiments.paper.task import PEOPLE, Attempt
-from server.experiments.paper.trials import Trial, flown, trials_of
-from server.experiments.paper.variants import WITH_EKF, WITHOUT_EKF, Variant
-from server.experiments.text import Column, dashed, plain, statements
-from server.films.progress import Progress
+from server.experiments.paper.setup import published
+from server.experiments.paper.setup.measure import Setup
+from server.experiments.paper.setup.task import PEOPLE, Attempt
+from server.experiments.paper.setup.trials import Trial, flown, trials_of
+from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Variant
 
 NAME: Final = "table_3"
 TITLE: Final = (

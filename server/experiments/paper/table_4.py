@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from math import nan
 from pathlib import Path
 
-from server.experiments.paper import published
-from server.experiments.paper.flight import Trace
-from server.experiments.paper.measure import Cell, Setup, cell_of
 from server.experiments.paper.picture import figure_7, figure_8
 from server.experiments.paper.result import Result
-from server.experiments.paper.variants import WITH_VCI, WITHOUT_VCI, Variant
+from server.experiments.paper.setup import published
+from server.experiments.paper.setup.flight import Trace
+from server.experiments.paper.setup.measure import Cell, Setup, cell_of
+from server.experiments.paper.setup.variants import WITH_VCI, WITHOUT_VCI, Variant
 
 NAME = "table_4"
 TITLE = "Table IV, Fig. 7, 8: 3° in 0.3 s about z_c at 2.5 m, RMS in mm and degrees"

@@ -10,16 +10,16 @@ from contextlib import closing
 from pathlib import Path
 from time import monotonic
 
-from server.experiments.numbers import whole
-from server.experiments.processes import cores
+from server.common.processes import cores
+from server.common.progress import Progress
+from server.common.ranges import whole
 from server.experiments.sweep import picture, summary
 from server.experiments.sweep.errors import SweepError
-from server.experiments.sweep.keys import Number, Switch, Word, known_keys
 from server.experiments.sweep.results import Results
-from server.experiments.sweep.session import Outcome, Session
 from server.experiments.sweep.sweep_file import Sweep, examples, read
 from server.experiments.sweep.workers import on_cluster, on_processes
-from server.films.progress import Progress
+from server.simulation.session import Outcome, Session
+from server.simulation.sweep_keys import Number, Switch, Word, known_keys
 
 INTERRUPTED, KILLED = 130, 3
 

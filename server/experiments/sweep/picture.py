@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from server.experiments.sweep.keys import Value
-from server.experiments.sweep.session import Outcome
 from server.experiments.sweep.summary import by_value, went_well, worded
 from server.experiments.sweep.sweep_file import Sweep
+from server.simulation.session import Outcome
+from server.simulation.sweep_keys import Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

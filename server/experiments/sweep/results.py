@@ -19,9 +19,9 @@ from typing import Any
 
 from server.experiments.sweep import summary
 from server.experiments.sweep.errors import SweepError
-from server.experiments.sweep.made_with import other, versions
-from server.experiments.sweep.session import FIGURES, Figures, Outcome
+from server.experiments.sweep.provenance import other, versions
 from server.experiments.sweep.sweep_file import Sweep
+from server.simulation.session import FIGURES, Figures, Outcome
 
 
 class Results:

@@ -8,10 +8,10 @@ from math import isnan
 
 import numpy as np
 
-from server.experiments import text
-from server.experiments.sweep.keys import Value
-from server.experiments.sweep.session import Outcome
+from server.common import text
 from server.experiments.sweep.sweep_file import Sweep
+from server.simulation.session import Outcome
+from server.simulation.sweep_keys import Value
 
 
 @dataclass(frozen=True, slots=True)

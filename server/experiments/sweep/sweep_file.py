@@ -24,8 +24,8 @@ from typing import Any, Final, cast
 
 from hardware.robot_file import RobotFileError, robot_of, robot_path, robot_table
 from server.experiments.sweep.errors import SweepError
-from server.experiments.sweep.keys import Allowed, Number, Value, known_keys, nearest
-from server.experiments.sweep.session import Session, Settings, prepared
+from server.simulation.session import Session, Settings, prepared
+from server.simulation.sweep_keys import Allowed, Number, Value, known_keys, nearest
 
 TOP: Final = ("robot", "seeds", "seconds", "settle_s", "fixed", "grid", "list")
 SECONDS: Final = Number(1.0, 600.0)

@@ -12,11 +12,11 @@ from itertools import islice
 from typing import TYPE_CHECKING, Final
 
 import server
-from server.experiments import processes
-from server.experiments.processes import AHEAD
-from server.experiments.sweep import made_with
+from server.common import processes
+from server.common.processes import AHEAD
+from server.experiments.sweep import provenance
 from server.experiments.sweep.errors import SweepError
-from server.experiments.sweep.session import Outcome, Session, fly
+from server.simulation.session import Outcome, Session, fly
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -35,7 +35,7 @@ def on_processes(sessions: Iterable[Session], workers: int) -> Generator[Outcome
 
 def version() -> str:
     """Of what a worker flies with."""
-    return f"{server.__version__}, code {made_with.code()}"
+    return f"{server.__version__}, code {provenance.code()}"
 
 
 def on_cluster(sessions: Iterable[Session], address: str) -> Generator[Outcome, None, None]:

@@ -3,8 +3,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from pipeline.camera.extrinsics import Mounting
 from pipeline.camera.lens import Camera, points_of
-from pipeline.camera.mounting import Mounting
 
 K = np.array([[930.0, 0.0, 646.0], [0.0, 931.5, 354.0], [0.0, 0.0, 1.0]])
 LENSES = {

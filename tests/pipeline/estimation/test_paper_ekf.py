@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim import judge, scores
-from hardware.sim.world import Setup, World
-from hardware.sim.world_sensors import body_samples, feed
+from hardware.sim.world import evaluator, metrics
+from hardware.sim.world.sensors import body_samples, feed
+from hardware.sim.world.world import Setup, World
 from pipeline.estimation.estimator import Fusion
 from pipeline.estimation.paper_ekf import PaperEkf
 from pipeline.estimator_config import EkfConfig
@@ -233,7 +233,9 @@ def test_the_states_are_the_callers_own():
 def test_it_is_accurate_and_knows_how_accurate():
     """Phone latency, seeds not tuned on: honest means a mean NEES near 6."""
     worlds = [World(Setup(seed=seed, duration=8.0)) for seed in (31, 32)]
-    both = scores.judge([judge.run(PaperEkf(EkfConfig()), world) for world in worlds], start=4.0)
+    both = metrics.judge(
+        [evaluator.run(PaperEkf(EkfConfig()), world) for world in worlds], start=4.0
+    )
     assert both.now_mm < 7.5
     assert both.now_deg < 0.25
     assert both.u_mm_s < 35.0

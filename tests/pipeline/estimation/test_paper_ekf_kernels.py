@@ -6,7 +6,7 @@ import pytest
 from pipeline.estimation import paper_ekf_kernels as kernels
 from pipeline.estimation import paper_ekf_replay as compiled
 from pipeline.estimation.imu_history import BODY, PHONE
-from pipeline.estimation.late_fusion import imu_variances, walk_densities
+from pipeline.estimation.out_of_sequence import imu_variances, walk_densities
 from pipeline.estimation.relative_model import (
     H_BODY,
     H_PHONE,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.estimation import ray_kernels, u_form
+from pipeline.estimation import gravity_free, ray_kernels
+from pipeline.estimation.gravity_free import Felt, Motion
 from pipeline.estimation.ray_kernels import TOUCHED, correct, fuse_rays, is_sound
 from pipeline.estimation.relative_kernels import OFFSET, X_OFFSET, N, X
-from pipeline.estimation.u_form import Felt, Motion
 from pipeline.frames import R_from_rpy, exp, log
 
 LEDS = np.array([[0.28, 0.0, 0.05], [0.0, 0.3, -0.06], [-0.05, -0.3, -0.03], [-0.2, 0.05, 0.2]])
@@ -28,10 +28,10 @@ def state(pitch=0.3):
 def expected(x, R, led, ahead=0.0):
     """Tangents, H (2, 22); the readable way."""
     motion, felt = Motion(x[:3], R, x[3:6]), Felt(*FELT.reshape(4, 3))
-    H_z, z_rate = u_form.seen_jacobian(motion, felt, led)
+    H_z, z_rate = gravity_free.seen_jacobian(motion, felt, led)
     H = np.zeros((2, N))
     H[:, :6], H[:, OFFSET] = H_z, z_rate
-    return u_form.seen_at(motion, led) + z_rate * ahead, H
+    return gravity_free.seen_at(motion, led) + z_rate * ahead, H
 
 
 def covariances(m, sigma=5e-4):
@@ -55,7 +55,7 @@ def fuse(x, R, P, tangents, C, ahead=HERE, gate=GATE, use=None, leds=LEDS):
 
 @pytest.mark.parametrize("pitch", [0.3, np.pi / 2, -np.pi / 2])
 def test_expected_tangents_and_jacobian_are_the_readable_ones(pitch):
-    """Which finite differences vouch for, the derivative by time included: `test_u_form`."""
+    """Which finite differences vouch for, the derivative by time included: `test_gravity_free`."""
     x, R, _ = state(pitch)
     for led in LEDS:
         place, H = np.empty(2), np.full((2, 7), np.nan)
@@ -72,7 +72,7 @@ def test_the_compiled_jacobian_is_that_of_finite_differences():
 
     def seen(error):
         moved = Motion(x[:3] + error[:3], R @ exp(error[3:6]), x[3:6])
-        return u_form.seen_at(moved, LEDS[0])
+        return gravity_free.seen_at(moved, LEDS[0])
 
     ray_kernels._expect(x, R, FELT, LEDS[0], 0.0, place, H)
     columns = np.array([(seen(e * k) - seen(-e * k)) / (2.0 * e) for k in np.eye(6)]).T
@@ -148,8 +148,8 @@ def test_a_row_exposed_later_is_compared_with_where_the_led_will_be():
     """30 ms of rolling shutter over a moving robot agree with the state at its middle."""
     x, R, P = state()
     inputs, ahead = Felt(*FELT.reshape(4, 3)), np.array([-0.015, -0.005, 0.005, 0.015])
-    at = [u_form.step(Motion(x[:3], R, x[3:6]), inputs, h) for h in ahead]
-    tangents = np.array([u_form.seen_at(m, led) for m, led in zip(at, LEDS, strict=True)])
+    at = [gravity_free.step(Motion(x[:3], R, x[3:6]), inputs, h) for h in ahead]
+    tangents = np.array([gravity_free.seen_at(m, led) for m, led in zip(at, LEDS, strict=True)])
     C = np.tile(1e-7 * np.eye(2), (4, 1, 1))
     dated, ignorant = (
         fuse(*(a.copy() for a in (x, R, P)), tangents, C, a)[0] for a in (ahead, HERE)

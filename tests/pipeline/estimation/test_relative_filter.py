@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.judge import run
-from hardware.sim.world import Occlusion, Setup, World
-from hardware.sim.world_sensors import events, give
+from hardware.sim.world.evaluator import run
+from hardware.sim.world.sensors import events, give
+from hardware.sim.world.world import Occlusion, Setup, World
 from pipeline.estimation.estimator import Fusion
 from pipeline.signals import BodyImu, PhoneImu, Seen
 from tests.pipeline.flight import Flight, is_finite, new, shifted

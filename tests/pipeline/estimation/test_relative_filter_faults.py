@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.world import Setup, World
-from hardware.sim.world_sensors import events
+from hardware.sim.world.sensors import events
+from hardware.sim.world.world import Setup, World
 from pipeline.estimation import ray_kernels, relative_kernels
 from pipeline.estimation.estimator import Fusion
 from pipeline.estimation.estimators import warm_up

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hardware.sim.world import Setup, World
-from hardware.sim.world_sensors import events, feed, give
+from hardware.sim.world.sensors import events, feed, give
+from hardware.sim.world.world import Setup, World
 from pipeline.estimation.estimator import Fusion
 from pipeline.signals import Seen
 from tests.pipeline.flight import Flight, new, shifted

@@ -5,7 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pipeline.estimation import u_form
+from pipeline.estimation import gravity_free
+from pipeline.estimation.gravity_free import Felt, Motion
+from pipeline.estimation.imu_interpolation_kernels import sample_at
 from pipeline.estimation.relative_kernels import (
     BIASES,
     INPUTS,
@@ -17,8 +19,6 @@ from pipeline.estimation.relative_kernels import (
     inputs_at,
 )
 from pipeline.estimation.relative_noise import hand_of
-from pipeline.estimation.sample_kernels import sample_at
-from pipeline.estimation.u_form import Felt, Motion
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import exp, log
 from tests.pipeline.way import BIAS, BODY, HELD, PHONE, UP, Way, samples
@@ -97,7 +97,7 @@ def test_a_transit_is_a_step_for_each_stretch_between_samples():
     for t, until in pairwise(knots.tolist()):
         middle = 0.5 * (t + until)
         inputs = np.concatenate((interpolated(BODY, middle), interpolated(PHONE, middle))) - BIAS
-        x = u_form.step(x, Felt(*inputs.reshape(4, 3)), until - t)
+        x = gravity_free.step(x, Felt(*inputs.reshape(4, 3)), until - t)
     assert np.abs(way.x[:3] - x.p).max() < 1e-11
     assert np.abs(way.R - x.R).max() < 1e-11
     assert np.abs(way.x[3:6] - x.u).max() < 1e-11

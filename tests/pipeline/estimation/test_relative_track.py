@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.world import LEDS_IN_B, Setup, World
-from hardware.sim.world_sensors import body_samples, phone_samples, pictures
+from hardware.sim.world.sensors import body_samples, phone_samples, pictures
+from hardware.sim.world.world import LEDS_IN_B, Setup, World
 from pipeline.estimation.ray_kernels import fuse_rays
 from pipeline.estimation.relative_kernels import BIASES, OFFSET
 from pipeline.estimation.relative_track import KEPT, Anchor, RelativeTrack

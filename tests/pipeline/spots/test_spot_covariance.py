@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hardware.sim.codec import Decoder, Encoder
+from hardware.codec import Decoder, Encoder
 from hardware.sim.render import Look, render
 from pipeline.frames import exp
 from pipeline.signals import Frame

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hardware.sim import random_motion
-from hardware.sim.world import Setup, World
-from hardware.sim.world_sensors import events
+from hardware.sim.world import random_motion
+from hardware.sim.world.sensors import events
+from hardware.sim.world.world import Setup, World
 from pipeline.estimator_config import TimeOffsetConfig
 from pipeline.frames import exp
 from pipeline.signals import BodyImu, PhoneImu

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from hardware.sim.render import Look
-from pipeline.expected import Expected
 from pipeline.frames import exp
+from pipeline.prediction import Expected
 from pipeline.signals import Frame, Spots
+from pipeline.vision.detection import Prior
 from pipeline.vision.few_leds import name_few, places
-from pipeline.vision.sighting import Prior
 from pipeline.vision.vision import Vision
 from pipeline.vision_config import IdentifyConfig
 from tests.pipeline.seeing import (

@@ -4,13 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.codec import Decoder, Encoder
+from hardware.codec import Decoder, Encoder
 from hardware.sim.render import Look
 from pipeline.frames import R_from_rpy
 from pipeline.signals import Frame
-from pipeline.vision.gates import disbelief
+from pipeline.vision.detection import Prior
+from pipeline.vision.gating import disbelief
 from pipeline.vision.last_pose import FORGET_MISSES
-from pipeline.vision.sighting import Prior
 from pipeline.vision.vision import Vision, warm_up
 from pipeline.vision_config import GatesConfig
 from tests.pipeline.seeing import (

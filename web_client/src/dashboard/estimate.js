@@ -1,6 +1,6 @@
 /** What the estimator and the phone's camera say of themselves: numbers, and in words what should worry. */
 
-/** @import {CameraHealth, Estimate} from '../protocol_types.js' */
+/** @import {CameraHealth, Estimate} from '../wire/protocol_types.js' */
 /** @import {Board, Sample} from './model.js' */
 
 import { Elements } from './elements.js';

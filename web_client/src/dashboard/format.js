@@ -1,6 +1,6 @@
 /** Numbers for people: of one width, with a dash for what is not known. */
 
-import { SIDES } from '../mode_words.js';
+import { SIDES } from '../ui/mode_words.js';
 
 /**
  * @param {number | null | undefined} value
@@ -58,7 +58,7 @@ export function scaleEnd(totalMs) {
 
 /**
  * Gaps of the last minute by side, the longest of each behind it.
- * @param {import('../protocol_types.js').Status['gaps']} gaps
+ * @param {import('../wire/protocol_types.js').Status['gaps']} gaps
  */
 export function gapLine(gaps) {
   const sides = Object.entries(gaps).map(([side, { count, longest_ms: longest }]) => {

@@ -1,26 +1,26 @@
 /** The supervisor page: joins link, board and buttons. The only module here that acts by itself. */
 
-/** @import {ToPage} from '../protocol_types.js' */
-/** @import {Received} from '../protocol.js' */
+/** @import {ToPage} from '../wire/protocol_types.js' */
+/** @import {Received} from '../wire/protocol.js' */
 /** @import {Event} from './model.js' */
 /** @import {Invite} from './phone_card.js' */
-/** @import {Role} from '../pairing.js' */
+/** @import {Role} from '../wire/pairing.js' */
 
-import { browserOf } from '../browser.js';
+import { browserOf } from '../app/browser.js';
 import { BoardView } from './view.js';
-import { ChoiceCard } from '../choice_card.js';
+import { ChoiceCard } from '../ui/choice_card.js';
 import { EstimatePanel } from './estimate.js';
 import { EMPTY, reduce } from './model.js';
-import { KnobPanel } from './knobs.js';
-import { ServerTime, WakefulClock, commandOf } from '../command.js';
-import { Link, socketUrl } from '../link.js';
+import { KnobPanel } from './runtime_parameters.js';
+import { ServerTime, WakefulClock, commandOf } from '../wire/command.js';
+import { Link, socketUrl } from '../wire/link.js';
 import { PathSelect } from './path_select.js';
 import { PeopleCard } from './people_card.js';
 import { PhoneCard } from './phone_card.js';
-import { Kind, VERSION } from '../protocol.js';
-import { Problem, adviceFor, problemOf } from '../problems.js';
-import { StopPost } from '../stop.js';
-import { OWN_HEADERS, ask, becomeKnown, exclusion, usualName } from '../pairing.js';
+import { Kind, VERSION } from '../wire/protocol.js';
+import { Problem, adviceFor, problemOf } from '../wire/problems.js';
+import { StopPost } from '../wire/stop.js';
+import { OWN_HEADERS, ask, becomeKnown, exclusion, usualName } from '../wire/pairing.js';
 
 const TICK_MS = 100;
 const STOP_TICK_MS = 50;

@@ -1,13 +1,13 @@
 /** The supervisor's page as a pure function: what is known, and what an event makes of it. */
 
-/** @import {Refused, Status} from '../protocol_types.js' */
-/** @import {ShownMode} from '../session_types.js' */
-/** @import {StopAnswer} from '../stop.js' */
+/** @import {Refused, Status} from '../wire/protocol_types.js' */
+/** @import {ShownMode} from '../ui/session_types.js' */
+/** @import {StopAnswer} from '../wire/stop.js' */
 
-import { GIVE_UP_MS } from '../command.js';
-import { Problem } from '../problems.js';
-import { endOf, endWords, hasStopped, weigh } from '../stop.js';
-import { STATUS_LIFE_MS } from '../session.js';
+import { GIVE_UP_MS } from '../wire/command.js';
+import { Problem } from '../wire/problems.js';
+import { endOf, endWords, hasStopped, weigh } from '../wire/stop.js';
+import { STATUS_LIFE_MS } from '../ui/session.js';
 
 /** Twenty seconds of Status at 10 Hz. */
 export const REMEMBERED = 200;
@@ -136,7 +136,7 @@ function answered(board, answer) {
 
 /**
  * @param {Board} board
- * @param {import('../stop.js').StopEnd} end
+ * @param {import('../wire/stop.js').StopEnd} end
  * @returns {Board}
  */
 function stopEnded(board, end) {

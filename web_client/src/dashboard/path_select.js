@@ -1,9 +1,9 @@
 /** A choice of the way that the phone's pictures come by. */
 
-/** @import {PathChoice} from '../protocol_types.js' */
+/** @import {PathChoice} from '../wire/protocol_types.js' */
 
 import { Elements } from './elements.js';
-import { PATIENCE_MS } from './knobs.js';
+import { PATIENCE_MS } from './runtime_parameters.js';
 
 export class PathSelect extends Elements {
   /**

@@ -1,6 +1,6 @@
 /** Everybody who is paired: who asks to come in, who leads, and what a supervisor can do about it. */
 
-/** @import {Person} from '../protocol_types.js' */
+/** @import {Person} from '../wire/protocol_types.js' */
 
 /** @typedef {'confirm' | 'deny' | 'revoke' | 'lead'} Deed */
 

@@ -1,13 +1,13 @@
 /** The supervisor page's DOM. Elements are made once; a new Status only changes their text and width. */
 
 /** @import {Board} from './model.js' */
-/** @import {Advice} from '../problems.js' */
-/** @import {Status} from '../protocol_types.js' */
+/** @import {Advice} from '../wire/problems.js' */
+/** @import {Status} from '../wire/protocol_types.js' */
 
 import { Elements, write } from './elements.js';
-import { MODE_WORDS } from '../mode_words.js';
+import { MODE_WORDS } from '../ui/mode_words.js';
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from './format.js';
-import { stopWords } from '../stop.js';
+import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
 import { REMEMBERED, shownMode, wishes } from './model.js';
 

@@ -1,0 +1,1 @@
+"""Can LEDs be told apart, how well do they show a pose, and what layout is better?"""

@@ -1,0 +1,158 @@
+"""The control process's end of the link, sans-I/O: epochs, counters, nonces, challenges.
+
+A sample is believed if it was made with the robot's key and is newer than the last one of the same
+start of the robot. The first one, and the first of another start, must echo a challenge of one of
+our newest commands: so a recording of an earlier session or start is not believed, however many of
+them somebody sends. Within a start the robot's own counter is enough.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+
+import numpy as np
+
+from hardware.follower import BodySample, FollowerState, ThrustCommand, check_command
+from hardware.link.datagram import (
+    U32,
+    U64,
+    Command,
+    LinkError,
+    Sample,
+    decode_sample,
+    encode_command,
+    is_later,
+)
+from hardware.robot_file import RobotFile
+from pipeline.frames import Array
+
+SENT_KEPT = 256
+"""Commands remembered: 1.3 s."""
+
+
+def random_u64() -> int:
+    """Unpredictable number of 64 bits, not 0."""
+    return 1 + secrets.randbelow(U64 - 1)
+
+
+class ControlEnd:
+    """Turns thrusts into datagrams and datagrams into samples. Times are [s], monotonic."""
+
+    def __init__(
+        self,
+        thrusters: int,
+        f_max: float,
+        max_rise: float,
+        epoch: int,
+        key: bytes,
+        challenges: Callable[[], int] = random_u64,
+    ) -> None:
+        """For a robot whose thrusters give up to `f_max` and rise by `max_rise` per command [N].
+
+        `epoch` must be later than that of every control process the robot has followed.
+        """
+        self.thrusters, self.epoch = thrusters, epoch
+        self._f_max, self._max_rise = f_max, max_rise
+        self._key, self._new_challenge = key, challenges
+        self._counter = 0
+        self._last = np.zeros(thrusters)
+        self._sent_at = [0.0] * SENT_KEPT
+        self._challenges = [0] * SENT_KEPT
+        self._newest: Sample | None = None
+        self.limited = 0
+        """Commands that rose faster than the robot allows and were slowed down."""
+        self.dropped = 0
+        """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
+
+    @classmethod
+    def of(
+        cls,
+        robot_file: RobotFile,
+        key: bytes,
+        epoch: int,
+        challenges: Callable[[], int] = random_u64,
+    ) -> ControlEnd:
+        """For the robot of a robot file."""
+        robot = robot_file.robot
+        max_rise = robot_file.link.max_rise
+        return cls(robot.A.shape[1], robot.f_max, max_rise, epoch, key, challenges)
+
+    def command(self, command: ThrustCommand, now: float) -> bytes:
+        """The datagram for `command`.
+
+        It echoes the newest sample its sender can have known: a late command can't seem fresh.
+
+        Raises:
+            FollowerError: a command no robot may be told.
+        """
+        check_command(command, self.thrusters, self._f_max)
+        if not command.armed and self._newest and self._is_outdated(self._newest):
+            self._renew(self._newest)
+        self._counter = (self._counter + 1) % U32
+        self._last = self._slowed(command.thrusts)
+        challenge = self._new_challenge()
+        self._sent_at[self._counter % SENT_KEPT] = now
+        self._challenges[self._counter % SENT_KEPT] = challenge
+        return encode_command(
+            Command(
+                epoch=self.epoch,
+                counter=self._counter,
+                nonce=self._newest.nonce if self._newest else 0,
+                challenge=challenge,
+                armed=command.armed,
+                thrusts=tuple(self._last.tolist()),
+                stop=command.stop,
+            ),
+            self._key,
+        )
+
+    def receive(self, data: bytes, now: float) -> BodySample | None:
+        """The sample in `data`; None and counted if it is none, or not to be believed."""
+        try:
+            sample = decode_sample(data, self._key)
+        except LinkError:
+            self.dropped += 1
+            return None
+        if len(sample.thrusts) != self.thrusters or not self._is_believed(sample):
+            self.dropped += 1
+            return None
+        self._newest = sample
+        return BodySample(
+            t_us=sample.t_us,
+            omega_in_b=np.array(sample.omega_in_b),
+            a_in_b=np.array(sample.a_in_b),
+            thrusts=np.array(sample.thrusts),
+            state=sample.state,
+            boot_id=sample.boot_id,
+            refusal=sample.refusal,
+            round_trip_s=self._round_trip(sample, now),
+        )
+
+    def _is_believed(self, sample: Sample) -> bool:
+        last = self._newest
+        if last is not None and sample.boot_id == last.boot_id:
+            return is_later(sample.counter, last.counter)
+        return sample.challenge != 0 and sample.challenge in self._challenges
+
+    def _is_outdated(self, robot: Sample) -> bool:
+        """Whether the robot would never again take our epoch."""
+        refusing = robot.state == FollowerState.REFUSING and robot.epoch != 0
+        return refusing and self.epoch <= robot.epoch < U64 - 1  # nothing is later than that
+
+    def _renew(self, robot: Sample) -> None:
+        self.epoch = robot.epoch + 1
+        self._counter = 0
+        self._last = np.zeros(self.thrusters)
+
+    def _slowed(self, thrusts: Array) -> Array:
+        """`thrusts`, none rising faster than the robot takes: late is better than refused."""
+        slowed: Array = np.minimum(thrusts, self._last + self._max_rise)
+        self.limited += int(bool((slowed < thrusts).any()))
+        return slowed
+
+    def _round_trip(self, sample: Sample, now: float) -> float | None:
+        behind = (self._counter - sample.accepted) % U32
+        if sample.epoch != self.epoch or behind >= SENT_KEPT or sample.accepted == 0:
+            return None
+        return now - self._sent_at[sample.accepted % SENT_KEPT]

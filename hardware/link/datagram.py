@@ -1,0 +1,235 @@
+"""The datagrams of our own link, byte by byte; little-endian, one per UDP packet, version 2.
+
+Command, control → robot (52 + 4 m bytes, m thrusters):
+
+| offset   | type     | field                                                                     |
+|----------|----------|---------------------------------------------------------------------------|
+| 0        | 4 bytes  | magic `LLcm`                                                              |
+| 4        | u8       | version, 2                                                                |
+| 5        | u8       | m, 1 to 16                                                                |
+| 6        | u16      | flags: bit 0 armed, bit 1 stop, others 0                                  |
+| 8        | u64      | epoch of the control process, later in each one, 0 is none                |
+| 16       | u64      | nonce of the newest sample this command rests on; 0 before any            |
+| 24       | u64      | challenge, unpredictable, not 0: to be echoed                             |
+| 32       | u32      | counter, one more with each command of the epoch                          |
+| 36       | m × f32  | thrusts [N]                                                               |
+| 36 + 4 m | 16 bytes | HMAC-SHA-256 of all bytes before, truncated                               |
+
+Sample, robot → control (92 + 4 m bytes), pushed at the robot's own rate:
+
+| offset   | type     | field                                                                     |
+|----------|----------|---------------------------------------------------------------------------|
+| 0        | 4 bytes  | magic `LLsm`                                                              |
+| 4        | u8       | version, 2                                                                |
+| 5        | u8       | m                                                                         |
+| 6        | u8       | state: `FollowerState`                                                    |
+| 7        | u8       | refusal: `Refusal`                                                        |
+| 8        | u64      | time on the robot's monotonic clock [µs]                                  |
+| 16       | u64      | nonce, unpredictable, not 0: to be echoed                                 |
+| 24       | u64      | challenge of the newest command heard, 0 none                             |
+| 32       | u64      | epoch the robot follows or last followed, 0 none                          |
+| 40       | u32      | boot id, another one after each start                                     |
+| 44       | u32      | counter, one more with each sample                                        |
+| 48       | u32      | counter of the newest command it took                                     |
+| 52       | 3 × f32  | gyroscope, body axes [rad/s]                                              |
+| 64       | 3 × f32  | accelerometer, body axes, specific force [m/s²]                           |
+| 76       | m × f32  | thrusts [N]                                                               |
+| 76 + 4 m | 16 bytes | HMAC-SHA-256 of all bytes before, truncated                               |
+
+Both directions have the same key (`link_key.py`), one per robot; the magic under the MAC tells them
+apart, so that neither end believes its own words thrown back. What a robot must do with commands is
+in `robot_end.py`, and in C in `deploy/watchdog/`; what control believes is in `control_end.py`.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from functools import cache
+from math import isfinite
+
+from hardware.follower import FollowerState, Refusal
+from hardware.link.link_key import MAC_BYTES, is_authentic, mac
+from pipeline.frames import Array
+
+VERSION = 2
+COMMAND_MAGIC, SAMPLE_MAGIC = b"LLcm", b"LLsm"
+MAX_THRUSTERS = 16
+COMMAND_OVERHEAD, SAMPLE_OVERHEAD = 36 + MAC_BYTES, 76 + MAC_BYTES
+"""Bytes beside the thrusts."""
+MAX_BYTES = SAMPLE_OVERHEAD + 4 * MAX_THRUSTERS
+ARMED, STOP = 1, 2
+U32, U64 = 1 << 32, 1 << 64
+
+Triple = tuple[float, float, float]
+
+
+class LinkError(ValueError):
+    """Bytes that are no datagram of this link.
+
+    Attributes:
+        field: Which field.
+        allowed: What would have been allowed.
+    """
+
+    def __init__(self, field: str, allowed: str) -> None:
+        super().__init__(f"{field}: {allowed}")
+        self.field, self.allowed = field, allowed
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Command, control → robot."""
+
+    epoch: int
+    counter: int
+    nonce: int
+    challenge: int
+    armed: bool
+    thrusts: tuple[float, ...]
+    """[N]; may be anything a float can be."""
+    stop: bool = False
+    """Somebody pressed STOP."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Sample, robot → control."""
+
+    state: FollowerState
+    refusal: Refusal
+    t_us: int
+    nonce: int
+    challenge: int
+    epoch: int
+    boot_id: int
+    counter: int
+    accepted: int
+    """Counter of the newest command taken."""
+    omega_in_b: Triple
+    a_in_b: Triple
+    thrusts: tuple[float, ...]
+
+
+@cache
+def _command_layout(thrusters: int) -> struct.Struct:
+    return struct.Struct(f"<4sBBHQQQI{thrusters}f")
+
+
+@cache
+def _sample_layout(thrusters: int) -> struct.Struct:
+    return struct.Struct(f"<4sBBBBQQQQIII6f{thrusters}f")
+
+
+def encode_command(command: Command, key: bytes) -> bytes:
+    """Bytes of a command."""
+    thrusters = len(command.thrusts)
+    body = _command_layout(thrusters).pack(
+        COMMAND_MAGIC,
+        VERSION,
+        thrusters,
+        ARMED * command.armed | STOP * command.stop,
+        command.epoch,
+        command.nonce,
+        command.challenge,
+        command.counter,
+        *command.thrusts,
+    )
+    return body + mac(key, body)
+
+
+def encode_sample(sample: Sample, key: bytes) -> bytes:
+    """Bytes of a sample."""
+    thrusters = len(sample.thrusts)
+    body = _sample_layout(thrusters).pack(
+        SAMPLE_MAGIC,
+        VERSION,
+        thrusters,
+        sample.state,
+        sample.refusal,
+        sample.t_us,
+        sample.nonce,
+        sample.challenge,
+        sample.epoch,
+        sample.boot_id,
+        sample.counter,
+        sample.accepted,
+        *sample.omega_in_b,
+        *sample.a_in_b,
+        *sample.thrusts,
+    )
+    return body + mac(key, body)
+
+
+def decode_command(data: bytes, key: bytes) -> Command:
+    """The command in `data`; its values are judged by `RobotEnd`.
+
+    Raises:
+        LinkError: not a command of this version, not made with the key, or with unknown flags.
+    """
+    thrusters = _checked(data, key, COMMAND_MAGIC, COMMAND_OVERHEAD)
+    fields = _command_layout(thrusters).unpack(data[:-MAC_BYTES])
+    flags, epoch, nonce, challenge, counter = fields[3:8]
+    if flags & ~(ARMED | STOP):
+        raise LinkError("command.flags", "bits 0 and 1")
+    armed, stop = bool(flags & ARMED), bool(flags & STOP)
+    return Command(epoch, counter, nonce, challenge, armed, fields[8:], stop)
+
+
+def decode_sample(data: bytes, key: bytes) -> Sample:
+    """The sample in `data`.
+
+    Raises:
+        LinkError: not a sample of this version, not made with the key, or with a value that
+            can't be.
+    """
+    thrusters = _checked(data, key, SAMPLE_MAGIC, SAMPLE_OVERHEAD)
+    fields = _sample_layout(thrusters).unpack(data[:-MAC_BYTES])
+    state, refusal, t_us, nonce, challenge, epoch, boot_id, counter, accepted = fields[3:12]
+    values = fields[12:]
+    if state >= len(FollowerState) or refusal >= len(Refusal):
+        raise LinkError("sample.state, sample.refusal", "a known state and refusal")
+    if t_us >= 1 << 60:
+        raise LinkError("sample.time", "0 to 2^60 µs")
+    if not all(map(isfinite, values)):
+        raise LinkError("sample.gyroscope, accelerometer, thrusts", "finite numbers")
+    return Sample(
+        state=FollowerState(state),
+        refusal=Refusal(refusal),
+        t_us=t_us,
+        nonce=nonce,
+        challenge=challenge,
+        epoch=epoch,
+        boot_id=boot_id,
+        counter=counter,
+        accepted=accepted,
+        omega_in_b=values[0:3],
+        a_in_b=values[3:6],
+        thrusts=values[6:],
+    )
+
+
+def _checked(data: bytes, key: bytes, magic: bytes, overhead: int) -> int:
+    """Count of thrusters of an authentic datagram; `overhead` is its size without thrusts."""
+    if not overhead < len(data) <= MAX_BYTES:
+        raise LinkError("size", f"{overhead + 4} to {overhead + 4 * MAX_THRUSTERS} bytes")
+    if data[:4] != magic:
+        raise LinkError("magic", repr(magic))
+    if data[4] != VERSION:
+        raise LinkError("version", f"{VERSION}")
+    thrusters = data[5]
+    if not 1 <= thrusters <= MAX_THRUSTERS or len(data) != overhead + 4 * thrusters:
+        raise LinkError("thrusters", f"1 to {MAX_THRUSTERS}, agreeing with the size")
+    if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
+        raise LinkError("mac", "made with the robot's key")
+    return thrusters
+
+
+def is_later(a: int, b: int) -> bool:
+    """Whether counter `a` comes after `b`, round the corner of 32 bits."""
+    return 0 < (a - b) % U32 < U32 // 2
+
+
+def triple(values: Array) -> Triple:
+    """Three floats of an array (3,)."""
+    return float(values[0]), float(values[1]), float(values[2])

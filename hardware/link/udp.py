@@ -1,0 +1,124 @@
+"""Our own link over UDP: the default way to a robot, simulated or real.
+
+| file                | what                                                             |
+|---------------------|------------------------------------------------------------------|
+| `datagram.py`       | both datagrams, byte by byte                                     |
+| `control_end.py`    | the control process's end without a socket                       |
+| `robot_end.py`      | the robot's end without a socket: gate, watchdog, ramp           |
+| `deploy/watchdog/`  | the robot's end in C, for firmware                               |
+| this file           | the socket of the control process                                |
+
+The robot listens on a port and answers the first command of a new control process, of zero thrust;
+the next one is fresh, and samples come at the robot's own rate. Neither end waits for the other.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+
+from hardware.follower import BodySample, FollowerError, ThrustCommand
+from hardware.link.control_end import ControlEnd
+from hardware.link.datagram import MAX_BYTES
+from hardware.robot_file import RobotFile
+
+MAX_SAMPLES = 256
+"""Taken at once; the rest waits for the next call."""
+STOP_REPEATS = 5
+
+
+class UdpFollower:
+    """A robot at the other end of the network."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        end: ControlEnd,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Ready to talk with `host`:`port`; sends nothing yet.
+
+        Raises:
+            FollowerError: no such host.
+        """
+        self.thrusters = end.thrusters
+        self._end, self._clock = end, clock
+        try:
+            family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        except OSError as error:
+            what = f"robot at {host}:{port}: {error}"
+            raise FollowerError(what, "a host this machine knows") from error
+        self._socket = socket.socket(family, kind)
+        self._socket.setblocking(False)
+        self._socket.connect(address)  # from here on the kernel drops whatever others send
+        self._closed = False
+        self.lost = 0
+        """Commands known to have gone nowhere: nobody listens, or a full queue."""
+
+    @property
+    def epoch(self) -> int:
+        """Under which commands are sent; a new one after the robot has gone to zero by itself."""
+        return self._end.epoch
+
+    @property
+    def dropped(self) -> int:
+        """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
+        return self._end.dropped
+
+    def receive(self) -> list[BodySample]:
+        """What has arrived. See `Follower`."""
+        self._check_open()
+        samples = (self._end.receive(data, self._clock()) for data in self._arrived())
+        return [sample for sample in samples if sample is not None]
+
+    def send(self, command: ThrustCommand) -> None:
+        """See `Follower`."""
+        self._check_open()
+        self._send(command)
+
+    def stop(self) -> None:
+        """Zero thrust, several times."""
+        for _ in range(0 if self._closed else STOP_REPEATS):
+            self._send(ThrustCommand.zero(self.thrusters))
+
+    def close(self) -> None:
+        """Close. See `Follower`."""
+        self._closed = True
+        self._socket.close()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise FollowerError("the link is closed", "an open one")
+
+    def _send(self, command: ThrustCommand) -> None:
+        data = self._end.command(command, self._clock())
+        try:
+            self._socket.send(data)
+        except OSError:  # refused: nobody listens there (yet); or the way is down or full
+            self.lost += 1
+
+    def _arrived(self) -> list[bytes]:
+        arrived: list[bytes] = []
+        for _ in range(MAX_SAMPLES):
+            try:
+                arrived.append(self._socket.recv(MAX_BYTES + 1))
+            except BlockingIOError:
+                break
+            except OSError:  # tells of an earlier command that met a closed port
+                self.lost += 1
+        return arrived
+
+
+def connect(
+    robot_file: RobotFile, key: bytes, epoch: int, host: str | None = None, port: int | None = None
+) -> UdpFollower:
+    """A link to the robot of a robot file; `host` and `port` override the file's.
+
+    Raises:
+        FollowerError: no such host.
+    """
+    link = robot_file.link
+    end = ControlEnd.of(robot_file, key, epoch)
+    return UdpFollower(host or link.host, port or link.port, end)

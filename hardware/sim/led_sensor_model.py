@@ -1,0 +1,89 @@
+"""Camera and vision that err by noise only: LEDs' rays without a picture, for many short flights.
+
+Nothing is rendered, encoded, searched or named wrongly, so a flight costs a few times less; what a
+picture knows of an LED is its place in the picture, wrong by white noise of a known size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hardware.sim.phone import BodyHistory, VirtualPhone
+from pipeline.frames import Array
+from pipeline.identification import pnp
+from pipeline.signals import BodyImu, Match, PhoneImu, Seen, Spots
+from pipeline.timing.camera_imu_delay import StampOffsetSearch
+from pipeline.vision.rays import rays_of
+
+LEAST_NOISE_PX = 0.01
+"""Nobody claims to know a spot's place better."""
+MIN_LEDS = 4
+"""For a pose from nothing else."""
+
+
+class NoisyEye:
+    """One phone's view of one robot."""
+
+    def __init__(
+        self,
+        phone: VirtualPhone,
+        leds_in_b: Array,
+        noise_px: float,
+        hidden: Callable[[float], Sequence[int]],
+        rng: np.random.Generator,
+    ) -> None:
+        """`noise_px`: standard deviation of an LED's place, each way; `hidden` as the phone's."""
+        self._phone, self._leds_in_b, self._hidden = phone, leds_in_b, hidden
+        self._noise_px, self._rng = noise_px, rng
+        self._stamps = StampOffsetSearch()
+
+    def feel(self, sample: PhoneImu | BodyImu) -> None:
+        """Follow a motion sample, for the pictures' time offset."""
+        self._stamps.feel(sample)
+
+    def seen(self, t: float, stamp: float, body: BodyHistory) -> Seen | None:
+        """What a picture taken at `t` [s], and dated `stamp` [s], says; None without any LED."""
+        camera = self._phone.camera
+        pixels = self._pixels(t, body)
+        shown = camera.sees(pixels)
+        shown[list(self._hidden(t))] = False
+        led = np.flatnonzero(shown)
+        if len(led) == 0:
+            return None
+        spots = self._spots(pixels[led])
+        match = Match(led, np.arange(len(led)))
+        pose = None
+        if len(led) >= MIN_LEDS:
+            R_cb, p_bc_in_c = self._phone.relative_pose(t, body)
+            fit = pnp.solve(camera, self._leds_in_b, spots, match, (p_bc_in_c, R_cb))
+            pose = pnp.pose_of(fit, stamp) if fit is not None else None
+        if pose is not None:
+            self._stamps.saw(pose)
+        rays = rays_of(camera, spots, match, stamp)
+        return Seen(stamp, rays, pose, camera.half_field, self._stamps.offset)
+
+    def _pixels(self, t: float, body: BodyHistory) -> Array:
+        """(n, 2) where the LEDs are in a picture, each when its row is read; behind: nowhere."""
+        pixels = self._pixels_at(t, self._leds_in_b, body)
+        if self._phone.camera.readout_s != 0.0:
+            delays = self._phone.camera.row_delays(pixels[:, 1])
+            for k in np.flatnonzero(np.isfinite(delays)):
+                later = t + float(delays[k])
+                pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body)[0]
+        return pixels
+
+    def _pixels_at(self, t: float, leds_in_b: Array, body: BodyHistory) -> Array:
+        R_cb, p_bc_in_c = self._phone.relative_pose(t, body)
+        q_in_c = p_bc_in_c + leds_in_b @ R_cb.T
+        pixels = np.full((len(leds_in_b), 2), np.nan)
+        ahead = q_in_c[:, 0] > 0.0
+        pixels[ahead] = self._phone.camera.pixels(q_in_c[ahead])
+        return pixels
+
+    def _spots(self, pixels: Array) -> Spots:
+        n, claimed = len(pixels), max(self._noise_px, LEAST_NOISE_PX) ** 2
+        noise = self._noise_px * self._rng.standard_normal((n, 2))
+        covariances = np.tile(claimed * np.eye(2), (n, 1, 1))
+        return Spots(pixels + noise, covariances, np.ones(n), np.ones(n))

@@ -1,0 +1,1 @@
+"""Bad lines: emulated channels between network namespaces."""

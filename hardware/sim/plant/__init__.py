@@ -1,0 +1,1 @@
+"""The simulated robot's body, and what it may touch."""

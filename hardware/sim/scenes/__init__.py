@@ -1,0 +1,1 @@
+"""The vision benchmark: rendered scenes with their own truth."""

@@ -1,0 +1,166 @@
+"""Films of a scene: pictures with their truth, and what the motion sensors felt meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+import numpy.typing as npt
+
+from hardware.robot_file import load_robot
+from hardware.sim.scenes.motion import FLAT_LEDS, START_S, Sensors, movers, within
+from hardware.sim.scenes.optics import BANK, Optics, Sensor
+from hardware.sim.scenes.room import Room, bar_before, lights_around, mirror_near
+from hardware.sim.scenes.scene import HD, VGA, Picture, Scene, Size
+from hardware.sim.scenes.stage import Drawn, Stage
+from pipeline.camera.lens import Camera
+from pipeline.frames import Array, rotation_about_x
+from pipeline.signals import BodyImu, Image, PhoneImu
+
+RATE_HZ = 30.0
+IMU_AHEAD_S = 0.03
+"""Readings come sooner than pictures: those of so long after a picture are there before it."""
+MIN_LEDS = 4
+LED_RADIUS_M = 0.004
+GAMMA, CONTRAST = (2.0, 2.4), (0.0, 0.15)
+"""Every phone has its own tone curve, and nobody tells it."""
+DISTORTION = np.array([0.05, -0.12, 0.0005, -0.0004, 0.02])
+TURNS = {Picture.TURNED_90: 0.5 * np.pi, Picture.TURNED_180: np.pi}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """One picture, what is true of it, and the readings that came since the one before."""
+
+    t: float
+    """When the middle row's exposure was half done [s]."""
+    luma: Image
+    """(height, width), full range."""
+    R_cb: Array
+    """(3, 3), exact at `t`."""
+    p_bc_in_c: Array
+    """(3,) [m]."""
+    pixels: Array
+    """(n, 2) where each LED is when the row it is on is exposed."""
+    visible: npt.NDArray[np.bool_]
+    """(n,) wholly in the picture and hidden by nothing."""
+    merged: npt.NDArray[np.bool_]
+    """(n,) in one saturated area with another light."""
+    solvable: bool
+    """At least four LEDs visible and not merged, in a picture delivered upright."""
+    information: Array
+    """(n, 2, 2) Fisher information of each place [1/px²] by true point spread and noise; 0 unless
+    the film was asked for it."""
+    phone: tuple[PhoneImu, ...]
+    body: tuple[BodyImu, ...]
+
+
+def camera_of(size: Size, readout_s: float = 0.0) -> Camera:
+    """A phone's rear camera, 70° wide, 67° at 4:3."""
+    width, height = size
+    f = (0.714 if 4 * height < 3 * width else 0.75) * width
+    K = np.array([[f, 0.0, 0.506 * width], [0.0, 1.001 * f, 0.494 * height], [0.0, 0.0, 1.0]])
+    return Camera(width, height, K, "plumb_bob", DISTORTION, readout_s)
+
+
+def leds_of(scene: Scene) -> Array:
+    """(n, 3) places of the LEDs in b [m]."""
+    return FLAT_LEDS if scene.is_flat else load_robot("ames").robot.leds_in_b
+
+
+class Film:
+    """A scene with everything drawn for one seed; going through it again gives the same shots."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        seed: int,
+        size: Size = HD,
+        frames: int = 90,
+        bound: bool = False,
+    ) -> None:
+        """`bound`: each shot brings its `information`, for some more work."""
+        self.scene, self.seed, self.size, self.frames = scene, seed, size, frames
+        self._bound = bound
+        named = np.random.SeedSequence((seed, crc32(scene.name.encode()), *size))
+        self._seeds = named.spawn(4)
+        rng = np.random.default_rng(self._seeds[0])
+        self.leds_in_b = leds_of(scene)
+        self.camera = camera_of(size, within(rng, scene.readout_s))
+        """As a calibration knows it."""
+        self.optics = Optics(
+            blur_px=float(rng.uniform(0.75, 1.05)),
+            halo=within(rng, scene.halo),
+            halo_px=within(rng, scene.halo_px) * size[1] / HD[1],
+            electrons=within(rng, scene.electrons),
+            read=within(rng, scene.read_noise),
+            exposure_s=within(rng, scene.exposure_s),
+            gamma=float(rng.uniform(*GAMMA)),
+            contrast=float(rng.uniform(*CONTRAST)),
+        )
+        self.moving = movers(scene, rng)
+        self._stage = self._staged(rng)
+
+    def _staged(self, rng: np.random.Generator) -> Stage:
+        scene = self.scene
+        R_fc, p_cf_in_f = self.moving.hand.pose(START_S)
+        p_bf_in_f = self.moving.robot.pose(START_S)[1]
+        n = len(self.leds_in_b)
+        first = self.seed + self.size[0] // VGA[0]  # each LED in its turn
+        covered = (first + np.arange(scene.covered) * (1 + self.seed % (n - 1))) % n
+        light = within(rng, scene.room_light)
+        lamps = int(rng.integers(scene.lamps[0], scene.lamps[1] + 1))
+        windows = int(rng.integers(scene.windows[0], scene.windows[1] + 1))
+        half = self.camera.half_field
+        return Stage(
+            leds_in_b=self.leds_in_b,
+            led_radius_m=LED_RADIUS_M,
+            led_lights=within(rng, scene.led_light) * rng.uniform(0.85, 1.15, n),
+            shown=~np.isin(np.arange(n), covered),
+            lights=lights_around(lamps, windows, R_fc, p_cf_in_f, half, rng),
+            mirror=mirror_near(p_bf_in_f, R_fc, rng) if scene.mirror else None,
+            bar=bar_before(p_bf_in_f, p_cf_in_f, light, rng) if scene.bar else None,
+            room=Room(self.size, light, scene.texture, self.optics.grey, rng),
+            R_fc_start=R_fc,
+        )
+
+    def __len__(self) -> int:
+        """Count of the shots."""
+        return self.frames
+
+    def __iter__(self) -> Iterator[Shot]:
+        """Shots in order of time, each drawn when asked for."""
+        camera, o = self.camera, self.optics
+        first, second = camera.row_delays(np.array([0.0, 1.0]))
+        sensor = Sensor(o, camera.width, camera.height, float(second - first))
+        grain = np.random.default_rng(self._seeds[1])
+        turn = rotation_about_x(TURNS.get(self.scene.picture, 0.0))
+        felt = Sensors(self.moving, turn, *map(np.random.default_rng, self._seeds[2:]))
+        for k in range(self.frames):
+            t = START_S + k / RATE_HZ
+            du, dv = (int(x) for x in grain.integers(0, BANK, 2))
+            drawn = self._stage.draw(sensor, camera, self.moving, t, (du, dv), self._bound)
+            yield self._shot(t, drawn, felt)
+
+    def _shot(self, t: float, drawn: Drawn, felt: Sensors) -> Shot:
+        R_cb, p_bc_in_c = self.moving.relative(t)
+        enough = int((drawn.visible & ~drawn.merged).sum()) >= MIN_LEDS
+        luma, pixels = drawn.luma, drawn.pixels
+        if self.scene.picture is Picture.MIRRORED:
+            luma = np.ascontiguousarray(luma[:, ::-1])
+            pixels = np.column_stack((self.camera.width - 1 - pixels[:, 0], pixels[:, 1]))
+        return Shot(
+            t=t,
+            luma=luma,
+            R_cb=R_cb,
+            p_bc_in_c=p_bc_in_c,
+            pixels=pixels,
+            visible=drawn.visible,
+            merged=drawn.merged,
+            solvable=enough and self.scene.picture is Picture.UPRIGHT,
+            information=drawn.information,
+            phone=felt.phone(t + IMU_AHEAD_S),
+            body=felt.body(t + IMU_AHEAD_S),
+        )

@@ -1,0 +1,111 @@
+"""A simulated robot in virtual time, in the process of a test or experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from hardware.follower import BodySample, FollowerError, FollowerState, ThrustCommand
+from hardware.link.control_end import ControlEnd
+from hardware.robot_file import RobotFile
+from hardware.sim.plant.plant import Plant, PlantOptions
+from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
+
+HERE = ("lockstep", 0)
+KEY = bytes(16)
+"""Nobody else is on this link."""
+Tamper = Callable[[bytes], Sequence[bytes]]
+"""What comes out of a link for a datagram that goes in."""
+
+
+def whole(data: bytes) -> Sequence[bytes]:
+    """As it should."""
+    return (data,)
+
+
+class LockstepFollower:
+    """The same bytes, gate, watchdog and plant as over UDP; time passes only in `advance`."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        seed: int = 0,
+        epoch: int = 1,
+        options: PlantOptions | None = None,
+    ) -> None:
+        """A robot hanging at rest at time 0, refusing thrust."""
+        self._robot = SimulatedRobot(robot_file, seed, seed + 1, seeded_nonces(seed), KEY, options)
+        self._end = ControlEnd.of(robot_file, KEY, epoch, seeded_nonces(seed + 1))
+        self.thrusters = self._end.thrusters
+        self.connected = True
+        """False: the link loses everything, both ways."""
+        self.to_robot: Tamper = whole
+        """What the link makes of a command's datagram ..."""
+        self.to_control: Tamper = whole
+        """... and of a sample's."""
+        self._robot_file = robot_file
+        self._now_us = 0
+        self._arrived: list[bytes] = []
+        self._closed = False
+
+    @property
+    def plant(self) -> Plant:
+        """The truth, and the place for disturbances."""
+        return self._robot.plant
+
+    @property
+    def epoch(self) -> int:
+        """Under which commands are sent; a new one after the robot has gone to zero by itself."""
+        return self._end.epoch
+
+    @property
+    def t(self) -> float:
+        """Virtual time [s]; the robot's clock shows the same."""
+        return 1e-6 * self._now_us
+
+    @property
+    def state(self) -> FollowerState:
+        """What the robot itself does."""
+        return self._robot.end.state
+
+    def restart(self) -> None:
+        """The robot's computer starts anew; its body goes on as it was."""
+        self._robot.restart(self._robot_file, KEY)
+
+    def advance(self, dt: float = 0.005) -> None:
+        """Let `dt` [s] pass, whole ticks of 5 ms."""
+        for _ in range(round(1e6 * dt / TICK_US)):
+            self._now_us += TICK_US
+            data = self._robot.tick(self._now_us)
+            if self.connected and self._robot.end.recipients(self._now_us):
+                self._arrived += self.to_control(data)
+
+    def receive(self) -> list[BodySample]:
+        """What has arrived. See `Follower`."""
+        self._check_open()
+        arrived, self._arrived = self._arrived, []
+        samples = (self._end.receive(data, self.t) for data in arrived)
+        return [sample for sample in samples if sample is not None]
+
+    def send(self, command: ThrustCommand) -> None:
+        """See `Follower`."""
+        self._check_open()
+        self._send(command)
+
+    def stop(self) -> None:
+        """Zero thrust."""
+        if not self._closed:
+            self._send(ThrustCommand.zero(self.thrusters))
+
+    def close(self) -> None:
+        """Close. See `Follower`."""
+        self._closed = True
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise FollowerError("the link is closed", "an open one")
+
+    def _send(self, command: ThrustCommand) -> None:
+        data = self._end.command(command, self.t)
+        if self.connected:
+            for one in self.to_robot(data):
+                self._robot.receive(one, HERE, self._now_us)

@@ -1,0 +1,1 @@
+"""The estimation benchmark: hand and robot by their statistics, with their truth."""

@@ -1,0 +1,162 @@
+"""A `World` as a linear model about its truth: what each sensor sees of each hidden process.
+
+State (66,): value, rate, acceleration of the hand's six slow axes (18); value, rate, force of its
+six tremors (18); value, rate, acceleration of the robot's six axes (18); biases of the phone's
+gyroscope and accelerometer, and of the body's (12).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from hardware.sim.world import sensors
+from hardware.sim.world.random_motion import TREMOR_SIGMA, Process, three_pole, tremor
+from hardware.sim.world.rotations import rates_each, rpy_each, skew_each
+from hardware.sim.world.world import LEDS_IN_B, Indices, World
+from pipeline.frames import Array
+
+N: Final = 66
+HAND, TREMOR, ROBOT = slice(0, 18), slice(18, 36), slice(36, 54)
+PHONE_BIASES, BODY_BIASES = slice(54, 60), slice(60, 66)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """What one sensor says, whitened: rows H (m, 66) of unit variance."""
+
+    i: int
+    """When, on the grid."""
+    arrival: float
+    """[s]."""
+    H: Array
+    is_picture: bool = False
+
+
+def prior(world: World) -> Array:
+    """(66, 66) covariance before anything is measured."""
+    biases = np.repeat((*sensors.PHONE_BIAS, *sensors.BODY_BIAS), 3)
+    processes = [s**2 * process.stationary for s, process in _processes(world)]
+    P: Array = block_diag(*processes, np.diag(np.square(biases)))
+    return P
+
+
+def step(world: World, h: float) -> tuple[Array, Array]:
+    """Transition (66, 66) over `h` [s] and the covariance of what is new; exact."""
+    steps = [(s, *process.step(h)) for s, process in _processes(world)]
+    whole: Array = block_diag(*(Phi for _, Phi, _ in steps), np.eye(12))
+    new: Array = block_diag(*(s**2 * Q for s, _, Q in steps), np.zeros((12, 12)))
+    return whole, new
+
+
+def readings(world: World) -> list[Reading]:
+    """Everything the sensors say, in the order of its times."""
+    phone, body = phone_by_state(world, world.phone.i), body_by_state(world, world.body.i)
+    rows = [
+        Reading(int(i), float(a), H / _imu_sigmas(sensors.PHONE_NOISE, sensors.PHONE_STEP))
+        for i, a, H in zip(world.phone.i, world.phone.arrival, phone, strict=True)
+    ]
+    rows += [
+        Reading(int(i), float(a), H / _imu_sigmas(sensors.BODY_NOISE, (0.0, 0.0)))
+        for i, a, H in zip(world.body.i, world.body.arrival, body, strict=True)
+    ]
+    seen = tangents_by_state(world, world.pictures.i) * (sensors.FOCAL_PX / sensors.NOISE_PX)
+    good = world.visible & ~world.false
+    rows += [
+        Reading(int(i), float(a), H[g].reshape(-1, N), is_picture=True)
+        for i, a, H, g in zip(world.pictures.i, world.pictures.arrival, seen, good, strict=True)
+    ]
+    return sorted(rows, key=lambda reading: reading.i)
+
+
+def phone_by_state(world: World, i: Indices) -> Array:
+    """(n, 6, 66) of the phone's (ω, f)."""
+    H = _felt_by_motion(world.hand[:, i], world.f_c[i]) @ _hand_by_state(world)
+    H[:, :, PHONE_BIASES] = np.eye(6)
+    return H
+
+
+def body_by_state(world: World, i: Indices) -> Array:
+    """(n, 6, 66) of the robot's (ω, f)."""
+    own = _felt_by_motion(world.robot[:, i], world.f_b[i] @ world.R_mean.T)
+    H = np.kron(np.eye(2), world.R_mean.T) @ own @ _robot_by_state()
+    H[:, :, BODY_BIASES] = np.eye(6)
+    return H
+
+
+def pose_by_state(world: World, i: Indices) -> Array:
+    """(n, 6, 66) of (δp in c, θ in b) with R = R̂ Exp(θ)."""
+    p, R = world.p[i], world.R[i]
+    R_cf = world.R_fc[i].transpose(0, 2, 1)
+    hand, robot = _hand_by_state(world), _robot_by_state()
+    turn_c = rates_each(world.hand[0, i, 3:]) @ hand[3:6]
+    turn_b = world.R_mean.T @ rates_each(world.robot[0, i, 3:]) @ robot[3:6]
+    position = skew_each(p) @ turn_c + R_cf @ (robot[:3] - hand[:3])
+    return np.concatenate((position, turn_b - R.transpose(0, 2, 1) @ turn_c), axis=1)
+
+
+def tangents_by_state(world: World, i: Indices) -> Array:
+    """(n, LEDs, 2, 66)."""
+    p, R, pose = world.p[i], world.R[i], pose_by_state(world, i)
+    rows = []
+    for led in LEDS_IN_B:
+        place = pose[:, :3] - R @ skew_each(led[None]) @ pose[:, 3:]
+        rows.append(sensors.tangents_by_place(p + R @ led) @ place)
+    return np.stack(rows, axis=1)
+
+
+def _felt_by_motion(motion: Array, force: Array) -> Array:
+    """(n, 6, 18) of (ω, f) in own axes by value, rate and acceleration of a motion (3, n, 6)."""
+    eta, rates = motion[0, :, 3:], motion[1, :, 3:]
+    (sr, sp, _), (cr, cp, _) = np.sin(eta.T), np.cos(eta.T)
+    _, pitch, yaw = rates.T
+    S, zero = rates_each(eta), np.zeros(len(eta))
+    J = np.zeros((len(eta), 6, 18))
+    by_roll = (zero, cr * cp * yaw - sr * pitch, -cr * pitch - sr * cp * yaw)
+    by_pitch = (-cp * yaw, -sr * sp * yaw, -cr * sp * yaw)
+    J[:, :3, 3], J[:, :3, 4] = np.stack(by_roll, axis=1), np.stack(by_pitch, axis=1)
+    J[:, :3, 9:12] = S
+    J[:, 3:, 3:6] = skew_each(force) @ S
+    J[:, 3:, 12:15] = rpy_each(eta).transpose(0, 2, 1)
+    return J
+
+
+def _hand_by_state(world: World) -> Array:
+    """(18, 66) value, rate and acceleration of the hand's axes."""
+    H, fading = _slow(HAND), 2.0 / world.setup.tremor_relaxation
+    for k, omega in enumerate(world.tremor_omega):
+        fast = TREMOR.start + 3 * k
+        H[k, fast] = H[6 + k, fast + 1] = 1.0
+        H[12 + k, fast : fast + 3] = -(omega**2), -fading, 1.0
+    return H
+
+
+def _robot_by_state() -> Array:
+    """The same of the robot's."""
+    return _slow(ROBOT)
+
+
+def _slow(where: slice) -> Array:
+    H = np.zeros((18, N))
+    for k in range(6):
+        slow = where.start + 3 * k
+        H[k, slow] = H[6 + k, slow + 1] = H[12 + k, slow + 2] = 1.0
+    return H
+
+
+def _processes(world: World) -> list[tuple[float, Process]]:
+    """(σ [m or rad], process): 18 of three states."""
+    relaxation, setup = world.setup.tremor_relaxation, world.setup
+    tremors = [tremor(omega, relaxation) for omega in world.tremor_omega.tolist()]
+    sigmas = np.repeat((*setup.hand_sigma, *TREMOR_SIGMA, *setup.robot_sigma), 3)
+    whole = [three_pole()] * 6 + tremors + [three_pole()] * 6
+    return list(zip(sigmas.tolist(), whole, strict=True))
+
+
+def _imu_sigmas(noise: tuple[float, float], step: tuple[float, float]) -> Array:
+    """(6, 1): noise and rounding."""
+    sigmas: Array = np.sqrt(np.square(noise) + np.square(step) / 12.0)
+    return np.repeat(sigmas, 3)[:, None]

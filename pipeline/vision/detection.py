@@ -1,0 +1,52 @@
+"""What is known before a picture, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pipeline.camera.lens import Camera
+from pipeline.frames import Array
+from pipeline.prediction import Expected
+from pipeline.signals import LedRays, Match, RelativePose, Seen, Spots, StampOffset
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """What is known without looking; each may be missing."""
+
+    up_in_c: Array | None = None
+    """Opposite of gravity (3,)."""
+    up_in_b: Array | None = None
+    omega_cf_in_c: Array | None = None
+    """When the picture was taken [rad/s]."""
+    omega_bf_in_b: Array | None = None
+    expected: Expected | None = None
+    """What a filter predicts for that time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """What came of a picture."""
+
+    t: float
+    pose: RelativePose | None
+    rays: LedRays
+    """The named LEDs, if they are believed."""
+    spots: Spots
+    match: Match | None
+    reason: str
+    """Why there is no pose; empty if there is."""
+    took_s: dict[str, float] = field(default_factory=dict)
+    """By stage: detect, identify, pose."""
+    unbelieved: RelativePose | None = None
+    """What the picture shows if gravity, which denies it, is left out."""
+    offset: StampOffset | None = None
+    """Coarse, of the picture's stamp, for who knows it."""
+    bounded: bool = False
+    """There was more light in the picture than time to try it all: the next one goes on."""
+
+    def seen(self, camera: Camera) -> Seen | None:
+        """For a filter; None if it says nothing of the robot."""
+        if self.pose is None and len(self.rays) == 0:
+            return None
+        return Seen(self.t, self.rays, self.pose, camera.half_field, self.offset)

@@ -1,0 +1,69 @@
+"""What a motion sensor felt in the last half second: its vertical and its turning, at any time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.estimation.gravity_direction import Vertical
+from pipeline.frames import Array
+
+REMEMBERED_S = 0.6
+MAX_REMEMBERED = 1024
+STALE_S = 0.3
+"""Farther from the nearest sample nothing is known."""
+
+
+class Feeling(NamedTuple):
+    """One moment."""
+
+    t: float
+    """[s]."""
+    up: Array | None
+    """Opposite of gravity (3,) in the sensor's axes."""
+    omega: Array
+    """(3,) [rad/s]."""
+
+
+class Felt:
+    """Samples come in the order of time, from one thread; any thread may ask."""
+
+    def __init__(self) -> None:
+        """Nothing felt."""
+        self._vertical = Vertical()
+        self._feelings: tuple[Feeling, ...] = ()
+
+    def add(self, t: float, omega: Array, specific_force: Array) -> None:
+        """Take a sample of `t` [s]: `omega` (3,) [rad/s], `specific_force` (3,) [m/s²]."""
+        self._vertical.add(t, omega, specific_force)
+        kept = self._feelings[-MAX_REMEMBERED:]
+        first = 0
+        while first < len(kept) and kept[first].t < t - REMEMBERED_S:
+            first += 1
+        # a new tuple each time: who reads one in another thread keeps it whole
+        self._feelings = (*kept[first:], Feeling(t, self._vertical.up, omega))
+
+    def at(self, t: float) -> Feeling | None:
+        """Between the samples around `t` [s], or that of the nearest; None if all are far."""
+        feelings = self._feelings
+        if not feelings or not feelings[0].t - STALE_S <= t <= feelings[-1].t + STALE_S:
+            return None
+        later = len(feelings)
+        while later > 0 and feelings[later - 1].t > t:
+            later -= 1
+        if later == 0:
+            return feelings[0]._replace(t=t)
+        if later == len(feelings):
+            return feelings[-1]._replace(t=t)
+        return _between(feelings[later - 1], feelings[later], t)
+
+
+def _between(a: Feeling, b: Feeling, t: float) -> Feeling:
+    share = (t - a.t) / (b.t - a.t)
+    omega = (1.0 - share) * a.omega + share * b.omega
+    if a.up is None or b.up is None:
+        return Feeling(t, b.up, omega)
+    up = (1.0 - share) * a.up + share * b.up
+    norm = float(np.sqrt(up @ up))
+    return Feeling(t, up / norm if norm > 0.5 else b.up, omega)

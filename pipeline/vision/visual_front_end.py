@@ -1,0 +1,172 @@
+"""Pictures and both motion sensors → judged poses: what a live phone and a folder of frames share.
+
+Nothing here decodes, reads a file or knows a clock: `server.phone.frame_pipeline` puts a decoder
+before it, and `lightleash locate` files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.camera.block import Look
+from pipeline.camera.calibration_monitor import CameraWatch
+from pipeline.camera.exposure import ExposureWatch
+from pipeline.camera.lens import Camera
+from pipeline.camera.line_delay import Readout
+from pipeline.frames import Array
+from pipeline.prediction import Expectation, Expected
+from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
+from pipeline.timing.camera_imu_delay import StampOffsetSearch
+from pipeline.vision import vision
+from pipeline.vision.detection import Prior, Sighting
+from pipeline.vision.gating import disbelief
+from pipeline.vision.imu_buffer import Felt
+from pipeline.vision.rays import NO_RAYS
+from pipeline.vision.vision import Vision
+from pipeline.vision_config import GatesConfig
+
+DOUBT_S = 0.15
+"""Between looks without gravity."""
+
+
+class Looking:
+    """One camera's pictures of one robot, and what moves them."""
+
+    def __init__(
+        self,
+        camera: Camera,
+        leds_in_b: Array,
+        gates: GatesConfig,
+        clock: Callable[[], float] = lambda: 0.0,
+    ) -> None:
+        """LEDs (n, 3) [m]; `clock` only times the stages."""
+        self.camera = camera
+        self._gates, self._clock, self._leds_in_b = gates, clock, leds_in_b
+        self._vision = Vision(camera, leds_in_b)
+        self._phone, self._body = Felt(), Felt()
+        self._expectation, self._stamps = Expectation(), StampOffsetSearch()
+        self.watch, self.readout = CameraWatch(camera, leds_in_b), Readout(camera.readout_s)
+        self.exposure = ExposureWatch(camera.focal_px)
+        self.doubts_gravity = False
+        """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
+        self._t_doubt = -np.inf
+
+    def feel(self, sample: PhoneImu) -> None:
+        """Follow the phone's motion."""
+        self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
+        self._stamps.feel(sample)
+        self.watch.feel(sample)
+
+    def feel_body(self, samples: Iterable[BodyImu]) -> None:
+        """Follow the robot's motion."""
+        for sample in samples:
+            self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+            self._stamps.feel(sample)
+            self.watch.feel(sample)
+
+    def expect(self, expected: Expected | None) -> None:
+        """Follow what a filter says; None: it says nothing."""
+        self._expectation.add(expected)
+
+    def look(self, frame: Frame, up_in_b: Array | None, omega_bf_in_b: Array | None) -> Sighting:
+        """What a picture shows, with what the robot's own sensors said (3,) (3,) [rad/s]."""
+        prior = self._prior(frame.t, up_in_b, omega_bf_in_b)
+        judged = self._judged(self._vision.step(frame, prior, self._clock), prior)
+        if judged.pose is not None:
+            self._watched(frame, judged, judged.pose, prior)
+        if judged.pose is None and judged.unbelieved is None and self.doubts_gravity:
+            return replace(judged, unbelieved=self._without_gravity(frame))
+        return judged
+
+    @property
+    def offset_s(self) -> float:
+        """A picture was taken at its stamp plus this [s], as far as known."""
+        facts, coarse = self.watch.facts, self._stamps.offset
+        if facts is not None:
+            return facts.offset_s
+        return coarse.value if coarse is not None else 0.0
+
+    def _prior(self, t: float, up_in_b: Array | None, omega_bf_in_b: Array | None) -> Prior:
+        """What is known before a picture with stamp `t` [s] is looked at."""
+        phone = self._phone.at(t + self.offset_s)
+        body = self._body.at(t + self.offset_s)
+        return Prior(
+            phone.up if phone is not None else None,
+            up_in_b,
+            phone.omega if phone is not None else None,
+            body.omega if body is not None else omega_bf_in_b,
+            self._expectation.at(t),
+        )
+
+    def _judged(self, sighting: Sighting, prior: Prior) -> Sighting:
+        if sighting.pose is None:
+            return sighting
+        lie = disbelief(sighting.pose, prior.up_in_c, prior.up_in_b, self._gates)
+        if lie is not None:
+            self._vision.forget()
+            alone = disbelief(sighting.pose, None, None, self._gates) is None
+            return replace(
+                sighting,
+                pose=None,
+                rays=NO_RAYS,
+                reason=f"Not believed: {lie}.",
+                unbelieved=sighting.pose if alone else None,
+            )
+        self._vision.keep(sighting.pose)
+        self._stamps.saw(sighting.pose)
+        return replace(sighting, offset=self._stamps.offset)
+
+    def _watched(self, frame: Frame, sighting: Sighting, pose: RelativePose, prior: Prior) -> None:
+        """Learn about the camera from a believed pose."""
+        rays, match = sighting.rays, sighting.match
+        if match is None or len(rays) == 0:
+            return
+        pixels = sighting.spots.pixels[match.spot]
+        if prior.omega_cf_in_c is not None:
+            depth_m = float(pose.p_bc_in_c[0])
+            self.exposure.see(frame, pixels, depth_m, prior.omega_cf_in_c)
+        look = Look(
+            sighting.t,
+            rays.led,
+            rays.tangents,
+            rays.covariances,
+            pixels[:, 1] / self.camera.height - 0.5,
+            pose.p_bc_in_c,
+            pose.R_cb,
+        )
+        news, facts = self.watch.saw(look, self._stamps.offset), self.watch.facts
+        if news and facts is not None and not self.watch.complaint and self.readout.learn(facts):
+            self.camera = replace(self.camera, readout_s=self.readout.in_use_s)
+            self._vision.roll(self.readout.in_use_s)
+
+    def _without_gravity(self, frame: Frame) -> RelativePose | None:
+        """The pose of a picture from nothing else, now and then: the search is long."""
+        if 0.0 <= frame.t - self._t_doubt < DOUBT_S:
+            return None
+        self._t_doubt = frame.t
+        pose = Vision(self.camera, self._leds_in_b).step(frame, Prior()).pose
+        is_good = pose is not None and disbelief(pose, None, None, self._gates) is None
+        return pose if is_good else None
+
+
+def warm_up() -> None:
+    """Look and watch once, so that whatever is compiled once is so before the first picture."""
+    vision.warm_up()
+    K = np.array([[400.0, 0.0, 160.0], [0.0, 400.0, 120.0], [0.0, 0.0, 1.0]])
+    leds = np.array([[0.1, 0.3, 0.2], [0.0, -0.3, 0.1], [-0.1, 0.2, -0.3], [0.2, -0.1, -0.2]])
+    camera, place = Camera(320, 240, K, "plumb_bob", np.zeros(5)), np.array([2.5, 0.0, 0.0])
+    watch, still = CameraWatch(camera, leds), np.zeros(3)
+    for k in range(160):
+        watch.feel(PhoneImu(0.02 * k, still, still))
+        watch.feel(BodyImu(0.02 * k, still, still))
+    tangents = (leds[:, 1:]) / (place[0] + leds[:, :1])
+    C, names = np.tile(1e-6 * np.eye(2), (len(leds), 1, 1)), np.arange(len(leds))
+    for k in range(30):
+        t = 0.1 * k + 0.1
+        watch.saw(Look(t, names, tangents, C, np.zeros(len(leds)), place, np.eye(3)), None)
+    luma = np.zeros((240, 320), dtype=np.uint8)
+    luma[119:122, 159:162] = 255
+    ExposureWatch(400.0).see(Frame(0.0, luma), np.array([[160.0, 120.0]]), 2.5, still)

@@ -1,0 +1,96 @@
+"""Where a server is and what opens its door: from its run file, or from the command line."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from pipeline.config import VirtualCameraConfig
+from server.common.runtime import RUN_FILE, runtime_directory
+from server.common.runtime_parameters import Knobs
+
+DEFAULT_CAMERA = VirtualCameraConfig()
+
+
+class PhoneClientError(Exception):
+    """The server can't be found, or doesn't take us; says why in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """Where a server is and what opens its door."""
+
+    url: str
+    """http://… or https://…"""
+    token: str
+    truth_port: int = 0
+    """UDP port of the simulated robot's true pose; 0: not known."""
+    robot: str = "ames"
+    """Name or path of its robot file."""
+    ca: Path | None = None
+    """Certificate of the authority that signed the server's."""
+    virtual_camera: VirtualCameraConfig = DEFAULT_CAMERA
+    """How the server smooths the phone's turns: its lag is no tracking error."""
+
+
+def run_of(directory: Path | None = None) -> dict[str, object]:
+    """The run file of the server on this machine.
+
+    Raises:
+        PhoneClientError: there is none, or it makes no sense.
+    """
+    path = (directory or runtime_directory()) / RUN_FILE
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, object])
+    except FileNotFoundError as error:
+        why = "no server is running here: start `lightleash serve`, or name one with --url"
+        raise PhoneClientError(why) from error
+    except (OSError, msgspec.MsgspecError) as error:
+        raise PhoneClientError(f"{path}: not a run file of `lightleash serve`: {error}") from error
+
+
+def running_server(directory: Path | None = None) -> Access:
+    """The server running on this machine, as its run file tells.
+
+    Raises:
+        PhoneClientError: there is none, or its run file makes no sense.
+    """
+    run = run_of(directory)
+    try:
+        url = run["http_url"] or run["https_url"]
+        knobs = run.get("virtual_camera")
+        return Access(
+            str(url),
+            str(run["operator_token"]),
+            int(str(run.get("truth_port") or 0)),
+            str(run.get("robot") or "ames"),
+            virtual_camera=msgspec.convert(knobs, Knobs).config() if knobs else DEFAULT_CAMERA,
+        )
+    except (ValueError, LookupError, TypeError, msgspec.MsgspecError) as error:
+        why = f"{RUN_FILE}: not a run file of `lightleash serve`: {error}"
+        raise PhoneClientError(why) from error
+
+
+def add_access_arguments(parser: argparse.ArgumentParser) -> None:
+    """The options that say where the server is."""
+    parser.add_argument("--url", help="of the server; default: the one running here")
+    parser.add_argument("--token", help="operator_token of that server's run file; goes with --url")
+    parser.add_argument("--ca", type=Path, help="certificate of the server's own authority (PEM)")
+
+
+def access_of(arguments: argparse.Namespace) -> Access:
+    """The server these options mean.
+
+    Raises:
+        PhoneClientError: there is none, or url and token don't come together.
+    """
+    if (arguments.url is None) != (arguments.token is None):
+        raise PhoneClientError("--url and --token go together")
+    if arguments.url is None:
+        return running_server()
+    if not arguments.url.startswith(("http://", "https://")):
+        raise PhoneClientError(f"--url {arguments.url}: allowed: http://… or https://…")
+    return Access(arguments.url, arguments.token, ca=arguments.ca)

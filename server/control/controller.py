@@ -1,0 +1,277 @@
+"""What the control process does in a tick, without sockets and clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from math import inf
+
+import numpy as np
+
+from hardware.follower import ThrustCommand
+from hardware.link.robot_end import SILENCE_US
+from pipeline.config import TeleopConfig
+from pipeline.estimation.gravity_direction import Vertical
+from pipeline.frames import Array, wxyz_from_R
+from pipeline.prediction import Expected
+from pipeline.robot import Robot
+from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, Requests, Seen
+from pipeline.teleop import Inputs, Output, Teleop
+from server.common.runtime_parameters import Knobs, TuneInput, turned
+from server.control.gap_log import GapLog
+from server.control.ipc import (
+    ControlStatus,
+    Input,
+    OperatorInput,
+    PhoneImuInput,
+    ReadyInput,
+    RequestInput,
+)
+from server.control.ipc_estimate import EstimateFields, finite
+from server.control.ipc_vision import SeenInput, triple
+from server.control.tick_rate import TickRate
+
+PERIOD_S = 0.005
+"""From tick to tick."""
+SERVER_SILENT_S = 0.5
+"""Without word from the server for longer, arming is refused."""
+STOOD_STILL_S = 1e-6 * SILENCE_US
+"""Between two ticks: the robot has heard nothing for so long, and coasts."""
+
+
+TooLate = Callable[[float, float], str]
+
+
+def never_too_late(picture_age: float, body_age: float) -> str:
+    """Nobody knows the margins."""
+    return ""
+
+
+LATELY = 50
+
+
+class Mean:
+    """Of some dozens of values lately; 0 before the first."""
+
+    def __init__(self) -> None:
+        self.value = 0.0
+        self._count = 0
+
+    def add(self, value: float) -> None:
+        """Take another."""
+        self._count = min(self._count + 1, LATELY)
+        self.value += (value - self.value) / self._count
+
+
+class Controller:
+    """One robot's control; everything it is told comes with a time."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        config: TeleopConfig,
+        unfit: str = "",
+        too_late: TooLate = never_too_late,
+    ) -> None:
+        """Disarmed, until somebody asks.
+
+        `unfit` says why this process may never arm, if so; `too_late` why not with pictures and
+        body samples so old [s].
+        """
+        self._unfit, self._too_late = unfit, too_late
+        self._picture_age, self._body_age = Mean(), Mean()
+        self.teleop = Teleop(robot, config)
+        self._virtual_camera = config.virtual_camera
+        self._estimator_name = config.estimator
+        self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
+        self._t_ready = self._t_robot_gap = -np.inf
+        self._t_tick, self._armed = np.inf, False
+        self._longest_gap_s = config.failsafe.gap
+        silent_s = config.failsafe.silent
+        self._gaps = GapLog({"phone": silent_s, "robot": STOOD_STILL_S, "server": STOOD_STILL_S})
+        self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
+        self._vertical = Vertical()
+        self.omega_bf_in_b = np.zeros(3)
+        self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
+        self._fuse_ms = 0.0
+
+    @property
+    def up_in_b(self) -> Array | None:
+        """Opposite of gravity in the body (3,), for vision; None before the first sample."""
+        return self._vertical.up
+
+    def expected(self, output: Output) -> Expected | None:
+        """Where the filter says that the robot is, for vision; None if it doesn't."""
+        if output.relative is None:
+            return None
+        return Expected.of(output.relative, self.teleop.estimator.health.time_offset)
+
+    def tick(
+        self,
+        now: float,
+        messages: Iterable[Input],
+        body: Sequence[BodyImu],
+        robot_reason: str,
+        robot_gap: str = "",
+        robot_left_s: float = inf,
+    ) -> tuple[ThrustCommand, Output]:
+        """One control period.
+
+        Args:
+            now: Time [s].
+            messages: From the server, oldest first.
+            body: The robot's samples on our clock, oldest first.
+            robot_reason: Why the robot itself refuses thrust; empty if it doesn't. Ends a flight.
+            robot_gap: Why it does not follow for the moment. Ends no flight, while it is short.
+            robot_left_s: Until it ramps down by itself, if it goes on as it is [s].
+        """
+        phone, seen, operator, wishes = self._sort(messages, now)
+        for sample in body:
+            self._vertical.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+            self._body_samples.append(
+                (sample.t, *triple(sample.omega_m_bf_in_b), *triple(sample.a_m_bf_in_b))
+            )
+        stall_s = now - self._t_tick
+        output = self.teleop.step(
+            Inputs(
+                t=now,
+                phone_imu=tuple(phone),
+                body_imu=tuple(body),
+                seen=tuple(seen),
+                operator=operator,
+                requests=wishes,
+                refusals=self._why_not(now, robot_reason),
+                fault=self._out_of_time(stall_s) or (robot_reason if self._armed else ""),
+                gap=_stood_still(stall_s) or robot_gap,
+                robot_left_s=robot_left_s,
+            )
+        )
+        self._t_tick, self._armed = now, output.failsafe.mode not in (Mode.DISARMED, Mode.STOPPED)
+        self._note_gaps(output, stall_s, robot_gap)
+        if output.relative is not None:
+            self.omega_bf_in_b = output.relative.omega_bf_in_b
+        for one in seen:
+            self._fuse_ms = 1e3 * (now - one.t)
+            self._picture_age.add(now - one.t)
+        if body:
+            self._body_age.add(now - body[-1].t)
+        stop = output.failsafe.mode == Mode.STOPPED
+        return ThrustCommand(output.thrusts, output.armed, stop), output
+
+    def _sort(
+        self, messages: Iterable[Input], now: float
+    ) -> tuple[list[PhoneImu], list[Seen], Operator | None, Requests]:
+        phone: list[PhoneImu] = []
+        seen: list[Seen] = []
+        operator: Operator | None = None
+        wishes: set[str] = set()
+        for message in messages:
+            match message:
+                case PhoneImuInput():
+                    phone.append(PhoneImu(message.t, np.array(message.omega), np.array(message.a)))
+                case SeenInput():
+                    seen.append(message.seen())
+                case OperatorInput():
+                    operator = message.operator()
+                case RequestInput():
+                    wishes.add(message.what)
+                case ReadyInput():
+                    self._refusals, self._t_ready = tuple(message.refusals), now
+                case TuneInput():
+                    self._virtual_camera = turned(self._virtual_camera, message)
+                    self.teleop.tune(self._virtual_camera)
+        known = Requests.__slots__
+        return phone, seen, operator, Requests(**{w: True for w in wishes if w in known})
+
+    def _why_not(self, now: float, robot_reason: str) -> tuple[str, ...]:
+        if now - self._t_ready > SERVER_SILENT_S:
+            return ("The server is silent.",)
+        late = self._too_late(self._picture_age.value, self._body_age.value)
+        return (*self._refusals, *(why for why in (robot_reason, self._unfit, late) if why))
+
+    def _out_of_time(self, stall_s: float) -> str:
+        """Said in its own words, or the robot would seem to be what was silent."""
+        slow = self._rate.complaint(stall_s)
+        return _stood_still(stall_s) if stall_s > self._longest_gap_s else slow
+
+    def _note_gaps(self, output: Output, stall_s: float, robot_gap: str) -> None:
+        """Whose silence it was: while control stood still, nobody else could be heard."""
+        ages, stalled = output.ages, stall_s > STOOD_STILL_S
+        if not robot_gap:
+            self._t_robot_gap = output.t
+        deaf_s = STOOD_STILL_S + PERIOD_S + output.t - self._t_robot_gap if robot_gap else 0.0
+        robot_s = max(ages.body_imu, deaf_s)
+        silent_s = {
+            "phone": 0.0 if stalled else max(ages.operator, ages.phone_imu),
+            "robot": 0.0 if stalled else robot_s,
+            "server": stall_s,
+        }
+        self._gaps.add(output.t, silent_s)
+
+    def status(
+        self,
+        output: Output,
+        epoch: int,
+        realtime: str,
+        lateness_ms: dict[str, float],
+        step_ms: float,
+        dropped: int,
+    ) -> ControlStatus:
+        """All that a supervisor may want to know, and the body's samples since the last one."""
+        relative, view = output.relative, output.view
+        reference, error = output.reference, output.error
+        estimator = self.teleop.estimator
+        health = estimator.health
+        samples, self._body_samples = self._body_samples, []
+        return ControlStatus(
+            t=output.t,
+            epoch=epoch,
+            mode=int(output.failsafe.mode),
+            reason=output.failsafe.reason,
+            refusals=list(output.refusals),
+            pose_age=output.ages.pose,
+            operator_age=output.ages.operator,
+            phone_imu_age=output.ages.phone_imu,
+            body_imu_age=output.ages.body_imu,
+            body_imu_rate_hz=len(samples) / 0.02,
+            p_bc_in_c=triple(relative.p_bc_in_c) if relative else None,
+            R_cb_wxyz=wxyz_from_R(relative.R_cb) if relative else None,
+            R_fc_wxyz=wxyz_from_R(output.R_fc) if output.R_fc is not None else None,
+            R_fv_wxyz=wxyz_from_R(view.R_fv) if view else None,
+            reference_p_in_v=triple(reference.p_rv_in_v) if reference else None,
+            reference_R_wxyz=wxyz_from_R(reference.R_vr) if reference else None,
+            error_m=_norm(error.e_p_in_v) if error else None,
+            error_rad=_norm(error.e_eta_in_b) if error else None,
+            u_bf_in_c=triple(relative.u_bf_in_c) if relative else None,
+            sigma_p=relative.sigma_p if relative else None,
+            sigma_theta=relative.sigma_theta if relative else None,
+            time_offset=finite(health.time_offset),
+            thrusts=output.thrusts.tolist(),
+            saturated=output.saturated,
+            up_in_b=triple(self.up_in_b) if self.up_in_b is not None else None,
+            omega_b=triple(self.omega_bf_in_b),
+            body_samples=samples,
+            poses_fused=health.fused,
+            poses_dropped=health.dropped,
+            inputs_dropped=dropped,
+            realtime=realtime,
+            lateness_ms=lateness_ms,
+            fuse_ms=self._fuse_ms,
+            step_ms=step_ms,
+            knobs=Knobs.of(self._virtual_camera),
+            guarding=view.guarding if view else 0.0,
+            estimate=EstimateFields.of(self._estimator_name, estimator, health, relative),
+            until_ramp_s=output.until_ramp_s,
+            resumes=output.resumes,
+            gaps=self._gaps.lately(),
+            warnings=self._gaps.warnings(),
+        )
+
+
+def _stood_still(stall_s: float) -> str:
+    if stall_s <= STOOD_STILL_S:
+        return ""
+    return f"The server's computer stood still for {stall_s:.2f} s."
+
+
+def _norm(v: Array) -> float:
+    return float(np.sqrt(v @ v))

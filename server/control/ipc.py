@@ -1,0 +1,253 @@
+"""What server and control process tell each other: msgpack in unix datagrams, never blocking.
+
+The server sends *inputs* to `control.sock`; the control process sends `ControlStatus` to
+`server.sock`. Either side may die and come back: a datagram to nobody is dropped and counted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from pipeline.frames import R_from_wxyz
+from pipeline.prediction import Expected
+from pipeline.signals import Operator, PhoneImu
+from server.common.runtime_parameters import Knobs, TuneInput
+from server.control.gap_log import Gaps
+from server.control.ipc_estimate import EstimateFields
+from server.control.ipc_vision import SeenInput, Triple, triple
+
+MAX_DATAGRAM = 16_384
+LARGEST = 1e9
+"""No time, sensor or pose has a number beyond it."""
+
+
+class PhoneImuInput(msgspec.Struct, tag="imu", array_like=True, frozen=True):
+    """One motion sample of the phone, in camera axes, on the server's monotonic clock."""
+
+    t: float
+    omega: Triple
+    a: Triple
+
+    @classmethod
+    def of(cls, sample: PhoneImu) -> PhoneImuInput:
+        """To be sent."""
+        return cls(sample.t, triple(sample.omega_m_cf_in_c), triple(sample.a_m_cf_in_c))
+
+    def sample(self) -> PhoneImu:
+        """As received."""
+        return PhoneImu(self.t, np.array(self.omega), np.array(self.a))
+
+
+class OperatorInput(msgspec.Struct, tag="operator", array_like=True, frozen=True):
+    """Sign of life and hold-to-move button; `t` is when the echoed nonce was sent."""
+
+    t: float
+    held: bool
+    press: int
+
+    @classmethod
+    def of(cls, operator: Operator) -> OperatorInput:
+        """To be sent."""
+        return cls(operator.t, operator.held, operator.press)
+
+    def operator(self) -> Operator:
+        """As received."""
+        return Operator(self.t, self.held, self.press)
+
+
+class RequestInput(msgspec.Struct, tag="request", array_like=True, frozen=True):
+    """A wish of a person, already checked for its role."""
+
+    what: str
+
+
+class ReadyInput(msgspec.Struct, tag="ready", array_like=True, frozen=True):
+    """What the server has against arming, nothing when all is well; sent at 10 Hz."""
+
+    refusals: list[str]
+
+
+Input = PhoneImuInput | SeenInput | OperatorInput | RequestInput | ReadyInput | TuneInput
+
+
+def is_believable(message: Input) -> bool:
+    """Whether all its numbers are finite and of this world: no other may reach the state."""
+    match message:
+        case PhoneImuInput():
+            numbers: tuple[float, ...] = (message.t, *message.omega, *message.a)
+        case SeenInput():
+            numbers = tuple(message.numbers())
+        case OperatorInput():
+            numbers = (message.t,)
+        case _:
+            return True
+    return all(abs(number) <= LARGEST for number in numbers)
+
+
+class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
+    """The state of control at one tick, sent at 50 Hz."""
+
+    t: float
+    epoch: int
+    """Of this control process; a new one starts disarmed."""
+    mode: int
+    reason: str
+    refusals: list[str]
+    pose_age: float
+    operator_age: float
+    phone_imu_age: float
+    body_imu_age: float
+    body_imu_rate_hz: float
+    p_bc_in_c: Triple | None
+    R_cb_wxyz: tuple[float, float, float, float] | None
+    R_fc_wxyz: tuple[float, float, float, float] | None
+    """Attitude of the phone."""
+    R_fv_wxyz: tuple[float, float, float, float] | None
+    """Attitude of the virtual camera."""
+    reference_p_in_v: Triple | None
+    reference_R_wxyz: tuple[float, float, float, float] | None
+    """R_vr."""
+    error_m: float | None
+    error_rad: float | None
+    u_bf_in_c: Triple | None
+    """Velocity of the body seen from f."""
+    sigma_p: float | None
+    """Largest standard deviations of position [m] and attitude [rad]."""
+    sigma_theta: float | None
+    time_offset: float | None
+    """Of the pictures' stamps, if the filter knows: taken at the stamp plus this [s]."""
+    thrusts: list[float]
+    saturated: bool
+    up_in_b: Triple | None
+    """Direction of gravity's opposite in the body, for vision's prior and gate."""
+    omega_b: Triple
+    body_samples: list[tuple[float, float, float, float, float, float, float]]
+    """Body IMU since the last status, for recordings: t, ω in b, specific force in b."""
+    poses_fused: int
+    poses_dropped: int
+    inputs_dropped: int
+    realtime: str
+    lateness_ms: dict[str, float]
+    """p50, p99, p999, max and missed of the last minute."""
+    fuse_ms: float
+    """Capture of the last fused picture → fused."""
+    step_ms: float
+    """Median CPU time of a tick."""
+    knobs: Knobs | None = None
+    """Of the virtual camera, as they stand."""
+    guarding: float = 0.0
+    """0 to 1: how much the virtual camera hurries to keep the robot in the picture."""
+    estimate: EstimateFields | None = None
+    until_ramp_s: float | None = None
+    """In COAST and HOLD: left until control or the robot ramps down, if all goes on as it is."""
+    resumes: bool = False
+    """It will follow again by itself, if news come back in time."""
+    gaps: dict[str, Gaps] = {}
+    """Short silences of `phone`, `robot` and `server` (control stood still) in the last minute."""
+    warnings: list[str] = []
+    """What somebody who arms should know; refuses nothing."""
+
+
+def expected_of(status: ControlStatus) -> Expected | None:
+    """Where control's filter says that the robot is, for vision; None if it doesn't."""
+    p, R_wxyz, u = status.p_bc_in_c, status.R_cb_wxyz, status.u_bf_in_c
+    if p is None or R_wxyz is None or u is None:
+        return None
+    if status.sigma_p is None or status.sigma_theta is None:
+        return None
+    return Expected(
+        t=status.t,
+        p_bc_in_c=np.array(p),
+        R_cb=R_from_wxyz(R_wxyz),
+        u_bf_in_c=np.array(u),
+        sigma_p=status.sigma_p,
+        sigma_theta=status.sigma_theta,
+        time_offset=status.time_offset or 0.0,
+    )
+
+
+_encoder = msgspec.msgpack.Encoder()
+_input_decoder = msgspec.msgpack.Decoder(Input)
+_status_decoder = msgspec.msgpack.Decoder(ControlStatus)
+
+
+class Endpoint:
+    """One end of the link: a bound unix datagram socket and the path of the other one."""
+
+    def __init__(self, own: Path, other: Path) -> None:
+        """Bind `own`, taking the place of a dead predecessor."""
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(own)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.bind(str(own))
+        self._other = str(other)
+        self.dropped = 0
+
+    def fileno(self) -> int:
+        """For event loops."""
+        return self._socket.fileno()
+
+    def send(self, message: Input | ControlStatus) -> bool:
+        """Send, or drop and count when the other end is gone or full."""
+        try:
+            self._socket.sendto(_encoder.encode(message), self._other)
+        except (FileNotFoundError, ConnectionRefusedError, BlockingIOError):
+            self.dropped += 1
+            return False
+        return True
+
+    def _datagrams(self, limit: int) -> list[bytes]:
+        datagrams: list[bytes] = []
+        with contextlib.suppress(BlockingIOError):
+            while len(datagrams) < limit:
+                datagrams.append(self._socket.recv(MAX_DATAGRAM))
+        return datagrams
+
+    def inputs(self, limit: int = 64) -> list[Input]:
+        """What has arrived from the server, oldest first; what can't be believed is counted."""
+        inputs: list[Input] = []
+        for datagram in self._datagrams(limit):
+            try:
+                message = _input_decoder.decode(datagram)
+            except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+                self.dropped += 1
+                continue
+            if is_believable(message):
+                inputs.append(message)
+            else:
+                self.dropped += 1
+        return inputs
+
+    def statuses(self, limit: int = 64) -> list[ControlStatus]:
+        """What has arrived from the control process, oldest first."""
+        statuses: list[ControlStatus] = []
+        for datagram in self._datagrams(limit):
+            try:
+                statuses.append(_status_decoder.decode(datagram))
+            except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+                self.dropped += 1
+        return statuses
+
+    def close(self) -> None:
+        """Close and unlink."""
+        path = self._socket.getsockname()
+        self._socket.close()
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(path)
+
+
+def server_end(directory: Path) -> Endpoint:
+    """The server's end in the runtime directory."""
+    return Endpoint(directory / "server.sock", directory / "control.sock")
+
+
+def control_end(directory: Path) -> Endpoint:
+    """The control process's end."""
+    return Endpoint(directory / "control.sock", directory / "server.sock")

@@ -1,0 +1,201 @@
+"""The control process: 200 Hz between the server's datagrams and the robot's link.
+
+It knows nothing of HTTP and outlives the server: without word from it, `Teleop` holds, ramps down
+and disarms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import get_args
+
+import msgspec
+import numpy as np
+
+from hardware.dynamics import dynamics_of
+from hardware.follower import ThrustCommand
+from hardware.link.control_end import ControlEnd
+from hardware.link.link_key import LinkKeyError, take_key
+from hardware.link.udp import UdpFollower
+from hardware.robot_file import RobotFile, load_robot
+from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
+from pipeline.control.latency_guard import LatencyGuard
+from pipeline.estimation.estimators import warm_up
+from server.common.clock import unix_ms
+from server.common.options import Parser
+from server.common.runtime_parameters import DEFAULT_KNOBS, Knobs
+from server.control import realtime
+from server.control.controller import PERIOD_S, Controller, TooLate
+from server.control.ipc import Endpoint, control_end
+from server.control.robot_clock import RobotLink
+from server.control.robot_epoch import next_epoch
+
+STATUS_EVERY = 4
+"""Ticks: 50 Hz."""
+LATENESS_EVERY = 400
+"""Ticks: every 2 s."""
+
+UPRIGHT = "This robot flies, but does not keep its attitude by itself (keeps_attitude_in_ramp)."
+
+
+@dataclass(frozen=True, slots=True)
+class ControlOptions:
+    """How the control process was started."""
+
+    runtime: Path
+    robot: str
+    host: str
+    port: int
+    gains: str
+    estimator: EstimatorName
+    virtual_camera: Knobs
+    epochs: Path
+    real: bool
+    """The robot is no simulation: it is not armed while the schedule can't be kept."""
+
+
+def parse(argv: Sequence[str] | None) -> ControlOptions:
+    """Options from the command line."""
+    parser = Parser(prog="control", description=__doc__)
+    parser.add_argument("--runtime", type=Path, required=True, help="directory of the sockets")
+    parser.add_argument("--robot", default="ames", help="name or path of a robot file")
+    parser.add_argument("--host", default="127.0.0.1", help="of the robot")
+    parser.add_argument("--port", type=int, required=True, help="of the robot (UDP)")
+    parser.add_argument("--gains", default="phone", help="name of a gain set in the robot file")
+    parser.add_argument("--estimator", choices=get_args(EstimatorName), default="relative")
+    parser.add_argument(
+        "--virtual-camera", type=_knobs, default=DEFAULT_KNOBS, help="knobs as JSON"
+    )
+    parser.add_argument("--epochs", type=Path, required=True, help="keeps the newest epoch")
+    parser.add_argument("--real", action="store_true", help="the robot is no simulation")
+    return ControlOptions(**vars(parser.parse_args(argv)))
+
+
+def _knobs(text: str) -> Knobs:
+    try:
+        return msgspec.json.decode(text, type=Knobs)
+    except msgspec.MsgspecError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def teleop_config(
+    robot_file: RobotFile,
+    gains: str,
+    virtual_camera: VirtualCameraConfig,
+    estimator: EstimatorName = "relative",
+) -> TeleopConfig:
+    """The default configuration with a gain set of the robot file.
+
+    Raises:
+        SystemExit: no such gain set; says which there are.
+    """
+    if gains not in robot_file.gains:
+        raise SystemExit(f"gains: {gains!r} is not one of {', '.join(robot_file.gains)}")
+    return replace(
+        TeleopConfig(),
+        gains=robot_file.gains[gains],
+        virtual_camera=virtual_camera,
+        estimator=estimator,
+    )
+
+
+def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate:
+    """Why not to arm with pictures and body samples of an age, by the margins of the loop."""
+    robot, plant = robot_file.robot, robot_file.plant
+    guard = LatencyGuard(
+        dynamics_of(robot, plant), robot.axes | robot.wrench_axes, robot_file.gains, config
+    )
+    return partial(guard.refusal, gains, config.estimator)
+
+
+def never_upright(robot_file: RobotFile) -> str:
+    """Why never to arm a robot that would turn over when this process dies, or ""."""
+    falls = robot_file.robot.weight_to_carry > 0.0 and not robot_file.keeps_attitude_in_ramp
+    return UPRIGHT if falls else ""
+
+
+def _key() -> bytes:
+    try:
+        return take_key(os.environ)
+    except LinkKeyError as error:
+        raise SystemExit(f"control: {error}") from error
+
+
+def run(options: ControlOptions) -> None:
+    """Keep the schedule until SIGTERM or SIGINT.
+
+    However it ends, a robot that gives thrust then hears nothing any more and comes down by its own
+    ramp, upright if it flies: zeros would let it fall.
+    """
+    robot_file, key = load_robot(options.robot), _key()
+    config = teleop_config(
+        robot_file, options.gains, options.virtual_camera.config(), options.estimator
+    )
+    warm_up()
+    granted = realtime.claim()
+    late = options.real and not granted.startswith(realtime.GRANTED)
+    controller = Controller(
+        robot_file.robot,
+        config,
+        f"No real robot with {granted}." if late else never_upright(robot_file),
+        too_late(robot_file, options.gains, config),
+    )
+    epoch = next_epoch(options.epochs, unix_ms())
+    follower = UdpFollower(options.host, options.port, ControlEnd.of(robot_file, key, epoch))
+    endpoint = control_end(options.runtime)
+    stopping: list[int] = []
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda n, _frame: stopping.append(n))
+    try:
+        _loop(controller, follower, endpoint, granted, stopping)
+    finally:
+        follower.close()
+        endpoint.close()
+
+
+def _loop(
+    controller: Controller,
+    follower: UdpFollower,
+    endpoint: Endpoint,
+    granted: str,
+    stopping: list[int],
+) -> None:
+    """Tick until told to stop; who gives no thrust then says so to the end."""
+    schedule, link = realtime.Schedule(PERIOD_S), RobotLink(follower)
+    lateness: dict[str, float] = {}
+    cpu_ms, command = np.zeros(LATENESS_EVERY), ThrustCommand.zero(follower.thrusters)
+    while not stopping:
+        now = schedule.wait()
+        cpu = time.thread_time()
+        body = link.receive(now)
+        command, output = controller.tick(
+            now, endpoint.inputs(), body, link.reason, link.gap, link.left_s
+        )
+        follower.send(command)
+        cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (time.thread_time() - cpu)
+        if schedule.ticks % LATENESS_EVERY == 0:
+            lateness = schedule.lateness_ms()
+        if schedule.ticks % STATUS_EVERY == 0:
+            endpoint.send(
+                controller.status(
+                    output,
+                    epoch=follower.epoch,
+                    realtime=granted,
+                    lateness_ms=lateness,
+                    step_ms=float(np.median(cpu_ms)),
+                    dropped=endpoint.dropped + follower.dropped,
+                )
+            )
+    if not command.armed:
+        follower.stop()
+
+
+if __name__ == "__main__":
+    run(parse(None))

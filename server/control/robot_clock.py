@@ -1,0 +1,101 @@
+"""The robot's samples on our clock, and what the robot itself has against flying."""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState, Refusal
+from hardware.link.robot_end import BACK_UNTIL_US, RAMP_AFTER_US, SILENCE_US
+from pipeline.signals import BodyImu
+
+
+class BodyClock:
+    """Dates the robot's samples on our clock: the least delay of the last second is believed."""
+
+    def __init__(self) -> None:
+        """No sample yet."""
+        self._excess = np.full(200, np.inf)
+        self._count = 0
+
+    def imu(self, sample: BodySample, t_received: float) -> BodyImu:
+        """The sample on our clock; never later than its arrival."""
+        t_robot = sample.t_us * 1e-6
+        self._excess[self._count % len(self._excess)] = t_received - t_robot
+        self._count += 1
+        return BodyImu(t_robot + float(self._excess.min()), sample.omega_in_b, sample.a_in_b)
+
+    def forget(self) -> None:
+        """The robot has restarted: its clock is a new one."""
+        self._excess[:] = np.inf
+
+
+DEAF = "The robot hears nothing for the moment."
+SILENCE_S, RAMP_AFTER_S = 1e-6 * SILENCE_US, 1e-6 * RAMP_AFTER_US
+RAMP_BEGUN_S = 1e-6 * (BACK_UNTIL_US - RAMP_AFTER_US)
+"""A robot that has just begun to ramp takes commands back: so long it may say so."""
+
+
+class RobotLink:
+    """The robot's samples on our clock, and what it says against flying."""
+
+    def __init__(self, follower: Follower) -> None:
+        """Nothing heard yet."""
+        self._follower = follower
+        self._clock = BodyClock()
+        self._boot_id: int | None = None
+        self._restarted = False
+        self.reason = "The robot has not answered yet."
+        """Why it does not follow and will not by itself; empty while it may."""
+        self.gap = ""
+        """Why it does not follow for the moment."""
+        self._t_ramp = self._t_deaf = np.inf
+        self._t_sample = -np.inf
+        self.left_s = inf
+        """Until the robot ramps down by itself, if it goes on as it is [s]."""
+
+    def receive(self, now: float) -> list[BodyImu]:
+        """The samples that have come since the last call."""
+        samples, dated = self._follower.receive(), []
+        for sample in samples:
+            if self._boot_id is not None and sample.boot_id != self._boot_id:
+                self._clock.forget()
+                self._restarted = True
+            self._boot_id = sample.boot_id
+            dated.append(self._clock.imu(sample, now))
+        if samples:
+            self.reason, self.gap = self._reason(samples[-1]), ""
+            self._bear(samples[-1], now)
+            self._t_sample = now
+        self.left_s = self._left(now)
+        return dated
+
+    def _left(self, now: float) -> float:
+        """A robot that we don't hear coasts, too: commands must echo its newest samples."""
+        deaf_since = self._t_deaf
+        if now - self._t_sample > SILENCE_S:
+            deaf_since = min(deaf_since, self._t_sample)
+        return max(0.0, deaf_since + RAMP_AFTER_S - now)
+
+    def _bear(self, last: BodySample, now: float) -> None:
+        """A robot that coasts, or has only just begun to ramp, may come back."""
+        if last.state != FollowerState.RAMP:
+            self._t_ramp = np.inf
+        elif not self._restarted:
+            self._t_ramp = min(self._t_ramp, now)
+            if now - self._t_ramp < RAMP_BEGUN_S:
+                self.reason, self.gap = "", DEAF
+        if last.state == FollowerState.COAST:
+            self.gap = DEAF
+        if last.state not in (FollowerState.COAST, FollowerState.RAMP):
+            self._t_deaf = np.inf
+        else:
+            self._t_deaf = min(self._t_deaf, now - SILENCE_S)
+
+    def _reason(self, last: BodySample) -> str:
+        """A robot that restarts refuses what we go on sending: the restart is what went wrong."""
+        if last.state not in (FollowerState.RAMP, FollowerState.REFUSING):
+            self._restarted = False
+            return ""
+        return EXPLANATIONS[Refusal.STARTED if self._restarted else last.refusal]

@@ -1,0 +1,1 @@
+"""What the server observes of itself, of its links and of the camera."""

@@ -1,0 +1,37 @@
+"""From what `Looking` learnt of a camera to what pages show of it."""
+
+from __future__ import annotations
+
+from pipeline.camera.exposure import ADVICE
+from pipeline.vision.visual_front_end import Looking
+from server.protocol.camera_messages import CameraHealth
+
+
+def health(looking: Looking) -> CameraHealth:
+    """Any thread may ask: each value is replaced whole."""
+    facts, exposure, hint = looking.watch.facts, looking.exposure.exposure_s, looking.exposure.hint
+    told = CameraHealth(
+        complaint=looking.watch.complaint,
+        hint=hint.value,
+        advice=ADVICE[hint],
+        exposure_ms=None if exposure is None else round(1e3 * exposure, 1),
+        readout_ms=round(1e3 * looking.readout.in_use_s, 2),
+        readout_learnt=looking.readout.is_learnt,
+    )
+    if facts is None:
+        return told
+    return CameraHealth(
+        complaint=told.complaint,
+        hint=told.hint,
+        advice=told.advice,
+        exposure_ms=told.exposure_ms,
+        readout_ms=told.readout_ms,
+        readout_learnt=told.readout_learnt,
+        readout_sigma_ms=round(1e3 * facts.readout_sigma_s, 2),
+        time_offset_ms=round(1e3 * facts.offset_s, 2),
+        time_offset_sigma_ms=round(1e3 * facts.offset_sigma_s, 2),
+        larger_percent=round(100.0 * facts.focal, 2),
+        larger_sigma_percent=round(100.0 * facts.focal_sigma, 2),
+        held_percent=round(100.0 * facts.held, 1),
+        held_sigma_percent=round(100.0 * facts.held_sigma, 1),
+    )

@@ -1,0 +1,1 @@
+"""PROTOCOL.md and the page's types, generated."""

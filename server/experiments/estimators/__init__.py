@@ -1,0 +1,1 @@
+"""`lightleash experiments estimators`: three estimators on the same data."""

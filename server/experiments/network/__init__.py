@@ -1,0 +1,1 @@
+"""`lightleash experiments network`: WebRTC and websockets over bad lines."""

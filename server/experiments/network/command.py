@@ -1,0 +1,189 @@
+"""`lightleash experiments network`: a phone by WebRTC and by websockets, over bad lines."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from hardware.sim.network.emulated_link import Link
+from hardware.sim.network.netns import NamespaceError
+from server.common.text import table
+from server.experiments.network.figures import drops, percentile, recovery
+from server.experiments.network.phone import CLIENTS, FRAME_RATE_HZ
+from server.experiments.network.run import Rig, Run, RunError
+from server.experiments.network.scenarios import SCENARIOS, Scenario
+
+COLUMNS = (
+    ("scenario", "line", "{}"),
+    ("path", "path", "{}"),
+    ("frame_p50_ms", "frame p50", "{:.0f}"),
+    ("frame_p95_ms", "p95 ms", "{:.0f}"),
+    ("drops_pct", "drops %", "{:.1f}"),
+    ("operator_p50_ms", "record p50", "{:.0f}"),
+    ("operator_p999_ms", "p99.9 ms", "{:.0f}"),
+    ("echo_p999_ms", "echo p99.9", "{:.0f}"),
+    ("recovery_s", "again after s", "{:.2f}"),
+    ("late_ms", "line late ms", "{:.1f}"),
+    ("verdict", "goals", "{}"),
+)
+NEEDS_TIME_S = 8.0
+"""The shortest run with a fault in it, and time to recover."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Figures of one run; times in ms unless the name says otherwise."""
+
+    scenario: str
+    path: str
+    frame_p50_ms: float
+    """Of a picture that comes, since it left the sensor: encoding and the whole way."""
+    frame_p95_ms: float
+    drops_pct: float
+    """Of the camera's pictures, those that never came to the decoder."""
+    operator_p50_ms: float
+    """Of the newest motion or touch, at any time."""
+    operator_p999_ms: float
+    echo_p999_ms: float
+    """Since the newest ping that came back in a touch went out: control's measure."""
+    recovery_s: float
+    """From the end of a fault until pictures are fresh again, the median; NaN without faults."""
+    worst_recovery_s: float
+    late_ms: float
+    """By how much the emulator itself was late, p99."""
+    video_path: str
+    undecodable: int
+    skipped: int
+    ended: str
+    verdict: str
+
+
+def row_of(scenario: Scenario, path: str, run: Run) -> Row:
+    """Figures of a run."""
+    begin, end = run.begin, run.end
+    frames = 1e3 * run.frames.within(begin, end).ages
+    operator = 1e3 * run.records.ages_of_newest(begin, end)
+    again = [recovery(run.frames, t_over) for t_over in run.fault_ends]
+    row = Row(
+        scenario.name,
+        path,
+        percentile(frames, 50.0),
+        percentile(frames, 95.0),
+        100.0 * drops(run.frames, begin, end, FRAME_RATE_HZ),
+        percentile(operator, 50.0),
+        percentile(operator, 99.9),
+        percentile(1e3 * run.echoes.ages_of_newest(begin, end), 99.9),
+        float(np.median(again)) if again else float("nan"),
+        max(again, default=float("nan")),
+        1e3 * run.lateness.p99,
+        run.video_path,
+        run.undecodable,
+        run.skipped,
+        run.ended,
+        "",
+    )
+    return replace(row, verdict=verdict_of(scenario, row) if path == "webrtc" else "")
+
+
+def misses(scenario: Scenario, row: Row) -> Iterator[str]:
+    """Which goals were not met, in words."""
+    if row.ended:
+        yield row.ended
+    for name, goal in asdict(scenario.goals).items():
+        if goal is not None and not getattr(row, name) <= goal:
+            yield f"{name} > {goal:g}"
+
+
+def verdict_of(scenario: Scenario, row: Row) -> str:
+    """What was missed, or "met"; "" if nothing is asked."""
+    is_asked = any(goal is not None for goal in asdict(scenario.goals).values())
+    return ", ".join(misses(scenario, row)) or ("met" if is_asked else "")
+
+
+def measure(arguments: argparse.Namespace) -> Iterator[tuple[Scenario, str, Run]]:
+    """Each scenario by each path, one after the other.
+
+    Raises:
+        NamespaceError: this machine, or this user, can't make networks.
+        RunError: a process did not do its part.
+    """
+    with Link() as link:
+        rig = Rig(link)
+        try:
+            for name in arguments.scenarios:
+                for path in arguments.paths:
+                    scenario = SCENARIOS[name]
+                    yield scenario, path, rig.run(scenario, path, arguments.seconds, arguments.seed)
+        finally:
+            rig.close()
+
+
+def write(rows: list[Row], runs: list[Run], folder: Path) -> None:
+    """JSON and the picture."""
+    from server.experiments.network.picture import draw
+
+    folder.mkdir(parents=True, exist_ok=True)
+    told = [
+        {name: _told(value) for name, value in asdict(row).items()}
+        | {"to_phone": asdict(run.counts[0]), "to_server": asdict(run.counts[1])}
+        for row, run in zip(rows, runs, strict=True)
+    ]
+    text, picture = folder / "network.json", folder / "network.png"
+    text.write_text(json.dumps(told, indent=1))
+    draw([(row.scenario, row.path, run) for row, run in zip(rows, runs, strict=True)], picture)
+    print(f"written: {picture}, {text}")
+
+
+def _told(value: str | float) -> str | float | None:
+    """As JSON has it: no NaN, no infinity."""
+    if isinstance(value, float):
+        return round(value, 3) if isfinite(value) else None
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, print, draw; 1 if a goal was missed, 2 if it can't be measured here."""
+    rows: list[Row] = []
+    runs: list[Run] = []
+    try:
+        for scenario, path, one in measure(arguments):
+            rows.append(row_of(scenario, path, one))
+            runs.append(one)
+            print(f"{scenario.name}, {path}: {scenario.told}", file=sys.stderr, flush=True)
+    except (NamespaceError, RunError) as error:
+        print(f"lightleash experiments network: {error}", file=sys.stderr)
+        return 2
+    print(
+        f"640x480, {FRAME_RATE_HZ:g} pictures a second, {arguments.seconds:g} s each, seed "
+        f"{arguments.seed}; both directions alike; goals are those of webrtc"
+    )
+    print(table(COLUMNS, rows))
+    if arguments.out is not None:
+        write(rows, runs, arguments.out)
+    return int(any(row.verdict not in ("", "met") for row in rows))
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not NEEDS_TIME_S <= value <= 3600.0:
+        raise argparse.ArgumentTypeError(f"{text}: allowed: {NEEDS_TIME_S:g} to 3600")
+    return value
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    told = "; ".join(f"{one.name}: {one.told}" for one in SCENARIOS.values()).replace("%", "%%")
+    parser.add_argument(
+        "--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), help=told
+    )
+    parser.add_argument("--paths", nargs="+", choices=CLIENTS, default=list(CLIENTS))
+    parser.add_argument("--seconds", type=_seconds, default=30.0, help="of each scenario and path")
+    parser.add_argument("--seed", type=int, default=0, help="of the line's chances and of the hand")
+    parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")

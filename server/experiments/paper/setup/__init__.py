@@ -1,0 +1,1 @@
+"""The paper's experimental setup: tasks, flights, figures, assumptions."""

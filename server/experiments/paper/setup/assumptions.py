@@ -1,0 +1,155 @@
+"""Every number behind the figures that the paper does not give, and those of it that it does.
+
+known: stands in the paper or follows from it; identified: fitted so that the simulated robot
+reproduces Tables I and IV (`hardware/robots/ames.toml`); chosen: ours, plausible, not fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+
+from hardware.plant_parameters import PlantParameters
+from hardware.sim.render import Look
+from server.experiments.paper.setup import published
+from server.experiments.paper.setup.assumption import Assumption
+from server.experiments.paper.setup.assumptions_task import of_task
+from server.experiments.paper.setup.flight import HOVER_S, REST_S
+from server.experiments.paper.setup.measure import WINDOW_S, Setup
+from server.simulation.led_robot import PERIOD_S
+from server.simulation.sensors import PAPER, Leader, Pictures
+from server.simulation.vision_models import BITRATE_BPS
+
+
+def of(setup: Setup) -> list[Assumption]:
+    """Of the experiments as they are set up."""
+    leader = sensors(setup.leader) if setup.leader == PAPER else phone_sensors(setup.leader)
+    return [*method(), *leader, *plant(setup.robot_file.plant), *of_task()]
+
+
+def method() -> Iterator[Assumption]:
+    """How is it flown and judged?"""
+    yield Assumption("gains", "Table II (a) with EKF, (b) without", "known")
+    yield Assumption("control and filter", f"{1.0 / PERIOD_S:g} Hz", "known")
+    yield Assumption("virtual camera", "τ = 3.18 s, 0.16 s (0.05 Hz)", "known")
+    yield Assumption("window of RMS", f"{WINDOW_S:g} s from the start of the move", "identified")
+    yield Assumption(
+        "error", "what the controller sees, in b; true: against the simulated truth", "chosen"
+    )
+    yield Assumption("arm's velocity", "a triangle, 20 ms to turn the acceleration round", "chosen")
+    yield Assumption(
+        "hover before the move",
+        f"{HOVER_S:g} s; the true error's mean over the last {REST_S:g} s of it is taken off",
+        "chosen",
+    )
+    yield Assumption(
+        "thrusts at their limits",
+        "the paper's columns cut each (`lift`), as [26] knows no upper one; ours keeps the torque",
+        "chosen",
+    )
+    yield Assumption("push of Fig. 9", f"{published.PUSH_N:g} N by the thrusters", "known")
+    yield Assumption("noise of the EKF", "the project's defaults (`EkfConfig`)", "chosen")
+
+
+def sensors(leader: Leader) -> Iterator[Assumption]:
+    """The paper's handheld device."""
+    o = leader.options
+    yield Assumption("pictures", f"{o.frame_rate_hz:g} fps, the newest is taken", "known")
+    yield Assumption("hand's IMU", f"{o.motion_rate_hz:g} Hz, no bias", "known")
+    yield Assumption("its noise", "0.007 °/s/√Hz, 60 µg/√Hz (data sheet)", "known")
+    yield Assumption("its delay", _ms(o.motion_delay_s), "chosen")
+    yield Assumption("pictures' delay", _ms(o.picture_delay_s), "chosen")
+    yield Assumption(
+        "lens", f"10 mm: {leader.focal_px:g} px on {leader.width}x{leader.height}", "chosen"
+    )
+    yield from _common(leader)
+
+
+def phone_sensors(leader: Leader) -> Iterator[Assumption]:
+    """A phone on the same arm: nothing of it is the paper's."""
+    o = leader.options
+    yield Assumption("pictures", f"{o.frame_rate_hz:g} fps", "chosen")
+    if leader.pictures != "spots":
+        yield from _filmed(leader.pictures)
+    yield Assumption("pictures' delay", _ms(o.picture_delay_s), "chosen")
+    yield Assumption(
+        "phone's IMU", f"{o.motion_rate_hz:g} Hz, {_ms(o.motion_delay_s)} late", "chosen"
+    )
+    yield Assumption("its rounding", "0.1 °/s, 0.1 m/s² (Chromium)", "known")
+    yield Assumption("its biases", f"{o.bias_omega:g} rad/s, {o.bias_a:g} m/s²", "chosen")
+    yield Assumption("clocks", "the phone's is known exactly", "chosen")
+    yield Assumption("lens", f"{leader.focal_px:g} px on {leader.width}x{leader.height}", "chosen")
+    yield from _common(leader)
+
+
+def _filmed(codec: Pictures) -> Iterator[Assumption]:
+    """Pictures that are rendered."""
+    look = Look()
+    # a JPEG's size follows from its quality
+    rate = "" if codec == "jpeg" else f" at {1e-6 * BITRATE_BPS:g} Mbit/s"
+    yield Assumption(
+        "their way", f"rendered, {codec}{rate}, decoded, the server's vision looks", "chosen"
+    )
+    yield Assumption(
+        "their light",
+        f"{1e3 * look.exposure_s:g} ms exposure, all rows at once, LEDs of "
+        f"{2e3 * look.led_radius_m:g} mm, a dim room without other lamps",
+        "chosen",
+    )
+
+
+def _common(leader: Leader) -> Iterator[Assumption]:
+    if leader.pictures == "spots":
+        noise = f"{leader.noise_px:g} px per coordinate, white, names known: nothing is rendered"
+        yield Assumption("LEDs' centres", noise, "chosen")
+    yield Assumption(
+        "derivative without EKF", f"low pass of {1e3 * leader.derivative_tau_s:g} ms", "chosen"
+    )
+    yield Assumption(
+        "ours, unless wished otherwise",
+        f"relative filter, gains {leader.gains}, feed-forward through a low pass of "
+        f"{leader.feedforward_low_pass_hz:g} Hz",
+        "chosen",
+    )
+
+
+def plant(plant: PlantParameters) -> Iterator[Assumption]:
+    """The simulated robot; what each number rests on is said in its file."""
+    hangs = plant.suspension
+    yield Assumption("robot's mass", f"{plant.mass:g} kg", "identified")
+    yield Assumption(
+        "its inertia", " ".join(f"{x:g}" for x in plant.inertia) + " kg m²", "identified"
+    )
+    if hangs is not None:
+        yield Assumption("cable", f"{hangs.length:g} m, {hangs.stiffness:g} N/m", "identified")
+        yield Assumption(
+            "its damping, hook",
+            f"{hangs.damping:g} N s/m, {hangs.hook_above_com:g} m above the centre of mass",
+            "chosen",
+        )
+    thrusters = len(plant.thruster_torques)
+    yield Assumption("thrusters", f"{thrusters} on a cube's corners", "chosen")
+    yield Assumption("largest thrust", f"{plant.f_max:g} N", "identified")
+    yield Assumption(
+        "thrusters' lag, delay",
+        f"{1e3 * plant.lag:g} ms, {1e3 * plant.delay:g} ms with the link",
+        "chosen",
+    )
+    yield Assumption("drag", f"{plant.air_damping:g} N s/m", "chosen")
+    yield Assumption("body's IMU", "200 Hz, small MEMS: biases 0.5 °/s, 40 mg", "chosen")
+    yield Assumption("LEDs", "five, on the arms", "known")
+    yield Assumption("their places", "of the robot file", "chosen")
+
+
+def _ms(span_s: tuple[float, float]) -> str:
+    return f"{1e3 * span_s[0]:g}-{1e3 * span_s[1]:g} ms"
+
+
+def lines(ones: Iterable[Assumption]) -> str:
+    """One line each."""
+    return "\n".join(f"  {one.status:<10} {one.what}: {one.value}" for one in ones)
+
+
+def json(ones: Iterable[Assumption]) -> list[dict[str, str]]:
+    """For programs."""
+    return [asdict(one) for one in ones]

@@ -1,0 +1,149 @@
+"""One experiment's flight in virtual time: arm, hover, the arm moves, and what happens then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hardware.robot_file import RobotFile
+from hardware.sim.hand import make_hand
+from hardware.sim.reference_trajectory import Intent, missed_by
+from pipeline.config import TeleopConfig
+from pipeline.frames import Array
+from pipeline.teleop import Output
+from server.simulation.led_robot import PERIOD_S, Led
+from server.simulation.sensors import Leader
+
+HOVER_S = 8.0
+"""From switching on to the arm's move; tracking begins within the first second."""
+REST_S = 1.0
+"""Before the move; the mean error in it is the reference's own, not the move's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """A force that the thrusters are made to give beside what control asks for. Sec. V-C.2."""
+
+    after_s: float
+    """Since the arm's move [s]."""
+    y_n: float
+    """Along y_b [N]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """Rows since `REST_S` before the arm's move, one a control period; SI."""
+
+    t: Array
+    """(n,) since the move [s]."""
+    error_in_b: Array
+    """(n, 6) the controller's error: reference less what it believes, the paper's measure."""
+    missed_in_b: Array
+    """(n, 6) the true one: where the body was meant to be less where it is."""
+    p_bc_in_c: Array
+    """(n, 3) as estimated."""
+    thrusts: Array
+    """(n, m) asked of the thrusters [N]."""
+    wrench_in_b: Array
+    """(n, 6) that control asked for, as far as the thrusters could give it [N, N m]."""
+    saturated: Array
+    """(n,) 1 where the thrusters could not give the wrench."""
+    moved: Array
+    """(n, 3) of the camera since the start [m]."""
+    ended: str
+    """Why tracking ended early, or ""."""
+
+
+@dataclass(slots=True)
+class _Rows:
+    t: list[float] = field(default_factory=list)
+    values: list[Array] = field(default_factory=list)
+
+
+class Flight:
+    """One flight; `run` gives its trace."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        config: TeleopConfig,
+        leader: Leader,
+        hand: str,
+        seed: int = 0,
+        push: Push | None = None,
+    ) -> None:
+        """Everything at rest; `hand` is one of `hardware.sim.hand.HANDS`."""
+        robot = robot_file.robot
+        self._robot, self._config, self._push = robot, config, push
+        self._hand = make_hand(hand, seed=seed, start=robot_file.start, rest_s=HOVER_S)
+        self._led = Led(robot_file, config, leader, self._hand, seed)
+        self._push_in_b = np.zeros(6)
+        self._intent: Intent | None = None
+        self._rows, self._ended = _Rows(), ""
+
+    def run(self, seconds: float) -> Trace:
+        """Fly until `seconds` after the arm's move, or until tracking ends."""
+        for _ in range(round((HOVER_S + seconds) / PERIOD_S)):
+            self._advance()
+            if self._ended:
+                break
+        if not self._ended and not self._rows.t:
+            self._ended = "tracking never began"
+        return self._trace()
+
+    def _advance(self) -> None:
+        """One control period of everything."""
+        led = self._led
+        if self._push is not None and led.t + PERIOD_S >= HOVER_S + self._push.after_s:
+            self._push_in_b[1] = self._push.y_n
+            led.push(self._push_in_b)
+        output = led.advance()
+        if led.ended:
+            self._ended = f"{led.t - HOVER_S:+.2f} s: {led.ended}"
+        if led.tracks:
+            self._measure(led.t, output)
+
+    def _measure(self, now: float, output: Output) -> None:
+        body, hand = self._led.body, self._hand.pose(now)
+        if self._intent is None:
+            self._intent = Intent(self._config.virtual_camera, hand, body)
+        offset_in_f, turn = missed_by(body, self._intent.step(hand, PERIOD_S), self._robot.axes)
+        error, view, relative = output.error, output.view, output.relative
+        if now < HOVER_S - REST_S or error is None or view is None or relative is None:
+            return
+        self._rows.t.append(now - HOVER_S)
+        self._rows.values.append(
+            np.concatenate(
+                (
+                    view.R_vb.T @ error.e_p_in_v,
+                    error.e_eta_in_b,
+                    -body[0].T @ offset_in_f,
+                    -turn,
+                    relative.p_bc_in_c,
+                    [output.saturated],
+                    hand[1],
+                    self._robot.A @ output.thrusts - self._push_in_b,
+                    output.thrusts,
+                )
+            )
+        )
+
+    def _trace(self) -> Trace:
+        t, robot = np.array(self._rows.t), self._robot
+        width = 25 + robot.A.shape[1]
+        rows = np.array(self._rows.values).reshape(-1, width)
+        missed = rows[:, 6:12]
+        if len(t):
+            missed = missed - missed[t < 0.0].mean(axis=0)
+        return Trace(
+            t,
+            rows[:, :6],
+            missed,
+            rows[:, 12:15],
+            rows[:, 25:],
+            rows[:, 19:25],
+            rows[:, 15],
+            rows[:, 16:19] - rows[:1, 16:19],
+            self._ended,
+        )

@@ -1,0 +1,1 @@
+"""`lightleash experiments tremor`: what of the hand's tremor comes through."""

@@ -1,0 +1,200 @@
+"""`lightleash bench vision`: seeing, on films with known truth.
+
+A film is drawn for each scene and size and sent through every channel; the live stages look at what
+arrives. CPU times are this thread's. What is reported uses other seeds than those for tuning.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import cv2
+
+from hardware.sim.scenes.scene import (
+    FIRST_REPORTING_SEED,
+    HD,
+    SCENES,
+    SIZES,
+    Motion,
+    Scene,
+    Size,
+    at_reference,
+)
+from hardware.sim.scenes.video import Film
+from pipeline.vision.visual_front_end import warm_up
+from server.experiments.vision.channel import DEFAULT_CODECS, WITHOUT_IMU, Channel, channel
+from server.experiments.vision.learning import Learnt, learn
+from server.experiments.vision.rows import Row, plain_values, row, text
+from server.experiments.vision.verdicts import REFERENCE, verdicts, verdicts_on_learning
+from server.experiments.vision.watch import Record, watch
+from server.experiments.vision.write import write_film
+
+FRAMES = 90
+FILM_FRAMES, LONG_FILM_FRAMES = 45, 90
+"""Of one film; more frames are more films. Who leaves and returns takes the longer ones."""
+ALL_SIZES = (0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One film through all channels."""
+
+    scene: Scene
+    size: Size
+    seed: int
+    frames: int
+    channels: tuple[Channel, ...]
+    plain: bool
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    sizes = [f"{w}x{h}" for w, h in SIZES]
+    parser.add_argument("--frames", type=int, default=FRAMES, help="per scene, size, codec")
+    parser.add_argument("--scenes", nargs="+", choices=list(SCENES), default=list(SCENES))
+    parser.add_argument("--sizes", nargs="+", choices=sizes, default=sizes)
+    parser.add_argument(
+        "--codecs",
+        nargs="+",
+        default=[*DEFAULT_CODECS, "raw" + WITHOUT_IMU],
+        metavar="CODEC",
+        help="raw, jpeg, h264-MBIT, vp8-MBIT; with -noimu behind it: no motion sensors",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the first film")
+    parser.add_argument(
+        "--tuning", action="store_true", help=f"use the seeds below {FIRST_REPORTING_SEED}"
+    )
+    parser.add_argument("--no-imu", action="store_true", help="no motion sensors at all")
+    parser.add_argument("--no-plain", action="store_true", help="leave plain OpenCV out")
+    parser.add_argument(
+        "--learn", type=int, default=0, metavar="FILMS", help="of 20 s, for the readout and dates"
+    )
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="figures as JSON and a picture")
+    parser.add_argument(
+        "--write", type=Path, metavar="DIR", help="only write each film's frames and readings"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, print, draw; the exit code is 1 if a goal is not met."""
+    try:
+        tasks = list(_tasks(arguments))
+    except ValueError as error:
+        print(f"lightleash bench: {error}", file=sys.stderr)
+        return 2
+    if arguments.write is not None:
+        return _write(tasks, arguments.write)
+    records: dict[tuple[str, Size, str], Record] = {}
+    pools: dict[tuple[str, str], Record] = {}
+    for done, part in enumerate(_watched(tasks, arguments.jobs), 1):
+        _progress(done, len(tasks))
+        for record in part:
+            key = (record.scene, record.size, record.channel)
+            records.setdefault(key, Record(*key)).add(record)
+            pool = Record(record.scene, ALL_SIZES, record.channel)
+            pools.setdefault((record.scene, record.channel), pool).add(record)
+    learnt = [learn(tasks[0].seed + k) for k in range(arguments.learn)]
+    pooled = [row(record) for record in pools.values()]
+    return _report([row(record) for record in _sorted(records)], pooled, learnt, arguments.out)
+
+
+def _report(rows: list[Row], pools: list[Row], learnt: list[Learnt], out: Path | None) -> int:
+    print(text([one for one in rows if one.frames]))
+    floors = {one.height: f"{1e3 * one.pass_ms:.0f} µs" for one in rows if one.pass_ms > 0.0}
+    told = ", ".join(f"{height} rows {floor}" for height, floor in floors.items())
+    print(f"\none pass over a picture: {told}\n")
+    judged = verdicts(rows, pools) + verdicts_on_learning(learnt)
+    print("\n".join(map(str, judged)))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        goals = [{"goal": v.goal, "met": v.met, "found": v.found} for v in judged]
+        films = [asdict(one) for one in learnt]
+        values = {
+            "rows": plain_values(rows),
+            "all_sizes": plain_values(pools),
+            "learnt": films,
+            "verdicts": goals,
+        }
+        (out / "vision.json").write_text(json.dumps(values, indent=1, ensure_ascii=False))
+        from server.experiments.vision.picture import draw  # brings matplotlib
+
+        draw(rows, out / "vision.png")
+        print(f"\nwritten: {out / 'vision.json'}, {out / 'vision.png'}")
+    return 1 if any(verdict.met is False for verdict in judged) else 0
+
+
+def _tasks(arguments: argparse.Namespace) -> Iterator[Task]:
+    first = arguments.seed + (0 if arguments.tuning else FIRST_REPORTING_SEED)
+    if not 0 <= arguments.seed < FIRST_REPORTING_SEED:
+        raise ValueError(f"seed {arguments.seed}: allowed: 0 to {FIRST_REPORTING_SEED - 1}")
+    if arguments.frames < 1 or arguments.jobs < 1:
+        raise ValueError("frames and jobs: allowed: 1 or more")
+    channels = [channel(name) for name in arguments.codecs]
+    if arguments.no_imu:
+        channels = [Channel(codec, False) for codec in dict.fromkeys(c.codec for c in channels)]
+    for name in arguments.scenes:
+        for size in SCENES[name].sizes:
+            if "{}x{}".format(*size) not in arguments.sizes:
+                continue
+            # the goals are stated for one distance and size
+            scene = (
+                at_reference(SCENES[name]) if (name in REFERENCE and size == HD) else SCENES[name]
+            )
+            is_long = scene.motion is Motion.LEAVING or scene.bar
+            length = LONG_FILM_FRAMES if is_long else FILM_FRAMES
+            for k, begin in enumerate(range(0, arguments.frames, length)):
+                frames = min(length, arguments.frames - begin)
+                yield Task(scene, size, first + k, frames, tuple(channels), not arguments.no_plain)
+
+
+def _watched(tasks: list[Task], jobs: int) -> Iterator[list[Record]]:
+    if jobs == 1:
+        _warm()
+        yield from map(_watch, tasks)
+        return
+    with ProcessPoolExecutor(jobs, initializer=_warm) as pool:
+        for done in as_completed([pool.submit(_watch, task) for task in tasks]):
+            yield done.result()
+
+
+def _warm() -> None:
+    cv2.setNumThreads(1)
+    warm_up()
+
+
+def _watch(task: Task) -> list[Record]:
+    return watch(task.scene, task.size, task.seed, task.frames, list(task.channels), task.plain)
+
+
+def _sorted(records: dict[tuple[str, Size, str], Record]) -> list[Record]:
+    """By scene as in the family, then size; channels as given."""
+    order = list(SCENES)
+    return sorted(records.values(), key=lambda r: (order.index(r.scene), r.size))
+
+
+def _write(tasks: list[Task], out: Path) -> int:
+    for done, task in enumerate(tasks, 1):
+        film = Film(task.scene, task.seed, task.size, task.frames)
+        folder = out / f"{task.scene.name}-{task.size[0]}x{task.size[1]}-{task.seed}"
+        write_film(film, folder)
+        _progress(done, len(tasks))
+    print(f"written: {len(tasks)} films in {out}")
+    return 0
+
+
+def _progress(done: int, of: int) -> None:
+    if sys.stderr.isatty():
+        bar = "#" * (40 * done // of)
+        sys.stderr.write(f"\r[{bar:40}] {done} of {of}" + ("\n" if done == of else ""))
+        sys.stderr.flush()

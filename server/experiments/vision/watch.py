@@ -1,0 +1,228 @@
+"""One film through several channels: what was found, and how exact, how sure, how fast."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+from time import thread_time
+
+from hardware.sim.scenes.scene import Picture, Scene, Size
+from hardware.sim.scenes.video import Film, Shot
+from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
+from pipeline.vision.detection import Sighting
+from pipeline.vision.imu_buffer import Felt
+from pipeline.vision.visual_front_end import Looking
+from pipeline.vision_config import GatesConfig
+from server.experiments.vision.channel import Channel, Wire
+from server.experiments.vision.errors import Error, is_wrong, measured
+from server.experiments.vision.plain import Plain, pass_s
+
+STAGES = ("detect", "identify", "pose")
+FRESH_EVERY = 10
+"""Pictures followed for one that is also tried from nothing."""
+FRESH_LOOKS = 3
+"""Pictures that who starts from nothing may take."""
+REMEMBERED_S = 1.0
+"""Readings that who starts from nothing knows."""
+GAP = 3
+"""Unsolvable pictures in a row after which the robot counts as returned."""
+
+
+@dataclass(slots=True)
+class Record:
+    """What came of all pictures of a scene at a size through a channel."""
+
+    scene: str
+    size: Size
+    channel: str
+    frames: int = 0
+    solvable: int = 0
+    found: int = 0
+    """Of the solvable ones."""
+    wrong: int = 0
+    """Of all looks."""
+    fresh_frames: int = 0
+    """Pictures tried from nothing."""
+    fresh: int = 0
+    """Starts from nothing whose pictures were solvable."""
+    fresh_found: int = 0
+    undecoded: int = 0
+    returns: list[int] = field(default_factory=list)
+    """Solvable pictures until found again, the finding one included."""
+    errors: list[Error] = field(default_factory=list)
+    tracking_s: list[tuple[float, float, float]] = field(default_factory=list)
+    """By stage, of pictures after one with a pose."""
+    starting_s: list[tuple[float, float, float]] = field(default_factory=list)
+    """The same of all others."""
+    whole_s: list[float] = field(default_factory=list)
+    """All that a picture took, what is learnt of the camera included."""
+    blobs: list[int] = field(default_factory=list)
+    """How many lights there were when starting."""
+    pass_s: list[float] = field(default_factory=list)
+    wrong_at: list[tuple[int, int]] = field(default_factory=list)
+    """(seed, picture) of the wrong ones."""
+
+    def add(self, other: Record) -> None:
+        """Take in what came of another film."""
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, int | list):
+                setattr(self, name, value + getattr(other, name))
+
+
+class Eye:
+    """The live stages behind one channel."""
+
+    def __init__(self, film: Film, channel: Channel) -> None:
+        """Nothing seen yet."""
+        self.channel, self._film = channel, film
+        self._looking = self._new()
+        self._wire = Wire(channel.codec, film.size)
+        self.record = Record(film.scene.name, film.size, channel.name)
+        self._phone: deque[PhoneImu] = deque()
+        self._body: deque[BodyImu] = deque()
+        self._felt = Felt()
+        self._had_pose = False
+        self._fresh: Looking | None = None
+        self._fresh_left, self._fresh_fair = 0, False
+        self._unsolvable, self._waiting = 0, 0
+
+    def _new(self) -> Looking:
+        return Looking(self._film.camera, self._film.leds_in_b, GatesConfig(), thread_time)
+
+    def see(self, k: int, shot: Shot) -> None:
+        """The film's next shot, picture `k`."""
+        if self.channel.imu:
+            self._feel(shot)
+        frame = self._wire.carry(shot.t, shot.luma)
+        record = self.record
+        record.frames += 1
+        record.solvable += shot.solvable
+        if frame is None:
+            record.undecoded += 1
+            self._count_return(shot, False)
+            return
+        sighting = self._look(self._looking, frame)
+        pose = sighting.pose
+        self._clocked(sighting, self._had_pose)
+        self._had_pose = pose is not None
+        self._count_return(shot, pose is not None)
+        record.found += shot.solvable and pose is not None
+        self._judge(k, shot, sighting)
+        self._see_afresh(k, shot, frame)
+
+    def _feel(self, shot: Shot) -> None:
+        for looking in (self._looking, self._fresh):
+            if looking is not None:
+                _tell(looking, shot.phone, shot.body)
+        self._phone.extend(shot.phone)
+        self._body.extend(shot.body)
+        for samples in (self._phone, self._body):
+            while samples and samples[0].t < shot.t - REMEMBERED_S:
+                samples.popleft()
+        for sample in shot.body:
+            self._felt.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+
+    def _look(self, looking: Looking, frame: Frame) -> Sighting:
+        body = self._felt.at(frame.t) if self.channel.imu else None
+        begin = thread_time()
+        sighting = looking.look(frame, body.up if body else None, body.omega if body else None)
+        self.record.whole_s.append(thread_time() - begin)
+        return sighting
+
+    def _clocked(self, sighting: Sighting, was_tracking: bool) -> None:
+        took = sighting.took_s
+        times = (took.get("detect", 0.0), took.get("identify", 0.0), took.get("pose", 0.0))
+        (self.record.tracking_s if was_tracking else self.record.starting_s).append(times)
+        if not was_tracking:
+            self.record.blobs.append(len(sighting.spots))
+
+    def _judge(self, k: int, shot: Shot, sighting: Sighting) -> None:
+        pose, film = sighting.pose, self._film
+        if pose is not None and not self._accuse(k, shot, pose) and shot.visible.sum() >= 3:
+            self.record.errors.append(measured(pose, shot, film.camera, film.leds_in_b))
+
+    def _accuse(self, k: int, shot: Shot, pose: RelativePose) -> bool:
+        """Count a pose that is none of the robot."""
+        wrong = self._film.scene.picture is not Picture.UPRIGHT or is_wrong(pose, shot)
+        if wrong:
+            self.record.wrong += 1
+            self.record.wrong_at.append((self._film.seed, k))
+        return wrong
+
+    def _see_afresh(self, k: int, shot: Shot, frame: Frame) -> None:
+        """Now and then somebody starts from nothing, and has a few pictures for it."""
+        if k % FRESH_EVERY == 0:
+            self._fresh, self._fresh_left, self._fresh_fair = self._new(), FRESH_LOOKS, True
+            _tell(self._fresh, tuple(self._phone), tuple(self._body))
+        if self._fresh is None:
+            return
+        self._fresh_left -= 1
+        self._fresh_fair &= shot.solvable
+        sighting = self._look(self._fresh, frame)
+        self._clocked(sighting, False)
+        self.record.fresh_frames += 1
+        found = sighting.pose is not None
+        if sighting.pose is not None:
+            self._accuse(-1 - k, shot, sighting.pose)
+        if found or self._fresh_left == 0:
+            self.record.fresh += self._fresh_fair
+            self.record.fresh_found += self._fresh_fair and found
+            self._fresh = None
+
+    def _count_return(self, shot: Shot, is_found: bool) -> None:
+        """How long after its return the robot is found."""
+        if not shot.solvable:
+            if self._waiting:
+                self.record.returns.append(self._waiting)
+            self._waiting, self._unsolvable = 0, self._unsolvable + 1
+            return
+        if self._unsolvable >= GAP or self._waiting:
+            self._waiting += 1
+        self._unsolvable = 0
+        if is_found and self._waiting:
+            self.record.returns.append(self._waiting)
+            self._waiting = 0
+
+
+def _tell(looking: Looking, phone: tuple[PhoneImu, ...], body: tuple[BodyImu, ...]) -> None:
+    for sample in phone:
+        looking.feel(sample)
+    looking.feel_body(body)
+
+
+def watch(
+    scene: Scene, size: Size, seed: int, frames: int, channels: list[Channel], plain: bool
+) -> list[Record]:
+    """Every channel's record of one film; the last one is plain OpenCV's, if wanted."""
+    film = Film(scene, seed, size, frames, bound=True)
+    eyes = [Eye(film, channel) for channel in channels if _is_fair(scene, channel)]
+    script = Plain(film.camera, film.leds_in_b)
+    record = Record(scene.name, size, "plain OpenCV")
+    for k, shot in enumerate(film):
+        record.pass_s.append(pass_s(shot.luma))
+        for eye in eyes:
+            eye.see(k, shot)
+        if plain:
+            _try_plain(script, record, film, shot)
+    return [eye.record for eye in eyes] + [record]
+
+
+def _is_fair(scene: Scene, channel: Channel) -> bool:
+    """Without motion sensors a turned picture is one of a turned robot."""
+    return channel.imu or scene.picture in (Picture.UPRIGHT, Picture.MIRRORED)
+
+
+def _try_plain(script: Plain, record: Record, film: Film, shot: Shot) -> None:
+    pose = script.look(shot)
+    record.frames += 1
+    record.solvable += shot.solvable
+    record.tracking_s.append((script.took_s, 0.0, 0.0))
+    if pose is None:
+        return
+    record.found += shot.solvable
+    if film.scene.picture is not Picture.UPRIGHT or is_wrong(pose, shot):
+        record.wrong += 1
+    elif shot.visible.sum() >= 3:
+        error = measured(pose, shot, film.camera, film.leds_in_b)
+        record.errors.append(replace(error, nees=float("nan")))  # it claims no covariance

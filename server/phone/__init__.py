@@ -1,0 +1,1 @@
+"""The session of the leading phone: its records, its frames, its calibration."""

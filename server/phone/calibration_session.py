@@ -1,0 +1,170 @@
+"""The calibration that a phone's page asks for: film with guidance, solve beside, keep the profile.
+
+Films in a thread, solves in a process; the event loop only asks how it stands.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from hardware.codec import Decoder
+from pipeline.signals import PhoneImu
+from server.calibration.board import Board, Detector
+from server.calibration.camera_yaml import profile_path, store
+from server.calibration.guide import Guide
+from server.calibration.job import Job, Outcome, Solving
+from server.calibration.verdict import Verdict
+from server.calibration.views import look
+from server.media.decoding import MakeDecoder
+from server.phone.decoder import FrameDecoder
+from server.phone.frame_worker import FrameThread
+from server.phone.ingest import EncodedFrame
+from server.protocol.calibration_messages import Calibration
+
+MOST_SAMPLES = 20_000
+"""Of motion: more than a minute at 200 Hz."""
+SHOWN_PER_CELL = 3
+FAILED = Verdict("refused", ["The calibration failed: look at the server's log."])
+
+
+class Wizard(FrameThread):
+    """One calibration of one phone at one picture size and orientation."""
+
+    def __init__(
+        self,
+        device: str,
+        shape: tuple[int, int, int],
+        folder: Path,
+        on_taken: Callable[[int], None],
+        on_key_wanted: Callable[[], None],
+        make: MakeDecoder = Decoder,
+    ) -> None:
+        """Begins to film pictures of `shape`: width, height [px], angle of the screen [°].
+
+        The profile goes to `folder`. Callbacks run in the thread. `make` is `FrameDecoder`'s.
+        """
+        super().__init__("calibration", on_taken)
+        size, self.screen_angle_deg = shape[:2], shape[2]
+        self.size = size
+        self._device, self._folder, self._on_key_wanted = device, folder, on_key_wanted
+        self._board = Board()
+        self._detector = Detector(self._board)
+        self._decoder = FrameDecoder(*size, make)
+        self._guide = Guide(self._board, size)
+        self._shown = self._filming("filming")
+        self._motion: deque[tuple[float, float, float, float]] = deque(maxlen=MOST_SAMPLES)
+        self._solving: Solving | None = None
+        self.stored: Path | None = None
+        """Where the profile is, once it is."""
+        self.start()
+
+    @property
+    def undecodable(self) -> int:
+        """Pictures that were garbage or needed a lost one."""
+        return self._decoder.undecodable
+
+    def feel(self, sample: PhoneImu) -> None:
+        """The phone's motion."""
+        x, y, z = map(float, sample.omega_m_cf_in_c)
+        self._motion.append((sample.t, x, y, z))
+
+    def state(self) -> Calibration:
+        """How it stands, for the page; stores the profile when it is there."""
+        solving = self._solving
+        if self.failed and self._shown.phase == "filming":
+            self._shown = self._finished(Outcome(FAILED, "", []))
+        if solving is not None and self._shown.phase == "solving" and solving.done:
+            self._shown = self._finished(solving.outcome() or Outcome(FAILED, "", []))
+        return self._shown
+
+    def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
+        if self._solving is not None:
+            return
+        if has_gap:
+            self._decoder.needs_key = True
+        luma = None
+        for frame in frames:  # each: neighbours in time tell how fast the camera turned
+            luma = self._decoder.decoded(frame)
+            if luma is not None:
+                self._guide.add(frame.t, look(luma, frame.t, self._board, self._detector))
+        if luma is None:
+            self._tell(self._on_key_wanted)
+            return
+        if self._guide.enough:
+            self._shown = self._filming("solving")
+            self._solve(Solving(self._job()))
+        else:
+            self._shown = self._filming("filming")
+
+    def _solve(self, solving: Solving) -> None:
+        """In the thread: who was stopped meanwhile solves nothing."""
+        self._tell(lambda: setattr(self, "_solving", solving))
+        if self._solving is not solving:
+            solving.stop()
+
+    def _job(self) -> Job:
+        guide = self._guide
+        views = sorted({view.t: view for view in guide.views}.values(), key=lambda view: view.t)
+        motion = np.array(self._motion).reshape(-1, 4)
+        today = date.today().isoformat()
+        return Job(
+            self._board,
+            self.size,
+            views,
+            guide.pictures,
+            motion,
+            self._device,
+            self.screen_angle_deg,
+            today,
+        )
+
+    def _filming(self, phase: str) -> Calibration:
+        guide, now = self._guide, self._guide.progress
+        is_filming = phase == "filming"
+        return Calibration(
+            phase="filming" if is_filming else "solving",
+            hint=guide.hint
+            if is_filming
+            else "Enough filmed. Put the phone down: computing takes half a minute.",
+            progress=round(now.share, 3),
+            tasks={
+                "Whole picture": round(now.covered, 3),
+                "Tilted": round(now.tilted, 3),
+                "Near and far": round(now.near_and_far, 3),
+                "Turned": round(now.turned, 3),
+            },
+            width=self.size[0],
+            height=self.size[1],
+            columns=guide.cells.shape[1],
+            cells=np.minimum(guide.cells, SHOWN_PER_CELL).ravel().tolist(),
+            outline=guide.outline() if is_filming else [],
+            blurred=is_filming and guide.blurred,
+        )
+
+    def stop(self) -> None:
+        """End it, whatever is under way."""
+        super().stop()
+        if self._solving is not None:
+            self._solving.stop()
+
+    def _finished(self, outcome: Outcome) -> Calibration:
+        verdict = outcome.verdict
+        if outcome.text:
+            angle = self.screen_angle_deg
+            path = profile_path(self._folder, self._device, self.size, angle)
+            store(path, outcome.text)
+            self.stored = path
+        return Calibration(
+            phase="done" if outcome.text else "refused",
+            hint="Calibrated." if outcome.text else "Not good enough yet.",
+            progress=1.0,
+            verdict=verdict.level,
+            figures=outcome.figures,
+            reasons=verdict.reasons,
+            advice=verdict.advice,
+        )

@@ -1,0 +1,42 @@
+"""What a picture must have in common with a calibration: its size, and how the phone was turned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hardware.camera_file import find_camera_file
+from pipeline.camera.lens import Camera
+from server.protocol.wire_records import QUARTERS, Picture
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Of the pictures of one stream: with another one it is another camera."""
+
+    width: int
+    height: int
+    screen_angle_deg: int
+    shrunk: int = 0
+    """By so many quarters the page has made pictures smaller than the camera's."""
+
+    @classmethod
+    def of(cls, picture: Picture) -> Shape:
+        """That of one picture."""
+        return cls(picture.width, picture.height, picture.screen_angle_deg, picture.shrunk)
+
+    @property
+    def taken(self) -> tuple[int, int]:
+        """Size of the camera's picture (width, height) [px]."""
+        share = QUARTERS / (QUARTERS - self.shrunk)
+        return round(share * self.width), round(share * self.height)
+
+    def camera(self, device: str, folders: Sequence[Path]) -> tuple[Path, Camera]:
+        """The file that calibrates `device` for such pictures, and the camera that makes them.
+
+        Raises:
+            CameraFileError: there is none.
+        """
+        path, camera = find_camera_file(device, *self.taken, folders, self.screen_angle_deg)
+        return path, camera.resized(self.width, self.height)

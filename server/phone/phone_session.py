@@ -1,0 +1,261 @@
+"""One operator's phone at the server: its clock, its stream, its eyes, and what it still lacks."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from hardware.camera_file import CameraFileError
+from hardware.codec import Decoder
+from pipeline.camera.extrinsics import SQUARE
+from pipeline.camera.lens import Camera
+from pipeline.robot import Robot
+from pipeline.signals import BodyImu, Operator, PhoneImu
+from pipeline.vision.detection import Sighting
+from pipeline.vision_config import GatesConfig
+from server.control.ipc import ControlStatus, Input, OperatorInput, PhoneImuInput, expected_of
+from server.control.ipc_vision import SeenInput
+from server.diagnostics.link_log import LinkLog
+from server.diagnostics.meter import Meter
+from server.media.decoding import MakeDecoder
+from server.phone.calibration_session import Wizard
+from server.phone.frame_pipeline import Sight
+from server.phone.image_format import Shape
+from server.phone.ingest import EncodedFrame, Ingest
+from server.phone.sensor_check import SensorCheck
+from server.phone.vision_thread import VisionThread
+from server.protocol.calibration_messages import Calibrate, Calibration
+from server.protocol.messages import Hello
+from server.protocol.video_path_messages import PathChoice
+from server.protocol.wire import WireError
+from server.protocol.wire_records import Motion, Picture, Pong, Record
+
+STALE_S = 1.0
+"""A stream silent for longer keeps the robot from being armed."""
+
+
+class OperatorPhone:
+    """From hello to goodbye."""
+
+    def __init__(
+        self,
+        hello: Hello,
+        robot: Robot,
+        cameras: list[Path],
+        to_control: Callable[[Input], object],
+        clock: Callable[[], float],
+        on_taken: Callable[[int], None],
+        on_key_wanted: Callable[[], None],
+        profiles: Path | None = None,
+        make_decoder: MakeDecoder = Decoder,
+    ) -> None:
+        """`to_control` may be called from the vision thread too; calibrations go to `profiles`.
+
+        `make_decoder` says where pictures are decoded, by itself here.
+        """
+        self.id = secrets.token_urlsafe(12)
+        self.device, self.hello = hello.device or "a phone", hello
+        self.ingest = Ingest(lambda: 1 + secrets.randbits(63))
+        self._robot, self._cameras = robot, cameras
+        self._to_control, self._clock = to_control, clock
+        self._greeted = clock()
+        self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
+        self.vision: VisionThread | None = None
+        self._shape: Shape | None = None
+        self._profiles, self._make_decoder = profiles, make_decoder
+        self.wizard: Wizard | None = None
+        """The camera's calibration, while one is under way."""
+        self.video_path = ""
+        """How the pictures come, in words."""
+        self.path_choice: PathChoice | None = None
+        self.camera_problem = self.camera_text = ""
+        self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
+        self.sighting: Sighting | None = None
+        self.latency_ms: dict[str, float] = {}
+        self._check = SensorCheck()
+        self.link = LinkLog(clock())
+        """What came when, lately."""
+
+    def silent_for(self, now: float) -> float:
+        """Since its last sign of life [s]; hello was the first."""
+        return min(self.meters["operator"].age(now), now - self._greeted)
+
+    def ping(self, now: float) -> Record:
+        """The next PING, to be sent at `now` [s]."""
+        record = self.ingest.ping(now)
+        self.link.asked(1e-6 * record.t_us)
+        return record
+
+    def take(self, record: Record, now: float) -> None:
+        """A record of this phone, from either of its sockets.
+
+        Raises:
+            WireError: not believable, or a picture without a calibration.
+        """
+        match self.ingest.record(record, now):
+            case PhoneImu() as sample if isinstance(record.body, Motion):
+                self.meters["phone_imu"].tick(now, sample.t)
+                self.link.came("motion", sample.t, now)
+                self._to_control(PhoneImuInput.of(sample))
+                self._check.feel(sample.t, record.body)
+                if self.wizard is not None:
+                    self.wizard.feel(sample)
+                if self.vision is not None:
+                    self.vision.feel(sample)
+                    self.vision.doubt(self._check.doubts_gravity)
+            case Operator() as operator:
+                self.meters["operator"].tick(now, operator.t)
+                self._to_control(OperatorInput.of(operator))
+            case EncodedFrame() as frame:
+                self._see(frame, now)
+            case None if isinstance(record.body, Pong):
+                self.link.came("answers", 1e-6 * record.body.server_time_us, now)
+            case None if isinstance(record.body, Picture):  # it can't be dated yet
+                self._on_taken(record.sequence)
+
+    def want_key(self) -> None:
+        """Ask for a picture that can be decoded alone."""
+        self._on_key_wanted()
+
+    def know(self, status: ControlStatus) -> None:
+        """What control says of the robot, for eyes and tests."""
+        self._check.know(status)
+        if self.vision is not None:
+            up_in_b = np.array(status.up_in_b) if status.up_in_b is not None else None
+            self.vision.know(up_in_b, np.array(status.omega_b), expected_of(status))
+            rows = np.array(status.body_samples).reshape(-1, 7)
+            self.vision.feel_body([BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows])
+
+    def _see(self, frame: EncodedFrame, now: float) -> None:
+        self.meters["video"].tick(now, frame.t)
+        self.link.came("pictures", frame.t, now)
+        shape = Shape.of(frame.picture)
+        if shape != self._shape:
+            self._open_eyes(shape)
+        if self.wizard is not None:
+            self.wizard.offer(frame)
+            return
+        if self.vision is None:
+            self._on_taken(frame.sequence)
+            raise WireError("calibration", "frame", self.camera_problem)
+        self.vision.offer(frame)
+
+    def _open_eyes(self, shape: Shape) -> None:
+        """Begin to look, or begin again at another size or angle: that is another camera."""
+        is_calibrating = self.wizard is not None and self.wizard.stored is None
+        self.close()
+        self._shape, self.camera_problem = shape, ""
+        if is_calibrating and not shape.shrunk:
+            self._calibrate(shape)
+            return
+        try:
+            path, camera = shape.camera(self.device, self._cameras)
+        except CameraFileError as error:
+            self.camera_problem = str(error)
+            return
+        self.camera_text = path.read_text(encoding="utf-8")
+        self.ingest.mounting = camera.mounting
+        sight = Sight(camera, self._robot, GatesConfig(), self._clock, self._make_decoder)
+        self.vision = VisionThread(
+            sight, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
+        )
+
+    def _sighted(self, camera: Camera, sighting: Sighting, frame: EncodedFrame) -> None:
+        """In the vision thread: hand on what was seen, remember where the time went."""
+        now = self._clock()
+        seen = sighting.seen(camera)
+        if seen is not None:
+            self._to_control(SeenInput.of(seen))
+        if sighting.pose is not None:
+            self.meters["pose"].tick(now, sighting.t)
+        took = {name: 1e3 * s for name, s in sighting.took_s.items()}
+        self.latency_ms = {
+            "capture to arrival": 1e3 * (frame.t_received - sighting.t),
+            "waiting": 1e3 * (now - frame.t_received) - sum(took.values()),
+            **took,
+        }
+        self._check.saw(sighting)
+        self.sighting = sighting
+
+    def thumbnail(self, wanted: bool) -> npt.NDArray[np.uint8] | None:
+        """The next small picture (h, w, 3) RGB of what the camera sees, if anyone `wanted` it."""
+        if self.vision is None:
+            return None
+        self.vision.watched = wanted
+        picture, self.vision.thumbnail = self.vision.thumbnail, None
+        return picture if wanted else None
+
+    def refusals(self, now: float) -> list[str]:
+        """What this phone still lacks, in words for the person who can mend it."""
+        clock = self.ingest.clock
+        if not clock.ready:
+            reason = clock.reason or "The phone's clock is not known yet."
+            return [f"{reason} Wait a moment."]
+        why: list[str] = []
+        faults: list[str] = []
+        if not self.ingest.visible:
+            why.append("The page on the phone is hidden: bring it to the front.")
+        if self.meters["phone_imu"].age(now) > STALE_S:
+            why.append("The phone's motion sensors are silent: allow them in the browser.")
+        else:
+            faults = self._check.faults()
+            why += faults
+        if self.wizard is not None:
+            why.append("The camera is being calibrated.")
+        elif self.camera_problem:
+            why.append(f"The camera is not calibrated: {self.camera_problem}.")
+        elif self.meters["video"].age(now) > STALE_S:
+            why.append("No pictures from the phone: allow the camera in the browser.")
+        elif self.vision is not None and self.vision.failed:
+            why.append(self.vision.failed)
+        elif self.meters["pose"].age(now) > STALE_S and not faults:
+            found = self.sighting.reason if self.sighting is not None else ""
+            why.append(f"The robot is not seen. {found}".strip())
+        if not faults and self.vision is not None and self.vision.looking.watch.complaint:
+            why.append(self.vision.looking.watch.complaint)
+        return why
+
+    def calibrate(self, wish: Calibrate) -> None:
+        """Begin to calibrate the camera that films now, or leave that and look again.
+
+        Raises:
+            WireError: there is no picture yet.
+        """
+        if wish.what == "start" and (self._shape is None or self._profiles is None):
+            raise WireError("order", "calibrate.what", "when pictures come")
+        if wish.what == "start" and self._shape is not None and self._shape.shrunk:
+            raise WireError("order", "calibrate.what", "when pictures have the camera's own size")
+        self.close()
+        if wish.what == "start" and self._shape is not None:
+            self._calibrate(self._shape)
+        else:
+            # the next picture opens eyes, with what may have been stored, or says what is wrong
+            self._shape, self.camera_problem = None, ""
+
+    def _calibrate(self, shape: Shape) -> None:
+        """Begin, or begin again in another orientation."""
+        assert self._profiles is not None
+        size = (shape.width, shape.height, shape.screen_angle_deg)
+        callbacks = self._on_taken, self._on_key_wanted
+        self.wizard = Wizard(self.device, size, self._profiles, *callbacks, self._make_decoder)
+
+    def calibration(self) -> Calibration:
+        """What the page should know of it."""
+        if self.wizard is not None:
+            return self.wizard.state()
+        return Calibration("needed" if self.camera_problem else "off")
+
+    def close(self) -> None:
+        """Stop looking; who calibrates wants motion as it comes."""
+        self.ingest.mounting = SQUARE
+        if self.wizard is not None:
+            self.wizard.stop()
+            self.wizard = None
+        if self.vision is not None:
+            self.vision.stop()
+            self.vision = None

@@ -1,0 +1,56 @@
+"""The gravity test of one phone's sensors, fed by the event loop and by the vision thread."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from pipeline.estimation.sensor_validation import GravityTest
+from pipeline.estimator_config import GravityTestConfig
+from pipeline.frames import Array
+from pipeline.vision.detection import Sighting
+from server.control.ipc import ControlStatus
+from server.protocol.wire_records import Motion
+
+MAX_WAITING = 64
+"""Poses between two samples of the phone."""
+
+
+class SensorCheck:
+    """Collects what the test needs; `saw` may be called from another thread."""
+
+    def __init__(self) -> None:
+        """Nothing tested."""
+        self._test = GravityTest(GravityTestConfig())
+        self._poses: deque[tuple[float, Array]] = deque(maxlen=MAX_WAITING)
+        self._up_in_b: Array | None = None
+
+    def feel(self, t: float, motion: Motion) -> None:
+        """A sample of the phone, taken at `t` [s] on our clock, as it came."""
+        rate, force = np.array(motion.rotation_rate), np.array(motion.acceleration)
+        self._test.add_motion(t, rate, force, motion.screen_angle_deg)
+        while self._poses and self._up_in_b is not None:
+            t_pose, R_cb = self._poses.popleft()
+            self._test.add_pose(t_pose, R_cb, self._up_in_b)
+
+    def know(self, status: ControlStatus) -> None:
+        """What the robot's own sensors said."""
+        self._up_in_b = np.array(status.up_in_b) if status.up_in_b is not None else None
+        for t, x, y, z, *_ in status.body_samples:
+            self._test.add_body(t, np.array((x, y, z)))
+
+    def saw(self, sighting: Sighting) -> None:
+        """A picture was looked at."""
+        pose = sighting.pose or sighting.unbelieved
+        if pose is not None:
+            self._poses.append((pose.t, pose.R_cb))
+
+    @property
+    def doubts_gravity(self) -> bool:
+        """Poses that gravity denies are wanted as well."""
+        return self._test.doubts_up
+
+    def faults(self) -> list[str]:
+        """What is wrong, in words for who holds the phone."""
+        return self._test.faults()

@@ -1,0 +1,105 @@
+"""The vision thread: newest picture → pose → control, beside the event loop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.frames import Array
+from pipeline.prediction import Expected
+from pipeline.signals import BodyImu, Image, PhoneImu
+from pipeline.vision.detection import Sighting
+from pipeline.vision.visual_front_end import Looking
+from server.phone.frame_pipeline import Sight
+from server.phone.frame_worker import FrameThread
+from server.phone.ingest import EncodedFrame
+
+THUMBNAIL_WIDTH = 480
+THUMBNAIL_S = 0.1
+
+Picture = npt.NDArray[np.uint8]
+
+
+class VisionThread(FrameThread):
+    """Owns one phone's `Sight`: pictures go in, sightings come out, nothing queues up between."""
+
+    def __init__(
+        self,
+        sight: Sight,
+        on_sighting: Callable[[Sighting, EncodedFrame], None],
+        on_taken: Callable[[int], None],
+        on_key_wanted: Callable[[], None],
+    ) -> None:
+        """Callbacks run in this thread."""
+        super().__init__("vision", on_taken)
+        self._sight = sight
+        self._on_sighting, self._on_key_wanted = on_sighting, on_key_wanted
+        self._prior: tuple[Array | None, Array] = (None, np.zeros(3))
+        self._t_thumbnail = 0.0
+        self.watched = False
+        """Whether anyone wants thumbnails."""
+        self.thumbnail: Picture | None = None
+        """(h, w, 3) RGB, with what was found."""
+        self.start()
+
+    @property
+    def undecodable(self) -> int:
+        """Pictures that were garbage or needed a lost one."""
+        return self._sight.undecodable
+
+    @property
+    def looking(self) -> Looking:
+        """What it learnt of the camera; to be read."""
+        return self._sight.looking
+
+    def feel(self, sample: PhoneImu) -> None:
+        """The phone's motion, for the prior."""
+        self._sight.feel(sample)
+
+    def know(self, up_in_b: Array | None, omega_bf_in_b: Array, expected: Expected | None) -> None:
+        """What control knows of the body, for the prior."""
+        self._prior = (up_in_b, omega_bf_in_b)
+        self._sight.expect(expected)
+
+    def feel_body(self, samples: Sequence[BodyImu]) -> None:
+        """The robot's motion, for the pictures' time offset."""
+        self._sight.feel_body(samples)
+
+    def doubt(self, gravity: bool) -> None:
+        """Whether the phone's gravity is yet to be tested."""
+        self._sight.doubt(gravity)
+
+    def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
+        if has_gap:
+            self._sight.needs_key = True
+        sighting = self._sight.see(frames, *self._prior)
+        if sighting is None:
+            self._tell(self._on_key_wanted)
+            return
+        self._tell(lambda: self._on_sighting(sighting, frames[-1]))
+        now = time.monotonic()
+        if self.watched and now - self._t_thumbnail > THUMBNAIL_S and self._sight.luma is not None:
+            self._t_thumbnail = now
+            self.thumbnail = draw(self._sight.luma, sighting)
+
+
+def draw(luma: Image, sighting: Sighting) -> Picture:
+    """A small picture (h, w, 3) RGB: found LEDs circled in green, other lights in orange."""
+    scale = THUMBNAIL_WIDTH / luma.shape[1]
+    small = cv2.resize(luma, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    picture = cv2.cvtColor(small, cv2.COLOR_GRAY2RGB)
+    found = set(sighting.match.spot.tolist()) if sighting.match is not None else set()
+    for index, (u, v) in enumerate(scale * sighting.spots.pixels):
+        colour = (80, 255, 120) if index in found else (255, 160, 60)
+        cv2.circle(picture, (round(u), round(v)), 9, colour, 1, cv2.LINE_AA)
+    return np.asarray(picture, dtype=np.uint8)
+
+
+def jpeg(picture: Picture) -> bytes:
+    """A thumbnail's bytes."""
+    _, data = cv2.imencode(".jpg", picture[:, :, ::-1], (cv2.IMWRITE_JPEG_QUALITY, 75))
+    return data.tobytes()

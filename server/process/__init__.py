@@ -1,0 +1,1 @@
+"""What `lightleash serve` starts: the launcher and the server process."""

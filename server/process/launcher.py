@@ -1,0 +1,207 @@
+"""`lightleash serve`: starts robot, control and server, and stops them, robot first."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import signal
+import socket
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from hardware.link.link_key import KEY_VARIABLE, LinkKeyError, new_key
+from hardware.robot_file import RobotFileError, load_robot
+from server.common.access import PhoneClientError
+from server.common.child import PROMPT_NICENESS, Child
+from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
+from server.common.settings import Settings
+from server.process.invite import invite, print_code
+from server.process.robot_key import epoch_file, key_of
+
+BACKLOG = 1_024
+"""Connections that the kernel keeps for a server that is busy or restarts."""
+MAX_DEATHS = 4
+"""Of one process before anything worked: better end, with the reason on the screen."""
+POLL_S = 0.05
+REMIND_S = 15.0
+"""People wait longer for what still speaks."""
+FLIES, SERVES = -900, 300
+"""Who dies first when memory runs out: the server is started anew and nothing falls down."""
+SECRET_VARIABLE = "_LIGHTLEASH_SECRET"
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A listening socket; port 0 takes any free one.
+
+    Raises:
+        OSError: the port is taken or the address is not ours.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    bound = socket.socket(family, socket.SOCK_STREAM)
+    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        bound.bind((host, port))
+        bound.listen(BACKLOG)
+    except OSError as error:
+        bound.close()
+        raise OSError(f"{host}, port {port}: {error.strerror}; choose another one") from error
+    return bound
+
+
+def free_udp_port() -> int:
+    """A port nobody uses now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+class Launcher:
+    """Keeps the processes alive until told to stop."""
+
+    def __init__(self, children: Sequence[Child], run_file: Path) -> None:
+        """`children` are stopped in this order; the server tells of itself in `run_file`."""
+        self.children = children
+        self._run_file = run_file
+        self._stopping = False
+
+    def stop(self, *_: object) -> None:
+        """End soon; may be called from a signal handler."""
+        self._stopping = True
+
+    def run(self) -> int:
+        """Start, announce, watch, stop; gives the exit code."""
+        announced, said = False, time.monotonic()
+        names = ", ".join(child.name for child in self.children)
+        print(f"Starting {names}: some seconds, about a minute the first time.", flush=True)
+        try:
+            while not self._stopping:
+                self.revive(time.monotonic())
+                if not announced and self._run_file.exists():
+                    announced = True
+                    self._announce()
+                if not announced and self._is_hopeless():
+                    return 1
+                if not announced and time.monotonic() - said > REMIND_S:
+                    said = time.monotonic()
+                    print("Still starting: what computes fast is compiled first, once.", flush=True)
+                time.sleep(POLL_S)
+        finally:
+            print("\nStopping: robot first.", flush=True)
+            for child in self.children:
+                child.stop()
+            self._run_file.unlink(missing_ok=True)
+        return 0
+
+    def _announce(self) -> None:
+        try:
+            announce(json.loads(self._run_file.read_text()))
+        except (OSError, PhoneClientError) as error:  # the server has just died: it comes back
+            print(f"{error}; `lightleash invite` prints links.", file=sys.stderr, flush=True)
+
+    def revive(self, now: float) -> None:
+        """Start whoever should run and doesn't."""
+        for child in self.children:
+            said = child.revive(now)
+            if said:
+                print(said, file=sys.stderr, flush=True)
+
+    def _is_hopeless(self) -> bool:
+        worst = max(self.children, key=lambda child: child.deaths)
+        if worst.deaths < MAX_DEATHS:
+            return False
+        print(f"The {worst.name} process does not start: see above.", file=sys.stderr)
+        return True
+
+
+def children_of(
+    settings: Settings,
+    arguments: Sequence[str],
+    runtime: Path,
+    sockets: tuple[socket.socket, socket.socket],
+) -> list[Child]:
+    """Robot, control, server: the order in which they are stopped.
+
+    `sockets` (HTTPS, HTTP) and the secret of the run outlive the server process: one that is
+    started anew has the same address and still knows its pages.
+
+    Robot and control share a key: of a real robot its own, of a simulated one another each run.
+
+    Raises:
+        RobotFileError: no such robot, or it has no such gains.
+        LinkKeyError: a real robot without a key.
+    """
+    robot_file = load_robot(settings.robot)
+    name = robot_file.robot.name
+    if settings.gains not in robot_file.gains:
+        raise RobotFileError(settings.robot, "gains", f"one of {', '.join(robot_file.gains)}")
+    link = robot_file.link
+    host, port = settings.robot_host or link.host, settings.robot_port or link.port
+    truth_port, children = 0, []
+    key, epochs = new_key(), runtime / f"{name}.epoch"
+    if not settings.simulate:
+        key, epochs = key_of(settings.state, name), epoch_file(settings.state, name)
+    shared = {KEY_VARIABLE: key.hex()}
+    if settings.simulate:
+        host, port, truth_port = "127.0.0.1", free_udp_port(), free_udp_port()
+        simulated = ["hardware.sim.robot", "--robot", settings.robot, "--port", str(port)]
+        simulated += ["--truth-port", str(truth_port)]
+        children.append(Child("robot", simulated, shared, oom_score=FLIES))
+    control = ["server.control.process", "--runtime", str(runtime), "--robot", settings.robot]
+    control += ["--host", host, "--port", str(port), "--gains", settings.gains]
+    control += ["--estimator", settings.estimator, "--epochs", str(epochs)]
+    control += [] if settings.simulate else ["--real"]
+    knobs = msgspec.json.encode(settings.virtual_camera.knobs).decode()
+    control += ["--virtual-camera", knobs]
+    children.append(Child("control", control, shared, oom_score=FLIES))
+    descriptors = tuple(s.fileno() for s in sockets)
+    server = ["server", "_server", str(runtime), str(truth_port), *map(str, descriptors)]
+    secret = {SECRET_VARIABLE: secrets.token_hex(32)}
+    server += arguments
+    children.append(Child("server", server, secret, descriptors, SERVES, PROMPT_NICENESS))
+    return children
+
+
+def announce(run: Mapping[str, object]) -> None:
+    """Print what a newcomer needs: the code to scan and the page to open.
+
+    Links are for people at a terminal alone: what goes elsewhere is kept in logs.
+    """
+    if sys.stdout.isatty():
+        phone, supervisor = invite(run, "operator"), invite(run, "supervisor")
+        print_code(phone.url)
+        print(f"\nPhone:       {phone.url}")
+        print(f"Supervisor:  {supervisor.here}")
+        print(f"Each opens once, within {phone.lives_s / 60:g} minutes; `lightleash invite`, with")
+        print("--role viewer or supervisor or without, prints another one.")
+    else:
+        print(f"\nPhone:       {run['https_url']}/ by a link of `lightleash invite`")
+        print(f"Supervisor:  {run['http_url']}/supervisor by `lightleash invite --role supervisor`")
+    if run["truth_port"]:  # the robot is a simulated one
+        print("No phone at hand? Press “Start virtual phone” on the supervisor's page.")
+    print("Ctrl-C stops, robot first.", flush=True)
+
+
+def main(settings: Settings, arguments: Sequence[str]) -> int:
+    """Entry of `lightleash serve`; `arguments` are handed on to the server process."""
+    os.umask(0o077)  # whatever is written, by the children too, is for this user alone
+    runtime = runtime_directory()
+    try:
+        with (
+            prepare(runtime),
+            listen(settings.host, settings.https_port) as https,
+            listen("127.0.0.1", settings.http_port) as http,
+        ):
+            children = children_of(settings, arguments, runtime, (https, http))
+            launcher = Launcher(children, runtime / RUN_FILE)
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                signal.signal(number, launcher.stop)
+            return launcher.run()
+    except (RobotFileError, LinkKeyError, BusyError, OSError) as error:
+        print(f"lightleash serve: {error}", file=sys.stderr)
+        return 2

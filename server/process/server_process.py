@@ -1,0 +1,226 @@
+"""The server process: the app on HTTPS for phones and on HTTP for this machine alone."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import resource
+import signal
+import socket
+import sys
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+from starlette.types import ASGIApp
+
+from hardware.camera_file import CAMERAS
+from hardware.robot_file import ROBOTS, load_robot
+from server.calibration.camera_yaml import PROFILES
+from server.common.runtime import (
+    MEMBERS_FILE,
+    RUN_FILE,
+    VIEW_SOCKET,
+    private_directory,
+    write_private,
+)
+from server.common.settings import Settings
+from server.diagnostics import bounded_log
+from server.media.decoding import Decoding
+from server.phone.frame_worker import join_all
+from server.process import warm_up
+from server.recording.control import Recordings
+from server.recording.reader import recover_all
+from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
+from server.rtc.signalling_endpoint import RtcDesk
+from server.security.admission import Admission
+from server.security.audit import Audit
+from server.security.listener import Listener, listener
+from server.security.places import limits_for
+from server.security.request_guard import Guard
+from server.security.security import Doors
+from server.security.tls import Certificate, certificate, own_addresses, own_names
+from server.view.viser_proxy import routes as view_routes
+from server.view.viser_view import Dashboard
+from server.web.app import Api, make_app
+from server.web.people_api import PeopleApi
+from server.web.session_manager import Hub
+from server.web.websocket import PageServer
+
+ANY_ADDRESS = ("0.0.0.0", "::")
+POLL_S = 0.05
+MAX_HANDLES = 8_192
+"""Some systems allow a number that they don't grant."""
+WARMING = "The server is getting ready: wait a moment."
+SWITCH_S = 5e-4
+"""Each datagram makes the event loop give up the interpreter for a moment, ten times a picture by
+WebRTC; a vision thread that computes would keep it for Python's usual 5 ms each time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What the launcher hands over: it outlives this process, so does what is in here."""
+
+    runtime: Path
+    truth_port: int
+    https: socket.socket
+    http: socket.socket
+    secret: bytes
+    """Of this run."""
+
+
+def base_url(host: str, port: int) -> str:
+    """Where phones reach an HTTPS listener that is bound to `host`."""
+    address = own_addresses()[0] if host in ANY_ADDRESS else host
+    return f"https://[{address}]:{port}" if ":" in address else f"https://{address}:{port}"
+
+
+async def serve(settings: Settings, given: Given) -> None:
+    """Serve until SIGTERM or SIGINT."""
+    tls = _certificate(settings)
+    audit = Audit(settings.state)
+    members = given.runtime / MEMBERS_FILE
+    doors = Doors(given.secret, settings.pairing.confirm, members, audit)
+    warming = warm_up.begin()
+    decoding = Decoding()
+    hub = _hub(settings, given, doors, decoding)
+    view = given.runtime / VIEW_SOCKET
+    dashboard = _dashboard(settings, hub, view)
+    base = base_url(settings.host, given.https.getsockname()[1])
+    api = Api(hub, tls.authority)
+    people = PeopleApi(hub, doors, base, http_url(given))
+    desk = RtcDesk(hub, settings.rtc, settings.video.bitrate_bps)
+    routes = [*people.routes(), *view_routes(view), *desk.routes()]
+    app = make_app(api, PageServer(hub, settings.video), routes)
+    admission = Admission(limits_for(raise_handles()))
+    guarded = Guard(app, doors, [*own_names(), *settings.names], admission)
+    if settings.record:
+        hub.start_recording()
+    run = json.dumps(_run(settings, given, base, doors))
+    telling = asyncio.create_task(_tell_when_ready(hub, warming, given.runtime / RUN_FILE, run))
+    try:
+        await _until_signalled(hub, doors_of(guarded, tls, given, admission))
+    finally:
+        telling.cancel()
+        await desk.close()
+        (given.runtime / RUN_FILE).unlink(missing_ok=True)
+        api.phone.stop()
+        dashboard.stop()
+        audit.close()
+        await asyncio.to_thread(join_all)
+        decoding.close()
+
+
+def http_url(given: Given) -> str:
+    """Where this machine reaches the server."""
+    return f"http://127.0.0.1:{given.http.getsockname()[1]}"
+
+
+async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, run: str) -> None:
+    """The run file says that a robot can be led: the control process compiles for a while first.
+
+    So may this one. What is loaded by then is needed for ever, and frozen before anybody flies.
+    """
+    hub.unready = WARMING
+    while hub.status is None or warming.is_alive():
+        await asyncio.sleep(POLL_S)
+    hub.pauses.garbage.settle()
+    hub.unready = ""
+    write_private(run_file, run)
+
+
+def _hub(settings: Settings, given: Given, doors: Doors, decoding: Decoding) -> Hub:
+    folder = private_directory(private_directory(settings.state) / "recordings")
+    recover_all(folder)
+    recordings = Recordings(folder, _metadata(settings))
+    robot = load_robot(settings.robot).robot
+    profiles = private_directory(settings.state / PROFILES)
+    cameras = [*settings.cameras, profiles, CAMERAS]
+    return Hub(given.runtime, robot, cameras, recordings, profiles, doors, decoding)
+
+
+def _dashboard(settings: Settings, hub: Hub, view: Path) -> Dashboard:
+    robot_file = load_robot(settings.robot)
+    dashboard = Dashboard(robot_file.robot, robot_file.plant, robot_file.start, view)
+    dashboard.start(lambda: (hub.status, hub.last_thumbnail))
+    return dashboard
+
+
+def _run(settings: Settings, given: Given, base: str, doors: Doors) -> dict[str, object]:
+    """What other programs of this user are told."""
+    return {
+        "http_url": http_url(given),
+        "https_url": base,
+        "operator_token": doors.operator_token,
+        "supervisor_token": doors.supervisor_token,
+        "truth_port": given.truth_port,
+        "robot": _seen_from_anywhere(settings.robot),
+        "pid": os.getpid(),
+        "virtual_camera": settings.virtual_camera.model_dump(),
+    }
+
+
+def _seen_from_anywhere(robot: str) -> str:
+    """A name as it is, a path as an absolute one."""
+    return str(Path(robot).absolute()) if robot.endswith(".toml") else robot
+
+
+def doors_of(
+    app: ASGIApp, tls: Certificate, given: Given, admission: Admission
+) -> list[tuple[Listener, socket.socket]]:
+    """HTTPS for phones and HTTP for this machine, with their sockets."""
+    return [
+        (listener(app, tls, admission), given.https),
+        (listener(app, None, admission), given.http),
+    ]
+
+
+async def _until_signalled(hub: Hub, listeners: list[tuple[Listener, socket.socket]]) -> None:
+    loop, stop = asyncio.get_running_loop(), asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop.set)
+    tasks = [asyncio.create_task(one.serve(sockets=[bound])) for one, bound in listeners]
+    hub_task = asyncio.create_task(hub.run())
+    stopping = asyncio.create_task(stop.wait())
+    try:
+        done, _ = await asyncio.wait(
+            [*tasks, hub_task, stopping], return_when=asyncio.FIRST_COMPLETED
+        )
+        for task in done:
+            task.result()
+    finally:
+        for one, _ in listeners:
+            one.should_exit = True
+        hub_task.cancel()
+        await asyncio.gather(*tasks, hub_task, return_exceptions=True)
+
+
+def raise_handles() -> int:
+    """Let this process have as many file handles as it may; how many that is."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = MAX_HANDLES if most == resource.RLIM_INFINITY else min(most, MAX_HANDLES)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+    return wanted
+
+
+def _certificate(settings: Settings) -> Certificate:
+    if settings.cert is not None and settings.key is not None:
+        return Certificate(settings.cert, settings.key, None)
+    return certificate(settings.state, settings.names)
+
+
+def _metadata(settings: Settings) -> dict[str, str]:
+    """What a recording must know to be understood later."""
+    name = settings.robot
+    path = Path(name) if name.endswith(".toml") else ROBOTS / f"{name}.toml"
+    text = path.read_text(encoding="utf-8")
+    return {ROBOT_KEY: text, SETTINGS_KEY: settings.model_dump_json()}
+
+
+def main(settings: Settings, given: Given) -> int:
+    """Entry of the server process."""
+    sys.setswitchinterval(SWITCH_S)
+    bounded_log.set_up()
+    asyncio.run(serve(settings, given))
+    return 0

@@ -1,0 +1,269 @@
+"""The JSON messages of the protocol: one `msgspec` struct each, `type` is its tag.
+
+Together with the records of `wire.py` they are the whole protocol.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from pipeline.config import EstimatorName, VirtualCameraMode
+from server.common.runtime_parameters import AdaptiveBeta, CutoffHz, Knobs, SpeedLimit
+from server.protocol.calibration_messages import Calibrate, Calibration
+from server.protocol.camera_messages import CameraHealth
+from server.protocol.people_messages import Deed, Person
+from server.protocol.video_path_messages import PathChoice
+from server.protocol.wire import MAX_MESSAGE_BYTES, WireError
+
+Text = Annotated[str, Meta(max_length=200)]
+AgeMs = Annotated[int, Meta(ge=0, le=3_600_000)]
+ServerMs = Annotated[int, Meta(ge=0, le=2**53)]
+Side = Annotated[int, Meta(ge=16, le=4096)]
+
+
+class Hello(msgspec.Struct, tag="hello", forbid_unknown_fields=True, frozen=True):
+    """Page → server, first: who is there."""
+
+    version: int
+    """Protocol version of the page."""
+    role: Literal["operator", "supervisor", "video"]
+    """`video`: the second socket of an operator, for frames alone."""
+    device: Text = ""
+    """Names the camera's calibration: what the browser or a virtual phone says of itself."""
+    session: Annotated[str, Meta(max_length=64)] = ""
+    """On the video socket: the session of the operator it belongs to."""
+    sensors: Text = ""
+    """Which interface delivers motion, for the supervisor to read."""
+    video: Text = ""
+    """How frames are encoded, for the supervisor to read."""
+
+
+class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=True):
+    """Page → server: a wish of a person; the control process decides.
+
+    `key_frame` travels server → page: the next FRAME must be decodable alone.
+    """
+
+    what: Literal["arm", "disarm", "stop", "reset", "key_frame"]
+    age_ms: AgeMs = 0
+    """Since the person asked, by the page's own clock."""
+    server_ms: ServerMs | None = None
+    """The server's clock when this was sent, as far as the page knows: `time_ms` of the `status`
+    that was least late and what has passed since that came; None: it has heard none."""
+
+
+class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):
+    """Page → server: turn `Knobs` of the virtual camera; those left out or null stay.
+
+    `status` shows how they stand: that is the answer.
+    """
+
+    cutoff_hz: CutoffHz | None = None
+    mode: VirtualCameraMode | None = None
+    adaptive_beta: AdaptiveBeta | None = None
+    max_speed_m_s: SpeedLimit | None = None
+    guard: bool | None = None
+
+
+class Log(msgspec.Struct, tag="log", forbid_unknown_fields=True, frozen=True):
+    """Page → server: a fault on the page that a supervisor should read."""
+
+    text: Text
+
+
+class Welcome(msgspec.Struct, tag="welcome", frozen=True):
+    """Server → page: the answer to hello."""
+
+    session: str
+    version: int
+    robot: str
+    """Name of the robot."""
+    width: Side
+    """Wanted picture."""
+    height: Side
+    frame_rate_hz: int
+    bitrate_bps: int
+    you: str = ""
+    """Id of this page's pairing, as in `people` of a status."""
+
+
+class Refused(msgspec.Struct, tag="refused", frozen=True):
+    """Server → page: something was not taken; nothing else of the sender was lost."""
+
+    code: str
+    field: str
+    allowed: str
+    fatal: bool = False
+    """True: the server closes the connection after this."""
+
+
+class Stream(msgspec.Struct, frozen=True):
+    """Health of one stream."""
+
+    age_ms: float | None
+    """Of its newest item; None before the first."""
+    rate_hz: float
+    dropped: int = 0
+    """Superseded, too old or refused, since the start."""
+
+
+class GapCount(msgspec.Struct, frozen=True):
+    """Short silences of one side in the last minute."""
+
+    count: int
+    longest_ms: float
+
+
+class VirtualCamera(msgspec.Struct, frozen=True):
+    """The virtual camera in the control process."""
+
+    knobs: Knobs
+    """As they stand."""
+    lag_deg: float | None
+    """Angle from the phone to the virtual camera; None before a phone is there."""
+    guarding: float
+    """0 to 1: how much it hurries now."""
+
+
+class Estimate(msgspec.Struct, frozen=True):
+    """What the estimator of the relative motion says of itself; counts are since the start.
+
+    The standard deviation of the position is `sigma_mm` of the status.
+    """
+
+    name: EstimatorName
+    complaint: str
+    """Why nobody should fly on the estimate, or ""."""
+    nis: float | None
+    """Normalised innovation squared per degree of freedom, lately: 1 is honest, 0.5 to 2 fine."""
+    age_ms: float | None
+    """Of the last picture that was fused; None while nothing is known."""
+    fused: int
+    """Pictures the estimate rested on."""
+    dropped: int
+    """The other pictures."""
+    late: int
+    """Of these, older than the horizon."""
+    leds_rejected: int
+    """Single LEDs beyond their gate."""
+    time_offset_ms: float | None
+    """A picture was taken at its stamp plus this."""
+    time_offset_sigma_ms: float | None
+    """Standard deviation; None while it can't be believed."""
+    sigma_deg: float | None
+    """Largest standard deviation of the attitude."""
+    bias_body_deg_s: list[float] | None
+    """Of the body's gyroscope, in the body's axes."""
+    bias_body_m_s2: list[float] | None
+    """Of the body's accelerometer."""
+    bias_phone_deg_s: list[float] | None
+    """Of the phone's gyroscope, in the camera's axes."""
+    bias_phone_m_s2: list[float] | None
+    """Of the phone's accelerometer."""
+
+
+class Status(msgspec.Struct, tag="status", frozen=True):
+    """Server → page, 10 Hz: the truth about the robot, on every screen."""
+
+    mode: Literal["DISARMED", "ARMED", "TRACK", "COAST", "HOLD", "RAMP", "STOPPED", "LOST"]
+    """LOST: the control process does not answer."""
+    reason: str
+    """Why the mode is what it is, in words for the person who can mend it."""
+    ready: bool
+    """`arm` would be granted."""
+    refusals: list[str]
+    """What keeps it from being granted, each in words."""
+    robot: str
+    operator: str
+    """The device of the operator, or ""."""
+    video_path: str
+    """How the operator's pictures come and what dates them, in words, or ""."""
+    streams: dict[str, Stream]
+    """By name: operator, phone_imu, video, pose, body_imu, control."""
+    latency_ms: dict[str, float]
+    """By stage, in order: capture to arrival, waiting, decode, detect, …, to control, control."""
+    leds: int
+    """LEDs in the last picture."""
+    reprojection_px: float | None
+    position_mm: list[float] | None
+    """Of the body relative to the camera, in the camera's axes."""
+    error_mm: float | None
+    """Distance from the reference, while tracking."""
+    error_deg: float | None
+    sigma_mm: float | None
+    saturated: bool
+    recording: str
+    """Name of the running recording, or ""."""
+    phones: int
+    supervisors: int
+    realtime: str
+    """Class of the control loop: what holds its schedule."""
+    control: dict[str, float]
+    """Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms."""
+    messages: list[str]
+    """The newest events, newest first."""
+    virtual_camera: VirtualCamera | None = None
+    """None before the control process has told of it."""
+    estimate: Estimate | None = None
+    """None before the control process has told of it."""
+    camera: CameraHealth | None = None
+    """Of the operator's phone; None while nobody looks through it."""
+    path_choice: PathChoice | None = None
+    """As the operator's page says; None: it lets nobody choose."""
+    time_ms: int = 0
+    """The server's clock when this was made."""
+    until_ramp_ms: float | None = None
+    """In COAST and HOLD: left until control or the robot ramps down, if all goes on as it is."""
+    resumes: bool = False
+    """In COAST and HOLD: it follows again by itself, once all is well."""
+    gaps: dict[str, GapCount] = {}
+    """By side: `phone` (or its link), `robot` (its link), `server` (its computer stood still)."""
+    warnings: list[str] = []
+    """What who arms should know, each in words; refuses nothing."""
+    server: dict[str, float] = {}
+    """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
+    while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a
+    processor for armed_stall_waited_ms; garbage collections while it was armed: processor time of
+    the longest, gc_ms, and number of full ones, gc_full."""
+    people: list[Person] = []
+    """Who is paired, in the order they came."""
+
+
+FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log
+ToPage = Welcome | Refused | Status | Command | PathChoice | Calibration | Deed
+
+_decoder = msgspec.json.Decoder(FromPage)
+_to_page_decoder = msgspec.json.Decoder(ToPage)
+_encoder = msgspec.json.Encoder()
+
+
+def encode_message(message: FromPage | ToPage) -> str:
+    """JSON text of a message."""
+    return _encoder.encode(message).decode()
+
+
+def decode_message(text: str | bytes) -> FromPage:
+    """The message in `text`.
+
+    Raises:
+        WireError: too long, not JSON, an unknown type or field, or a value out of its range.
+    """
+    if len(text) > MAX_MESSAGE_BYTES:
+        raise WireError("size", "message", f"at most {MAX_MESSAGE_BYTES} bytes")
+    try:
+        message: FromPage = _decoder.decode(text)
+    except msgspec.ValidationError as error:
+        reason, _, path = str(error).partition(" - at ")
+        raise WireError("value", path.strip("`") or "message", reason) from error
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise WireError("type", "message", "JSON text") from error
+    return message
+
+
+def decode_from_server(text: str | bytes) -> ToPage:
+    """The message of a server in `text`, for clients written in Python."""
+    message: ToPage = _to_page_decoder.decode(text)
+    return message

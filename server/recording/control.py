@@ -1,0 +1,79 @@
+"""Starting and stopping recordings of what the hub sees."""
+
+from __future__ import annotations
+
+import time
+from math import inf
+from pathlib import Path
+
+from server.control.ipc import ControlStatus
+from server.protocol.wire import HEADER, KEY_FLAG, Kind
+from server.recording.writer import CAMERA_KEY, DEVICE_KEY, Direction, Recorder
+
+KEY_S = 0.5
+"""Between two requests for a key: one may be lost on the way."""
+
+
+class Recordings:
+    """At most one recording at a time."""
+
+    def __init__(self, directory: Path, metadata: dict[str, str]) -> None:
+        """Files go to `directory`; `metadata` goes into each."""
+        self._directory, self._metadata = directory, metadata
+        self._recorder: Recorder | None = None
+        self._has_key, self._t_asked = True, -inf
+
+    @property
+    def name(self) -> str:
+        """Of the running recording, or ""."""
+        return self._recorder.name if self._recorder is not None else ""
+
+    def start(self, device: str = "", camera_text: str = "") -> str:
+        """Begin, unless one is running; gives its name.
+
+        Raises:
+            RecordingError: the file can't be made.
+        """
+        if self._recorder is None:
+            name = time.strftime("%Y%m%d-%H%M%S")
+            own = {DEVICE_KEY: device, CAMERA_KEY: camera_text}
+            self._recorder = Recorder(self._directory, name, {**self._metadata, **own})
+            self._has_key, self._t_asked = False, -inf
+        return self.name
+
+    def stop(self) -> str:
+        """End; gives the path of the file, or ""."""
+        recorder, self._recorder = self._recorder, None
+        self._has_key = True
+        if recorder is None:
+            return ""
+        recorder.close()
+        return str(recorder.path)
+
+    def key_is_due(self, now: float) -> bool:
+        """Whether to ask the page for a key: without one no recorded picture can be decoded."""
+        if self._has_key or now - self._t_asked < KEY_S:
+            return False
+        self._t_asked = now
+        return True
+
+    def record(self, direction: Direction, data: bytes, t: float) -> None:
+        """A record that came or went."""
+        if self._recorder is not None:
+            self._recorder.record(direction, data, t)
+            self._has_key = self._has_key or _is_key(data)
+
+    def message(self, direction: Direction, text: str, t: float) -> None:
+        """A message that came or went."""
+        if self._recorder is not None:
+            self._recorder.message(direction, text, t)
+
+    def status(self, status: ControlStatus, t: float) -> None:
+        """A status of the control process."""
+        if self._recorder is not None:
+            self._recorder.status(status, t)
+
+
+def _is_key(data: bytes) -> bool:
+    """Whether a record is a picture that can be decoded alone."""
+    return len(data) > HEADER.size and data[2] == Kind.FRAME and bool(data[3] & KEY_FLAG)

@@ -1,0 +1,193 @@
+"""Recordings: MCAP files of what went over the wire, written beside the loop, safe against crashes.
+
+The bytes recorded are the bytes of the wire. Channels, with log times on the server's clock:
+
+| channel | encoding | what |
+|---|---|---|
+| phone/records, server/records | `lightleash` (`server.protocol.wire`) | binary, both ways |
+| phone/messages, server/messages | json (`server.protocol.messages`) | text, both ways |
+| control/status | json | `ControlStatus`, with the samples of the robot's motion sensors |
+
+Publish time is the sender's own clock for records, else the log time. A file is called
+`*.mcap.part` until closed; what a crash leaves behind ends at the last flush, and
+`reader.recover` makes it readable.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import queue
+import threading
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Literal
+
+import msgspec
+from mcap.writer import Writer
+
+import server
+from server.common.runtime import new_private_file
+from server.control.ipc import ControlStatus
+from server.protocol.wire import HEADER, VERSION
+
+Direction = Literal["phone", "server"]
+PHONE_RECORDS, SERVER_RECORDS = "phone/records", "server/records"
+PHONE_MESSAGES, SERVER_MESSAGES = "phone/messages", "server/messages"
+STATUS = "control/status"
+ENCODINGS = {
+    PHONE_RECORDS: "lightleash",
+    SERVER_RECORDS: "lightleash",
+    PHONE_MESSAGES: "json",
+    SERVER_MESSAGES: "json",
+    STATUS: "json",
+}
+DEVICE_KEY, ROBOT_KEY, CAMERA_KEY, SETTINGS_KEY = "device", "robot_file", "camera_file", "settings"
+"""Metadata: phone, text of the robot's and the camera's file, settings of the server."""
+CHUNK_BYTES = 131_072
+FLUSH_S = 0.25
+CAPACITY = 4_096
+"""Items waiting for the disk; at 300 a second more than ten seconds."""
+MAX_BYTES = 8 << 30
+MAX_NS = (1 << 64) - 1
+
+
+class RecordingError(Exception):
+    """A recording that can't be read or written.
+
+    Attributes:
+        path: Which file.
+        what: What is wrong with it.
+        allowed: What would help.
+    """
+
+    def __init__(self, path: Path, what: str, allowed: str) -> None:
+        super().__init__(f"{path}: {what}; {allowed}")
+        self.path, self.what, self.allowed = path, what, allowed
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    topic: str
+    t: float
+    data: bytes | ControlStatus
+
+
+class Recorder:
+    """Writes one recording from its own thread; what the disk can't take in time is dropped."""
+
+    def __init__(
+        self, directory: Path, name: str, metadata: dict[str, str], max_bytes: int = MAX_BYTES
+    ) -> None:
+        """Open `directory/name.mcap.part`.
+
+        Raises:
+            RecordingError: it can't be created, or there is one of this name.
+        """
+        self.name = name
+        self.path = directory / f"{name}.mcap"
+        self.written = self.dropped = 0
+        self.error = ""
+        """Why the recording ended early, or ""."""
+        self._max_bytes = max_bytes
+        self._closing = threading.Event()
+        self._queue: queue.Queue[_Item | None] = queue.Queue(CAPACITY)
+        try:
+            directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if self.path.exists():
+                raise FileExistsError("there is a recording of this name")
+            self._file = new_private_file(part_of(self.path))
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise RecordingError(self.path, str(error), "another name or directory") from error
+        own = {"protocol_version": str(VERSION), "lightleash_version": server.__version__}
+        self._metadata = metadata | own
+        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+        self._thread.start()
+
+    def record(self, direction: Direction, data: bytes, t: float) -> None:
+        """Keep a binary record that `direction` sent, seen at `t` [s]. Never waits or raises."""
+        self._put(_Item(PHONE_RECORDS if direction == "phone" else SERVER_RECORDS, t, data))
+
+    def message(self, direction: Direction, text: str, t: float) -> None:
+        """Keep a JSON message in the same way."""
+        topic = PHONE_MESSAGES if direction == "phone" else SERVER_MESSAGES
+        self._put(_Item(topic, t, text.encode()))
+
+    def status(self, status: ControlStatus, t: float) -> None:
+        """Keep a status of the control process."""
+        self._put(_Item(STATUS, t, status))
+
+    def close(self) -> None:
+        """Write what is waiting, close and rename the file; waits for the disk."""
+        self._closing.set()
+        with suppress(queue.Full):
+            self._queue.put_nowait(None)  # wakes the thread
+        self._thread.join()
+
+    def _put(self, item: _Item) -> None:
+        if self.error or self._closing.is_set():
+            self.dropped += 1
+            return
+        try:
+            self._queue.put_nowait(item)
+        except queue.Full:
+            self.dropped += 1
+
+    def _run(self) -> None:
+        try:
+            with self._file:
+                writer, channels = start_file(self._file, self._metadata)
+                self._write(writer, channels)
+                finish_file(writer, self._file)
+            part_of(self.path).rename(self.path)
+        except OSError as error:  # a full or vanished disk must not take the robot down
+            self.error = str(error)
+
+    def _write(self, writer: Writer, channels: dict[str, int]) -> None:
+        flushed = time.monotonic()
+        while not (self._closing.is_set() and self._queue.empty()):
+            with suppress(queue.Empty):
+                item = self._queue.get(timeout=FLUSH_S)
+                if item is not None:
+                    _add(writer, channels[item.topic], item)
+                    self.written += 1
+            if time.monotonic() - flushed >= FLUSH_S:
+                writer.flush()  # type: ignore[no-untyped-call]
+                flushed = time.monotonic()
+                if self._file.tell() > self._max_bytes:
+                    self.error = f"larger than {self._max_bytes} bytes"
+                    return
+
+
+def part_of(path: Path) -> Path:
+    """The name of a recording before it is closed."""
+    return path.with_name(path.name + ".part")
+
+
+def start_file(file: IO[bytes], metadata: dict[str, str]) -> tuple[Writer, dict[str, int]]:
+    """A writer that has written the metadata, and the ids of our channels."""
+    writer = Writer(file, chunk_size=CHUNK_BYTES)
+    writer.start(profile="lightleash", library=f"lightleash {server.__version__}")
+    writer.add_metadata("lightleash", metadata)
+    return writer, {t: writer.register_channel(t, e, schema_id=0) for t, e in ENCODINGS.items()}
+
+
+def _add(writer: Writer, channel: int, item: _Item) -> None:
+    log_time = publish_time = round(1e9 * item.t)
+    data = item.data
+    if isinstance(data, ControlStatus):
+        data = msgspec.json.encode(msgspec.structs.asdict(data))
+    elif ENCODINGS[item.topic] == "lightleash" and len(data) >= HEADER.size:
+        t_us = HEADER.unpack_from(data)[5]  # not checked yet: it may be anything
+        publish_time = min(max(0, 1000 * t_us), MAX_NS)
+    writer.add_message(channel, log_time, data, publish_time)
+
+
+def finish_file(writer: Writer, file: IO[bytes]) -> None:
+    """End the MCAP file and wait for the disk."""
+    writer.finish()  # type: ignore[no-untyped-call]
+    file.flush()
+    os.fsync(file.fileno())

@@ -1,0 +1,1 @@
+"""Recorded phones, live through a server or offline through the pipeline alone."""

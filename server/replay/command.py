@@ -1,0 +1,211 @@
+"""`lightleash replay`: a recorded phone again, over a real websocket or offline."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from time import monotonic as now
+
+from pipeline.timing.clock_synchronisation import ClockOffset
+from server.common.access import Access, PhoneClientError, access_of, add_access_arguments
+from server.common.options import Parser
+from server.protocol.messages import Command, Status
+from server.protocol.wire import WireError, decode
+from server.protocol.wire_records import Picture, Pong, Record, Touch
+from server.recording.reader import Recording, device_of, read, recover
+from server.recording.writer import RecordingError
+from server.replay.offline import run_offline
+from server.virtual_phone.phone_client import PhoneClient
+from server.virtual_phone.phone_script import SYNCHRONISED_PONGS
+
+PHONE_CLOCK_OFFSET_S = 1000.0
+"""Of the replayed phone's clock: any will do, the server must find it."""
+DEVICE = "lightleash-replay"
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A recorded record and when it was what."""
+
+    t: float
+    """Received [s], the recorded server's clock."""
+    latency_s: float
+    """Between its capture and that."""
+    record: Record
+
+
+def timed(recording: Recording) -> list[Timed]:
+    """The phone's records with their latencies; its clock is found as the server finds it.
+
+    Raises:
+        RecordingError: the file is damaged.
+    """
+    records: list[tuple[float, Record]] = []
+    for t, data in recording.phone_records():
+        with suppress(WireError):  # recorded as it came: the server refused it then, and so do we
+            records.append((t, decode(data)))
+    offsets = _clock_offsets(records)
+    return [
+        Timed(t, max(0.0, t + offset - 1e-6 * record.t_us), record)
+        for (t, record), offset in zip(records, offsets, strict=True)
+    ]
+
+
+def _clock_offsets(records: list[tuple[float, Record]]) -> list[float]:
+    """Phone's clock minus the server's at each record [s]; before it is known, the first known."""
+    clock, offsets = ClockOffset(), list[float | None]()
+    for t, record in records:
+        if isinstance(record.body, Pong):
+            clock.add(1e-6 * record.body.server_time_us, 1e-6 * record.t_us, t)
+        offsets.append(clock.offset if clock.ready else None)
+    quickest = max((1e-6 * r.t_us - t for t, r in records), default=0.0)  # no pings: took no time
+    first = next((offset for offset in offsets if offset is not None), quickest)
+    return [first if offset is None else offset for offset in offsets]
+
+
+class Replay:
+    """A recorded phone as a living one: its records re-timed, PINGs answered. Sans-I/O.
+
+    Captures and arrivals are as far apart as recorded, divided by the speed. The nonces of TOUCH
+    are the living server's: an echo of old ones would be the lie they are there to unmask.
+    """
+
+    def __init__(self, records: list[Timed], speed: float = 1.0) -> None:
+        """Time runs `speed` times as fast as it was recorded."""
+        self._records = [r for r in records if not isinstance(r.record.body, Pong)]
+        self._speed = speed
+        self._nonce = self.pings = 0
+
+    def pong(self, nonce: int, server_time_us: int, t: float) -> Record:
+        """The answer to a PING that came at `t` [s]."""
+        self._nonce = nonce
+        self.pings += 1
+        return Record(self.pings, _phone_us(t), Pong(nonce, server_time_us))
+
+    def due(self, t_start: float) -> Iterator[tuple[float, Timed]]:
+        """When each record is to be sent [s], in order; the first at `t_start`."""
+        t_first = self._records[0].t if self._records else 0.0
+        for timed_record in self._records:
+            yield t_start + (timed_record.t - t_first) / self._speed, timed_record
+
+    def retimed(self, t_due: float, recorded: Timed) -> Record:
+        """The record as it is sent at `t_due` [s]."""
+        t_captured = t_due - recorded.latency_s / self._speed
+        record = replace(recorded.record, t_us=_phone_us(t_captured))
+        if isinstance(record.body, Touch):
+            return replace(record, body=replace(record.body, nonce=self._nonce))
+        return record
+
+
+def _phone_us(t: float) -> int:
+    return round(1e6 * (t + PHONE_CLOCK_OFFSET_S))
+
+
+@dataclass(slots=True)
+class Played:
+    """What became of a replay."""
+
+    records: int = 0
+    pictures_dropped: int = 0
+    """For want of credit, and those that can't be decoded without them."""
+    late_s: float = 0.0
+    """Largest lateness against the recorded timing."""
+    modes: dict[str, int] = field(default_factory=dict)
+    """How often each mode was shown."""
+
+
+async def play(recording: Recording, access: Access, speed: float) -> Played:
+    """Push the phone's stream over the real websockets; its wishes (arm, ...) are not repeated.
+
+    Raises:
+        RecordingError: the file is damaged.
+        PhoneClientError: the server is not there, refuses or goes away.
+    """
+    records, played = timed(recording), Played()
+    replay = Replay(records, speed)
+
+    def shown(status: Status) -> Command | None:
+        played.modes[status.mode] = played.modes.get(status.mode, 0) + 1
+        return None
+
+    client = PhoneClient(access, lambda nonce, t_us: replay.pong(nonce, t_us, now()), shown)
+    await client.open(device_of(recording) or DEVICE)
+    answering = asyncio.create_task(client.run())
+    sending = asyncio.create_task(_send(replay, client, played))
+    try:
+        done, _ = await asyncio.wait((answering, sending), return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            task.result()
+    finally:
+        for task in (answering, sending):
+            task.cancel()
+        await asyncio.gather(answering, sending, return_exceptions=True)
+        await client.close()
+    return played
+
+
+async def _send(replay: Replay, client: PhoneClient, played: Played) -> None:
+    while replay.pings < SYNCHRONISED_PONGS:
+        await asyncio.sleep(0.02)
+    decodable = True
+    for t_due, recorded in replay.due(now()):
+        await asyncio.sleep(max(0.0, t_due - now()))
+        played.late_s = max(played.late_s, now() - t_due)
+        if isinstance(recorded.record.body, Picture):
+            decodable = client.has_credit and (decodable or recorded.record.body.key)
+            if not decodable:
+                played.pictures_dropped += 1
+                continue
+        await client.send(replay.retimed(t_due, recorded))
+        played.records += 1
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0.05 <= speed <= 20.0:
+        raise argparse.ArgumentTypeError(f"{text}: allowed: 0.05 to 20")
+    return speed
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(prog="lightleash replay", description=__doc__)
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("--speed", type=_speed, default=1.0, help="times as fast as recorded")
+    parser.add_argument("--offline", action="store_true", help="through the pipeline, no server")
+    parser.add_argument("--out", type=Path, help="CSV of what the pipeline saw; with --offline")
+    parser.add_argument("--recover", action="store_true", help="rescue a file never closed; only")
+    add_access_arguments(parser)
+    return parser
+
+
+def _run(arguments: argparse.Namespace) -> str:
+    """Do what is asked; gives a line about it."""
+    if arguments.recover:
+        return f"recovered: {recover(arguments.recording)}"
+    recording = read(arguments.recording)
+    if arguments.offline:
+        out = arguments.out or arguments.recording.with_suffix(".csv")
+        return f"{out}: {run_offline(recording, out)}"
+    played = asyncio.run(play(recording, access_of(arguments), arguments.speed))
+    modes = ", ".join(sorted(played.modes)) or "none"
+    return (
+        f"{played.records} records sent, {played.pictures_dropped} pictures dropped,"
+        f" at most {1e3 * played.late_s:.0f} ms late; modes: {modes}"
+    )
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; gives the exit status."""
+    try:
+        sys.stdout.write(_run(_parser().parse_args(argv)) + "\n")
+    except KeyboardInterrupt:
+        return 130
+    except (RecordingError, PhoneClientError, OSError) as error:
+        sys.stderr.write(f"lightleash replay: {error}\n")
+        return 1
+    return 0

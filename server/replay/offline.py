@@ -1,0 +1,181 @@
+"""A recorded phone through ingest, vision and control in virtual time: the same bytes each time.
+
+The robot does not follow: its recorded motion samples are used, and what is compared are the
+estimates, as rows of `table`.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from pipeline.config import TeleopConfig
+from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose
+from pipeline.teleop import Output
+from server.control.controller import PERIOD_S, Controller
+from server.control.ipc import Input, OperatorInput, PhoneImuInput, ReadyInput, RequestInput
+from server.control.ipc_vision import SeenInput
+from server.phone.frame_pipeline import Sight
+from server.phone.image_format import Shape
+from server.phone.ingest import EncodedFrame, Ingest
+from server.protocol.messages import Command, Hello, decode_message
+from server.protocol.wire import WireError, decode
+from server.protocol.wire_records import Picture, Ping, Record
+from server.recording.reader import Entry, Recording
+from server.recording.writer import PHONE_MESSAGES, PHONE_RECORDS, SERVER_RECORDS, RecordingError
+from server.replay.setting import body_samples, first_shape, recorded_camera, recorded_robot
+from server.replay.table import COLUMNS, row_of
+
+READY_EVERY, EXPECT_EVERY = 20, 4
+"""Ticks between words of the server to control, and of control to the server."""
+Tap = Callable[[float, Sequence[Input], Sequence[BodyImu]], None]
+"""Takes the time [s], what the server said, the robot's motion samples."""
+
+
+class Offline:
+    """One recording, played once."""
+
+    def __init__(self, recording: Recording, tap: Tap = lambda *heard: None) -> None:
+        """Read what it says of robot and camera; `tap` is told what control hears.
+
+        Raises:
+            RecordingError: damaged, or its robot or camera can't be used.
+        """
+        self._recording = recording
+        self.robot, self._tap = recorded_robot(recording).robot, tap
+        self._config = TeleopConfig()
+        self._controller = Controller(self.robot, self._config)
+        self._shape = first_shape(recording)
+        self._nonces: deque[int] = deque()
+        self._greet()
+        self._body = deque(body_samples(recording))
+        self._inbox: list[Input] = []
+        self._seen: list[tuple[EncodedFrame, RelativePose | None]] = []
+        self.refused = 0
+        """Records that ingest refused, as the server did then."""
+
+    def _greet(self) -> None:
+        """A phone has come: nothing is known of its clock and its pictures."""
+        self._ingest = Ingest(self._nonces.popleft)
+        self._new_sight()
+
+    def _new_sight(self) -> None:
+        """Open eyes for pictures of the present shape.
+
+        Raises:
+            RecordingError: nobody knows a camera that takes such pictures.
+        """
+        camera = recorded_camera(self._recording, self._shape)
+        self._sight = Sight(camera, self.robot, self._config.gates)
+        self._ingest.mounting = camera.mounting
+        self._is_blind = False
+
+    def rows(self) -> Iterator[dict[str, str]]:
+        """One row per picture.
+
+        Raises:
+            RecordingError: the file is damaged.
+        """
+        recording = self._recording
+        entries = recording.entries(PHONE_RECORDS, SERVER_RECORDS, PHONE_MESSAGES)
+        waiting = next(entries, None)
+        ticks = int((recording.t_last - recording.t_first) / PERIOD_S) + 2
+        for k in range(ticks):
+            now = recording.t_first + k * PERIOD_S
+            while waiting is not None and waiting.t <= now:
+                self._hear(waiting)
+                waiting = next(entries, None)
+            if k % READY_EVERY == 0:
+                self._inbox.append(ReadyInput([]))
+            output = self._tick(now)
+            if k % EXPECT_EVERY == 0:
+                self._sight.expect(self._controller.expected(output))
+            for frame, pose in self._seen:
+                yield row_of(frame, pose, output, recording.t_first)
+            self._seen.clear()
+
+    def _tick(self, now: float) -> Output:
+        body: list[BodyImu] = []
+        while self._body and self._body[0].t <= now:
+            body.append(self._body.popleft())
+        self._sight.feel_body(body)
+        inbox, self._inbox = self._inbox, []
+        self._tap(now, inbox, body)
+        _, output = self._controller.tick(now, inbox, body, "")
+        return output
+
+    def _hear(self, entry: Entry) -> None:
+        """What the server did with it then, without sockets."""
+        try:
+            if entry.topic == PHONE_MESSAGES:
+                message = decode_message(entry.data)
+                if isinstance(message, Hello):
+                    self._greet()
+                elif isinstance(message, Command):
+                    self._inbox.append(RequestInput(message.what))
+                return
+            record = decode(entry.data)
+            if isinstance(record.body, Ping):
+                self._nonces.append(record.body.nonce)
+                self._ingest.ping(entry.t)
+            elif entry.topic == PHONE_RECORDS:
+                self._take(record, entry.t)
+        except WireError:
+            self.refused += 1
+
+    def _take(self, record: Record, now: float) -> None:
+        """A record of the phone."""
+        match self._ingest.record(record, now):
+            case PhoneImu() as sample:
+                self._sight.feel(sample)
+                self._inbox.append(PhoneImuInput.of(sample))
+            case Operator() as operator:
+                self._inbox.append(OperatorInput.of(operator))
+            case EncodedFrame() as frame:
+                self._see(frame)
+            case None if isinstance(record.body, Picture):  # those that follow lean on it
+                self._fit(record.body)
+                self._sight.decoded(EncodedFrame(now, now, record.sequence, record.body))
+
+    def _fit(self, picture: Picture) -> None:
+        """Open other eyes for another size or angle, as the server did; none if it had none."""
+        shape = Shape.of(picture)
+        if shape == self._shape:
+            return
+        self._shape = shape
+        try:
+            self._new_sight()
+        except RecordingError:
+            self._is_blind = True
+
+    def _see(self, frame: EncodedFrame) -> None:
+        self._fit(frame.picture)
+        controller, sighting = self._controller, None
+        if not self._is_blind:
+            known = controller.up_in_b, controller.omega_bf_in_b
+            sighting = self._sight.see([frame], *known)
+        self._seen.append((frame, sighting.pose if sighting is not None else None))
+        seen = sighting.seen(self._sight.camera) if sighting is not None else None
+        if seen is not None:
+            self._inbox.append(SeenInput.of(seen))
+
+
+def run_offline(recording: Recording, out: Path) -> str:
+    """Write the CSV; gives a line about it.
+
+    Raises:
+        RecordingError: the recording can't be used.
+        OSError: the CSV can't be written.
+    """
+    pictures = found = 0
+    offline = Offline(recording)
+    with out.open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        for row in offline.rows():
+            writer.writerow(row)
+            pictures += 1
+            found += row["found"] == "1"
+    return f"{pictures} pictures, the robot found in {found}, {offline.refused} records refused"

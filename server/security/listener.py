@@ -1,0 +1,124 @@
+"""uvicorn as we want it: impatient, with doors of its own, signals left to the owner."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Iterator
+
+import uvicorn
+from starlette.types import ASGIApp
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from server.protocol.wire import MAX_RECORD_BYTES
+from server.security.acceptor import Acceptor
+from server.security.admission import Admission
+from server.security.tls import Certificate
+
+HEAD_S = 5.0
+"""A request's head must be whole within this."""
+
+
+class Patience(H11Protocol):
+    """uvicorn's HTTP without its patience: a head that never ends is cut off."""
+
+    _head_due: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Start the clock."""
+        super().connection_made(transport)
+        self._expect_head()
+
+    def data_received(self, data: bytes) -> None:
+        """A whole head stops the clock; the first byte of another one starts it again."""
+        cycle = self.cycle
+        if self._head_due is None and (cycle is None or cycle.response_complete):
+            self._expect_head()
+        super().data_received(data)
+        is_websocket = self.transport.get_protocol() is not self
+        if self.cycle is not cycle or is_websocket:
+            self._head_is_whole()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Stop all clocks: a timer would keep what TLS has buffered, a megabyte of a large page."""
+        self._head_is_whole()
+        super().connection_lost(exc)
+        self._unset_keepalive_if_required()
+
+    def _expect_head(self) -> None:
+        self._head_due = self.loop.call_later(HEAD_S, self._late)
+
+    def _head_is_whole(self) -> None:
+        if self._head_due is not None:
+            self._head_due.cancel()
+            self._head_due = None
+
+    def _late(self) -> None:
+        self._head_due = None
+        if not self.transport.is_closing():
+            self.transport.close()
+
+
+class Listener(uvicorn.Server):
+    """Accepts by admission, and leaves signals to its owner."""
+
+    def __init__(self, config: uvicorn.Config, admission: Admission) -> None:
+        """Listens when it is run, at the sockets that it is given then."""
+        super().__init__(config)
+        self._admission = admission
+        self._acceptors: list[Acceptor] = []
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Capture none."""
+        yield
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Open the doors."""
+        await self.lifespan.startup()
+        self.servers = []  # of asyncio's own: none
+        self._acceptors = [
+            Acceptor(bound, self.config.ssl, self._protocol, self._admission)
+            for bound in sockets or ()
+        ]
+        for acceptor in self._acceptors:
+            acceptor.start()
+        self.started = True
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Close them."""
+        for acceptor in self._acceptors:
+            acceptor.close()
+        await super().shutdown(sockets)
+
+    def _protocol(self) -> Patience:
+        return Patience(self.config, self.server_state, self.lifespan.state)
+
+
+def listener(app: ASGIApp, tls: Certificate | None, admission: Admission | None = None) -> Listener:
+    """A server of `app`, with TLS or without; it is given its socket when it is run.
+
+    Listeners that share an `admission` share the places.
+    """
+    return Listener(
+        uvicorn.Config(
+            app,
+            http=Patience,
+            ws="websockets-sansio",
+            ws_max_size=MAX_RECORD_BYTES + 1024,
+            ws_per_message_deflate=False,
+            ws_ping_interval=5.0,
+            ws_ping_timeout=5.0,
+            lifespan="off",
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,  # who asks is who connected, whatever programs of this machine say
+            timeout_keep_alive=5,
+            timeout_graceful_shutdown=1,
+            ssl_certfile=tls.cert if tls else None,
+            ssl_keyfile=tls.key if tls else None,
+        ),
+        Admission() if admission is None else admission,
+    )

@@ -1,0 +1,194 @@
+"""Before every request and websocket: Host, Origin, role, and how much is asked. Pure ASGI."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from msgspec.structs import replace
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from server.common.clock import now
+from server.common.roles import Least, is_enough, least_of
+from server.security.admission import LOOPBACK, Admission, Peer, peer_of
+from server.security.pairings import Member
+from server.security.quotas import Asker, Quotas
+from server.security.rechecked import Rechecked
+from server.security.security import Doors
+
+PORT = re.compile(r":\d{1,5}$")
+"""The port at the end of a Host header; an IPv6 address is in brackets."""
+
+
+PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+    "media-src 'self' blob:; connect-src 'self'; worker-src 'self'; frame-src 'self'; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+)
+SENSORS = "camera=(self), accelerometer=(self), gyroscope=(self), magnetometer=(self)"
+HEADERS = {
+    "permissions-policy": SENSORS,
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+}
+STOP = "/api/stop"
+"""Never limited, and taken also of who is shut out while it comes."""
+SHUT_OUT = 401, "role", "pair anew: this pairing has ended"
+Refusal = tuple[int, str, str]
+"""Status, field, what is allowed."""
+
+
+class Guard:
+    """Refuses foreign hosts and origins, and those without the role; adds the security headers."""
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        doors: Doors,
+        hosts: Iterable[str],
+        admission: Admission | None = None,
+        quotas: Quotas | None = None,
+    ) -> None:
+        """`hosts` are the names and addresses this server answers to.
+
+        `admission` is told whose address has shown a role, and limits what strangers ask, `quotas`
+        what everybody else does.
+        """
+        self._app, self._doors = app, doors
+        self._admission = Admission() if admission is None else admission
+        self._quotas = Quotas() if quotas is None else quotas
+        doors.on_gone = self._admission.forget
+        self._hosts = {f"[{host}]" if ":" in host else host.lower() for host in hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Let in or turn away."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        headers = {k.decode("latin-1").lower(): v.decode("latin-1") for k, v in scope["headers"]}
+        peer = peer_of(scope)
+        member = self._doors.who(headers, scope["scheme"] in ("https", "wss"), peer.host)
+        is_in = member is not None and member.state == "in"
+        refusal = self._refusal(scope, headers, member)
+        if not self._admission.may_ask(peer, is_in, now()):
+            await _refuse((429, "requests", "fewer"), scope, receive, send)
+            return
+        is_stop = refusal is None and scope["path"] == STOP
+        asker = None if is_stop else self._asker(member if is_in else None, peer)
+        allowed = self._quotas.may_ask(asker, scope["path"], now())
+        refusal = (429, "requests", allowed) if allowed else refusal
+        if refusal is None:
+            with self._quotas.place(asker, scope["type"] == "websocket") as allowed:
+                if not allowed:
+                    await self._serve(scope, receive, send, member, headers.get("host", ""))
+                    return
+                refusal = 429, "requests", allowed
+        self._note(refusal, member, peer.host, scope["path"])
+        await _refuse(refusal, scope, receive, send)
+
+    async def _serve(
+        self, scope: Scope, receive: Receive, send: Send, member: Member | None, host: str
+    ) -> None:
+        """Hand it to the app, with who asks."""
+        address = peer_of(scope).host
+        scope["member"] = replace(member, address=address) if member is not None else None
+        if member is None:
+            await self._app(scope, receive, _with_headers(scope, host, send))
+            return
+        if scope["type"] == "websocket":
+            await self._doors.sockets.run(self._app, member.id, scope, receive, send)
+            return
+        extended = _with_headers(scope, host, send)
+        if scope["path"] == STOP or _least(scope) in ("anyone", "known"):
+            await self._app(scope, receive, extended)
+            return
+        one = Rechecked(receive, extended, lambda: self._doors.has_still(member))
+        await self._app(scope, one.receive, one.send)
+        if one.ended:
+            await _refuse(SHUT_OUT, scope, receive, extended)
+
+    def _asker(self, member: Member | None, peer: Peer) -> Asker | None:
+        """Whose pool it is; None: the strangers'."""
+        if member is not None:
+            return Asker("member" if member.digest else "program", member.id)
+        if peer.host in LOOPBACK:
+            return Asker("loopback", "")
+        return Asker("address", peer.host) if self._admission.is_known(peer.host, now()) else None
+
+    def _note(self, refusal: Refusal, member: Member | None, address: str, path: str) -> None:
+        name, role = (member.name, member.role) if member is not None else ("", "")
+        status, field, allowed = refusal
+        why = f"{path}: {status} {field}: {allowed}"
+        self._doors.audit.note("refusal", name, role, address, why[:200])
+
+    def _refusal(
+        self, scope: Scope, headers: dict[str, str], member: Member | None
+    ) -> Refusal | None:
+        """Why not, or None for welcome."""
+        host = headers.get("host", "")
+        if PORT.sub("", host).lower() not in self._hosts:
+            return 421, "Host", "an address of this server"
+        bearer = headers.get("authorization", "").lower().startswith("bearer ")
+        changes = _changes(scope)
+        if changes and not bearer and not self._is_own(scope, headers, host):
+            return 403, "Origin", "this server's own pages"
+        least = _least(scope)
+        if least == "anyone":
+            return None
+        if member is None:
+            return 401, "role", "pair first: open the link or scan the QR code"
+        if least == "known":
+            return None
+        if member.state == "waiting":
+            return 403, "pairing", "once a supervisor has confirmed it"
+        if member.state != "in":
+            return 401, "role", f"pair anew: this pairing has ended. {member.why}".strip()
+        return None if is_enough(member.role, least) else (403, "role", least)
+
+    def _is_own(self, scope: Scope, headers: dict[str, str], host: str) -> bool:
+        """A page of another site can neither know our origin nor set our header."""
+        scheme = {"ws": "http", "wss": "https"}.get(scope["scheme"], scope["scheme"])
+        if headers.get("origin") != f"{scheme}://{host}":
+            return False
+        return scope["type"] == "websocket" or "x-lightleash" in headers
+
+
+def _changes(scope: Scope) -> bool:
+    """Whether it may do more than read."""
+    return scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+
+
+def _least(scope: Scope) -> Least:
+    return least_of(scope["path"], is_read=not _changes(scope))
+
+
+async def _refuse(refusal: Refusal, scope: Scope, receive: Receive, send: Send) -> None:
+    status, field, allowed = refusal
+    body = {"code": "role" if status == 401 else "refused", "field": field, "allowed": allowed}
+    response = JSONResponse(body, status)
+    if scope["type"] == "http" or "websocket.http.response" in scope.get("extensions", {}):
+        await response(scope, receive, send)
+    else:
+        await send({"type": "websocket.close", "code": 1008})
+
+
+def _with_headers(scope: Scope, host: str, send: Send) -> Send:
+    if scope["type"] == "websocket":
+        return send
+    # older Safari does not count websockets of the same origin as 'self'
+    scheme = "wss" if scope["scheme"] == "https" else "ws"
+    policy = PAGE_POLICY.replace("connect-src 'self'", f"connect-src 'self' {scheme}://{host}")
+    headers = {"content-security-policy": policy, **HEADERS}
+
+    async def extended(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            present = {name.lower() for name, _ in message["headers"]}
+            extra = [
+                (k.encode(), v.encode()) for k, v in headers.items() if k.encode() not in present
+            ]
+            message = {**message, "headers": [*message["headers"], *extra]}
+        await send(message)
+
+    return extended

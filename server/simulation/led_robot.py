@@ -1,0 +1,106 @@
+"""A robot that is led, in virtual time: hand with its sensors, pipeline, link, simulated robot."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from hardware.follower import ThrustCommand
+from hardware.robot_file import RobotFile
+from hardware.sim.hand import Hand
+from hardware.sim.plant.plant import Plant, PlantOptions
+from hardware.sim.reference_trajectory import Pose
+from hardware.sim.truth import Truth
+from hardware.sim.virtual_time_follower import LockstepFollower
+from pipeline.config import TeleopConfig
+from pipeline.frames import Array
+from pipeline.signals import Mode, Operator, Requests
+from pipeline.teleop import Inputs, Output, Teleop
+from server.control.robot_clock import RobotLink
+from server.simulation.sensor_rig import Rig
+from server.simulation.sensors import Leader
+
+PERIOD_S = 0.005
+
+
+class Led:
+    """It arms itself as soon as it may, with the button held; `advance` moves everything."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        config: TeleopConfig,
+        leader: Leader,
+        hand: Hand,
+        seed: int = 0,
+        options: PlantOptions | None = None,
+    ) -> None:
+        """Everything at rest."""
+        self._rig = Rig(leader, hand, robot_file.robot, config.gates, seed)
+        self._follower = LockstepFollower(robot_file, seed, options=options)
+        self._link = RobotLink(self._follower)
+        self._teleop = Teleop(robot_file.robot, config, PERIOD_S)
+        self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
+        self._mode = Mode.DISARMED
+        self._ready = False
+        self.ended = ""
+        """Why tracking ended, or ""."""
+
+    @property
+    def t(self) -> float:
+        """Virtual time [s]."""
+        return self._follower.t
+
+    @property
+    def plant(self) -> Plant:
+        """The truth."""
+        return self._follower.plant
+
+    @property
+    def body(self) -> Pose:
+        """Where the robot truly is."""
+        return self.plant.R_fb, self.plant.p_bf_in_f
+
+    @property
+    def tracks(self) -> bool:
+        """Whether it follows the hand now."""
+        return self._mode is Mode.TRACK
+
+    def push(self, wrench_in_b: Array) -> None:
+        """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
+        self._teleop.push(wrench_in_b)
+
+    def advance(self) -> Output:
+        """One control period of everything."""
+        before = self.t
+        self._follower.advance(PERIOD_S)
+        now = self.t
+        self._poses.append((now, self.plant.wxyz_fb, self.plant.p_bf_in_f))
+        felt, seen = self._rig.arrivals(before, now, self._robot_at)
+        body = self._link.receive(now)
+        held = self._mode in (Mode.ARMED, Mode.TRACK, Mode.COAST)
+        inputs = Inputs(
+            t=now,
+            phone_imu=tuple(felt),
+            body_imu=tuple(body),
+            seen=tuple(seen),
+            operator=Operator(now, held, press=int(held)),
+            requests=Requests(arm=self._ready),
+            gap=self._link.gap,
+            refusals=(self._link.reason,) if self._link.reason else (),
+            fault=self._link.reason if self._mode is not Mode.DISARMED else "",
+        )
+        output = self._teleop.step(inputs)
+        self._mode = output.failsafe.mode
+        self._ready = self._mode is Mode.DISARMED and not output.refusals
+        if self._mode in (Mode.HOLD, Mode.RAMP) and not self.ended:
+            self.ended = output.failsafe.reason
+        self._follower.send(ThrustCommand(output.thrusts, output.armed))
+        offset = self._teleop.estimator.health.time_offset
+        self._rig.learn(output.relative, offset, body)
+        return output
+
+    def _robot_at(self, t: float) -> tuple[Array, Array]:
+        times, wxyz, p = zip(*self._poses, strict=True)
+        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0)).at(t)

@@ -1,0 +1,306 @@
+"""The whole loop in virtual time: simulated robot, virtual phone, records, vision, control.
+
+The same bytes and the same code as live, without sockets, clocks and threads; as fast as the CPU
+allows, and the same for a seed every time.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from hardware.camera_file import find_camera
+from hardware.codec import Encoder
+from hardware.robot_file import RobotFile
+from hardware.sim.hand import make_hand
+from hardware.sim.led_sensor_model import NoisyEye
+from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
+from hardware.sim.reference_trajectory import Pose
+from hardware.sim.render import Look
+from hardware.sim.truth import Truth
+from hardware.sim.virtual_time_follower import LockstepFollower
+from pipeline.camera.extrinsics import SQUARE, Mounting
+from pipeline.config import TeleopConfig
+from pipeline.frames import Array
+from pipeline.signals import BodyImu, Operator, PhoneImu, Seen
+from pipeline.teleop import Output
+from server.control.controller import PERIOD_S, Controller, never_too_late
+from server.control.ipc import (
+    Input,
+    OperatorInput,
+    PhoneImuInput,
+    ReadyInput,
+    RequestInput,
+    is_believable,
+)
+from server.control.ipc_vision import SeenInput
+from server.control.process import too_late
+from server.control.robot_clock import RobotLink
+from server.phone.frame_pipeline import Sight
+from server.phone.ingest import EncodedFrame, Ingest
+from server.protocol.wire import WireError, decode, encode
+from server.protocol.wire_records import Ping, Record, Touch
+from server.simulation.line import Kind, Transit
+from server.simulation.trace import Judge, Trace
+from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
+
+EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}
+NETWORK_TICKS = 2
+"""10 ms one way for what is small."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is simulated."""
+
+    hand: str = "steady"
+    seed: int = 0
+    latency_s: tuple[float, float] = (0.060, 0.120)
+    """Of a picture, from capture to arrival."""
+    frame_rate_hz: float = 30.0
+    width: int = 1280
+    height: int = 720
+    gains: str = ""
+    """Name of the gain set, if arming is to be refused where its margins say so."""
+    codec: str = "h264"
+    bitrate_bps: int = 3_000_000
+    readout_s: float = 0.0
+    """Of the rolling shutter."""
+    mounting: Mounting = SQUARE
+    """How the camera sits beside the phone's motion sensors ..."""
+    knows_mounting: bool = True
+    """... and whether the camera's file says it."""
+    hidden: tuple[tuple[float, float, tuple[int, ...]], ...] = ()
+    """From when to when [s] which LEDs can't be seen."""
+    led_noise_px: float | None = None
+    """None: pictures are rendered and looked at; else LEDs' rays come with this noise instead."""
+
+    def hidden_at(self, t: float) -> tuple[int, ...]:
+        """LEDs that can't be seen at `t` [s]."""
+        covered = (leds for since, until, leds in self.hidden if since <= t < until)
+        return tuple(sorted({led for leds in covered for led in leds}))
+
+
+class Lockstep:
+    """One flight. `advance` moves everything by one control period."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        config: TeleopConfig,
+        scene: Scene,
+        operator: VirtualOperator | None = None,
+    ) -> None:
+        """Everything at rest at time 0; the phone is held by the usual `operator` or another."""
+        self.scene = scene
+        self.follower = LockstepFollower(robot_file, scene.seed)
+        late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
+        self.controller = Controller(robot_file.robot, config, too_late=late)
+        self._judge = Judge(config.virtual_camera, robot_file.robot.axes, PERIOD_S)
+        self.trace = self._judge.trace
+        self.lost: set[str] = set()
+        """What of the phone does not arrive now: motion, picture, touch."""
+        self.transit = Transit()
+        """Between phone and server, beyond the usual delays."""
+        self.control_every = 1
+        """Ticks from one of control's to the next; 0: it stands still."""
+        self.tamper: Callable[[list[Input]], list[Input]] = list
+        """What becomes of what the server tells control."""
+        self._script = make_script(robot_file, scene, operator)
+        nonces = np.random.default_rng((scene.seed, 7))
+        self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
+        camera = self._script.phone.camera
+        camera = camera if scene.knows_mounting else replace(camera, mounting=SQUARE)
+        self._ingest.mounting = camera.mounting
+        self._sight = Sight(camera, robot_file.robot, config.gates)
+        self._eye = make_eye(robot_file, scene, self._script)
+        self._link = RobotLink(self.follower)
+        self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
+        self._on_their_way: deque[tuple[int, Record]] = deque()
+        self._inbox: list[Input] = []
+        self._output: Output | None = None
+        self._ticks = 0
+
+    @property
+    def t(self) -> float:
+        """Virtual time [s]."""
+        return self.follower.t
+
+    @property
+    def phone(self) -> VirtualPhone:
+        """What the person holds."""
+        return self._script.phone
+
+    def truth(self) -> tuple[Pose, Pose]:
+        """Poses of camera and body in f."""
+        plant = self.follower.plant
+        return self._script.phone.hand.pose(self.t), (plant.R_fb, plant.p_bf_in_f)
+
+    def run(self, seconds: float) -> Trace:
+        """Fly until `seconds`, or until tracking ends."""
+        while self.t < seconds and not self.trace.left:
+            self.advance()
+        return self.trace
+
+    def wish(self, what: str) -> None:
+        """A supervisor's wish."""
+        self._inbox.append(RequestInput(what))
+
+    def advance(self) -> Output:
+        """One control period of everything."""
+        t_before = self.t
+        self.follower.advance(PERIOD_S)
+        self._ticks += 1
+        plant = self.follower.plant
+        self._poses.append((self.t, plant.wxyz_fb, plant.p_bf_in_f))
+        self._hear_phone(t_before)
+        self._hear_small_talk()
+        due = self.control_every > 0 and self._ticks % self.control_every == 0
+        if due or self._output is None:
+            self._output = self._control()
+        hand, body = self.truth()
+        self._judge.look(self.t, body, hand, self._output)
+        return self._output
+
+    def _control(self) -> Output:
+        """What the control process does in a tick, and what its status leads to."""
+        inbox, self._inbox = list(filter(is_believable, self.tamper(self._inbox))), []
+        felt = self._link.receive(self.t)
+        command, output = self.controller.tick(
+            self.t, inbox, felt, self._link.reason, self._link.gap, self._link.left_s
+        )
+        if self._ticks % EVERY_TICKS["status"] == 0:
+            self._sight.expect(self.controller.expected(output))
+        self.follower.send(command)
+        self._feel(*felt)
+        wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
+        if wish is not None:
+            self._inbox.append(RequestInput(wish.what))
+        return output
+
+    def _robot_at(self, t: float) -> tuple[Array, Array]:
+        times, wxyz, p = zip(*self._poses, strict=True)
+        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0)).at(t)
+
+    def _hear_phone(self, t_before: float) -> None:
+        """Sensors and pictures that arrive within this period."""
+        for event in self._script.phone.events(t_before, self.t):
+            if event.t_capture < PERIOD_S or event.kind.value in self.lost:
+                continue
+            if event.kind == EventKind.MOTION:
+                motion = self._script.motion(event.t_capture)
+                self.transit.send(self.t, "motion", partial(self._take, motion))
+            elif self._eye is not None:
+                self._glimpse(self._eye, event.t_capture)
+            else:
+                key = self._sight.needs_key
+                picture = self._script.picture(event.t_capture, self._robot_at, key)
+                self.transit.send(self.t, "picture", partial(self._take, picture))
+        self.transit.deliver(self.t)
+
+    def _hear_small_talk(self) -> None:
+        """PING there and PONG back, TOUCH, and the server's readiness, each at its rate."""
+        if self._ticks % EVERY_TICKS["ping"] == 0:
+            self._send_later(self._ingest.ping(self.t))
+        if self._ticks % EVERY_TICKS["touch"] == 0:
+            self._send_later(self._script.touch(self.t))
+        if self._ticks % EVERY_TICKS["ready"] == 0:
+            clock = [] if self._ingest.clock.ready else ["The phone's clock is not known yet."]
+            self._inbox.append(ReadyInput(clock))
+        while self._on_their_way and self._on_their_way[0][0] <= self._ticks:
+            _, record = self._on_their_way.popleft()
+            if isinstance(record.body, Ping):
+                self.transit.send(self.t, "ping", partial(self._answer, record.body, record.t_us))
+            elif "touch" not in self.lost:
+                kind: Kind = "touch" if isinstance(record.body, Touch) else "pong"
+                self.transit.send(self.t, kind, partial(self._take, record))
+        self.transit.deliver(self.t)
+
+    def _answer(self, ping: Ping, t_us: int) -> None:
+        """The page answers at once."""
+        self._send_later(self._script.pong(ping.nonce, t_us, self.t))
+
+    def _send_later(self, record: Record) -> None:
+        self._on_their_way.append((self._ticks + NETWORK_TICKS, record))
+
+    def _take(self, record: Record) -> None:
+        """What the server does with a record: the bytes, not the object, go on."""
+        try:
+            signal = self._ingest.record(decode(encode(record)), self.t)
+        except WireError:  # a live server hangs up: of this phone there is no news
+            self.transit.lost += 1
+            return
+        match signal:
+            case PhoneImu() as sample:
+                self._feel(sample)
+                self._inbox.append(PhoneImuInput.of(sample))
+            case Operator() as operator:
+                self._inbox.append(OperatorInput.of(operator))
+            case EncodedFrame() as frame:
+                self._see(frame)
+
+    def _see(self, frame: EncodedFrame) -> None:
+        up_in_b, omega = self.controller.up_in_b, self.controller.omega_bf_in_b
+        sighting = self._sight.see([frame], up_in_b, omega)
+        self.trace.pictures += 1
+        self.trace.leds.append(len(sighting.rays) if sighting is not None else 0)
+        self._tell(sighting.seen(self._sight.camera) if sighting is not None else None)
+
+    def _glimpse(self, eye: NoisyEye, t: float) -> None:
+        """A picture of which only the LEDs' rays exist; dated as others are."""
+        clock, phone = self._ingest.clock, self._script.phone
+        if not clock.ready:
+            return
+        stamp = clock.local(phone.clock.at(t - phone.camera.mounting.time_offset_s))
+        stamp += self._sight.camera.mounting.time_offset_s
+        seen = eye.seen(t, stamp, self._robot_at)
+        self.trace.pictures += 1
+        self.trace.leds.append(len(seen.rays) if seen is not None else 0)
+        self.transit.send(self.t, "picture", partial(self._tell, seen))
+
+    def _tell(self, seen: Seen | None) -> None:
+        if seen is not None:
+            self.trace.poses += seen.pose is not None
+            self._inbox.append(SeenInput.of(seen))
+
+    def _feel(self, *samples: PhoneImu | BodyImu) -> None:
+        """Motion samples, for whoever looks."""
+        for sample in samples:
+            if self._eye is not None:
+                self._eye.feel(sample)
+            elif isinstance(sample, PhoneImu):
+                self._sight.feel(sample)
+            else:
+                self._sight.feel_body([sample])
+
+
+def make_eye(robot_file: RobotFile, scene: Scene, script: PhoneScript) -> NoisyEye | None:
+    """What stands for pictures and vision in a scene without them."""
+    if scene.led_noise_px is None:
+        return None
+    rng, leds_in_b = np.random.default_rng((scene.seed, 11)), robot_file.robot.leds_in_b
+    return NoisyEye(script.phone, leds_in_b, scene.led_noise_px, scene.hidden_at, rng)
+
+
+def make_script(
+    robot_file: RobotFile, scene: Scene, operator: VirtualOperator | None = None
+) -> PhoneScript:
+    """The virtual phone of a scene, with its page and its holder."""
+    options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
+    camera = find_camera(DEVICE, scene.width, scene.height)
+    phone = VirtualPhone(
+        replace(camera, readout_s=scene.readout_s, mounting=scene.mounting),
+        make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
+        robot_file.robot.leds_in_b,
+        Look(),
+        np.random.default_rng((scene.seed, 3)),
+        options,
+        hidden=scene.hidden_at,
+    )
+    size = scene.width, scene.height
+    encoder = Encoder(*size, scene.frame_rate_hz, scene.bitrate_bps, scene.codec)
+    return PhoneScript(phone, encoder, operator or VirtualOperator())

@@ -1,0 +1,104 @@
+"""What a leader sees of the robot: spots with noise, or pictures through a codec and vision."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final, Protocol
+
+import numpy as np
+
+from hardware.codec import Encoder
+from hardware.sim.led_sensor_model import NoisyEye
+from hardware.sim.phone import BodyHistory, Event, VirtualPhone
+from pipeline.estimation.gravity_direction import Vertical
+from pipeline.frames import Array
+from pipeline.prediction import Expected
+from pipeline.robot import Robot
+from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
+from pipeline.vision_config import GatesConfig
+from server.common.settings import VideoSettings
+from server.phone.frame_pipeline import Sight
+from server.phone.ingest import EncodedFrame
+from server.protocol.wire_records import Picture
+from server.virtual_phone.phone_script import PhoneScript, VirtualOperator
+
+BITRATE_BPS: Final = VideoSettings().bitrate_bps
+"""What a server asks a phone for."""
+STATUS_PERIODS: Final = 4
+"""Vision hears of control's filter every 20 ms, as in the server."""
+
+
+class Eye(Protocol):
+    """Pictures that arrived, and what vision knows beside them."""
+
+    def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
+        """Follow the motion of both sides."""
+
+    def expect(self, relative: RelativeState | None, time_offset: float) -> None:
+        """Follow what control's filter says at the end of a period."""
+
+    def see(self, pictures: Sequence[Event], body: BodyHistory) -> Seen | None:
+        """What the newest of `pictures`, in order and not none, says of the robot."""
+
+
+class SpotsEye:
+    """Nothing is rendered, searched or named wrongly, and each picture's time is known."""
+
+    def __init__(
+        self, phone: VirtualPhone, leds_in_b: Array, noise_px: float, rng: np.random.Generator
+    ) -> None:
+        """LEDs (n, 3) [m]; `noise_px` as in `NoisyEye`."""
+        self._eye = NoisyEye(phone, leds_in_b, noise_px, lambda t: (), rng)
+
+    def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
+        """It needs no help."""
+
+    def expect(self, relative: RelativeState | None, time_offset: float) -> None:
+        """It needs no help."""
+
+    def see(self, pictures: Sequence[Event], body: BodyHistory) -> Seen | None:
+        """What the newest says; the others are passed over."""
+        t = pictures[-1].t_capture
+        return self._eye.seen(t, t, body)
+
+
+class PicturesEye:
+    """Pictures are rendered, encoded, decoded and looked at, as a phone and a server do."""
+
+    def __init__(self, phone: VirtualPhone, codec: str, robot: Robot, gates: GatesConfig) -> None:
+        """`codec` is one of `hardware.codec.CODECS`."""
+        camera, rate_hz = phone.camera, phone.options.frame_rate_hz
+        encoder = Encoder(camera.width, camera.height, rate_hz, BITRATE_BPS, codec)
+        self._script = PhoneScript(phone, encoder, VirtualOperator())
+        self._sight = Sight(camera, robot, gates)
+        self._vertical, self._omega_bf_in_b = Vertical(), np.zeros(3)
+        self._periods = 0
+
+    def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
+        """Follow the motion of both sides."""
+        for sample in samples:
+            if isinstance(sample, PhoneImu):
+                self._sight.feel(sample)
+            else:
+                self._sight.feel_body((sample,))
+                self._vertical.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+
+    def expect(self, relative: RelativeState | None, time_offset: float) -> None:
+        """Follow what control's filter says at the end of a period."""
+        self._periods += 1
+        if relative is not None:
+            self._omega_bf_in_b = relative.omega_bf_in_b
+        if self._periods % STATUS_PERIODS == 0:
+            said = Expected.of(relative, time_offset) if relative is not None else None
+            self._sight.expect(said)
+
+    def see(self, pictures: Sequence[Event], body: BodyHistory) -> Seen | None:
+        """What the newest says; all are decoded, as each needs the one before it."""
+        frames = [self._frame(event, body) for event in pictures]
+        sighting = self._sight.see(frames, self._vertical.up, self._omega_bf_in_b)
+        return sighting.seen(self._sight.camera) if sighting is not None else None
+
+    def _frame(self, event: Event, body: BodyHistory) -> EncodedFrame:
+        record = self._script.picture(event.t_capture, body, self._sight.needs_key)
+        assert isinstance(record.body, Picture)
+        return EncodedFrame(event.t_capture, event.t_deliver, record.sequence, record.body)

@@ -1,0 +1,1 @@
+"""Commands for users: calibrate, doctor, led_layout, locate, survey, tune."""

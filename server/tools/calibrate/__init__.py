@@ -1,0 +1,1 @@
+"""`lightleash calibrate`: a camera file from a film of a board."""

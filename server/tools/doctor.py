@@ -1,0 +1,180 @@
+"""`lightleash doctor`: what this machine can do, and what to do about what it can't."""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import queue
+import socket
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from server.common.access import PhoneClientError, access_of, add_access_arguments
+from server.common.options import Parser
+from server.common.settings import state_directory
+from server.diagnostics.link_check import LEAST_S
+from server.diagnostics.link_log import KEPT_S
+from server.tools.doctor_phone import examine
+
+GOOD, POOR, BAD = "ok", "!!", "XX"
+LATE_MS = 5.0
+"""p99.9 above it: the loop does not hold 200 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing looked at."""
+
+    grade: str
+    what: str
+    found: str
+    advice: str = ""
+
+
+def _jitter(seconds: float, results: multiprocessing.Queue[tuple[str, dict[str, float]]]) -> None:
+    """In a process of its own, as the control loop is."""
+    from server.control.realtime import Schedule, claim
+
+    granted = claim()
+    schedule = Schedule(0.005, window=round(seconds / 0.005))
+    for _ in range(round(seconds / 0.005)):
+        schedule.wait()
+    results.put((granted, schedule.lateness_ms()))
+
+
+def realtime(seconds: float) -> Iterator[Finding]:
+    """Scheduling class, and how well 200 Hz is held."""
+    context = multiprocessing.get_context("spawn")
+    results: multiprocessing.Queue[tuple[str, dict[str, float]]] = context.Queue()
+    process = context.Process(target=_jitter, args=(seconds, results))
+    process.start()
+    try:
+        granted, late = results.get(timeout=seconds + 30.0)
+    except queue.Empty:
+        yield Finding(BAD, "real time", "the test did not end", "see the messages above")
+        return
+    finally:
+        process.join(1.0)
+    fifo = granted.startswith("SCHED_FIFO")
+    advice = "give CAP_SYS_NICE (deploy/lightleash.service does), else only fly in simulation"
+    yield Finding(GOOD if fifo else POOR, "real time", granted, "" if fifo else advice)
+    text = ", ".join(f"{name} {value:g}" for name, value in late.items())
+    held = late["p999"] <= LATE_MS
+    advice = (
+        ""
+        if held
+        else f"1 tick in 1000 is over {LATE_MS:g} ms late and the robot feels it: close "
+        "other programs; on a laptop, plug in the charger"
+    )
+    yield Finding(
+        GOOD if held else POOR, f"200 Hz for {seconds:g} s", f"late by ms: {text}", advice
+    )
+
+
+def certificates() -> Iterator[Finding]:
+    """What phones will be shown."""
+    from server.security.tls import certificate, own_addresses
+
+    try:
+        made = certificate(state_directory())
+    except OSError as error:
+        yield Finding(BAD, "certificate", str(error), "make the state directory writable")
+        return
+    addresses = ", ".join(own_addresses())
+    yield Finding(GOOD, "certificate", f"{made.cert} for {addresses}", "install /ca.crt on phones")
+
+
+def ports(numbers: Sequence[int]) -> Iterator[Finding]:
+    """Whether the default ports are free."""
+    for number in numbers:
+        with socket.socket() as probe:
+            try:
+                probe.bind(("0.0.0.0", number))
+                yield Finding(GOOD, f"port {number}", "free")
+            except OSError as error:
+                advice = "stop what uses it, or choose another with --https-port, --http-port"
+                yield Finding(POOR, f"port {number}", str(error), advice)
+
+
+def codecs() -> Iterator[Finding]:
+    """Every codec, there and back."""
+    import numpy as np
+
+    from hardware.codec import CODECS, DecodeError, Decoder, Encoder
+
+    luma = np.full((240, 320), 40, dtype=np.uint8)
+    luma[100:110, 200:210] = 250
+    for name in CODECS:
+        try:
+            data, _ = Encoder(320, 240, 30.0, 1_000_000, name).encode(luma, key=True)
+            brightest = Decoder(name, 320, 240).decode(data).argmax()
+            good = 100 <= brightest // 320 < 110
+            yield Finding(GOOD if good else BAD, f"codec {name}", f"{len(data)} bytes a picture")
+        except (DecodeError, OSError, ValueError) as error:
+            yield Finding(BAD, f"codec {name}", str(error), "install the locked requirements")
+
+
+def machine() -> Iterator[Finding]:
+    """Processors and libraries."""
+    import av
+    import cv2
+
+    cores = os.cpu_count() or 1
+    advice = "" if cores > 1 else "video and control will fight for the one core"
+    yield Finding(GOOD if cores > 1 else POOR, "processors", str(cores), advice)
+    yield Finding(GOOD, "libraries", f"OpenCV {cv2.__version__}, PyAV {av.__version__}")
+
+
+def cameras() -> Iterator[Finding]:
+    """Whose calibrations are known."""
+    from hardware.camera_file import CAMERAS, CameraFileError, load_camera
+
+    for path in sorted(Path(CAMERAS).glob("*.yaml")):
+        try:
+            name, camera = load_camera(path)
+            yield Finding(GOOD, "calibration", f"{name} {camera.width}x{camera.height}")
+        except CameraFileError as error:
+            yield Finding(BAD, "calibration", str(error), "mend the file")
+
+
+def _phone(parser: Parser, arguments: argparse.Namespace) -> int:
+    seconds = KEPT_S if arguments.seconds is None else arguments.seconds
+    if not LEAST_S <= seconds <= KEPT_S:
+        parser.error(f"--seconds {seconds:g}: allowed with --phone: {LEAST_S:g} to {KEPT_S:g}")
+    try:
+        return examine(access_of(arguments), seconds, print)
+    except PhoneClientError as error:
+        print(f"lightleash doctor: {error}", file=sys.stderr)
+        return 1
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry of `lightleash doctor`: 0 if nothing is broken."""
+    parser = Parser(prog="lightleash doctor", description=__doc__)
+    parser.add_argument("--phone", action="store_true", help="of the running server: its link")
+    parser.add_argument("--seconds", type=float, help="to listen (60), or of the 200 Hz test (3)")
+    add_access_arguments(parser)
+    arguments = parser.parse_args(argv)
+    if arguments.phone:
+        return _phone(parser, arguments)
+    seconds = 3.0 if arguments.seconds is None else arguments.seconds
+    checks: list[Callable[[], Iterator[Finding]]] = [
+        machine,
+        lambda: realtime(seconds),
+        certificates,
+        lambda: ports((8443, 8080)),
+        codecs,
+        cameras,
+    ]
+    broken = False
+    for check in checks:
+        for finding in check():
+            broken = broken or finding.grade == BAD
+            print(f"[{finding.grade}] {finding.what}: {finding.found}")
+            if finding.advice:
+                print(f"     → {finding.advice}")
+    print("Broken: see XX." if broken else "Ready.")
+    return 1 if broken else 0

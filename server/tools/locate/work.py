@@ -1,0 +1,139 @@
+"""The work itself: frames and motion samples through the live pipeline's stages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from time import thread_time
+
+import numpy as np
+
+from pipeline.camera.lens import Camera
+from pipeline.frames import Array
+from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
+from pipeline.vision.detection import Sighting
+from pipeline.vision.imu_buffer import Feeling, Felt
+from pipeline.vision.visual_front_end import Looking
+from pipeline.vision_config import GatesConfig
+from server.common.errors import InputError
+from server.media.frame import Shot
+from server.media.frame_source import Frames
+
+AHEAD_S = 0.2
+"""So much later than a frame, motion samples are known when it is looked at: as live ones are."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What motion sensors recorded: (n, 7) t [s], rate [rad/s], specific force [m/s²]."""
+
+    camera: Array | None = None
+    """In the axes of c."""
+    body: Array | None = None
+    """In the axes of b."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Located:
+    """What came of one frame."""
+
+    shot: Shot
+    sighting: Sighting | None
+    """None: it could not be read."""
+    read_s: float
+    """CPU time of getting the picture [s]."""
+    felt: tuple[Feeling | None, Feeling | None]
+    """What the camera's and the body's sensors said about its time."""
+
+    @property
+    def ups(self) -> tuple[Array | None, Array | None]:
+        """The opposite of gravity in c and in b (3,), as far as known."""
+        camera, body = self.felt
+        return camera.up if camera is not None else None, body.up if body is not None else None
+
+    @property
+    def pose(self) -> RelativePose | None:
+        """If it was found."""
+        return self.sighting.pose if self.sighting is not None else None
+
+    @property
+    def leds(self) -> int | None:
+        """How many were named; None: nobody looked."""
+        if self.sighting is None:
+            return None
+        return len(self.sighting.match.led) if self.sighting.match is not None else 0
+
+    @property
+    def reason(self) -> str:
+        """Why there is no pose; empty if there is."""
+        return self.sighting.reason if self.sighting is not None else self.shot.problem
+
+
+class Locator:
+    """Frames of one camera and one robot, looked at in the order of time."""
+
+    def __init__(self, camera: Camera, leds_in_b: Array, motion: Motion) -> None:
+        """`leds_in_b` (n, 3) [m]."""
+        self.camera = camera
+        self.looking = Looking(camera, leds_in_b, GatesConfig(), thread_time)
+        self.looking.doubts_gravity = True  # told in the end, if it was wrong
+        self._camera_samples = _Samples(motion.camera)
+        self._body_samples = _Samples(motion.body)
+        self._camera_felt, self._body_felt = Felt(), Felt()
+
+    def locate(self, frames: Frames) -> Iterator[Located]:
+        """One after the other.
+
+        Raises:
+            InputError: a frame of another size, or what `frames` raises.
+        """
+        started = thread_time()
+        for shot in frames:
+            read_s = thread_time() - started
+            yield self._located(shot, read_s)
+            started = thread_time()
+
+    def _located(self, shot: Shot, read_s: float) -> Located:
+        self._feel(shot.t)
+        t = shot.t + self.looking.offset_s
+        body = self._body_felt.at(t)
+        felt = (self._camera_felt.at(t), body)
+        if shot.luma is None:
+            return Located(shot, None, read_s, felt)
+        self._check_size(shot.name, shot.luma.shape)
+        frame = Frame(shot.t, shot.luma, shot.full_range)
+        up_in_b, omega_bf_in_b = (body.up, body.omega) if body is not None else (None, None)
+        return Located(shot, self.looking.look(frame, up_in_b, omega_bf_in_b), read_s, felt)
+
+    def _feel(self, t: float) -> None:
+        """All that was felt up to a little after `t` [s]: the frames' clock may differ by that."""
+        for row in self._camera_samples.until(t + AHEAD_S):
+            self._camera_felt.add(row[0], row[1:4], row[4:])
+            self.looking.feel(PhoneImu(float(row[0]), row[1:4], row[4:]))
+        for row in self._body_samples.until(t + AHEAD_S):
+            self._body_felt.add(row[0], row[1:4], row[4:])
+            self.looking.feel_body([BodyImu(float(row[0]), row[1:4], row[4:])])
+
+    def _check_size(self, name: str, shape: tuple[int, ...]) -> None:
+        camera = self.camera
+        if shape != (camera.height, camera.width):
+            raise InputError(
+                name,
+                "",
+                f"is {shape[1]}x{shape[0]}, but the camera file is for"
+                f" {camera.width}x{camera.height}",
+            )
+
+
+class _Samples:
+    """Rows of a table, taken as time goes by."""
+
+    def __init__(self, table: Array | None) -> None:
+        self._table = table if table is not None else np.zeros((0, 7))
+        self._next = 0
+
+    def until(self, t: float) -> Array:
+        """(n, 7) what was not yet taken up to `t` [s]."""
+        stop = int(np.searchsorted(self._table[:, 0], t, side="right"))
+        rows, self._next = self._table[self._next : stop], max(self._next, stop)
+        return rows

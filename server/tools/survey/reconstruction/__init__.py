@@ -1,0 +1,1 @@
+"""From spots of a film to the places of the LEDs."""

@@ -1,0 +1,1 @@
+"""`lightleash tune`: gains for a measured latency, under stated margins."""

@@ -1,0 +1,70 @@
+"""What a gain set's loops bear and do, axis by axis, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import degrees, inf, log10
+from typing import Final
+
+from hardware.gain_tuning import moved, variants
+from hardware.robot_schema import AXES
+from pipeline.control.margins import Loop, Sensing, axis_margins
+from server.common import text
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One axis before or after; margins are the worse of with and without feed-forward."""
+
+    set: str
+    axis: str
+    Kp: float
+    Ki: float
+    Kd: float
+    gain_db: float
+    """Up or down, whichever is less."""
+    phase_deg: float
+    delay_ms: float
+    bandwidth: float
+    """Highest frequency at which the loop still acts [rad/s]."""
+    moved: float
+    """By 1 N or N m RMS of gusts, feedback alone [mm or °]."""
+
+
+COLUMNS: Final = (
+    ("set", "gains", "{}"),
+    ("axis", "axis", "{}"),
+    ("Kp", "Kp", "{:g}"),
+    ("Ki", "Ki", "{:g}"),
+    ("Kd", "Kd", "{:g}"),
+    ("gain_db", "gain dB", "{:.1f}"),
+    ("phase_deg", "phase °", "{:.0f}"),
+    ("delay_ms", "delay ms", "{:.0f}"),
+    ("bandwidth", "acts to rad/s", "{:.1f}"),
+    ("moved", "mm/N, °/N m", "{:.1f}"),
+)
+
+
+def table(loops: Mapping[str, Loop], axes: Sequence[int], sensing: Sensing) -> str:
+    """A line for each axis of each set."""
+    rows = [_row(name, loop, axis, sensing) for name, loop in loops.items() for axis in axes]
+    return text.table(COLUMNS, rows)
+
+
+def _row(name: str, loop: Loop, axis: int, sensing: Sensing) -> Row:
+    found = [axis_margins(one, axis, sensing) for one in variants(loop)]
+    gains, unit = loop.gains, 1e3 if axis < 3 else degrees(1.0)
+    least = min(min(one.gain_up, 1.0 / one.gain_down if one.gain_down else inf) for one in found)
+    return Row(
+        set=name,
+        axis=AXES[axis],
+        Kp=float(gains.Kp[axis]),
+        Ki=float(gains.Ki[axis]),
+        Kd=float(gains.Kd[axis]),
+        gain_db=20.0 * log10(least),
+        phase_deg=degrees(min(one.phase for one in found)),
+        delay_ms=1e3 * min(one.delay for one in found),
+        bandwidth=max(one.crossover for one in found),
+        moved=unit * moved(loop, axis, sensing),
+    )

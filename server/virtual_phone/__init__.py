@@ -1,0 +1,1 @@
+"""What leads without a phone: scripts, clients, the command."""

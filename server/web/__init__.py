@@ -1,0 +1,1 @@
+"""HTTP and websockets: the pages, the session manager, the status."""

@@ -1,0 +1,92 @@
+"""Prometheus: what a supervisor sees, as numbers for machines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import radians
+
+from prometheus_client import CollectorRegistry, Gauge, generate_latest
+
+from pipeline.signals import Mode
+from server.protocol.messages import Estimate, Status
+from server.web.session_manager import Hub
+from server.web.status import build
+
+
+def exposition(hub: Hub) -> bytes:
+    """The present status in Prometheus' text format."""
+    registry, status = CollectorRegistry(), build(hub)
+    mode = Gauge("lightleash_mode", "1 for the present mode", ["mode"], registry=registry)
+    for name in (*Mode.__members__, "LOST"):
+        mode.labels(name).set(name == status.mode)
+    age = Gauge(
+        "lightleash_stream_age_seconds", "of the newest item", ["stream"], registry=registry
+    )
+    rate = Gauge("lightleash_stream_rate_hertz", "items a second", ["stream"], registry=registry)
+    lost = Gauge("lightleash_stream_dropped", "items dropped", ["stream"], registry=registry)
+    for name, stream in status.streams.items():
+        if stream.age_ms is not None:
+            age.labels(name).set(1e-3 * stream.age_ms)
+        rate.labels(name).set(stream.rate_hz)
+        lost.labels(name).set(stream.dropped)
+    latency = Gauge("lightleash_latency_seconds", "by stage", ["stage"], registry=registry)
+    for name, ms in status.latency_ms.items():
+        latency.labels(name).set(1e-3 * ms)
+    control = Gauge(
+        "lightleash_control", "lateness [ms] and missed ticks", ["figure"], registry=registry
+    )
+    for name, value in status.control.items():
+        control.labels(name).set(value)
+    pauses = Gauge(
+        "lightleash_server", "longest pauses [ms], full collections", ["figure"], registry=registry
+    )
+    for name, value in status.server.items():
+        pauses.labels(name).set(value)
+    if status.error_mm is not None:
+        error = Gauge("lightleash_error_metres", "from the reference", registry=registry)
+        error.set(1e-3 * status.error_mm)
+    if status.estimate is not None:
+        _estimate(status.estimate, status, registry)
+    return generate_latest(registry)
+
+
+def _estimate(told: Estimate, status: Status, registry: CollectorRegistry) -> None:
+    """What the estimator says of itself; what it doesn't know is left out."""
+    complains = Gauge(
+        "lightleash_estimator_complains", "1: don't fly on it", ["estimator"], registry=registry
+    )
+    complains.labels(told.name).set(told.complaint != "")
+    for name, words, value, unit in _estimate_figures(told, status):
+        if value is not None:
+            Gauge(f"lightleash_estimate_{name}", words, registry=registry).set(unit * value)
+    pictures = Gauge(
+        "lightleash_estimate_pictures", "late ones are dropped ones", ["fate"], registry=registry
+    )
+    for fate in ("fused", "dropped", "late"):
+        pictures.labels(fate).set(getattr(told, fate))
+    bias = Gauge(
+        "lightleash_estimate_bias", "[rad/s] or [m/s²]", ["sensor", "axis"], registry=registry
+    )
+    for sensor, values, unit in (
+        ("body_gyroscope", told.bias_body_deg_s, radians(1.0)),
+        ("body_accelerometer", told.bias_body_m_s2, 1.0),
+        ("phone_gyroscope", told.bias_phone_deg_s, radians(1.0)),
+        ("phone_accelerometer", told.bias_phone_m_s2, 1.0),
+    ):
+        for axis, value in zip("xyz", values or (), strict=False):
+            bias.labels(sensor, axis).set(unit * value)
+
+
+def _estimate_figures(
+    told: Estimate, status: Status
+) -> Iterable[tuple[str, str, float | None, float]]:
+    """(name, words, value, its unit in SI) of each figure without labels."""
+    return (
+        ("nis", "innovation squared per degree of freedom; 1 is honest", told.nis, 1.0),
+        ("age_seconds", "of the last fused picture", told.age_ms, 1e-3),
+        ("leds_rejected", "single LEDs beyond their gate", told.leds_rejected, 1.0),
+        ("time_offset_seconds", "of the pictures' stamps", told.time_offset_ms, 1e-3),
+        ("time_offset_sigma_seconds", "its sigma", told.time_offset_sigma_ms, 1e-3),
+        ("sigma_metres", "of the position", status.sigma_mm, 1e-3),
+        ("sigma_radians", "of the attitude", told.sigma_deg, radians(1.0)),
+    )

@@ -1,0 +1,318 @@
+"""Where all meets: the operator's phone, pages that watch, control, recordings, events."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec.structs import asdict
+
+from hardware.codec import Decoder
+from pipeline.robot import Robot
+from pipeline.signals import Mode
+from server.common.clock import now
+from server.common.runtime_parameters import TuneInput
+from server.control.ipc import ControlStatus, Input, ReadyInput, RequestInput, server_end
+from server.diagnostics.blame import Blame
+from server.diagnostics.events import Events
+from server.diagnostics.meter import Meter
+from server.diagnostics.pauses import Pauses
+from server.media.decoding import Decoding
+from server.phone.calibration_control import Desk
+from server.phone.client_connection import Page
+from server.phone.phone_session import OperatorPhone
+from server.phone.transports import FastPath, PhonePaths
+from server.phone.vision_thread import Picture, jpeg
+from server.protocol.calibration_messages import Calibrate
+from server.protocol.messages import Command, Hello, Status, ToPage, Tune, encode_message
+from server.protocol.people_messages import Deed
+from server.protocol.wire import encode
+from server.protocol.wire_records import Record, Thumbnail
+from server.recording.control import Recordings
+from server.security.pairings import Member, of_this_machine
+from server.security.security import Doors
+from server.web.handover import Handover
+from server.web.people import People
+from server.web.status import build
+
+log = logging.getLogger("lightleash")
+
+INSIST_S, INSISTS = 0.01, 100
+"""How often and how many times a STOP is sent to a control process that can't take it."""
+TICK_S = 0.1
+AT_REST = ("DISARMED", "STOPPED", "LOST")
+GROUNDED = (Mode.DISARMED, Mode.ARMED, Mode.STOPPED)
+PROGRAM = of_this_machine("operator")
+
+
+class Hub:
+    """One robot, at most one operator, any number of supervisors."""
+
+    def __init__(
+        self,
+        runtime: Path,
+        robot: Robot,
+        cameras: list[Path],
+        recordings: Recordings,
+        profiles: Path | None = None,
+        doors: Doors | None = None,
+        decoding: Decoding | None = None,
+    ) -> None:
+        """Listens to control in `runtime`; `profiles` is where new calibrations go.
+
+        Without `decoding` pictures are decoded in this process.
+        """
+        self.robot, self.recordings = robot, recordings
+        self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
+        self.paths = PhonePaths(lambda data: recordings.record("server", data, now()))
+        self._desk = Desk(self.paths.tell)
+        self._control = server_end(runtime)
+        self.people = People(doors or Doors(), self._keep_deed)
+        self.handover = Handover(self)
+        self.phone: OperatorPhone | None = None
+        self.supervisors: set[Page] = set()
+        self.status: ControlStatus | None = None
+        self.control_meter = Meter()
+        self._events = Events()
+        self._last_mode = ""
+        self._shown: Status | None = None
+        self.last_thumbnail: Picture | None = None
+        """What the phone saw, for the 3D view."""
+        self.blame = Blame()
+        self.pauses = Pauses(on_stall=self.blame.stalled)
+        self.unready = ""
+        """What the server itself has against arming."""
+
+    async def run(self) -> None:
+        """Serve until cancelled."""
+        loop = asyncio.get_running_loop()
+        loop.add_reader(self._control.fileno(), self._hear_control)
+        watching = asyncio.create_task(self.pauses.watch())
+        try:
+            while True:
+                await asyncio.sleep(TICK_S)
+                self._tick()
+                await self.handover.expire()
+        finally:
+            watching.cancel()
+            self.pauses.close()
+            loop.remove_reader(self._control.fileno())
+            if self.phone is not None:
+                self.phone.close()
+            self.recordings.stop()
+            self._control.close()
+
+    def to_control(self, message: Input) -> None:
+        """Hand something to the control process."""
+        self._control.send(message)
+
+    @property
+    def events(self) -> Sequence[str]:
+        """What people should see, newest first."""
+        return self._events.shown
+
+    def say(self, text: str, of: str = "") -> None:
+        """An event that people should see, and the log keep; see `Events.add`."""
+        if said := self._events.add(text, of, now()):
+            log.info("%s", said)
+
+    def _keep_deed(self, deed: Deed) -> None:
+        self.recordings.message("server", encode_message(deed), now())
+
+    def wish(self, command: Command, who: Member) -> None:
+        """A person's wish, already checked for its role."""
+        if command.what == "key_frame":
+            return
+        lacks = self.status.refusals if command.what == "arm" and self.status is not None else ()
+        self.people.note(command.what, who, f"refused: {'; '.join(lacks)}"[:300] if lacks else "")
+        self.say(said := f"{who.name}: {command.what}", of=said)
+        self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
+
+    def tune(self, wish: Tune) -> None:
+        """A supervisor turns knobs of the virtual camera."""
+        knobs = {name: value for name, value in asdict(wish).items() if value is not None}
+        if not knobs:
+            return
+        told = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
+        if self._control.send(TuneInput(**knobs)):
+            self.say(f"supervisor: {told}", of="virtual camera")
+        else:
+            self.say(f"{told} did not reach the control process: try again.")
+
+    def calibrate(self, wish: Calibrate) -> None:
+        """The operator's phone begins to calibrate its camera, or leaves it; see `Desk.wish`."""
+        if (phone := self.phone) is not None:
+            self._desk.wish(phone, wish, self.status)
+            self.say(f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration")
+
+    def _ask(self, request: RequestInput, insists: int) -> None:
+        """Nobody may be there, or the queue may be full: what stops the robot is said again."""
+        if self._control.send(request):
+            return
+        if insists > 0:
+            asyncio.get_running_loop().call_later(INSIST_S, self._ask, request, insists - 1)
+        else:
+            self.say(f"{request.what} did not reach the control process: try again.")
+
+    def greet(self, hello: Hello, page: Page, who: Member = PROGRAM) -> OperatorPhone | None:
+        """Give the lease to a phone of `who`; None while another one has it, or shall have it.
+
+        A robot that somebody else has left in flight comes down first: None until it has.
+        """
+        current = self.phone
+        silent_s = current.silent_for(now()) if current is not None else None
+        if not self.people.lease.is_free_for(who.id, silent_s, now()):
+            return None
+        if self.is_flying() and self.people.lease.is_of_another(who.id):
+            self.people.note("take-over", who, "the robot comes down first")
+            self.say(f"{who.name} leads once the robot is down.")
+            self.disarm()
+            return None
+        if current is not None:
+            self.people.note("take-over", who, "the phone that led was silent")
+            self.part(current)
+        soon: Callable[..., Any] = asyncio.get_running_loop().call_soon_threadsafe
+        self.phone = OperatorPhone(
+            hello,
+            self.robot,
+            self._cameras,
+            self.to_control,
+            now,
+            on_taken=partial(soon, self.paths.taken),
+            on_key_wanted=partial(soon, self.paths.want_key),
+            profiles=self._profiles,
+            make_decoder=self._decoding.open if self._decoding is not None else Decoder,
+        )
+        self.paths.begin(page)
+        self.recordings.message("phone", encode_message(hello), now())
+        self.disarm()  # never go on with another hand
+        self.people.lease.take(who.id)
+        self.people.note("lead", who, self.phone.device)
+        self.say(f"{who.name} leads: {self.phone.device}.")
+        return self.phone
+
+    def is_flying(self) -> bool:
+        """Whether the robot may be in the air, as far as is known."""
+        return self.status is None or Mode(self.status.mode) not in GROUNDED
+
+    def disarm(self) -> None:
+        """Bring the robot down, whoever leads."""
+        self._ask(RequestInput("disarm"), INSISTS)
+
+    def join_video(self, session: str, page: Page) -> OperatorPhone | None:
+        """The video socket of the phone that has the lease; None for anyone else."""
+        if (phone := self._leading(session)) is not None:
+            self.paths.join_video(page)
+        return phone
+
+    def join_fast(self, session: str, fast: FastPath) -> OperatorPhone | None:
+        """A fast path of the phone that has the lease; None for anyone else."""
+        if (phone := self._leading(session)) is not None:
+            self.paths.use(fast)
+        return phone
+
+    def _leading(self, session: str) -> OperatorPhone | None:
+        return self.phone if self.phone is not None and self.phone.id == session else None
+
+    def part(self, phone: OperatorPhone) -> None:
+        """A phone has gone."""
+        if self.phone is phone:
+            self.phone = None
+            self.paths.close()
+            self.people.note("leave", self.people.named(self.people.lease.holder), phone.device)
+            self.people.lease.free()
+            self.say(f"{phone.device} has left.")
+            phone.close()
+
+    def start_recording(self) -> str:
+        """Begin to record, with what a replay must know of the phone that leads; gives the name.
+
+        Raises:
+            RecordingError: the file can't be made.
+        """
+        phone = self.phone
+        if phone is None:
+            return self.recordings.start()
+        name = self.recordings.start(phone.device, phone.camera_text)
+        self.recordings.message("phone", encode_message(phone.hello), now())
+        self._ask_key()
+        return name
+
+    def record(self, data: str | bytes, t: float) -> None:
+        """Keep what the leading phone said, if a recording runs."""
+        if isinstance(data, bytes):
+            self.recordings.record("phone", data, t)
+        else:
+            self.recordings.message("phone", data, t)
+
+    def _ask_key(self) -> None:
+        """Pictures recorded before the next key are of no use."""
+        if self.recordings.key_is_due(now()):
+            self.paths.want_key()
+
+    def ping(self) -> None:
+        """Ask the phone for a sign of life."""
+        if self.phone is not None:
+            self.paths.ping(encode(self.phone.ping(now())))
+
+    def _hear_control(self) -> None:
+        for status in self._control.statuses():
+            self.status = status
+            self.control_meter.tick(now(), status.t)
+            self.recordings.status(status, now())
+            if self.phone is not None:
+                self.phone.know(status)
+
+    def refusals(self) -> list[str]:
+        """What the server has against arming."""
+        if self.unready:
+            return [self.unready]
+        if self.phone is None:
+            return ["No phone is connected: scan the code, or start the virtual phone."]
+        return self.phone.refusals(now())
+
+    def _tick(self) -> None:
+        self.to_control(ReadyInput(self.refusals()))
+        self.handover.make_room(now())
+        for said in self._events.count_up(now()):
+            log.info("%s", said)
+        status = build(self)
+        if status.mode != self._last_mode:
+            self.say(f"{status.mode}: {status.reason}")
+            self.people.note("mode", why=f"{status.mode}: {status.reason}")
+            self._last_mode = status.mode
+        self._shown = status
+        if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
+            self.say(paused)
+        if self._decoding is not None and (ended := self._decoding.news(now())):
+            self.say(ended)
+        self.broadcast(status)
+        self._show_picture()
+        self._ask_key()
+        self._desk.tell(self.phone, self.status)
+
+    def broadcast(self, message: ToPage) -> None:
+        """To every page."""
+        text = encode_message(message)
+        self.recordings.message("server", text, now())
+        for page in self.supervisors:
+            page.push(text)
+        self.paths.tell(text)
+
+    def _show_picture(self) -> None:
+        picture = self.phone.thumbnail(bool(self.supervisors)) if self.phone is not None else None
+        if picture is None:
+            return
+        self.last_thumbnail = picture
+        data = encode(Record(0, int(1e6 * now()), Thumbnail(jpeg(picture))))
+        for page in self.supervisors:
+            page.push(data)
+
+    def snapshot(self) -> bytes:
+        """The last status as JSON, for people with a terminal."""
+        return msgspec.json.encode(self._shown)

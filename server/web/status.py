@@ -1,0 +1,194 @@
+"""The truth about the robot, as every screen shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from math import acos, degrees, isfinite
+from typing import Literal, Protocol, cast
+
+from pipeline.robot import Robot
+from pipeline.signals import Mode
+from server.common.clock import now
+from server.control.ipc import ControlStatus
+from server.diagnostics.blame import Blame, warnings
+from server.diagnostics.camera_health import health
+from server.diagnostics.meter import Meter
+from server.diagnostics.pauses import Pauses
+from server.phone.phone_session import OperatorPhone
+from server.protocol.messages import Estimate, GapCount, Status, Stream, VirtualCamera
+from server.recording.control import Recordings
+from server.security.security import UNSAVED
+from server.web.people import People
+
+LOST_S = 0.3
+"""A control process silent for longer is lost."""
+ModeName = Literal["DISARMED", "ARMED", "TRACK", "COAST", "HOLD", "RAMP", "STOPPED", "LOST"]
+
+
+class Known(Protocol):
+    """What a status is built from: the hub has it."""
+
+    robot: Robot
+    phone: OperatorPhone | None
+    status: ControlStatus | None
+    control_meter: Meter
+    recordings: Recordings
+    pauses: Pauses
+    blame: Blame
+    people: People
+
+    @property
+    def events(self) -> Sequence[str]:
+        """Newest first."""
+
+    @property
+    def supervisors(self) -> Collection[object]:
+        """Pages that watch."""
+
+
+def build(hub: Known) -> Status:
+    """From what the hub knows now."""
+    t, control, phone = now(), hub.status, hub.phone
+    mode, silence = mode_of(hub, t)
+    gaps = hub.blame.gaps(control, t) if control is not None else {}
+    refusals = [f"{silence}."] if control is None or silence else control.refusals
+    sighting = phone.sighting if phone is not None else None
+    found = sighting is not None and sighting.pose is not None
+    return Status(
+        mode=mode,
+        reason=f"{silence}; the robot stops by its own watchdog."
+        if control is None or silence
+        else hub.blame.reason(control, t),
+        ready=not refusals,
+        refusals=list(refusals),
+        robot=hub.robot.name,
+        operator=phone.device if phone is not None else "",
+        video_path=phone.video_path if phone is not None else "",
+        streams=_streams(hub, t),
+        latency_ms=_latency(hub),
+        leds=len(sighting.match.led) if sighting is not None and sighting.match else 0,
+        reprojection_px=_rounded(sighting.pose.reprojection_px, 2)
+        if found and sighting and sighting.pose
+        else None,
+        position_mm=[round(1e3 * x, 1) for x in control.p_bc_in_c]
+        if control is not None and control.p_bc_in_c is not None
+        else None,
+        error_mm=_rounded(control.error_m, 1, 1e3) if control else None,
+        error_deg=_rounded(control.error_rad, 2, degrees(1.0)) if control else None,
+        sigma_mm=_rounded(control.sigma_p, 1, 1e3) if control else None,
+        saturated=control.saturated if control else False,
+        recording=hub.recordings.name,
+        phones=int(phone is not None),
+        supervisors=len(hub.supervisors),
+        realtime=control.realtime if control else "",
+        control=_control(control),
+        messages=list(hub.events),
+        virtual_camera=_virtual_camera(control),
+        estimate=_estimate(control),
+        camera=health(phone.vision.looking)
+        if phone is not None and phone.vision is not None
+        else None,
+        path_choice=phone.path_choice if phone is not None else None,
+        time_ms=int(1e3 * t),
+        until_ramp_ms=_rounded(control.until_ramp_s, 0, 1e3) if control and not silence else None,
+        resumes=control is not None and control.resumes,
+        gaps={side: GapCount(one.count, 1e3 * one.longest_s) for side, one in gaps.items()},
+        warnings=[*warnings(gaps), *([UNSAVED] if hub.people.doors.is_unsaved else [])],
+        server=hub.pauses.figures(),
+        people=hub.people.present(),
+    )
+
+
+def mode_of(hub: Known, t: float) -> tuple[ModeName, str]:
+    """The robot's mode at `t` [s], and why it is LOST, or ""."""
+    control = hub.status
+    silence = _silence(control, hub.control_meter.age(t))
+    if control is None or silence:
+        return "LOST", silence
+    return cast(ModeName, Mode(control.mode).name), ""
+
+
+def _silence(control: ControlStatus | None, age: float) -> str:
+    if control is None:
+        return "The control process is starting, about a minute the first time"
+    return "The control process does not answer" if age > LOST_S else ""
+
+
+def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | None:
+    return None if value is None or not isfinite(value) else round(scale * value, digits)
+
+
+def _virtual_camera(control: ControlStatus | None) -> VirtualCamera | None:
+    if control is None or control.knobs is None:
+        return None
+    phone, virtual = control.R_fc_wxyz, control.R_fv_wxyz
+    lag = None
+    if phone is not None and virtual is not None:
+        lag = 2.0 * acos(min(1.0, abs(sum(a * b for a, b in zip(phone, virtual, strict=True)))))
+    return VirtualCamera(
+        knobs=control.knobs,
+        lag_deg=_rounded(lag, 1, degrees(1.0)),
+        guarding=round(control.guarding, 2),
+    )
+
+
+def _estimate(control: ControlStatus | None) -> Estimate | None:
+    if control is None or control.estimate is None:
+        return None
+    told, deg = control.estimate, degrees(1.0)
+    return Estimate(
+        name=told.name,
+        complaint=told.complaint,
+        nis=_rounded(told.nis, 2),
+        age_ms=_rounded(told.age, 1, 1e3),
+        fused=control.poses_fused,
+        dropped=control.poses_dropped,
+        late=told.late,
+        leds_rejected=told.leds_rejected,
+        time_offset_ms=_rounded(control.time_offset, 2, 1e3),
+        time_offset_sigma_ms=_rounded(told.time_offset_sigma, 2, 1e3),
+        sigma_deg=_rounded(control.sigma_theta, 2, deg),
+        bias_body_deg_s=_each(told.bias_omega_b, 2, deg),
+        bias_body_m_s2=_each(told.bias_a_b, 3),
+        bias_phone_deg_s=_each(told.bias_omega_c, 2, deg),
+        bias_phone_m_s2=_each(told.bias_a_c, 3),
+    )
+
+
+def _each(values: Sequence[float] | None, digits: int, scale: float = 1.0) -> list[float] | None:
+    return None if values is None else [round(scale * value, digits) for value in values]
+
+
+def _control(control: ControlStatus | None) -> dict[str, float]:
+    if control is None:
+        return {}
+    lateness = {f"{name}_ms": value for name, value in control.lateness_ms.items()}
+    missed = lateness.pop("missed_ms", 0.0)
+    return {**lateness, "missed": missed, "step_ms": round(control.step_ms, 3)}
+
+
+def _latency(hub: Known) -> dict[str, float]:
+    stages = dict(hub.phone.latency_ms) if hub.phone is not None else {}
+    if stages and hub.status is not None:
+        stages["to control"] = max(0.0, hub.status.fuse_ms - sum(stages.values()))
+        stages["control"] = hub.status.step_ms
+    return {name: round(max(0.0, ms), 2) for name, ms in stages.items()}
+
+
+def _streams(hub: Known, t: float) -> dict[str, Stream]:
+    streams = {}
+    if hub.phone is not None:
+        streams = {name: meter.stream(t) for name, meter in hub.phone.meters.items()}
+        vision = hub.phone.vision
+        if vision is not None:
+            video = streams["video"]
+            lost = vision.dropped + vision.undecodable
+            streams["video"] = Stream(video.age_ms, video.rate_hz, lost)
+    control = hub.status
+    if control is not None:
+        age = control.body_imu_age + hub.control_meter.age(t)
+        age_ms = round(1e3 * age, 1) if age < 1e6 else None
+        streams["body_imu"] = Stream(age_ms, round(control.body_imu_rate_hz, 1), 0)
+        link = hub.control_meter.stream(t)
+        streams["control"] = Stream(link.age_ms, link.rate_hz, control.inputs_dropped)
+    return streams

@@ -1,0 +1,306 @@
+"""The watchdog in C answers random traffic exactly as the reference in Python does."""
+
+import ctypes
+import json
+import math
+import random
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hardware.follower import FollowerState, Refusal
+from hardware.link.datagram import Command, encode_command
+from hardware.link.link_key import LinkKeyError, mac, read_key
+from hardware.link.robot_end import LinkLimits, RobotEnd
+from hardware.robot_file import load_robot
+from tests.hardware.test_attitude_keeper import asymmetric, turned
+
+SOURCE = Path(__file__).parents[3] / "deploy" / "watchdog"
+KEY = bytes(range(16))
+VECTORS = json.loads((Path(__file__).parents[2] / "data" / "link_vectors.json").read_text())
+IDLE, RUNNING, RAMP, _, COAST = FollowerState
+LIMITS = LinkLimits(thrusters=3, f_max=3.0, max_rise=1.0, ramp_us=700_000)
+NAMES = ("watchdog.c", "attitude.c", "hmac.c")
+GCC = ("gcc", "-std=c99", "-pedantic", "-O2", "-Wall", "-Wextra", "-Werror", "-Wconversion")
+
+
+class CGains(ctypes.Structure):
+    _fields_ = (
+        ("lift_row", ctypes.c_double * 16),
+        ("lift_column", ctypes.c_double * 16),
+        ("gain", ctypes.c_double * 6 * 16),
+    )
+
+    @classmethod
+    def of(cls, gains):
+        c = cls()
+        for i in range(len(gains.lift_row)):
+            c.lift_row[i], c.lift_column[i] = gains.lift_row[i], gains.lift_column[i]
+            c.gain[i][:] = gains.gain[i]
+        return c
+
+
+class CLimits(ctypes.Structure):
+    _fields_ = (
+        ("thrusters", ctypes.c_uint8),
+        ("f_max", ctypes.c_double),
+        ("max_rise", ctypes.c_double),
+        ("ramp_us", ctypes.c_int64),
+        ("attitude", ctypes.POINTER(CGains)),
+    )
+
+
+class CRobotEnd:
+    """`ll_watchdog` with the methods of `RobotEnd`."""
+
+    def __init__(self, library, limits, boot_id, key=KEY):
+        self.library = library
+        self.memory = ctypes.create_string_buffer(4096)
+        self.thrusters = limits.thrusters
+        c_limits = CLimits(limits.thrusters, limits.f_max, limits.max_rise, limits.ramp_us)
+        if limits.attitude is not None:
+            self.gains = CGains.of(limits.attitude)
+            c_limits.attitude = ctypes.pointer(self.gains)
+        self.started = library.ll_init(
+            self.memory, ctypes.byref(c_limits), ctypes.c_uint32(boot_id), key
+        )
+        self.answers = False
+
+    def receive(self, data, _peer, now_us):
+        size, now = ctypes.c_size_t(len(data)), ctypes.c_int64(now_us)
+        answer = ctypes.c_bool()
+        why = self.library.ll_receive(self.memory, data, size, now, ctypes.byref(answer))
+        self.answers = answer.value
+        return Refusal(why)
+
+    def setpoint(self, now_us):
+        thrusts = (ctypes.c_float * 16)()
+        self.library.ll_setpoint(self.memory, ctypes.c_int64(now_us), thrusts)
+        return np.array(thrusts[: self.thrusters])
+
+    def sample(self, now_us, nonce, omega, a, thrusts):
+        out = ctypes.create_string_buffer(156)
+        size = self.library.ll_sample(
+            self.memory,
+            ctypes.c_int64(now_us),
+            ctypes.c_uint64(nonce),
+            (ctypes.c_float * 3)(*omega),
+            (ctypes.c_float * 3)(*a),
+            (ctypes.c_float * 16)(*thrusts),
+            out,
+        )
+        return out.raw[:size]
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    if shutil.which("gcc") is None:
+        pytest.skip("NO COMPILER, not tested: gcc is not installed")
+    path = tmp_path_factory.mktemp("watchdog") / "watchdog.so"
+    sources = (*(str(SOURCE / name) for name in NAMES), "-shared", "-fPIC", "-o", str(path), "-lm")
+    subprocess.run((*GCC, *sources), check=True)
+    library = ctypes.CDLL(str(path))
+    library.ll_sample.restype = ctypes.c_size_t
+    library.ll_init.restype = ctypes.c_bool
+    return library
+
+
+class Traffic:
+    """Control processes that mostly behave, drawn from a seed."""
+
+    def __init__(self, seed, thrusters):
+        self.thrusters = thrusters
+        self.random = random.Random(seed)
+        self.epoch = self.random.choice((1, 2**40, 2**63))
+        self.counter = self.random.choice((0, 2**32 - 100))
+        self.sent = [b""]
+
+    def often(self, share):
+        return self.random.random() < share
+
+    def step_us(self):
+        if self.often(0.985):
+            return 5000
+        return self.random.choice(HOLES_US)
+
+    def datagram(self, state, nonce):
+        rnd = self.random
+        if self.often(0.02):
+            return rnd.choice((rnd.choice(self.sent), rnd.randbytes(64), self.sent[-1][:-1], b""))
+        if self.often(0.02 if state == FollowerState.REFUSING else 0.004):
+            self.epoch = max(1, self.epoch + rnd.choice((1, 1, 1, -1, 1000)))
+        self.counter = (
+            self.counter + (1 if self.often(0.98) else rnd.choice((0, 2, 200, 201, -3)))
+        ) % 2**32
+        thrusting = state != FollowerState.REFUSING and self.often(0.98)
+        thrusts = [rnd.uniform(0.0, 1.9) if thrusting else 0.0] * self.thrusters
+        if self.often(0.01):
+            thrusts[1] = rnd.choice((float("nan"), float("inf"), -1.0, 3.5, 3.0, -0.0))
+        command = Command(
+            epoch=self.epoch,
+            counter=self.counter,
+            nonce=nonce if self.often(0.99) else rnd.choice((0, max(1, nonce - 12))),
+            challenge=rnd.getrandbits(64),
+            armed=any(thrusts) if self.often(0.99) else False,
+            thrusts=tuple(thrusts if self.often(0.995) else thrusts[:2]),
+            stop=self.often(0.01),
+        )
+        key = KEY if self.often(0.995) else rnd.randbytes(16)
+        self.sent.append(encode_command(command, key))
+        return self.sent[-1]
+
+
+HOLES_US = (*range(0, 450_000, 50_000), -20_000, 1, 39_999, 41_000, 60_001, 1_500_000)
+PERIODS = np.array([40.0, 50.0, 60.0])
+QUADROTOR = load_robot("quadrotor")
+HANGS, FLIES = LIMITS, LinkLimits.of(QUADROTOR)
+
+
+def hold_against_each_other(library, seed, limits, seen):
+    """The same traffic for both; adds to `seen` what happened."""
+    traffic = Traffic(seed, limits.thrusters)
+    python, c = RobotEnd(limits, 77, KEY), CRobotEnd(library, limits, 77)
+    now_us = 10_000_000
+    for nonce in range(1, 2500):
+        now_us += traffic.step_us()
+        omega = tuple(float(v) for v in np.float32(0.3 * np.sin(nonce / PERIODS)))
+        if traffic.often(0.002):
+            omega = (*omega[:2], traffic.random.choice((math.nan, math.inf, -math.inf)))
+        values = (omega, (0.5, 1.5, 9.75), np.full(limits.thrusters, 0.5))
+        a = python.sample(now_us, nonce, *values)
+        assert a == c.sample(now_us, nonce, *values)
+        before, data = python.state, traffic.datagram(python.state, nonce)
+        now_us += traffic.random.choice((0, 0, 3000))
+        peer = ("", nonce)
+        why = python.receive(data, peer, now_us)
+        assert why == c.receive(data, peer, now_us), nonce
+        assert (python._asking == peer) == c.answers
+        assert (python._peer == peer) == (why == Refusal.NONE)
+        np.testing.assert_allclose(python.setpoint(now_us), c.setpoint(now_us), atol=1e-6)
+        seen |= {python.state, ("answer", why), (before, python.state)}
+        seen.add((why == Refusal.NONE, c.answers))
+
+
+@pytest.mark.parametrize("limits", [HANGS, FLIES], ids=["hangs", "flies"])
+def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, limits):
+    seen = set()
+    for seed in range(6):
+        hold_against_each_other(library, seed, limits, seen)
+    assert seen >= {*FollowerState}
+    assert seen >= {(state, FollowerState.RUNNING) for state in (COAST, RAMP, RUNNING, IDLE)}
+    assert seen >= {(taken, answered) for taken in (True, False) for answered in (True, False)}
+    others = {Refusal.NONE, Refusal.STARTED, Refusal.HANDSHAKE}
+    others |= {Refusal.RISE} if limits is FLIES else set()  # from 0 to full in two commands
+    assert seen >= {("answer", why) for why in Refusal if why not in others}
+
+
+BAD_LIMITS = (
+    *({"thrusters": n} for n in (0, 17)),
+    *({"ramp_us": ramp_us} for ramp_us in (0, -1)),
+    *({name: bad} for name in ("f_max", "max_rise") for bad in (0, -1, math.nan, math.inf)),
+)
+
+
+@pytest.mark.parametrize("bad", BAD_LIMITS, ids=str)
+def test_limits_that_limit_nothing_are_refused_and_then_no_command_is_taken(library, bad):
+    assert CRobotEnd(library, LIMITS, 77).started
+    robot = CRobotEnd(library, replace(LIMITS, **bad), 77)
+    assert not robot.started
+    for nonce, now_us in enumerate(range(1_000_000, 2_000_000, 5000), 1):
+        robot.sample(now_us, nonce, (0.0,) * 3, (0.0,) * 3, np.zeros(3))
+        command = Command(5, nonce, nonce, nonce, False, (0.0,) * 3)
+        assert robot.receive(encode_command(command, KEY), None, now_us) == Refusal.THRUSTERS
+
+
+def run_robot(path, key_text, *numbers):
+    """The program of a robot, which must refuse to start."""
+    program, key_file = path / "robot", path / "robot.key"
+    key_file.write_text(key_text)
+    key_file.chmod(0o600)
+    words = (str(program), str(key_file), "0", "3", *numbers)
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=20.0)
+
+
+@pytest.fixture(scope="module")
+def program_path(library, tmp_path_factory):
+    path = tmp_path_factory.mktemp("robot")
+    sources = [str(SOURCE / name) for name in ("robot_main.c", *NAMES)]
+    words = ("gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(path / "robot"))
+    subprocess.run((*words, *sources, "-lm"), check=True)
+    return path
+
+
+HEX = KEY.hex()
+NO_KEYS = ("", HEX[:-1], HEX + "0", HEX + "\n00", HEX[:16] + " " + HEX[16:], "0x" + HEX[:-2])
+NO_KEYS += (HEX[:-1] + "g", "+1" + HEX[2:], "x" + HEX)
+
+
+@pytest.mark.parametrize("text", NO_KEYS)
+def test_the_program_refuses_what_python_refuses_as_a_key(program_path, text):
+    done = run_robot(program_path, text, "3.0", "1.0", "2000")
+    assert (done.returncode, "no key" in done.stderr) == (2, True)
+    with pytest.raises(LinkKeyError):
+        read_key(program_path / "robot.key")
+
+
+BAD_NUMBERS = (("nan", "1", "9"), ("3", "nan", "9"), ("3", "1", "-9"), ("3", "1", "0"))
+
+
+@pytest.mark.parametrize("numbers", BAD_NUMBERS)
+@pytest.mark.parametrize("key_text", [HEX, f" \n{HEX.upper()}\n\n"])
+def test_the_program_reads_the_key_and_refuses_numbers_that_limit_nothing(
+    program_path, key_text, numbers
+):
+    done = run_robot(program_path, key_text, *numbers)
+    assert (done.returncode, "above 0" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_c_and_python_agree_on_torques_whatever_the_rotors(library, seed):
+    gains, falling, random = asymmetric(seed)
+    keeper, c_gains = turned(gains, random), CGains.of(gains)
+    attitude = (ctypes.c_double * 12)(*keeper.up_in_b, 0.0, 0.0, 1.0, *keeper._omega_in_b)
+    thrusts = (ctypes.c_double * 16)(*falling)
+    n, f_max = ctypes.c_uint8(len(falling)), ctypes.c_double(gains.f_max)
+    library.ll_attitude_thrusts(attitude, ctypes.byref(c_gains), n, f_max, thrusts)
+    np.testing.assert_allclose(thrusts[: len(falling)], keeper.thrusts(falling), atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["sha256", "hmac_sha256"])
+def test_the_digests_are_those_of_fips_180_4_and_rfc_4231(library, kind):
+    for vector in VECTORS[kind]:
+        data, digest = bytes.fromhex(vector["data"]), ctypes.create_string_buffer(32)
+        if kind == "sha256":
+            library.ll_sha256(data, ctypes.c_size_t(len(data)), digest)
+        else:
+            key, prepared = bytes.fromhex(vector["key"]), ctypes.create_string_buffer(64)
+            library.ll_hmac_init(prepared, key, ctypes.c_size_t(len(key)))
+            library.ll_hmac_of(prepared, data, ctypes.c_size_t(len(data)), digest)
+        expected = bytes.fromhex(vector["digest"])
+        assert digest.raw[: len(expected)] == expected
+
+
+@pytest.mark.parametrize("length", range(130))
+def test_the_mac_is_right_for_every_length_of_message(library, length):
+    data, digest = bytes(range(length)), ctypes.create_string_buffer(32)
+    prepared = ctypes.create_string_buffer(64)
+    library.ll_hmac_init(prepared, KEY, ctypes.c_size_t(16))
+    library.ll_hmac_of(prepared, data, ctypes.c_size_t(length), digest)
+    assert digest.raw[:16] == mac(KEY, data)
+
+
+@pytest.mark.parametrize("vector", [v for v in VECTORS["datagrams"] if v["kind"] == "command"])
+def test_the_recorded_commands_are_read_and_no_byte_of_them_may_differ(library, vector):
+    data, key = bytes.fromhex(vector["bytes"]), bytes.fromhex(vector["key"])
+    limits = replace(LIMITS, thrusters=data[5])
+    for at in (None, *range(len(data))):
+        sent = bytearray(data)
+        if at is not None:
+            sent[at] ^= 1
+        robot = CRobotEnd(library, limits, 77, key)
+        why = robot.receive(bytes(sent), None, 1_000_000)
+        assert (why == Refusal.MALFORMED) == (at is not None)

@@ -1,0 +1,73 @@
+"""An eye that errs by noise only: as wrong as it says, blind where LEDs are hidden."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hardware.camera_file import find_camera
+from hardware.robot_file import load_robot
+from hardware.sim.hand import make_hand
+from hardware.sim.led_sensor_model import NoisyEye
+from hardware.sim.phone import VirtualPhone
+from hardware.sim.render import Look
+from pipeline.frames import Array
+
+LEDS = load_robot("ames").robot.leds_in_b
+
+
+def at_rest(t: float) -> tuple[Array, Array]:
+    return np.eye(3), np.zeros(3)
+
+
+def eye(noise_px: float, hidden: tuple[int, ...] = (), readout_s: float = 0.0) -> NoisyEye:
+    camera = replace(find_camera("lightleash-virtual-phone", 1280, 720), readout_s=readout_s)
+    rng = np.random.default_rng(1)
+    phone = VirtualPhone(camera, make_hand("moving", seed=2), LEDS, Look(), rng)
+    return NoisyEye(phone, LEDS, noise_px, lambda t: hidden, np.random.default_rng(3))
+
+
+def test_without_noise_it_tells_the_truth() -> None:
+    one = eye(0.0)
+    seen = one.seen(3.0, 3.1, at_rest)
+    assert seen is not None
+    assert seen.pose is not None
+    R_cb, p_bc_in_c = one._phone.relative_pose(3.0, at_rest)
+    np.testing.assert_allclose(seen.pose.p_bc_in_c, p_bc_in_c, atol=1e-6)
+    np.testing.assert_allclose(seen.pose.R_cb, R_cb, atol=1e-6)
+    assert seen.t == seen.pose.t == 3.1
+    assert seen.rays.led.tolist() == [0, 1, 2, 3, 4]
+
+
+def test_its_noise_is_what_its_rays_claim() -> None:
+    noisy, perfect = eye(0.3), eye(0.0)
+    times = 2.0 + 0.03 * np.arange(60)
+    pairs = [(noisy.seen(t, t, at_rest), perfect.seen(t, t, at_rest)) for t in times]
+    whitened = [
+        np.linalg.solve(np.linalg.cholesky(C), a - b)
+        for one, other in pairs
+        if one is not None and other is not None
+        for C, a, b in zip(
+            one.rays.covariances, one.rays.tangents, other.rays.tangents, strict=True
+        )
+    ]
+    assert np.std(whitened) == pytest.approx(1.0, abs=0.1)
+
+
+def test_hidden_leds_have_no_rays_and_few_give_no_pose() -> None:
+    seen = eye(0.1, hidden=(0, 3)).seen(2.0, 2.0, at_rest)
+    assert seen is not None
+    assert seen.rays.led.tolist() == [1, 2, 4]
+    assert seen.pose is None
+    assert eye(0.1, hidden=(0, 1, 2, 3, 4)).seen(2.0, 2.0, at_rest) is None
+
+
+def test_each_led_is_where_it_is_when_its_row_is_read() -> None:
+    rolling = eye(0.0, readout_s=0.03).seen(4.0, 4.0, at_rest)
+    assert rolling is not None
+    for k, t in enumerate(rolling.rays.t):
+        alone = eye(0.0).seen(float(t), 4.0, at_rest)
+        assert alone is not None
+        np.testing.assert_allclose(rolling.rays.tangents[k], alone.rays.tangents[k], atol=2e-5)

@@ -1,0 +1,159 @@
+"""What one picture leaves open, later ones decide, or nothing is said."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.frames import R_from_rpy, exp, log
+from pipeline.identification.initialisation import CONFIRMED, Starting
+from pipeline.identification.pnp import pose_of
+from pipeline.identification.relocalisation import Hints
+from tests.pipeline.seeing import CAMERA, LEDS_IN_B, UP_IN_F, Truth, is_wrong, truth_at
+from tests.pipeline.spotting import CONFIG, NOISE_PX, hints_of, lamps_beside, seen, spots_of
+
+DT = 1.0 / 30.0
+STILL = np.zeros((2, 3))
+
+
+def starting(leds_in_b=LEDS_IN_B):
+    return Starting(CAMERA, leds_in_b, CONFIG)
+
+
+def turning(truth, k, rate=0.03):
+    """The robot goes round by `rate` [rad] a picture, and the turns of c and b since the last."""
+    about = truth.R.T @ truth.R_fc.T @ UP_IN_F
+    return replace(truth, R=truth.R @ exp(k * rate * about)), np.stack((np.zeros(3), rate * about))
+
+
+def test_a_sure_explanation_is_told_at_once():
+    rng = np.random.default_rng(80)
+    truth = truth_at(rng)
+    naming = starting().step(0.0, seen(truth, rng, lamps=5), hints_of(truth), None)
+    assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+
+
+def test_four_leds_without_gravity_wait_until_the_robot_has_turned():
+    rng = np.random.default_rng(81)
+    late = 0
+    for _ in range(6):
+        start, eye, found = truth_at(rng), starting(), None
+        for k in range(12):
+            truth, _ = turning(start, k)
+            naming = eye.step(k * DT, seen(truth, rng, range(4), lamps=0), Hints(), None)
+            if naming is not None:
+                assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+                found = k if found is None else found
+        assert found is not None
+        late += found >= CONFIRMED - 1
+    assert late >= 4
+
+
+def test_a_weak_explanation_that_never_moves_is_never_told():
+    rng = np.random.default_rng(82)
+    for _ in range(4):
+        truth, eye = truth_at(rng), starting()
+        lamps = lamps_beside(truth.pixels(), 3, rng)
+        pixels = np.vstack((truth.pixels()[:4], lamps))
+        told = 0
+        for k in range(12):
+            spots = spots_of(pixels + rng.normal(0.0, NOISE_PX, pixels.shape))
+            told += eye.step(k * DT, spots, Hints(), None) is not None
+        assert told == 0
+
+
+def test_a_pause_ends_what_was_pending():
+    rng = np.random.default_rng(83)
+    start, eye = truth_at(rng), starting()
+    for k in range(6):
+        truth, _ = turning(start, k, 0.1)
+        assert eye.step(5.0 * k, seen(truth, rng, range(4)), Hints(), None) is None
+
+
+FLAT = np.column_stack((np.zeros(5), LEDS_IN_B[:, 1:]))
+"""A robot whose LEDs are in one plane: seen from afar it has two attitudes that fit alike."""
+
+
+def flat_view(yaw, distance, rng, noise_px=0.05):
+    R_fc = np.eye(3)
+    truth = Truth(distance * np.array([1.0, 0.02, 0.01]), R_from_rpy(np.array([0, 0, yaw])), R_fc)
+    pixels = CAMERA.pixels(truth.p + FLAT @ truth.R.T)
+    return truth, spots_of(pixels + rng.normal(0.0, noise_px, pixels.shape))
+
+
+def upright(truth):
+    return Hints(truth.R_fc.T @ UP_IN_F, truth.R.T @ truth.R_fc.T @ UP_IN_F)
+
+
+def test_of_two_branches_none_is_told_while_both_fit():
+    rng = np.random.default_rng(84)
+    told = 0
+    for _ in range(10):
+        truth, spots = flat_view(0.25, 9.0, rng)
+        eye = starting(FLAT)
+        naming = eye.step(0.0, spots, upright(truth), None)
+        told += naming is not None
+        assert naming is not None or eye.ambiguous
+    assert told == 0
+
+
+def test_the_gyroscopes_refute_the_wrong_branch():
+    rng = np.random.default_rng(85)
+    decided = 0
+    for _ in range(8):
+        eye, up = starting(FLAT), np.array([0.0, 0.0, 1.0])
+        for k in range(12):
+            truth, spots = flat_view(0.2 + 0.04 * k, 9.0, rng)
+            turn = np.stack((np.zeros(3), 0.04 * up))
+            naming = eye.step(k * DT, spots, upright(truth), turn)
+            if naming is not None:
+                assert np.linalg.norm(log(naming.fit.R_cb.T @ truth.R)) < np.deg2rad(10.0)
+                decided += 1
+                break
+    assert decided >= 6
+
+
+def test_against_a_remembered_attitude_only_the_surest_is_told():
+    rng = np.random.default_rng(86)
+    truth = truth_at(rng)
+    hints = replace(hints_of(truth), R_cb=truth.R.T, turn=0.3)
+    assert starting().step(0.0, seen(truth, rng), hints, STILL) is not None
+    four = seen(truth, rng, range(4), lamps=10)
+    assert starting().step(0.0, four, hints, STILL) is None
+
+
+def ball_of(count, rng):
+    """(count, 3) LEDs about a robot, none near another."""
+    leds = []
+    while len(leds) < count:
+        way = rng.normal(size=3)
+        led = way * rng.uniform(0.25, 0.35) / np.linalg.norm(way)
+        if all(np.linalg.norm(led - other) > 0.07 for other in leds):
+            leds.append(led)
+    return np.array(leds)
+
+
+def test_of_thirty_two_leds_the_near_half_is_enough_without_gravity():
+    for seed in (0, 1):
+        rng = np.random.default_rng(seed)
+        leds_in_b, truth = ball_of(32, rng), truth_at(rng)
+        leds_in_c = truth.p + leds_in_b @ truth.R.T
+        near = np.flatnonzero(leds_in_c[:, 0] <= np.median(leds_in_c[:, 0]))
+        shown, eye, naming, k = CAMERA.pixels(leds_in_c), starting(leds_in_b), None, 0
+        while naming is None and k < 60:
+            pixels = np.vstack((shown[near], lamps_beside(shown, 3, rng)))
+            pixels += rng.normal(0.0, NOISE_PX, pixels.shape)
+            spots = spots_of(pixels, brightness=rng.uniform(1.0, 2.0, len(pixels)))
+            naming, k = eye.step(k * DT, spots, Hints(), None), k + 1
+        assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+        assert set(naming.match.led) == set(near)
+
+
+def test_all_of_thirty_two_leds_are_named():
+    rng = np.random.default_rng(2)
+    leds_in_b, truth = ball_of(32, rng), truth_at(rng)
+    pixels = CAMERA.pixels(truth.p + leds_in_b @ truth.R.T)
+    apart = np.linalg.norm(pixels[:, None] - pixels, axis=2) + np.eye(32) * 99.0
+    assert apart.min() > 1.0
+    naming = starting(leds_in_b).step(0.0, spots_of(pixels), hints_of(truth), None)
+    assert len(naming.match.led) == 32
+    assert not is_wrong(pose_of(naming.fit, 0.0), truth)

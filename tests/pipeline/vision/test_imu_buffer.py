@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from pipeline.frames import GRAVITY, exp
+from pipeline.vision.imu_buffer import STALE_S, Felt
+
+UP = np.array([0.0, 0.0, 1.0])
+ZERO = np.zeros(3)
+
+
+def turned(rate, n=120, dt=0.01):
+    """A sensor that turns about its y axis, and its true vertical at any time."""
+    felt, omega = Felt(), np.array([0.0, rate, 0.0])
+    for k in range(n):
+        felt.add(k * dt, omega, GRAVITY * exp(-omega * k * dt) @ UP)
+    return felt, lambda t: exp(-omega * t) @ UP
+
+
+def test_before_anything_is_felt_nothing_is_known():
+    assert Felt().at(0.0) is None
+
+
+def test_the_vertical_is_that_of_the_asked_time_not_the_newest():
+    felt, truth = turned(1.0)
+    for t in (0.7, 0.8549, 1.1):
+        assert np.degrees(np.arccos(min(1.0, felt.at(t).up @ truth(t)))) < 0.1
+
+
+def test_between_two_samples_the_rate_is_between_theirs():
+    felt = Felt()
+    for k in range(100):
+        felt.add(0.01 * k, np.array([0.0, 0.01 * k, 1.0]), GRAVITY * UP)
+    np.testing.assert_allclose(felt.at(0.905).omega, [0.0, 0.905, 1.0])
+
+
+def test_a_little_beyond_the_samples_the_nearest_counts_and_then_none():
+    felt, _ = turned(0.5)
+    newest = felt.at(1.19)
+    np.testing.assert_array_equal(felt.at(1.19 + 0.9 * STALE_S).up, newest.up)
+    assert felt.at(1.19 + 1.1 * STALE_S) is None
+    oldest = next(t for t in np.arange(-1.0, 1.0, 0.01) if felt.at(t) is not None)
+    assert oldest == pytest.approx(0.59 - STALE_S, abs=0.02)
+
+
+def test_only_the_last_moments_are_remembered_at_any_rate():
+    felt = Felt()
+    for k in range(5000):
+        felt.add(1e-4 * k, ZERO, GRAVITY * UP)
+    assert len(felt._feelings) <= 1025
+
+
+def test_free_fall_has_a_rate_but_no_vertical():
+    felt = Felt()
+    felt.add(0.0, np.ones(3), ZERO)
+    assert felt.at(0.0).up is None
+    felt.add(0.1, np.ones(3), GRAVITY * UP)
+    np.testing.assert_allclose(felt.at(0.05).up, UP)

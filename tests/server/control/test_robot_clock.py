@@ -1,0 +1,172 @@
+"""RobotLink: the robot's samples on our clock, and its reasons in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hardware.follower import EXPLANATIONS, BodySample, FollowerState, Refusal, ThrustCommand
+from server.control.robot_clock import (
+    DEAF,
+    RAMP_AFTER_S,
+    RAMP_BEGUN_S,
+    SILENCE_S,
+    BodyClock,
+    RobotLink,
+)
+
+
+def sample(
+    t_us: int,
+    state: FollowerState = FollowerState.IDLE,
+    refusal: Refusal = Refusal.NONE,
+    boot_id: int = 1,
+) -> BodySample:
+    up = np.array([0.0, 0.0, 9.81])
+    return BodySample(t_us, np.zeros(3), up, np.zeros(8), state, boot_id, refusal, None)
+
+
+class Script:
+    """A follower that gives what it was told to give."""
+
+    thrusters = 8
+
+    def __init__(self) -> None:
+        self.next: list[BodySample] = []
+
+    def receive(self) -> list[BodySample]:
+        given_, self.next = self.next, []
+        return given_
+
+    def send(self, command: ThrustCommand) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+@given(
+    st.lists(st.floats(0.0, 0.2), min_size=5, max_size=100), st.floats(-1e5, 1e5), st.floats(0, 1)
+)
+def test_samples_are_never_later_than_they_arrive_and_their_spacing_stays(
+    delays: list[float], offset: float, start: float
+) -> None:
+    clock = BodyClock()
+    dated = []
+    for k, delay in enumerate([0.0, *delays]):
+        taken = start + 0.005 * k
+        t_us = round(1e6 * taken)
+        imu = clock.imu(sample(t_us), offset + 1e-6 * t_us + delay)
+        assert imu.t <= offset + 1e-6 * t_us + delay + 1e-9
+        dated.append(imu.t)
+    np.testing.assert_allclose(np.diff(dated), 0.005, atol=1e-6)
+    assert dated[0] == pytest.approx(offset + start, abs=1e-5)
+
+
+def test_a_path_that_grew_longer_is_believed_after_a_second() -> None:
+    clock = BodyClock()
+    for k in range(300):
+        clock.imu(sample(5_000 * k), 0.005 * k + 0.001)
+    for k in range(300, 501):
+        imu = clock.imu(sample(5_000 * k), 0.005 * k + 0.011)
+    assert imu.t == pytest.approx(2.5 + 0.011)
+
+
+def test_a_robot_that_restarts_has_another_clock() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    follower.next = [sample(50_000_000)]
+    link.receive(100.0)
+    follower.next = [sample(5_000, boot_id=2)]
+    (imu,) = link.receive(101.0)
+    assert imu.t == pytest.approx(101.0)
+
+
+def test_samples_of_before_a_restart_that_come_with_those_after_it_do_not_date_them() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    follower.next = [sample(50_000_000), sample(5_000, boot_id=2), sample(10_000, boot_id=2)]
+    _, first, second = link.receive(101.0)
+    assert second.t == pytest.approx(101.0)
+    assert first.t == pytest.approx(second.t, abs=0.006)
+
+
+def test_a_robot_that_restarted_says_so_until_it_is_ready_whatever_else_it_refuses() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    reasons = []
+    for state, refusal, boot_id in [
+        (FollowerState.RUNNING, Refusal.NONE, 1),
+        (FollowerState.REFUSING, Refusal.NONCE, 2),
+        (FollowerState.REFUSING, Refusal.EPOCH, 2),
+        (FollowerState.IDLE, Refusal.NONE, 2),
+        (FollowerState.RAMP, Refusal.SILENT, 2),
+    ]:
+        follower.next = [sample(1_000, state, refusal, boot_id)]
+        link.receive(1.0)
+        reasons.append(link.reason)
+    started = EXPLANATIONS[Refusal.STARTED]
+    assert reasons == ["", started, started, "", ""]
+    assert link.gap == DEAF
+
+
+def test_a_robot_that_coasts_or_has_only_just_begun_to_ramp_has_nothing_against_flying_on() -> None:
+    follower, told = Script(), []
+    link = RobotLink(follower)
+    silent = EXPLANATIONS[Refusal.SILENT]
+    for state, at in [
+        (FollowerState.COAST, 1.0),
+        (FollowerState.RAMP, 1.2),
+        (FollowerState.RAMP, 1.2 + 0.9 * RAMP_BEGUN_S),
+        (FollowerState.RAMP, 1.2 + 1.1 * RAMP_BEGUN_S),
+        (FollowerState.RUNNING, 2.0),
+        (FollowerState.RAMP, 3.0),
+    ]:
+        refusal = Refusal.NONE if state == FollowerState.RUNNING else Refusal.SILENT
+        follower.next = [sample(1_000, state, refusal)]
+        link.receive(at)
+        told.append((link.reason, link.gap))
+    bears, ended, well = ("", DEAF), (silent, ""), ("", "")
+    assert told == [bears, bears, bears, ended, well, bears]
+
+
+def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    assert link.receive(1.0) == []
+    assert link.reason == "The robot has not answered yet."
+    for refusal in Refusal:
+        for state in FollowerState:
+            follower.next = [sample(1_000, state, refusal)]
+            link.receive(1.0)
+            link.receive(1.0 + RAMP_BEGUN_S)
+            follower.next = [sample(1_000, state, refusal)]
+            link.receive(1.0 + RAMP_BEGUN_S)
+            refuses = state in (FollowerState.RAMP, FollowerState.REFUSING)
+            assert link.reason == (EXPLANATIONS[refusal] if refuses else "")
+    follower.next = []
+    before = link.reason
+    link.receive(2.0)
+    assert link.reason == before
+
+
+def test_it_says_when_the_robot_will_ramp_by_itself() -> None:
+    script = Script()
+    link = RobotLink(script)
+    left = {}
+    for k in range(200):
+        t = 0.005 * k
+        coasts = 0.3 <= t < 0.4 or t >= 0.7
+        state = FollowerState.COAST if coasts else FollowerState.RUNNING
+        state = FollowerState.RAMP if t >= 0.92 else state
+        script.next = [] if 0.5 < t < 0.65 else [sample(5000 * k, state)]
+        link.receive(t)
+        left[round(t, 3)] = link.left_s
+    assert left[0.2] == left[0.45] == left[0.55] == left[0.65] == np.inf
+    assert left[0.3] == pytest.approx(RAMP_AFTER_S - SILENCE_S)
+    assert left[0.395] == pytest.approx(RAMP_AFTER_S - SILENCE_S - 0.095)
+    assert left[0.6] == pytest.approx(RAMP_AFTER_S - 0.1)
+    assert left[0.8] == pytest.approx(RAMP_AFTER_S - SILENCE_S - 0.1)
+    assert left[0.95] == 0.0

@@ -1,0 +1,222 @@
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hardware
+from hardware.codec import Encoder
+from hardware.robot_file import load_robot
+from pipeline.camera.extrinsics import Mounting
+from pipeline.frames import GRAVITY, exp
+from pipeline.prediction import Expected
+from pipeline.signals import PhoneImu, StampOffset
+from pipeline.vision_config import GatesConfig
+from server.phone.frame_pipeline import Sight
+from server.phone.ingest import ARRIVAL_S, EncodedFrame
+from server.protocol.wire_records import Codec, Picture
+from tests.pipeline.seeing import CAMERA, is_wrong, moved, picture, truth_at
+
+ROBOT = load_robot(Path(hardware.__file__).parent / "robots" / "ames.toml").robot
+ZERO, UP = np.zeros(3), np.array([0.0, 0.0, 1.0])
+DT = 1.0 / 30.0
+CODECS = {"h264": Codec.H264, "vp8": Codec.VP8, "jpeg": Codec.JPEG}
+
+
+def sight(**gates):
+    return Sight(CAMERA, ROBOT, GatesConfig(**gates))
+
+
+def encoder(codec="h264"):
+    return Encoder(CAMERA.width, CAMERA.height, 30.0, 3_000_000, codec)
+
+
+def sent(k, data, key, codec="h264", t=None):
+    shot = Picture(CODECS[codec], key, CAMERA.width, CAMERA.height, 0, data)
+    t = k * DT if t is None else t
+    return EncodedFrame(t, t + 0.05, k, shot)
+
+
+def shots(rng, n, codec="h264", with_=None, truth=None):
+    """Encoded pictures of a robot, and what was true."""
+    truth, camera_side = truth or truth_at(rng), with_ or encoder(codec)
+    for k in range(n):
+        yield sent(k, *camera_side.encode(picture(truth, rng)), codec), truth
+        truth = moved(truth, rng)
+
+
+def hold(eye, truth, t):
+    """The phone's motion sensors when held still as in `truth`."""
+    eye.feel(PhoneImu(t, ZERO, GRAVITY * truth.prior().up_in_c))
+
+
+def look(eye, frames, truth):
+    hold(eye, truth, frames[-1].t)
+    return eye.see(frames, truth.prior().up_in_b, ZERO)
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_encoded_pictures_become_poses(codec):
+    rng = np.random.default_rng(80)
+    eye = sight()
+    assert eye.needs_key
+    for frame, truth in shots(rng, 5, codec):
+        sighting = look(eye, [frame], truth)
+        assert sighting.reason == ""
+        assert sighting.t == frame.t
+        assert not is_wrong(sighting.pose, truth)
+    assert not eye.needs_key
+    assert eye.undecodable == 0
+    assert eye.luma.shape == (CAMERA.height, CAMERA.width)
+
+
+def test_pictures_are_dated_as_the_profile_of_the_camera_says():
+    rng = np.random.default_rng(80)
+    camera = replace(CAMERA, mounting=Mounting(np.eye(3), time_offset_s=-0.02))
+    eye = Sight(camera, ROBOT, GatesConfig())
+    frame, truth = next(iter(shots(rng, 1)))
+    assert look(eye, [frame], truth).t == pytest.approx(frame.t - 0.02)
+
+
+def test_of_several_pictures_all_are_decoded_and_the_newest_is_looked_at():
+    rng = np.random.default_rng(81)
+    frames, truths = zip(*shots(rng, 5), strict=True)
+    eye = sight()
+    sighting = look(eye, frames, truths[-1])
+    assert sighting.t == frames[-1].t
+    assert not is_wrong(sighting.pose, truths[-1])
+
+
+def test_no_pictures_are_no_sighting():
+    assert sight().see([], None, ZERO) is None
+
+
+def test_a_stream_begins_with_a_key_picture():
+    rng = np.random.default_rng(82)
+    camera_side = encoder()
+    (_, second), truths = zip(*shots(rng, 2, with_=camera_side), strict=True)
+    eye = sight()
+    assert look(eye, [second], truths[1]) is None
+    assert eye.needs_key
+    assert eye.undecodable == 0  # nobody tried
+    again = sent(2, *camera_side.encode(picture(truths[1], rng), key=True))
+    assert look(eye, [again], truths[1]).pose is not None
+
+
+@pytest.mark.parametrize("garbage", [b"", b"\x00" * 500, b"not a picture", b"\xff\xd8\xff"])
+def test_an_undecodable_picture_is_counted_and_the_stream_waits_for_a_key(garbage):
+    rng = np.random.default_rng(83)
+    camera_side, eye = encoder(), sight()
+    (first, second, third), truths = zip(*shots(rng, 3, with_=camera_side), strict=True)
+    assert look(eye, [first], truths[0]).pose is not None
+    assert (
+        look(eye, [replace(second, picture=replace(second.picture, data=garbage))], truths[1])
+        is None
+    )
+    assert eye.undecodable == 1
+    assert eye.needs_key
+    assert look(eye, [third], truths[2]) is None
+    assert eye.undecodable == 1
+    key = sent(3, *camera_side.encode(picture(truths[2], rng), key=True))
+    assert not is_wrong(look(eye, [key], truths[2]).pose, truths[2])
+    assert not eye.needs_key
+
+
+def test_a_picture_of_another_size_is_undecodable():
+    rng = np.random.default_rng(84)
+    small, truth = Encoder(640, 480, 30.0, 1_000_000), truth_at(rng)
+    eye = sight()
+    frame = sent(0, *small.encode(np.zeros((480, 640), np.uint8)))
+    assert look(eye, [frame], truth) is None
+    assert eye.undecodable == 1
+
+
+def test_the_codec_may_change_at_a_key_picture():
+    rng = np.random.default_rng(85)
+    eye, truth = sight(), truth_at(rng)
+    for codec in ("h264", "jpeg", "vp8", "h264"):
+        ((frame, _),) = shots(rng, 1, codec, truth=truth)
+        assert not is_wrong(look(eye, [frame], truth).pose, truth)
+
+
+def test_a_pose_that_gravity_contradicts_is_not_believed():
+    rng = np.random.default_rng(86)
+    eye = sight()
+    (first, second), (truth, after) = zip(*shots(rng, 2), strict=True)
+    assert eye.see([first], None, ZERO).pose is not None  # nothing contradicts
+    hold(eye, after, second.t)
+    upset = exp(np.array([0.5, 0.0, 0.0])) @ truth.prior().up_in_b
+    sighting = eye.see([second], upset, ZERO)
+    assert sighting.pose is None
+    assert sighting.reason.startswith("Not believed: gravity disagrees by")
+
+
+def test_a_pose_out_of_range_is_not_believed():
+    rng = np.random.default_rng(87)
+    ((frame, truth),) = shots(rng, 1)
+    sighting = look(sight(max_range_m=1.0), [frame], truth)
+    assert sighting.pose is None
+    assert "m away" in sighting.reason
+
+
+def test_why_nothing_is_seen_is_passed_on():
+    rng = np.random.default_rng(88)
+    dark = np.full((CAMERA.height, CAMERA.width), 40, np.uint8)
+    sighting = look(sight(), [sent(0, *encoder().encode(dark))], truth_at(rng))
+    assert sighting.reason == "No light in the picture is bright enough."
+
+
+def test_the_stages_are_timed():
+    rng = np.random.default_rng(89)
+    ticks = count()
+    eye = Sight(CAMERA, ROBOT, GatesConfig(), lambda: next(ticks))
+    ((frame, truth),) = shots(rng, 1)
+    assert set(look(eye, [frame], truth).took_s) == {"decode", "detect", "identify", "pose"}
+
+
+def test_after_a_lost_picture_nothing_is_decoded_before_a_key():
+    """FFmpeg hides a missing picture: the LEDs would stand where they were, without a word."""
+    rng = np.random.default_rng(84)
+    frames, truths = zip(*shots(rng, 3), strict=True)
+    eye = sight()
+    assert look(eye, frames[:1], truths[0]).pose is not None
+    assert look(eye, frames[2:], truths[2]) is None
+    assert eye.needs_key
+
+
+def test_a_few_leds_where_control_expects_them_are_rays_without_a_pose():
+    rng = np.random.default_rng(90)
+    eye, truth, camera_side = sight(), truth_at(rng), encoder()
+    for k in range(8):
+        for t in (k * DT - 0.01, k * DT + 0.01):
+            eye.expect(Expected(t, truth.p, truth.R, ZERO, 0.005, 0.005))
+        covered = () if k < 3 else (0, 2, 4)
+        shot = sent(k, *camera_side.encode(picture(truth, rng, covered=covered)))
+        sighting = look(eye, [shot], truth)
+        assert (sighting.pose is None) == (k >= 3)
+    assert sorted(sighting.rays.led.tolist()) == [1, 3]
+    assert sighting.reason == "2 of 5 LEDs seen."
+    eye.expect(None)
+    shot = sent(8, *camera_side.encode(picture(truth, rng, covered=(0, 2, 4))))
+    assert len(look(eye, [shot], truth).rays) == 0
+
+
+def test_rays_of_a_pose_that_is_not_believed_are_not_handed_on():
+    rng = np.random.default_rng(91)
+    ((frame, truth),) = shots(rng, 1)
+    sighting = look(sight(max_range_m=1.0), [frame], truth)
+    assert sighting.match is not None
+    assert len(sighting.rays) == 0
+    assert sighting.seen(CAMERA) is None
+
+
+@pytest.mark.parametrize(
+    ("by_arrival", "offset"), [(True, StampOffset(0.0, ARRIVAL_S)), (False, None)]
+)
+def test_of_pictures_dated_by_their_arrival_the_filter_is_told_by_how_much(by_arrival, offset):
+    eye = sight()
+    for frame, truth in shots(np.random.default_rng(83), 3):
+        guessed = replace(frame.picture, by_arrival=by_arrival)
+        sighting = look(eye, [replace(frame, picture=guessed)], truth)
+    assert sighting.seen(CAMERA).offset == offset

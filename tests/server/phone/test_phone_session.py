@@ -1,0 +1,275 @@
+"""One operator's phone: what it lacks, in words, and what it says, to control."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from hardware.camera_file import CAMERAS
+from pipeline.camera import verdict as camera_verdict
+from pipeline.estimation import sensor_validation
+from pipeline.frames import exp
+from pipeline.signals import LedRays, RelativePose, Spots
+from pipeline.vision.detection import Sighting
+from pipeline.vision.rays import NO_RAYS
+from server.control.ipc import OperatorInput, PhoneImuInput
+from server.control.ipc_vision import SeenInput
+from server.phone.ingest import EncodedFrame
+from server.phone.phone_session import STALE_S, OperatorPhone
+from server.protocol.calibration_messages import Calibrate
+from server.protocol.messages import Hello
+from server.protocol.wire import VERSION, WireError
+from server.protocol.wire_records import Motion, Ping, Pong, Record, Touch
+from server.virtual_phone.phone_script import DEVICE
+from tests.pipeline.seeing import CAMERA, rays_at
+from tests.server.house import JPEG, ROBOT
+
+NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
+
+FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
+
+
+class Rig:
+    """A phone in virtual time; its clock is ours."""
+
+    def __init__(self, device: str, cameras: Path = CAMERAS) -> None:
+        self.t = 50.0
+        self.to_control: list[object] = []
+        self.taken: list[int] = []
+        hello = Hello(VERSION, "operator", device)
+        self.phone = OperatorPhone(
+            hello,
+            ROBOT,
+            [cameras],
+            self.to_control.append,
+            lambda: self.t,
+            self.taken.append,
+            lambda: None,
+        )
+        self.nonce = 0
+
+    def say(self, body: object, sequence: int = 1) -> None:
+        self.phone.take(Record(sequence, int(1e6 * self.t), body), self.t)  # type: ignore[arg-type]
+
+    def synchronise(self) -> None:
+        for _ in range(6):
+            self.synchronise_once()
+            self.t += 0.05
+
+    def synchronise_once(self) -> None:
+        ping = self.phone.ingest.ping(self.t)
+        assert isinstance(ping.body, Ping)
+        self.nonce = ping.body.nonce
+        self.say(Pong(self.nonce, ping.t_us))
+
+    def settle(self) -> None:
+        """A second of motion at rest: the sensors pass what can be tested without pictures."""
+        for _ in range(60):
+            self.t += 1.0 / 60.0
+            self.synchronise_once()
+            self.say(FLAT)
+
+    def why(self) -> list[str]:
+        return self.phone.refusals(self.t)
+
+
+@pytest.fixture
+def rig():
+    made = Rig("Nobody's phone")
+    yield made
+    made.phone.close()
+
+
+def test_each_thing_that_lacks_is_told_to_the_person_who_can_mend_it(rig):
+    assert rig.why() == ["The phone's clock is not known yet. Wait a moment."]
+    rig.synchronise()
+    motion, pictures = rig.why()
+    assert "motion sensors" in motion
+    assert "camera" in pictures
+    rig.say(FLAT)
+    assert rig.why() == [sensor_validation.WAIT, pictures]
+    rig.settle()
+    assert rig.why() == [pictures]
+    rig.say(Touch(False, False, 0, rig.nonce))
+    assert rig.why() == ["The page on the phone is hidden: bring it to the front.", pictures]
+    rig.t += STALE_S + 0.1
+    assert motion in rig.why()
+
+
+def test_a_camera_without_a_calibration_is_told_as_long_as_it_films(rig):
+    rig.synchronise()
+    rig.settle()
+    for sequence in (1, 2):
+        with pytest.raises(WireError) as refused:
+            rig.say(JPEG, sequence)
+        assert refused.value.code == "calibration"
+        assert "Nobody" in refused.value.allowed or "nobody" in refused.value.allowed
+    assert rig.taken == [1, 2]
+    (why,) = rig.why()
+    assert why.startswith("The camera is not calibrated: ")
+
+
+def test_after_a_calibration_nothing_is_said_of_the_camera_before_the_next_picture(rig):
+    rig.synchronise()
+    rig.settle()
+    with pytest.raises(WireError):
+        rig.say(JPEG, 1)
+    assert rig.phone.calibration().phase == "needed"
+    rig.phone.calibrate(Calibrate("stop"))
+    assert rig.phone.calibration().phase == "off"
+    with pytest.raises(WireError):
+        rig.say(JPEG, 2)
+    assert rig.phone.calibration().phase == "needed"
+
+
+def test_motion_and_touch_reach_control_at_their_own_times(rig):
+    rig.say(FLAT)
+    assert rig.to_control == []
+    rig.synchronise()
+    rig.say(FLAT)
+    rig.say(Touch(True, True, 3, rig.nonce))
+    imu, operator = rig.to_control
+    assert isinstance(imu, PhoneImuInput)
+    assert isinstance(operator, OperatorInput)
+    assert imu.t == pytest.approx(rig.t, abs=1e-3)
+    assert operator.t == pytest.approx(rig.t - 0.05)
+    assert operator.held
+
+
+def test_a_hidden_page_holds_no_button(rig):
+    rig.synchronise()
+    rig.say(Touch(True, False, 3, rig.nonce))
+    assert not rig.to_control[-1].held
+
+
+def test_hello_is_the_first_sign_of_life_and_old_nonces_are_none(rig):
+    rig.t += 1.0
+    assert rig.phone.silent_for(rig.t) == pytest.approx(1.0)
+    rig.synchronise()
+    rig.t += 1.0
+    rig.say(Touch(False, True, 0, rig.nonce))
+    assert rig.phone.silent_for(rig.t) == pytest.approx(1.05)
+
+
+def test_pictures_that_cannot_be_dated_are_given_back(rig):
+    rig.say(JPEG, 9)
+    assert rig.taken == [9]
+
+
+def test_a_calibrated_phone_has_eyes_until_it_leaves():
+    rig = Rig(DEVICE)
+    rig.synchronise()
+    rig.settle()
+    rig.say(JPEG)
+    assert rig.phone.vision is not None
+    assert rig.phone.camera_problem == ""
+    assert rig.why() == ["The robot is not seen."]
+    rig.t += STALE_S + 0.1
+    assert any("No pictures" in why for why in rig.why())
+    with pytest.raises(WireError, match="calibrat"):
+        rig.say(replace(JPEG, width=640, height=200))
+    assert rig.phone.vision is None
+    rig.phone.close()
+
+
+def test_the_profile_of_a_camera_turns_the_motion_as_long_as_it_films(tmp_path):
+    R_ci = exp(np.array([0.03, 0.02, -0.04]))
+    table = yaml.safe_load((CAMERAS / "virtual_phone.yaml").read_text())
+    table["camera_imu"] = {"rotation": R_ci.ravel().tolist(), "time_offset_s": 0.0}
+    (tmp_path / "phone.yaml").write_text(yaml.safe_dump(table))
+    rig = Rig(DEVICE, tmp_path)
+    rig.settle()
+    plain = rig.to_control[-1]
+    rig.say(JPEG)
+    rig.t += 0.01
+    rig.say(FLAT)
+    turned = rig.to_control[-1]
+    assert isinstance(plain, PhoneImuInput)
+    assert isinstance(turned, PhoneImuInput)
+    np.testing.assert_allclose(turned.a, R_ci @ plain.a)
+    rig.phone.close()
+    assert (rig.phone.ingest.mounting.R_ci == np.eye(3)).all()
+
+
+SHOT = EncodedFrame(49.9, 50.0, 1, JPEG)
+FEW = rays_at(49.9, np.array([2.5, 0.0, 0.0]), np.eye(3), leds=[0, 2])
+
+
+def sighting_of(pose: RelativePose | None, rays: LedRays) -> Sighting:
+    return Sighting(49.9, pose, rays, NO_SPOTS, None, "2 of 5 LEDs seen.")
+
+
+def test_a_few_leds_reach_control_without_a_pose_and_nothing_as_nothing(rig):
+    rig.phone._sighted(CAMERA, sighting_of(None, NO_RAYS), SHOT)
+    assert rig.to_control == []
+    rig.phone._sighted(CAMERA, sighting_of(None, FEW), SHOT)
+    (said,) = rig.to_control
+    assert isinstance(said, SeenInput)
+    assert said.pose is None
+    assert [led.led for led in said.leds] == [0, 2]
+    assert said.half_field == CAMERA.half_field
+
+
+def test_only_a_pose_counts_as_seeing_the_robot(rig):
+    pose = RelativePose(49.9, np.array([2.5, 0.0, 0.0]), np.eye(3), np.eye(6), 0.1, 5)
+    rig.phone._sighted(CAMERA, sighting_of(None, FEW), SHOT)
+    assert rig.phone.meters["pose"].age(rig.t) > STALE_S
+    rig.phone._sighted(CAMERA, sighting_of(pose, FEW), SHOT)
+    assert rig.phone.meters["pose"].age(rig.t) < STALE_S
+    assert rig.to_control[-1].pose.leds == 5
+
+
+def test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed():
+    rig = Rig(DEVICE)
+    try:
+        rig.settle()
+        rig.say(JPEG)
+        assert rig.phone.vision is not None
+        assert not [why for why in rig.why() if "stabilisation" in why]
+        rig.phone.vision.looking.watch.complaint = camera_verdict.STABILISED
+        assert rig.why()[-1] == camera_verdict.STABILISED
+    finally:
+        rig.phone.close()
+
+
+SMALL = replace(JPEG, width=960, height=540, shrunk=1)
+
+
+def test_pictures_that_the_page_made_smaller_are_those_of_the_same_camera():
+    rig = Rig(DEVICE)
+    try:
+        rig.synchronise()
+        rig.say(JPEG)
+        full = rig.phone.vision._sight.camera
+        rig.say(SMALL, 2)
+        small = rig.phone.vision._sight.camera
+        assert (small.width, small.height) == (960, 540)
+        points = np.array([[1.0, 0.2, -0.1], [2.0, -0.5, 0.3]])
+        np.testing.assert_allclose(
+            small.pixels(points) + 0.5, 0.75 * (full.pixels(points) + 0.5), rtol=1e-12
+        )
+    finally:
+        rig.phone.close()
+
+
+@pytest.mark.parametrize("size", [{"shrunk": 0}, {"shrunk": 2}, {"height": 528}])
+def test_pictures_of_a_size_nobody_calibrated_are_refused_until_the_size_is_right_again(size):
+    rig = Rig(DEVICE)
+    try:
+        rig.synchronise()
+        rig.say(JPEG)
+        for sequence in (2, 3):
+            with pytest.raises(WireError, match="no calibration") as refused:
+                rig.say(replace(SMALL, **size), sequence)
+            assert refused.value.code == "calibration"
+            assert rig.phone.vision is None
+        assert any("The camera is not calibrated" in why for why in rig.why())
+        rig.say(JPEG, 4)
+        assert rig.phone.vision is not None
+        assert not any("not calibrated" in why for why in rig.why())
+    finally:
+        rig.phone.close()

@@ -1,0 +1,259 @@
+"""Recordings: what was put in comes out; crashes cost the last moments only; damage is named."""
+
+import json
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+
+import msgspec
+import pytest
+
+from server.control.ipc import ControlStatus
+from server.protocol.wire import VERSION, encode
+from server.protocol.wire_records import Ping, Pong, Record, Touch
+from server.recording.reader import read, recover, recover_all
+from server.recording.writer import (
+    CAPACITY,
+    PHONE_MESSAGES,
+    PHONE_RECORDS,
+    SERVER_RECORDS,
+    STATUS,
+    Recorder,
+    RecordingError,
+    part_of,
+)
+
+TOUCH = encode(Record(7, 5_000_000, Touch(True, True, 1, 99)))
+METADATA = {"device": "a phone", "robot_file": "name = 'ames'\n"}
+WRITER = """
+import sys
+from pathlib import Path
+from server.recording.writer import Recorder
+recorder = Recorder(Path(sys.argv[1]), "killed", {"device": "a phone"})
+touch = bytes.fromhex(sys.argv[2])
+count, size = 0, 0
+while size < 3 * 131072:
+    if recorder.written > count - 1000:
+        recorder.record("phone", touch, 100.0 + 0.01 * count)
+        count += 1
+    size = Path(recorder._file.name).stat().st_size * 20  # it compresses
+print("written", flush=True)
+sys.stdin.read()
+"""
+
+
+def status(t):
+    fields = {name: None for name in ControlStatus.__struct_fields__}
+    samples = [(t - 0.005, 0.1, 0.2, 0.3, 0.0, 0.0, 9.8)]
+    return ControlStatus(**fields | {"t": t, "pose_age": float("inf"), "body_samples": samples})
+
+
+def make(directory, name="flight", touches=1):
+    recorder = Recorder(directory, name, METADATA)
+    for k in range(touches):
+        recorder.record("phone", TOUCH, 100.0 + 0.1 * k)
+    return recorder
+
+
+def test_what_was_recorded_is_read_back_in_order_of_time(tmp_path):
+    pong = encode(Record(8, 6_000_000, Pong(5, 99_000_000)))
+    recorder = make(tmp_path)
+    recorder.record("server", encode(Record(1, 99_000_000, Ping(5))), 99.0)
+    recorder.record("phone", pong, 99.5)
+    recorder.message("phone", '{"type":"command","what":"arm"}', 101.0)
+    recorder.status(status(102.0), 102.001)
+    recorder.close()
+    recording = read(recorder.path)
+    assert recording.metadata["robot_file"] == METADATA["robot_file"]
+    assert recording.metadata["protocol_version"] == str(VERSION)
+    assert list(recording.phone_records()) == [(99.5, pong), (100.0, TOUCH)]
+    entries = list(recording.entries())
+    assert [e.topic for e in entries] == [
+        SERVER_RECORDS, PHONE_RECORDS, PHONE_RECORDS, PHONE_MESSAGES, STATUS,
+    ]  # fmt: skip
+    assert (recording.t_first, recording.t_last) == (99.0, 102.001)
+    kept = json.loads(entries[-1].data)
+    assert kept["body_samples"][0] == [pytest.approx(101.995), 0.1, 0.2, 0.3, 0.0, 0.0, 9.8]
+    assert kept["pose_age"] is None
+    assert (recorder.written, recorder.dropped, recorder.error) == (5, 0, "")
+
+
+def test_capture_time_on_the_phones_clock_is_the_publish_time(tmp_path):
+    from mcap.reader import make_reader
+
+    recorder = make(tmp_path)
+    recorder.record("phone", TOUCH[:8] + b"\xff" * 24, 101.0)  # not yet checked bytes
+    recorder.record("phone", b"short", 102.0)
+    recorder.close()
+    with recorder.path.open("rb") as stream:
+        published = [m.publish_time for _, _, m in make_reader(stream).iter_messages()]
+    assert published == [5_000_000_000, 0, 102_000_000_000]
+
+
+def test_while_open_the_file_has_another_name_and_is_locked(tmp_path):
+    recorder = make(tmp_path)
+    try:
+        assert part_of(recorder.path).exists()
+        assert not recorder.path.exists()
+        assert recover_all(tmp_path) == []
+        with pytest.raises(RecordingError, match="is being written"):
+            recover(part_of(recorder.path))
+    finally:
+        recorder.close()
+    assert recorder.path.exists()
+    assert not part_of(recorder.path).exists()
+
+
+def test_a_name_in_use_is_refused(tmp_path):
+    make(tmp_path).close()
+    with pytest.raises(RecordingError, match="another name"):
+        make(tmp_path)
+
+
+def test_after_close_everything_is_dropped_and_counted(tmp_path):
+    recorder = make(tmp_path)
+    recorder.close()
+    recorder.record("phone", TOUCH, 101.0)
+    recorder.status(status(1.0), 1.0)
+    assert recorder.dropped == 2
+
+
+def test_a_slow_disk_costs_items_not_time(tmp_path, monkeypatch):
+    disk = threading.Event()
+    taken = threading.Event()
+
+    def slow(*_args):
+        taken.set()
+        disk.wait()
+
+    monkeypatch.setattr("server.recording.writer._add", slow)
+    recorder = make(tmp_path)
+    taken.wait()
+    for _ in range(CAPACITY + 30):
+        recorder.record("phone", TOUCH, 1.0)
+    assert recorder.dropped == 30
+    disk.set()
+    recorder.close()
+    assert recorder.written == CAPACITY + 1
+
+
+def test_a_full_disk_ends_the_recording_and_says_so(tmp_path):
+    recorder = Recorder(tmp_path, "flight", METADATA, max_bytes=0)
+    while not recorder.error:
+        recorder.record("phone", TOUCH, 1.0)
+    recorder.close()
+    assert "larger than" in recorder.error
+    assert read(recorder.path).metadata["device"] == "a phone"
+
+
+def test_a_killed_recording_is_refused_then_recovered(tmp_path):
+    command = [sys.executable, "-c", WRITER, str(tmp_path), TOUCH.hex()]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"written\n"
+    process.kill()
+    process.communicate()
+    part = tmp_path / "killed.mcap.part"
+    with pytest.raises(RecordingError, match=r"never closed.*--recover"):
+        read(part)
+    (path,) = recover_all(tmp_path)
+    assert not part.exists()
+    recording = read(path)
+    records = list(recording.phone_records())
+    assert recording.metadata["device"] == "a phone"
+    assert len(records) > 1000
+    assert all(data == TOUCH for _, data in records)
+    assert [t for t, _ in records] == pytest.approx([100 + 0.01 * k for k in range(len(records))])
+
+
+def test_recovering_twice_changes_nothing(tmp_path):
+    recorder = make(tmp_path, touches=50)
+    recorder.close()
+    before = list(read(recorder.path).entries())
+    recover(recorder.path)
+    assert list(read(recorder.path).entries()) == before
+    assert recover_all(tmp_path) == []
+
+
+def finished_bytes(tmp_path):
+    recorder = make(tmp_path, touches=30)
+    recorder.close()
+    return recorder.path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (b"", "not an MCAP"),
+        (b"hello, I am a film\n" * 9, "not an MCAP"),
+        (b"\x89MCAP0\r\n", "never closed"),
+        (b"\x89MCAP0\r\n" * 2, "be used|damaged"),
+        (b"\x89MCAP0\r\n" + bytes(64) + b"\x89MCAP0\r\n", "damaged"),
+    ],
+)
+def test_garbage_is_named(tmp_path, content, what):
+    path = tmp_path / "garbage.mcap"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=what) as caught:
+        read(path)
+    assert caught.value.path == path
+
+
+def test_a_directory_or_missing_file_is_named(tmp_path):
+    for path in (tmp_path, tmp_path / "none.mcap"):
+        with pytest.raises(RecordingError, match="can't be used"):
+            read(path)
+
+
+def test_every_flipped_byte_is_read_or_named(tmp_path):
+    whole = finished_bytes(tmp_path)
+    path = tmp_path / "damaged.mcap"
+    for k in range(8, len(whole) - 8, 5):
+        path.write_bytes(whole[:k] + bytes([whole[k] ^ 0x55]) + whole[k + 1 :])
+        with suppress(RecordingError):
+            assert len(list(read(path).entries())) <= 30
+
+
+def test_every_cut_is_recovered_up_to_the_cut(tmp_path):
+    whole = finished_bytes(tmp_path)
+    part = tmp_path / "cut.mcap.part"
+    counts = []
+    for k in range(8, len(whole), 97):
+        part.write_bytes(whole[:k])
+        try:
+            counts.append(len(list(read(recover(part)).entries())))
+        except RecordingError:
+            counts.append(0)
+    assert counts == sorted(counts)
+    assert counts[-1] == 30
+
+
+def test_another_version_is_named(tmp_path):
+    from mcap.writer import Writer
+
+    path = tmp_path / "old.mcap"
+    for metadata, what in (({"protocol_version": "0"}, "version 0"), (None, "no recording of")):
+        with path.open("wb") as stream:
+            writer = Writer(stream)
+            writer.start()
+            if metadata:
+                writer.add_metadata("lightleash", metadata)
+            writer.finish()
+        with pytest.raises(RecordingError, match=what):
+            read(path)
+
+
+def test_a_recording_without_a_phone_is_named(tmp_path):
+    recorder = make(tmp_path, touches=0)
+    recorder.status(status(1.0), 1.0)
+    recorder.close()
+    with pytest.raises(RecordingError, match="no stream of a phone"):
+        read(recorder.path)
+
+
+def test_statuses_survive_whatever_number_they_hold(tmp_path):
+    recorder = make(tmp_path)
+    odd = msgspec.structs.replace(status(1.0), error_m=float("nan"), lateness_ms={"p50": 1e308})
+    recorder.status(odd, 3.0)
+    recorder.close()
+    assert recorder.written == 2

@@ -1,0 +1,160 @@
+"""Packets to pictures: at the last packet, in order, and never long behind a loss."""
+
+from dataclasses import dataclass
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.protocol.wire import MAX_RECORD_BYTES
+from server.rtc.receiving.jitter import ASK_AGAIN_S, CAPACITY, JitterBuffer
+
+PATIENCE_S = 0.1
+
+
+@dataclass
+class Packet:
+    sequence_number: int
+    timestamp: int
+    marker: int
+    _data: bytes
+    payload_type: int = 99
+
+
+def stream(*sizes, first=65_530, keys=(0,)):
+    """Pictures of so many packets each; a key begins with K, others with a digit."""
+    packets = []
+    for k, size in enumerate(sizes):
+        for i in range(size):
+            text = f"{'K' if k in keys and i == 0 else '.'}{k}:{i} "
+            number = first + len(packets) & 0xFFFF
+            packets.append(Packet(number, 3000 * k, int(i == size - 1), text.encode()))
+    return packets
+
+
+class Rig:
+    def __init__(self):
+        self.t = 10.0
+        self.frames = []
+        self.buffer = JitterBuffer(
+            lambda _type, data: data.startswith(b"K"),
+            self.frames.append,
+            lambda: self.t,
+            lambda: PATIENCE_S,
+        )
+
+    def add(self, *packets):
+        return any([self.buffer.add(packet)[0] for packet in packets])
+
+    @property
+    def texts(self):
+        return [frame.data.decode() for frame in self.frames]
+
+
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_a_picture_goes_on_with_its_last_packet_not_with_the_next_picture(rig):
+    packets = stream(3)
+    rig.add(*packets[:2])
+    assert rig.frames == []
+    rig.add(packets[2])
+    assert rig.texts == ["K0:0 .0:1 .0:2 "]
+
+
+@given(st.data())
+def test_whatever_the_order_all_pictures_come_once_and_in_order(data):
+    sizes = data.draw(st.lists(st.integers(1, 5), min_size=1, max_size=8))
+    packets = stream(*sizes, first=data.draw(st.integers(0, 65_535)))
+    rest = data.draw(st.permutations(packets[1:]))
+    rig = Rig()
+    assert not rig.add(packets[0], *rest, *packets)
+    assert len(rig.frames) == len(sizes)
+    assert "".join(rig.texts) == "".join(p._data.decode() for p in packets)
+    assert [frame.number for frame in rig.frames] == list(range(1, len(sizes) + 1))
+
+
+def test_packets_that_only_fill_the_line_are_no_pictures(rig):
+    packets = stream(2, 1)
+    filling = [Packet(packets[2].sequence_number + i & 0xFFFF, 0, 0, b"") for i in range(3)]
+    packets[2].sequence_number = packets[2].sequence_number + 3 & 0xFFFF
+    rig.add(*packets[:2], *filling, packets[2])
+    assert rig.texts == ["K0:0 .0:1 ", ".1:0 "]
+
+
+def test_a_picture_without_a_mark_ends_where_the_next_one_begins(rig):
+    packets = stream(2, 1)
+    packets[1].marker = 0
+    rig.add(*packets)
+    assert rig.texts == ["K0:0 .0:1 ", ".1:0 "]
+
+
+def test_a_hole_is_waited_for_and_filled(rig):
+    packets = stream(1, 3, 1)
+    rig.add(packets[0], packets[1], *packets[3:])
+    rig.t += 0.9 * PATIENCE_S
+    assert not rig.buffer.poll(rig.t)
+    rig.add(packets[2])
+    assert len(rig.frames) == 3
+    assert rig.buffer.due() is None
+
+
+def test_after_a_hole_that_stays_only_a_key_helps_and_is_asked_for_at_once(rig):
+    packets = stream(1, 2, 1, 1, 2, 1, keys=(0, 4))
+    rig.add(packets[0], packets[1], packets[3])
+    assert rig.buffer.due() == pytest.approx(rig.t + PATIENCE_S)
+    rig.t += 1.01 * PATIENCE_S
+    assert rig.buffer.poll(rig.t)
+    assert not rig.add(packets[4])
+    assert not rig.add(*packets[5:])
+    assert rig.texts == ["K0:0 ", "K4:0 .4:1 ", ".5:0 "]
+    assert [frame.number for frame in rig.frames] == [1, 3, 4]
+    assert (rig.buffer.given_up, rig.buffer.needs_key) == (1, False)
+
+
+def test_a_key_right_behind_the_hole_is_kept(rig):
+    packets = stream(1, 2, 2, keys=(0, 2))
+    rig.add(packets[0], packets[1], *packets[3:])
+    rig.t += 1.01 * PATIENCE_S
+    rig.buffer.poll(rig.t)
+    assert rig.texts == ["K0:0 ", "K2:0 .2:1 "]
+
+
+def test_the_request_for_a_key_is_repeated_while_useless_pictures_come(rig):
+    packets = stream(*[1] * 9, keys=())
+    asked = []
+    for packet in packets:
+        if rig.add(packet):
+            asked.append(rig.t)
+        rig.t += ASK_AGAIN_S / 3.0
+    assert len(asked) == 3
+    assert rig.frames == []
+    assert rig.buffer.dropped == 9
+
+
+def test_another_stream_begins_anew_with_a_key(rig):
+    rig.add(*stream(1, 1, first=0))
+    assert rig.add(*stream(1, 1, 1, first=CAPACITY + 100, keys=(1,)))
+    assert rig.texts == ["K0:0 ", ".1:0 ", "K1:0 ", ".2:0 "]
+    assert rig.buffer.restarts == 1
+
+
+def test_a_late_packet_changes_nothing(rig):
+    packets = stream(1, 2, 1, keys=(0, 2))
+    rig.add(packets[0], packets[1], packets[3])
+    rig.t += 1.01 * PATIENCE_S
+    rig.buffer.poll(rig.t)
+    before = rig.texts
+    rig.add(packets[2], packets[0])
+    assert rig.texts == before
+
+
+def test_a_picture_without_end_is_not_kept_in_memory(rig):
+    size = MAX_RECORD_BYTES // 64
+    for number in range(2 * CAPACITY):
+        rig.add(Packet(number, 0, 0, bytes(size)))
+    assert rig.buffer._size <= MAX_RECORD_BYTES
+    assert rig.frames == []
+    assert rig.buffer.needs_key

@@ -1,0 +1,64 @@
+"""Doctor: says what is broken and what to do about it."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from hardware import camera_file
+from server.security import tls
+from server.tools import doctor
+from server.tools.doctor import BAD, GOOD, POOR, Finding
+
+
+def test_every_codec_of_the_lock_file_works():
+    found = list(doctor.codecs())
+    assert len(found) == 3
+    assert {finding.grade for finding in found} == {GOOD}
+
+
+def test_a_port_in_use_is_told_with_a_way_out():
+    with socket.create_server(("127.0.0.1", 0)) as used:
+        (finding,) = doctor.ports([used.getsockname()[1]])
+    assert finding.grade == POOR
+    assert "--https-port" in finding.advice
+
+
+def test_calibrations_are_listed_and_a_broken_one_is_named(tmp_path, monkeypatch):
+    assert {finding.grade for finding in doctor.cameras()} == {GOOD}
+    (tmp_path / "broken.yaml").write_text("image_width: [")
+    monkeypatch.setattr(camera_file, "CAMERAS", tmp_path)
+    (finding,) = doctor.cameras()
+    assert finding.grade == BAD
+    assert "broken.yaml" in finding.found
+
+
+def test_a_state_directory_that_cannot_be_written_is_told(monkeypatch):
+    def denied(_state):
+        raise PermissionError("no")
+
+    monkeypatch.setattr(tls, "certificate", denied)
+    (finding,) = doctor.certificates()
+    assert finding.grade == BAD
+    assert "writable" in finding.advice
+
+
+@pytest.mark.parametrize(("grade", "code"), [(GOOD, 0), (POOR, 0), (BAD, 1)])
+def test_only_what_is_broken_fails(monkeypatch, capsys, grade, code):
+    for name in ("machine", "certificates", "codecs", "cameras"):
+        monkeypatch.setattr(doctor, name, lambda: iter(()))
+    monkeypatch.setattr(doctor, "ports", lambda _: iter(()))
+    finding = Finding(grade, "thing", "state", "do this")
+    monkeypatch.setattr(doctor, "realtime", lambda _: iter([finding]))
+    assert doctor.main([]) == code
+    printed = capsys.readouterr().out
+    assert f"[{grade}] thing: state" in printed
+    assert "do this" in printed
+
+
+@pytest.mark.slow
+def test_the_schedule_is_measured_in_a_process_of_its_own():
+    granted, held = doctor.realtime(0.2)
+    assert granted.what == "real time"
+    assert "p999" in held.found

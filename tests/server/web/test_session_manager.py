@@ -1,0 +1,296 @@
+"""Hub: one operator at a time, wishes that arrive, events that can be read."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+import pytest
+
+from server.common.clock import now
+from server.common.runtime_parameters import TuneInput
+from server.control.ipc import ReadyInput, RequestInput
+from server.diagnostics.events import EVENTS
+from server.protocol.messages import Command, Hello, Tune, encode_message
+from server.protocol.wire import VERSION, decode, encode
+from server.protocol.wire_records import Codec, Ping, Record
+from server.security.pairings import of_this_machine
+from server.web import session_manager as hub_module
+from server.web.lease import LEASE_S
+from tests.server.house import JPEG, control_status, house_in, is_request
+
+
+class Paper:
+    """A page that keeps what it is sent."""
+
+    def __init__(self) -> None:
+        self.data: list[str | bytes] = []
+
+    def push(self, data: str | bytes) -> None:
+        self.data.append(data)
+
+    push_newest = push
+
+
+@pytest.fixture
+def house(tmp_path):
+    with house_in(tmp_path) as made:
+        yield made
+
+
+def test_a_recording_begins_with_a_picture_that_can_be_decoded(house):
+    async def scene():
+        page = Paper()
+        house.hub.greet(hello("first"), page)
+        house.hub.start_recording()
+        await asyncio.sleep(0)
+        house.hub.recordings.stop()
+        return page.data
+
+    assert encode_message(Command("key_frame")) in asyncio.run(scene())
+
+
+def hello(device: str) -> Hello:
+    return Hello(VERSION, "operator", device)
+
+
+def in_loop(scene):
+    async def run():
+        return scene()
+
+    return asyncio.run(run())
+
+
+def test_one_phone_leads_until_it_has_been_silent(house, monkeypatch):
+    def scene():
+        hub = house.hub
+        first = hub.greet(hello("first"), Paper())
+        assert hub.greet(hello("second"), Paper()) is None
+        assert hub.phone is first
+        monkeypatch.setattr("server.web.session_manager.now", lambda: now() + LEASE_S)
+        second = hub.greet(hello("second"), Paper())
+        assert hub.phone is second is not None
+        hub.part(first)
+        assert hub.phone is second
+        hub.part(second)
+        assert hub.phone is None
+
+    in_loop(scene)
+
+
+def test_whoever_comes_to_lead_finds_the_robot_disarmed(house):
+    in_loop(lambda: house.hub.greet(hello("first"), Paper()))
+    assert any(map(is_request("disarm"), house.control.inputs()))
+
+
+def test_pings_go_to_the_phone_that_leads_alone(house, monkeypatch):
+    def scene():
+        old, new = Paper(), Paper()
+        house.hub.greet(hello("first"), old)
+        house.hub.ping()
+        monkeypatch.setattr("server.web.session_manager.now", lambda: now() + LEASE_S)
+        house.hub.greet(hello("second"), new)
+        house.hub.ping()
+        (ping,) = map(decode, new.data)
+        assert isinstance(ping.body, Ping)
+        assert len(old.data) == 1
+
+    in_loop(scene)
+
+
+def test_only_the_session_that_leads_may_send_pictures(house):
+    def scene():
+        assert house.hub.join_video("", Paper()) is None
+        phone = house.hub.greet(hello("first"), Paper())
+        assert house.hub.join_video("guess", Paper()) is None
+        assert house.hub.join_video(phone.id, Paper()) is phone
+        house.hub.part(phone)
+        assert house.hub.join_video(phone.id, Paper()) is None
+
+    in_loop(scene)
+
+
+class Fast:
+    """A fast path that keeps what it is told."""
+
+    def __init__(self):
+        self.data, self.keys, self.closed, self.has_video = [], 0, False, True
+
+    def push(self, data):
+        self.data.append(data)
+
+    def request_key(self):
+        self.keys += 1
+
+    def close(self):
+        self.closed = True
+
+
+def test_pings_take_all_ways_that_are_open(house):
+    def scene():
+        page, fast = Paper(), Fast()
+        phone = house.hub.greet(hello("first"), page)
+        assert house.hub.join_fast("guess", fast) is None
+        house.hub.ping()
+        assert house.hub.join_fast(phone.id, fast) is phone
+        house.hub.ping()
+        assert len(fast.data) == 1
+        assert page.data[1:] == fast.data
+        house.hub.paths.leave(fast)
+        house.hub.ping()
+        assert (len(fast.data), len(page.data)) == (1, 3)
+
+    in_loop(scene)
+
+
+def test_a_phone_has_one_fast_path_which_goes_with_it(house):
+    def scene():
+        phone = house.hub.greet(hello("first"), Paper())
+        former, fast = Fast(), Fast()
+        house.hub.join_fast(phone.id, former)
+        house.hub.join_fast(phone.id, fast)
+        assert (former.closed, fast.closed) == (True, False)
+        house.hub.paths.leave(former)  # late news
+        house.hub.ping()
+        assert len(fast.data) == 1
+        house.hub.part(phone)
+        assert fast.closed
+
+    in_loop(scene)
+
+
+def test_a_recording_begins_with_a_key_picture(house):
+    def scene():
+        fast = Fast()
+        phone = house.hub.greet(hello("first"), Paper())
+        house.hub.join_fast(phone.id, fast)
+        house.hub.start_recording()
+        assert fast.keys == 1
+
+    in_loop(scene)
+
+
+def test_what_the_server_lacks_reaches_control_with_every_tick(house):
+    house.hub._tick()
+    (ready,) = house.control.inputs()
+    assert isinstance(ready, ReadyInput)
+    assert "No phone is connected" in ready.refusals[0]
+
+
+def test_wishes_reach_control_except_those_for_phones(house):
+    def scene():
+        for what in ("arm", "disarm", "stop", "reset", "key_frame"):
+            house.hub.wish(Command(what), of_this_machine("operator"))
+
+    in_loop(scene)
+    heard = [m.what for m in house.control.inputs() if isinstance(m, RequestInput)]
+    assert heard == ["arm", "disarm", "stop", "reset"]
+    assert house.hub.events[0] == "local program (operator): reset"
+
+
+def test_a_turned_knob_reaches_control_and_is_an_event(house):
+    in_loop(lambda: house.hub.tune(Tune(cutoff_hz=0.5, guard=False)))
+    assert house.control.inputs() == [TuneInput(cutoff_hz=0.5, guard=False)]
+    assert house.hub.events[0] == "supervisor: virtual camera: cutoff_hz 0.5, guard False"
+
+
+def test_a_wish_to_turn_nothing_is_none(house):
+    in_loop(lambda: house.hub.tune(Tune()))
+    assert house.control.inputs() == []
+    assert not house.hub.events
+
+
+def test_a_knob_that_does_not_reach_control_is_told(house):
+    house.control.close()
+    in_loop(lambda: house.hub.tune(Tune(mode="off")))
+    assert "did not reach" in house.hub.events[0]
+
+
+def test_a_stop_is_said_again_until_control_can_take_it(house):
+    async def scene():
+        while house.hub._control.send(ReadyInput([])):
+            pass
+        house.hub.wish(Command("stop"), of_this_machine("operator"))
+        assert not any(map(is_request("stop"), house.control.inputs()))
+        heard = []
+        for _ in range(1000):
+            heard += house.control.inputs()
+            if any(map(is_request("stop"), heard)):
+                return
+            await asyncio.sleep(0.005)
+        raise AssertionError(heard)
+
+    asyncio.run(scene())
+
+
+def test_events_are_few_newest_first_and_hold_no_control_characters(house):
+    for k in range(2 * EVENTS):
+        house.hub.say(f"{k}\x1b]0;owned\x07\n")
+    assert len(house.hub.events) == EVENTS
+    assert house.hub.events[0] == f"{2 * EVENTS - 1}·]0;owned··"
+
+
+def test_a_change_of_mode_is_an_event_and_every_page_is_told(house):
+    watcher = Paper()
+    house.hub.supervisors.add(watcher)
+    house.control.send(control_status(mode=5, reason="STOP was pressed."))
+    house.hub._hear_control()
+    house.hub._tick()
+    assert house.hub.events[0] == "STOPPED: STOP was pressed."
+    house.hub._tick()
+    assert list(house.hub.events).count("STOPPED: STOP was pressed.") == 1
+    assert '"mode":"STOPPED"' in watcher.data[-1]
+
+
+class Eyes:
+    """A vision thread that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.known: list[tuple[object, ...]] = []
+
+    def know(self, *what: object) -> None:
+        self.known.append(what)
+
+    def feel_body(self, samples: object) -> None: ...
+
+    def stop(self) -> None: ...
+
+
+def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
+    def scene():
+        phone = house.hub.greet(hello("first"), Paper())
+        phone.vision = eyes = Eyes()
+        sure = {"u_bf_in_c": (0.0, 0.1, 0.0), "sigma_p": 0.01, "sigma_theta": 0.02}
+        pose = {"p_bc_in_c": (2.5, 0.0, 0.0), "R_cb_wxyz": (1.0, 0.0, 0.0, 0.0)}
+        for fields in ({}, {**pose, **sure}):
+            house.control.send(control_status(**fields))
+        house.hub._hear_control()
+        (_, _, before), (_, _, after) = eyes.known
+        assert before is None
+        assert (after.sigma_p, after.sigma_theta, after.time_offset) == (0.01, 0.02, 0.0)
+        assert after.p_bc_in_c.tolist() == [2.5, 0.0, 0.0]
+        assert after.R_cb.tolist() == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+
+    in_loop(scene)
+
+
+def test_a_recording_asks_for_a_key_again_until_one_has_come(house, monkeypatch):
+    def scene():
+        fast, t = Fast(), now()
+        phone = house.hub.greet(hello("first"), Paper())
+        house.hub.join_fast(phone.id, fast)
+        house.hub.start_recording()
+        picture = replace(JPEG, codec=Codec.H264, key=False)
+        for _ in range(30):
+            t += 0.1
+            monkeypatch.setattr(hub_module, "now", lambda t=t: t)
+            house.hub.record(encode(Record(1, 1, picture)), t)
+            house.hub._ask_key()
+        assert 6 <= fast.keys <= 8  # twice a second
+        house.hub.record(encode(Record(2, 1, replace(picture, key=True))), t)
+        asked = fast.keys
+        monkeypatch.setattr(hub_module, "now", lambda: t + 10.0)
+        house.hub._ask_key()
+        assert fast.keys == asked
+
+    in_loop(scene)

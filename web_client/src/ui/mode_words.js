@@ -1,0 +1,32 @@
+/** What the modes are called and what they mean to a person. */
+
+/** @import {Status} from '../wire/protocol_types.js' */
+/** @import {ShownMode} from './session_types.js' */
+
+/** @type {Record<ShownMode, [string, string]>} */
+export const MODE_WORDS = {
+  DISARMED: ['DISARMED', 'Thrusters are off'],
+  ARMED: ['ARMED', 'Ready to move'],
+  TRACK: ['TRACK', 'The robot follows you'],
+  COAST: ['COAST', 'Waiting for the network…'],
+  HOLD: ['HOLD', 'The robot keeps still'],
+  RAMP: ['RAMP', 'Thrust fades to zero'],
+  STOPPED: ['STOPPED', 'Thrust is off'],
+  LOST: ['LOST', 'The control is silent'],
+  NO_LINK: ['NO LINK', 'Connecting…'],
+  NO_WORD: ['NO WORD', 'The server is silent'],
+};
+
+/** On whose side a silence was. @type {Record<string, string>} */
+export const SIDES = { phone: 'phone', robot: 'robot', server: 'computer' };
+
+/**
+ * How many gaps there were in the last minute, and on whose side most of them.
+ * @param {Status['gaps']} gaps
+ */
+export function gapWords(gaps) {
+  const sides = Object.entries(gaps).sort(([, a], [, b]) => b.count - a.count);
+  const total = sides.reduce((sum, [, { count }]) => sum + count, 0);
+  const [most] = sides;
+  return most === undefined || total === 0 ? '0' : `${total} ${SIDES[most[0]] ?? most[0]}`;
+}

@@ -1,0 +1,168 @@
+/**
+ * Which picture of the camera is this encoded frame? Browsers do not say. The frame bears RTP's time stamp,
+ * whose clock began anywhere but runs beside the camera's to a millisecond: how far it is ahead is found by
+ * laying the frames' stamps over the captures', as a key over a lock.
+ */
+
+/** @import {ScreenAngle} from '../wire/protocol.js' */
+
+/**
+ * @typedef {object} Capture
+ * @property {number} captureUs On the page's clock.
+ * @property {number} stampUs On the camera's.
+ * @property {number} lateUs So much later than it was taken `captureUs` may be [µs].
+ * @property {ScreenAngle} screenAngle
+ */
+
+/** @typedef {{ stampUs: number, outUs: number }} Encoded By RTP's clock, and when it left on the page's. */
+
+const RTP_PER_US = 0.09;
+const KEPT_CAPTURES = 128;
+const KEPT_FRAMES = 40;
+/** A starved page tells late of its captures: frames that left so long ago have theirs for certain [µs]. */
+const HINDSIGHT_US = 300_000;
+const ENOUGH = 5;
+/** A capture so long before is not the one that comes out [µs]. */
+const OLD_US = 200_000;
+/** A capture further from where it should be is another picture's, its own was skipped [µs]. */
+const FAR_US = 5000;
+/** Where cameras are too regular to tell, the quicker encoder is believed: a period costs half a ms. */
+const DELAY_COST = 0.015;
+/** Between a capture and its way out of a quick encoder, where nothing is known of captures [µs]. */
+const USUAL_US = 10_000;
+
+export class CaptureMatcher {
+  constructor() {
+    /** @type {Capture[]} */
+    this.captures = [];
+    /** @type {Encoded[]} */
+    this.frames = [];
+    /** How far RTP's clock is ahead of the camera's [µs]. @type {number | null} */
+    this.aheadUs = null;
+    /** @type {number | null} */
+    this.lastStamp = null;
+    this.ticks = 0;
+    this.lastUs = -Infinity;
+    /** No frame leaves before it was taken, but captures are told late: so much later they may be, [µs] */
+    this.lateUs = 0;
+    /** and so much later they are, by the quickest frame. */
+    this.foundLateUs = 0;
+    /** @type {ScreenAngle} */
+    this.screenAngle = 0;
+  }
+
+  /** @param {Capture} capture In the order of time. */
+  captured(capture) {
+    this.captures.push(capture);
+    this.screenAngle = capture.screenAngle;
+    this.lateUs = capture.lateUs;
+    if (this.captures.length > KEPT_CAPTURES) this.captures.shift();
+  }
+
+  /**
+   * When an encoded frame was taken, on the page's clock, and how the screen stood.
+   * @param {number} rtpTimestamp
+   * @param {number} nowUs On the page's clock.
+   * @returns {Pick<Capture, 'captureUs' | 'screenAngle'>}
+   */
+  match(rtpTimestamp, nowUs) {
+    const stampUs = this.unwrapped(rtpTimestamp) / RTP_PER_US;
+    this.frames.push({ stampUs, outUs: nowUs });
+    if (this.frames.length > KEPT_FRAMES) this.frames.shift();
+    this.aheadUs = this.ahead(nowUs);
+    const found = this.aheadUs === null
+      ? { captureUs: nowUs - USUAL_US, screenAngle: this.screenAngle }
+      : this.taken(stampUs - this.aheadUs);
+    const captureUs = Math.max(found.captureUs - this.foundLateUs, this.lastUs + 1);
+    this.lastUs = captureUs;
+    return { captureUs, screenAngle: found.screenAngle };
+  }
+
+  /** @param {number} stampUs By the camera's clock: of a capture, or of one that the page has skipped. */
+  taken(stampUs) {
+    const near = nearest(this.captures, stampUs);
+    if (near === null) return { captureUs: stampUs, screenAngle: this.screenAngle };
+    const { captureUs, screenAngle } = near;
+    const skippedUs = stampUs - near.stampUs;
+    return Math.abs(skippedUs) <= FAR_US ? near : { captureUs: captureUs + skippedUs, screenAngle };
+  }
+
+  /**
+   * How far RTP's clock is ahead of the camera's: of all that is possible, what fits best.
+   * @param {number} nowUs
+   */
+  ahead(nowUs) {
+    const old = this.frames.filter(({ outUs }) => outUs <= nowUs - HINDSIGHT_US);
+    const frames = old.length >= ENOUGH ? old : this.frames;
+    const last = frames.at(-1);
+    if (last === undefined) return null;
+    const tried = this.captures
+      .filter(({ captureUs }) => captureUs <= last.outUs + this.lateUs && captureUs > last.outUs - OLD_US)
+      .map(({ stampUs }) => last.stampUs - stampUs);
+    if (this.aheadUs !== null) tried.push(this.aheadUs);
+    let best = this.aheadUs;
+    let least = Infinity;
+    for (const rough of tried) {
+      const { aheadUs, delayUs, misfit } = this.fit(rough, frames);
+      if (misfit < least) [best, least, this.foundLateUs] = [aheadUs, misfit, Math.max(0, -delayUs)];
+    }
+    return best;
+  }
+
+  /**
+   * @param {number} roughUs How far RTP's clock may be ahead.
+   * @param {Encoded[]} frames
+   */
+  fit(roughUs, frames) {
+    const offsets = frames.map(({ stampUs }) => offset(this.captures, stampUs - roughUs));
+    const aheadUs = roughUs + median(offsets);
+    let misfit = 0;
+    let delayUs = Infinity;
+    for (const { stampUs, outUs } of frames) {
+      const wayUs = stampUs - aheadUs;
+      misfit += Math.min(Math.abs(offset(this.captures, wayUs)), FAR_US) / frames.length;
+      delayUs = Math.min(delayUs, outUs - this.taken(wayUs).captureUs);
+    }
+    return { aheadUs, delayUs, misfit: delayUs < -this.lateUs ? Infinity : misfit + DELAY_COST * delayUs };
+  }
+
+  /** @param {number} rtpTimestamp */
+  unwrapped(rtpTimestamp) {
+    this.ticks += (rtpTimestamp - (this.lastStamp ?? rtpTimestamp)) | 0;
+    this.lastStamp = rtpTimestamp;
+    return this.ticks;
+  }
+}
+
+/**
+ * @param {Capture[]} captures In the order of time.
+ * @param {number} stampUs
+ */
+function nearest(captures, stampUs) {
+  let low = 0;
+  let high = captures.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (/** @type {Capture} */ (captures[middle]).stampUs < stampUs) low = middle + 1;
+    else high = middle;
+  }
+  const after = captures[low] ?? null;
+  const before = captures[low - 1] ?? null;
+  if (before === null || after === null) return before ?? after;
+  return stampUs - before.stampUs <= after.stampUs - stampUs ? before : after;
+}
+
+/**
+ * From the nearest capture [µs].
+ * @param {Capture[]} captures
+ * @param {number} stampUs
+ */
+function offset(captures, stampUs) {
+  return stampUs - (nearest(captures, stampUs)?.stampUs ?? stampUs);
+}
+
+/** @param {number[]} values At least one. */
+function median(values) {
+  const sorted = [...values].sort((a, b) => a - b);
+  return /** @type {number} */ (sorted[values.length >> 1]);
+}

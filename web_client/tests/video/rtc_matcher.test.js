@@ -1,0 +1,94 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { CaptureMatcher } from '../../src/video/rtc_matcher.js';
+
+/** Repeatable noise from 0 to 1. @param {number} seed */
+function noise(seed) {
+  let state = seed;
+  return () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return state / 2 ** 32;
+  };
+}
+
+/**
+ * Frames through an encoder: the share that is matched with its own capture, after the first second.
+ * @param {{ encodingMs: number, jitterMs: number, spread?: number, lost?: number, periodMs?: number, count?: number,
+ *   starvedMs?: number, lateMs?: number }} way
+ */
+function matchedShare({
+  encodingMs, jitterMs, spread = 6, lost = 0, periodMs = 1000 / 30, count = 300, starvedMs = 0, lateMs = 0,
+}) {
+  const random = noise(7);
+  const matcher = new CaptureMatcher();
+  /** @type {{ at: number, act: () => void }[]} */
+  const events = [];
+  let right = 0;
+  let all = 0;
+  let busyUntil = 0;
+  let toldUs = 0;
+  for (let k = 0; k < count; k += 1) {
+    const captureUs = 5e6 + 1000 * (k * periodMs + spread * random());
+    toldUs = Math.max(toldUs, captureUs + 1500 + 1000 * (lateMs + starvedMs * random()));
+    const saidUs = captureUs + 1000 * lateMs;
+    const lateUs = 2000 + 1000 * lateMs;
+    const capture = { captureUs: saidUs, stampUs: captureUs - 5e6, lateUs, screenAngle: /** @type {const} */ (90) };
+    events.push({ at: toldUs, act: () => matcher.captured(capture) });
+    if (random() < lost) continue;
+    const stamp = (4294900000 + Math.round(0.09 * (captureUs + 1000 * jitterMs * (random() - 0.5)))) >>> 0;
+    const slow = k === 0 ? 60 : 0;
+    busyUntil = Math.max(busyUntil, captureUs + 1000 * (encodingMs + slow + 8 * random() ** 3));
+    const at = busyUntil;
+    events.push({
+      at,
+      act: () => {
+        const found = matcher.match(stamp, at);
+        if (k < 30) return;
+        all += 1;
+        right += Math.abs(found.captureUs - captureUs) < 4000 ? 1 : 0;
+      },
+    });
+  }
+  events.sort((a, b) => a.at - b.at).forEach(({ act }) => act());
+  return right / all;
+}
+
+for (const [words, way] of Object.entries({
+  'a quick encoder': { encodingMs: 3, jitterMs: 2 },
+  'the encoder of a phone': { encodingMs: 22, jitterMs: 4 },
+  'a camera that skips and an encoder that drops': { encodingMs: 8, jitterMs: 4, spread: 15, lost: 0.2 },
+  'a page that is starved and tells late of its captures': { encodingMs: 8, jitterMs: 1, starvedMs: 150 },
+  'an encoder slower than a picture, and a camera not too regular': { encodingMs: 50, jitterMs: 1, spread: 12, lost: 0.6 },
+  'a quick encoder, and captures told of on their way to the screen': { encodingMs: 2, jitterMs: 2, spread: 2, lateMs: 9 },
+  'sixty pictures a second': { encodingMs: 5, jitterMs: 2, spread: 3, periodMs: 1000 / 60, count: 600 },
+})) {
+  test(`each encoded frame finds its own picture: ${words}`, () => {
+    assert.equal(matchedShare(way), 1);
+  });
+}
+
+test('a frame whose capture was skipped is dated between its neighbours, and no capture is used twice', () => {
+  const matcher = new CaptureMatcher();
+  /** @type {number[]} */
+  const times = [];
+  for (let k = 0; k < 200; k += 1) {
+    const captureUs = 1e6 + k * 33_333;
+    if (k % 9 !== 5) matcher.captured({ captureUs, stampUs: captureUs + 77, lateUs: 2000, screenAngle: 0 });
+    const found = matcher.match(Math.round(0.09 * captureUs) >>> 0, captureUs + 6000 + (k % 5) * 1000);
+    if (k >= 40) {
+      times.push(found.captureUs);
+      assert.ok(Math.abs(found.captureUs - captureUs) < 8000, `${found.captureUs - captureUs}`);
+    }
+  }
+  assert.ok(times.every((t, i) => i === 0 || t > Number(times[i - 1])));
+});
+
+test('without captures a frame is dated by its way out, with the last known angle', () => {
+  const matcher = new CaptureMatcher();
+  matcher.captured({ captureUs: 1e6, stampUs: 0, lateUs: 2000, screenAngle: 270 });
+  const first = matcher.match(90_000, 9e6);
+  assert.equal(first.screenAngle, 270);
+  const later = matcher.match(90_000 + 90_000, 10e6);
+  assert.ok(Math.abs(later.captureUs - first.captureUs - 1e6) < 1e3);
+});
