@@ -18,6 +18,7 @@ from pipeline.control.tracking import Situation, Tracking
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.estimation.attitude import Attitude
 from pipeline.estimation.estimators import make_estimator
+from pipeline.estimation.frozen_imu import FrozenImu
 from pipeline.estimation.gyro_bridge import GyroBridge
 from pipeline.frames import Array
 from pipeline.robot import Robot
@@ -103,7 +104,7 @@ class Teleop:
         self._operator = Operator(-np.inf, held=False, press=0)
         self._half_field: tuple[float, float] | None = None
         self._t_seen = self._t_phone = -np.inf
-        self._body = BodyImu(-np.inf, np.zeros(3), np.zeros(3))
+        self._body, self._frozen_imu = BodyImu(-np.inf, np.zeros(3), np.zeros(3)), FrozenImu()
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
         self._force_in_b = self._given_in_b = np.zeros(3)
@@ -181,6 +182,7 @@ class Teleop:
         for body in inputs.body_imu:
             self.estimator.add_body_imu(body)
             self._body = body
+            self._frozen_imu.add(body)
         for seen in inputs.seen:
             self._half_field = seen.half_field
             if self.estimator.add_seen(seen, inputs.t):
@@ -228,7 +230,9 @@ class Teleop:
         return failsafe.Inputs(
             held=self._operator.held,
             press=self._operator.press,
-            fault=inputs.fault or flight_envelope.fault(limits, is_tracking, known, error),
+            fault=inputs.fault
+            or flight_envelope.fault(limits, is_tracking, known, error)
+            or self._sensor_fault(),
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
             or self._astray(known),
@@ -236,6 +240,15 @@ class Teleop:
             requests=inputs.requests,
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
             **ages.in_ms(),
+        )
+
+    def _sensor_fault(self) -> str:
+        """A body at rest may say the same for long, if its sensors are simulated without noise."""
+        flies = self._failsafe.mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
+        return (
+            "The robot's motion sensors stand still."
+            if flies and self._frozen_imu.is_frozen
+            else ""
         )
 
     def _astray(self, known: Situation | None) -> str:

@@ -23,6 +23,11 @@ LEFT = np.array([0.0, 1.0, 0.0])
 COVARIANCE = np.diag([1e-6, 1e-7, 1e-7, 1e-6, 1e-6, 1e-6])
 
 
+def quiver(t: float) -> np.ndarray:
+    """What a gyroscope at rest says (3,) [rad/s]: never the same twice."""
+    return np.full(3, 1e-9 * t)
+
+
 def run(
     teleop: Teleop,
     start: float,
@@ -32,6 +37,7 @@ def run(
     arm_at: float = -1.0,
     body_a: np.ndarray = UP,
     R_cb: np.ndarray = LEVEL,
+    gyro: Callable[[float], np.ndarray] = quiver,
 ) -> list[Output]:
     """Everything at rest, seen perfectly, 50 ms late."""
     outputs = []
@@ -45,7 +51,7 @@ def run(
                 Inputs(
                     t=t,
                     phone_imu=phone,
-                    body_imu=(BodyImu(t, STILL, body_a),),
+                    body_imu=(BodyImu(t, gyro(t), body_a),),
                     seen=(picture,) if k % 6 == 0 and seen > 0.0 else (),
                     operator=Operator(t - 0.01, held, int(held)),
                     requests=Requests(arm=abs(t - arm_at) < 1e-9),
@@ -102,7 +108,7 @@ def test_timers_go_by_the_measured_time_at_every_rate_of_control(rate_hz: int) -
         inputs = Inputs(
             t=t,
             phone_imu=(PhoneImu(t - 0.02, STILL, UP),),
-            body_imu=(BodyImu(t, STILL, UP),),
+            body_imu=(BodyImu(t, quiver(t), UP),),
             seen=(seen,) if k % (rate_hz // 15) == 0 else (),
             operator=Operator(t - 0.01, False, 1),
         )
@@ -143,3 +149,14 @@ def test_thrusts_are_always_finite_and_within_limits() -> None:
         assert np.isfinite(output.thrusts).all()
         assert output.thrusts.min() >= 0.0
         assert output.thrusts.max() <= ROBOT.f_max
+
+
+@pytest.mark.parametrize("gyro", [np.zeros(3), np.array([0.1, 0.0, 0.0])])
+def test_a_flight_ends_when_the_robots_motion_sensors_stand_still(gyro: np.ndarray) -> None:
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    run(teleop, 1.5, 0.3, held=True)
+    frozen = run(teleop, 1.8, 0.15, held=True, gyro=lambda t: gyro)
+    assert [o.failsafe.mode for o in frozen if o.t < 1.89] == 18 * [Mode.TRACK]
+    assert frozen[-1].failsafe.mode == Mode.RAMP
+    assert frozen[-1].failsafe.reason == "The robot's motion sensors stand still."

@@ -189,7 +189,7 @@ PEOPLE: Final = (
 )
 BODY: Final = (
     open_ended("body's rates are no numbers", "27", h.body_imu("nan")),
-    open_ended("body's sensors stuck", "22", h.body_imu("stuck")),
+    ramps("body's sensors stuck", "22", h.body_imu("stuck"), 0.12),
     open_ended("body's gyroscope 6°/s off", "22", h.body_imu("biased")),
     open_ended("body's accelerations turned round", "22", h.body_imu("turned")),
     open_ended("a thruster dead", "29", h.thruster(0.0)),

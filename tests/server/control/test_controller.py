@@ -38,6 +38,11 @@ UP, STILL = (0.0, 0.0, GRAVITY), (0.0, 0.0, 0.0)
 COVARIANCE = np.diag([1e-6] * 6)
 
 
+def quiver(t: float) -> np.ndarray:
+    """What a gyroscope at rest says (3,) [rad/s]: never the same twice."""
+    return np.full(3, 1e-9 * t)
+
+
 def picture(t: float) -> SeenInput:
     """Of a robot at rest, 2.5 m ahead."""
     place = np.array([2.5, 0.0, 0.0])
@@ -77,7 +82,7 @@ class Rig:
             self.k += 1
             t = 100.0 + 0.005 * self.k
             said = [*self.said(t), *(extra if step == 0 else ())]
-            body = [BodyImu(t - 0.003, np.zeros(3), np.array(UP))]
+            body = [BodyImu(t - 0.003, quiver(t), np.array(UP))]
             out.append(self.controller.tick(t, said, body, robot_reason, robot_gap))
         return out
 
@@ -99,7 +104,7 @@ class Rig:
                 self.k += 1
                 heard = 100.0 + 0.005 * self.k
                 said += self.said(heard)
-                body.append(BodyImu(heard - 0.003, np.zeros(3), np.array(UP)))
+                body.append(BodyImu(heard - 0.003, quiver(heard), np.array(UP)))
             yield t, self.controller.tick(t, said, body, "")[1]
             said, body = [], []
 
