@@ -63,6 +63,11 @@ class _Verdict:
         if error is not None and not isinstance(error, pytest.skip.Exception):
             os._exit(pytest.ExitCode.TESTS_FAILED)
 
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """So is a module that cannot be imported, or a test named in it would count as misspelt."""
+        if report.failed:
+            os._exit(pytest.ExitCode.TESTS_FAILED)
+
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, exitstatus: int) -> None:
         """A test that failed may leave open sockets behind: of no interest."""
@@ -138,7 +143,6 @@ def _result(status: int, cpu_s: float) -> Result:
     code = os.WEXITSTATUS(status)
     if code == pytest.ExitCode.OK:
         return Result(Outcome.SURVIVED, cpu_s)
-    # A module that cannot even be imported interrupts pytest while it collects.
-    if code in (pytest.ExitCode.TESTS_FAILED, pytest.ExitCode.INTERRUPTED):
+    if code == pytest.ExitCode.TESTS_FAILED:
         return Result(Outcome.KILLED, cpu_s)
     raise HarnessError(f"pytest ended with status {code}")

@@ -56,11 +56,14 @@ static int f(int a, int b)
 """
 
 
-def mutants(directory: Path, test: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+def mutants(
+    directory: Path, test: str, *arguments: str, name: str = ""
+) -> subprocess.CompletedProcess[str]:
+    """`name`: of the only test that is asked; all by default."""
     (directory / "planted.py").write_text(SOURCE)
     (directory / "test_planted.py").write_text(test)
     targets = directory / "targets.toml"
-    targets.write_text('["planted.py"]\ntests = ["test_planted.py"]\n')
+    targets.write_text(f'["planted.py"]\ntests = ["test_planted.py{name}"]\n')
     places = ("--root", str(directory), "--targets", str(targets))
     return subprocess.run(
         (sys.executable, "-m", "tests.mutants", *places, *arguments),
@@ -113,6 +116,18 @@ def test_tests_that_fail_without_a_mutant_are_an_error_and_no_score(tmp_path):
     done = mutants(tmp_path, WEAK.replace("assert light(0)", "assert False"), *equivalent(tmp_path))
     assert done.returncode != 0
     assert "fail without a mutant" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_mutant_with_which_a_named_tests_module_fails_to_load_is_killed(tmp_path):
+    """Only a name that exists with no mutant is no error."""
+    loads = STRONG + "\nassert light(0) is Light.GREEN\n"
+    name = "::test_only_the_slow_get_green"
+    done = mutants(tmp_path, loads, *equivalent(tmp_path), name=name)
+    assert (done.returncode, "100.0%" in done.stdout) == (0, True), done.stderr
+    done = mutants(tmp_path, loads, *equivalent(tmp_path), name=f"{name}_")
+    assert done.returncode != 0
+    assert "pytest ended with status 4" in done.stderr
 
 
 def test_a_mutant_is_known_by_its_change_wherever_it_stands():
