@@ -178,6 +178,7 @@ class RobotEnd:
     def halt(self) -> None:
         """Zero at once, then refuse: the robot is being switched off."""
         self._refuse()
+        self._candidate = 0
 
     def sample(
         self, now_us: int, nonce: int, omega_in_b: Triple, a_in_b: Triple, thrusts: Array
@@ -218,13 +219,12 @@ class RobotEnd:
     def _note(self, command: Command) -> bool:
         """Whether nothing newer was heard before; if so, remember it, and echo its challenge."""
         epoch, counter = self._newest
-        if command.epoch < epoch:
-            return False
-        if command.epoch == epoch and not is_later(command.counter, counter):
-            return False
-        self._newest = command.epoch, command.counter
-        self._challenge = command.challenge
-        return True
+        later = is_later(command.counter, counter)
+        newest = command.epoch > epoch or (command.epoch == epoch and later)
+        if newest:
+            self._newest = command.epoch, command.counter
+            self._challenge = command.challenge
+        return newest
 
     def _advance(self, now_us: int) -> None:
         """Let time do its work: silence, ramp, abandoned handshakes."""
@@ -239,10 +239,10 @@ class RobotEnd:
         if self.state == FollowerState.COAST and silence_us > coast_us:
             self._leave(now_us)
         if self.state == FollowerState.RAMP and self._given.has_faded(now_us):
-            self._refuse(self._candidate)
+            self._refuse()
 
     def _leave(self, now_us: int) -> None:
-        """Ramp down; at once if there is no thrust."""
+        """Ramp down, or go on to; at once if there is no thrust."""
         if self._given:
             self.state, self.refusal = FollowerState.RAMP, Refusal.SILENT
             self._given.fade(now_us)
@@ -254,10 +254,10 @@ class RobotEnd:
         early = now_us - self._taken_us <= self._limits.back_until_us
         return early and not self._replaced
 
-    def _refuse(self, candidate: int = 0) -> None:
+    def _refuse(self) -> None:
+        """At once; a handshake goes on."""
         self.state, self.refusal = FollowerState.REFUSING, Refusal.SILENT
         self._given.zero()
-        self._candidate = candidate
 
     def _judge(self, command: Command, now_us: int) -> Refusal:
         limits = self._limits
@@ -310,7 +310,7 @@ class RobotEnd:
         running = bool(thrusts.any())
         self._taken_us, self._counter = now_us, command.counter
         if self.state == FollowerState.RAMP and not running:
-            self._refuse(self._candidate)
+            self._refuse()
         else:
             self._given.follow(thrusts, now_us)
             self.state = FollowerState.RUNNING if running else FollowerState.IDLE
@@ -319,10 +319,9 @@ class RobotEnd:
     def _shake_hands(self, command: Command, now_us: int) -> None:
         """Zero of a later epoch: it gets the robot when thrust is zero and time enough is over."""
         self._replaced = True
-        if self.state not in (FollowerState.RAMP, FollowerState.REFUSING):
-            self._leave(now_us)
+        self._leave(now_us)
         if command.stop:
-            self._refuse(self._candidate)
+            self._refuse()
         if command.epoch != self._candidate:
             self._candidate, self._handshake_us = command.epoch, now_us
         self._candidate_counter, self._shaken_us = command.counter, now_us
@@ -337,16 +336,16 @@ class RobotEnd:
         """Rule 4: zero without a fresh nonce, which is not taken otherwise."""
         if any(command.thrusts) or self.state == FollowerState.REFUSING:
             return
-        if command.epoch == self._epoch:
-            if is_later(command.counter, self._counter):
-                self._counter = command.counter
-                self._to_zero()
-        elif command.stop and newest and command.epoch > self._epoch:
-            self._refuse(self._candidate)
+        if command.epoch > self._epoch:
+            if command.stop and newest:
+                self._refuse()
+        elif command.epoch == self._epoch and is_later(command.counter, self._counter):
+            self._counter = command.counter
+            self._to_zero()
 
     def _to_zero(self) -> None:
         if self.state == FollowerState.RAMP:
-            self._refuse(self._candidate)
+            self._refuse()
         else:
             self._given.zero()
             if self.state == FollowerState.RUNNING:

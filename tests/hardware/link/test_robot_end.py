@@ -134,6 +134,19 @@ def test_a_gap_in_the_handshake_begins_it_again(gap_us, ready_after):
     assert sent == ready_after
 
 
+def test_a_halt_in_the_handshake_begins_it_again():
+    bench = Bench()
+    for _ in range(90):
+        bench.tick()
+        bench.send(bench.command())
+    bench.end.halt()
+    since_us = bench.now_us + 5000
+    for _ in bench.ticks_until(FollowerState.IDLE):
+        bench.tick()
+        bench.send(bench.command())
+    assert bench.now_us - since_us == 500_000
+
+
 def test_that_a_handshake_was_given_up_is_told_until_something_else_is_wrong():
     bench = Bench()
     bench.send(bench.command())
