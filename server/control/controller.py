@@ -141,7 +141,7 @@ class Controller:
                 requests=wishes,
                 refusals=self._why_not(now, robot_reason),
                 fault=self._out_of_time(stall_s) or (robot_reason if self._armed else ""),
-                gap=_stood_still(stall_s) or robot_gap,
+                gap=_stood_still(stall_s, STOOD_STILL_S) or robot_gap,
                 robot_left_s=robot_left_s,
             )
         )
@@ -191,7 +191,7 @@ class Controller:
     def _out_of_time(self, stall_s: float) -> str:
         """Said in its own words, or the robot would seem to be what was silent."""
         slow = self._rate.complaint(stall_s)
-        return _stood_still(stall_s) if stall_s > self._longest_gap_s else slow
+        return _stood_still(stall_s, self._longest_gap_s) or slow
 
     def _note_gaps(self, output: Output, stall_s: float, robot_gap: str) -> None:
         """Whose silence it was: while control stood still, nobody else could be heard."""
@@ -267,10 +267,9 @@ class Controller:
         )
 
 
-def _stood_still(stall_s: float) -> str:
-    if stall_s <= STOOD_STILL_S:
-        return ""
-    return f"The server's computer stood still for {stall_s:.2f} s."
+def _stood_still(stall_s: float, borne_s: float) -> str:
+    words = f"The server's computer stood still for {stall_s:.2f} s."
+    return words if stall_s > borne_s else ""
 
 
 def _norm(v: Array) -> float:

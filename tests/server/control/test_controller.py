@@ -12,11 +12,18 @@ import pytest
 from hardware.follower import ThrustCommand
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig, VirtualCameraMode
-from pipeline.frames import GRAVITY
+from pipeline.frames import GRAVITY, exp
 from pipeline.signals import BodyImu, Mode
 from pipeline.teleop import Output
 from server.common.runtime_parameters import TuneInput
-from server.control.controller import STOOD_STILL_S, Controller, Mean, TooLate, never_too_late
+from server.control.controller import (
+    PERIOD_S,
+    STOOD_STILL_S,
+    Controller,
+    Mean,
+    TooLate,
+    never_too_late,
+)
 from server.control.gap_log import MANY, SIDES
 from server.control.ipc import (
     ControlStatus,
@@ -146,8 +153,8 @@ def test_before_the_server_has_spoken_and_when_it_falls_silent_arming_is_refused
     rig.ready = []
     assert rig.run(0.01)[-1][1].refusals == ()
     rig.ready = None
-    assert rig.run(0.48)[-1][1].refusals == ()
-    assert rig.run(0.04)[-1][1].refusals == ("The server is silent.",)
+    assert rig.run(0.5)[-1][1].refusals == ()
+    assert rig.run(0.005)[-1][1].refusals == ("The server is silent.",)
     assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
 
 
@@ -195,9 +202,29 @@ def test_a_mean_is_exact_of_the_first_values_and_forgets_them_within_some_dozens
         assert mean.value - before == pytest.approx((10.0 - before) / 50)
 
 
+def test_whoever_knows_no_margins_finds_nothing_too_late():
+    assert never_too_late(inf, inf) == ""
+
+
 def test_what_is_refused_before_anything_was_armed_is_no_reason_of_a_flights_end():
     output = Rig().run(0.005, robot_reason="The robot ramps.")[0][1]
     assert (output.failsafe.mode, output.failsafe.reason) == (Mode.DISARMED, "Not armed.")
+
+
+def test_what_the_robot_refuses_is_no_fault_before_the_first_arming():
+    rig = Rig()
+    rig.k = 5  # a tick with news of everything
+    refusals = rig.run(0.005, robot_reason="The robot ramps.")[0][1].refusals
+    assert refusals == ("The robot ramps.", "Just recovered: wait a moment.")
+
+
+def test_what_the_robot_refuses_while_stopped_delays_no_arming_after_it():
+    rig = Rig()
+    rig.track()
+    rig.held = False
+    rig.run(0.005, [RequestInput("stop")])
+    rig.run(1.0, robot_reason="The robot ramps.")
+    assert rig.run(0.005, [RequestInput("reset")])[-1][1].refusals == ()
 
 
 def turned_by(mode: VirtualCameraMode) -> float:
@@ -258,6 +285,40 @@ def test_a_robot_that_refuses_disarms_what_is_armed_ramps_what_is_held_and_else_
     assert rig.run(0.1)[-1][1].failsafe.mode == Mode.HOLD
     state = rig.run(0.1, robot_reason="The robot ramps.")[-1][1].failsafe
     assert (state.mode, state.reason) == (Mode.RAMP, "The robot ramps.")
+
+
+def test_a_robot_that_refuses_after_a_gap_ends_the_flight():
+    rig = Rig()
+    rig.track()
+    assert rig.run(0.1, robot_gap="The robot coasts.")[-1][1].failsafe.mode == Mode.COAST
+    state = rig.run(0.005, robot_reason="The robot ramps.")[-1][1].failsafe
+    assert (state.mode, state.reason) == (Mode.RAMP, "The robot ramps.")
+
+
+def refusals_after(pause_s: float) -> tuple[str, ...]:
+    """Of a pause that began at 0, where times are exact."""
+    controller = Controller(ROBOT, TeleopConfig())
+    for t in (0.0, pause_s):
+        said: list[Input] = [PhoneImuInput(t, STILL, UP), picture(t), ReadyInput([])]
+        said.append(OperatorInput(t, False, 0))
+        _, output = controller.tick(t, said, [BodyImu(t, np.zeros(3), np.array(UP))], "")
+    return output.refusals
+
+
+def test_a_pause_that_the_robot_bears_is_no_standing_still():
+    assert refusals_after(STOOD_STILL_S) == ("Just recovered: wait a moment.",)
+    longer = refusals_after(np.nextafter(STOOD_STILL_S, 1.0))
+    assert longer == ("The server's computer stood still for 0.06 s.",)
+
+
+def test_a_server_that_stood_still_for_as_long_as_a_gap_may_last_ends_no_flight():
+    rig = Rig()
+    rig.track()
+    while (rig.k + 200) % 6:  # so that news of everything await it
+        rig.run(0.005)
+    rig.k += 199
+    state = rig.run(0.005)[-1][1].failsafe
+    assert (state.mode, "stood still for 1.00 s" in state.reason) == (Mode.COAST, True)
 
 
 def test_a_stall_before_arming_is_a_refusal_that_passes():
@@ -321,9 +382,18 @@ def test_a_status_tells_how_long_it_waits_and_whose_gaps_there_were():
     assert {side: gaps.count for side, gaps in status.gaps.items()} == dict.fromkeys(SIDES, 1)
     assert status.gaps["phone"].longest_s == pytest.approx(0.42, abs=0.03)
     assert status.gaps["server"].longest_s == pytest.approx(0.205)
-    assert status.gaps["robot"].longest_s == pytest.approx(STOOD_STILL_S + 0.1, abs=0.006)
+    assert status.gaps["robot"].longest_s == pytest.approx(STOOD_STILL_S + 0.105)
     assert status.warnings == []
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
+
+
+def test_a_pause_that_the_robot_bears_ends_no_gap_of_the_phone():
+    controller = Controller(ROBOT, TeleopConfig())
+    said = [OperatorInput(-0.3, False, 0), PhoneImuInput(-0.3, STILL, UP)]
+    for t in (0.0, STOOD_STILL_S, STOOD_STILL_S + PERIOD_S):
+        _, output = controller.tick(t, said if t == 0.0 else [], [], "")
+    gaps = controller.status(output, 1, "FIFO", {}, 0.5, 0).gaps
+    assert (gaps["phone"].count, gaps["server"].count) == (1, 0)
 
 
 @pytest.mark.parametrize("heard", [OperatorInput, PhoneImuInput])
@@ -408,6 +478,20 @@ def test_up_in_the_body_follows_a_turn_and_ignores_free_fall():
     before = controller.up_in_b
     controller.tick(2.0, [], [BodyImu(2.0, rate, np.zeros(3))], "")
     np.testing.assert_array_equal(controller.up_in_b, before)
+
+
+def test_vision_is_told_how_the_filter_has_last_seen_the_robot_turn():
+    controller, rate = Controller(ROBOT, TeleopConfig()), np.array([0.0, 0.0, 0.5])
+    np.testing.assert_array_equal(controller.omega_bf_in_b, np.zeros(3))
+    for k in range(100):
+        t = 0.005 * k
+        phone, body = PhoneImuInput(t, STILL, UP), BodyImu(t, rate, np.array(UP))
+        place, R_cb = np.array([2.5, 0.0, 0.0]), exp(t * rate)
+        seen = seen_at(t, place, R_cb, COVARIANCE, leds_in_b=ROBOT.leds_in_b)
+        _, output = controller.tick(t, [phone, SeenInput.of(seen)], [body], "")
+    assert output.relative is not None
+    np.testing.assert_allclose(controller.omega_bf_in_b, rate, atol=0.02)
+    np.testing.assert_array_equal(controller.omega_bf_in_b, output.relative.omega_bf_in_b)
 
 
 def test_what_the_filter_expects_is_the_same_by_status_and_in_process():
