@@ -134,11 +134,8 @@ class LatencyGuard:
 
     def _is_sound(self, loop: Loop, sensing: Sensing) -> bool:
         least = self._margins
-        for axis in self._axes:
-            margins = axis_margins(loop, axis, sensing)
-            if margins.delay < least.min_delay_s or margins.phase < least.min_phase_rad:
-                return False
-        return True
+        found = (axis_margins(loop, axis, sensing) for axis in self._axes)
+        return all(m.delay >= least.min_delay_s and m.phase >= least.min_phase_rad for m in found)
 
 
 def _kind(estimator: EstimatorName) -> EstimatorName:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +12,15 @@ import pytest
 from hardware.dynamics import dynamics_of
 from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, MarginsConfig, TeleopConfig
-from pipeline.control.latency_guard import BODY_AGES_S, NEVER, Bearable, LatencyGuard
-from pipeline.control.margins import Loop, Sensing, axis_margins
+from pipeline.control import latency_guard
+from pipeline.control.latency_guard import (
+    BODY_AGES_S,
+    NEVER,
+    RESOLUTION_S,
+    Bearable,
+    LatencyGuard,
+)
+from pipeline.control.margins import UNSTABLE, AxisMargins, Loop, Sensing, axis_margins
 
 
 def guard(robot: str = "ames", config: TeleopConfig | None = None) -> LatencyGuard:
@@ -96,6 +104,23 @@ def test_what_is_allowed_leaves_the_stated_margin_and_no_more_is_allowed(
             assert (latency == NEVER) == (not is_sound(0.0, late))
     else:
         assert set(worked_out.latencies) == {allowed}
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.7, 1.0])
+def test_the_least_margins_are_enough_and_latencies_are_found_in_steps_of_their_resolution(
+    monkeypatch: pytest.MonkeyPatch, steps: int, share: float
+) -> None:
+    bound = share * steps * RESOLUTION_S
+    margins = MarginsConfig(max_latency_s=steps * RESOLUTION_S)
+    enough = replace(UNSTABLE, delay=margins.min_delay_s, phase=margins.min_phase_rad)
+
+    def found(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
+        return enough if sensing.latency <= bound else UNSTABLE
+
+    monkeypatch.setattr(latency_guard, "axis_margins", found)
+    worked_out = guard("ground", TeleopConfig(margins=margins)).bearable["phone", "none"]
+    assert worked_out.latency(0.0) == math.floor(share * steps) * RESOLUTION_S
 
 
 def test_what_nobody_measured_yet_is_refused(ames: LatencyGuard) -> None:
