@@ -75,7 +75,7 @@ def test_every_picture_comes_with_its_own_record(codec, tmp_path, monkeypatch):
         attitudes.append(record.orientation_wxyz)
         return plain, record
 
-    monkeypatch.setattr(link_module.trailer, "split", noting)
+    monkeypatch.setattr(link_module.metadata_trailer, "split", noting)
 
     async def play(house, page):
         await page.film(PICTURES)
