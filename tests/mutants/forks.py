@@ -19,7 +19,6 @@ CPU_FACTOR, CPU_SPARE_S = 3, 4
 """A mutant has this many times the CPU time of the unchanged file, and some more."""
 WALL_FACTOR = 20
 """... and this many times that by the clock, for one that waits for ever."""
-MEMORY_BYTES = 8 << 30
 
 
 class Outcome(Enum):
@@ -125,7 +124,6 @@ def _fork(body: Callable[[], int], cpu_s: int) -> int:
     status, errors = 70, os.fdopen(os.dup(2), "w")  # pytest's own are not shown
     try:
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         signal.alarm(WALL_FACTOR * cpu_s)
         status = body()

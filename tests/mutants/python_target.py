@@ -6,6 +6,7 @@ import ast
 import importlib
 import importlib.abc
 import importlib.util
+import resource
 import sys
 from collections.abc import Sequence
 from enum import Enum
@@ -14,6 +15,9 @@ from pathlib import Path
 from types import ModuleType
 
 from tests.mutants.forks import run_pytest
+
+MEMORY_BYTES = 8 << 30
+"""What Python may take with a mutant; C has none to take, and sanitizers reserve far more."""
 
 
 class PythonTarget:
@@ -36,6 +40,7 @@ class PythonTarget:
 
     def run(self, source: str) -> int:
         """Pytest's exit status with another text of the module; for a process of its own."""
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
         sys.meta_path.insert(0, _Instead(self._name, source, str(self._path)))
         return run_pytest(self._tests)
 
