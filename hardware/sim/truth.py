@@ -16,7 +16,6 @@ Request: any 8 bytes, to the truth port on the loopback interface. Answer, littl
 
 from __future__ import annotations
 
-import select
 import socket
 import struct
 import time
@@ -89,7 +88,6 @@ class TruthClient:
     def __init__(self, port: int, timeout: float = 0.05) -> None:
         """Truth on `port`; an answer is waited for no longer than `timeout` [s]."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
         self._socket.connect(("127.0.0.1", port))
         self._port, self._timeout = port, timeout
         self._requests = 0
@@ -107,11 +105,13 @@ class TruthClient:
         try:
             self._socket.send(request)
             while (left := deadline - time.monotonic()) > 0.0:
-                if select.select([self._socket], [], [], left)[0]:
-                    truth = decode_truth(self._socket.recv(MAX_BYTES), request)
-                    if truth is not None:
-                        self._newest = truth
-                        return truth
+                self._socket.settimeout(left)
+                truth = decode_truth(self._socket.recv(MAX_BYTES), request)
+                if truth is not None:
+                    self._newest = truth
+                    return truth
+        except TimeoutError:
+            pass
         except OSError as error:
             raise FollowerError(f"truth on port {self._port}: {error}", "a running one") from error
         raise FollowerError(f"no truth on port {self._port}", "a running simulated robot")

@@ -64,6 +64,8 @@ class _Running:
             ours.callback(self.channel.close)
             theirs.callback(other.close)
             self.channel.settimeout(START_S)
+            self._unread = select.poll()  # not select(), which knows 1024 files
+            self._unread.register(self.channel, select.POLLIN)
             descriptor = _memory(theirs)
             self.memory = mmap.mmap(descriptor, MEMORY_BYTES)
             numbers = other.fileno(), descriptor
@@ -83,7 +85,7 @@ class _Running:
         Raises:
             OSError: there is no answer.
         """
-        while select.select([self.channel], [], [], 0.0)[0]:  # words of one that ended unasked
+        while self._unread.poll(0):  # words of one that ended unasked
             self._answer()
         self.memory[: len(data)] = data
         self.channel.sendall(request)

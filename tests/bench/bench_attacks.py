@@ -181,9 +181,11 @@ def led(server: Serving) -> Iterator[Leader]:
             time.sleep(0.2)
         leader = Leader(server.request("GET", "/api/status")["mode"] == "TRACK")
         time.sleep(SETTLE_S if leader.flew else 0.0)  # the integral learns the suspension
-        yield leader
-        phone.send_signal(signal.SIGINT)
-        said, _ = phone.communicate()
+        try:
+            yield leader
+        finally:
+            phone.send_signal(signal.SIGINT)
+            said, _ = phone.communicate()
         leader.error_mm = json.loads(said.splitlines()[-1])["rms_mm"] or float("nan")
 
 
