@@ -37,7 +37,7 @@ import { MinimumDelayClock, eventUs, nowUs } from '../wire/clock.js';
 
 /** Clocks are read late [µs]. */
 const READ_LATE_US = 2000;
-/** A video element tells of a frame on its way to the screen: one turn of the display, 60 a second [µs]. */
+/** A video element tells of a frame on its way to the screen: a 60th of a second [µs]. */
 const SHOWN_LATE_US = 17_000;
 
 /**

@@ -43,9 +43,9 @@ export class CaptureMatcher {
     this.lastStamp = null;
     this.ticks = 0;
     this.lastUs = -Infinity;
-    /** No frame leaves before it was taken, but captures are told late: so much later they may be, [µs] */
+    /** No frame leaves before it was taken, but captures may be told so late [µs], */
     this.lateUs = 0;
-    /** and so much later they are, by the quickest frame. */
+    /** and are, by the quickest frame. */
     this.foundLateUs = 0;
     /** @type {ScreenAngle} */
     this.screenAngle = 0;

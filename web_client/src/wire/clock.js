@@ -20,19 +20,24 @@ export function eventUs(timeStampMs, now) {
   return tUs > now - 1e6 && tUs <= now ? tUs : now;
 }
 
+/** So many frames must agree: one stamp that is wrong would date all others. */
+const AGREE = 3;
+
 /**
  * Brings time stamps of an unknown epoch (camera frames) to the page's clock.
  *
- * Delay only ever makes (arrival − stamp) larger, so the smallest of the last frames is the best; two
- * buckets make the minimum follow a drifting clock.
+ * Delay only ever makes (arrival − stamp) larger: the smallest of the last frames are the best; two
+ * buckets follow a drifting clock.
  */
 export class MinimumDelayClock {
-  /** @param {number} window Frames a minimum may live, at most twice that. */
+  /** @param {number} window Frames a least delay may live, at most twice. */
   constructor(window = 150) {
     this.window = window;
     this.count = 0;
-    this.current = Infinity;
-    this.previous = Infinity;
+    /** @type {number[]} */
+    this.current = [];
+    /** @type {number[]} */
+    this.previous = [];
   }
 
   /**
@@ -42,20 +47,26 @@ export class MinimumDelayClock {
    */
   captureUs(stampUs, arrivalUs) {
     const difference = arrivalUs - stampUs;
-    if (Math.abs(difference - Math.min(this.current, this.previous)) > 1e6) {
+    if (Math.abs(difference - (this.current[0] ?? this.previous[0] ?? Infinity)) > 1e6) {
       this.count = 0;
-      this.previous = Infinity;
-      this.current = Infinity;
+      this.current = [];
+      this.previous = [];
     }
-    this.current = Math.min(this.current, difference);
+    this.current = smallest([...this.current, difference]);
+    const least = smallest([...this.current, ...this.previous]).at(-1) ?? difference;
     this.count += 1;
     if (this.count >= this.window) {
       this.previous = this.current;
-      this.current = difference;
+      this.current = [];
       this.count = 0;
     }
-    return stampUs + Math.min(this.current, this.previous);
+    return Math.min(stampUs + least, arrivalUs);
   }
+}
+
+/** @param {number[]} values */
+function smallest(values) {
+  return values.sort((a, b) => a - b).slice(0, AGREE);
 }
 
 /** Events per second over the last second or so. */

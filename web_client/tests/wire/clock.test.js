@@ -34,6 +34,17 @@ test('the mapping follows a drifting clock', () => {
   assert.ok(Math.abs(error) < 1100, `${error} µs after 10 ms of drift`);
 });
 
+test('a wrong stamp now and then dates no other frame', () => {
+  const random = noise();
+  const clock = new MinimumDelayClock();
+  for (let i = 0; i < 900; i++) {
+    const truth = 5e6 + i * 33_333;
+    const wrong = i % 200 === 99 ? 40_000 : 0; // stamped after it was taken
+    const capture = clock.captureUs(truth + wrong, truth + 4000 + 20_000 * random() ** 2);
+    if (i > 60 && !wrong) assert.ok(Math.abs(capture - truth - 4000) < 1500, `${i}: ${capture - truth}`);
+  }
+});
+
 test('a new epoch (camera restarted) starts anew', () => {
   const clock = new MinimumDelayClock();
   clock.captureUs(9e9, 1e6);
