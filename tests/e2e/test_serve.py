@@ -30,6 +30,8 @@ MODULES = {"robot": "hardware.sim.robot", "control": "server.control.process", "
 ZERO_N = 1e-3
 RAMP_S = 6.0
 """A ramp of one period of the suspension, with the failsafe's waits before it."""
+ANSWER_S = 0.5
+"""A robot that has not told its thrust by then is taken for dead: 50 ms are few when it is busy."""
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +93,8 @@ def flight(server: Serving, *options: str) -> Iterator[subprocess.Popen[bytes]]:
     )
     try:
         until(lambda: mode(server) == "TRACK", 60.0, "TRACK")
+        with closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth:
+            until(lambda: thrust(truth) > 1.0, 2.0, "thrust, which begins without a jump")
         yield phone
     finally:
         phone.send_signal(signal.SIGINT)
@@ -194,7 +198,10 @@ def test_what_it_leaves_on_the_disk_is_for_its_user_alone(server: Serving) -> No
 def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarmed(
     server: Serving, number: signal.Signals
 ) -> None:
-    with closing(TruthClient(server.truth_port)) as truth, flight(server) as phone:
+    with (
+        closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth,
+        flight(server) as phone,
+    ):
         before = thrust(truth)
         assert before > 1.0
         pid = kill(server, "control", number)
@@ -214,7 +221,10 @@ def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarm
 def test_the_server_killed_in_flight_leaves_control_to_ramp_down_and_comes_back_as_it_was(
     server: Serving,
 ) -> None:
-    with closing(TruthClient(server.truth_port)) as truth, flight(server) as phone:
+    with (
+        closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth,
+        flight(server) as phone,
+    ):
         assert thrust(truth) > 1.0
         control = processes(server.process.pid)["control"]
         kill(server, "server")
@@ -228,7 +238,10 @@ def test_the_server_killed_in_flight_leaves_control_to_ramp_down_and_comes_back_
 
 
 def test_a_robot_killed_in_flight_does_not_fly_on_when_it_is_back(server: Serving) -> None:
-    with closing(TruthClient(server.truth_port)) as truth, flight(server) as phone:
+    with (
+        closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth,
+        flight(server) as phone,
+    ):
         pid = kill(server, "robot")
         phone.send_signal(signal.SIGSTOP)
         try:
@@ -243,7 +256,7 @@ def test_a_robot_killed_in_flight_does_not_fly_on_when_it_is_back(server: Servin
 
 
 def test_stop_over_plain_http_cuts_at_once_and_stays(server: Serving) -> None:
-    with closing(TruthClient(server.truth_port)) as truth, flight(server):
+    with closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth, flight(server):
         assert thrust(truth) > 1.0
         server.request("POST", "/api/stop")
         until(lambda: thrust(truth) < ZERO_N, 1.0, "no thrust")
