@@ -99,3 +99,8 @@ def nees(pose, truth):
     """Squared error over covariance, per degree of freedom: median 0.89 if consistent."""
     error = error_of(pose, truth)
     return float(error @ np.linalg.solve(pose.covariance, error)) / 6.0
+
+
+def quiver(t: float) -> np.ndarray:
+    """What a gyroscope at rest says (3,) [rad/s]: never the same twice."""
+    return np.full(3, 1e-9 * t)

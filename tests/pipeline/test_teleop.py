@@ -13,7 +13,7 @@ from pipeline.config import EnvelopeConfig, TeleopConfig
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, Requests
 from pipeline.teleop import Inputs, Output, Teleop
-from tests.pipeline.seeing import seen_at
+from tests.pipeline.seeing import quiver, seen_at
 
 ROBOT = load_robot("ames").robot
 UP = np.array([0.0, 0.0, GRAVITY])
@@ -21,11 +21,6 @@ STILL, LEVEL = np.zeros(3), np.eye(3)
 P = np.array([2.5, 0.0, 0.0])
 LEFT = np.array([0.0, 1.0, 0.0])
 COVARIANCE = np.diag([1e-6, 1e-7, 1e-7, 1e-6, 1e-6, 1e-6])
-
-
-def quiver(t: float) -> np.ndarray:
-    """What a gyroscope at rest says (3,) [rad/s]: never the same twice."""
-    return np.full(3, 1e-9 * t)
 
 
 def run(

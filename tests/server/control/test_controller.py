@@ -38,16 +38,11 @@ from server.control.ipc import (
 )
 from server.control.ipc_vision import SeenInput
 from server.control.tick_rate import OVER_S
-from tests.pipeline.seeing import seen_at
+from tests.pipeline.seeing import quiver, seen_at
 
 ROBOT = load_robot("ames").robot
 UP, STILL = (0.0, 0.0, GRAVITY), (0.0, 0.0, 0.0)
 COVARIANCE = np.diag([1e-6] * 6)
-
-
-def quiver(t: float) -> np.ndarray:
-    """What a gyroscope at rest says (3,) [rad/s]: never the same twice."""
-    return np.full(3, 1e-9 * t)
 
 
 def picture(t: float) -> SeenInput:
