@@ -6,6 +6,9 @@ import ast
 import re
 from pathlib import Path
 
+from server.cli import COMMANDS
+from server.experiments import EXPERIMENTS
+
 ROOT = Path(__file__).resolve().parents[1]
 CITED = re.compile(r"Eq\.\s*((?:\(\d+\)(?:\s*-\s*|,\s*|\s+and\s+)?)+)")
 
@@ -52,3 +55,14 @@ def test_every_equation_from_1_to_24_has_a_home() -> None:
     rows = re.findall(r"^\| \((\d+)\)(?:-\((\d+)\))? \|", text, re.MULTILINE)
     numbers = {n for first, last in rows for n in range(int(first), int(last or first) + 1)}
     assert numbers == set(range(1, 25))
+
+
+def test_the_readme_s_table_of_commands_is_the_command_line_s() -> None:
+    table = (ROOT / "README.md").read_text().split("## Commands")[1].split("```")[0]
+    rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    words = [word for row in rows for word in re.findall(r"`([a-z][a-z_ ]*)`", row)]
+    begun = {word.split()[0] for word in words if word.split()[0] in COMMANDS}
+    assert begun == {name for name in COMMANDS if not name.startswith("_")}
+    after = words[words.index("experiments loop") :]
+    flown = [word.removeprefix("experiments ") for word in after]
+    assert sorted(flown) == sorted(EXPERIMENTS)
