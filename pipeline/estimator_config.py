@@ -127,6 +127,9 @@ class RelativeConfig:
     """A pose that fits worse starts nothing."""
     gate_chi2: float = 13.8
     """99.9 % of χ² with 2 degrees of freedom: one LED."""
+    offset_still: float = 0.01
+    """Of LEDs that move through the picture so slowly [rad/s] half is believed about the time
+    offset: 0.1 px of what is no noise, at f = 900 px, would be 11 ms."""
     misses_before_restart: int = 3
     """So many pictures in a row of which most LEDs are beyond the gate."""
     horizon_s: float = 0.5

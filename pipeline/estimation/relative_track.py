@@ -87,7 +87,7 @@ class RelativeTrack:
         self._config, self._walks = config, walks_of(config)
         self._phone_factor = 0.0
         self.doubt_phone(1.0)
-        self._gate = config.gate_chi2
+        self._gate, self._still = config.gate_chi2, config.offset_still
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
         self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
         self._products = np.zeros((2, MOVING, N))
@@ -187,6 +187,7 @@ class RelativeTrack:
                 np.array(rays.tangents, dtype=np.float64, order="C"),  # compiled for such alone
                 np.array(rays.covariances, dtype=np.float64, order="C"),
                 self._gate,
+                self._still,
                 use,
             )
         )

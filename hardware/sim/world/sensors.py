@@ -73,7 +73,9 @@ def pictures(world: World) -> list[Event]:
     stamps = world.phone_stamps(world.t[i]) - world.setup.time_offset
     noise_px = NOISE_PX * rng.normal(size=(len(i), len(LEDS_IN_B), 2))
     wrong = rng.uniform(-OUTLIER_PX, OUTLIER_PX, noise_px.shape)
-    told = tangents(world, i) + np.where(world.false[..., None], wrong, noise_px) / FOCAL_PX
+    true = tangents(world, i)
+    noise_px = _stuck(FOCAL_PX * true, noise_px, world.setup.stick_px)
+    told = true + np.where(world.false[..., None], wrong, noise_px) / FOCAL_PX
     poses = _poses(world, stamps, noise_px)
     rows = zip(world.pictures.arrival.tolist(), stamps.tolist(), told, poses, strict=True)
     return [
@@ -154,6 +156,18 @@ def tangents_by_place(q: Array) -> Array:
     Z[:, 0, 0], Z[:, 1, 0] = -q[:, 1] / q[:, 0], -q[:, 2] / q[:, 0]
     Z[:, 0, 1] = Z[:, 1, 2] = 1.0
     return Z / q[:, 0, None, None]
+
+
+def _stuck(px: Array, noise_px: Array, stick_px: float) -> Array:
+    """(n, LEDs, 2) error of LEDs that stay as drawn while they move by up to `stick_px` [px]."""
+    error, drawn_at = noise_px.copy(), px[0].copy()
+    for k in range(1, len(px)):
+        moved = px[k] - drawn_at
+        stays = np.linalg.norm(moved, axis=1, keepdims=True) < stick_px
+        drawn = px[k - 1] + error[k - 1]
+        error[k] = np.where(stays, drawn - px[k], noise_px[k])
+        drawn_at = np.where(stays, drawn_at, px[k])
+    return error
 
 
 def _disturbed(rng: np.random.Generator, truth: Array, bias: float, noise: float) -> Array:

@@ -65,10 +65,14 @@ class Setup:
     tremor_hz: tuple[float, float] = (8.5, 9.5)
     tremor_relaxation: float = inf
     """In which the hand's tremor forgets its phase; a hand's: 0.1-0.2. inf: six sines."""
+    tremor: float = 1.0
+    """Its size over that of `TREMOR_SIGMA`; 0: the phone lies."""
     robot_sigma: tuple[float, float] = (0.06, float(np.deg2rad(4.0)))
     occlusions: tuple[Occlusion, ...] = ()
     outliers: float = 0.0
     """Probability that an LED's pixel is anything within ±60 px of the right one."""
+    stick_px: float = 0.0
+    """A codec leaves an LED where it drew it last until it has moved by more, its noise too."""
     time_offset: float = 0.0
     """A picture was taken at its stamp plus this."""
     clock_offset: float = 0.0
@@ -184,4 +188,4 @@ class World:
 def _hand(rng: np.random.Generator, t: Array, setup: Setup) -> tuple[Array, Array]:
     slow = slow_motion(rng, len(t), GRID_S, setup.hand_sigma)
     fast, omega = tremor_motion(rng, t, setup.tremor_relaxation, setup.tremor_hz)
-    return slow + fast, omega
+    return slow + setup.tremor * fast, omega

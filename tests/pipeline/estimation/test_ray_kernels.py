@@ -47,10 +47,10 @@ def picture(x, R, noise=1e-3, seed=3):
     return places + noise * rng.normal(size=places.shape)
 
 
-def fuse(x, R, P, tangents, C, ahead=HERE, gate=GATE, use=None, leds=LEDS):
+def fuse(x, R, P, tangents, C, ahead=HERE, gate=GATE, use=None, leds=LEDS, still=0.0):
     """(χ², use); x, R, P are changed."""
     use = np.full(len(leds), -1, dtype=np.int8) if use is None else use
-    return fuse_rays(x, R, P, FELT, leds, ahead, tangents, C, gate, use), use
+    return fuse_rays(x, R, P, FELT, leds, ahead, tangents, C, gate, still, use), use
 
 
 @pytest.mark.parametrize("pitch", [0.3, np.pi / 2, -np.pi / 2])
@@ -219,3 +219,29 @@ def test_a_correction_is_added_where_it_belongs():
     added = x - before
     assert np.allclose(added, np.concatenate((dx[:3], dx[6:9], dx[9:])))
     assert np.abs(R - R_before @ exp(dx[3:6])).max() < 1e-15
+
+
+def test_of_slow_leds_nothing_is_believed_about_the_time_offset():
+    x, R, P = state(0.3)
+    told, C = picture(x, R), covariances(4)
+    whole = [value.copy() for value in (x, R, P)]
+    fuse(*whole, told, C)
+    held = [value.copy() for value in (x, R, P)]
+    fuse(*held, told, C, still=1e6)
+    rest = np.arange(len(P)) != OFFSET
+    assert held[0][X_OFFSET] == pytest.approx(x[X_OFFSET], abs=1e-12)
+    assert held[2][OFFSET, OFFSET] == pytest.approx(P[OFFSET, OFFSET])
+    assert whole[2][OFFSET, OFFSET] < P[OFFSET, OFFSET]
+    np.testing.assert_allclose(held[2][np.ix_(rest, rest)], whole[2][np.ix_(rest, rest)])
+    np.testing.assert_allclose(np.delete(held[0], X_OFFSET), np.delete(whole[0], X_OFFSET))
+
+
+def test_of_fast_leds_all_is_believed_about_the_time_offset():
+    x, R, P = state(0.3)
+    told, C = picture(x, R), covariances(4)
+    whole = [value.copy() for value in (x, R, P)]
+    fuse(*whole, told, C)
+    fast = [value.copy() for value in (x, R, P)]
+    fuse(*fast, told, C, still=1e-3)
+    for a, b in zip(whole, fast, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-6, atol=1e-9)

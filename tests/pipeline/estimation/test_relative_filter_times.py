@@ -107,3 +107,18 @@ def test_whoever_sleeps_forgets(world, arriving):
         if arrival <= 3.5:
             give(flight.filter, sample, 3.5)
     assert flight.error(flight.filter.state(3.5)) < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stick_px", [0.15, 0.4])
+@pytest.mark.parametrize("seed", [1000, 1001])
+def test_a_codec_s_dead_zone_before_a_phone_at_rest_is_no_time_offset(stick_px, seed):
+    """The robot sways by millimetres, its LEDs lag behind by a part of a pixel."""
+    still = {"hand_sigma": (0.0, 0.0), "tremor": 0.0, "robot_sigma": (0.003, np.deg2rad(0.05))}
+    world = World(Setup(seed=seed, duration=12.0, stick_px=stick_px, **still))
+    estimator = new()
+    offsets = []
+    for _ in feed(estimator, world):
+        assert not estimator.complaint
+        offsets.append(estimator.health.time_offset)
+    assert np.nanmax(np.abs(offsets)) < 0.02  # 40 to 100 ms, when each picture was believed
