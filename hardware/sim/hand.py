@@ -190,15 +190,15 @@ def make_hand(
 
 
 HANDS: dict[str, Callable[[np.random.Generator], tuple[Part, ...]]] = {
-    "still": lambda rng: (),
+    "still": lambda _: (),
     "steady": lambda rng: (steady_wander(rng), tremor(rng)),
     # "moving" is what the AMES' thrusters can follow; "restless" keeps them at their limits
     "moving": lambda rng: (three_poles(rng, 0.3, 0.03, 1.0), tremor(rng)),
     "restless": lambda rng: (three_poles(rng, 0.5, 0.05, 3.0), tremor(rng)),
     "demo": lambda rng: (demo(), tremor(rng)),
     "circle": lambda rng: (circle(), tremor(rng)),
-    "step_x": lambda rng: (step(0, STEP_M),),
-    "step_y": lambda rng: (step(1, STEP_M),),
-    "step_z": lambda rng: (step(2, STEP_M),),
-    "turn_z": lambda rng: (step(5, float(np.deg2rad(STEP_DEG))),),
+    "step_x": lambda _: (step(0, STEP_M),),
+    "step_y": lambda _: (step(1, STEP_M),),
+    "step_z": lambda _: (step(2, STEP_M),),
+    "turn_z": lambda _: (step(5, float(np.deg2rad(STEP_DEG))),),
 }

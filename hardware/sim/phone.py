@@ -153,7 +153,7 @@ class VirtualPhone:
         rng: np.random.Generator,
         options: PhoneOptions = PhoneOptions(),
         clock: PhoneClock = PhoneClock(),
-        hidden: Callable[[float], Sequence[int]] = lambda t: (),
+        hidden: Callable[[float], Sequence[int]] = lambda _: (),
     ) -> None:
         """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says.
 

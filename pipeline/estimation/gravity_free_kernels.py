@@ -37,7 +37,7 @@ def step(x: Array, R: Array, felt: Array, h: float, w: Array, f: Array, g: Array
             g[i, 9 + j], g[6 + i, 9 + j] = -k * h * E[i, j], -h * E[i, j]
     _put_by_attitude(E, B, M, ERB, h, J, K, f, g)
     put_right_jacobian(k * b[0], k * b[1], k * b[2], J)
-    _put_by_body_rate(E, B, M, J, h, w[11], K, w[10], g)
+    _put_by_body_rate(E, B, M, J, h, w[11], K, g)
     turn(E, y, Ey)
     put_right_jacobian(-k * c[0], -k * c[1], -k * c[2], J)
     _put_by_camera_rate(x, R, E, EE, BB, J, y, Ey, a, force, h, w, g)
@@ -62,7 +62,7 @@ def _put_by_attitude(
 
 @kernel
 def _put_by_body_rate(
-    E: Array, B: Array, M: Array, J: Array, h: float, A: Array, K: Array, L: Array, g: Array
+    E: Array, B: Array, M: Array, J: Array, h: float, A: Array, K: Array, g: Array
 ) -> None:
     """B Exp(δ) with δ = J δω h/2: θ⁺ = (Bᵀ + 1) δ, and the force turns by δ."""
     for i in range(3):

@@ -7,7 +7,6 @@ The server sends *inputs* to `control.sock`; the control process sends `ControlS
 from __future__ import annotations
 
 import contextlib
-import os
 import socket
 from pathlib import Path
 
@@ -182,8 +181,7 @@ class Endpoint:
 
     def __init__(self, own: Path, other: Path) -> None:
         """Bind `own`, taking the place of a dead predecessor."""
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(own)
+        own.unlink(missing_ok=True)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.bind(str(own))
@@ -237,10 +235,9 @@ class Endpoint:
 
     def close(self) -> None:
         """Close and unlink."""
-        path = self._socket.getsockname()
+        path = Path(self._socket.getsockname())
         self._socket.close()
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(path)
+        path.unlink(missing_ok=True)
 
 
 def server_end(directory: Path) -> Endpoint:

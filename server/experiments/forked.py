@@ -32,7 +32,7 @@ def forked(work: Callable[[], Result]) -> Result:
             with os.fdopen(writer, "wb") as pipe:
                 pickle.dump(work(), pipe)
             code = 0
-        except BaseException:  # it must not go on as if it were the other one
+        except BaseException:  # noqa: BLE001 (it must not go on as if it were the other one)
             traceback.print_exc()
         finally:
             os._exit(code)

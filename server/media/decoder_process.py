@@ -84,7 +84,7 @@ def _decode_for_ever(
         code = 0
     except ConnectionError:  # the server has gone meanwhile
         code = 0
-    except Exception:
+    except Exception:  # noqa: BLE001 (the parent starts another one)
         traceback.print_exc()
     finally:
         os._exit(code)  # nothing of the parent's is to be tidied up here

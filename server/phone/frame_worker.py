@@ -40,7 +40,7 @@ class FrameThread(ABC):
 
     def start(self) -> None:
         """Begin, as soon as there is room for another thread."""
-        ending = sum(not one._running for one in list(_alive))
+        ending = sum(one.is_ending for one in list(_alive))
         if not self._has_begun and self._running and ending < MAX_ENDING:
             self._has_begun = True
             _alive.add(self)
@@ -67,6 +67,15 @@ class FrameThread(ABC):
             self._running = False
             self._waiting.clear()
             self._condition.notify()
+
+    def join(self, seconds: float) -> None:
+        """Wait for the end of the thread, so long at most."""
+        self._thread.join(seconds)
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether it was stopped."""
+        return not self._running
 
     def _tell(self, callback: Callable[[], object]) -> None:
         """Call, unless the thread was stopped meanwhile."""
@@ -103,7 +112,7 @@ def join_all() -> None:
     for one in ending:
         one.stop()
     for one in ending:
-        one._thread.join(JOIN_S / len(ending))
+        one.join(JOIN_S / len(ending))
 
 
 atexit.register(join_all)

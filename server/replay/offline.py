@@ -37,7 +37,7 @@ Tap = Callable[[float, Sequence[Input], Sequence[BodyImu]], None]
 class Offline:
     """One recording, played once."""
 
-    def __init__(self, recording: Recording, tap: Tap = lambda *heard: None) -> None:
+    def __init__(self, recording: Recording, tap: Tap = lambda *_: None) -> None:
         """Read what it says of robot and camera; `tap` is told what control hears.
 
         Raises:

@@ -58,7 +58,7 @@ class Doors:
         self.pairings = Pairings(confirm, book=_book_in(store))
         self.audit = audit or Audit()
         self.sockets = Sockets()
-        self.on_gone: Callable[[str], None] = lambda address: None
+        self.on_gone: Callable[[str], None] = lambda _: None
         """Called when nobody of an address is in any more."""
         self.is_unsaved = False
         """Who is here is not kept as it is."""

@@ -20,7 +20,7 @@ class PhoneLine(Protocol):
 class CleanLine:
     """Lets everything through at once."""
 
-    def out(self, t: float, kind: Kind) -> float | None:
+    def out(self, t: float, _: Kind) -> float | None:
         """See `PhoneLine`."""
         return t
 

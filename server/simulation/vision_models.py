@@ -48,7 +48,7 @@ class SpotsEye:
         self, phone: VirtualPhone, leds_in_b: Array, noise_px: float, rng: np.random.Generator
     ) -> None:
         """LEDs (n, 3) [m]; `noise_px` as in `NoisyEye`."""
-        self._eye = NoisyEye(phone, leds_in_b, noise_px, lambda t: (), rng)
+        self._eye = NoisyEye(phone, leds_in_b, noise_px, lambda _: (), rng)
 
     def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
         """It needs no help."""

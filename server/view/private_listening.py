@@ -21,7 +21,7 @@ def listening_at(path: Path) -> Iterator[None]:
     original = server.serve
     serve_at_port = cast(Callable[..., object], original)
 
-    def serve(handler: Handler, host: str, port: int, **options: object) -> object:
+    def serve(handler: Handler, *_: object, **options: object) -> object:
         return serve_at_port(handler, unix=True, path=str(path), **options)
 
     server.serve = serve  # type: ignore[assignment, misc]

@@ -75,7 +75,7 @@ def routes(viser: Path) -> list[BaseRoute]:
     ]
 
 
-async def _page(request: Request) -> Response:
+async def _page(_: Request) -> Response:
     headers = {"content-security-policy": VIEW_POLICY}
     return Response(_html(), media_type="text/html; charset=utf-8", headers=headers)
 

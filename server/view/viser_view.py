@@ -36,7 +36,7 @@ _log = logging.getLogger(__name__)
 class _Viser(viser.ViserServer):
     """viser without its public tunnel, which any client may ask for."""
 
-    def request_share_url(self, verbose: bool = True) -> str | None:
+    def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002 (viser's name)
         """Never."""
         return None
 
@@ -108,7 +108,7 @@ class Dashboard:
                 if status is None or status is not shown:
                     self.show(status, thumbnail)
                 shown = status
-        except Exception:
+        except Exception:  # noqa: BLE001 (a view that fails is a flight without one)
             _log.exception("the 3D view has stopped; control and recording go on")
 
     def show(self, status: ControlStatus | None, thumbnail: Thumbnail | None) -> None:

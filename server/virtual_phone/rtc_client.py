@@ -173,7 +173,7 @@ class RtcPhoneClient(PhoneClient):
         await self._gone.wait()
         raise PhoneClientError(f"{self._access.url}: the WebRTC connection has ended")
 
-    async def _open_video(self, device: str, welcome: Welcome) -> None:
+    async def _open_video(self, _: str, welcome: Welcome) -> None:
         """Ask for an offer, answer it, and wait until the data channel is open."""
         said = await self._post("/api/rtc", Ask(welcome.session))
         offer = msgspec.json.decode(said, type=Offer)

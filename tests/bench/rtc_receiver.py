@@ -145,7 +145,7 @@ class Receiver(RtcHouse):
             reading.cancel()
 
 
-async def receive(result: Path) -> None:
+async def receive() -> dict[str, object]:
     seen = Seen()
     with tempfile.TemporaryDirectory() as folder:
         house = Receiver(Path(folder), seen)
@@ -158,9 +158,9 @@ async def receive(result: Path) -> None:
             watching.cancel()
             await house.close_calls()
     told = {name: getattr(seen, name) for name in ("pictures", "clock", "imu_hz")}
-    result.write_text(json.dumps({**told, "paths": sorted(seen.paths)}))
+    return {**told, "paths": sorted(seen.paths)}
 
 
 if __name__ == "__main__":
     sys.setswitchinterval(SWITCH_S)
-    asyncio.run(receive(Path(sys.argv[1])))
+    Path(sys.argv[1]).write_text(json.dumps(asyncio.run(receive())))

@@ -158,8 +158,8 @@ def test_killed_outright_it_leaves_no_process_and_no_network_behind(link: Link) 
     assert holder.stdout is not None
     assert holder.stdin is not None
     inside = int(holder.stdout.readline())
-    network = os.readlink(f"/proc/{inside}/ns/net")
-    assert network != os.readlink("/proc/self/ns/net")
+    network = network_of(inside)
+    assert network != network_of("self")
     assert network in networks_in_use()
     holder.send_signal(signal.SIGKILL)
     holder.wait()
@@ -172,12 +172,16 @@ def test_killed_outright_it_leaves_no_process_and_no_network_behind(link: Link) 
     assert named_namespaces() == before
 
 
-def networks_in_use() -> set[str]:
+def network_of(pid: int | str) -> Path:
+    return Path(f"/proc/{pid}/ns/net").readlink()
+
+
+def networks_in_use() -> set[Path]:
     """Of all processes."""
     found = set()
     for path in Path("/proc").glob("[0-9]*/ns/net"):
         try:
-            found.add(os.readlink(path))
+            found.add(path.readlink())
         except OSError:  # it has just ended
             continue
     return found
@@ -185,7 +189,7 @@ def networks_in_use() -> set[str]:
 
 def named_namespaces() -> list[str]:
     folder = Path("/run/netns")
-    return sorted(os.listdir(folder)) if folder.exists() else []
+    return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
 
 
 def test_without_rights_it_says_what_it_takes() -> None:

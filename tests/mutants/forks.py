@@ -127,7 +127,7 @@ def _fork(body: Callable[[], int], cpu_s: int) -> int:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         signal.alarm(WALL_FACTOR * cpu_s)
         status = body()
-    except BaseException:
+    except BaseException:  # noqa: BLE001 (whatever a mutant does ends it)
         traceback.print_exc(file=errors)
         errors.flush()
     finally:

@@ -15,7 +15,7 @@ JPEG = b"\xff\xd8" + bytes(30)
 
 
 def status(mode):
-    fields = {name: None for name in Status.__struct_fields__}
+    fields = dict.fromkeys(Status.__struct_fields__)
     numbers = dict.fromkeys(("leds", "phones", "supervisors", "time_ms"), 0)
     texts = dict.fromkeys(
         ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""

@@ -112,7 +112,7 @@ def _in_thread(function: Callable[[], T]) -> T:
     def work() -> None:
         try:
             results.append(function())
-        except BaseException as error:
+        except BaseException as error:  # noqa: BLE001 (raised again by who waits)
             errors.append(error)
 
     thread = threading.Thread(target=work, name="namespace")

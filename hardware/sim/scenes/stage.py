@@ -74,7 +74,7 @@ class Stage:
         ways = self._ways(sensor, camera, moving, t)
         n = len(self.leds_in_b)
         lamps, owners = self._lamps(camera, ways)
-        panes = self._panes(sensor, camera, ways)
+        panes = self._panes(sensor, ways)
         room, grey = self._room(camera, moving, t)
         luma = sensor.picture(room, grey, lamps, panes, shift)
         visible, merged = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
@@ -134,7 +134,7 @@ class Stage:
         ]
         return lamps, [int(owners[j]) for j in drawn]
 
-    def _panes(self, sensor: Sensor, camera: Camera, ways: Ways) -> list[Pane]:
+    def _panes(self, sensor: Sensor, ways: Ways) -> list[Pane]:
         o = sensor.optics
         first = len(self.leds_in_b) * (2 if self.mirror else 1) + len(self.lights.radii_m)
         panes: list[Pane] = []

@@ -78,8 +78,7 @@ def times_of(faults: Sequence[Fault], outcomes: Sequence[Outcome]) -> list[Times
     found = []
     for fault in faults:
         some = [one for one in outcomes if one.fault == fault.name]
-        for event in (event for event in EVENTS if event in fault.by):
-            found.append(_times(fault.name, event, some))
+        found += [_times(fault.name, event, some) for event in EVENTS if event in fault.by]
     return found
 
 

@@ -16,7 +16,7 @@ Inputs = Callable[[list[Input]], list[Input]]
 Change = Callable[[PhoneImuInput], PhoneImuInput]
 
 
-def nothing(data: bytes) -> Sequence[bytes]:
+def nothing(_: bytes) -> Sequence[bytes]:
     """All are lost."""
     return ()
 

@@ -62,7 +62,7 @@ class WebSocketLine:
 
     gaps: Gaps
 
-    def out(self, t: float, kind: Kind) -> float | None:
+    def out(self, t: float, _: Kind) -> float | None:
         """See `PhoneLine`."""
         gap = self.gaps.at(t)
         return t if gap is None else max(t, heard_again(*gap))

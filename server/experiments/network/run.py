@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from select import select
 
 import msgspec
@@ -188,9 +189,9 @@ def _start(inside: Namespace, module: str, *arguments: str) -> subprocess.Popen[
 
 def _favour(pid: int) -> None:
     """Run it before the other work of this machine, where that is permitted."""
-    for thread in os.listdir(f"/proc/{pid}/task"):
+    for thread in Path(f"/proc/{pid}/task").iterdir():
         with contextlib.suppress(OSError):
-            os.sched_setscheduler(int(thread), os.SCHED_RR, os.sched_param(PRIORITY))
+            os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(PRIORITY))
 
 
 def _line(process: subprocess.Popen[bytes], patience_s: float) -> bytes:

@@ -112,13 +112,13 @@ class Summary:
         of_phone = assumptions.json(assumptions.phone_sensors(self.phone))
         return {"title": TITLE, "rows": rows, "phone": of_phone}
 
-    def draw(self, folder: Path) -> list[Path]:
+    def draw(self, _: Path) -> list[Path]:
         """It has no picture."""
         return []
 
 
-def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Summary:
-    """Fly what the goals ask for, whatever leader and `extra` variants are set.
+def measure(setup: Setup, _: Sequence[Variant] = ()) -> Summary:
+    """Fly what the goals ask for, whatever leader and further variants are set.
 
     Of the leader set, its phones only take the kind of pictures.
     """

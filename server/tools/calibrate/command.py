@@ -174,7 +174,7 @@ def _pair(values: Array, sigma: Array, digits: int) -> str:
 def _bar() -> Callable[[int, int | None], object]:
     """A progress bar, where somebody watches."""
     if not sys.stderr.isatty():
-        return lambda done, total: None
+        return lambda *_: None
 
     def show(done: int, count: int | None) -> None:
         total = count or done + 1

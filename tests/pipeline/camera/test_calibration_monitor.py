@@ -103,7 +103,7 @@ def test_a_hand_that_only_trembles_is_not_judged():
 
 def test_pictures_without_motion_samples_teach_nothing():
     watch = CameraWatch(CAMERA, LEDS_IN_B)
-    assert not any([watch.saw(look, None) for look in looks(world(), Faults())])
+    assert not any(watch.saw(look, None) for look in looks(world(), Faults()))
     assert watch.facts is None
 
 

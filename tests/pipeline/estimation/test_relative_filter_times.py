@@ -29,9 +29,9 @@ def test_what_arrives_late_twice_or_too_early_is_counted(world, arriving):
     assert flight.give(newest) is Fusion.DUPLICATE
     assert flight.give(shifted(newest, dt=-0.61)) is Fusion.LATE
     assert flight.give(shifted(newest, dt=0.2)) is Fusion.EARLY
-    assert estimator.pictures - counted == {
-        kind: 1 for kind in (Fusion.DUPLICATE, Fusion.LATE, Fusion.EARLY)
-    }
+    assert estimator.pictures - counted == dict.fromkeys(
+        (Fusion.DUPLICATE, Fusion.LATE, Fusion.EARLY), 1
+    )
     health = estimator.health
     assert health.fused + health.dropped == estimator.pictures.total() == len(flight.told)
     assert health.late == 1

@@ -26,6 +26,7 @@ from server.protocol.wire_records import Codec, Picture
 
 WIDTH, HEIGHT = 640, 368
 START_S = 60.0
+OPEN_FILES = Path("/proc/self/fd")
 
 
 @pytest.fixture(scope="module")
@@ -201,10 +202,10 @@ def test_a_start_without_file_handles_leaves_none_open(monkeypatch: pytest.Monke
         raise OSError(errno.EMFILE, "Too many open files")
 
     monkeypatch.setattr(subprocess, "Popen", poor)
-    before = os.listdir("/proc/self/fd")
+    before = len(list(OPEN_FILES.iterdir()))
     with pytest.raises(OSError, match="Too many"):
         decoding_module._Running(1.0)
-    assert len(os.listdir("/proc/self/fd")) == len(before)
+    assert len(list(OPEN_FILES.iterdir())) == before
 
 
 def test_what_ends_the_decoder_but_is_no_fault_of_a_picture_is_told() -> None:

@@ -44,7 +44,7 @@ sys.stdin.read()
 
 
 def status(t):
-    fields = {name: None for name in ControlStatus.__struct_fields__}
+    fields = dict.fromkeys(ControlStatus.__struct_fields__)
     samples = [(t - 0.005, 0.1, 0.2, 0.3, 0.0, 0.0, 9.8)]
     return ControlStatus(**fields | {"t": t, "pose_age": float("inf"), "body_samples": samples})
 

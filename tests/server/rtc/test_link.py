@@ -98,7 +98,7 @@ def test_motion_and_touch_come_by_the_data_channel_and_reach_control(tmp_path):
         await page.film(10)
         for sequence in range(1, 6):
             await page.touch(sequence, held=sequence > 2)
-        motions = [k for k in range(1, 11)]
+        motions = list(range(1, 11))
         await eventually(
             lambda: [r.sequence for r, _ in house.taken if isinstance(r.body, Motion)] == motions
         )

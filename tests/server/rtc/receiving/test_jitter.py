@@ -44,7 +44,8 @@ class Rig:
         )
 
     def add(self, *packets):
-        return any([self.buffer.add(packet)[0] for packet in packets])
+        asked = [self.buffer.add(packet)[0] for packet in packets]
+        return any(asked)
 
     @property
     def texts(self):
