@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -50,7 +49,7 @@ def server(robot: str, gains: str, estimator: str = "relative") -> Iterator[dict
                 time.sleep(0.1)
             yield environment
         finally:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
             process.wait(20.0)
 
 

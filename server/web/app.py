@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Sequence
@@ -55,7 +54,7 @@ class VirtualPhone:
     def stop(self) -> None:
         """Ask it to leave; it lets go of the button first."""
         if self._process is not None and self.running:
-            self._process.send_signal(signal.SIGINT)
+            self._process.terminate()
 
 
 class Api:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -184,7 +183,7 @@ def led(server: Serving) -> Iterator[Leader]:
         try:
             yield leader
         finally:
-            phone.send_signal(signal.SIGINT)
+            phone.terminate()
             said, _ = phone.communicate()
         leader.error_mm = json.loads(said.splitlines()[-1])["rms_mm"] or float("nan")
 

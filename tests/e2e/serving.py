@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -58,7 +57,7 @@ class Serving:
 
 @contextlib.contextmanager
 def serving(folder: Path, *arguments: str) -> Iterator[Serving]:
-    """Start it, wait until it answers, end it as a person would.
+    """Start it, wait until it answers, end it: by SIGTERM, which a job in the background hears too.
 
     A link is enough to lead, unless `arguments` say otherwise.
     """
@@ -83,7 +82,7 @@ def serving(folder: Path, *arguments: str) -> Iterator[Serving]:
             environment=environment,
         )
     finally:
-        process.send_signal(signal.SIGINT)
+        process.terminate()
         try:
             process.wait(15.0)
         except subprocess.TimeoutExpired:

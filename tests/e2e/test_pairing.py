@@ -217,7 +217,7 @@ def test_a_terminal_is_shown_links_that_open_once_and_the_log_beside_it_is_not(
             urllib.request.urlopen(request, timeout=5.0)
         assert "█" in shown or "▀" in shown  # the code to scan
     finally:
-        process.send_signal(signal.SIGINT)
+        process.terminate()
         process.wait(20.0)
         log.close()
         os.close(terminal)

@@ -97,7 +97,7 @@ def flight(server: Serving, *options: str) -> Iterator[subprocess.Popen[bytes]]:
             until(lambda: thrust(truth) > 1.0, 2.0, "thrust, which begins without a jump")
         yield phone
     finally:
-        phone.send_signal(signal.SIGINT)
+        phone.terminate()
         try:
             phone.wait(10.0)
         except subprocess.TimeoutExpired:
@@ -176,7 +176,7 @@ def test_a_virtual_phone_leads_the_robot_by_either_path(
         assert float(str(link["motion_hz"])) > 30.0
         assert float(str(link["picture_hz"])) > 5.0
         assert link["rtt_ms"] is not None
-        phone.send_signal(signal.SIGINT)
+        phone.terminate()
         assert phone.stdout is not None
         summary = json.loads(phone.stdout.read().decode().splitlines()[-1])
     assert summary["tracked_s"] > 2.0
@@ -284,7 +284,8 @@ def test_ctrl_c_ends_all_robot_first_and_leaves_no_socket(tmp_path: Path) -> Non
     with serving(tmp_path) as server:
         pids = processes(server.process.pid)
         assert set(pids) == set(MODULES)
-    assert server.process.returncode == 0
+        server.process.send_signal(signal.SIGINT)
+        assert server.process.wait(15.0) == 0
     assert not [pid for pid in pids.values() if Path(f"/proc/{pid}").exists()]
     assert not list(server.runtime.glob("*.sock"))
     assert not (server.runtime / "lightleash-run.json").exists()
