@@ -33,8 +33,10 @@ BOUNDS: Final = np.log([(0.5, 60.0), (0.2, 8.0), (0.01, 2.0)])
 SPARE: Final = 1.01
 """Margins are sought so much larger, for gains are rounded."""
 DIGITS: Final = 3
+"""Significant ones, of a gain that is proposed."""
 UNSTABLE: Final = 100.0
 FORBIDDEN: Final = 10.0
+"""Costs above all that a stable loop, and one with its margins, may have."""
 
 
 @dataclass(frozen=True, slots=True)

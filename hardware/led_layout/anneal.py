@@ -39,7 +39,7 @@ HOT = 16
 """Namings that are remembered."""
 FEW = 40
 """Views that the search asks at first."""
-MM = 1e-3
+MM = 1e-3  # [m]
 
 
 @dataclass(frozen=True, slots=True)

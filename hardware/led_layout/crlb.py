@@ -10,6 +10,7 @@ from hardware.led_layout.viewpoints import Looks, attitude, seen
 from pipeline.frames import Array, skew
 
 HUGE = 1e12
+"""Variance of a pose that is not to be had [m², rad²]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

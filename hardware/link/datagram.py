@@ -52,14 +52,16 @@ from hardware.follower import FollowerState, Refusal
 from hardware.link.link_key import MAC_BYTES, is_authentic, mac
 from pipeline.frames import Array
 
-VERSION = 2
+VERSION = 2  # of these datagrams
 COMMAND_MAGIC, SAMPLE_MAGIC = b"LLcm", b"LLsm"
-MAX_THRUSTERS = 16
-COMMAND_OVERHEAD, SAMPLE_OVERHEAD = 36 + MAC_BYTES, 76 + MAC_BYTES
+MAX_THRUSTERS = 16  # of any robot
+COMMAND_OVERHEAD, SAMPLE_OVERHEAD = 36 + MAC_BYTES, 76 + MAC_BYTES  # bytes
 """Bytes beside the thrusts."""
 MAX_BYTES = SAMPLE_OVERHEAD + 4 * MAX_THRUSTERS
 ARMED, STOP = 1, 2
+"""Bits of a command's flags."""
 U32, U64 = 1 << 32, 1 << 64
+"""Where counters and epochs go round."""
 
 Triple = tuple[float, float, float]
 

@@ -20,6 +20,7 @@ BodyHistory = Callable[[float], tuple[Array, Array]]
 """(R_fb (3, 3), p_bf_in_f (3,) [m]) of the robot at a time [s]."""
 
 REMEMBERED_DELAYS = 1024
+"""Drawn before the flight, and used again in turn: a picture keeps its delay."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,7 @@ REDATE_S, MAX_REDATES = 0.004, 8
 DRIFT: Final = 2e-3
 """A bias of the body's gyroscope that was wrong by more is put right before summing up [rad/s]."""
 WAITING: Final = 4096
+"""Motion samples, kept until a picture asks for them: twenty seconds at 200 Hz."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -28,7 +28,7 @@ from pipeline.frames import Array
 
 WINDOW: Final = 10
 """Blocks kept: about 25 s of motion."""
-MIN_BLOCKS: Final = 4
+MIN_BLOCKS: Final = 4  # before anything is said
 PRIOR: Final = np.array([0.1, 0.05, 0.3, 2.0, 0.005, 0.1, 0.1, 0.1])
 """Standard deviations before the first block; a phone's gyroscope is right to half a percent."""
 PLACE_M: Final = 0.002

@@ -32,6 +32,7 @@ BOUNDLESS = 1e3
 EXACT = 1e-8
 """Of `scale` [N, N m]; reached after one correction, unless thrusters are nearly parallel."""
 MOST_CORRECTIONS = 20
+"""At most: each leaves a share of the order of ε."""
 
 
 class Allocation:

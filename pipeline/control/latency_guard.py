@@ -21,7 +21,7 @@ from pipeline.gains import Gains
 BODY_AGES_S: Final = tuple(0.0025 * k for k in range(1, 33))
 """Up to 80 ms; in between, what holds for the next older one counts."""
 RESOLUTION_S: Final = 0.002
-NEVER: Final = -1.0
+NEVER: Final = -1.0  # no age [s]
 KINDS: Final[tuple[EstimatorName, ...]] = ("relative", "none")
 """`paper` bears what `relative` bears: both fuse a picture when it was taken."""
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 
-BODY: Final = 0
-PHONE: Final = 1
+BODY: Final = 0  # kinds: of one time, the body first
+PHONE: Final = 1  # ... then the phone
 Kinds = npt.NDArray[np.int8]
 
 

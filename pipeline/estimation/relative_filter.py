@@ -38,6 +38,7 @@ DATED_S: Final = 0.005
 FRESH_S: Final = 2.0
 """A restart so soon after the last one: what was kept of the sensors is wrong as well."""
 NIS_PICTURES: Final = 30
+"""Over which the innovations are averaged: a second."""
 
 
 class RelativeFilter:

@@ -20,7 +20,7 @@ import numpy as np
 
 from pipeline.frames import Array, R_from_rpy, S_in_a, S_in_b, cross, skew
 
-N: Final = 30
+N: Final = 30  # states. Eq. (10)
 
 
 class States:

@@ -14,7 +14,7 @@ MOST_PIXELS = 8000
 GLARING = 2
 """What is left out is worth a word if it is so many times as high as the least."""
 PEAK, LEFT, TOP, RIGHT, BOTTOM = range(5)
-PLACE = 5
+PLACE = 5  # numbers of a place
 
 _RELIEF = numba.types.Array(numba.uint8, 2, "C")
 _PLACES = numba.int32[:, ::1]

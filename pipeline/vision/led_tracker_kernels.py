@@ -24,7 +24,7 @@ from pipeline.vision.predicted_windows_kernels import (
 from pipeline.vision.robust_refinement_kernels import believe
 from pipeline.vision.translation_voting_kernels import Names, name_by_shift
 
-FEWEST = 3
+FEWEST = 3  # LEDs a pose needs
 
 
 @kernel

@@ -22,9 +22,10 @@ from pipeline.spots.centroid_kernels import C_UU, C_UV, C_VV, S_UU, S_UV, S_VV
 from pipeline.spots.spot_kernels import LUMA, measure
 
 Windows = npt.NDArray[np.int64]
-MOTION = 16
-OMEGA_C, OMEGA_B = 1, 7
+MOTION = 16  # numbers of a motion
+OMEGA_C, OMEGA_B = 1, 7  # where its rates begin
 ROW_ITERATIONS = 3
+"""A point's row says when it was read, and the time says its row."""
 NEAREST_M = 0.1
 EDGE_PX, LEAST_HALF_PX = 2.0, 5.0
 

@@ -15,7 +15,7 @@ from pipeline.signals import Image
 
 SIDES = (3, 20)
 """Fewest and most squares along one side."""
-MARKER_RATIO = 0.75
+MARKER_RATIO = 0.75  # side of a marker, of its square's
 DICTIONARIES = {
     "4X4_250": cv2.aruco.DICT_4X4_250,
     "5X5_250": cv2.aruco.DICT_5X5_250,

@@ -38,6 +38,7 @@ RECENT = 9
 BLUR_EVERY = 5
 """What the film's sharpest views are is judged by each so-many-th."""
 SMALL = 0.22
+"""Share of the picture that a board fills, below which its corners are too coarse."""
 SIDES = ("from the left", "from the right", "from above", "from below")
 
 

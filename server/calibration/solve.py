@@ -34,6 +34,7 @@ RATES_SHARE = 0.02
 GYRO_FLOOR = 0.005
 """Error of a gyroscope's rate at one moment [rad/s]."""
 GRID = (17, 11)
+"""Columns, rows of the points at which the lens's uncertainty is looked at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,6 +16,7 @@ from server.calibration.views import View
 FOCALS = np.geomspace(0.35, 3.0, 16)
 """Tried, over the picture's longer side."""
 TRIED_VIEWS = 16
+"""Enough to begin with: all are solved for afterwards."""
 OUTLIER_PX = 20.0
 _EYE, _NONE = np.eye(3), np.zeros(4)
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import monotonic
 from typing import TextIO
+
+from server.common.clock import now
 
 BAR = 30
 EVERY_S = 0.1
@@ -15,9 +16,7 @@ STEP = 10
 class Progress:
     """Of `total` things, or of an unknown number of them."""
 
-    def __init__(
-        self, total: int | None, stream: TextIO, clock: Callable[[], float] = monotonic
-    ) -> None:
+    def __init__(self, total: int | None, stream: TextIO, clock: Callable[[], float] = now) -> None:
         """`clock` [s]."""
         self._total, self._stream, self._clock = total, stream, clock
         self._tty = stream.isatty()

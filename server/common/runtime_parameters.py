@@ -13,6 +13,7 @@ from pipeline.control.cutoff import cutoff_hz, time_constants
 
 SLOWEST_HZ, FASTEST_HZ = 0.03, 3.0
 MOST_ADAPTIVE: Final = 10.0
+"""Allowed for β of the virtual camera's adaptive cutoff."""
 FASTEST_M_S: Final = 5.0
 
 CutoffHz = Annotated[float, Meta(ge=SLOWEST_HZ, le=FASTEST_HZ)]

@@ -47,6 +47,7 @@ def never_too_late(*_: float) -> str:
 
 
 LATELY = 50
+"""Values of a mean."""
 
 
 class Mean:

@@ -13,7 +13,7 @@ from pipeline.signals import LedRays, RelativePose, Seen, StampOffset
 Triple = tuple[float, float, float]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 ThirtySix = Annotated[list[float], msgspec.Meta(min_length=36, max_length=36)]
-MAX_LEDS = 16
+MAX_LEDS = 16  # of any robot file
 
 
 def triple(v: Array) -> Triple:

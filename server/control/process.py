@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import os
 import signal
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,6 +27,7 @@ from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.estimation.estimators import warm_up
+from server.common import clock
 from server.common.clock import unix_ms
 from server.common.options import Parser
 from server.common.runtime_parameters import DEFAULT_KNOBS, Knobs
@@ -173,13 +173,13 @@ def _loop(
     cpu_ms, command = np.zeros(LATENESS_EVERY), ThrustCommand.zero(follower.thrusters)
     while not stopping:
         now = schedule.wait()
-        cpu = time.thread_time()
+        cpu = clock.thread_cpu()
         body = link.receive(now)
         command, output = controller.tick(
             now, endpoint.inputs(), body, link.reason, link.gap, link.left_s
         )
         follower.send(command)
-        cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (time.thread_time() - cpu)
+        cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (clock.thread_cpu() - cpu)
         if schedule.ticks % LATENESS_EVERY == 0:
             lateness = schedule.lateness_ms()
         if schedule.ticks % STATUS_EVERY == 0:

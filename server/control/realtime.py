@@ -9,7 +9,9 @@ import time
 
 import numpy as np
 
-FIFO_PRIORITY = 50
+from server.common import clock
+
+FIFO_PRIORITY = 50  # as the kernel's own interrupt threads
 GRANTED = "SCHED_FIFO"
 """How `claim` begins when it got what it asked for."""
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
@@ -45,7 +47,7 @@ class Schedule:
     def __init__(self, period: float, window: int = 12_000) -> None:
         """Ticks every `period` [s]; statistics over the last `window` ticks."""
         self.period = period
-        self._next = time.monotonic() + period
+        self._next = clock.now() + period
         self._lateness = np.zeros(window)
         self.ticks = 0
         self.missed = 0
@@ -53,10 +55,10 @@ class Schedule:
 
     def wait(self) -> float:
         """Sleep until the next tick is due; gives the time now [s, monotonic]."""
-        delay = self._next - time.monotonic()
+        delay = self._next - clock.now()
         if delay > 0.0:
             time.sleep(delay)
-        now = time.monotonic()
+        now = clock.now()
         late = now - self._next
         self._lateness[self.ticks % len(self._lateness)] = late
         self.ticks += 1

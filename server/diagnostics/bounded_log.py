@@ -20,6 +20,7 @@ BYTES_HZ, BYTES_AT_ONCE = 150.0, 131_072.0
 URGENT_BYTES_HZ = 50.0
 """Beside that for errors, which a flood of warnings must not drown."""
 MAX_KINDS = 256
+"""Of messages that are told apart; the oldest is forgotten."""
 CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028\u2029]")
 
 

@@ -11,6 +11,7 @@ EVENTS, MOST_OF_PAGES = 12, 5
 LINES_HZ, LINES_AT_ONCE = 0.2, 4.0
 """Of one kind of one page's doing."""
 MAX_KINDS = 128
+"""Of events that are told apart; the oldest is forgotten."""
 
 
 class Events:

@@ -13,6 +13,7 @@ from server.protocol.link_messages import LinkReport
 
 LASTS_S = 1.0
 MAX_KEPT = 8
+"""Reports, one for each span that is asked for."""
 RULES = FailsafeConfig()
 
 

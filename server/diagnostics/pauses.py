@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from server.common import clock
 from server.common.clock import now
 from server.diagnostics.garbage import Garbage
 
@@ -80,8 +80,8 @@ class Pauses:
     def __init__(
         self,
         clock: Callable[[], float] = now,
-        cpu: Callable[[], float] = time.process_time,
-        thread_cpu: Callable[[], float] = time.thread_time,
+        cpu: Callable[[], float] = clock.process_cpu,
+        thread_cpu: Callable[[], float] = clock.thread_cpu,
         on_stall: Callable[[float, float], None] | None = None,
         waited: Callable[[], float] | None = None,
     ) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
-from server.common import text
+from server.common import clock, text
 from server.control.process import teleop_config
 from server.simulation.figures import Result, result_of, rows_of
 from server.simulation.trace import Trace
@@ -100,9 +99,9 @@ def run(arguments: argparse.Namespace) -> int:
     flights: list[tuple[Result, Trace]] = []
     for hand in arguments.hands:
         flight = replace(scene, hand=hand, seed=arguments.seed)
-        cpu = time.process_time()
+        cpu = clock.process_cpu()
         trace = _fly(Lockstep(robot_file, config, flight), arguments.seconds, hand)
-        flights.append((result_of(trace, flight, time.process_time() - cpu), trace))
+        flights.append((result_of(trace, flight, clock.process_cpu() - cpu), trace))
     print(table([result for result, _ in flights]))
     if arguments.out is not None:
         draw(flights, arguments.out / "loop.png")

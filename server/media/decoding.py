@@ -34,7 +34,7 @@ PICTURE_CPU_S = 0.25
 SAY_AGAIN_S = 5.0
 AGAIN_S = (0.0, *BACKOFF_S)
 """One that was steady costs a picture and no more: the first start anew is at once."""
-MAX_NUMBER = 0xFFFFFFFF
+MAX_NUMBER = 0xFFFFFFFF  # of a request, as wide as its field
 log = logging.getLogger("lightleash")
 
 

@@ -19,7 +19,7 @@ MAX_RATE, MAX_FORCE = 100.0, 1000.0
 """[rad/s], [m/s²]: of any sensor there is."""
 USUAL_RATE, USUAL_FORCE = 5.0, (4.0, 20.0)
 """The median beyond which it is another unit."""
-MIN_SAMPLES = 2
+MIN_SAMPLES = 2  # to interpolate between
 
 
 def load_times(path: Path) -> dict[str, tuple[int, float]]:

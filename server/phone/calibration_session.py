@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from server.calibration.guide import Guide
 from server.calibration.job import Job, Outcome, Solving
 from server.calibration.verdict import Verdict
 from server.calibration.views import look
+from server.common.clock import today
 from server.media.decoding import MakeDecoder
 from server.phone.decoder import FrameDecoder
 from server.phone.frame_worker import FrameThread
@@ -28,7 +28,7 @@ from server.protocol.calibration_messages import Calibration
 
 MOST_SAMPLES = 20_000
 """Of motion: more than a minute at 200 Hz."""
-SHOWN_PER_CELL = 3
+SHOWN_PER_CELL = 3  # views, by the page's shades of grey
 FAILED = Verdict("refused", ["The calibration failed: look at the server's log."])
 
 
@@ -111,7 +111,6 @@ class Wizard(FrameThread):
         guide = self._guide
         views = sorted({view.t: view for view in guide.views}.values(), key=lambda view: view.t)
         motion = np.array(self._motion).reshape(-1, 4)
-        today = date.today().isoformat()
         return Job(
             self._board,
             self.size,
@@ -120,7 +119,7 @@ class Wizard(FrameThread):
             motion,
             self._device,
             self.screen_angle_deg,
-            today,
+            today(),
         )
 
     def _filming(self, phase: str) -> Calibration:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 
 import cv2
@@ -14,11 +13,12 @@ from pipeline.prediction import Expected
 from pipeline.signals import BodyImu, Image, PhoneImu
 from pipeline.vision.detection import Sighting
 from pipeline.vision.visual_front_end import Looking
+from server.common import clock
 from server.phone.frame_pipeline import Sight
 from server.phone.frame_worker import FrameThread
 from server.phone.ingest import EncodedFrame
 
-THUMBNAIL_WIDTH = 480
+THUMBNAIL_WIDTH = 480  # [px]
 THUMBNAIL_S = 0.1
 
 Picture = npt.NDArray[np.uint8]
@@ -81,7 +81,7 @@ class VisionThread(FrameThread):
             self._tell(self._on_key_wanted)
             return
         self._tell(lambda: self._on_sighting(sighting, frames[-1]))
-        now = time.monotonic()
+        now = clock.now()
         if self.watched and now - self._t_thumbnail > THUMBNAIL_S and self._sight.luma is not None:
             self._t_thumbnail = now
             self.thumbnail = draw(self._sight.luma, sighting)

@@ -16,6 +16,7 @@ import msgspec
 
 from hardware.link.link_key import KEY_VARIABLE, LinkKeyError, new_key
 from hardware.robot_file import RobotFileError, load_robot
+from server.common import clock
 from server.common.access import PhoneClientError
 from server.common.child import PROMPT_NICENESS, Child
 from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
@@ -76,19 +77,19 @@ class Launcher:
 
     def run(self) -> int:
         """Start, announce, watch, stop; gives the exit code."""
-        announced, said = False, time.monotonic()
+        announced, said = False, clock.now()
         names = ", ".join(child.name for child in self.children)
         print(f"Starting {names}: some seconds, about a minute the first time.", flush=True)
         try:
             while not self._stopping:
-                self.revive(time.monotonic())
+                self.revive(clock.now())
                 if not announced and self._run_file.exists():
                     announced = True
                     self._announce()
                 if not announced and self._is_hopeless():
                     return 1
-                if not announced and time.monotonic() - said > REMIND_S:
-                    said = time.monotonic()
+                if not announced and clock.now() - said > REMIND_S:
+                    said = clock.now()
                     print("Still starting: what computes fast is compiled first, once.", flush=True)
                 time.sleep(POLL_S)
         finally:

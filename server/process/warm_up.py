@@ -14,7 +14,7 @@ import threading
 from pipeline.vision.visual_front_end import warm_up
 from server.common.child import die_with, raise_niceness, watched
 
-NICE = 10
+NICE = 10  # control and vision go before
 
 
 def begin() -> threading.Thread:

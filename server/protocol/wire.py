@@ -30,7 +30,7 @@ from server.protocol.wire_records import (
 VERSION = 2
 """Of the protocol. A page of another version is told so and refused."""
 
-MAGIC = 0x4C
+MAGIC = 0x4C  # "L"
 HEADER = struct.Struct("<BBBBIq")
 """magic u8, version u8, kind u8, flags u8, sequence u32, time i64 [µs of the sender's clock]."""
 
@@ -38,7 +38,7 @@ KEY_FLAG = 1
 """Of FRAME."""
 MAX_RECORD_BYTES = 262_144
 MAX_MESSAGE_BYTES = 4_096
-MAX_PIXELS = 2_100_000
+MAX_PIXELS = 2_100_000  # of a picture: full HD, and some rows of padding
 
 
 class WireError(ValueError):

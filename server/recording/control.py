@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from math import inf
 from pathlib import Path
 
+from server.common import clock
 from server.control.ipc import ControlStatus
 from server.protocol.wire import HEADER, KEY_FLAG, Kind
 from server.recording.writer import CAMERA_KEY, DEVICE_KEY, Direction, Recorder
@@ -35,7 +35,7 @@ class Recordings:
             RecordingError: the file can't be made.
         """
         if self._recorder is None:
-            name = time.strftime("%Y%m%d-%H%M%S")
+            name = clock.file_stamp()
             own = {DEVICE_KEY: device, CAMERA_KEY: camera_text}
             self._recorder = Recorder(self._directory, name, {**self._metadata, **own})
             self._has_key, self._t_asked = False, -inf

@@ -19,7 +19,6 @@ import fcntl
 import os
 import queue
 import threading
-import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +28,7 @@ import msgspec
 from mcap.writer import Writer
 
 import server
+from server.common import clock
 from server.common.runtime import new_private_file
 from server.control.ipc import ControlStatus
 from server.protocol.wire import HEADER, VERSION
@@ -147,16 +147,16 @@ class Recorder:
             self.error = str(error)
 
     def _write(self, writer: Writer, channels: dict[str, int]) -> None:
-        flushed = time.monotonic()
+        flushed = clock.now()
         while not (self._closing.is_set() and self._queue.empty()):
             with suppress(queue.Empty):
                 item = self._queue.get(timeout=FLUSH_S)
                 if item is not None:
                     _add(writer, channels[item.topic], item)
                     self.written += 1
-            if time.monotonic() - flushed >= FLUSH_S:
+            if clock.now() - flushed >= FLUSH_S:
                 writer.flush()  # type: ignore[no-untyped-call]
-                flushed = time.monotonic()
+                flushed = clock.now()
                 if self._file.tell() > self._max_bytes:
                     self.error = f"larger than {self._max_bytes} bytes"
                     return

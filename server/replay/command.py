@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from time import monotonic as now
 
 from pipeline.timing.clock_synchronisation import ClockOffset
 from server.common.access import Access, PhoneClientError, access_of, add_access_arguments
+from server.common.clock import now
 from server.common.options import Parser
 from server.protocol.messages import Command, Status
 from server.protocol.wire import WireError, decode

@@ -23,6 +23,7 @@ LOOPBACK = ("127.0.0.1", "::1", "::ffff:127.0.0.1")
 KNOWN_S = 12 * 3600.0
 """An address is known for so long after its last request with a role."""
 MAX_KNOWN, MAX_NETWORKS = 64, 1024
+"""Addresses, networks remembered; the oldest is forgotten, so that no flood fills memory."""
 
 
 class Peer(NamedTuple):

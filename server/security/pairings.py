@@ -25,11 +25,12 @@ WAIT_S = 300.0
 IDLE_S = 12 * 3600.0
 """A session that nobody has used for so long has ended."""
 MAX_LINKS, MAX_MEMBERS, MAX_ENDED = 64, 32, 64
+"""The oldest link and ended member are forgotten; another member is refused."""
 KEY_BYTES = 16
 LETTERS = "BCDFGHJKLMNPQRSTVWXZ"
 """Of match codes: without vowels they spell nothing, without Y and I they are not misread."""
-CODE_LETTERS = 4
-MAX_NAME = 40
+CODE_LETTERS = 4  # two people compare them in a glance
+MAX_NAME = 40  # letters
 
 
 class PairingError(Exception):

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 from server.protocol.session import Bucket
 
 Kind = Literal["member", "program", "loopback", "address"]
-MAX_POOLS = 256
+MAX_POOLS = 256  # one for each who asks; the oldest is forgotten
 COSTS = {"/api/link": 25.0, "/metrics": 25.0, "/api/invite": 10.0, "/view": 10.0, "/view/": 10.0}
 """What computes for long, or is large, counts for so many requests."""
 

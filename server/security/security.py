@@ -27,6 +27,7 @@ COOKIE = "lightleash"
 PAIR_TRIES, PAIR_WINDOW_S = 10, 60.0
 """So many wrong links of one address in that time."""
 MAX_ADDRESSES = 1_000
+"""Whose tries are remembered: no flood fills memory."""
 SAVE_AGAIN_S = 1.0
 UNSAVED = (
     "The disk takes nothing: who is paired can't be written down. It is tried each second; "

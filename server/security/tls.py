@@ -18,12 +18,13 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from server.common.clock import utc
 from server.common.runtime import new_private_file, private_directory
 from server.security.tls_limits import authority_limits, general_name, is_permitted
 
 LEAF_DAYS, AUTHORITY_DAYS = 397, 729
 RENEW_DAYS, RENEW_AUTHORITY_DAYS = 30, 60
-SIOCGIFADDR = 0x8915
+SIOCGIFADDR = 0x8915  # linux/sockios.h
 log = logging.getLogger("lightleash")
 
 
@@ -182,7 +183,7 @@ def _make_leaf(paths: dict[str, Path], wanted: Iterable[str]) -> None:
 def _builder(
     subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, days: int
 ) -> x509.CertificateBuilder:
-    now = datetime.datetime.now(datetime.UTC)
+    now = utc()
     return (
         x509.CertificateBuilder()
         .subject_name(subject)
@@ -223,7 +224,7 @@ def _limits_of(authority: x509.Certificate) -> x509.NameConstraints:
 
 
 def _days_left(one: x509.Certificate) -> int:
-    return (one.not_valid_after_utc - datetime.datetime.now(datetime.UTC)).days
+    return (one.not_valid_after_utc - utc()).days
 
 
 def _name(common: str) -> x509.Name:

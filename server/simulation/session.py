@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, fields, replace
@@ -16,6 +15,7 @@ from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.gains import Gains
+from server.common import clock
 from server.control.controller import PERIOD_S
 from server.simulation.figures import result_of
 from server.simulation.sweep_keys import ROWS, Value
@@ -96,12 +96,12 @@ class Flown:
 
 def fly(session: Session) -> Outcome:
     """Fly it. A setting with which nothing can be computed is an outcome, too."""
-    started = time.process_time()
+    started = clock.process_cpu()
     try:
         figures = _fly(prepared(session), session)
     except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
         figures = Figures(ended=f"failed: {type(error).__name__}: {error}")
-    return Outcome(session.index, figures, time.process_time() - started)
+    return Outcome(session.index, figures, clock.process_cpu() - started)
 
 
 def _fly(flown: Flown, session: Session) -> Figures:

@@ -7,7 +7,6 @@ import asyncio
 import json
 import signal
 import sys
-import time
 from functools import partial
 from math import degrees
 
@@ -23,6 +22,7 @@ from hardware.sim.phone_faults import Fault
 from hardware.sim.render import Look
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
+from server.common import clock
 from server.common.access import PhoneClientError, access_of, add_access_arguments
 from server.common.child import raise_niceness, set_oom_score
 from server.common.options import Parser
@@ -53,7 +53,7 @@ def make_script(
         seed=arguments.seed,
         start=robot_file.start,
         p_robot_in_f=_robot_now(truth_port),
-        t_start=time.monotonic(),
+        t_start=clock.now(),
         rest_s=rest_s if arguments.rest is None else arguments.rest,
     )
     rng = np.random.default_rng(arguments.seed)

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from server.common import clock
 from server.common.runtime import RUN_FILE
 
 START_S = 180.0
@@ -42,9 +43,9 @@ def server(robot: str, gains: str, estimator: str = "relative") -> Iterator[dict
                 stderr=subprocess.STDOUT,
             )
         try:
-            end = time.monotonic() + START_S
+            end = clock.now() + START_S
             while not (folder / "lightleash" / RUN_FILE).exists():
-                if process.poll() is not None or time.monotonic() > end:
+                if process.poll() is not None or clock.now() > end:
                     raise RuntimeError(f"serve did not start: {log.read_text()}")
                 time.sleep(0.1)
             yield environment

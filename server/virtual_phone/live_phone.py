@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -14,6 +13,7 @@ from hardware.follower import FollowerError
 from hardware.sim.phone import Event, Stream
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
+from server.common import clock
 from server.common.access import Access
 from server.diagnostics.garbage import Garbage
 from server.protocol.messages import Command, Status
@@ -40,7 +40,7 @@ LEAVE_S = 0.4
 
 async def until(t: float) -> None:
     """Sleep until `t` [s] on the monotonic clock; at once if that has passed."""
-    await asyncio.sleep(max(0.0, t - time.monotonic()))
+    await asyncio.sleep(max(0.0, t - clock.now()))
 
 
 class SeenRobot:
@@ -91,7 +91,7 @@ class LivePhone:
         self.status: Status | None = None
         self._made: asyncio.Queue[tuple[float, Record]] = asyncio.Queue(8)
         self._leave = asyncio.Event()
-        self._garbage = Garbage(time.thread_time)
+        self._garbage = Garbage(clock.thread_cpu)
 
     def leave(self) -> None:
         """Let go of the button, disarm and end the run."""
@@ -133,13 +133,13 @@ class LivePhone:
         await self._leave.wait()
 
     def _pong(self, nonce: int, server_time_us: int) -> Record:
-        return self.script.pong(nonce, server_time_us, time.monotonic())
+        return self.script.pong(nonce, server_time_us, clock.now())
 
     def _status(self, status: Status) -> Command | None:
         self.status = status
         if status.virtual_camera is not None:
             self.score.tune(status.virtual_camera.knobs.config())
-        return self.script.operator.see(status.mode, status.ready, time.monotonic())
+        return self.script.operator.see(status.mode, status.ready, clock.now())
 
     async def _motions(self) -> None:
         for event in _endless(self.script.phone.motions):
@@ -147,9 +147,9 @@ class LivePhone:
             await self.client.send(self.script.motion(event.t_capture))
 
     async def _touches(self) -> None:
-        operator, t = self.script.operator, time.monotonic()
+        operator, t = self.script.operator, clock.now()
         while True:
-            presses, now = operator.presses, time.monotonic()
+            presses, now = operator.presses, clock.now()
             await self.client.send(self.script.touch(now))
             if operator.presses != presses:
                 self.score.start(now, self._scored.pose)
@@ -167,7 +167,7 @@ class LivePhone:
         with ThreadPoolExecutor(1, "camera") as thread:
             for event in _endless(self.script.phone.pictures):
                 await until(event.t_capture + EXPOSED_S)
-                late = is_superseded(event, time.monotonic(), period)
+                late = is_superseded(event, clock.now(), period)
                 if late or self._made.full() or not self.client.has_credit:
                     self.skipped += 1
                     continue
@@ -201,7 +201,7 @@ def is_superseded(event: Event, now: float, period: float) -> bool:
 
 def _endless(stream: Stream) -> Iterator[Event]:
     """Captures from now on."""
-    t = time.monotonic()
+    t = clock.now()
     while True:
         yield from stream.captures(t, t + 1.0)
         t += 1.0

@@ -9,6 +9,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
 MAX_BODY, BODY_S = 4_096, 5.0
+"""Bytes, and seconds until all of them have come."""
 
 
 async def body_of(request: Request, longest: int = MAX_BODY) -> bytes:

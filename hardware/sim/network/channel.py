@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-UDP = 17
+UDP = 17  # IP's number of it
 UDP_HEADER_BYTES = 8
 Taken = tuple[float, bytes]
 """When it comes out [s], packet."""

@@ -25,6 +25,7 @@ ADDRESSES = ("10.77.0.1", "10.77.0.2")
 PRIORITY = 45
 """Below control's: the line must be as late as it is told to be, not as the machine is busy."""
 REMEMBERED = 20_000
+"""Packets, for how late they were."""
 WAKE_S = 0.5
 
 

@@ -17,16 +17,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-CLONE_NEWNET = 0x40000000
+CLONE_NEWNET = 0x40000000  # linux/sched.h
 TUN = Path("/dev/net/tun")
-TUNSETIFF, IFF_TUN, IFF_NO_PI = 0x400454CA, 0x0001, 0x1000
-SIOCGIFFLAGS, SIOCSIFFLAGS = 0x8913, 0x8914
-SIOCSIFADDR, SIOCSIFNETMASK, SIOCSIFMTU = 0x8916, 0x891C, 0x8922
-IFF_UP = 1
+TUNSETIFF, IFF_TUN, IFF_NO_PI = 0x400454CA, 0x0001, 0x1000  # linux/if_tun.h
+SIOCGIFFLAGS, SIOCSIFFLAGS = 0x8913, 0x8914  # linux/sockios.h
+SIOCSIFADDR, SIOCSIFNETMASK, SIOCSIFMTU = 0x8916, 0x891C, 0x8922  # the same
+IFF_UP = 1  # linux/if.h
 WIRE = "wire"
 MTU = 1500
+"""Bytes of a packet: Ethernet's."""
 NO_IPV6 = Path("/proc/sys/net/ipv6/conf/all/disable_ipv6")
-PR_SET_PDEATHSIG, SIGKILL = 1, 9
+PR_SET_PDEATHSIG, SIGKILL = 1, 9  # linux/prctl.h
 _libc = ctypes.CDLL(None, use_errno=True)
 
 T = TypeVar("T")

@@ -15,9 +15,11 @@ Range = tuple[float, float]
 Size = tuple[int, int]
 
 FIRST_REPORTING_SEED: Final = 1000
+"""Those below are for tuning."""
 VGA: Final[Size] = (640, 480)
 HD: Final[Size] = (1280, 720)
 FULL_HD: Final[Size] = (1920, 1080)
+"""Width, height [px]."""
 SIZES: Final = (VGA, HD, FULL_HD)
 
 

@@ -21,7 +21,7 @@ NODES = 5
 ROW_ITERATIONS = 4
 BEYOND = 1.25
 """Half fields to each side outside of which nothing is drawn."""
-EVERYWHERE = (-1e4, 1e4)
+EVERYWHERE = (-1e4, 1e4)  # beyond any picture [px]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,7 @@ from hardware.sim.world.world import Flags, World
 from pipeline.frames import Array
 
 BAND = (0.025, 0.975)
+"""Quantiles between which 95 % of honest filters are."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from hardware.sim.world.rotations import rates_each, rpy_each, skew_each
 from hardware.sim.world.world import LEDS_IN_B, Indices, World
 from pipeline.frames import Array
 
-N: Final = 66
+N: Final = 66  # states, in these slices
 HAND, TREMOR, ROBOT = slice(0, 18), slice(18, 36), slice(36, 54)
 PHONE_BIASES, BODY_BIASES = slice(54, 60), slice(60, 66)
 

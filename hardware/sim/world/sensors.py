@@ -33,7 +33,7 @@ MIN_LEDS: Final = 4
 """For a pose from nothing else."""
 PHONE_BIAS: Final = (0.002, 0.05)
 """σ of gyroscope [rad/s] and accelerometer [m/s²]."""
-PHONE_NOISE: Final = (0.001, 0.02)
+PHONE_NOISE: Final = (0.001, 0.02)  # σ, in the same units
 PHONE_STEP: Final = (float(np.deg2rad(0.1)), 0.1)
 """Rounding."""
 BODY_BIAS: Final = (0.02, 0.15)

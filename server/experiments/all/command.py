@@ -18,7 +18,7 @@ from server.experiments.all.tables import table
 
 PAGE, FOLDER = "index.html", "parts"
 NOT_SAID: Final = "none are used"
-INTERRUPTED, REFUSED = 130, 2
+INTERRUPTED, REFUSED = 130, 2  # exit codes
 BLANK: Final = "\r\x1b[K"
 """Begins a terminal's line anew."""
 

@@ -19,7 +19,7 @@ PICTURES: Final = {".png": "image/png", ".svg": "image/svg+xml"}
 MOST_BYTES: Final = 8_000_000
 MOST_LINES: Final = 60
 """Of a CSV file; longer ones stay files."""
-MOST_TEXT: Final = 20_000
+MOST_TEXT: Final = 20_000  # letters
 PNG: Final = b"\x89PNG\r\n\x1a\n"
 WIDE: Final = 1.7
 """Width over height, from which a picture would be too small on a phone."""

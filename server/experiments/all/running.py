@@ -15,13 +15,12 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, Literal, NoReturn
 
 import msgspec
 
-from server.common.clock import now
+from server.common.clock import now, utc
 from server.experiments.all.provenance import ROOT
 
 Status = Literal["begun", "done", "missed", "refused", "failed"]
@@ -37,6 +36,7 @@ MISSED: Final = (
 TRACEBACK: Final = "Traceback (most recent call last):"
 GRACE_S, LOOK_S = 10.0, 1.0
 REASON_LINES, REASON_LENGTH = 3, 600
+"""Lines, letters of its last words that are shown."""
 
 
 class FolderError(Exception):
@@ -186,7 +186,7 @@ def _write(folder: Path, record: Record) -> None:
 
 def stamp() -> str:
     """What time it is."""
-    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return utc().strftime("%Y-%m-%d %H:%M UTC")
 
 
 @contextmanager

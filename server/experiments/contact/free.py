@@ -21,7 +21,7 @@ NEAR: Final = "moving"
 """About ±6 cm at 0.3 Hz: the suspension pulls by up to 1.6 N."""
 HANDS: Final = (NEAR, "circle")
 """The second goes 15 cm away in 5 s, for which the AMES needs 4 N."""
-SECONDS: Final = 8.0
+SECONDS: Final = 8.0  # of each flight
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ import asyncio
 import json
 import signal
 import sys
-import time
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
 from hardware.sim.render import Look
+from server.common import clock
 from server.common.access import Access, PhoneClientError
 from server.virtual_phone.live_phone import EXPOSED_S, LivePhone
 from server.virtual_phone.phone_client import PhoneClient
@@ -28,7 +28,9 @@ from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperat
 from server.virtual_phone.rtc_client import RtcPhoneClient
 
 WIDTH, HEIGHT, FRAME_RATE_HZ, BITRATE_BPS = 640, 480, 30.0, 1_500_000
+"""Of its pictures [px, px, 1/s, bit/s]."""
 WARM_PICTURES = 30
+"""Sent before the line becomes bad: a second."""
 LONGEST_S = 3600.0
 CLIENTS = {"webrtc": RtcPhoneClient, "websocket": PhoneClient}
 
@@ -41,7 +43,7 @@ def script(seed: int) -> PhoneScript:
         seed=seed,
         start=robot_file.start,
         p_robot_in_f=np.zeros(3),
-        t_start=time.monotonic(),
+        t_start=clock.now(),
         rest_s=0.0,
     )
     options = PhoneOptions(

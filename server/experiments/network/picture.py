@@ -11,7 +11,7 @@ from server.experiments.network.figures import Times
 from server.experiments.network.run import Run
 
 COLOURS = {"webrtc": "C0", "websocket": "C1"}
-COLUMNS = 5
+COLUMNS = 5  # of panels
 AGES_MS = (1.0, 3e3)
 
 

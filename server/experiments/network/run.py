@@ -20,6 +20,7 @@ from hardware.sim.network.channel import CLEAN, Counts
 from hardware.sim.network.emulated_link import Lateness, Link
 from hardware.sim.network.netns import Namespace
 from hardware.sim.phone import PhoneClock
+from server.common import clock
 from server.experiments.network.figures import Arrivals
 from server.experiments.network.scenarios import Scenario
 from server.experiments.network.server import Heard, Place
@@ -105,9 +106,9 @@ class Rig:
         self._connect(f"{path} {seed}\n".encode())
         link.renew(scenario.line, scenario.line, seed)
         time.sleep(SETTLE_S)
-        begin = time.monotonic()
+        begin = clock.now()
         fault_ends = self._play(scenario, begin, begin + seconds)
-        end, counts, lateness = time.monotonic(), link.counts(), link.lateness()
+        end, counts, lateness = clock.now(), link.counts(), link.lateness()
         time.sleep(TRAILING_S)
         link.shape(CLEAN, CLEAN)
         self._phone.send_signal(signal.SIGUSR1)
@@ -145,7 +146,7 @@ class Rig:
                 _sleep_until(at)
                 with self._fault(scenario):
                     _sleep_until(at + scenario.fault_s)
-                ends.append(time.monotonic())
+                ends.append(clock.now())
                 at += FAULT_EVERY_S
         _sleep_until(end)
         return ends
@@ -202,9 +203,9 @@ def _line(process: subprocess.Popen[bytes], patience_s: float) -> bytes:
     """
     assert process.stdout is not None
     name = " ".join(map(str, process.args[2:3])) if isinstance(process.args, list) else ""
-    said, deadline = b"", time.monotonic() + patience_s
+    said, deadline = b"", clock.now() + patience_s
     while not said.endswith(b"\n"):
-        left = deadline - time.monotonic()
+        left = deadline - clock.now()
         if left <= 0.0 or not select([process.stdout], [], [], left)[0]:
             raise RunError(f"{name} said nothing for {patience_s:g} s")
         part = process.stdout.read(65_536)
@@ -225,4 +226,4 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _sleep_until(t: float) -> None:
-    time.sleep(max(0.0, t - time.monotonic()))
+    time.sleep(max(0.0, t - clock.now()))

@@ -24,7 +24,7 @@ NAME: Final = "beaten"
 TITLE: Final = (
     "Beaten? Relative filter, feed-forward, VCI off (I) or selective (IV); true RMS error"
 )
-SECONDS: Final = 4.0
+SECONDS: Final = 4.0  # after each step, as in Table I
 NO_LAG_S: Final = 0.001
 
 

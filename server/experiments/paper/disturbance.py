@@ -24,7 +24,7 @@ TITLE: Final = (
     f"Table IV at {published.MOVE_AT_S:g} s"
 )
 HAND: Final = "turn_z"
-SECONDS: Final = 13.0
+SECONDS: Final = 13.0  # of a flight
 PUSH: Final = Push(published.PUSH_AT_S - published.MOVE_AT_S, published.PUSH_N)
 SHARE: Final = 0.1
 """Of the peak: back."""

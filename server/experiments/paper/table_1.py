@@ -15,7 +15,7 @@ from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Varia
 
 NAME = "table_1"
 TITLE = "Table I, Fig. 6: 3 cm in 0.3 s along each axis, RMS in mm"
-SECONDS = 4.0
+SECONDS = 4.0  # after each step
 
 
 def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Result:

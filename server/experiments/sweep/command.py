@@ -8,8 +8,8 @@ from collections.abc import Generator, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from pathlib import Path
-from time import monotonic
 
+from server.common.clock import now
 from server.common.processes import cores
 from server.common.progress import Progress
 from server.common.ranges import whole
@@ -21,7 +21,7 @@ from server.experiments.sweep.workers import on_cluster, on_processes
 from server.simulation.session import Outcome, Session
 from server.simulation.sweep_keys import Number, Switch, Word, known_keys
 
-INTERRUPTED, KILLED = 130, 3
+INTERRUPTED, KILLED = 130, 3  # exit codes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -64,13 +64,13 @@ def _flown(sweep: Sweep, results: Results, folder: Path, arguments: argparse.Nam
         print("MIXED: some of them were flown by other code or libraries, see sweep.json")
     hands = arguments.scheduler or f"{arguments.workers or cores()} processes"
     results.write(sys.argv, hands)
-    started, cpu_s = monotonic(), results.cpu_s
+    started, cpu_s = now(), results.cpu_s
     code = _fill(results, missing, arguments, len(sessions)) if missing else 0
     results.write(sys.argv, hands)
     if missing:
         print(
             f"{len(results.done)} sessions; now {results.cpu_s - cpu_s:.1f} CPU-seconds "
-            f"by {hands} in {monotonic() - started:.1f} s"
+            f"by {hands} in {now() - started:.1f} s"
         )
     drawn = ""
     if results.done:

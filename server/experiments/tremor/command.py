@@ -38,7 +38,7 @@ SETTLE_S = 4.0
 """From the first attitude: the hand has begun to move, the virtual camera follows."""
 SEGMENT_S = 10.0
 """Of Welch's averaged periodograms."""
-TURN_SEED, TURN_S = 1, 4.0
+TURN_SEED, TURN_S = 1, 4.0  # of the hand that turns once
 
 
 @dataclass(frozen=True, slots=True)

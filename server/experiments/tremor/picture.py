@@ -10,7 +10,7 @@ from typing import Protocol
 from pipeline.frames import Array
 
 SHOWN_HZ = (0.1, 50.0)
-SHOWN_DECADES = 11.0
+SHOWN_DECADES = 11.0  # of power
 LINES = {"hand": "k:", "selective": "--", "selective at once": ":"}
 
 

@@ -15,7 +15,7 @@ WRONG_M, WRONG_SHARE, WRONG_RAD = 0.02, 0.05, np.deg2rad(10.0)
 """Beyond 2 cm + 5 % of the range, or 10°, a reported pose is wrong."""
 MEDIAN_CHI2_6 = 5.348
 """Median of χ² with 6 degrees of freedom: NEES/6 is 0.89 in the median if consistent."""
-STEP = 1e-5
+STEP = 1e-5  # of a numeric derivative [m, rad]
 
 
 @dataclass(frozen=True, slots=True)

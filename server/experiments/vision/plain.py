@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from time import thread_time
-
 import cv2
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -12,11 +10,12 @@ from hardware.sim.scenes.video import Shot
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, exp
 from pipeline.signals import Image, RelativePose
+from server.common.clock import thread_cpu
 
-THRESHOLD = 128
+THRESHOLD = 128  # grey, half of what there is
 AREA_PX = (2, 2000)
 REACH_PX = 20.0
-MIN_LEDS = 4
+MIN_LEDS = 4  # for a pose without a prior
 
 
 class Plain:
@@ -33,9 +32,9 @@ class Plain:
     def look(self, shot: Shot) -> RelativePose | None:
         """The pose in a shot's picture."""
         told = self._last or (shot.p_bc_in_c, shot.R_cb)
-        begin = thread_time()
+        begin = thread_cpu()
         pose = self._pose(shot, *told)
-        self.took_s = thread_time() - begin
+        self.took_s = thread_cpu() - begin
         self._last = (pose.p_bc_in_c, pose.R_cb) if pose is not None else None
         return pose
 
@@ -68,6 +67,6 @@ class Plain:
 
 def pass_s(luma: Image) -> float:
     """CPU time of one pass over a picture: less is impossible for who looks at all of it."""
-    begin = thread_time()
+    begin = thread_cpu()
     cv2.minMaxLoc(luma)
-    return thread_time() - begin
+    return thread_cpu() - begin

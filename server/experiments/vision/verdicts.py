@@ -15,7 +15,7 @@ PLAIN = "plain OpenCV"
 FRAMES_WANTED = 20_000
 FEWEST = 20
 """Found poses of a row before its NEES counts."""
-NEES = (0.5, 1.8)
+NEES = (0.5, 1.8)  # per freedom, allowed
 CROWDED = "distractors"
 """At least 20 lamps and five LEDs."""
 

@@ -42,7 +42,7 @@ from server.experiments.vision.write import write_film
 FRAMES = 90
 FILM_FRAMES, LONG_FILM_FRAMES = 45, 90
 """Of one film; more frames are more films. Who leaves and returns takes the longer ones."""
-ALL_SIZES = (0, 0)
+ALL_SIZES = (0, 0)  # no size
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field, replace
-from time import thread_time
 
 from hardware.sim.scenes.scene import Picture, Scene, Size
 from hardware.sim.scenes.video import Film, Shot
@@ -13,6 +12,7 @@ from pipeline.vision.detection import Sighting
 from pipeline.vision.imu_buffer import Felt
 from pipeline.vision.visual_front_end import Looking
 from pipeline.vision_config import GatesConfig
+from server.common.clock import thread_cpu
 from server.experiments.vision.channel import Channel, Wire
 from server.experiments.vision.errors import Error, is_wrong, measured
 from server.experiments.vision.plain import Plain, pass_s
@@ -88,7 +88,7 @@ class Eye:
         self._unsolvable, self._waiting = 0, 0
 
     def _new(self) -> Looking:
-        return Looking(self._film.camera, self._film.leds_in_b, GatesConfig(), thread_time)
+        return Looking(self._film.camera, self._film.leds_in_b, GatesConfig(), thread_cpu)
 
     def see(self, k: int, shot: Shot) -> None:
         """The film's next shot, picture `k`."""
@@ -125,9 +125,9 @@ class Eye:
 
     def _look(self, looking: Looking, frame: Frame) -> Sighting:
         body = self._felt.at(frame.t) if self.channel.imu else None
-        begin = thread_time()
+        begin = thread_cpu()
         sighting = looking.look(frame, body.up if body else None, body.omega if body else None)
-        self.record.whole_s.append(thread_time() - begin)
+        self.record.whole_s.append(thread_cpu() - begin)
         return sighting
 
     def _clocked(self, sighting: Sighting, was_tracking: bool) -> None:

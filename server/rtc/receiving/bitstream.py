@@ -13,7 +13,7 @@ UNITS_LOOKED_AT = 4
 MAX_PARAMETERS_BYTES = 256
 LARGEST_SIDE = 65_535
 """[px]; sequence parameters can say any number, also less than nothing."""
-HIGH_PROFILES = (100, 110, 122, 244, 44, 83, 86, 118, 128)
+HIGH_PROFILES = (100, 110, 122, 244, 44, 83, 86, 118, 128)  # H.264, 7.3.2.1.1
 VP8_KEY = b"\x9d\x01\x2a"
 """Bytes 3 to 5 of a VP8 key frame; its width and height follow."""
 

@@ -18,7 +18,7 @@ from server.protocol.wire_records import MOST_SHRUNK
 FIELDS = struct.Struct("<IqBhhhh")
 """sequence u32, time i64 [µs of the phone's clock], flags u8, orientation w x y z 4 × i16."""
 MARK = b"\xcc\xd2\x81"
-GROUP = 7
+GROUP = 7  # bytes, then one of their highest bits
 RAW_BYTES = FIELDS.size + 2
 TRAILER_BYTES = RAW_BYTES + -(-RAW_BYTES // GROUP) + len(MARK)
 ONE = 32767.0

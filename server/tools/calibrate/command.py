@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from server.calibration.camera_yaml import PROFILES, profile_path, store, yaml_o
 from server.calibration.lens import COEFFICIENTS
 from server.calibration.solve import Solution, solve
 from server.calibration.verdict import Verdict, judge, judge_views
+from server.common.clock import today
 from server.common.errors import InputError
 from server.common.options import Parser
 from server.common.settings import state_directory
@@ -25,7 +25,7 @@ from server.tools.calibrate.draw_board import write_board
 from server.tools.calibrate.report import draw
 from server.tools.calibrate.video import Filmed, FilmError, watch
 
-BAR = 30
+BAR = 30  # letters wide
 
 ABOUT = f"""Calibrate a camera with a film of a ChArUco board.
 
@@ -114,7 +114,7 @@ def _calibrate(arguments: argparse.Namespace, board: Board) -> int:
     if verdict.level == "refused":
         return _refuse(verdict)
     _tell(verdict)
-    text = yaml_of(found, verdict, name, arguments.screen_angle, date.today().isoformat())
+    text = yaml_of(found, verdict, name, arguments.screen_angle, today())
     for path in _places(arguments, found.size):
         store(path, text)
         print(f"camera file: {path}")

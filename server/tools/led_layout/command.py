@@ -30,6 +30,7 @@ from server.tools.led_layout.files import OutError, changes, figures, make_folde
 from server.tools.led_layout.report import Judged, judged, lines
 
 SEARCH_VIEWS = 100
+"""Of all, spread evenly, that a search looks at; what it finds is judged by all."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -10,7 +10,7 @@ from server.common.options import Parser
 PURPOSE = (
     "Where was the robot in each frame, and how sure is that? Runs the live pipeline on files."
 )
-FPS = (0.01, 10_000.0)
+FPS = (0.01, 10_000.0)  # least, most pictures a second
 PLOTS = (".png", ".pdf", ".svg")
 FORMATS = """\
 files:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from time import thread_time
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from pipeline.vision.detection import Sighting
 from pipeline.vision.imu_buffer import Feeling, Felt
 from pipeline.vision.visual_front_end import Looking
 from pipeline.vision_config import GatesConfig
+from server.common.clock import thread_cpu
 from server.common.errors import InputError
 from server.media.frame import Shot
 from server.media.frame_source import Frames
@@ -75,7 +75,7 @@ class Locator:
     def __init__(self, camera: Camera, leds_in_b: Array, motion: Motion) -> None:
         """`leds_in_b` (n, 3) [m]."""
         self.camera = camera
-        self.looking = Looking(camera, leds_in_b, GatesConfig(), thread_time)
+        self.looking = Looking(camera, leds_in_b, GatesConfig(), thread_cpu)
         self.looking.doubts_gravity = True  # told in the end, if it was wrong
         self._camera_samples = _Samples(motion.camera)
         self._body_samples = _Samples(motion.body)
@@ -87,11 +87,11 @@ class Locator:
         Raises:
             InputError: a frame of another size, or what `frames` raises.
         """
-        started = thread_time()
+        started = thread_cpu()
         for shot in frames:
-            read_s = thread_time() - started
+            read_s = thread_cpu() - started
             yield self._located(shot, read_s)
-            started = thread_time()
+            started = thread_cpu()
 
     def _located(self, shot: Shot, read_s: float) -> Located:
         self._feel(shot.t)

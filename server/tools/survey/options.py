@@ -6,7 +6,7 @@ import argparse
 from dataclasses import dataclass
 from math import isfinite
 
-LED = (1, 8)
+LED = (1, 8)  # first, last, as people count
 TAPE_M = (0.005, 10.0)
 PLACE_M = 10.0
 

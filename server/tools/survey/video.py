@@ -19,6 +19,7 @@ from server.tools.survey.reconstruction.errors import SurveyError
 
 MOST_SPOTS = 24
 MOST_FRAMES = 3000
+"""Of a frame, the brightest; of a film, so that all fit into memory."""
 
 
 def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Seen]:

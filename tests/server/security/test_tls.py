@@ -18,6 +18,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from hypothesis import given
 from hypothesis import strategies as st
 
+from server.common import clock
 from server.security import tls
 from server.security.tls import AUTHORITY_DAYS, LEAF_DAYS, certificate, own_addresses, own_names
 from server.security.tls_limits import PRIVATE, authority_limits, is_permitted
@@ -71,19 +72,14 @@ def test_a_good_one_is_kept(tmp_path):
 
 
 def later(days):
-    class Later(datetime.datetime):
-        @classmethod
-        def now(cls, tz=None):
-            return super().now(tz) + datetime.timedelta(days=days)
-
-    return Later
+    return lambda: clock.utc() + datetime.timedelta(days=days)
 
 
 @pytest.mark.parametrize(("days", "renewed"), [(0, False), (LEAF_DAYS - 40, False), (370, True)])
 def test_it_is_renewed_before_it_ends_by_the_same_authority(tmp_path, monkeypatch, days, renewed):
     before = certificate(tmp_path)
     cert, authority = before.cert.read_bytes(), before.authority.read_bytes()
-    monkeypatch.setattr(tls.datetime, "datetime", later(days))
+    monkeypatch.setattr(tls, "utc", later(days))
     certificate(tmp_path)
     assert (before.cert.read_bytes() != cert) == renewed
     assert before.authority.read_bytes() == authority
@@ -218,7 +214,7 @@ def test_an_authority_that_will_not_do_is_replaced_and_that_is_said_once(
     made = unlimited(tmp_path) if old == "unlimited" else certificate(tmp_path)
     before = made.authority.read_bytes()
     if old == "nearly over":
-        monkeypatch.setattr(tls.datetime, "datetime", later(AUTHORITY_DAYS - 40))
+        monkeypatch.setattr(tls, "utc", later(AUTHORITY_DAYS - 40))
     if old == "of another machine":
         monkeypatch.setattr(tls.socket, "gethostname", lambda: "other-machine")
     for _ in range(3):
@@ -231,7 +227,7 @@ def test_an_authority_that_will_not_do_is_replaced_and_that_is_said_once(
 
 def test_no_certificate_outlives_its_authority(tmp_path, monkeypatch):
     made = certificate(tmp_path)
-    monkeypatch.setattr(tls.datetime, "datetime", later(AUTHORITY_DAYS - 100))
+    monkeypatch.setattr(tls, "utc", later(AUTHORITY_DAYS - 100))
     certificate(tmp_path)
     assert load(made.cert).not_valid_after_utc <= load(made.authority).not_valid_after_utc
 

@@ -14,7 +14,7 @@ from pipeline.frames import Array, exp
 
 HUBER = 3.0
 """Standard deviations beyond which an observation counts less."""
-ITERATIONS = 60
+ITERATIONS = 60  # at most, of Levenberg and Marquardt
 Indices = npt.NDArray[np.intp]
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from pipeline.frames import Array, exp
 from server.tools.survey.reconstruction.bundle import Observations, Scene, linearised, squares
 
-ITERATIONS = 25
-FEWEST = 4
+ITERATIONS = 25  # at most, of Levenberg and Marquardt
+FEWEST = 4  # LEDs a frame must show
 
 
 def each_posed(
