@@ -7,13 +7,14 @@
 #: make test-all  test, then fuzz, and the robot's watchdog in C as long
 #: make bench   only the measurements, on a quiet machine
 #: make mutants do tests notice small changes in what keeps a robot safe?  (ARGS="FILE --all")
+#: make hooks   let git run the quick checks before each commit
 #: make lock    write requirements/*.txt anew from pyproject.toml (UPGRADE=1: newest versions)
 #: make clean   remove .venv, node_modules and caches
 #: Needs Python 3.11 or later and make; uses uv where there is one. PYTHON=... picks the Python.
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
-.PHONY: fuzz test-all mutants lock clean
+.PHONY: fuzz test-all mutants hooks lock clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -79,7 +80,7 @@ types: dev
 
 web: dev
 	@if [ -e $(WEB) ]; then cd web_client && npm run check && npm test; \
-	else echo "!!! SKIPPED: types and tests of the web client (npm is missing)" >&2; fi
+	else echo "!!! NOT TESTED: types and tests of the web client (npm is missing)" >&2; test -z "$$CI"; fi
 
 # A fresh clone's kernels take a minute to compile: once, and not by each of the workers at once.
 kernels: dev
@@ -118,6 +119,9 @@ bench: dev
 # Needs gcc for the watchdog in C.
 mutants: dev
 	$(BIN)/python -m tests.mutants $(ARGS)
+
+hooks: dev
+	git config core.hooksPath .githooks
 
 lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt
