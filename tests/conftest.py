@@ -1,13 +1,45 @@
-"""Settings for every test."""
+"""Settings for every test, and what becomes of those that can't run here."""
+
+from __future__ import annotations
 
 import os
+from collections import Counter
+from collections.abc import Generator
 
 import matplotlib
+import pytest
 from hypothesis import settings
 
 matplotlib.use("agg")  # no test needs a display
 
+IS_CI = bool(os.environ.get("CI"))
+
 # A busy machine is not a failed law: examples have no deadline. In CI they are the same each time.
 settings.register_profile("default", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
-settings.load_profile("ci" if os.environ.get("CI") else "default")
+settings.load_profile("ci" if IS_CI else "default")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """In CI what is skipped has failed: there everything must be there."""
+    report = yield
+    if IS_CI and report.skipped and not hasattr(report, "wasxfail"):
+        report.outcome, report.longrepr = "failed", f"skipped in CI: {reason_of(report)}"
+    return report
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """The last line says what was not tested."""
+    skipped = Counter(map(reason_of, terminalreporter.stats.get("skipped", [])))
+    if skipped:
+        told = "; ".join(f"{reason} ({count})" for reason, count in skipped.items())
+        terminalreporter.write_line(f"NOT TESTED HERE: {told}", yellow=True, bold=True)
+
+
+def reason_of(report: pytest.TestReport) -> str:
+    """Why it was skipped."""
+    why = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+    return why.removeprefix("Skipped: ")
