@@ -112,6 +112,7 @@ def run_pytest(arguments: Iterable[str], plugins: Iterable[object] = ()) -> int:
         "no:cacheprovider",
         "-p",
         "no:xdist",
+        "--timeout=0",  # the fork has its own alarm
     )
     return int(pytest.main([*quick, *arguments], plugins=[_Verdict(), *plugins]))
 
