@@ -237,9 +237,7 @@ def step(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsaf
             after = _ending(now, inputs, limits) or _coast(now, inputs, limits)
         case Mode.HOLD:
             after = _ending(now, inputs, limits) or _hold(now, inputs, limits)
-    if after.mode in (Mode.DISARMED, Mode.RAMP) or not inputs.held:
-        return _over(after, inputs)
-    return after
+    return after if inputs.held else _over(after, inputs)
 
 
 def _timed(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsafe:

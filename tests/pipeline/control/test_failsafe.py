@@ -65,12 +65,16 @@ def test_arming_is_refused_with_every_reason_in_words() -> None:
         ({"held": False}, 5, Mode.HOLD),
         ({"press": 2}, 5, Mode.HOLD),
         ({"operator_ms": 150}, 5, Mode.TRACK),
+        ({"phone_imu_ms": 150}, 5, Mode.TRACK),
+        ({"robot_ms": 150}, 5, Mode.TRACK),
         ({"operator_ms": 151}, 5, Mode.COAST),
         ({"phone_imu_ms": 151}, 5, Mode.COAST),
         ({"robot_ms": 151}, 5, Mode.COAST),
         ({"gap": "stood still"}, 5, Mode.COAST),
         ({"operator_ms": 151, "held": False}, 5, Mode.HOLD),
+        ({"pose_ms": 2_500}, 5, Mode.TRACK),
         ({"pose_ms": 2_501}, 5, Mode.HOLD),
+        ({"pose_ms": 4_000}, 5, Mode.HOLD),
         ({"doubt": "unsure"}, 5, Mode.HOLD),
         ({"fault": "spins"}, 5, Mode.RAMP),
         ({"requests": DISARM}, 5, Mode.RAMP),
@@ -104,8 +108,8 @@ def test_after_a_gap_it_follows_again_by_itself_once_all_was_fresh_for_a_moment(
         state = failsafe.step(state, replace(HELD, **{silent: age}), 5, LIMITS)  # type: ignore[arg-type]
     assert state.mode == Mode.COAST
     assert failsafe.ceiling(state, LIMITS) == 1.0
-    assert run(state, HELD, 90).mode == Mode.COAST
-    assert run(state, HELD, 105).mode == Mode.TRACK
+    assert run(state, HELD, LIMITS.fresh - 5).mode == Mode.COAST
+    assert run(state, HELD, LIMITS.fresh).mode == Mode.TRACK
 
 
 @pytest.mark.parametrize("change", [{"held": False}, {"press": 2}])
@@ -125,9 +129,16 @@ def test_a_gap_that_flutters_becomes_a_hold_after_a_second_and_counts_for_its_le
         state = run(run(state, replace(HELD, operator_ms=151), 50), HELD, 50)
         assert state.mode == Mode.COAST
     state = run(run(state, replace(HELD, operator_ms=151), 50), HELD, 5)
-    assert state.mode == Mode.HOLD
+    assert (state.mode, state.reason) == (Mode.HOLD, "No word from the phone.")
     assert run(state, HELD, 2_000).mode == Mode.HOLD
     assert run(state, HELD, 2_100).mode == Mode.RAMP
+
+
+def test_a_gap_that_becomes_a_hold_is_named_after_who_is_silent_now() -> None:
+    state = run(tracking(), replace(HELD, operator_ms=151), 500)
+    assert (state.mode, state.reason) == (Mode.COAST, "No word from the phone.")
+    state = run(state, replace(HELD, robot_ms=151), 500)
+    assert (state.mode, state.reason) == (Mode.HOLD, "No word from the robot.")
 
 
 @pytest.mark.parametrize(("gap_ms", "recover_ms"), [(20, 200), (845, 200), (900, 500)])
@@ -147,6 +158,15 @@ def test_what_is_armed_bears_a_gap_but_nothing_longer() -> None:
     assert run(armed(), replace(GOOD, operator_ms=1_000), 500).mode == Mode.ARMED
     assert run(armed(), replace(GOOD, operator_ms=1_001), 5).mode == Mode.DISARMED
     assert run(armed(), replace(GOOD, doubt="unsure"), 5).mode == Mode.DISARMED
+
+
+def test_what_is_armed_is_disarmed_by_request_or_when_idle_for_as_long_as_is_allowed() -> None:
+    state = run(armed(), replace(GOOD, requests=DISARM), 5)
+    assert (state.mode, state.reason) == (Mode.DISARMED, "Disarmed.")
+    idle = run(armed(), GOOD, LIMITS.armed_idle - 5)
+    assert idle.mode == Mode.ARMED
+    state = run(idle, GOOD, 5)
+    assert (state.mode, state.reason) == (Mode.DISARMED, "Armed but not moved for a while.")
 
 
 def test_one_that_does_not_hang_hovers_without_a_phone_for_as_long_as_hold_may_last() -> None:
@@ -175,6 +195,7 @@ def test_it_says_how_long_it_waits_and_whether_it_follows_again() -> None:
         (run(tracking(), LIFTED, 105), replace(GOOD, pose_ms=2_500), 2_900, False),
         (run(tracking(), LIFTED, 105), replace(HELD, press=2), 2_900, True),
         (run(tracking(), LIFTED, 105), replace(GOOD, pose_ms=3_000), 1_000, False),
+        (run(tracking(), LIFTED, 105), replace(GOOD, operator_ms=1_200), 0, False),
         (run(tracking(), replace(HELD, fault="x"), 5), HELD, None, False),
     ]:
         assert failsafe.until_ramp(state, inputs, LIMITS) == left
@@ -186,6 +207,8 @@ def test_ramp_falls_linearly_and_cannot_be_aborted() -> None:
     half = run(state, replace(HELD, press=9, requests=ARM), 1000)
     assert half.mode == Mode.RAMP
     assert failsafe.ceiling(half, LIMITS) == pytest.approx(0.5, abs=0.01)
+    assert run(state, HELD, LIMITS.ramp - 5).mode == Mode.RAMP
+    assert run(state, HELD, LIMITS.ramp).mode == Mode.DISARMED
 
 
 def test_stop_latches_until_a_reset_with_the_button_free() -> None:
@@ -206,6 +229,23 @@ def test_an_estimator_that_cannot_bridge_holds_as_soon_as_the_picture_is_old() -
 def test_nobody_takes_off_with_a_robot_that_the_camera_does_not_see() -> None:
     unseen = replace(GOOD, pose_ms=301)
     assert "not see" in failsafe.refusals(run(Failsafe(), unseen, 600), unseen, LIMITS)[0]
+
+
+def test_what_is_as_old_as_it_may_be_is_news_and_sure() -> None:
+    silent = LIMITS.silent
+    at = replace(GOOD, robot_ms=silent, operator_ms=silent, phone_imu_ms=silent)
+    at = replace(at, pose_ms=LIMITS.pose_hold)
+    for why in (failsafe.silence, failsafe.uncertainty, failsafe.staleness):
+        assert why(at, LIMITS) == ""
+
+
+def test_timers_count_from_the_start_for_a_thousand_seconds() -> None:
+    state = run(Failsafe(), GOOD, 1_000)
+    assert (state.mode_ms, state.good_ms) == (1_000, 1_000)
+    for dt_ms in (999_000, 1):
+        state = failsafe.step(state, GOOD, dt_ms, replace(LIMITS, silent=999_000))
+        assert (state.mode_ms, state.good_ms) == (1_000_000, 1_000_000)
+    assert Failsafe().bad_ms == 1_000_000
 
 
 STARTED = Failsafe(bad_ms=0)
