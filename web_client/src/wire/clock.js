@@ -22,23 +22,22 @@ export function eventUs(timeStampMs, now) {
 
 /** So many frames must agree: one stamp that is wrong would date all others. */
 const AGREE = 3;
+/** So many frames a least delay may live, at most twice. */
+const WINDOW = 150;
 
 /**
  * Brings time stamps of an unknown epoch (camera frames) to the page's clock.
  *
  * Delay only ever makes (arrival − stamp) larger: the smallest of the last frames are the best; two
- * buckets follow a drifting clock.
+ * buckets follow a drifting clock. One frame far off has waited; several in a row, and the camera began anew.
  */
 export class MinimumDelayClock {
-  /** @param {number} window Frames a least delay may live, at most twice. */
-  constructor(window = 150) {
-    this.window = window;
-    this.count = 0;
-    /** @type {number[]} */
-    this.current = [];
-    /** @type {number[]} */
-    this.previous = [];
-  }
+  count = 0;
+  far = 0;
+  /** @type {number[]} */
+  current = [];
+  /** @type {number[]} */
+  previous = [];
 
   /**
    * @param {number} stampUs Of the frame, on the unknown clock.
@@ -47,20 +46,17 @@ export class MinimumDelayClock {
    */
   captureUs(stampUs, arrivalUs) {
     const difference = arrivalUs - stampUs;
-    if (Math.abs(difference - (this.current[0] ?? this.previous[0] ?? Infinity)) > 1e6) {
-      this.count = 0;
-      this.current = [];
-      this.previous = [];
-    }
-    this.current = smallest([...this.current, difference]);
-    const least = smallest([...this.current, ...this.previous]).at(-1) ?? difference;
+    this.far = Math.abs(difference - this.least()) > 1e6 ? this.far + 1 : 0;
+    if (this.far >= AGREE) [this.current, this.previous, this.count, this.far] = [[], [], 0, 0];
+    if (this.far === 0) this.current = smallest([...this.current, difference]);
+    const captureUs = Math.min(stampUs + this.least(), arrivalUs);
     this.count += 1;
-    if (this.count >= this.window) {
-      this.previous = this.current;
-      this.current = [];
-      this.count = 0;
-    }
-    return Math.min(stampUs + least, arrivalUs);
+    if (this.count >= WINDOW) [this.previous, this.current, this.count] = [this.current, [], 0];
+    return captureUs;
+  }
+
+  least() {
+    return smallest([...this.current, ...this.previous]).at(-1) ?? NaN;
   }
 }
 
@@ -69,38 +65,20 @@ function smallest(values) {
   return values.sort((a, b) => a - b).slice(0, AGREE);
 }
 
-/** Events per second over the last second or so. */
+/** An amount per second over the last second. */
 export class Rate {
-  constructor() {
-    /** @type {number[]} */
-    this.times = [];
-    this.amounts = /** @type {number[]} */ ([]);
-  }
+  /** @type {{ t: number, amount: number }[]} */
+  events = [];
 
-  /**
-   * @param {number} now [ms]
-   * @param {number} amount
-   */
+  /** @param {number} now [ms] */
   add(now, amount = 1) {
-    this.times.push(now);
-    this.amounts.push(amount);
-    this.forget(now);
+    this.events.push({ t: now, amount });
+    this.perSecond(now);
   }
 
-  /**
-   * @param {number} now [ms]
-   * @returns {number} Amount per second.
-   */
+  /** @param {number} now [ms] */
   perSecond(now) {
-    this.forget(now);
-    return this.amounts.reduce((sum, amount) => sum + amount, 0);
-  }
-
-  /** @param {number} now */
-  forget(now) {
-    while (this.times.length > 0 && /** @type {number} */ (this.times[0]) <= now - 1000) {
-      this.times.shift();
-      this.amounts.shift();
-    }
+    this.events = this.events.filter(({ t }) => t > now - 1000);
+    return this.events.reduce((sum, { amount }) => sum + amount, 0);
   }
 }
