@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 import yaml
 
-from pipeline.camera.extrinsics import SQUARE, Mounting
+from pipeline.camera.extrinsics import SQUARE, Extrinsics
 from pipeline.camera.lens import MODELS, Camera
 from pipeline.frames import Array
 
@@ -68,7 +68,7 @@ def _read(path: Path) -> tuple[str, Camera, int | None]:
         raise CameraFileError(str(path), "", "lists within too many others") from error
     if not isinstance(table, dict):
         raise CameraFileError(str(path), "", "a YAML mapping: camera_info or a Kalibr camchain")
-    reader = _Reader(str(path), table)
+    reader = _CameraFileReader(str(path), table)
     name, camera = reader.kalibr("cam0") if "cam0" in table else reader.camera_info()
     return name, camera, reader.screen_angle_deg()
 
@@ -120,7 +120,7 @@ def slug(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
 
 
-class _Reader:
+class _CameraFileReader:
     """Checks every key it reads."""
 
     def __init__(self, file: str, table: dict[str, Any]) -> None:
@@ -170,7 +170,7 @@ class _Reader:
         key = "rolling_shutter_readout_s"
         return self._number(self._table.get(key, 0.0), key, *READOUTS_S)
 
-    def _mounting(self) -> Mounting:
+    def _mounting(self) -> Extrinsics:
         """How the camera sits beside the motion sensors; the key may be missing."""
         table = self._table.get("camera_imu")
         if table is None:
@@ -186,7 +186,7 @@ class _Reader:
         key = "camera_imu.time_offset_s"
         offset_s = self._number(table.get("time_offset_s", 0.0), key, *TIME_OFFSETS_S)
         U, _, Vt = np.linalg.svd(R_ci)
-        return Mounting(U @ Vt, offset_s)
+        return Extrinsics(U @ Vt, offset_s)
 
     def _line_readout_s(self, name: str, height: int) -> float:
         """Of a camchain: our own key beside the cameras, else Kalibr's time between two rows."""

@@ -8,7 +8,7 @@ whose spectrum is that of gusts and hands, by feedback alone:
     J² = (1/π) ∫ |P(jω) / (1 + L(jω))|² · 2 ω₀ / (ω² + ω₀²) dω,   P = 1 / (m s² + c s + k)
 
 Margins hold with and without feed-forward, whose felt pull is another loop. Beside gain, phase and
-delay, L keeps off −1, about as far as a loop that has both margins just so (`Goals.modulus`).
+delay, L keeps off −1, about as far as a loop that has both margins just so (`MarginGoals.modulus`).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ FORBIDDEN: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Goals:
+class MarginGoals:
     """Margins that every loop must keep."""
 
     gain: float
@@ -68,7 +68,7 @@ class TuningError(Exception):
         self.axis = axis
 
 
-def tuned(loop: Loop, axes: Iterable[int], sensing: Sensing, goals: Goals) -> Gains:
+def tuned(loop: Loop, axes: Iterable[int], sensing: Sensing, goals: MarginGoals) -> Gains:
     """The gains of `loop` with those of `axes` replaced by the best there are.
 
     The same every time. Roll and pitch of a robot that tilts come first: x and y rest on them.
@@ -93,7 +93,7 @@ def _alike(loop: Loop, axis: int, rows: Array) -> tuple[float, ...]:
     return (axis // 3, d.inertia[axis], d.damping[axis], d.stiffness[axis], *rows[:, axis], *inner)
 
 
-def _best(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> Array:
+def _best(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> Array:
     """(3,) Kp, Ki, Kd."""
     inertia = float(loop.dynamics.inertia[axis])
     turns_to_move = loop.dynamics.needs_tilt and axis in TILT_AXIS.values()
@@ -123,7 +123,7 @@ def _start(loop: Loop, axis: int, inertia: float) -> Array:
     return np.clip(np.log([w, Kd / (inertia * w), Ki / (w * Kp)]), *BOUNDS.T)
 
 
-def _cost(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> float:
+def _cost(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> float:
     """Logarithm of J; above all of those, by how much the goals are missed."""
     missing = sum(shortfall(one, axis, sensing, goals) for one in variants(loop))
     if missing > 0.0:
@@ -136,7 +136,7 @@ def variants(loop: Loop) -> Sequence[Loop]:
     return (loop,) if loop.feedforward is None else (loop, replace(loop, feedforward=None))
 
 
-def shortfall(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> float:
+def shortfall(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> float:
     """By how much the goals are missed, as shares of them; 0: they are kept with some to spare."""
     found = axis_margins(loop, axis, sensing)
     if not found.stable:
@@ -151,13 +151,13 @@ def shortfall(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> float:
     return float(sum(max(0.0, 1.0 - has / (SPARE * wanted)) for has, wanted in pairs))
 
 
-def keeps(loop: Loop, axis: int, sensing: Sensing, goals: Goals) -> bool:
+def keeps(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> bool:
     """Whether the goals themselves are kept."""
     found = [axis_margins(one, axis, sensing) for one in variants(loop)]
     return all(_is_enough(one, goals) for one in found)
 
 
-def _is_enough(found: AxisMargins, goals: Goals) -> bool:
+def _is_enough(found: AxisMargins, goals: MarginGoals) -> bool:
     gain = found.gain_up >= goals.gain and found.gain_down <= 1.0 / goals.gain
     return found.stable and gain and found.phase >= goals.phase and found.delay >= goals.delay
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from hardware.robot_file import RobotFileError, robot_path, robot_table
-from hardware.robot_schema import Led
+from hardware.robot_schema import LedSection
 from pipeline.frames import Array
 
 COUNTS = (3, 32)
@@ -29,12 +29,12 @@ def load_leds(name_or_path: str | Path) -> tuple[str, Array]:
     """
     path = robot_path(name_or_path)
     table = robot_table(path)
-    reader = _Reader(str(path))
+    reader = _LedFileReader(str(path))
     name = table.get("name", path.stem)
     return str(name), reader.leds(table)
 
 
-class _Reader:
+class _LedFileReader:
     """Checks what it reads."""
 
     def __init__(self, file: str) -> None:
@@ -55,7 +55,7 @@ class _Reader:
 
     def _place(self, k: int, row: dict[str, Any]) -> Array:
         try:
-            led = np.array(Led.model_validate(row).position_in_body_m, dtype=np.float64)
+            led = np.array(LedSection.model_validate(row).position_in_body_m, dtype=np.float64)
         except ValidationError as error:
             fault = error.errors()[0]
             where = ".".join(map(str, fault["loc"]))

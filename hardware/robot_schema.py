@@ -101,7 +101,7 @@ class BodyImuSection(Section):
     acc_step_mg: NotNegative
 
 
-class Led(Section):
+class LedSection(Section):
     """[[leds]]; at most one of the three reaches, which `robot leds --improve` may use."""
 
     position_in_body_m: Vector
@@ -113,7 +113,7 @@ class Led(Section):
     """It may be anywhere on the straight arm between these two places in the body's axes."""
 
     @model_validator(mode="after")
-    def _one_reach(self) -> Led:
+    def _one_reach(self) -> LedSection:
         said = [self.reach_m, self.reach_box_m, self.reach_segment_m]
         if sum(reach is not None for reach in said) > 1:
             raise ValueError("at most one of reach_m, reach_box_m, reach_segment_m")
@@ -156,7 +156,7 @@ class RobotSchema(Section):
     air: Air
     thrusters: Thrusters
     body_imu: BodyImuSection
-    leds: Annotated[list[Led], Field(min_length=4, max_length=16)]
+    leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
     gains: Annotated[dict[str, GainsSection], Field(min_length=1)]
     link: LinkSection
 

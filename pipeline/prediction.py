@@ -16,7 +16,7 @@ MAX_GAP_S = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Expected:
+class Prediction:
     """A filter's prediction for a time, made without the picture of that time."""
 
     t: float
@@ -35,21 +35,21 @@ class Expected:
     """Of the pictures' stamps, as the filter knows it: taken at the stamp plus this [s]."""
 
     @classmethod
-    def of(cls, state: RelativeState, time_offset: float) -> Expected:
+    def of(cls, state: RelativeState, time_offset: float) -> Prediction:
         """What a filter's state says of its own time; a `time_offset` of NaN is none."""
         place = (state.p_bc_in_c, state.R_cb, state.u_bf_in_c)
         offset = time_offset if isfinite(time_offset) else 0.0
         return cls(state.t, *place, state.sigma_p, state.sigma_theta, offset)
 
 
-class Expectation:
+class PredictionHistory:
     """The last second of predictions. One thread may add while another one asks."""
 
     def __init__(self) -> None:
         """Nothing known."""
-        self._rows: tuple[Expected, ...] = ()
+        self._rows: tuple[Prediction, ...] = ()
 
-    def add(self, expected: Expected | None) -> None:
+    def add(self, expected: Prediction | None) -> None:
         """The filter's newest prediction; None when it has none: then all before is void."""
         if expected is None or (self._rows and expected.t <= self._rows[-1].t):
             self._rows = ()  # another life of the filter
@@ -57,7 +57,7 @@ class Expectation:
             recent = (row for row in self._rows if expected.t - row.t <= REMEMBERED_S)
             self._rows = (*recent, expected)
 
-    def at(self, stamp: float) -> Expected | None:
+    def at(self, stamp: float) -> Prediction | None:
         """Prediction for a picture's stamp [s]; None outside what is remembered."""
         rows = self._rows
         if not rows:
@@ -73,10 +73,10 @@ class Expectation:
         return _between(rows[k - 1], rows[k], t)
 
 
-def _between(before: Expected, after: Expected, t: float) -> Expected:
+def _between(before: Prediction, after: Prediction, t: float) -> Prediction:
     """On the straight way from one to the other; as unsure as the worse of them."""
     share = (t - before.t) / (after.t - before.t)
-    return Expected(
+    return Prediction(
         t=t,
         p_bc_in_c=before.p_bc_in_c + share * (after.p_bc_in_c - before.p_bc_in_c),
         R_cb=before.R_cb @ exp(share * log(before.R_cb.T @ after.R_cb)),

@@ -131,7 +131,7 @@ class StampOffset:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class VisionMeasurement:
     """What a picture says of the robot, whatever of it was hidden."""
 
     t: float
@@ -212,7 +212,7 @@ class Mode(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Operator:
+class TouchState:
     """What the page's main thread last said, judged by the age of the nonce it echoed."""
 
     t: float

@@ -25,12 +25,12 @@ from pipeline.robot import Robot
 from pipeline.signals import (
     BodyImu,
     Mode,
-    Operator,
     PhoneImu,
     RelativeState,
     Requests,
-    Seen,
+    TouchState,
     VirtualView,
+    VisionMeasurement,
 )
 
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-4, 0.060
@@ -45,8 +45,8 @@ class Inputs:
     """Now [s]."""
     phone_imu: tuple[PhoneImu, ...] = ()
     body_imu: tuple[BodyImu, ...] = ()
-    seen: tuple[Seen, ...] = ()
-    operator: Operator | None = None
+    seen: tuple[VisionMeasurement, ...] = ()
+    operator: TouchState | None = None
     requests: Requests = failsafe.NO_REQUESTS
     refusals: tuple[str, ...] = ()
     """What the server or the robot's link has against arming."""
@@ -91,7 +91,7 @@ class Teleop:
         self.attitude, self._bridge = Attitude(), GyroBridge()
         self._config, self._robot = config, robot
         self._h, self._t_step, self._stood_still = period, np.nan, False
-        self._limits = failsafe.Limits.of(
+        self._limits = failsafe.FailsafeTimers.of(
             config.failsafe, robot.ramp_s, robot.hangs, bridges=config.estimator != "none"
         )
         self._virtual_camera = VirtualCamera(config.virtual_camera)
@@ -101,7 +101,7 @@ class Teleop:
         # what stands on the floor brakes and stays by itself
         self._keeps_station = robot.hangs or robot.weight_to_carry > 0.0
         self._failsafe = failsafe.Failsafe()
-        self._operator = Operator(-np.inf, held=False, press=0)
+        self._operator = TouchState(-np.inf, held=False, press=0)
         self._half_field: tuple[float, float] | None = None
         self._t_seen = self._t_phone = -np.inf
         self._body, self._frozen_imu = BodyImu(-np.inf, np.zeros(3), np.zeros(3)), FrozenImu()
@@ -225,9 +225,9 @@ class Teleop:
 
     def _judge(
         self, inputs: Inputs, known: Situation | None, error: PoseError | None, ages: Ages
-    ) -> failsafe.Inputs:
+    ) -> failsafe.FailsafeInputs:
         limits, is_tracking = self._config.envelope, self._failsafe.mode == Mode.TRACK
-        return failsafe.Inputs(
+        return failsafe.FailsafeInputs(
             held=self._operator.held,
             press=self._operator.press,
             fault=inputs.fault

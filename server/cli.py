@@ -48,7 +48,7 @@ def _server(argv: Sequence[str]) -> int:
     from server.process.launcher import SECRET_VARIABLE
 
     runtime, truth_port, https, http, *rest = argv
-    given = server_process.Given(
+    given = server_process.LaunchContext(
         Path(runtime),
         int(truth_port),
         socket.socket(fileno=int(https)),

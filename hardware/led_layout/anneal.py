@@ -21,7 +21,7 @@ import numpy as np
 from hardware.led_layout.crlb import sigmas
 from hardware.led_layout.margins import Progress, check, wrong
 from hardware.led_layout.reach import Reach
-from hardware.led_layout.viewpoints import Looks
+from hardware.led_layout.viewpoints import Viewpoints
 from pipeline.frames import Array
 
 WARM, COLD = 0.5, 0.02
@@ -43,7 +43,7 @@ MM = 1e-3  # [m]
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class AnnealingOptions:
     """How long and how."""
 
     turns: int = 600
@@ -59,7 +59,7 @@ def asked(count: int) -> tuple[tuple[int, int], ...]:
     return ((count, 0), (4, 2), (4, 1)) if count > 4 else ((4, 2), (4, 1))
 
 
-def apart_px(leds_in_b: Array, looks: Looks) -> float:
+def apart_px(leds_in_b: Array, looks: Viewpoints) -> float:
     """The least distance of two spots over all views, without perspective [px]."""
     i, j = np.array(list(combinations(range(len(leds_in_b)), 2))).T
     arms = leds_in_b[i] - leds_in_b[j]
@@ -68,10 +68,10 @@ def apart_px(leds_in_b: Array, looks: Looks) -> float:
     return looks.focal_px / float(looks.distances[0]) * float(np.sqrt(across2.min()))
 
 
-class _Judge:
+class _Evaluator:
     """Scores layouts by views that it learns."""
 
-    def __init__(self, looks: Looks, enough_px: float, now: Array) -> None:
+    def __init__(self, looks: Viewpoints, enough_px: float, now: Array) -> None:
         self._looks, self._enough_px = looks, enough_px
         chosen = np.linspace(0, len(looks.angles) - 1, min(FEW, len(looks.angles))).astype(int)
         self._some = replace(looks, angles=looks.angles[chosen])
@@ -145,8 +145,8 @@ class _Judge:
 def improve(
     leds_in_b: Array,
     reaches: Sequence[Reach],
-    looks: Looks,
-    search: Search,
+    looks: Viewpoints,
+    search: AnnealingOptions,
     progress: Progress | None = None,
 ) -> Array:
     """The best layout (n, 3) found, in whole millimetres where the reach allows.
@@ -169,7 +169,7 @@ def improve(
         if progress is not None:
             progress(_counted(ticks, lambda: all(run.done() for run in runs)))
         found = [run.result() for run in runs]
-    judge = _Judge(looks, search.enough_px, leds_in_b)
+    judge = _Evaluator(looks, search.enough_px, leds_in_b)
     for layout in (leds_in_b, *found):  # all by the same views, the worst of each among them
         judge.learn(layout)
     return max((leds_in_b, *found), key=judge.score)
@@ -189,12 +189,15 @@ def _counted(ticks: list[None], done: Callable[[], bool]) -> Iterator[None]:
 def _anneal(
     now: Array,
     reaches: Sequence[Reach],
-    looks: Looks,
-    search: Search,
+    looks: Viewpoints,
+    search: AnnealingOptions,
     ticks: list[None],
     start: int,
 ) -> Array:
-    rng, judge = np.random.default_rng([search.seed, start]), _Judge(looks, search.enough_px, now)
+    rng, judge = (
+        np.random.default_rng([search.seed, start]),
+        _Evaluator(looks, search.enough_px, now),
+    )
     leds = now if start == 0 else np.array([reach.anywhere(rng) for reach in reaches])
     best = leds
     for turn in range(search.turns):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hardware.led_layout.viewpoints import Looks, attitude, seen
+from hardware.led_layout.viewpoints import Viewpoints, attitude, seen
 from pipeline.frames import Array, skew
 
 HUGE = 1e12
@@ -25,7 +25,7 @@ class Sigmas:
     """(k, d) about the worst axis [rad]."""
 
 
-def sigmas(leds_in_b: Array, looks: Looks, noise_px: float) -> Sigmas:
+def sigmas(leds_in_b: Array, looks: Viewpoints, noise_px: float) -> Sigmas:
     """With all LEDs seen, each coordinate of each off by `noise_px`."""
     covariances = np.array(
         [
@@ -41,7 +41,7 @@ def sigmas(leds_in_b: Array, looks: Looks, noise_px: float) -> Sigmas:
     )
 
 
-def one_hidden(leds_in_b: Array, looks: Looks, noise_px: float) -> Sigmas:
+def one_hidden(leds_in_b: Array, looks: Viewpoints, noise_px: float) -> Sigmas:
     """The same with that one LED hidden that is missed most, for each figure of its own."""
     each = [sigmas(np.delete(leds_in_b, k, axis=0), looks, noise_px) for k in range(len(leds_in_b))]
     return Sigmas(

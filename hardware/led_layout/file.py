@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from hardware.led_file import load_leds
 from hardware.led_layout.reach import Ball, Box, Reach, Segment
 from hardware.robot_file import RobotFileError, robot_path, robot_table
-from hardware.robot_schema import Led, Start
+from hardware.robot_schema import LedSection, Start
 from pipeline.frames import Array
 
 INSIDE_M = 1e-6
@@ -42,7 +42,7 @@ def load_layout(name_or_path: str) -> Layout:
     path = robot_path(name_or_path)
     table = robot_table(path)
     reaches = tuple(
-        _reach(str(path), k, Led.model_validate(row), led)
+        _reach(str(path), k, LedSection.model_validate(row), led)
         for k, (row, led) in enumerate(zip(table["leds"], leds_in_b, strict=True))
     )
     try:
@@ -55,7 +55,7 @@ def load_layout(name_or_path: str) -> Layout:
     return Layout(name, leds_in_b, reaches, start.distance_m, elevation)
 
 
-def _reach(file: str, k: int, led: Led, place: Array) -> Reach | None:
+def _reach(file: str, k: int, led: LedSection, place: Array) -> Reach | None:
     reach: Reach
     if led.reach_m is not None:
         reach = Ball(place, led.reach_m)

@@ -21,7 +21,7 @@ import numpy as np
 
 from hardware.led_layout.fit_kernels import FREE, TILT, TURN
 from hardware.led_layout.margin_kernels import Indices, other_pose, smallest_wrong
-from hardware.led_layout.viewpoints import LedLayoutError, Looks, attitude, direction, seen
+from hardware.led_layout.viewpoints import LedLayoutError, Viewpoints, attitude, direction, seen
 from pipeline.frames import Array
 
 FEWEST, MOST = 4, 8
@@ -90,7 +90,7 @@ def check(leds_in_b: Array) -> None:
 
 def wrong(
     leds_in_b: Array,
-    looks: Looks,
+    looks: Viewpoints,
     angles: Array,
     distance: float,
     named: int,
@@ -121,7 +121,7 @@ def wrong(
     return float(least), int(which)
 
 
-def margins(leds_in_b: Array, looks: Looks, progress: Progress | None = None) -> Margins:
+def margins(leds_in_b: Array, looks: Viewpoints, progress: Progress | None = None) -> Margins:
     """The smallest margins over all wrong namings, for each view and distance.
 
     Args:
@@ -156,7 +156,7 @@ def in_threads(
             pass
 
 
-def _judge(leds_in_b: Array, looks: Looks, k: int, d: int, result: Margins) -> None:
+def _judge(leds_in_b: Array, looks: Viewpoints, k: int, d: int, result: Margins) -> None:
     count, distance = len(leds_in_b), float(looks.distances[d])
     for size, named in enumerate((4, count)):
         least = result.wrong[k, d, size]
@@ -174,7 +174,9 @@ def _judge(leds_in_b: Array, looks: Looks, k: int, d: int, result: Margins) -> N
     result.apart[k, d] = np.linalg.norm(px[i] - px[j], axis=1).min()
 
 
-def worst(leds_in_b: Array, looks: Looks, found: Margins, d: int, size: int, known: int) -> Worst:
+def worst(
+    leds_in_b: Array, looks: Viewpoints, found: Margins, d: int, size: int, known: int
+) -> Worst:
     """The worst view between those of `found`: downhill in direction from the worst of them.
 
     Args:

@@ -18,7 +18,7 @@ class LedLayoutError(ValueError):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Looks:
+class Viewpoints:
     """Views of a robot in the middle of the picture; what the camera's roll is does not matter."""
 
     angles: Array
@@ -58,7 +58,7 @@ def looks_about(
     focal_px: float,
     gravity_rad: float = np.radians(10.0),
     attitude_rad: float = np.radians(30.0),
-) -> Looks:
+) -> Viewpoints:
     """So many views, evenly over the sphere within a spread of azimuth and elevation."""
     azimuth, elevation = middle_rad
     half = (min(spread_rad[0], pi), min(spread_rad[1], pi))
@@ -68,7 +68,7 @@ def looks_about(
     turns = azimuth + half[0] * (2.0 * ((steps + 0.5) * GOLDEN % 1.0) - 1.0)
     angles = np.column_stack((turns, np.arcsin(heights)))
     window = ((azimuth - half[0], azimuth + half[0]), (low, high))
-    return Looks(angles, distances, focal_px, window, gravity_rad, attitude_rad)
+    return Viewpoints(angles, distances, focal_px, window, gravity_rad, attitude_rad)
 
 
 def direction(angles: Array) -> Array:

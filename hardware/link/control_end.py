@@ -17,9 +17,9 @@ from hardware.follower import BodySample, FollowerState, ThrustCommand, check_co
 from hardware.link.datagram import (
     U32,
     U64,
-    Command,
+    CommandDatagram,
     LinkError,
-    Sample,
+    SampleDatagram,
     decode_sample,
     encode_command,
     is_later,
@@ -59,7 +59,7 @@ class ControlEnd:
         self._last = np.zeros(thrusters)
         self._sent_at = [0.0] * SENT_KEPT
         self._challenges = [0] * SENT_KEPT
-        self._newest: Sample | None = None
+        self._newest: SampleDatagram | None = None
         self.limited = 0
         """Commands that rose faster than the robot allows and were slowed down."""
         self.dropped = 0
@@ -95,7 +95,7 @@ class ControlEnd:
         self._sent_at[self._counter % SENT_KEPT] = now
         self._challenges[self._counter % SENT_KEPT] = challenge
         return encode_command(
-            Command(
+            CommandDatagram(
                 epoch=self.epoch,
                 counter=self._counter,
                 nonce=self._newest.nonce if self._newest else 0,
@@ -129,18 +129,18 @@ class ControlEnd:
             round_trip_s=self._round_trip(sample, now),
         )
 
-    def _is_believed(self, sample: Sample) -> bool:
+    def _is_believed(self, sample: SampleDatagram) -> bool:
         last = self._newest
         if last is not None and sample.boot_id == last.boot_id:
             return is_later(sample.counter, last.counter)
         return sample.challenge != 0 and sample.challenge in self._challenges
 
-    def _is_outdated(self, robot: Sample) -> bool:
+    def _is_outdated(self, robot: SampleDatagram) -> bool:
         """Whether the robot would never again take our epoch."""
         refusing = robot.state == FollowerState.REFUSING and robot.epoch != 0
         return refusing and self.epoch <= robot.epoch < U64 - 1  # nothing is later than that
 
-    def _renew(self, robot: Sample) -> None:
+    def _renew(self, robot: SampleDatagram) -> None:
         self.epoch = robot.epoch + 1
         self._counter = 0
         self._last = np.zeros(self.thrusters)
@@ -151,7 +151,7 @@ class ControlEnd:
         self.limited += int(bool((slowed < thrusts).any()))
         return slowed
 
-    def _round_trip(self, sample: Sample, now: float) -> float | None:
+    def _round_trip(self, sample: SampleDatagram, now: float) -> float | None:
         behind = (self._counter - sample.accepted) % U32
         if sample.epoch != self.epoch or behind >= SENT_KEPT or sample.accepted == 0:
             return None

@@ -80,7 +80,7 @@ class LinkError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class CommandDatagram:
     """Command, control → robot."""
 
     epoch: int
@@ -95,7 +95,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class SampleDatagram:
     """Sample, robot → control."""
 
     state: FollowerState
@@ -123,7 +123,7 @@ def _sample_layout(thrusters: int) -> struct.Struct:
     return struct.Struct(f"<4sBBBBQQQQIII6f{thrusters}f")
 
 
-def encode_command(command: Command, key: bytes) -> bytes:
+def encode_command(command: CommandDatagram, key: bytes) -> bytes:
     """Bytes of a command."""
     thrusters = len(command.thrusts)
     body = _command_layout(thrusters).pack(
@@ -140,7 +140,7 @@ def encode_command(command: Command, key: bytes) -> bytes:
     return body + mac(key, body)
 
 
-def encode_sample(sample: Sample, key: bytes) -> bytes:
+def encode_sample(sample: SampleDatagram, key: bytes) -> bytes:
     """Bytes of a sample."""
     thrusters = len(sample.thrusts)
     body = _sample_layout(thrusters).pack(
@@ -163,7 +163,7 @@ def encode_sample(sample: Sample, key: bytes) -> bytes:
     return body + mac(key, body)
 
 
-def decode_command(data: bytes, key: bytes) -> Command:
+def decode_command(data: bytes, key: bytes) -> CommandDatagram:
     """The command in `data`; its values are judged by `RobotEnd`.
 
     Raises:
@@ -175,10 +175,10 @@ def decode_command(data: bytes, key: bytes) -> Command:
     if flags & ~(ARMED | STOP):
         raise LinkError("command.flags", "bits 0 and 1")
     armed, stop = bool(flags & ARMED), bool(flags & STOP)
-    return Command(epoch, counter, nonce, challenge, armed, fields[8:], stop)
+    return CommandDatagram(epoch, counter, nonce, challenge, armed, fields[8:], stop)
 
 
-def decode_sample(data: bytes, key: bytes) -> Sample:
+def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
     """The sample in `data`.
 
     Raises:
@@ -195,7 +195,7 @@ def decode_sample(data: bytes, key: bytes) -> Sample:
         raise LinkError("sample.time", "0 to 2^60 µs")
     if not all(map(isfinite, values)):
         raise LinkError("sample.gyroscope, accelerometer, thrusts", "finite numbers")
-    return Sample(
+    return SampleDatagram(
         state=FollowerState(state),
         refusal=Refusal(refusal),
         t_us=t_us,

@@ -53,9 +53,9 @@ from hardware.follower import FollowerState, Refusal
 from hardware.given_thrusts import GivenThrusts
 from hardware.link.datagram import (
     U32,
-    Command,
+    CommandDatagram,
     LinkError,
-    Sample,
+    SampleDatagram,
     Triple,
     decode_command,
     encode_sample,
@@ -193,7 +193,7 @@ class RobotEnd:
         self._nonces.append((nonce, now_us))
         self._answered, self._asking = self._asking, None
         return encode_sample(
-            Sample(
+            SampleDatagram(
                 state=self.state,
                 refusal=self.refusal,
                 t_us=now_us,
@@ -216,7 +216,7 @@ class RobotEnd:
         both = self._peer if lately else None, self._answered
         return tuple(dict.fromkeys(peer for peer in both if peer is not None))
 
-    def _note(self, command: Command) -> bool:
+    def _note(self, command: CommandDatagram) -> bool:
         """Whether nothing newer was heard before; if so, remember it, and echo its challenge."""
         epoch, counter = self._newest
         later = is_later(command.counter, counter)
@@ -259,7 +259,7 @@ class RobotEnd:
         self.state, self.refusal = FollowerState.REFUSING, Refusal.SILENT
         self._given.zero()
 
-    def _judge(self, command: Command, now_us: int) -> Refusal:
+    def _judge(self, command: CommandDatagram, now_us: int) -> Refusal:
         limits = self._limits
         if len(command.thrusts) != limits.thrusters:
             return Refusal.THRUSTERS
@@ -274,12 +274,12 @@ class RobotEnd:
             return Refusal.NONE
         return self._judge_thrusts(command, now_us)
 
-    def _is_later_zero(self, command: Command) -> bool:
+    def _is_later_zero(self, command: CommandDatagram) -> bool:
         """Rule 3: who is newer than who flies now and who is in his handshake."""
         newer = command.epoch > max(self._epoch, self._candidate)
         return newer and not any(command.thrusts)
 
-    def _judge_thrusts(self, command: Command, now_us: int) -> Refusal:
+    def _judge_thrusts(self, command: CommandDatagram, now_us: int) -> Refusal:
         limits, refusing = self._limits, self.state == FollowerState.REFUSING
         thrusts = np.array(command.thrusts)
         meant = bool(thrusts.any())
@@ -301,7 +301,7 @@ class RobotEnd:
             return Refusal.RISE
         return Refusal.NONE
 
-    def _take(self, command: Command, now_us: int) -> None:
+    def _take(self, command: CommandDatagram, now_us: int) -> None:
         """Act on a command that was judged good."""
         if command.epoch != self._epoch:
             self._shake_hands(command, now_us)
@@ -316,7 +316,7 @@ class RobotEnd:
             self.state = FollowerState.RUNNING if running else FollowerState.IDLE
             self.refusal = Refusal.NONE
 
-    def _shake_hands(self, command: Command, now_us: int) -> None:
+    def _shake_hands(self, command: CommandDatagram, now_us: int) -> None:
         """Zero of a later epoch: it gets the robot when thrust is zero and time enough is over."""
         self._replaced = True
         self._leave(now_us)
@@ -332,7 +332,7 @@ class RobotEnd:
             self.state, self.refusal = FollowerState.IDLE, Refusal.NONE
             self._taken_us, self._replaced = now_us, False
 
-    def _obey_zero(self, command: Command, newest: bool) -> None:
+    def _obey_zero(self, command: CommandDatagram, newest: bool) -> None:
         """Rule 4: zero without a fresh nonce, which is not taken otherwise."""
         if any(command.thrusts) or self.state == FollowerState.REFUSING:
             return

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from hardware.plant_parameters import StartParameters
-from hardware.sim.hand_parts import Keyed, Part, Waves, lift
+from hardware.sim.hand_parts import Keyed, MotionComponent, Waves, lift
 from pipeline.frames import GRAVITY, Array, R_from_rpy, S_in_b, rotation_about_z
 
 REST_S = 2.0
@@ -45,7 +45,11 @@ class MovingHand:
     """A start pose plus the parts of a motion, along level axes that face along its yaw."""
 
     def __init__(
-        self, parts: Sequence[Part], p_start_in_f: Array, rpy_start: Array, t_moves: float
+        self,
+        parts: Sequence[MotionComponent],
+        p_start_in_f: Array,
+        rpy_start: Array,
+        t_moves: float,
     ) -> None:
         """At rest at `p_start_in_f` [m], turned by `rpy_start` [rad], until `t_moves` [s]."""
         self._parts = tuple(parts)
@@ -95,17 +99,23 @@ def _strata(rng: np.random.Generator, n: int) -> Array:
     return (np.arange(n)[:, None] + rng.uniform(0.0, 1.0, (n, 6))) / n
 
 
-def tremor(rng: np.random.Generator, sigma_m: float = 5e-5, sigma_deg: float = 0.03) -> Part:
+def tremor(
+    rng: np.random.Generator, sigma_m: float = 5e-5, sigma_deg: float = 0.03
+) -> MotionComponent:
     """Physiological tremor: 8-12 Hz, 0.05 mm and 0.03° RMS."""
     return _noise(rng, 8.0 + 4.0 * _strata(rng, 12), sigma_m, sigma_deg)
 
 
-def steady_wander(rng: np.random.Generator, sigma_m: float = 5e-3, sigma_deg: float = 0.4) -> Part:
+def steady_wander(
+    rng: np.random.Generator, sigma_m: float = 5e-3, sigma_deg: float = 0.4
+) -> MotionComponent:
     """Someone trying to hold still: below 0.5 Hz, 5 mm and 0.4° RMS."""
     return _noise(rng, 0.05 + 0.4 * _strata(rng, 12), sigma_m, sigma_deg)
 
 
-def three_poles(rng: np.random.Generator, hz: float, sigma_m: float, sigma_deg: float) -> Part:
+def three_poles(
+    rng: np.random.Generator, hz: float, sigma_m: float, sigma_deg: float
+) -> MotionComponent:
     """White noise through three poles at `hz`: sines drawn from (1 + (f/f₀)²)⁻³."""
     u = np.linspace(0.0, np.pi / 2.0, 2001)
     share = np.cumsum(np.cos(u) ** 4)  # of the power below f = f₀ tan u
@@ -113,7 +123,7 @@ def three_poles(rng: np.random.Generator, hz: float, sigma_m: float, sigma_deg: 
     return _noise(rng, frequencies, sigma_m, sigma_deg)
 
 
-def step(axis: int, amplitude: float) -> Part:
+def step(axis: int, amplitude: float) -> MotionComponent:
     """A move of `amplitude` [m or rad] along one of the six axes within 0.3 s."""
     T, c = STEP_S, CORNER_S
     knots = np.array([0.0, c, 0.5 * (T - c), 0.5 * (T + c), T - c, T])
@@ -123,7 +133,7 @@ def step(axis: int, amplitude: float) -> Part:
     return Keyed(BSpline(unit.t, unit.c * (amplitude / unit(STEP_S)[axis]), unit.k))
 
 
-def demo() -> Part:
+def demo() -> MotionComponent:
     """A slow figure of ±15 cm with small turns, 20 s a round: something a newcomer can watch."""
     amplitude = np.array([[0.08, 0.15, 0.06, 0.0, np.deg2rad(1.0), np.deg2rad(1.5)]])
     period_s = np.array([[20.0, 20.0, 10.0, 20.0, 10.0, 20.0]])
@@ -131,14 +141,14 @@ def demo() -> Part:
     return Waves(amplitude, 2.0 * np.pi / period_s, phase, fade_s=4.0)
 
 
-def circle() -> Part:
+def circle() -> MotionComponent:
     """A circle of 15 cm across the line of sight, 20 s a round, without turning."""
     amplitude = np.array([[0.0, 0.15, 0.15, 0.0, 0.0, 0.0]])
     phase = np.array([[0.0, 0.0, 0.5 * np.pi, 0.0, 0.0, 0.0]])
     return Waves(amplitude, np.full((1, 6), 2.0 * np.pi / 20.0), phase, fade_s=4.0)
 
 
-def recorded(path: Path) -> Part:
+def recorded(path: Path) -> MotionComponent:
     """A hand from a CSV file: a heading line, then 6 rows or more of `RECORDED_COLUMNS`.
 
     Raises:
@@ -174,7 +184,7 @@ def make_hand(
     Raises:
         ValueError: an unknown kind or a file that can't be used.
     """
-    parts: tuple[Part, ...]
+    parts: tuple[MotionComponent, ...]
     if kind in HANDS:
         parts = HANDS[kind](np.random.default_rng(seed))
     elif Path(kind).is_file():
@@ -189,7 +199,7 @@ def make_hand(
     return MovingHand(parts, p_start, rpy_start, t_start + rest_s)
 
 
-HANDS: dict[str, Callable[[np.random.Generator], tuple[Part, ...]]] = {
+HANDS: dict[str, Callable[[np.random.Generator], tuple[MotionComponent, ...]]] = {
     "still": lambda _: (),
     "steady": lambda rng: (steady_wander(rng), tremor(rng)),
     # "moving" is what the AMES' thrusters can follow; "restless" keeps them at their limits

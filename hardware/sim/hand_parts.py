@@ -16,7 +16,7 @@ LIFT_S = 3.0
 """To rise to where one flies."""
 
 
-class Part(Protocol):
+class MotionComponent(Protocol):
     """One ingredient of a motion over (x, y, z [m], roll, pitch, yaw [rad])."""
 
     def at(self, t: float) -> Array:
@@ -89,7 +89,7 @@ class Keyed:
         return rows
 
 
-def lift(height: float) -> Part:
+def lift(height: float) -> MotionComponent:
     """A rise by `height` [m] within `LIFT_S`, jerk without jumps."""
     still = [(1, np.zeros(6)), (2, np.zeros(6)), (3, np.zeros(6))]
     ends = np.zeros((2, 6))

@@ -13,8 +13,8 @@ import numpy as np
 from hardware.sim.phone import BodyHistory, VirtualPhone
 from pipeline.frames import Array
 from pipeline.identification import pnp
-from pipeline.signals import BodyImu, Match, PhoneImu, Seen, Spots
-from pipeline.timing.camera_imu_delay import StampOffsetSearch
+from pipeline.signals import BodyImu, Match, PhoneImu, Spots, VisionMeasurement
+from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision.rays import rays_of
 
 LEAST_NOISE_PX = 0.01
@@ -23,7 +23,7 @@ MIN_LEDS = 4
 """For a pose from nothing else."""
 
 
-class NoisyEye:
+class LedSensorModel:
     """One phone's view of one robot."""
 
     def __init__(
@@ -37,13 +37,13 @@ class NoisyEye:
         """`noise_px`: standard deviation of an LED's place, each way; `hidden` as the phone's."""
         self._phone, self._leds_in_b, self._hidden = phone, leds_in_b, hidden
         self._noise_px, self._rng = noise_px, rng
-        self._stamps = StampOffsetSearch()
+        self._stamps = CameraImuDelay()
 
     def feel(self, sample: PhoneImu | BodyImu) -> None:
         """Follow a motion sample, for the pictures' time offset."""
         self._stamps.feel(sample)
 
-    def seen(self, t: float, stamp: float, body: BodyHistory) -> Seen | None:
+    def seen(self, t: float, stamp: float, body: BodyHistory) -> VisionMeasurement | None:
         """What a picture taken at `t` [s], and dated `stamp` [s], says; None without any LED."""
         camera = self._phone.camera
         pixels = self._pixels(t, body)
@@ -62,7 +62,7 @@ class NoisyEye:
         if pose is not None:
             self._stamps.saw(pose)
         rays = rays_of(camera, spots, match, stamp)
-        return Seen(stamp, rays, pose, camera.half_field, self._stamps.offset)
+        return VisionMeasurement(stamp, rays, pose, camera.half_field, self._stamps.offset)
 
     def _pixels(self, t: float, body: BodyHistory) -> Array:
         """(n, 2) where the LEDs are in a picture, each when its row is read; behind: nowhere."""

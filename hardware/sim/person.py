@@ -37,7 +37,7 @@ KEPT_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
+class Participant:
     """What differs between people."""
 
     name: str
@@ -60,7 +60,7 @@ class Person:
     practice: float
     """Exponent of the power law of practice (Newell, Rosenbloom 1981)."""
 
-    def practised(self, attempt: int) -> Person:
+    def practised(self, attempt: int) -> Participant:
         """At an attempt, counted from 1: quicker to react, and steadier."""
         share = float(attempt) ** -self.practice
         return replace(
@@ -124,7 +124,7 @@ class GuidingHand:
     """
 
     def __init__(
-        self, person: Person, laser: Laser, tube: Tube, rng: np.random.Generator, h: float
+        self, person: Participant, laser: Laser, tube: Tube, rng: np.random.Generator, h: float
     ) -> None:
         """At rest; `h` [s] from one look to the next."""
         self._person, self._laser, self._tube, self._h = person, laser, tube, h

@@ -10,8 +10,8 @@ from math import ceil, floor, radians
 import numpy as np
 
 from hardware.sim.hand import Hand
-from hardware.sim.phone_faults import Fault, spoilt_force, spoilt_rate
-from hardware.sim.render import Look, render
+from hardware.sim.phone_faults import SensorFault, spoilt_force, spoilt_rate
+from hardware.sim.render import RenderOptions, render
 from pipeline.camera.lens import Camera
 from pipeline.frames import GRAVITY, Array, R_cd, exp, log, wxyz_from_R
 from pipeline.signals import Image
@@ -60,7 +60,7 @@ class PhoneOptions:
     """[m/s²]."""
     step_angle: float = radians(0.1)
     """Of the orientation's rotation angle [rad]."""
-    fault: Fault = Fault.NONE
+    fault: SensorFault = SensorFault.NONE
 
 
 PERFECT = PhoneOptions(
@@ -104,7 +104,7 @@ class MotionReading:
     screen_angle_deg: int
 
 
-class Stream:
+class DelayedStream:
     """Captures at a fixed rate; each arrives after its own delay, in order. Any window of time."""
 
     def __init__(
@@ -150,7 +150,7 @@ class VirtualPhone:
         camera: Camera,
         hand: Hand,
         leds_in_b: Array,
-        look: Look,
+        look: RenderOptions,
         rng: np.random.Generator,
         options: PhoneOptions = PhoneOptions(),
         clock: PhoneClock = PhoneClock(),
@@ -169,10 +169,10 @@ class VirtualPhone:
         self._bias_a = schedule.normal(0.0, 1.0, 3) * options.bias_a
         # the sensors are taken to be the device, and the camera to sit beside its place
         self._R_cd = camera.mounting.R_ci @ R_cd(options.screen_angle_deg)
-        self.motions = Stream(
+        self.motions = DelayedStream(
             EventKind.MOTION, options.motion_rate_hz, options.motion_delay_s, schedule
         )
-        self.pictures = Stream(
+        self.pictures = DelayedStream(
             EventKind.PICTURE, options.frame_rate_hz, options.picture_delay_s, schedule
         )
 
@@ -196,7 +196,7 @@ class VirtualPhone:
             spoilt_rate(omega_in_d, o.fault),
             spoilt_force(a_in_d, o.fault, GRAVITY * R_ed[2]),
             wxyz_from_R(_rounded_rotation(R_ed, o.step_angle)),
-            0 if o.fault is Fault.SCREEN_ANGLE else o.screen_angle_deg,
+            0 if o.fault is SensorFault.SCREEN_ANGLE else o.screen_angle_deg,
         )
 
     def relative_pose(self, t: float, body: BodyHistory) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.frames import GRAVITY, Array
 
 
-class Fault(Enum):
+class SensorFault(Enum):
     """One at a time."""
 
     NONE = "none"
@@ -23,18 +23,18 @@ class Fault(Enum):
     G_UNITS = "g-units"
 
 
-def spoilt_rate(omega: Array, fault: Fault) -> Array:
+def spoilt_rate(omega: Array, fault: SensorFault) -> Array:
     """Rates (3,) as a browser with this fault gives them."""
-    return np.roll(omega, -1) if fault is Fault.RATE_ORDER else omega
+    return np.roll(omega, -1) if fault is SensorFault.RATE_ORDER else omega
 
 
-def spoilt_force(force: Array, fault: Fault, at_rest: Array) -> Array:
+def spoilt_force(force: Array, fault: SensorFault, at_rest: Array) -> Array:
     """Specific force (3,) [m/s²] likewise; `at_rest` is what it would be without motion."""
     match fault:
-        case Fault.IOS_SIGN:
+        case SensorFault.IOS_SIGN:
             return -force
-        case Fault.NO_GRAVITY:
+        case SensorFault.NO_GRAVITY:
             return force - at_rest
-        case Fault.G_UNITS:
+        case SensorFault.G_UNITS:
             return force / GRAVITY
     return force

@@ -13,7 +13,7 @@ Pose = tuple[Array, Array]
 """(R (3, 3), p (3,) [m]) in f."""
 
 
-class Intent:
+class ReferenceTrajectory:
     """The reference of an ideal virtual camera on the true hand, fixed when the button is pressed.
 
     The low pass is part of the intent: its lag is what the operator asked for, not an error.
@@ -40,7 +40,7 @@ class Intent:
     def warm_up() -> None:
         """Load what is compiled before somebody flies: at the press the phone would fall silent."""
         rest = np.eye(3), np.zeros(3)
-        Intent(VirtualCameraConfig(), rest, rest)
+        ReferenceTrajectory(VirtualCameraConfig(), rest, rest)
 
     def tune(self, config: VirtualCameraConfig) -> None:
         """The knobs were turned in flight."""

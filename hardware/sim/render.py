@@ -22,7 +22,7 @@ BANK = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class RenderOptions:
     """The room, the light and the sensor; linear light, 1 saturates."""
 
     led_radius_m: float = 0.008
@@ -47,7 +47,7 @@ def render(
     camera: Camera,
     pose: RelativePoseAt,
     leds_in_b: Array,
-    look: Look,
+    look: RenderOptions,
     rng: np.random.Generator,
 ) -> Image:
     """Luma (height, width), full range, sRGB-like gamma."""
@@ -66,7 +66,7 @@ def render(
 
 
 def _lights(
-    camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: Look
+    camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: RenderOptions
 ) -> list[tuple[Array, int, int]]:
     """Patches of light with the row and column of their corner."""
     lights: list[tuple[Array, int, int]] = []
@@ -87,7 +87,9 @@ def _lights(
     return lights
 
 
-def _row_delays(camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: Look) -> Array:
+def _row_delays(
+    camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: RenderOptions
+) -> Array:
     """When (n,) the row that each LED falls on is exposed, after the middle one [s]."""
     delays = np.zeros(len(leds_in_b))
     for _ in range(ROLLING_ITERATIONS if camera.readout_s > 0.0 else 0):
@@ -98,7 +100,7 @@ def _row_delays(camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: Lo
 
 
 def _projected(
-    camera: Camera, at: tuple[Array, Array], leds_in_b: Array, look: Look
+    camera: Camera, at: tuple[Array, Array], leds_in_b: Array, look: RenderOptions
 ) -> tuple[Array, Array]:
     """Pixels (n, 2) and apparent radii (n,) [px]; radius 0 behind the camera."""
     R_cb, p_bc_in_c = at
@@ -110,7 +112,7 @@ def _projected(
 
 
 def _patch(
-    track: list[tuple[Array, float]], light: float, exposures: int, look: Look
+    track: list[tuple[Array, float]], light: float, exposures: int, look: RenderOptions
 ) -> tuple[Array, int, int]:
     """A disc blurred by the point spread, with its halo, smeared along `track`."""
     centres = np.array([centre for centre, _ in track])
@@ -131,7 +133,7 @@ def _patch(
 
 
 @lru_cache(maxsize=4)
-def _stage(width: int, height: int, look: Look) -> tuple[Image, Image]:
+def _stage(width: int, height: int, look: RenderOptions) -> tuple[Image, Image]:
     """The empty room in grey levels, and a bank of noise offset by 128."""
     rng = np.random.default_rng(0)
     fall = np.linspace(1.3, 0.7, height)[:, None] * np.linspace(0.9, 1.1, width)[None]

@@ -36,7 +36,7 @@ PRIORITY = 60
 Address = tuple[str, int]
 
 
-class Process:
+class RobotProcess:
     """Sockets and the clock around a `SimulatedRobot`. Its clock shows µs since its start."""
 
     def __init__(self, robot: SimulatedRobot, listen: Address, truth_port: int | None) -> None:
@@ -144,7 +144,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         robot_file = load_robot(arguments.robot)
         port = robot_file.link.port if arguments.port is None else arguments.port
         robot = _robot(robot_file, arguments.seed, take_key(os.environ))
-        process = Process(robot, (arguments.listen, port), arguments.truth_port)
+        process = RobotProcess(robot, (arguments.listen, port), arguments.truth_port)
     except (RobotFileError, LinkKeyError, OSError, OverflowError) as error:
         sys.stderr.write(f"simulated robot: {error}\n")
         return 2

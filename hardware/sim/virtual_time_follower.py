@@ -22,7 +22,7 @@ def whole(data: bytes) -> Sequence[bytes]:
     return (data,)
 
 
-class LockstepFollower:
+class VirtualTimeFollower:
     """The same bytes, gate, watchdog and plant as over UDP; time passes only in `advance`."""
 
     def __init__(

@@ -18,7 +18,7 @@ GAP_S: Final = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class LedObservation:
     """The named LEDs of one picture with its pose."""
 
     t: float
@@ -43,15 +43,15 @@ class BlockPictures:
     def __init__(self, leds: int) -> None:
         """Of a robot with so many LEDs."""
         self._m = leds
-        self._looks: list[Look] = []
-        self._next: list[Look] = []
+        self._looks: list[LedObservation] = []
+        self._next: list[LedObservation] = []
 
     @property
     def last(self) -> float:
         """Stamp of the newest picture of the full block [s]."""
         return self._looks[-1].t
 
-    def add(self, look: Look) -> bool:
+    def add(self, look: LedObservation) -> bool:
         """Take a picture; True: a block is full and waits to be taken."""
         if self._is_full():
             self._next.append(look)

@@ -43,7 +43,7 @@ class Pictures(NamedTuple):
     """(3, 3) R_cb of the first picture."""
 
 
-class Gyro(NamedTuple):
+class GyroSamples(NamedTuple):
     """Samples from before the first picture to behind the last."""
 
     t: Array
@@ -68,7 +68,7 @@ def multiply_back(A: Array, B: Array, C: Array) -> None:
 
 
 @kernel
-def integrate(gyro: Gyro, fade: float, R: Array, held: Array) -> None:
+def integrate(gyro: GyroSamples, fade: float, R: Array, held: Array) -> None:
     """Attitude R (n, 3, 3) start ← then at each sample, and the turning of late, `held` (n, 3).
 
     `fade` [1/s] is how fast it forgets: a high pass of the angle.
@@ -86,7 +86,7 @@ def integrate(gyro: Gyro, fade: float, R: Array, held: Array) -> None:
 
 
 @kernel
-def put_between(gyro: Gyro, R: Array, t: float, R_t: Array, omega: Array) -> int:
+def put_between(gyro: GyroSamples, R: Array, t: float, R_t: Array, omega: Array) -> int:
     """Attitude and rate at `t`, linear between samples; gives the one before."""
     i, beyond = 0, len(gyro.t) - 1
     while beyond - i > 1:
@@ -122,7 +122,13 @@ def put_velocities(t: Array, R_c: Array, p: Array, u: Array) -> None:
 
 @kernel
 def put_track(
-    pictures: Pictures, phone: Gyro, body: Gyro, fade: float, R: Array, rates: Array, held: Array
+    pictures: Pictures,
+    phone: GyroSamples,
+    body: GyroSamples,
+    fade: float,
+    R: Array,
+    rates: Array,
+    held: Array,
 ) -> None:
     """What both gyroscopes say of each picture.
 
@@ -159,7 +165,7 @@ def put_track(
 def put_sums(
     pictures: Pictures,
     leds_in_b: Array,
-    gyros: tuple[Gyro, Gyro],
+    gyros: tuple[GyroSamples, GyroSamples],
     fade: float,
     floor: float,
     N: Array,

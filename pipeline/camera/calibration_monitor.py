@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.camera.block import BlockPictures, Look
-from pipeline.camera.block_kernels import Gyro, Pictures, put_sums
+from pipeline.camera.block import BlockPictures, LedObservation
+from pipeline.camera.block_kernels import GyroSamples, Pictures, put_sums
 from pipeline.camera.fit import WINDOW, CameraFacts, CameraFit
 from pipeline.camera.lens import Camera
 from pipeline.camera.verdict import verdict
@@ -47,11 +47,11 @@ class _Block:
     """What a block's sums are made of."""
 
     pictures: Pictures
-    phone: Gyro
-    body: Gyro
+    phone: GyroSamples
+    body: GyroSamples
 
 
-class CameraWatch:
+class CalibrationMonitor:
     """Samples come from the event loop, pictures from the vision thread."""
 
     def __init__(self, camera: Camera, leds_in_b: Array) -> None:
@@ -77,7 +77,7 @@ class CameraWatch:
         """Take a motion sample of either side, in order."""
         self._waiting.append(sample)
 
-    def saw(self, look: Look, coarse: StampOffset | None) -> bool:
+    def saw(self, look: LedObservation, coarse: StampOffset | None) -> bool:
         """Take the named LEDs of a believed pose and, if known, how wrong the stamps are.
 
         Returns:
@@ -134,7 +134,7 @@ class CameraWatch:
         for _ in range(2):
             N = np.zeros((self._fit.columns(len(self._leds_in_b)),) * 2)
             pictures = block.pictures._replace(t=block.pictures.t + self._shift)
-            body = Gyro(block.body.t, block.body.omega - self._bias_in_b)
+            body = GyroSamples(block.body.t, block.body.omega - self._bias_in_b)
             gyros = (block.phone, body)
             moved = put_sums(pictures, self._leds_in_b, gyros, FADE, self._floor, N)
             if moved < MOVED_RAD or not np.isfinite(N).all():
@@ -164,7 +164,7 @@ def _append(rows: deque[tuple[float, ...]], t: float, omega: Array) -> None:
         rows.append((t, *omega.tolist()))
 
 
-def _between(rows: deque[tuple[float, ...]], start: float, stop: float) -> Gyro | None:
+def _between(rows: deque[tuple[float, ...]], start: float, stop: float) -> GyroSamples | None:
     """Samples from the last sample before `start` to the first after `stop`.
 
     None if they don't reach or have a gap.
@@ -175,4 +175,4 @@ def _between(rows: deque[tuple[float, ...]], start: float, stop: float) -> Gyro 
     table = table[first:last]
     if len(table) < 2 or table[-1, 0] < stop or np.diff(table[:, 0]).max() > MAX_GAP_S:
         return None
-    return Gyro(table[:, 0].copy(), table[:, 1:].copy())
+    return GyroSamples(table[:, 0].copy(), table[:, 1:].copy())

@@ -38,7 +38,7 @@ FORGET: Final = 0.99
 """... and how much of that sum is left a look later."""
 
 
-class Hint(Enum):
+class ExposureHint(Enum):
     """What to change; the value is its name on the wire."""
 
     NONE = ""
@@ -48,16 +48,16 @@ class Hint(Enum):
     TOO_DIM = "too_dim"
 
 
-ADVICE: Final[Mapping[Hint, str]] = {
-    Hint.NONE: "",
-    Hint.TOO_BRIGHT: "The LEDs are too bright in the picture: expose shorter, or dim them.",
-    Hint.OUT_OF_FOCUS: "The LEDs are out of focus: set the focus to the robot's distance.",
-    Hint.BLURRED: "The picture smears when the phone moves: expose shorter, or light the room.",
-    Hint.TOO_DIM: "The LEDs are dim in the picture: come nearer, expose longer, or brighten them.",
+ADVICE: Final[Mapping[ExposureHint, str]] = {
+    ExposureHint.NONE: "",
+    ExposureHint.TOO_BRIGHT: "The LEDs are too bright in the picture: expose shorter, or dim them.",
+    ExposureHint.OUT_OF_FOCUS: "The LEDs are out of focus: set the focus to the robot's distance.",
+    ExposureHint.BLURRED: "The picture smears when the phone moves: expose shorter, or light the room.",
+    ExposureHint.TOO_DIM: "The LEDs are dim in the picture: come nearer, expose longer, or brighten them.",
 }
 
 
-class ExposureWatch:
+class ExposureMonitor:
     """Follows one camera."""
 
     def __init__(self, focal_px: float) -> None:
@@ -67,8 +67,8 @@ class ExposureWatch:
         self._levels = np.full(4, np.nan)
         """Contrast of 1, clipped area, area of the LED, σ across the motion [px], smoothed."""
         self._smear = np.zeros(2)
-        self._next, self._since = Hint.NONE, -np.inf
-        self.hint = Hint.NONE
+        self._next, self._since = ExposureHint.NONE, -np.inf
+        self.hint = ExposureHint.NONE
 
     @property
     def exposure_s(self) -> float | None:
@@ -117,21 +117,21 @@ class ExposureWatch:
         due = self._due()
         if due is not self._next:
             self._next, self._since = due, t
-        wait = END_S if due is Hint.NONE else BEGIN_S
+        wait = END_S if due is ExposureHint.NONE else BEGIN_S
         if t - self._since >= wait:
             self.hint = due
 
-    def _due(self) -> Hint:
+    def _due(self) -> ExposureHint:
         contrast, clipped, area, across = self._levels.tolist()
         exposure = self.exposure_s
         smeared = 0.0 if exposure is None else exposure / TOO_LONG_S
         excess = {
-            Hint.TOO_BRIGHT: clipped / (20.0 + 3.0 * area),
-            Hint.OUT_OF_FOCUS: across / (1.8 + 0.5 * sqrt(area / pi)) * (clipped < area),
-            Hint.BLURRED: smeared,
-            Hint.TOO_DIM: 0.25 / contrast,
+            ExposureHint.TOO_BRIGHT: clipped / (20.0 + 3.0 * area),
+            ExposureHint.OUT_OF_FOCUS: across / (1.8 + 0.5 * sqrt(area / pi)) * (clipped < area),
+            ExposureHint.BLURRED: smeared,
+            ExposureHint.TOO_DIM: 0.25 / contrast,
         }
         for hint, value in excess.items():
             if value > (0.8 if hint is self.hint else 1.0):
                 return hint
-        return Hint.NONE
+        return ExposureHint.NONE

@@ -11,7 +11,7 @@ from pipeline.signals import PhoneImu
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mounting:
+class Extrinsics:
     """As calibrated; the default is what a phone is built like."""
 
     R_ci: Array = field(default_factory=lambda: np.eye(3))
@@ -25,5 +25,5 @@ class Mounting:
         return PhoneImu(sample.t, R @ sample.omega_m_cf_in_c, R @ sample.a_m_cf_in_c)
 
 
-SQUARE = Mounting()
+SQUARE = Extrinsics()
 """Nothing is known better."""

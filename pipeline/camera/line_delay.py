@@ -16,7 +16,7 @@ MAX_S: Final = 0.06
 """No camera is slower; the sign says which row comes first."""
 
 
-class Readout:
+class LineDelay:
     """Which readout the rolling-shutter model should use."""
 
     def __init__(self, from_file_s: float) -> None:

@@ -12,7 +12,7 @@ from pipeline.signals import Spots
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class FrameMotion:
     """How the robot's place in c changes."""
 
     omega_cf_in_c: Array
@@ -27,7 +27,7 @@ class Motion:
     """How well an LED's velocity in c is known by all this [m/s]."""
 
 
-def unrolled(camera: Camera, spots: Spots, motion: Motion | None) -> Spots:
+def unrolled(camera: Camera, spots: Spots, motion: FrameMotion | None) -> Spots:
     """The spots as of the middle row's exposure; unchanged without rolling shutter or motion."""
     if camera.readout_s == 0.0 or motion is None or len(spots) == 0:
         return spots

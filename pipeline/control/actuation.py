@@ -17,7 +17,7 @@ EXACT = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Given:
+class ThrustDemand:
     """What the thrusters are asked for."""
 
     thrusts: Array
@@ -38,13 +38,13 @@ class Actuation:
         self.push_in_b = np.zeros(6)
         """Given beside what is asked for, a disturbance for experiments. Sec. V-C."""
 
-    def give(self, wrench_in_b: Array, R_fb: Array, omega_bf_in_b: Array) -> Given:
+    def give(self, wrench_in_b: Array, R_fb: Array, omega_bf_in_b: Array) -> ThrustDemand:
         """Thrusts for a wrench (6,) at the attitude and angular rate of the body."""
         if self._tilt is None:
             pushed_in_b = wrench_in_b + self.push_in_b
             thrusts = self._allocation.thrusts(pushed_in_b)
             missing_in_b = (pushed_in_b - self._A @ thrusts) * self._axes
-            return Given(thrusts, missing_in_b, _is_short(missing_in_b))
+            return ThrustDemand(thrusts, missing_in_b, _is_short(missing_in_b))
         tilting = self._tilt.wrench(wrench_in_b, R_fb, omega_bf_in_b) + self.push_in_b
         thrusts = self._allocation.thrusts(tilting)
         missing_in_b = (tilting - self._A @ thrusts) * self._axes
@@ -52,7 +52,7 @@ class Actuation:
         # sideways it has what the limit of the tilt left, once the body has turned there
         missing_in_b[:3] += self._tilt.refused_in_b
         missing_in_b[3:5] = 0.0
-        return Given(thrusts, missing_in_b, saturated)
+        return ThrustDemand(thrusts, missing_in_b, saturated)
 
 
 def _is_short(missing_in_b: Array) -> bool:

@@ -55,7 +55,7 @@ class Failsafe:
 
 
 @dataclass(frozen=True, slots=True)
-class Inputs:
+class FailsafeInputs:
     """What the machine judges in one tick; ages in ms, saturated."""
 
     held: bool
@@ -81,7 +81,7 @@ class Inputs:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class FailsafeTimers:
     """Timers [ms] of a configuration."""
 
     silent: int
@@ -104,7 +104,7 @@ class Limits:
     @classmethod
     def of(
         cls, config: FailsafeConfig, ramp_s: float, hangs: bool = True, bridges: bool = True
-    ) -> Limits:
+    ) -> FailsafeTimers:
         """Rounded to milliseconds.
 
         Args:
@@ -135,7 +135,7 @@ class Limits:
         )
 
 
-def ceiling(state: Failsafe, limits: Limits) -> float:
+def ceiling(state: Failsafe, limits: FailsafeTimers) -> float:
     """Share of the controller's thrust that may reach the robot."""
     if state.mode in FLYING:
         return 1.0
@@ -144,7 +144,7 @@ def ceiling(state: Failsafe, limits: Limits) -> float:
     return 0.0
 
 
-def silence(inputs: Inputs, limits: Limits) -> str:
+def silence(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
     """Of whom there is no news; empty if of all. A gap, as long as it is short.
 
     Who stood still could hear nobody: that is named first.
@@ -160,19 +160,19 @@ def silence(inputs: Inputs, limits: Limits) -> str:
     return ""
 
 
-def uncertainty(inputs: Inputs, limits: Limits) -> str:
+def uncertainty(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
     """Why the robot's place is not sure enough to track; empty if it is."""
     if inputs.pose_ms > limits.pose_hold:
         return "The camera has lost the robot."
     return inputs.doubt
 
 
-def staleness(inputs: Inputs, limits: Limits) -> str:
+def staleness(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
     """Which input is too old or unsure to track with, for who can mend it; empty if none."""
     return silence(inputs, limits) or uncertainty(inputs, limits)
 
 
-def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]:
+def refusals(state: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> tuple[str, ...]:
     """Why `arm` would not be granted now; empty if it would."""
     why = list(inputs.refusals)
     if state.mode == Mode.STOPPED:
@@ -191,14 +191,14 @@ def refusals(state: Failsafe, inputs: Inputs, limits: Limits) -> tuple[str, ...]
     return tuple(dict.fromkeys(why))
 
 
-def resumes(state: Failsafe, inputs: Inputs) -> bool:
+def resumes(state: Failsafe, inputs: FailsafeInputs) -> bool:
     """Whether it will follow again by itself, if news come back in time."""
     if state.mode == Mode.COAST:
         return inputs.held and inputs.press == state.press
     return state.mode == Mode.HOLD and inputs.held and inputs.press != state.press
 
 
-def until_ramp(state: Failsafe, inputs: Inputs, limits: Limits) -> int | None:
+def until_ramp(state: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> int | None:
     """Time left [ms] until a ramp if all goes on as it is; None while it can go on for ever.
 
     Whoever begins it: this machine, or the robot by itself.
@@ -214,7 +214,7 @@ def until_ramp(state: Failsafe, inputs: Inputs, limits: Limits) -> int | None:
     return max(0, left)
 
 
-def step(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsafe:
+def step(state: Failsafe, inputs: FailsafeInputs, dt_ms: int, limits: FailsafeTimers) -> Failsafe:
     """The machine's next state after `dt_ms`, as measured.
 
     A step longer than an input may be silent has seen nothing of what was good meanwhile.
@@ -240,7 +240,7 @@ def step(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsaf
     return after if inputs.held else _over(after, inputs)
 
 
-def _timed(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Failsafe:
+def _timed(state: Failsafe, inputs: FailsafeInputs, dt_ms: int, limits: FailsafeTimers) -> Failsafe:
     good = not staleness(inputs, limits) and not inputs.fault and dt_ms <= limits.silent
     good_ms = min(state.good_ms + dt_ms, FOREVER_MS) if good else 0
     bad_ms = state.bad_ms if good else min(state.bad_ms + max(dt_ms, 1), FOREVER_MS)
@@ -252,7 +252,7 @@ def _timed(state: Failsafe, inputs: Inputs, dt_ms: int, limits: Limits) -> Fails
     )
 
 
-def _recovery(state: Failsafe, limits: Limits) -> int:
+def _recovery(state: Failsafe, limits: FailsafeTimers) -> int:
     """For how long all must have been good before a press counts."""
     return limits.recover_short if state.bad_ms <= limits.short else limits.recover
 
@@ -261,28 +261,28 @@ def _enter(state: Failsafe, mode: Mode, reason: str) -> Failsafe:
     return replace(state, mode=mode, mode_ms=0, reason=reason)
 
 
-def _over(state: Failsafe, inputs: Inputs) -> Failsafe:
+def _over(state: Failsafe, inputs: FailsafeInputs) -> Failsafe:
     """The button is free, or pressed where that means nothing: that press leads nowhere."""
     return replace(state, press=inputs.press)
 
 
-def _stopped(now: Failsafe, inputs: Inputs) -> Failsafe:
+def _stopped(now: Failsafe, inputs: FailsafeInputs) -> Failsafe:
     if inputs.requests.reset and not inputs.held and not inputs.requests.stop:
         return _enter(now, Mode.DISARMED, "Reset after STOP.")
     return now
 
 
-def _disarmed(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+def _disarmed(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
     if inputs.requests.arm and not inputs.requests.disarm and not refusals(now, inputs, limits):
         return _enter(now, Mode.ARMED, "Hold the button to move.")
     return now
 
 
-def _ramp(now: Failsafe, limits: Limits) -> Failsafe:
+def _ramp(now: Failsafe, limits: FailsafeTimers) -> Failsafe:
     return _enter(now, Mode.DISARMED, now.reason) if now.mode_ms >= limits.ramp else now
 
 
-def _armed(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+def _armed(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
     lost = silence(inputs, limits) if _is_lost(inputs, limits.robot_ramp) else ""
     wrong = inputs.fault or lost or uncertainty(inputs, limits)
     if wrong:
@@ -294,18 +294,18 @@ def _armed(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
     return _pressed(now, inputs) or now
 
 
-def _is_lost(inputs: Inputs, limit: int) -> bool:
+def _is_lost(inputs: FailsafeInputs, limit: int) -> bool:
     return max(inputs.robot_ms, inputs.operator_ms, inputs.phone_imu_ms) > limit
 
 
-def _pressed(now: Failsafe, inputs: Inputs) -> Failsafe | None:
+def _pressed(now: Failsafe, inputs: FailsafeInputs) -> Failsafe | None:
     """TRACK, if a press counts now."""
     if inputs.held and inputs.press != now.press and now.bad_ms == 0:
         return _enter(_over(now, inputs), Mode.TRACK, "Following the phone.")
     return None
 
 
-def _endings(inputs: Inputs, limits: Limits) -> tuple[tuple[int, int], ...]:
+def _endings(inputs: FailsafeInputs, limits: FailsafeTimers) -> tuple[tuple[int, int], ...]:
     """Ages, and beyond which of them a flight is over."""
     return (
         (inputs.robot_ms, limits.robot_ramp),
@@ -313,7 +313,7 @@ def _endings(inputs: Inputs, limits: Limits) -> tuple[tuple[int, int], ...]:
     )
 
 
-def _ending(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe | None:
+def _ending(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe | None:
     """RAMP, if the flight is over."""
     if inputs.fault:
         return _enter(now, Mode.RAMP, inputs.fault)
@@ -326,7 +326,7 @@ def _ending(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe | None:
     return None
 
 
-def _let_go(now: Failsafe, inputs: Inputs) -> Failsafe | None:
+def _let_go(now: Failsafe, inputs: FailsafeInputs) -> Failsafe | None:
     """HOLD, if the finger has left the button, whether or not it is back."""
     if not inputs.held:
         why = "Button released: press again to go on."
@@ -338,7 +338,7 @@ def _let_go(now: Failsafe, inputs: Inputs) -> Failsafe | None:
     return replace(_enter(now, Mode.HOLD, why), mode_ms=kept)
 
 
-def _track(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+def _track(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
     let_go = _let_go(now, inputs)
     if let_go is not None:
         return let_go
@@ -349,7 +349,7 @@ def _track(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
     return _enter(now, Mode.HOLD, unsure) if unsure else now
 
 
-def _coast(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+def _coast(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
     let_go = _let_go(now, inputs)
     if let_go is not None:
         return let_go
@@ -361,7 +361,7 @@ def _coast(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
     return now
 
 
-def _hold(now: Failsafe, inputs: Inputs, limits: Limits) -> Failsafe:
+def _hold(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
     pressed = _pressed(now, inputs)
     if pressed is None and now.mode_ms >= limits.hold_max:
         return _enter(now, Mode.RAMP, f"{now.reason} Held for as long as is allowed.")

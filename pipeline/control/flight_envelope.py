@@ -22,7 +22,7 @@ class Ages:
     body_imu: float
 
     def in_ms(self) -> dict[str, int]:
-        """By the names of `failsafe.Inputs`, saturated."""
+        """By the names of `failsafe.FailsafeInputs`, saturated."""
         return {
             "operator_ms": saturated_ms(self.operator),
             "pose_ms": saturated_ms(self.pose),

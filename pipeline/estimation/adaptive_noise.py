@@ -37,7 +37,7 @@ MOST: Final = 1e4
 the LEDs decide."""
 
 
-class SensorDoubt:
+class AdaptiveNoise:
     """By what factor the variances of the phone's samples are greater than their data sheet's."""
 
     def __init__(self) -> None:

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
+from pipeline.signals import BodyImu, PhoneImu, RelativeState, VisionMeasurement
 
 
 class Fusion(Enum):
@@ -75,7 +75,7 @@ class Estimator(Protocol):
     def add_body_imu(self, sample: BodyImu) -> None:
         """Take a sample, in any order."""
 
-    def add_seen(self, seen: Seen, now: float) -> Fusion:
+    def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Take what a picture said; tells, and counts, what became of it."""
 
     def state(self, now: float) -> RelativeState | None:

@@ -13,7 +13,7 @@ from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimation.paper_ekf import PaperEkf
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.frames import GRAVITY, Array
-from pipeline.signals import BodyImu, LedRays, PhoneImu, RelativePose, Seen
+from pipeline.signals import BodyImu, LedRays, PhoneImu, RelativePose, VisionMeasurement
 
 
 def make_estimator(config: TeleopConfig, leds_in_b: Array) -> Estimator:
@@ -38,5 +38,5 @@ def warm_up() -> None:
             estimator.add_phone_imu(PhoneImu(t, still, up))
             rays = LedRays(np.arange(4), np.full(4, t), tangents, C)
             pose = RelativePose(t, p, np.eye(3), 1e-4 * np.eye(6), 0.0, 4)
-            estimator.add_seen(Seen(t, rays, pose), t)
+            estimator.add_seen(VisionMeasurement(t, rays, pose), t)
         estimator.state(0.05)

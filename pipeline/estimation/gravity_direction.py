@@ -12,7 +12,7 @@ FREE_FALL = 1.0
 """[m/s²]: a smaller specific force has no direction."""
 
 
-class Vertical:
+class GravityDirection:
     """Low-passed direction of the specific force, turned with the body that feels it."""
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ from pipeline.frames import Array, cross, exp, skew
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class RelativeMotion:
     """Relative pose and velocity."""
 
     p: Array
@@ -32,7 +32,7 @@ class Motion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Felt:
+class PredictedImu:
     """What both IMUs would say without bias and noise."""
 
     omega_b: Array
@@ -45,19 +45,19 @@ class Felt:
     """(3,) [m/s²], in c."""
 
 
-def derivative(x: Motion, felt: Felt) -> Motion:
+def derivative(x: RelativeMotion, felt: PredictedImu) -> RelativeMotion:
     """(ṗ, Ṙ, u̇)."""
-    return Motion(
+    return RelativeMotion(
         p=x.u - cross(felt.omega_c, x.p),
         R=x.R @ skew(felt.omega_b) - skew(felt.omega_c) @ x.R,
         u=x.R @ felt.f_b - felt.f_c - cross(felt.omega_c, x.u),
     )
 
 
-def error_jacobian(x: Motion, felt: Felt) -> tuple[Array, Array]:
+def error_jacobian(x: RelativeMotion, felt: PredictedImu) -> tuple[Array, Array]:
     """∂(δṗ, θ̇, δu̇) with respect to (δp, θ, δu): (9, 9), and to the four inputs: (9, 12).
 
-    The inputs' order is that of `Felt`.
+    The inputs' order is that of `PredictedImu`.
     """
     W_c = skew(felt.omega_c)
     F, G = np.zeros((9, 9)), np.zeros((9, 12))
@@ -70,24 +70,24 @@ def error_jacobian(x: Motion, felt: Felt) -> tuple[Array, Array]:
     return F, G
 
 
-def step(x: Motion, felt: Felt, h: float) -> Motion:
+def step(x: RelativeMotion, felt: PredictedImu, h: float) -> RelativeMotion:
     """The motion `h` seconds later, inputs constant: midpoint rule with exact rotations."""
     E, B = exp(-0.5 * h * felt.omega_c), exp(0.5 * h * felt.omega_b)
     a = E @ x.R @ B @ felt.f_b - felt.f_c
-    return Motion(
+    return RelativeMotion(
         p=E @ (E @ (x.p + h * x.u) + 0.5 * h * h * a),
         R=E @ E @ x.R @ B @ B,
         u=E @ (E @ x.u + h * a),
     )
 
 
-def seen_at(x: Motion, led_in_b: Array) -> Array:
+def seen_at(x: RelativeMotion, led_in_b: Array) -> Array:
     """Tangents (2,) q_y/q_x, q_z/q_x of an LED."""
     q = x.p + x.R @ led_in_b
     return np.array([q[1] / q[0], q[2] / q[0]])
 
 
-def seen_jacobian(x: Motion, felt: Felt, led_in_b: Array) -> tuple[Array, Array]:
+def seen_jacobian(x: RelativeMotion, felt: PredictedImu, led_in_b: Array) -> tuple[Array, Array]:
     """∂z/∂(δp, θ) (2, 6), and ∂z/∂t (2,) for a picture taken later."""
     q = x.p + x.R @ led_in_b
     D = np.array([[-q[1] / q[0], 1.0, 0.0], [-q[2] / q[0], 0.0, 1.0]]) / q[0]

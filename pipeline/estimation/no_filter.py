@@ -15,7 +15,7 @@ from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.sanity import are_finite, is_pose
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.frames import Array, cross, log
-from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, Seen
+from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
 
 
 class NoFilter:
@@ -54,7 +54,7 @@ class NoFilter:
         elif self._body is None or sample.t > self._body.t:
             self._body = sample
 
-    def add_seen(self, seen: Seen, now: float) -> Fusion:
+    def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Take the pose in it, if there is one; says, and counts, what became of it."""
         fusion = Fusion.BLIND if seen.pose is None else self._take(seen.pose, now)
         self.poses[fusion] += 1

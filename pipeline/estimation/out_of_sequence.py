@@ -25,7 +25,7 @@ from pipeline.frames import Array
 
 
 @dataclass(slots=True, eq=False)
-class Anchor:
+class EkfCheckpoint:
     """The filter at one time."""
 
     t: float
@@ -37,18 +37,18 @@ class Anchor:
     """(3, 3) rotation of the camera since the phone's last sample."""
 
     @staticmethod
-    def empty() -> Anchor:
+    def empty() -> EkfCheckpoint:
         """Of no meaning yet."""
-        return Anchor(-inf, np.zeros(N), np.zeros((N, N)), np.eye(3))
+        return EkfCheckpoint(-inf, np.zeros(N), np.zeros((N, N)), np.eye(3))
 
-    def copy(self, other: Anchor) -> None:
+    def copy(self, other: EkfCheckpoint) -> None:
         """Become like `other`."""
         self.t = other.t
         self.x[:], self.P[:], self.R_ic[:] = other.x, other.P, other.R_ic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SeenPose:
+class PoseMeasurement:
     """A measured (p, η)."""
 
     t: float
@@ -58,23 +58,23 @@ class SeenPose:
     """(6, 6) its covariance."""
 
 
-class LateFusion:
+class OutOfSequenceEkf:
     """The filter of `relative_model` on the time axis."""
 
     def __init__(self, config: EkfConfig) -> None:
         """Empty: `begin` before anything but `history.insert`."""
         self.history = ImuHistory()
-        self.checkpoint, self.now = Anchor.empty(), Anchor.empty()
-        self._frontier = Anchor.empty()
+        self.checkpoint, self.now = EkfCheckpoint.empty(), EkfCheckpoint.empty()
+        self._frontier = EkfCheckpoint.empty()
         self._frontier_good = False
-        self._waiting: list[SeenPose] = []
+        self._waiting: list[PoseMeasurement] = []
         self._walk, self._r = walk_densities(config), imu_variances(config)
         self._steps = np.array([config.max_step_s, config.tau_delta_c])
         self._work = workspace()
 
     def begin(self, t: float, x: Array, P: Array) -> None:
         """Start at time `t` [s] from x (30,), P (30, 30)."""
-        self.checkpoint = Anchor(t, x, P, np.eye(3))
+        self.checkpoint = EkfCheckpoint(t, x, P, np.eye(3))
         self._waiting.clear()
         self.history.forget_until(t)
         self._frontier_good = False
@@ -85,7 +85,7 @@ class LateFusion:
             self._frontier_good = False
         return self.history.insert(t, kind, rate, force)
 
-    def fuse(self, pose: SeenPose, gate: float) -> float:
+    def fuse(self, pose: PoseMeasurement, gate: float) -> float:
         """Compare a pose from after the checkpoint with its prediction; fuse it up to `gate`.
 
         Gives χ² (6 degrees of freedom); NaN: the filter can't be believed.
@@ -144,10 +144,10 @@ class LateFusion:
             self._update(self._frontier, pose, inf)
         return True
 
-    def _update(self, anchor: Anchor, pose: SeenPose, gate: float) -> float:
+    def _update(self, anchor: EkfCheckpoint, pose: PoseMeasurement, gate: float) -> float:
         return float(fuse_pose(anchor.x, anchor.P, pose.y, pose.C, gate, self._work))
 
-    def _advance(self, anchor: Anchor, t: float) -> bool:
+    def _advance(self, anchor: EkfCheckpoint, t: float) -> bool:
         """Replay the samples up to time `t` [s]; False: the filter can't be believed."""
         history = self.history
         used = replay(

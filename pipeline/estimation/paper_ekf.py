@@ -1,6 +1,6 @@
 """The paper's 30-state filter, with each measurement fused at the time it was taken. Eq. (5)-(13).
 
-A phone's picture is 60-120 ms old when its pose is known and its IMU samples 15-40 ms: `LateFusion`
+A phone's picture is 60-120 ms old when its pose is known and its IMU samples 15-40 ms: `OutOfSequenceEkf`
 fuses both in the past and predicts to now.
 
 Deviations from the paper: gravity stays in the accelerations (see `relative_model`); δ_c of
@@ -20,14 +20,14 @@ import numpy as np
 
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.imu_history import BODY, PHONE
-from pipeline.estimation.out_of_sequence import LateFusion, SeenPose, initial_variances
+from pipeline.estimation.out_of_sequence import OutOfSequenceEkf, PoseMeasurement, initial_variances
 from pipeline.estimation.paper_ekf_kernels import MIN_COS_PITCH
 from pipeline.estimation.paper_ekf_replay import seen_pose
 from pipeline.estimation.relative_model import N, States, pose_covariance_in_rpy
 from pipeline.estimation.sanity import are_finite, is_pose
 from pipeline.estimator_config import EkfConfig
 from pipeline.frames import Array, cross, rpy_from_R
-from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, Seen
+from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
 
 MAX_SLEEP_S: Final = 2.0
@@ -52,7 +52,7 @@ class PaperEkf:
 
     def reset(self) -> None:
         """Forget the estimate and the samples; the counts stay."""
-        self._filter = LateFusion(self._config)
+        self._filter = OutOfSequenceEkf(self._config)
         self._started = False
         self._rejections, self._t_pose = 0, -np.inf
         self.nis = float("nan")
@@ -109,7 +109,7 @@ class PaperEkf:
         elif not self._filter.insert(t, kind, rate, force):
             self.samples_duplicate += 1
 
-    def add_seen(self, seen: Seen, now: float) -> Fusion:
+    def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Fuse the pose in it, if there is one."""
         if seen.pose is None:
             self.poses[Fusion.BLIND] += 1
@@ -135,11 +135,11 @@ class PaperEkf:
         if np.cos(eta[1]) < 2.0 * MIN_COS_PITCH:
             return Fusion.SINGULAR
         y = np.concatenate((pose.p_bc_in_c, eta))
-        seen = SeenPose(pose.t, y, pose_covariance_in_rpy(eta, pose.covariance))
+        seen = PoseMeasurement(pose.t, y, pose_covariance_in_rpy(eta, pose.covariance))
         self._keep_up(now)
         return self._compare(seen) if self._started else self._start(seen)
 
-    def _compare(self, seen: SeenPose) -> Fusion:
+    def _compare(self, seen: PoseMeasurement) -> Fusion:
         """Fuse, gate, or begin again: after a failure, or when the gate was shut too often."""
         if seen.t < self._filter.checkpoint.t:
             return Fusion.LATE
@@ -155,7 +155,7 @@ class PaperEkf:
             return Fusion.GATED
         return self._start(seen)
 
-    def _start(self, seen: SeenPose) -> Fusion:
+    def _start(self, seen: PoseMeasurement) -> Fusion:
         """Begin at a pose: rates and forces from the nearest samples, the body at rest in f."""
         history = self._filter.history
         body, phone = history.nearest(seen.t, BODY), history.nearest(seen.t, PHONE)

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.adaptive_noise import SensorDoubt
+from pipeline.estimation.adaptive_noise import AdaptiveNoise
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.imu_history import ImuHistory
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
@@ -23,13 +23,13 @@ from pipeline.estimation.relative_start import (
     has_samples_near,
     is_better_start,
 )
-from pipeline.estimation.relative_track import Anchor, RelativeTrack
+from pipeline.estimation.relative_track import Checkpoint, RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_felt
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
+from pipeline.signals import BodyImu, PhoneImu, RelativeState, VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
-from pipeline.timing.offset_watch import OffsetWatch
+from pipeline.timing.offset_watch import OffsetMonitor
 
 MAX_SLEEP_S: Final = 2.0
 """If nobody asked for so long, what was known is forgotten; no sample comes from so far ahead."""
@@ -67,8 +67,8 @@ class RelativeFilter:
         self._recent: deque[float] = deque(maxlen=64)
         self._misses, self._t_seen, self._t_start = 0, -np.inf, -np.inf
         self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
-        self._offset = OffsetWatch()
-        self._doubt = SensorDoubt()
+        self._offset = OffsetMonitor()
+        self._doubt = AdaptiveNoise()
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
@@ -88,13 +88,13 @@ class RelativeFilter:
         elif not self._track.insert(history, t, rate, force):
             self.samples_duplicate += 1
 
-    def add_seen(self, seen: Seen, now: float) -> Fusion:
+    def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Fuse the LEDs of a picture when it was taken; tells, and counts, what became of it."""
         fusion = self._judge(seen, now)
         self.pictures[fusion] += 1
         return fusion
 
-    def _judge(self, seen: Seen, now: float) -> Fusion:
+    def _judge(self, seen: VisionMeasurement, now: float) -> Fusion:
         if not is_believable(seen, self._leds):
             return Fusion.INVALID
         if len(seen.rays) == 0:
@@ -118,7 +118,7 @@ class RelativeFilter:
             return Fusion.STARTED
         return self._fuse(seen, foretold, now)
 
-    def _doubted(self, seen: Seen, foretold: Anchor) -> float:
+    def _doubted(self, seen: VisionMeasurement, foretold: Checkpoint) -> float:
         """How far what is foretold must be stretched for this picture; learns of the sensors."""
         dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
@@ -128,7 +128,7 @@ class RelativeFilter:
         self._track.doubt_phone(self._doubt.factor)
         return stretch
 
-    def _fuse(self, seen: Seen, anchor: Anchor, now: float) -> Fusion:
+    def _fuse(self, seen: VisionMeasurement, anchor: Checkpoint, now: float) -> Fusion:
         """Fuse, or begin again when too many pictures in a row didn't fit."""
         chi2 = self._track.fuse(anchor, seen, self._doubted(seen, anchor))
         self._recent.append(seen.t)
@@ -155,7 +155,7 @@ class RelativeFilter:
             return self._start(seen, now)
         return Fusion.FUSED if used else Fusion.GATED
 
-    def _start(self, seen: Seen, now: float) -> Fusion:
+    def _start(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Begin at a pose, the body at rest in f; what was learnt of the sensors stays."""
         if not can_start(seen, self._config):
             return Fusion.BLIND

@@ -8,10 +8,10 @@ import numpy as np
 
 from pipeline.estimation.ray_kernels import NEAREST_M
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
-from pipeline.estimation.relative_track import Anchor, RelativeTrack
+from pipeline.estimation.relative_track import Checkpoint, RelativeTrack
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
-from pipeline.signals import Seen
+from pipeline.signals import VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
 
 START_GAP_S: Final = 0.1
@@ -23,7 +23,7 @@ Learnt = tuple[Array, Array]
 """Biases and time offset (13,), and their covariance (13, 13)."""
 
 
-def can_start(seen: Seen, config: RelativeConfig) -> bool:
+def can_start(seen: VisionMeasurement, config: RelativeConfig) -> bool:
     """Whether the picture has a pose, before the camera, that fits its LEDs well."""
     pose = seen.pose
     if pose is None or not pose.p_bc_in_c[0] > NEAREST_M:
@@ -31,7 +31,7 @@ def can_start(seen: Seen, config: RelativeConfig) -> bool:
     return pose.reprojection_px <= config.start_reprojection_px
 
 
-def is_better_start(seen: Seen, P: Array, config: RelativeConfig) -> bool:
+def is_better_start(seen: VisionMeasurement, P: Array, config: RelativeConfig) -> bool:
     """So little was known before the picture, P (22, 22), that it had better be a start."""
     if seen.pose is None or not can_start(seen, config):
         return False
@@ -52,7 +52,9 @@ def has_samples_near(track: RelativeTrack, t: float) -> bool:
     return True
 
 
-def first_anchor(seen: Seen, learnt: Learnt | None, now: float, config: RelativeConfig) -> Anchor:
+def first_anchor(
+    seen: VisionMeasurement, learnt: Learnt | None, now: float, config: RelativeConfig
+) -> Checkpoint:
     """The body at rest in f at the pose of `seen`; what was `learnt` of the sensors stays.
 
     Raises:
@@ -60,7 +62,7 @@ def first_anchor(seen: Seen, learnt: Learnt | None, now: float, config: Relative
     """
     if seen.pose is None:
         raise ValueError("a start needs a pose")
-    anchor = Anchor.empty()
+    anchor = Checkpoint.empty()
     if learnt is not None:
         anchor.x[X_BIASES:], anchor.P[BIASES:, BIASES:] = learnt
     else:

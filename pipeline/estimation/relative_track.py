@@ -2,7 +2,7 @@
 
     base ── picture ── picture ── … ── frontier ── now
 
-An `Anchor` is the filter right after a picture. What arrives late (a picture between two others, an
+An `Checkpoint` is the filter right after a picture. What arrives late (a picture between two others, an
 IMU sample that was held or interpolated over) spoils the anchors after it; they are made anew from
 the last good one, with the decisions on outliers they were made with. The *frontier* is as far as
 both IMUs' samples reach; from there to now the newest samples are held, with growing doubt.
@@ -32,7 +32,7 @@ from pipeline.estimation.relative_kernels import (
 from pipeline.estimation.relative_noise import hand_of, noise_of, walks_of
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, cross
-from pipeline.signals import Flags, Seen
+from pipeline.signals import Flags, VisionMeasurement
 
 KEPT: Final = TAPS
 """Samples up to the base that are still interpolated and extrapolated from."""
@@ -41,7 +41,7 @@ BENT: Final = 2
 
 
 @dataclass(slots=True, eq=False)
-class Anchor:
+class Checkpoint:
     """The filter at one time."""
 
     t: float
@@ -53,7 +53,7 @@ class Anchor:
     """(22, 22)."""
     R_ic: Array
     """(3, 3) rotation of the camera since the phone's last sample."""
-    seen: Seen | None = None
+    seen: VisionMeasurement | None = None
     """The picture that was fused here."""
     use: Flags | None = None
     """(m,) which of its LEDs were."""
@@ -61,11 +61,11 @@ class Anchor:
     """Factor of the variances of place, velocity and attitude that were foretold for it."""
 
     @staticmethod
-    def empty() -> Anchor:
+    def empty() -> Checkpoint:
         """Of no meaning yet."""
-        return Anchor(-inf, np.zeros(X), np.eye(3), np.zeros((N, N)), np.eye(3))
+        return Checkpoint(-inf, np.zeros(X), np.eye(3), np.zeros((N, N)), np.eye(3))
 
-    def copy(self, other: Anchor) -> None:
+    def copy(self, other: Checkpoint) -> None:
         """Become like `other`, its picture aside."""
         self.t = other.t
         self.x[:], self.R[:], self.P[:] = other.x, other.R, other.P
@@ -79,9 +79,9 @@ class RelativeTrack:
         """Empty: `begin` before anything but `insert`."""
         self._leds_in_b = np.ascontiguousarray(leds_in_b)
         self.body, self.phone = ImuHistory(), ImuHistory()
-        self.anchors: list[Anchor] = []
-        self.now = Anchor.empty()
-        self._frontier = Anchor.empty()
+        self.anchors: list[Checkpoint] = []
+        self.now = Checkpoint.empty()
+        self._frontier = Checkpoint.empty()
         self._spoilt_from = -inf
         """Anchors and frontier after this time must be made anew; inf: none."""
         self._config, self._walks = config, walks_of(config)
@@ -102,7 +102,7 @@ class RelativeTrack:
         self._hand[-1] *= sqrt(factor)
 
     @property
-    def newest(self) -> Anchor:
+    def newest(self) -> Checkpoint:
         """Of the last picture, or the base."""
         return self.anchors[-1]
 
@@ -111,7 +111,7 @@ class RelativeTrack:
         """Both IMUs' samples have come up to this time [s]."""
         return min(self.body.newest[0], self.phone.newest[0])
 
-    def begin(self, anchor: Anchor) -> None:
+    def begin(self, anchor: Checkpoint) -> None:
         """Start from `anchor`."""
         self.anchors = [anchor]
         self._spoilt_from = -inf
@@ -125,15 +125,15 @@ class RelativeTrack:
         self._spoilt_from = min(self._spoilt_from, before)
         return True
 
-    def foretold(self, t: float) -> Anchor:
+    def foretold(self, t: float) -> Checkpoint:
         """The filter at time `t` [s], later than the base, as if no picture had come then."""
         self._repair()
-        anchor = Anchor.empty()
+        anchor = Checkpoint.empty()
         anchor.copy(next(a for a in reversed(self.anchors) if a.t <= t))
         self._advance(anchor, t)
         return anchor
 
-    def in_picture(self, anchor: Anchor) -> Array:
+    def in_picture(self, anchor: Checkpoint) -> Array:
         """P (6, 6) of the pose in a picture stamped for the time of `anchor`: that is doubted too.
 
         The pose passes at ṗ = u − ω_c × p, Ṙ = R [ω_b − Rᵀ ω_c]×.
@@ -145,8 +145,8 @@ class RelativeTrack:
         P: Array = passing @ anchor.P[TOUCHED[:, None], TOUCHED] @ passing.T
         return P
 
-    def fuse(self, anchor: Anchor, seen: Seen, stretch: float = 1.0) -> float:
-        """Fuse the rays of `seen` into what was `foretold` of its time; `stretch` as in `Anchor`.
+    def fuse(self, anchor: Checkpoint, seen: VisionMeasurement, stretch: float = 1.0) -> float:
+        """Fuse the rays of `seen` into what was `foretold` of its time; `stretch` as in `Checkpoint`.
 
         Gives χ² (two degrees of freedom for each LED used); NaN: the filter can't be believed.
         """
@@ -170,7 +170,7 @@ class RelativeTrack:
         if anchor.seen is not None and anchor.use is not None:
             self._look(anchor, anchor.seen, anchor.use)
 
-    def _look(self, anchor: Anchor, seen: Seen, use: Flags) -> float:
+    def _look(self, anchor: Checkpoint, seen: VisionMeasurement, use: Flags) -> float:
         if anchor.stretch != 1.0:
             anchor.P[:MOVING] *= sqrt(anchor.stretch)
             anchor.P[:, :MOVING] *= sqrt(anchor.stretch)
@@ -234,7 +234,7 @@ class RelativeTrack:
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
         return self._inputs(self.now)
 
-    def _inputs(self, anchor: Anchor) -> Array:
+    def _inputs(self, anchor: Checkpoint) -> Array:
         body, phone = self.body, self.phone
         return np.asarray(
             inputs_at(
@@ -242,7 +242,7 @@ class RelativeTrack:
             )
         )
 
-    def _advance(self, anchor: Anchor, t: float) -> None:
+    def _advance(self, anchor: Checkpoint, t: float) -> None:
         body, phone = self.body, self.phone
         transit(
             anchor.x,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.signals import LedRays, RelativePose, Seen
+from pipeline.signals import LedRays, RelativePose, VisionMeasurement
 
 LARGEST = 1e6
 """No place [m], tangent or variance of a measurement has a number beyond it."""
@@ -42,7 +42,7 @@ def is_pose(pose: RelativePose) -> bool:
     return bool(is_rotation and is_symmetric and np.linalg.eigvalsh(C)[0] > 0.0)
 
 
-def is_believable(seen: Seen, leds: int) -> bool:
+def is_believable(seen: VisionMeasurement, leds: int) -> bool:
     """Whether all of `seen` can be computed with, for a robot with so many `leds`."""
     return (
         bool(np.isfinite(seen.t))

@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.estimation.rate_axes import MAX_GAP_S, WAYS, RateAxes, words
 from pipeline.estimator_config import GravityTestConfig
 from pipeline.frames import GRAVITY, Array, R_cd, R_from_wxyz, log, rotation_about_x
-from pipeline.timing.attitude_buffer import Turns
+from pipeline.timing.attitude_buffer import AttitudeBuffer
 
 WAIT = "The phone's motion sensors are being checked: a second."
 G_UNITS = "The phone's acceleration comes in g instead of m/s²: use another browser."
@@ -54,14 +54,14 @@ NEGATED: Final = 4
 """Hypotheses by index: quarter turns of the picture 0 to 3, then the opposite sign."""
 
 
-class GravityTest:
+class SensorValidation:
     """Feed it each motion sample in device axes and each pose; ask it what is wrong."""
 
     def __init__(self, config: GravityTestConfig) -> None:
         """Nothing tested."""
         self._config = config
         self._rates = RateAxes(config)
-        self._body = Turns()
+        self._body = AttitudeBuffer()
         self._felt: deque[tuple[float, Array]] = deque(maxlen=SUMS)
         self._omega = np.zeros(3)
         self._screen_angle_deg = 0

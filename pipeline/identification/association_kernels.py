@@ -21,7 +21,7 @@ NEAR_M = 0.1
 """No LED is nearer to the camera."""
 
 
-class Lights(NamedTuple):
+class BinnedSpots(NamedTuple):
     """The spots of one instant, and where to find them."""
 
     tangents: Array
@@ -34,16 +34,16 @@ class Lights(NamedTuple):
     """(2, 2) by axis: where the first bin starts, bins per unit."""
 
 
-def lights_of(tangents: Array, areas: Array) -> Lights:
+def lights_of(tangents: Array, areas: Array) -> BinnedSpots:
     """Sorted into bins."""
     below, scale = np.zeros((2, BINS + 1), dtype=np.int64), np.zeros((2, 2))
     index_spots(tangents, below, scale)
-    return Lights(tangents, areas, below, scale)
+    return BinnedSpots(tangents, areas, below, scale)
 
 
 @kernel
 def index_spots(tangents: Array, below: Integers, scale: Array) -> None:
-    """Fill `below` and `scale` of `Lights`."""
+    """Fill `below` and `scale` of `BinnedSpots`."""
     n = tangents.shape[0]
     for axis in range(2):
         low, high = tangents[0, axis], tangents[0, axis]
@@ -60,7 +60,7 @@ def index_spots(tangents: Array, below: Integers, scale: Array) -> None:
 
 
 @kernel
-def nearest(y: float, z: float, reach: float, lights: Lights) -> tuple[int, float]:
+def nearest(y: float, z: float, reach: float, lights: BinnedSpots) -> tuple[int, float]:
     """The spot nearest to (y, z), if it is within `reach`, and its squared distance; −1 if none."""
     mask = -1
     for axis in range(2):
@@ -94,7 +94,7 @@ def place(p: Array, R: Array, leds: Array, k: int) -> tuple[float, float, float]
 
 @kernel
 def is_complete(
-    p: Array, R: Array, leds: Array, allowed: int, reach: float, lights: Lights
+    p: Array, R: Array, leds: Array, allowed: int, reach: float, lights: BinnedSpots
 ) -> bool:
     """Whether no more than `allowed` LEDs are without a spot in reach."""
     missed = 0
@@ -112,7 +112,7 @@ def is_complete(
 
 @kernel
 def name_near(
-    p: Array, R: Array, leds: Array, reach: float, lights: Lights, names: Integers
+    p: Array, R: Array, leds: Array, reach: float, lights: BinnedSpots, names: Integers
 ) -> int:
     """Give each LED the spot within `reach` of where it should be; returns how many have one."""
     count = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import log, pi, sqrt
 
 from pipeline.frames import Array
-from pipeline.identification.association_kernels import Integers, Lights, place
+from pipeline.identification.association_kernels import BinnedSpots, Integers, place
 from pipeline.so3_kernels import kernel
 
 FLOOR_PX, LEVERAGE = 0.03, 2.0
@@ -18,7 +18,7 @@ SURE_TILT_RAD = 0.0175
 
 
 @kernel
-def _unnamed_near(p: Array, names: Integers, lights: Lights, radius: float) -> int:
+def _unnamed_near(p: Array, names: Integers, lights: BinnedSpots, radius: float) -> int:
     """Spots about the robot that are not its LEDs."""
     count = 0
     for s in range(lights.tangents.shape[0]):
@@ -33,7 +33,7 @@ def _unnamed_near(p: Array, names: Integers, lights: Lights, radius: float) -> i
 
 
 @kernel
-def _log_alike(p: Array, R: Array, leds: Array, names: Integers, lights: Lights) -> float:
+def _log_alike(p: Array, R: Array, leds: Array, names: Integers, lights: BinnedSpots) -> float:
     """Logarithm of the chance that as many spots have areas as alike, by depth squared, as these.
 
     Of k values, each k may be the lowest, and the others are above it by no more than the highest.
@@ -62,7 +62,7 @@ def log_false_alarms(
     count: int,
     squared_px: float,
     known: tuple[float, float, float, float, float],
-    lights: Lights,
+    lights: BinnedSpots,
 ) -> float:
     """Logarithm of how many explanations as good as this one chance gives in such a picture.
 

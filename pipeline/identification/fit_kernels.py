@@ -7,7 +7,7 @@ from math import acos, cos, sqrt
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.identification.association_kernels import NEAR_M, Integers, Lights, place
+from pipeline.identification.association_kernels import NEAR_M, BinnedSpots, Integers, place
 from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel, multiply, put_exp
 
@@ -45,7 +45,7 @@ def _linearised(
     leds: Array,
     names: Integers,
     without: int,
-    lights: Lights,
+    lights: BinnedSpots,
     A: Array,
     b: Array,
     row: Array,
@@ -69,7 +69,9 @@ def _linearised(
 
 
 @kernel
-def fit(p: Array, R: Array, leds: Array, names: Integers, without: int, lights: Lights) -> float:
+def fit(
+    p: Array, R: Array, leds: Array, names: Integers, without: int, lights: BinnedSpots
+) -> float:
     """Gauss-Newton of p and R to the named spots but LED `without`.
 
     Returns:
@@ -102,7 +104,7 @@ def fit(p: Array, R: Array, leds: Array, names: Integers, without: int, lights: 
 
 
 @kernel
-def worst(p: Array, R: Array, leds: Array, names: Integers, lights: Lights) -> float:
+def worst(p: Array, R: Array, leds: Array, names: Integers, lights: BinnedSpots) -> float:
     """The largest residual, in tangents."""
     most = 0.0
     for k in range(leds.shape[0]):

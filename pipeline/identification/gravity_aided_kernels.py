@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.identification.association_kernels import Lights, is_complete, name_near
+from pipeline.identification.association_kernels import BinnedSpots, is_complete, name_near
 from pipeline.identification.initialisation_kernels import (
     BOUNDED,
     FARTHEST_M,
@@ -119,7 +119,7 @@ def _attitude(level: _Level, yaw: Array, R: Array) -> None:
 
 @kernel
 def _try_pair(
-    rays: Array, level: _Level, reach_m: float, wanted: Wanted, lights: Lights, work: Work
+    rays: Array, level: _Level, reach_m: float, wanted: Wanted, lights: BinnedSpots, work: Work
 ) -> None:
     """Two rays (2, 3) as every two LEDs."""
     m = wanted.leds.shape[0]
@@ -151,7 +151,7 @@ def _try_pair(
 
 @kernel
 def upright(
-    level_R: Array, reach_m: float, budget: int, wanted: Wanted, lights: Lights, work: Work
+    level_R: Array, reach_m: float, budget: int, wanted: Wanted, lights: BinnedSpots, work: Work
 ) -> None:
     """Explain spots with the attitude known but for the yaw.
 

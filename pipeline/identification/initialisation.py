@@ -22,8 +22,8 @@ from pipeline.identification.explanations import (
     cost,
     rivals,
 )
-from pipeline.identification.pnp import Naming
-from pipeline.identification.relocalisation import Hints, Search
+from pipeline.identification.pnp import Association
+from pipeline.identification.relocalisation import Relocalisation, SearchHints
 from pipeline.signals import Spots
 from pipeline.vision_config import IdentifyConfig
 
@@ -70,13 +70,13 @@ class _Pending:
     pictures: int = 0
 
 
-class Starting:
+class Initialisation:
     """Finds a robot of which nothing, or only the attitude, is known."""
 
     def __init__(self, camera: Camera, leds_in_b: Array, config: IdentifyConfig) -> None:
         """Nothing seen yet."""
         self._camera, self._leds_in_b = camera, leds_in_b
-        self._search = Search(camera, leds_in_b, config)
+        self._search = Relocalisation(camera, leds_in_b, config)
         self._config = config
         self._pending = _Pending()
         self.ambiguous = False
@@ -91,7 +91,9 @@ class Starting:
         """What was pending was something else."""
         self._pending = _Pending()
 
-    def step(self, t: float, spots: Spots, hints: Hints, turn: Array | None) -> Naming | None:
+    def step(
+        self, t: float, spots: Spots, hints: SearchHints, turn: Array | None
+    ) -> Association | None:
         """Look in a picture's spots (those of one instant).
 
         Args:
@@ -107,7 +109,7 @@ class Starting:
         self._carry(turn)
         believed = self._believed(self._search.explanations(spots, hints), spots, hints)
         if believed is None and hints.R_cb is not None and not self.ambiguous:
-            free = Hints(hints.up_in_c, hints.up_in_b, area_px_m2=hints.area_px_m2)
+            free = SearchHints(hints.up_in_c, hints.up_in_b, area_px_m2=hints.area_px_m2)
             found = self._search.explanations(spots, free)
             if found and len(rivals(found)) == 1 and found[0].log_chance < AGAINST_MEMORY:
                 believed = found[0]
@@ -123,7 +125,7 @@ class Starting:
         if fit is None or fit.rms_px > self._config.start_rms_px:
             return None
         self._pending = _Pending()
-        return Naming(believed.match, fit)
+        return Association(believed.match, fit)
 
     def _carry(self, turn: Array | None) -> None:
         """What is pending turns as the gyroscopes say."""
@@ -135,7 +137,9 @@ class Starting:
         if self._pending.weak is not None:
             self._pending.weak.R_cb = before @ self._pending.weak.R_cb @ after
 
-    def _believed(self, found: list[Explanation], spots: Spots, hints: Hints) -> Explanation | None:
+    def _believed(
+        self, found: list[Explanation], spots: Spots, hints: SearchHints
+    ) -> Explanation | None:
         if not found or found[0].log_chance > WEAK:
             return None
         equal = rivals(found)

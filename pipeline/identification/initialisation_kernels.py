@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.identification.association_kernels import Integers, Lights, name_near, place
+from pipeline.identification.association_kernels import BinnedSpots, Integers, name_near, place
 from pipeline.identification.false_alarm_kernels import log_false_alarms
 from pipeline.identification.fit_kernels import angle_to, fit, is_turned_less, worst
 from pipeline.so3_kernels import kernel
@@ -103,7 +103,7 @@ def is_new(names: Integers, twin: int, work: Work) -> bool:
 
 @kernel
 def consider(
-    p: Array, R: Array, names: Integers, wanted: Wanted, lights: Lights, work: Work
+    p: Array, R: Array, names: Integers, wanted: Wanted, lights: BinnedSpots, work: Work
 ) -> None:
     """Fit p, R to `names` (m,) (spots of the LEDs or −1), all changed; keep what is good."""
     leds, f = wanted.leds, wanted.f
@@ -148,7 +148,7 @@ def _relieved(
     names: Integers,
     squared: float,
     wanted: Wanted,
-    lights: Lights,
+    lights: BinnedSpots,
     work: Work,
 ) -> float:
     """Leave one LED out after another while that is called for; squared residuals, < 0: no fit."""
@@ -178,7 +178,7 @@ def _relieved(
 
 
 @kernel
-def _are_alike(p: Array, R: Array, names: Integers, wanted: Wanted, lights: Lights) -> bool:
+def _are_alike(p: Array, R: Array, names: Integers, wanted: Wanted, lights: BinnedSpots) -> bool:
     """Whether the areas, by depth squared, are near each other, and near the known one."""
     low, high, x2 = 1e30, 0.0, p[0] * p[0]
     for k in range(names.shape[0]):
@@ -225,7 +225,7 @@ def _keep(
     squared_px: float,
     tilt: float,
     wanted: Wanted,
-    lights: Lights,
+    lights: BinnedSpots,
     work: Work,
 ) -> None:
     """Enter an explanation."""

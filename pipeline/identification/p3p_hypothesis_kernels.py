@@ -8,7 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.identification.association_kernels import Integers, Lights, is_complete, name_near
+from pipeline.identification.association_kernels import (
+    BinnedSpots,
+    Integers,
+    is_complete,
+    name_near,
+)
 from pipeline.identification.initialisation_kernels import (
     BOUNDED,
     FARTHEST_M,
@@ -80,7 +85,7 @@ def _are_distinct(names: Integers) -> bool:
 
 @kernel
 def _try_triple(
-    three: tuple[int, int, int], corners: _Corners, wanted: Wanted, lights: Lights, work: Work
+    three: tuple[int, int, int], corners: _Corners, wanted: Wanted, lights: BinnedSpots, work: Work
 ) -> None:
     """Three spots as three LEDs: up to four poses."""
     work.counters[LOOKED] += P3P_COST
@@ -105,7 +110,7 @@ def _try_triple(
 
 @kernel
 def any_way(
-    which: Integers, start: int, budget: int, wanted: Wanted, lights: Lights, work: Work
+    which: Integers, start: int, budget: int, wanted: Wanted, lights: BinnedSpots, work: Work
 ) -> int:
     """Explain spots of a robot in any attitude.
 

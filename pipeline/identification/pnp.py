@@ -20,7 +20,7 @@ BELIEF = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class PnpSolution:
     """A pose and how well it explains its spots."""
 
     p_bc_in_c: Array
@@ -50,11 +50,11 @@ class Fit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Naming:
+class Association:
     """Spots with names, and the pose that gives them."""
 
     match: Match
-    fit: Fit
+    fit: PnpSolution
 
 
 def refine(
@@ -64,7 +64,7 @@ def refine(
     weights: Array,
     p_bc_in_c: Array,
     R_cb: Array,
-) -> Fit | None:
+) -> PnpSolution | None:
     """Maximum likelihood by Gauss-Newton; None if it leaves the space before the camera.
 
     Args:
@@ -82,7 +82,7 @@ def refine(
     chi2 = pnp_kernels.refine(
         leds_in_b, normalised, still, weights, f, p, R, information, residuals
     )
-    return Fit(p, R, information, residuals, chi2) if chi2 >= 0.0 else None
+    return PnpSolution(p, R, information, residuals, chi2) if chi2 >= 0.0 else None
 
 
 def starts(leds_in_b: Array, normalised: Array) -> list[tuple[Array, Array]]:
@@ -120,7 +120,7 @@ def solve(
     match: Match,
     guess: tuple[Array, Array] | None = None,
     algebra: bool = False,
-) -> Fit | None:
+) -> PnpSolution | None:
     """Best pose of named spots, from `guess` (p_bc_in_c, R_cb) or algebra; with `algebra` both.
 
     Four spots may have two poses that fit about equally: a guess far off may lead to the other one,
@@ -136,7 +136,7 @@ def solve(
     return min((fit for fit in fits if fit is not None), key=lambda fit: fit.chi2, default=None)
 
 
-def pose_of(fit: Fit, t: float) -> RelativePose:
+def pose_of(fit: PnpSolution, t: float) -> RelativePose:
     """As a measurement; its covariance grows where the residuals are larger than claimed."""
     C = np.empty((6, 6))
     shared = np.zeros((6, 6)) if fit.shared is None else fit.shared

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_between, cross
-from pipeline.identification.association_kernels import CANDIDATES, Integers, Lights, lights_of
+from pipeline.identification.association_kernels import CANDIDATES, BinnedSpots, Integers, lights_of
 from pipeline.identification.explanations import Explanation, ranked
 from pipeline.identification.gravity_aided_kernels import upright
 from pipeline.identification.initialisation_kernels import (
@@ -50,7 +50,7 @@ Indices = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hints:
+class SearchHints:
     """What is known beside the spots; each may be missing."""
 
     up_in_c: Array | None = None
@@ -69,7 +69,7 @@ class Hints:
         return self.up_in_c is not None and self.up_in_b is not None
 
 
-class Search:
+class Relocalisation:
     """Looks for one robot in pictures of one camera; work left undone goes on in the next."""
 
     def __init__(self, camera: Camera, leds_in_b: Array, config: IdentifyConfig) -> None:
@@ -90,7 +90,7 @@ class Search:
         self.bounded = False
         """The last picture had more to try than it could."""
 
-    def explanations(self, spots: Spots, hints: Hints) -> list[Explanation]:
+    def explanations(self, spots: Spots, hints: SearchHints) -> list[Explanation]:
         """Of the spots (those of one instant), the likeliest first."""
         chosen = self._candidates(len(spots))
         self._work.counters[:] = 0
@@ -123,7 +123,7 @@ class Search:
         rest = STEADY + np.unique((np.arange(room) + self._turn) % (n - STEADY))
         return np.concatenate((np.arange(STEADY), rest))
 
-    def _wanted(self, least: int, hints: Hints) -> Wanted:
+    def _wanted(self, least: int, hints: SearchHints) -> Wanted:
         camera, config = self._camera, self._config
         ups, R_cb, turn = np.zeros((2, 3)), np.eye(3), pi
         if hints.R_cb is not None:
@@ -147,7 +147,7 @@ class Search:
             area_px_m2=float(hints.area_px_m2),
         )
 
-    def _upright(self, lights: Lights, hints: Hints) -> None:
+    def _upright(self, lights: BinnedSpots, hints: SearchHints) -> None:
         """Quickly, then, unless all LEDs are found, with gravity less trusted."""
         wanted = self._wanted(self._config.min_leds, hints)
         level = R_between(wanted.ups[1], wanted.ups[0])
@@ -159,7 +159,7 @@ class Search:
             reach_m = reach_rad * self._radius_m
             upright(level, reach_m, self.looked + budget, wanted, lights, self._work)
 
-    def _any_way(self, lights: Lights, hints: Hints) -> None:
+    def _any_way(self, lights: BinnedSpots, hints: SearchHints) -> None:
         """All LEDs, and, unless they are found, all but one; of many LEDs half."""
         m = len(self._leds)
         self._work.table[:] = 0
@@ -174,7 +174,7 @@ class Search:
         for number in range(len(self._triples)):
             self._try(number, wanted, lights, FEWER // len(self._triples))
 
-    def _half(self, wanted: Wanted, lights: Lights) -> None:
+    def _half(self, wanted: Wanted, lights: BinnedSpots) -> None:
         """Triple after triple of LEDs, until one of those seen explains enough."""
         end = self.looked + ALL
         for _ in range(len(self._triples)):
@@ -183,7 +183,7 @@ class Search:
                 return
             self._next = (self._next + 1) % len(self._triples)
 
-    def _try(self, number: int, wanted: Wanted, lights: Lights, budget: int) -> None:
+    def _try(self, number: int, wanted: Wanted, lights: BinnedSpots, budget: int) -> None:
         """From where it was left in the last picture."""
         start, most = self._at.get((wanted.least, number), 0), len(lights.tangents) ** 3
         self._at[wanted.least, number] = any_way(

@@ -10,7 +10,7 @@ SLOWEST = 0.02
 """Share of a new picture, once many were seen."""
 
 
-class Leaning:
+class TiltBias:
     """Learnt from believed poses; true until the robot is another one."""
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ COMMON = 2.0
 
 
 @dataclass(slots=True)
-class Doubt:
+class NoiseScale:
     """By how much the residuals say that covariances are too small: learnt, and slowly forgotten.
 
     What no picture tells of itself, a codec's bit rate above all, shows in how well LEDs fit.

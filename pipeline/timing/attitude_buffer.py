@@ -15,7 +15,7 @@ MAX_GAP_S: Final = 0.1
 """Longer without samples: what was added up is worth nothing."""
 
 
-class Turns:
+class AttitudeBuffer:
     """Attitude against that of the first sample, from angular rates; trapezoids between samples."""
 
     def __init__(self) -> None:

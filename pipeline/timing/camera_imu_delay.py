@@ -17,7 +17,7 @@ WAITING = 4096
 """Samples kept until the next picture."""
 
 
-class StampOffsetSearch:
+class CameraImuDelay:
     """Samples come from the event loop, pictures from the vision thread."""
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ _ROUNDS: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Bound:
+class OffsetBound:
     """The offset at our time `t` [s] is not beyond `offset` [s]."""
 
     t: float
@@ -28,16 +28,16 @@ class Bound:
 
 
 @dataclass(slots=True)
-class Bucket:
+class TightestBounds:
     """The tightest bounds of a span."""
 
     t: float
-    lower: Bound
-    upper: Bound
+    lower: OffsetBound
+    upper: OffsetBound
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class ClockLine:
     """Offset over our time."""
 
     t: float
@@ -55,7 +55,7 @@ class Line:
         return self.offset + self.drift * (t - self.t)
 
 
-def fit(buckets: Sequence[Bucket], t: float) -> Line:
+def fit(buckets: Sequence[TightestBounds], t: float) -> ClockLine:
     """The line with the most room between the bounds, seen from time `t` [s]."""
     base = buckets[-1].lower.offset
     rows = [(b.lower.t - t, b.lower.offset, b.upper.t - t, b.upper.offset) for b in buckets]
@@ -74,7 +74,7 @@ def fit(buckets: Sequence[Bucket], t: float) -> Line:
             error = _reach(top, bottom, best)
         width *= 2.0 / (len(_GRID) - 1)
         drifts = np.clip(drift + width * _GRID, -MAX_DRIFT, MAX_DRIFT)
-    return Line(t, base + middle, drift, max(error, 0.0), room)
+    return ClockLine(t, base + middle, drift, max(error, 0.0), room)
 
 
 def _reach(top: Array, bottom: Array, best: int) -> float:

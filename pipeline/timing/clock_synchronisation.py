@@ -13,7 +13,7 @@ from collections import deque
 from math import isfinite
 from typing import Final
 
-from pipeline.timing.clock_line import MAX_DRIFT, Bound, Bucket, Line, fit
+from pipeline.timing.clock_line import MAX_DRIFT, ClockLine, OffsetBound, TightestBounds, fit
 
 WINDOW_S: Final = 60.0
 """How long a bound counts: quartz keeps its rate over it."""
@@ -29,18 +29,18 @@ SLEW_S, MAX_SLEW = 0.5, 0.02
 """What was learnt reaches `local` within this time, time never running faster or slower by more."""
 
 
-class ClockOffset:
+class ClockSynchronisation:
     """Remote clock minus our clock."""
 
     def __init__(self, needed: int = NEEDED) -> None:
         """Be ready after `needed` answers, at a start as after a jump."""
         self._needed = needed
-        self._buckets: deque[Bucket] = deque()
+        self._buckets: deque[TightestBounds] = deque()
         self._contradictions: list[tuple[float, float, float]] = []
         self._answers = 0
         self._trips: deque[tuple[float, float]] = deque()
-        self._line: Line | None = None
-        self._mapping = Mapping()
+        self._line: ClockLine | None = None
+        self._mapping = ClockMapping()
         self.restarts = 0
         """Times the clock had jumped."""
         self.reason = ""
@@ -101,7 +101,7 @@ class ClockOffset:
         self._known()
         return self._mapping.local(t_remote)
 
-    def _known(self) -> Line:
+    def _known(self) -> ClockLine:
         if self._line is None:
             raise ValueError("no answer yet")
         return self._line
@@ -127,8 +127,8 @@ class ClockOffset:
 
     def _take(self, t_asked: float, t_remote: float, t_answered: float) -> None:
         drift = self._line.drift if self._line is not None else 0.0
-        lower = Bound(t_answered, t_remote - t_answered)
-        upper = Bound(t_asked, t_remote - t_asked)
+        lower = OffsetBound(t_answered, t_remote - t_answered)
+        upper = OffsetBound(t_asked, t_remote - t_asked)
         is_news = self._remember(lower, upper, drift)
         self._answers += 1
         self._trips.append((t_answered, t_answered - t_asked))
@@ -138,7 +138,7 @@ class ClockOffset:
             self._line = self._refit(t_answered)
             self._mapping.steer(self._line, settled=self._answers > self._needed)
 
-    def _refit(self, t: float) -> Line:
+    def _refit(self, t: float) -> ClockLine:
         """The line through what still agrees; a rate that has changed costs the older half."""
         line = fit(self._buckets, t)
         while len(self._buckets) > 1 and self._has_changed(line, t):
@@ -147,7 +147,7 @@ class ClockOffset:
             line = fit(self._buckets, t)
         return line
 
-    def _has_changed(self, line: Line, t: float) -> bool:
+    def _has_changed(self, line: ClockLine, t: float) -> bool:
         """The newest bounds leave much more room than all together: they follow another line."""
         if line.room < -TOLERANCE_S:
             return True
@@ -156,13 +156,13 @@ class ClockOffset:
         recent = fit(list(self._buckets)[-len(self._buckets) // 4 :], t).room
         return line.room < recent / 3.0 and line.room < recent - TOLERANCE_S
 
-    def _remember(self, lower: Bound, upper: Bound, drift: float) -> bool:
+    def _remember(self, lower: OffsetBound, upper: OffsetBound, drift: float) -> bool:
         """Into the newest bucket, if tighter than what is there; old buckets go."""
         t = lower.t
         while self._buckets and self._buckets[0].t < t - WINDOW_S:
             self._buckets.popleft()
         if not self._buckets or t >= self._buckets[-1].t + BUCKET_S:
-            self._buckets.append(Bucket(t, lower, upper))
+            self._buckets.append(TightestBounds(t, lower, upper))
             return True
         bucket = self._buckets[-1]
         is_higher = lower.offset - bucket.lower.offset > drift * (lower.t - bucket.lower.t)
@@ -174,7 +174,7 @@ class ClockOffset:
         return is_higher or is_lower
 
 
-class Mapping:
+class ClockMapping:
     """Remote time to ours: continuous, strictly increasing, and never changed for the past."""
 
     def __init__(self) -> None:
@@ -184,7 +184,7 @@ class Mapping:
         self._remote: list[float] = []
         self._drift = 0.0
 
-    def steer(self, line: Line, settled: bool) -> None:
+    def steer(self, line: ClockLine, settled: bool) -> None:
         """From `line.t` on, approach `line` smoothly; at once if not yet `settled`."""
         offset = self.offset(line.t) if settled and self._t else line.offset
         keep = bisect_right(self._t, line.t - 1e-9) if settled else 0

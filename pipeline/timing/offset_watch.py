@@ -23,7 +23,7 @@ UNKNOWN = "The pictures' time stamps are off: move the phone a little, so that b
 DRIFTING = "The pictures' time stamps drift: restart the camera on the phone."
 
 
-class OffsetWatch:
+class OffsetMonitor:
     """Compares; says when to begin again, and when nobody should fly."""
 
     def __init__(self) -> None:

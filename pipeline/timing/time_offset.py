@@ -18,7 +18,13 @@ import numpy.typing as npt
 from pipeline.estimator_config import TimeOffsetConfig
 from pipeline.frames import Array, R_from_wxyz, wxyz_from_R
 from pipeline.signals import BodyImu, PhoneImu
-from pipeline.timing.attitude_buffer import Turns, conjugate, matrices, product, small_vectors
+from pipeline.timing.attitude_buffer import (
+    AttitudeBuffer,
+    conjugate,
+    matrices,
+    product,
+    small_vectors,
+)
 
 PARAMETERS: Final = 7
 """Constant attitude, bias of the body's gyroscope, offset."""
@@ -43,7 +49,7 @@ class Offset:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
+class _AttitudeByShift:
     """What a picture makes of the unknown constant attitude, were it taken at each shift."""
 
     t: float
@@ -67,9 +73,9 @@ class TimeOffset:
 
     def reset(self) -> None:
         """Forget all samples and pictures."""
-        self._phone, self._body = Turns(), Turns()
+        self._phone, self._body = AttitudeBuffer(), AttitudeBuffer()
         self._waiting: deque[tuple[float, Array, Array]] = deque(maxlen=32)
-        self._seen: deque[_Seen] = deque()
+        self._seen: deque[_AttitudeByShift] = deque()
         self._new = 0
         self._offset: Offset | None = None
         self.reason = WAITING
@@ -126,7 +132,7 @@ class TimeOffset:
             wxyz = product(product(camera, wxyz_cb), conjugate(body))
             middle = len(times) // 2
             R_ic = R_from_wxyz(camera[middle])
-            self._seen.append(_Seen(t, wxyz, body[middle], R_ic @ C_in_c @ R_ic.T))
+            self._seen.append(_AttitudeByShift(t, wxyz, body[middle], R_ic @ C_in_c @ R_ic.T))
             self._new += 1
         while self._seen and self._seen[0].t < self._seen[-1].t - config.window_s:
             self._seen.popleft()
@@ -169,7 +175,7 @@ class TimeOffset:
         chi2: Array = np.square(left).sum(axis=0)
         return chi2
 
-    def _explained(self, middle: _Seen) -> Array:
+    def _explained(self, middle: _AttitudeByShift) -> Array:
         """(n, 3, 6) what a constant turn and a bias of the body's gyroscope do to the errors."""
         t = np.array([one.t for one in self._seen])
         R_jb = matrices(np.array([one.wxyz_b for one in self._seen]))

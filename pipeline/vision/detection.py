@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from pipeline.prediction import Expected
-from pipeline.signals import LedRays, Match, RelativePose, Seen, Spots, StampOffset
+from pipeline.prediction import Prediction
+from pipeline.signals import LedRays, Match, RelativePose, Spots, StampOffset, VisionMeasurement
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prior:
+class FramePrior:
     """What is known without looking; each may be missing."""
 
     up_in_c: Array | None = None
@@ -20,12 +20,12 @@ class Prior:
     omega_cf_in_c: Array | None = None
     """When the picture was taken [rad/s]."""
     omega_bf_in_b: Array | None = None
-    expected: Expected | None = None
+    expected: Prediction | None = None
     """What a filter predicts for that time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
+class Detection:
     """What came of a picture."""
 
     t: float
@@ -45,8 +45,8 @@ class Sighting:
     bounded: bool = False
     """There was more light in the picture than time to try it all: the next one goes on."""
 
-    def seen(self, camera: Camera) -> Seen | None:
+    def seen(self, camera: Camera) -> VisionMeasurement | None:
         """For a filter; None if it says nothing of the robot."""
         if self.pose is None and len(self.rays) == 0:
             return None
-        return Seen(self.t, self.rays, self.pose, camera.half_field, self.offset)
+        return VisionMeasurement(self.t, self.rays, self.pose, camera.half_field, self.offset)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.signals import Match, Spots
 from pipeline.vision_config import IdentifyConfig
 
@@ -27,7 +27,7 @@ FEW_PX = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Places:
+class PredictedLeds:
     """Where LEDs are expected in the picture."""
 
     pixels: Array
@@ -39,8 +39,8 @@ class Places:
 
 
 def places(
-    camera: Camera, leds_in_b: Array, expected: Expected, config: IdentifyConfig
-) -> Places | None:
+    camera: Camera, leds_in_b: Array, expected: Prediction, config: IdentifyConfig
+) -> PredictedLeds | None:
     """None if the expectation is too unsure, or no number."""
     q = expected.p_bc_in_c + leds_in_b @ expected.R_cb.T
     depth, f = float(expected.p_bc_in_c[0]), camera.focal_px
@@ -54,10 +54,10 @@ def places(
     reach_px = np.hypot(config.expected_sigmas * f / depth * expected.sigma_p, own_px)
     if not reach_px.max() <= config.expected_reach_px:
         return None
-    return Places(pixels, np.where(camera.sees(pixels), reach_px, 0.0), own_px)
+    return PredictedLeds(pixels, np.where(camera.sees(pixels), reach_px, 0.0), own_px)
 
 
-def name_few(spots: Spots, expected: Places, typical_area_px: float) -> Match | None:
+def name_few(spots: Spots, expected: PredictedLeds, typical_area_px: float) -> Match | None:
     """Names of spots that lie where LEDs are expected, all shifted alike.
 
     Args:

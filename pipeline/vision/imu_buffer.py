@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.estimation.gravity_direction import Vertical
+from pipeline.estimation.gravity_direction import GravityDirection
 from pipeline.frames import Array
 
 REMEMBERED_S = 0.6
@@ -15,7 +15,7 @@ STALE_S = 0.3
 """Farther from the nearest sample nothing is known."""
 
 
-class Feeling(NamedTuple):
+class BufferedImu(NamedTuple):
     """One moment."""
 
     t: float
@@ -26,13 +26,13 @@ class Feeling(NamedTuple):
     """(3,) [rad/s]."""
 
 
-class Felt:
+class ImuBuffer:
     """Samples come in the order of time, from one thread; any thread may ask."""
 
     def __init__(self) -> None:
         """Nothing felt."""
-        self._vertical = Vertical()
-        self._feelings: tuple[Feeling, ...] = ()
+        self._vertical = GravityDirection()
+        self._feelings: tuple[BufferedImu, ...] = ()
 
     def add(self, t: float, omega: Array, specific_force: Array) -> None:
         """Take a sample of `t` [s]: `omega` (3,) [rad/s], `specific_force` (3,) [m/s²]."""
@@ -42,9 +42,9 @@ class Felt:
         while first < len(kept) and kept[first].t < t - REMEMBERED_S:
             first += 1
         # a new tuple each time: who reads one in another thread keeps it whole
-        self._feelings = (*kept[first:], Feeling(t, self._vertical.up, omega))
+        self._feelings = (*kept[first:], BufferedImu(t, self._vertical.up, omega))
 
-    def at(self, t: float) -> Feeling | None:
+    def at(self, t: float) -> BufferedImu | None:
         """Between the samples around `t` [s], or that of the nearest; None if all are far."""
         feelings = self._feelings
         if not feelings or not feelings[0].t - STALE_S <= t <= feelings[-1].t + STALE_S:
@@ -59,11 +59,11 @@ class Felt:
         return _between(feelings[later - 1], feelings[later], t)
 
 
-def _between(a: Feeling, b: Feeling, t: float) -> Feeling:
+def _between(a: BufferedImu, b: BufferedImu, t: float) -> BufferedImu:
     share = (t - a.t) / (b.t - a.t)
     omega = (1.0 - share) * a.omega + share * b.omega
     if a.up is None or b.up is None:
-        return Feeling(t, b.up, omega)
+        return BufferedImu(t, b.up, omega)
     up = (1.0 - share) * a.up + share * b.up
     norm = float(np.sqrt(up @ up))
-    return Feeling(t, up / norm if norm > 0.5 else b.up, omega)
+    return BufferedImu(t, up / norm if norm > 0.5 else b.up, omega)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.frames import Array, exp, log
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.signals import RelativePose
 
 FORGET_MISSES = 3
@@ -75,7 +75,7 @@ class LastPose:
         if self._R_cb is not None:
             self._R_cb = exp(-self.turned[0]) @ self._R_cb @ exp(self.turned[1])
 
-    def keep(self, pose: RelativePose, expected: Expected | None) -> None:
+    def keep(self, pose: RelativePose, expected: Prediction | None) -> None:
         """`pose` was believed, where a filter had `expected` the robot."""
         last, back = self._pose, exp(self._since_kept)
         self.u_in_c, self.omega_in_b = np.zeros(3), np.zeros(3)
@@ -117,7 +117,7 @@ class LastPose:
         return (self._R_cb, off) if off < MEMORY_MOST_RAD else None
 
 
-def _contradict(pose: RelativePose, expected: Expected) -> bool:
+def _contradict(pose: RelativePose, expected: Prediction) -> bool:
     """Whether not both can be true."""
     shift, turn = pose.p_bc_in_c - expected.p_bc_in_c, log(expected.R_cb.T @ pose.R_cb)
     sigma_p = np.hypot(expected.sigma_p, _largest(pose.covariance[:3, :3]))

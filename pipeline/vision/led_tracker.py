@@ -9,17 +9,17 @@ from math import cos, pi, sqrt
 import numpy as np
 
 from pipeline.camera.lens import Camera
-from pipeline.camera.rolling_shutter import Motion
+from pipeline.camera.rolling_shutter import FrameMotion
 from pipeline.frames import Array
-from pipeline.identification.pnp import Fit, Naming
+from pipeline.identification.pnp import Association, PnpSolution
 from pipeline.signals import Frame, Match, Spots
 from pipeline.spots import leds
 from pipeline.spots.centroid_kernels import AREA, BRIGHTNESS, C_UU, C_UV, C_VV, FIELDS
-from pipeline.spots.noise_scale import Doubt
+from pipeline.spots.noise_scale import NoiseScale
 from pipeline.spots.spot_kernels import OF_ONE_WINDOW as MOST_OF_ONE
 from pipeline.spots.spot_kernels import WINDOW
 from pipeline.vision.led_tracker_kernels import identify
-from pipeline.vision.motion_blur import Smear
+from pipeline.vision.motion_blur import MotionBlur
 from pipeline.vision.predicted_windows_kernels import detect
 from pipeline.vision_config import IdentifyConfig, LedsConfig
 
@@ -45,24 +45,24 @@ BLIND_M_S = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Followed:
+class TrackedLeds:
     """What the windows of a picture hold."""
 
     spots: Spots
     """As they stand in the picture."""
-    naming: Naming | None
+    naming: Association | None
     took_s: Array
     """(3,) to detect, to name and solve, and to learn from it [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Look:
+class _Attempt:
     """One try."""
 
     spots: Spots
     table: Array
     """(n, FIELDS)."""
-    naming: Naming | None
+    naming: Association | None
     took_s: Array
 
     def names(self) -> int:
@@ -70,7 +70,7 @@ class _Look:
         return 0 if self.naming is None else len(self.naming.match.led)
 
 
-class Follower:
+class LedTracker:
     """Names and measures by where LEDs are foreseen; learns how sure spots are."""
 
     def __init__(
@@ -85,7 +85,7 @@ class Follower:
         self._leds_in_b = np.ascontiguousarray(leds_in_b, dtype=np.float64)
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
-        self.doubt, self.smear = Doubt(), Smear()
+        self.doubt, self.smear = NoiseScale(), MotionBlur()
         self._threes = 0
         """Poses of three LEDs in a row."""
         config = self._identify
@@ -100,9 +100,9 @@ class Follower:
         self,
         frame: Frame,
         place: Place,
-        motion: Motion | None,
+        motion: FrameMotion | None,
         clock: Clock = lambda: 0.0,
-    ) -> Followed:
+    ) -> TrackedLeds:
         """Look only where the LEDs are foreseen.
 
         Args:
@@ -115,32 +115,32 @@ class Follower:
         first = self._look(frame, place, motion, row, self._reach, clock)
         if self._reach < self._full and first.names() < self._known:
             again = self._look(frame, place, motion, row, self._full, clock)
-            first = _Look(again.spots, again.table, again.naming, first.took_s + again.took_s)
+            first = _Attempt(again.spots, again.table, again.naming, first.took_s + again.took_s)
         started = clock()
         self._known, self._reach = first.names(), self._full
         if first.naming is not None:
             self._learn(first.naming, first.table)
         first.took_s[2] += clock() - started
-        return Followed(first.spots, first.naming, first.took_s)
+        return TrackedLeds(first.spots, first.naming, first.took_s)
 
     def _look(
         self,
         frame: Frame,
         place: Place,
-        motion: Motion | None,
+        motion: FrameMotion | None,
         row: Array,
         reach: float,
         clock: Clock,
-    ) -> _Look:
+    ) -> _Attempt:
         started = clock()
         table, spots = self._measured(frame, place, row, reach)
         detected = clock()
         own = table[:, [C_UU, C_UV, C_UV, C_VV]].reshape(-1, 2, 2)
         naming = self._named(table, own, place, row, motion)
         took_s = np.array([detected - started, clock() - detected, 0.0])
-        return _Look(spots, table, naming, took_s)
+        return _Attempt(spots, table, naming, took_s)
 
-    def name(self, spots: Spots, place: Place, motion: Motion | None) -> Naming | None:
+    def name(self, spots: Spots, place: Place, motion: FrameMotion | None) -> Association | None:
         """The same for spots as they stand in the picture, wherever they were looked for."""
         table = np.zeros((len(spots), FIELDS))
         table[:, :2] = spots.pixels
@@ -176,8 +176,8 @@ class Follower:
         covariances: Array,
         place: Place,
         row: Array,
-        motion: Motion | None,
-    ) -> Naming | None:
+        motion: FrameMotion | None,
+    ) -> Association | None:
         """The pose of the LEDs, the odd ones left out, if it is near where it is foreseen."""
         n, sigma_u = len(self._leds_in_b), BLIND_M_S if motion is None else motion.sigma_u
         led, spot = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
@@ -192,16 +192,18 @@ class Follower:
         n = int(left)
         if n < THREE:
             return None
-        fit = Fit(pose[:3], pose[3:].reshape(3, 3), information, residuals[:n], chi2, shared)
+        fit = PnpSolution(
+            pose[:3], pose[3:].reshape(3, 3), information, residuals[:n], chi2, shared
+        )
         if not _near(fit, place, JUMP_M, JUMP_RAD):
             return None
-        naming = Naming(Match(led[:n], spot[:n]), fit)
+        naming = Association(Match(led[:n], spot[:n]), fit)
         self._threes = self._threes + 1 if n == THREE else 0
         if n == THREE and not self._three_do(naming, table[:, :2], place):
             return None
         return naming
 
-    def _three_do(self, naming: Naming, pixels: Array, place: Place) -> bool:
+    def _three_do(self, naming: Association, pixels: Array, place: Place) -> bool:
         """Whether they are where they are foreseen, and no other spot could be one of them."""
         fit, match = naming.fit, naming.match
         if self._threes > THREE_IN_A_ROW:
@@ -214,7 +216,7 @@ class Follower:
         near[:, match.spot] = False
         return not near.any()
 
-    def _learn(self, naming: Naming, table: Array) -> None:
+    def _learn(self, naming: Association, table: Array) -> None:
         """From the residuals, from how spots are smeared, and from how well they were foreseen."""
         fit = naming.fit
         freedoms = fit.residuals_px.size - 6
@@ -226,7 +228,7 @@ class Follower:
             self._reach = min(self._full, CALM_REACH_PX + CALM_RADII * sqrt(area / pi))
 
 
-def _near(fit: Fit, place: Place, jump_m: float, jump_rad: float) -> bool:
+def _near(fit: PnpSolution, place: Place, jump_m: float, jump_rad: float) -> bool:
     """Tracking may not jump."""
     shift, turn = fit.p_bc_in_c - place[0], place[1].T @ fit.R_cb
     cosine = 0.5 * (float(turn[0, 0] + turn[1, 1] + turn[2, 2]) - 1.0)

@@ -7,9 +7,9 @@ from math import sqrt
 import numpy as np
 
 from pipeline.camera.lens import Camera
-from pipeline.camera.rolling_shutter import Motion
+from pipeline.camera.rolling_shutter import FrameMotion
 from pipeline.frames import Array
-from pipeline.identification.pnp import Naming
+from pipeline.identification.pnp import Association
 from pipeline.vision.motion_blur_kernels import SLOPES, add_smears, put_slopes
 from pipeline.vision.predicted_windows_kernels import MOTION
 
@@ -20,7 +20,7 @@ STEADY, KEPT = 1e10, 0.97
 LONGEST_S = 0.05
 
 
-class Smear:
+class MotionBlur:
     """The exposure time, and how turning changes: together they displace a centroid."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Smear:
         camera: Camera,
         size: Array,
         leds_in_b: Array,
-        naming: Naming,
+        naming: Association,
         table: Array,
         expected: Array,
     ) -> tuple[float, float]:
@@ -61,14 +61,14 @@ class Smear:
         )  # fmt: skip
         return float(sums[2]), float(sums[3])
 
-    def again(self, motion: Motion | None) -> Array:
+    def again(self, motion: FrameMotion | None) -> Array:
         """The same for the picture that was asked for last, or for another guess of its motion."""
         row, last = _plain(motion), self._row
         if (row[:SLOPES] == last[:SLOPES]).all():
             row[SLOPES:] = last[SLOPES:]
         return row
 
-    def row(self, t: float, motion: Motion | None) -> Array:
+    def row(self, t: float, motion: FrameMotion | None) -> Array:
         """A picture's motion as the kernels take it."""
         row, last, dt = _plain(motion), self._row, t - self._t
         if row[0] != 0.0 and last[0] != 0.0 and 0.0 < dt < MOST_STEP_S:
@@ -79,7 +79,7 @@ class Smear:
         return row
 
 
-def _plain(motion: Motion | None) -> Array:
+def _plain(motion: FrameMotion | None) -> Array:
     """Without derivatives."""
     row = np.zeros(MOTION)
     if motion is not None:

@@ -8,23 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.camera.lens import Camera
-from pipeline.camera.rolling_shutter import Motion, unrolled
+from pipeline.camera.rolling_shutter import FrameMotion, unrolled
 from pipeline.frames import Array
 from pipeline.identification import pnp
-from pipeline.identification.initialisation import Starting
-from pipeline.identification.pnp import Naming
-from pipeline.identification.relocalisation import Hints
-from pipeline.identification.tilt_bias import Leaning
+from pipeline.identification.initialisation import Initialisation
+from pipeline.identification.pnp import Association
+from pipeline.identification.relocalisation import SearchHints
+from pipeline.identification.tilt_bias import TiltBias
 from pipeline.signals import Frame, Match, RelativePose, Spots
 from pipeline.spots import leds
 from pipeline.vision import few_leds
-from pipeline.vision.detection import Prior, Sighting
+from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.last_pose import LastPose, Place
-from pipeline.vision.led_tracker import Follower
+from pipeline.vision.led_tracker import LedTracker
 from pipeline.vision.rays import NO_RAYS, rays_of
 from pipeline.vision_config import IdentifyConfig, LedsConfig
 
-__all__ = ["Prior", "Sighting", "Vision", "warm_up"]
+__all__ = ["Detection", "FramePrior", "Vision", "warm_up"]
 
 Clock = Callable[[], float]
 STAGES = ("detect", "identify", "pose")
@@ -36,7 +36,7 @@ class _Found:
     """The spots of a picture and what they are called: all LEDs that a pose needs, or a few."""
 
     spots: Spots
-    naming: Naming | None = None
+    naming: Association | None = None
     few: Match | None = None
     bounded: bool = False
     """Not all was tried."""
@@ -56,17 +56,17 @@ class Vision:
         self.camera, self._leds_in_b = camera, leds_in_b
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
-        self._last, self._leaning = LastPose(), Leaning()
-        self._prior = Prior()
+        self._last, self._leaning = LastPose(), TiltBias()
+        self._prior = FramePrior()
         """Of the newest picture."""
-        self._places: few_leds.Places | None = None
+        self._places: few_leds.PredictedLeds | None = None
         """Where a filter that is trusted expects the LEDs in this picture."""
-        self._follower = Follower(camera, leds_in_b, self._leds, self._identify)
-        self._starting = Starting(camera, leds_in_b, self._identify)
+        self._follower = LedTracker(camera, leds_in_b, self._leds, self._identify)
+        self._starting = Initialisation(camera, leds_in_b, self._identify)
         self._area_px_m2 = 0.0
         """Of the last named spots, times their depth squared: what an LED looks like."""
 
-    def step(self, frame: Frame, prior: Prior, clock: Clock = lambda: 0.0) -> Sighting:
+    def step(self, frame: Frame, prior: FramePrior, clock: Clock = lambda: 0.0) -> Detection:
         """Look at a picture; `clock` only times the stages."""
         self._last.advance(frame.t, prior.omega_cf_in_c, prior.omega_bf_in_b)
         self._prior = prior
@@ -88,21 +88,21 @@ class Vision:
         took_s[2] += clock() - started
         return replace(sighting, took_s=dict(zip(STAGES, took_s.tolist(), strict=True)))
 
-    def _told(self, t: float, found: _Found) -> Sighting:
+    def _told(self, t: float, found: _Found) -> Detection:
         spots, naming, few = found.spots, found.naming, found.few
         if naming is not None:
             depth = float(naming.fit.p_bc_in_c[0])
             areas = sorted(spots.area[naming.match.spot].tolist())
             self._area_px_m2 = areas[len(areas) // 2] * depth**2
             rays = rays_of(self.camera, spots, naming.match, t, naming.fit.excess)
-            return Sighting(t, pnp.pose_of(naming.fit, t), rays, spots, naming.match, "")
+            return Detection(t, pnp.pose_of(naming.fit, t), rays, spots, naming.match, "")
         if few is not None:
             reason = f"{len(few.led)} of {len(self._leds_in_b)} LEDs seen."
             rays = rays_of(self.camera, spots, few, t)
-            return Sighting(t, None, rays, spots, few, reason, bounded=found.bounded)
+            return Detection(t, None, rays, spots, few, reason, bounded=found.bounded)
         self._last.miss()
         excuse = self._excuse(spots)
-        return Sighting(t, None, NO_RAYS, spots, None, excuse, bounded=found.bounded)
+        return Detection(t, None, NO_RAYS, spots, None, excuse, bounded=found.bounded)
 
     def keep(self, pose: RelativePose) -> None:
         """`pose`, of the last picture, was believed: predict from it."""
@@ -118,9 +118,9 @@ class Vision:
         self._last.forget()
         self._starting.forget()
         self._follower.forget()
-        self._leaning = Leaning()
+        self._leaning = TiltBias()
 
-    def _predictions(self, prior: Prior) -> list[Place]:
+    def _predictions(self, prior: FramePrior) -> list[Place]:
         """Where the robot may be, likeliest first: by a sure filter, by the last pose."""
         expected = prior.expected
         if expected is None:
@@ -135,20 +135,20 @@ class Vision:
         own = self._last.predicted()
         return [*places, own] if own is not None else places
 
-    def _motion(self, predicted: list[Place], prior: Prior) -> Motion | None:
+    def _motion(self, predicted: list[Place], prior: FramePrior) -> FrameMotion | None:
         """During the readout of a picture; without gyroscopes as it was between the last poses."""
         omega_c, omega_b, expected = prior.omega_cf_in_c, prior.omega_bf_in_b, prior.expected
         if not predicted:
-            return None if omega_c is None else Motion(omega_c, np.zeros(3), np.inf)
+            return None if omega_c is None else FrameMotion(omega_c, np.zeros(3), np.inf)
         depth, u_in_c = float(predicted[0][0][0]), self._last.u_in_c
         if self._places is not None and expected is not None:
             u_in_c = expected.u_bf_in_c
         if omega_c is None:
-            return Motion(np.zeros(3), u_in_c, depth, self._last.omega_in_b)
-        return Motion(omega_c, u_in_c, depth, np.zeros(3) if omega_b is None else omega_b)
+            return FrameMotion(np.zeros(3), u_in_c, depth, self._last.omega_in_b)
+        return FrameMotion(omega_c, u_in_c, depth, np.zeros(3) if omega_b is None else omega_b)
 
     def _search(
-        self, frame: Frame, motion: Motion | None, predicted: list[Place], clock: Clock
+        self, frame: Frame, motion: FrameMotion | None, predicted: list[Place], clock: Clock
     ) -> tuple[_Found, Array]:
         """In the whole picture; and how long that took, by stage [s]."""
         started = clock()
@@ -158,7 +158,7 @@ class Vision:
         return found, np.array([detected - started, clock() - detected, 0.0])
 
     def _named(
-        self, t: float, spots: Spots, motion: Motion | None, predicted: list[Place]
+        self, t: float, spots: Spots, motion: FrameMotion | None, predicted: list[Place]
     ) -> _Found:
         for place in predicted:
             naming = self._follower.name(spots, place, motion)
@@ -172,7 +172,7 @@ class Vision:
             return _Found(spots, self._exactly(naming, spots), bounded=bounded)
         return _Found(spots, few=self._few(upright), bounded=bounded)
 
-    def _exactly(self, naming: Naming, spots: Spots) -> Naming:
+    def _exactly(self, naming: Association, spots: Spots) -> Association:
         """With each LED's own motion during the readout, now that it has a name."""
         place = naming.fit.p_bc_in_c, naming.fit.R_cb
         again = self._follower.name(spots, place, self._motion([place], self._prior))
@@ -180,13 +180,13 @@ class Vision:
             return naming
         return again
 
-    def _hints(self) -> Hints:
+    def _hints(self) -> SearchHints:
         """For a search from nothing: the verticals, and what is remembered."""
         up_in_c, up_in_b = self._prior.up_in_c, self._leaning.corrected(self._prior.up_in_b)
         memory = self._last.attitude()
         if memory is None:
-            return Hints(up_in_c, up_in_b)
-        return Hints(up_in_c, up_in_b, *memory, self._area_px_m2)
+            return SearchHints(up_in_c, up_in_b)
+        return SearchHints(up_in_c, up_in_b, *memory, self._area_px_m2)
 
     def _few(self, spots: Spots) -> Match | None:
         """A few LEDs, where a filter expects them."""
@@ -220,7 +220,7 @@ def warm_up() -> None:
     for u, v in np.round(camera.pixels(robot + place)).astype(int):
         luma[v - 1 : v + 2, u - 1 : u + 2] = 255
     dark = np.zeros_like(luma)
-    for prior in (Prior(up, up, still, still), Prior()):
+    for prior in (FramePrior(up, up, still, still), FramePrior()):
         vision = Vision(camera, robot)
         for k, picture in enumerate((luma, luma, dark, luma)):
             sighting = vision.step(Frame(0.03 * k, picture), prior)

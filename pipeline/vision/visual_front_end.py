@@ -11,19 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.camera.block import Look
-from pipeline.camera.calibration_monitor import CameraWatch
-from pipeline.camera.exposure import ExposureWatch
+from pipeline.camera.block import LedObservation
+from pipeline.camera.calibration_monitor import CalibrationMonitor
+from pipeline.camera.exposure import ExposureMonitor
 from pipeline.camera.lens import Camera
-from pipeline.camera.line_delay import Readout
+from pipeline.camera.line_delay import LineDelay
 from pipeline.frames import Array
-from pipeline.prediction import Expectation, Expected
+from pipeline.prediction import Prediction, PredictionHistory
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
-from pipeline.timing.camera_imu_delay import StampOffsetSearch
+from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision import vision
-from pipeline.vision.detection import Prior, Sighting
+from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.gating import disbelief
-from pipeline.vision.imu_buffer import Felt
+from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.vision import Vision
 from pipeline.vision_config import GatesConfig
@@ -32,7 +32,7 @@ DOUBT_S = 0.15
 """Between looks without gravity."""
 
 
-class Looking:
+class VisualFrontEnd:
     """One camera's pictures of one robot, and what moves them."""
 
     def __init__(
@@ -46,10 +46,13 @@ class Looking:
         self.camera = camera
         self._gates, self._clock, self._leds_in_b = gates, clock, leds_in_b
         self._vision = Vision(camera, leds_in_b)
-        self._phone, self._body = Felt(), Felt()
-        self._expectation, self._stamps = Expectation(), StampOffsetSearch()
-        self.watch, self.readout = CameraWatch(camera, leds_in_b), Readout(camera.readout_s)
-        self.exposure = ExposureWatch(camera.focal_px)
+        self._phone, self._body = ImuBuffer(), ImuBuffer()
+        self._expectation, self._stamps = PredictionHistory(), CameraImuDelay()
+        self.watch, self.readout = (
+            CalibrationMonitor(camera, leds_in_b),
+            LineDelay(camera.readout_s),
+        )
+        self.exposure = ExposureMonitor(camera.focal_px)
         self.doubts_gravity = False
         """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
         self._t_doubt = -np.inf
@@ -67,11 +70,11 @@ class Looking:
             self._stamps.feel(sample)
             self.watch.feel(sample)
 
-    def expect(self, expected: Expected | None) -> None:
+    def expect(self, expected: Prediction | None) -> None:
         """Follow what a filter says; None: it says nothing."""
         self._expectation.add(expected)
 
-    def look(self, frame: Frame, up_in_b: Array | None, omega_bf_in_b: Array | None) -> Sighting:
+    def look(self, frame: Frame, up_in_b: Array | None, omega_bf_in_b: Array | None) -> Detection:
         """What a picture shows, with what the robot's own sensors said (3,) (3,) [rad/s]."""
         prior = self._prior(frame.t, up_in_b, omega_bf_in_b)
         judged = self._judged(self._vision.step(frame, prior, self._clock), prior)
@@ -89,11 +92,11 @@ class Looking:
             return facts.offset_s
         return coarse.value if coarse is not None else 0.0
 
-    def _prior(self, t: float, up_in_b: Array | None, omega_bf_in_b: Array | None) -> Prior:
+    def _prior(self, t: float, up_in_b: Array | None, omega_bf_in_b: Array | None) -> FramePrior:
         """What is known before a picture with stamp `t` [s] is looked at."""
         phone = self._phone.at(t + self.offset_s)
         body = self._body.at(t + self.offset_s)
-        return Prior(
+        return FramePrior(
             phone.up if phone is not None else None,
             up_in_b,
             phone.omega if phone is not None else None,
@@ -101,7 +104,7 @@ class Looking:
             self._expectation.at(t),
         )
 
-    def _judged(self, sighting: Sighting, prior: Prior) -> Sighting:
+    def _judged(self, sighting: Detection, prior: FramePrior) -> Detection:
         if sighting.pose is None:
             return sighting
         lie = disbelief(sighting.pose, prior.up_in_c, prior.up_in_b, self._gates)
@@ -119,7 +122,9 @@ class Looking:
         self._stamps.saw(sighting.pose)
         return replace(sighting, offset=self._stamps.offset)
 
-    def _watched(self, frame: Frame, sighting: Sighting, pose: RelativePose, prior: Prior) -> None:
+    def _watched(
+        self, frame: Frame, sighting: Detection, pose: RelativePose, prior: FramePrior
+    ) -> None:
         """Learn about the camera from a believed pose."""
         rays, match = sighting.rays, sighting.match
         if match is None or len(rays) == 0:
@@ -128,7 +133,7 @@ class Looking:
         if prior.omega_cf_in_c is not None:
             depth_m = float(pose.p_bc_in_c[0])
             self.exposure.see(frame, pixels, depth_m, prior.omega_cf_in_c)
-        look = Look(
+        look = LedObservation(
             sighting.t,
             rays.led,
             rays.tangents,
@@ -147,7 +152,7 @@ class Looking:
         if 0.0 <= frame.t - self._t_doubt < DOUBT_S:
             return None
         self._t_doubt = frame.t
-        pose = Vision(self.camera, self._leds_in_b).step(frame, Prior()).pose
+        pose = Vision(self.camera, self._leds_in_b).step(frame, FramePrior()).pose
         is_good = pose is not None and disbelief(pose, None, None, self._gates) is None
         return pose if is_good else None
 
@@ -158,7 +163,7 @@ def warm_up() -> None:
     K = np.array([[400.0, 0.0, 160.0], [0.0, 400.0, 120.0], [0.0, 0.0, 1.0]])
     leds = np.array([[0.1, 0.3, 0.2], [0.0, -0.3, 0.1], [-0.1, 0.2, -0.3], [0.2, -0.1, -0.2]])
     camera, place = Camera(320, 240, K, "plumb_bob", np.zeros(5)), np.array([2.5, 0.0, 0.0])
-    watch, still = CameraWatch(camera, leds), np.zeros(3)
+    watch, still = CalibrationMonitor(camera, leds), np.zeros(3)
     for k in range(160):
         watch.feel(PhoneImu(0.02 * k, still, still))
         watch.feel(BodyImu(0.02 * k, still, still))
@@ -166,7 +171,9 @@ def warm_up() -> None:
     C, names = np.tile(1e-6 * np.eye(2), (len(leds), 1, 1)), np.arange(len(leds))
     for k in range(30):
         t = 0.1 * k + 0.1
-        watch.saw(Look(t, names, tangents, C, np.zeros(len(leds)), place, np.eye(3)), None)
+        watch.saw(
+            LedObservation(t, names, tangents, C, np.zeros(len(leds)), place, np.eye(3)), None
+        )
     luma = np.zeros((240, 320), dtype=np.uint8)
     luma[119:122, 159:162] = 255
-    ExposureWatch(400.0).see(Frame(0.0, luma), np.array([[160.0, 120.0]]), 2.5, still)
+    ExposureMonitor(400.0).see(Frame(0.0, luma), np.array([[160.0, 120.0]]), 2.5, still)

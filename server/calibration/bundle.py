@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.frames import Array, exp
-from server.calibration.projection import BOTH, POSE, Film, Guess, linear, residuals_of
+from server.calibration.projection import BOTH, POSE, BoardCorners, Guess, linear, residuals_of
 
 HUBER = 2.5
 """Residuals beyond this many σ count less."""
@@ -22,7 +22,7 @@ SMALL = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prior:
+class ParameterPrior:
     """What is known beforehand; standard deviation 0 holds a parameter."""
 
     shared: Array
@@ -34,7 +34,7 @@ class Prior:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class BoardFit:
     """The likeliest parameters."""
 
     guess: Guess
@@ -62,7 +62,7 @@ class _Normal:
     cost: float
 
 
-def fit(film: Film, start: Guess, prior: Prior, with_rates: bool) -> Fit:
+def fit(film: BoardCorners, start: Guess, prior: ParameterPrior, with_rates: bool) -> BoardFit:
     """The likeliest parameters, sought from `start`; without rates they stay as they are."""
     free = np.flatnonzero(prior.shared_sigma > 0.0)
     width, guess = BOTH if with_rates else POSE, start
@@ -73,7 +73,12 @@ def fit(film: Film, start: Guess, prior: Prior, with_rates: bool) -> Fit:
 
 
 def _descended(
-    film: Film, guess: Guess, prior: Prior, width: int, free: npt.NDArray[np.intp], noise: float
+    film: BoardCorners,
+    guess: Guess,
+    prior: ParameterPrior,
+    width: int,
+    free: npt.NDArray[np.intp],
+    noise: float,
 ) -> Guess:
     """Levenberg-Marquardt."""
     damping = 1e-4
@@ -106,7 +111,12 @@ def _noise_of(residuals: Array) -> float:
 
 
 def _normal(
-    film: Film, guess: Guess, prior: Prior, width: int, free: npt.NDArray[np.intp], noise: float
+    film: BoardCorners,
+    guess: Guess,
+    prior: ParameterPrior,
+    width: int,
+    free: npt.NDArray[np.intp],
+    noise: float,
 ) -> _Normal:
     r, J_view, J_shared = linear(film, guess, width)
     J_shared = J_shared[:, :, free]
@@ -132,13 +142,13 @@ def _normal(
     return _Normal(A, B, C_each, g_view, g_shared, float(cost))
 
 
-def _by_view(film: Film, rows: Array) -> Array:
+def _by_view(film: BoardCorners, rows: Array) -> Array:
     sums: Array = np.add.reduceat(rows, film.starts, axis=0)
     return sums
 
 
 def _reduced(
-    normal: _Normal, damping: float, prior: Prior, free: npt.NDArray[np.intp]
+    normal: _Normal, damping: float, prior: ParameterPrior, free: npt.NDArray[np.intp]
 ) -> tuple[Array, Array, Array]:
     """Schur complement (s, s), A⁻¹ B (n, w, s), A⁻¹ g (n, w)."""
     A = normal.A.copy()
@@ -159,7 +169,7 @@ def _stepped(
     width: int,
     free: npt.NDArray[np.intp],
     damping: float,
-    prior: Prior,
+    prior: ParameterPrior,
 ) -> Guess:
     S, AB, Ag = _reduced(normal, damping, prior, free)
     off = (prior.shared - guess.shared)[free] / prior.shared_sigma[free] ** 2
@@ -178,7 +188,9 @@ def _stepped(
     )
 
 
-def _judged(film: Film, guess: Guess, prior: Prior, width: int, free: npt.NDArray[np.intp]) -> Fit:
+def _judged(
+    film: BoardCorners, guess: Guess, prior: ParameterPrior, width: int, free: npt.NDArray[np.intp]
+) -> BoardFit:
     residuals = residuals_of(film, guess)
     spare = max(residuals.size - POSE * len(film) - len(free), 1) / residuals.size
     noise = _noise_of(residuals) / np.sqrt(spare)
@@ -195,4 +207,4 @@ def _judged(film: Film, guess: Guess, prior: Prior, width: int, free: npt.NDArra
         covariance[np.ix_(free, free)] = bread * np.sqrt(np.outer(larger, larger))
     poses = np.linalg.inv(normal.A)[:, :POSE, :POSE]
     pose_sigma = np.sqrt(np.maximum(np.diagonal(poses, axis1=1, axis2=2), 0.0))
-    return Fit(guess, residuals, noise, covariance, pose_sigma)
+    return BoardFit(guess, residuals, noise, covariance, pose_sigma)

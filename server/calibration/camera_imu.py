@@ -31,7 +31,7 @@ class ImuError(ValueError):
     """Motion samples that can't be used; the text says what to do."""
 
 
-class Gyro:
+class GyroSpline:
     """Angular velocity over time, a cubic between samples."""
 
     def __init__(self, t: Array, omega_in_i: Array) -> None:
@@ -56,7 +56,7 @@ class Gyro:
         return np.asarray(inside & dense)
 
 
-def gyro_of(rows: Array) -> Gyro:
+def gyro_of(rows: Array) -> GyroSpline:
     """A gyroscope from finite rows (n, 4 or more): t, gx, gy, gz; times ascend.
 
     Raises:
@@ -64,7 +64,7 @@ def gyro_of(rows: Array) -> Gyro:
     """
     if len(rows) < FEWEST_SAMPLES:
         raise ImuError(f"imu: {len(rows)} samples; at least {FEWEST_SAMPLES} are needed")
-    return Gyro(rows[:, 0], rows[:, 1:4])
+    return GyroSpline(rows[:, 0], rows[:, 1:4])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +101,7 @@ class _Steps:
         return self.end - self.begin
 
 
-def align(t: Array, R_og: Array, gyro: Gyro) -> CameraImu:
+def align(t: Array, R_og: Array, gyro: GyroSpline) -> CameraImu:
     """Compare the turns between neighbouring views in order of time with a gyroscope's.
 
     Raises:
@@ -137,13 +137,13 @@ def align(t: Array, R_og: Array, gyro: Gyro) -> CameraImu:
     )
 
 
-def _steps(t: Array, R_og: Array, gyro: Gyro) -> _Steps:
+def _steps(t: Array, R_og: Array, gyro: GyroSpline) -> _Steps:
     near = np.flatnonzero((np.diff(t) < NEAR_S) & (gyro.covers(0.5 * (t[1:] + t[:-1]))))
     turned = [-(R_co @ log(R_og[k + 1] @ R_og[k].T)) for k in near]
     return _Steps(t[near], t[near + 1], np.array(turned).reshape(-1, 3))
 
 
-def _coarse(steps: _Steps, gyro: Gyro) -> tuple[Array, float, Array]:
+def _coarse(steps: _Steps, gyro: GyroSpline) -> tuple[Array, float, Array]:
     """Rotation, offset, bias by trying offsets, each with its best rotation (Kabsch)."""
     seen = steps.turned_in_c / steps.dt[:, None]
     best: tuple[float, Array, float, Array] | None = None
@@ -160,7 +160,7 @@ def _coarse(steps: _Steps, gyro: Gyro) -> tuple[Array, float, Array]:
     return best[1:]
 
 
-def _residuals(x: Array, R_ci: Array, steps: _Steps, gyro: Gyro) -> Array:
+def _residuals(x: Array, R_ci: Array, steps: _Steps, gyro: GyroSpline) -> Array:
     """(n, 3) [rad]."""
     angles = gyro.angle(steps.end + x[3]) - gyro.angle(steps.begin + x[3])
     felt = (angles - x[4:] * steps.dt[:, None]) @ (exp(x[:3]) @ R_ci).T

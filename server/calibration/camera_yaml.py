@@ -8,7 +8,7 @@ from pathlib import Path
 from hardware.camera_file import slug
 from pipeline.frames import Array
 from server.calibration.lens import matrix
-from server.calibration.solve import Solution
+from server.calibration.solve import CalibrationSolution
 from server.calibration.verdict import Verdict
 
 PROFILES = "cameras"
@@ -17,7 +17,11 @@ LENS_NAMES = ("fx_px", "fy_px", "cx_px", "cy_px")
 
 
 def yaml_of(
-    solution: Solution, verdict: Verdict, name: str, screen_angle_deg: int | None, date: str
+    solution: CalibrationSolution,
+    verdict: Verdict,
+    name: str,
+    screen_angle_deg: int | None,
+    date: str,
 ) -> str:
     """The text of the file; `date` is written into it."""
     width, height = solution.size
@@ -67,7 +71,7 @@ def _number(x: float) -> str:
     return text if "." in text or "e" in text else f"{text}.0"
 
 
-def _imu(solution: Solution) -> list[str]:
+def _imu(solution: CalibrationSolution) -> list[str]:
     imu = solution.imu
     if imu is None:
         return []
@@ -83,7 +87,7 @@ def _imu(solution: Solution) -> list[str]:
     ]
 
 
-def _quality(solution: Solution, verdict: Verdict) -> list[str]:
+def _quality(solution: CalibrationSolution, verdict: Verdict) -> list[str]:
     names = [*LENS_NAMES, *(f"d{k}" for k in range(len(solution.shared) - 5))]
     sigma = ", ".join(f"{name}: {x:.3g}" for name, x in zip(names, solution.sigma, strict=False))
     readout = f"{solution.sigma[-1]:.3g}" if solution.readout_known else "null"

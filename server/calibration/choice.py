@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 from server.calibration.board import Board
-from server.calibration.views import Aspect, View, aspect
+from server.calibration.views import Aspect, BoardView, aspect
 
 FOCAL_GUESS = 0.75
 """Of the picture's longer side: a phone's rear camera, before anything is known."""
@@ -33,7 +33,7 @@ def guessed_focal(size: tuple[int, int]) -> float:
     return FOCAL_GUESS * max(size)
 
 
-def coverage(views: Sequence[View], size: tuple[int, int]) -> npt.NDArray[np.intp]:
+def coverage(views: Sequence[BoardView], size: tuple[int, int]) -> npt.NDArray[np.intp]:
     """(rows, columns) how many corners fell into each cell of the picture."""
     columns, rows = CELLS
     counts = np.zeros((rows, columns), dtype=np.intp)
@@ -58,9 +58,9 @@ def sharp_limit(blurs: Array, width: int) -> float:
 class Choice:
     """Views for the fit and views to judge it by."""
 
-    fit: list[View]
-    held_out: list[View]
-    sharp: list[View]
+    fit: list[BoardView]
+    held_out: list[BoardView]
+    sharp: list[BoardView]
     """All that were good enough."""
     aspects: list[Aspect]
     """Of the chosen ones."""
@@ -68,7 +68,7 @@ class Choice:
     """Median over the film."""
 
 
-def choose(views: Sequence[View], board: Board, size: tuple[int, int]) -> Choice:
+def choose(views: Sequence[BoardView], board: Board, size: tuple[int, int]) -> Choice:
     """Farthest first: each next view is the one least like those already chosen."""
     blurs = np.array([view.blur_px for view in views])
     limit = sharp_limit(blurs, max(size))

@@ -14,7 +14,7 @@ from pipeline.frames import Array
 from server.calibration.board import Board
 from server.calibration.choice import coverage, features, guessed_focal, sharp_limit
 from server.calibration.verdict import TILT_DEG, bare_side
-from server.calibration.views import Aspect, View, aspect
+from server.calibration.views import Aspect, BoardView, aspect
 
 MOST_VIEWS = 1800
 """A minute of film."""
@@ -43,7 +43,7 @@ SIDES = ("from the left", "from the right", "from above", "from below")
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class Coverage:
     """0 to 1 each."""
 
     covered: float
@@ -64,10 +64,10 @@ class Guide:
 
     def __init__(self, board: Board, size: tuple[int, int]) -> None:
         """`size`: width and height of the pictures [px]."""
-        self.size, self.views = size, list[View]()
+        self.size, self.views = size, list[BoardView]()
         self.cells = coverage([], size)
         self.pictures = 0
-        self.last: View | None = None
+        self.last: BoardView | None = None
         """In the newest picture."""
         self._board = board
         self._chosen: list[Array] = []
@@ -78,7 +78,7 @@ class Guide:
         self._film_blurs: list[float] = []
         self._t_seen = self._t = self._t_first = -np.inf
 
-    def add(self, t: float, view: View | None) -> None:
+    def add(self, t: float, view: BoardView | None) -> None:
         """A picture was looked at, with a board in it or without."""
         self.pictures += 1
         before, self.last, self._t = self.last, view, t
@@ -115,11 +115,11 @@ class Guide:
             self._sizes.append(one.size)
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> Coverage:
         """How much is there."""
         ratio = max(self._sizes) / max(min(self._sizes), 1e-3) if self._sizes else 1.0
         tilts = [min(count / EACH_TILT, 1.0) for count in self._tilted]
-        return Progress(
+        return Coverage(
             min(float((self.cells > 0).mean()) / COVERED, 1.0),
             sum(tilts) / len(tilts),
             min(float(np.log(ratio) / np.log(DEPTH)), 1.0),
@@ -179,7 +179,7 @@ class Guide:
         return [round(place, 4) for place in places]
 
 
-def _speed(before: View, view: View) -> float:
+def _speed(before: BoardView, view: BoardView) -> float:
     """Median motion of the corners in both views [px/s]."""
     _, a, b = np.intersect1d(before.ids, view.ids, return_indices=True)
     if len(a) == 0:

@@ -11,9 +11,9 @@ from server.calibration.board import Board
 from server.calibration.camera_imu import FEWEST_SAMPLES, gyro_of
 from server.calibration.camera_yaml import yaml_of
 from server.calibration.lens import COEFFICIENTS
-from server.calibration.solve import Solution, solve
+from server.calibration.solve import CalibrationSolution, solve
 from server.calibration.verdict import TOO_FEW, Verdict, judge, judge_views
-from server.calibration.views import View
+from server.calibration.views import BoardView
 from server.common.child import raise_niceness
 
 KINDER = 10
@@ -22,12 +22,12 @@ MODEL = next(iter(COEFFICIENTS))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Job:
+class CalibrationJob:
     """What was filmed."""
 
     board: Board
     size: tuple[int, int]
-    views: list[View]
+    views: list[BoardView]
     pictures: int
     motion: Array
     """(n, 4) t, gyroscope in c [s, rad/s]."""
@@ -37,7 +37,7 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CalibrationOutcome:
     """What came of it."""
 
     verdict: Verdict
@@ -46,25 +46,25 @@ class Outcome:
     figures: list[str]
 
 
-def run(job: Job) -> Outcome:
+def run(job: CalibrationJob) -> CalibrationOutcome:
     """Calibrate and judge."""
     verdict = judge_views(job.views, job.pictures, job.board, job.size)
     if verdict is not None:
-        return Outcome(verdict, "", [])
+        return CalibrationOutcome(verdict, "", [])
     gyro = gyro_of(job.motion) if len(job.motion) >= FEWEST_SAMPLES else None
     found = solve(job.views, job.board, job.size, MODEL, gyro)
     if found is None:
-        return Outcome(Verdict("refused", ["Too few views."], [TOO_FEW]), "", [])
+        return CalibrationOutcome(Verdict("refused", ["Too few views."], [TOO_FEW]), "", [])
     verdict = judge(found)
     if gyro is None:
         verdict.worsen("usable", "The motion sensors said too little while filming.", "")
     if verdict.level == "refused":
-        return Outcome(verdict, "", figures(found))
+        return CalibrationOutcome(verdict, "", figures(found))
     text = yaml_of(found, verdict, job.device, job.screen_angle_deg, job.date)
-    return Outcome(verdict, text, figures(found))
+    return CalibrationOutcome(verdict, text, figures(found))
 
 
-def figures(found: Solution) -> list[str]:
+def figures(found: CalibrationSolution) -> list[str]:
     """What a person at the phone may like to know."""
     value, sigma = found.shared, found.sigma
     lines = [
@@ -82,7 +82,7 @@ def figures(found: Solution) -> list[str]:
 class Solving:
     """A job under way in a process of its own, which dies with its parent or when it is stopped."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: CalibrationJob) -> None:
         """Begin."""
         context = multiprocessing.get_context("spawn")
         self._answer, far = context.Pipe(duplex=False)
@@ -95,10 +95,10 @@ class Solving:
         """Whether `outcome` is there, or never will be."""
         return self._answer.poll() or not self._process.is_alive()
 
-    def outcome(self) -> Outcome | None:
+    def outcome(self) -> CalibrationOutcome | None:
         """What came of it; None: the process died."""
         try:
-            outcome: Outcome = self._answer.recv()
+            outcome: CalibrationOutcome = self._answer.recv()
         except EOFError:
             return None
         return outcome
@@ -108,6 +108,6 @@ class Solving:
         self._process.kill()
 
 
-def _work(job: Job, answer: Connection) -> None:
+def _work(job: CalibrationJob, answer: Connection) -> None:
     raise_niceness(KINDER)
     answer.send(run(job))

@@ -15,14 +15,14 @@ import numpy.typing as npt
 from pipeline.frames import Array
 from server.calibration.board import Board
 from server.calibration.lens import project
-from server.calibration.views import View
+from server.calibration.views import BoardView
 
 POSE, BOTH = 6, 12
 """Parameters of a view: turn and place, or these and the rates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Film:
+class BoardCorners:
     """Corners of all views, one below the other."""
 
     model: str
@@ -42,12 +42,12 @@ class Film:
         return len(self.starts)
 
 
-def film_of(views: Sequence[View], board: Board, model: str, height: int) -> Film:
+def film_of(views: Sequence[BoardView], board: Board, model: str, height: int) -> BoardCorners:
     """Views as one stack of corners."""
     counts = np.array([len(view) for view in views])
     corners = board.corners()
     pixels = np.concatenate([view.pixels for view in views])
-    return Film(
+    return BoardCorners(
         model,
         np.concatenate([corners[view.ids] for view in views]),
         pixels,
@@ -71,7 +71,7 @@ class Guess:
     """(n, 6) of the board relative to the camera: ω [rad/s] and v [m/s], in o."""
 
 
-def _moved(film: Film, guess: Guess) -> tuple[Array, Array, Array]:
+def _moved(film: BoardCorners, guess: Guess) -> tuple[Array, Array, Array]:
     """Corners in o (m, 3), R X alone (m, 3), delays (m,)."""
     delay = film.rows * guess.shared[-1]
     turned = np.einsum("mij,mj->mi", guess.R_og[film.view], film.corners_in_g)
@@ -98,13 +98,13 @@ def _skews(x: Array) -> Array:
     return out
 
 
-def residuals_of(film: Film, guess: Guess) -> Array:
+def residuals_of(film: BoardCorners, guess: Guess) -> Array:
     """Measured minus foreseen pixels (m, 2)."""
     points, _, _ = _moved(film, guess)
     return film.pixels - project(film.model, guess.shared[:-1], points)[0]
 
 
-def linear(film: Film, guess: Guess, width: int) -> tuple[Array, Array, Array]:
+def linear(film: BoardCorners, guess: Guess, width: int) -> tuple[Array, Array, Array]:
     """Residuals (m, 2), derivatives of the pixels by view (m, 2, w) and shared (m, 2, s)."""
     points, swung, delay = _moved(film, guess)
     pixels, by_point, by_lens = project(film.model, guess.shared[:-1], points)

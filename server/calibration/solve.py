@@ -10,14 +10,14 @@ import numpy.typing as npt
 
 from pipeline.frames import Array, R_co
 from server.calibration.board import Board
-from server.calibration.bundle import Fit, Prior, fit
-from server.calibration.camera_imu import CameraImu, Gyro, ImuError, align
+from server.calibration.bundle import BoardFit, ParameterPrior, fit
+from server.calibration.camera_imu import CameraImu, GyroSpline, ImuError, align
 from server.calibration.choice import Choice, choose
 from server.calibration.lens import normalised, prior_sigma, project
 from server.calibration.motion import Rates, rates
-from server.calibration.projection import Film, Guess, film_of
+from server.calibration.projection import BoardCorners, Guess, film_of
 from server.calibration.start import first_guess, plain_lens, poses
-from server.calibration.views import View
+from server.calibration.views import BoardView
 
 FEWEST_VIEWS = 8
 """For a fit at all; `verdict` asks for more."""
@@ -38,15 +38,15 @@ GRID = (17, 11)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solution:
+class CalibrationSolution:
     """A calibrated camera and what it rests on."""
 
     model: str
     size: tuple[int, int]
     """Width and height [px]."""
     choice: Choice
-    fit: Fit
-    film: Film
+    fit: BoardFit
+    film: BoardCorners
     """Of the fit."""
     held_out_px: float
     """RMS distance of corners in views that the fit never saw; nan without such views."""
@@ -71,13 +71,13 @@ class Solution:
 
 
 def solve(
-    views: Sequence[View],
+    views: Sequence[BoardView],
     board: Board,
     size: tuple[int, int],
     model: str,
-    gyro: Gyro | None = None,
+    gyro: GyroSpline | None = None,
     timed: bool = True,
-) -> Solution | None:
+) -> CalibrationSolution | None:
     """Calibrate; None with less than `FEWEST_VIEWS` sharp, different views.
 
     `views` are in order of time; without `timed` their times mean nothing (single photographs).
@@ -93,7 +93,7 @@ def solve(
     if len(kept) < len(choice.fit):
         still = work.without_motion(kept)
     found, known = work.with_motion(still, kept, views) if timed else (still, False)
-    return Solution(
+    return CalibrationSolution(
         model,
         size,
         replace(choice, fit=kept),
@@ -107,7 +107,7 @@ def solve(
     )
 
 
-def _believable(found: Fit, film: Film) -> npt.NDArray[np.bool_]:
+def _believable(found: BoardFit, film: BoardCorners) -> npt.NDArray[np.bool_]:
     """(n,) whether a view's error is an ordinary one."""
     errors = np.sqrt(np.add.reduceat((found.residuals**2).sum(axis=1), film.starts))
     errors = errors / np.sqrt(np.diff(np.append(film.starts, len(film.view))))
@@ -122,18 +122,18 @@ class _Work:
     """One calibration under way."""
 
     def __init__(
-        self, board: Board, size: tuple[int, int], model: str, gyro: Gyro | None, timed: bool
+        self, board: Board, size: tuple[int, int], model: str, gyro: GyroSpline | None, timed: bool
     ) -> None:
         self._board, self._size, self._model, self._gyro = board, size, model, gyro
         self._middle = plain_lens(model, size, 0.75 * max(size))
         self._by_time: dict[float, int] = {}
         self._rates: Rates | None = None
-        self.film: Film
+        self.film: BoardCorners
         self.imu: CameraImu | None = None
         untimed = "imu: the pictures have no times: add times.csv or --fps"
         self.imu_complaint = untimed if gyro is not None and not timed else ""
 
-    def without_motion(self, views: Sequence[View]) -> Fit:
+    def without_motion(self, views: Sequence[BoardView]) -> BoardFit:
         """As if the shutter opened all rows at once."""
         self.film = film_of(views, self._board, self._model, self._size[1])
         guess = first_guess(self._model, views, self._board, self._size)
@@ -141,8 +141,8 @@ class _Work:
         return fit(self.film, guess, self._prior(nothing, nothing, 0.0), with_rates=False)
 
     def with_motion(
-        self, still: Fit, views: Sequence[View], everything: Sequence[View]
-    ) -> tuple[Fit, bool]:
+        self, still: BoardFit, views: Sequence[BoardView], everything: Sequence[BoardView]
+    ) -> tuple[BoardFit, bool]:
         """Rates by the neighbours in time, then all together; whether a readout could be told."""
         found = still
         for _ in range(ROUNDS):
@@ -157,13 +157,13 @@ class _Work:
             found = fit(self.film, start, prior, with_rates=True)
         return found, True
 
-    def _rates_of_all(self, shared: Array, views: Sequence[View]) -> Rates:
+    def _rates_of_all(self, shared: Array, views: Sequence[BoardView]) -> Rates:
         """Poses of all views with the lens as it stands, and their derivatives."""
         film = film_of(views, self._board, self._model, self._size[1])
         R, p = poses(self._model, shared[:-1], views, self._board)
         now = self._rates
         value = np.zeros((len(views), 6)) if now is None else now.value
-        held = Prior(shared, np.zeros(len(shared)), value, np.ones((len(views), 6)))
+        held = ParameterPrior(shared, np.zeros(len(shared)), value, np.ones((len(views), 6)))
         found = fit(film, Guess(shared, R, p, value), held, with_rates=False)
         t = np.array([view.t for view in views])
         R, p = found.guess.R_og, found.guess.p_go_in_o
@@ -187,11 +187,13 @@ class _Work:
         sigma[there, :3] = GYRO_FLOOR
         return Rates(value, sigma, seen.known | there)
 
-    def _prior(self, value: Array, sigma: Array, readout_sigma_s: float) -> Prior:
+    def _prior(self, value: Array, sigma: Array, readout_sigma_s: float) -> ParameterPrior:
         lens = prior_sigma(self._model, max(self._size))
-        return Prior(np.append(self._middle, 0.0), np.append(lens, readout_sigma_s), value, sigma)
+        return ParameterPrior(
+            np.append(self._middle, 0.0), np.append(lens, readout_sigma_s), value, sigma
+        )
 
-    def judged(self, found: Fit, views: Sequence[View]) -> float:
+    def judged(self, found: BoardFit, views: Sequence[BoardView]) -> float:
         """RMS error of views that were kept out, each with its own pose [px]."""
         if len(views) == 0:
             return float("nan")
@@ -202,12 +204,12 @@ class _Work:
         if self._rates is not None:
             at = [self._by_time[view.t] for view in views]
             value, sigma = self._rates.value[at], self._rates.sigma[at]
-        prior = Prior(shared, np.zeros(len(shared)), value, sigma)
+        prior = ParameterPrior(shared, np.zeros(len(shared)), value, sigma)
         start = Guess(shared, R, p, value)
         return _rms(fit(film, start, prior, with_rates=self._rates is not None).residuals)
 
 
-def ray_sigma(solution: Solution) -> Array:
+def ray_sigma(solution: CalibrationSolution) -> Array:
     """(rows, columns) how uncertain the pixel of a given direction is, over the picture [px].
 
     A turn of the whole camera is free: what it could explain is no error of the lens.

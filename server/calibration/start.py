@@ -11,7 +11,7 @@ from pipeline.frames import Array
 from server.calibration.board import Board
 from server.calibration.lens import COEFFICIENTS, normalised
 from server.calibration.projection import Guess
-from server.calibration.views import View
+from server.calibration.views import BoardView
 
 FOCALS = np.geomspace(0.35, 3.0, 16)
 """Tried, over the picture's longer side."""
@@ -21,7 +21,7 @@ OUTLIER_PX = 20.0
 _EYE, _NONE = np.eye(3), np.zeros(4)
 
 
-def poses(model: str, lens: Array, views: Sequence[View], board: Board) -> tuple[Array, Array]:
+def poses(model: str, lens: Array, views: Sequence[BoardView], board: Board) -> tuple[Array, Array]:
     """R_og (n, 3, 3) and p_go_in_o (n, 3) of each view."""
     corners = board.corners()
     R, p = np.zeros((len(views), 3, 3)), np.zeros((len(views), 3))
@@ -38,7 +38,9 @@ def plain_lens(model: str, size: tuple[int, int], focal_px: float) -> Array:
     return np.array([focal_px, focal_px, *middle, *np.zeros(COEFFICIENTS[model])])
 
 
-def first_guess(model: str, views: Sequence[View], board: Board, size: tuple[int, int]) -> Guess:
+def first_guess(
+    model: str, views: Sequence[BoardView], board: Board, size: tuple[int, int]
+) -> Guess:
     """The best of some focal lengths; readout and rates are zero."""
     tried = views[:TRIED_VIEWS]
     costs = [_cost(model, tried, board, plain_lens(model, size, max(size) * f)) for f in FOCALS]
@@ -47,7 +49,7 @@ def first_guess(model: str, views: Sequence[View], board: Board, size: tuple[int
     return Guess(np.append(lens, 0.0), R, p, np.zeros((len(views), 6)))
 
 
-def _cost(model: str, views: Sequence[View], board: Board, lens: Array) -> float:
+def _cost(model: str, views: Sequence[BoardView], board: Board, lens: Array) -> float:
     """Mean reprojection error [px], each corner's bounded."""
     corners, focal, errors = board.corners(), float(lens[0]), []
     R, p = poses(model, lens, views, board)

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from pipeline.frames import log
 from server.calibration.board import Board
 from server.calibration.choice import choose, coverage
-from server.calibration.solve import FEWEST_VIEWS, Solution, ray_sigma
-from server.calibration.views import View
+from server.calibration.solve import FEWEST_VIEWS, CalibrationSolution, ray_sigma
+from server.calibration.views import BoardView
 
 Level = Literal["good", "usable", "refused"]
 
@@ -75,7 +75,7 @@ class Verdict:
 
 
 def judge_views(
-    views: Sequence[View], pictures: int, board: Board, size: tuple[int, int]
+    views: Sequence[BoardView], pictures: int, board: Board, size: tuple[int, int]
 ) -> Verdict | None:
     """Why nothing can be calibrated from these views at all; None if it can be tried."""
     choice = choose(views, board, size)
@@ -103,7 +103,7 @@ def scale_of(size: tuple[int, int]) -> float:
     return max(size) / 1280.0
 
 
-def judge(solution: Solution) -> Verdict:
+def judge(solution: CalibrationSolution) -> Verdict:
     """The verdict on a calibration."""
     verdict = Verdict()
     _judge_film(solution, verdict)
@@ -120,7 +120,7 @@ def _graded(value: float, limits: tuple[float, float], scale: float = 1.0) -> Le
     return "usable" if value > scale * limits[0] else "good"
 
 
-def _judge_film(solution: Solution, verdict: Verdict) -> None:
+def _judge_film(solution: CalibrationSolution, verdict: Verdict) -> None:
     choice = solution.choice
     if len(choice.fit) < ENOUGH_VIEWS:
         verdict.worsen("usable", f"It rests on {len(choice.fit)} views only.", TOO_FEW)
@@ -152,7 +152,7 @@ def bare_side(cells: npt.NDArray[np.intp]) -> str:
     return max(shares, key=lambda name: shares[name])
 
 
-def _judge_focal(solution: Solution, verdict: Verdict) -> None:
+def _judge_focal(solution: CalibrationSolution, verdict: Verdict) -> None:
     fx, fy = map(float, solution.shared[:2])
     share = float(max(solution.sigma[0] / abs(fx), solution.sigma[1] / abs(fy)))
     low, high = (limit * max(solution.size) for limit in PLAUSIBLE_FOCAL)
@@ -165,7 +165,7 @@ def _judge_focal(solution: Solution, verdict: Verdict) -> None:
         verdict.worsen("usable", f"Pixels seem not to be square: fx/fy = {fx / fy:.3f}.", MISFIT)
 
 
-def _judge_errors(solution: Solution, verdict: Verdict) -> None:
+def _judge_errors(solution: CalibrationSolution, verdict: Verdict) -> None:
     scale = scale_of(solution.size)
     ray = float(ray_sigma(solution).max())
     if _graded(ray, RAY_PX, scale) != "good":
@@ -179,7 +179,7 @@ def _judge_errors(solution: Solution, verdict: Verdict) -> None:
         verdict.worsen(_graded(error, HELD_OUT_PX, scale), reason, MISFIT)
 
 
-def _judge_readout(solution: Solution, verdict: Verdict) -> None:
+def _judge_readout(solution: CalibrationSolution, verdict: Verdict) -> None:
     if not solution.readout_known:
         reason = "The readout time was not measured: that needs a film of 20 pictures a second."
         verdict.worsen("usable", reason, SWING)
@@ -188,7 +188,7 @@ def _judge_readout(solution: Solution, verdict: Verdict) -> None:
         verdict.worsen("usable", reason, SWING)
 
 
-def _judge_imu(solution: Solution, verdict: Verdict) -> None:
+def _judge_imu(solution: CalibrationSolution, verdict: Verdict) -> None:
     imu = solution.imu
     if solution.imu_complaint:
         why = solution.imu_complaint.removeprefix("imu: ")

@@ -19,7 +19,7 @@ REACH = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class BoardView:
     """One picture of the board."""
 
     t: float
@@ -36,12 +36,12 @@ class View:
         return len(self.ids)
 
 
-def look(luma: Image, t: float, board: Board, detector: Detector) -> View | None:
+def look(luma: Image, t: float, board: Board, detector: Detector) -> BoardView | None:
     """What a picture shows of the board; None where that is too little to be of use."""
     ids, pixels = detector.find(luma)
     if len(ids) < FEWEST_CORNERS or not _spans(ids, board):
         return None
-    return View(t, ids, pixels, edge_width(luma, ids, pixels, board))
+    return BoardView(t, ids, pixels, edge_width(luma, ids, pixels, board))
 
 
 def _spans(ids: npt.NDArray[np.intp], board: Board) -> bool:
@@ -103,7 +103,7 @@ class Aspect:
         return float(np.rad2deg(np.arctan(np.sqrt(self.tilt @ self.tilt))))
 
 
-def aspect(view: View, board: Board, size: tuple[int, int], focal_px: float) -> Aspect:
+def aspect(view: BoardView, board: Board, size: tuple[int, int], focal_px: float) -> Aspect:
     """Place, size and tilt of the board in a view, for a guess of the focal length."""
     half = 0.5 * np.array(size)
     flat = (view.pixels - half) / focal_px

@@ -10,7 +10,7 @@ import msgspec
 
 from pipeline.config import VirtualCameraConfig
 from server.common.runtime import RUN_FILE, runtime_directory
-from server.common.runtime_parameters import Knobs
+from server.common.runtime_parameters import RuntimeParameters
 
 DEFAULT_CAMERA = VirtualCameraConfig()
 
@@ -67,7 +67,9 @@ def running_server(directory: Path | None = None) -> Access:
             str(run["operator_token"]),
             int(str(run.get("truth_port") or 0)),
             str(run.get("robot") or "ames"),
-            virtual_camera=msgspec.convert(knobs, Knobs).config() if knobs else DEFAULT_CAMERA,
+            virtual_camera=msgspec.convert(knobs, RuntimeParameters).config()
+            if knobs
+            else DEFAULT_CAMERA,
         )
     except (ValueError, LookupError, TypeError, msgspec.MsgspecError) as error:
         why = f"{RUN_FILE}: not a run file of `lightleash serve`: {error}"

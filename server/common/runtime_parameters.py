@@ -21,7 +21,7 @@ AdaptiveBeta = Annotated[float, Meta(ge=0.0, le=MOST_ADAPTIVE)]
 SpeedLimit = Annotated[float, Meta(ge=0.0, le=FASTEST_M_S)]
 
 
-class Knobs(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class RuntimeParameters(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """How the virtual camera smooths the turns of the phone."""
 
     cutoff_hz: CutoffHz
@@ -36,7 +36,7 @@ class Knobs(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Hurry after the phone when the robot nears the border of the picture."""
 
     @classmethod
-    def of(cls, config: VirtualCameraConfig) -> Knobs:
+    def of(cls, config: VirtualCameraConfig) -> RuntimeParameters:
         """Of a configuration; the cut-off is that of the low pass, used or not."""
         hz = cutoff_hz(replace(config, mode="full"))
         return cls(
@@ -52,7 +52,7 @@ class Knobs(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return turned(VirtualCameraConfig(), TuneInput(**msgspec.structs.asdict(self)))
 
 
-DEFAULT_KNOBS: Final = Knobs.of(VirtualCameraConfig())
+DEFAULT_KNOBS: Final = RuntimeParameters.of(VirtualCameraConfig())
 
 
 class TuneInput(msgspec.Struct, tag="tune", array_like=True, frozen=True):

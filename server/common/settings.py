@@ -26,7 +26,7 @@ from server.common.runtime_parameters import (
     FASTEST_M_S,
     MOST_ADAPTIVE,
     SLOWEST_HZ,
-    Knobs,
+    RuntimeParameters,
 )
 
 PREFIX = "LIGHTLEASH_"
@@ -122,9 +122,9 @@ class VirtualCameraSettings(BaseModel):
     guard: bool = Field(default=DEFAULT_KNOBS.guard, description="keep the robot in the picture")
 
     @property
-    def knobs(self) -> Knobs:
+    def knobs(self) -> RuntimeParameters:
         """As control takes them."""
-        return Knobs(**self.model_dump())
+        return RuntimeParameters(**self.model_dump())
 
 
 class Settings(BaseSettings):

@@ -19,7 +19,7 @@ def table(columns: Sequence[Column], rows: Iterable[object]) -> str:
     return "\n".join(lines)
 
 
-class Flown(Protocol):
+class FlightRow(Protocol):
     """A row about flights."""
 
     @property
@@ -33,7 +33,7 @@ def dashed(columns: Sequence[Column], rows: Iterable[object]) -> str:
     return table(columns, rows).replace("nan", "  –")
 
 
-def flights(columns: Sequence[Column], rows: Sequence[Flown]) -> str:
+def flights(columns: Sequence[Column], rows: Sequence[FlightRow]) -> str:
     """A table with dashes that also says which flights ended early."""
     ends = ["", *(f"  ended at {row.ended}" if row.ended else "" for row in rows)]
     lines = dashed(columns, rows).splitlines()

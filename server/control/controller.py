@@ -10,13 +10,13 @@ import numpy as np
 from hardware.follower import ThrustCommand
 from hardware.link.robot_end import SILENCE_US
 from pipeline.config import TeleopConfig
-from pipeline.estimation.gravity_direction import Vertical
+from pipeline.estimation.gravity_direction import GravityDirection
 from pipeline.frames import Array, wxyz_from_R
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, Requests, Seen
+from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState, VisionMeasurement
 from pipeline.teleop import Inputs, Output, Teleop
-from server.common.runtime_parameters import Knobs, TuneInput, turned
+from server.common.runtime_parameters import RuntimeParameters, TuneInput, turned
 from server.control.gap_log import GapLog
 from server.control.ipc import (
     ControlStatus,
@@ -90,7 +90,7 @@ class Controller:
         silent_s = config.failsafe.silent
         self._gaps = GapLog({"phone": silent_s, "robot": STOOD_STILL_S, "server": STOOD_STILL_S})
         self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
-        self._vertical = Vertical()
+        self._vertical = GravityDirection()
         self.omega_bf_in_b = np.zeros(3)
         self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
         self._fuse_ms = 0.0
@@ -100,11 +100,11 @@ class Controller:
         """Opposite of gravity in the body (3,), for vision; None before the first sample."""
         return self._vertical.up
 
-    def expected(self, output: Output) -> Expected | None:
+    def expected(self, output: Output) -> Prediction | None:
         """Where the filter says that the robot is, for vision; None if it doesn't."""
         if output.relative is None:
             return None
-        return Expected.of(output.relative, self.teleop.estimator.health.time_offset)
+        return Prediction.of(output.relative, self.teleop.estimator.health.time_offset)
 
     def tick(
         self,
@@ -160,10 +160,10 @@ class Controller:
 
     def _sort(
         self, messages: Iterable[Input], now: float
-    ) -> tuple[list[PhoneImu], list[Seen], Operator | None, Requests]:
+    ) -> tuple[list[PhoneImu], list[VisionMeasurement], TouchState | None, Requests]:
         phone: list[PhoneImu] = []
-        seen: list[Seen] = []
-        operator: Operator | None = None
+        seen: list[VisionMeasurement] = []
+        operator: TouchState | None = None
         wishes: set[str] = set()
         for message in messages:
             match message:
@@ -258,7 +258,7 @@ class Controller:
             lateness_ms=lateness_ms,
             fuse_ms=self._fuse_ms,
             step_ms=step_ms,
-            knobs=Knobs.of(self._virtual_camera),
+            knobs=RuntimeParameters.of(self._virtual_camera),
             guarding=view.guarding if view else 0.0,
             estimate=EstimateFields.of(self._estimator_name, estimator, health, relative),
             until_ramp_s=output.until_ramp_s,

@@ -18,7 +18,7 @@ WORDS = {
 }
 
 
-class Gaps(msgspec.Struct, array_like=True, frozen=True):
+class GapStatistics(msgspec.Struct, array_like=True, frozen=True):
     """Those of one side in the last minute."""
 
     count: int
@@ -43,9 +43,9 @@ class _Side:
         while self._over and now - self._over[0][0] > LATELY_S:
             self._over.popleft()
 
-    def lately(self) -> Gaps:
+    def lately(self) -> GapStatistics:
         lengths = [length for _, length in self._over] + [self._open_s] * (self._open_s > 0.0)
-        return Gaps(len(lengths), round(max(lengths, default=0.0), 3))
+        return GapStatistics(len(lengths), round(max(lengths, default=0.0), 3))
 
 
 class GapLog:
@@ -60,7 +60,7 @@ class GapLog:
         for side, log in self._sides.items():
             log.add(now, silent_s[side])
 
-    def lately(self) -> dict[str, Gaps]:
+    def lately(self) -> dict[str, GapStatistics]:
         """Of each side; one that is not over counts."""
         return {side: log.lately() for side, log in self._sides.items()}
 

@@ -14,10 +14,10 @@ import msgspec
 import numpy as np
 
 from pipeline.frames import R_from_wxyz
-from pipeline.prediction import Expected
-from pipeline.signals import Operator, PhoneImu
-from server.common.runtime_parameters import Knobs, TuneInput
-from server.control.gap_log import Gaps
+from pipeline.prediction import Prediction
+from pipeline.signals import PhoneImu, TouchState
+from server.common.runtime_parameters import RuntimeParameters, TuneInput
+from server.control.gap_log import GapStatistics
 from server.control.ipc_estimate import EstimateFields
 from server.control.ipc_vision import SeenInput, Triple, triple
 
@@ -51,13 +51,13 @@ class OperatorInput(msgspec.Struct, tag="operator", array_like=True, frozen=True
     press: int
 
     @classmethod
-    def of(cls, operator: Operator) -> OperatorInput:
+    def of(cls, operator: TouchState) -> OperatorInput:
         """To be sent."""
         return cls(operator.t, operator.held, operator.press)
 
-    def operator(self) -> Operator:
+    def operator(self) -> TouchState:
         """As received."""
-        return Operator(self.t, self.held, self.press)
+        return TouchState(self.t, self.held, self.press)
 
 
 class RequestInput(msgspec.Struct, tag="request", array_like=True, frozen=True):
@@ -138,7 +138,7 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Capture of the last fused picture → fused."""
     step_ms: float
     """Median CPU time of a tick."""
-    knobs: Knobs | None = None
+    knobs: RuntimeParameters | None = None
     """Of the virtual camera, as they stand."""
     guarding: float = 0.0
     """0 to 1: how much the virtual camera hurries to keep the robot in the picture."""
@@ -147,20 +147,20 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """In COAST and HOLD: left until control or the robot ramps down, if all goes on as it is."""
     resumes: bool = False
     """It will follow again by itself, if news come back in time."""
-    gaps: dict[str, Gaps] = {}
+    gaps: dict[str, GapStatistics] = {}
     """Short silences of `phone`, `robot` and `server` (control stood still) in the last minute."""
     warnings: list[str] = []
     """What somebody who arms should know; refuses nothing."""
 
 
-def expected_of(status: ControlStatus) -> Expected | None:
+def expected_of(status: ControlStatus) -> Prediction | None:
     """Where control's filter says that the robot is, for vision; None if it doesn't."""
     p, R_wxyz, u = status.p_bc_in_c, status.R_cb_wxyz, status.u_bf_in_c
     if p is None or R_wxyz is None or u is None:
         return None
     if status.sigma_p is None or status.sigma_theta is None:
         return None
-    return Expected(
+    return Prediction(
         t=status.t,
         p_bc_in_c=np.array(p),
         R_cb=R_from_wxyz(R_wxyz),

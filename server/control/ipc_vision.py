@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.signals import LedRays, RelativePose, Seen, StampOffset
+from pipeline.signals import LedRays, RelativePose, StampOffset, VisionMeasurement
 
 Triple = tuple[float, float, float]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
@@ -70,7 +70,7 @@ class SeenInput(msgspec.Struct, tag="seen", array_like=True, frozen=True):
     """Value and standard deviation [s]."""
 
     @classmethod
-    def of(cls, seen: Seen) -> SeenInput:
+    def of(cls, seen: VisionMeasurement) -> SeenInput:
         """To be sent."""
         rays = seen.rays
         rows = zip(
@@ -85,7 +85,7 @@ class SeenInput(msgspec.Struct, tag="seen", array_like=True, frozen=True):
         offset = (seen.offset.value, seen.offset.sigma) if seen.offset is not None else None
         return cls(seen.t, leds, pose, seen.half_field, offset)
 
-    def seen(self) -> Seen:
+    def seen(self) -> VisionMeasurement:
         """As received."""
         rays = LedRays(
             led=np.array([led.led for led in self.leds], dtype=np.intp),
@@ -95,7 +95,7 @@ class SeenInput(msgspec.Struct, tag="seen", array_like=True, frozen=True):
         )
         pose = self.pose.pose() if self.pose is not None else None
         offset = StampOffset(*self.offset) if self.offset is not None else None
-        return Seen(self.t, rays, pose, self.half_field, offset)
+        return VisionMeasurement(self.t, rays, pose, self.half_field, offset)
 
     def numbers(self) -> list[float]:
         """All that must be finite."""

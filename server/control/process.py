@@ -30,7 +30,7 @@ from pipeline.estimation.estimators import warm_up
 from server.common import clock
 from server.common.clock import unix_ms
 from server.common.options import Parser
-from server.common.runtime_parameters import DEFAULT_KNOBS, Knobs
+from server.common.runtime_parameters import DEFAULT_KNOBS, RuntimeParameters
 from server.control import realtime
 from server.control.controller import PERIOD_S, Controller, TooLate
 from server.control.ipc import Endpoint, control_end
@@ -55,7 +55,7 @@ class ControlOptions:
     port: int
     gains: str
     estimator: EstimatorName
-    virtual_camera: Knobs
+    virtual_camera: RuntimeParameters
     epochs: Path
     real: bool
     """The robot is no simulation: it is not armed while the schedule can't be kept."""
@@ -78,9 +78,9 @@ def parse(argv: Sequence[str] | None) -> ControlOptions:
     return ControlOptions(**vars(parser.parse_args(argv)))
 
 
-def _knobs(text: str) -> Knobs:
+def _knobs(text: str) -> RuntimeParameters:
     try:
-        return msgspec.json.decode(text, type=Knobs)
+        return msgspec.json.decode(text, type=RuntimeParameters)
     except msgspec.MsgspecError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 
-from server.control.gap_log import LATELY_S, MANY, WORDS, Gaps
+from server.control.gap_log import LATELY_S, MANY, WORDS, GapStatistics
 from server.control.ipc import ControlStatus
 
 STALL_S = 0.1
@@ -38,7 +38,7 @@ class Blame:
             self._is_ours = bool(self._stalls) and now - self._stalls[-1][0] < RECENT_S
         return _ours(control.reason) if self._is_ours else control.reason
 
-    def gaps(self, control: ControlStatus, now: float) -> dict[str, Gaps]:
+    def gaps(self, control: ControlStatus, now: float) -> dict[str, GapStatistics]:
         """Of the last minute by side, with the server's own on its."""
         while self._stalls and now - self._stalls[0][0] > LATELY_S:
             self._stalls.popleft()
@@ -48,12 +48,14 @@ class Blame:
         count, longest = len(self._stalls), max(late for _, late in self._stalls)
         phone, server = gaps["phone"], gaps["server"]
         left = max(0, phone.count - count)
-        gaps["phone"] = Gaps(left, phone.longest_s if left else 0.0)
-        gaps["server"] = Gaps(server.count + count, max(server.longest_s, round(longest, 3)))
+        gaps["phone"] = GapStatistics(left, phone.longest_s if left else 0.0)
+        gaps["server"] = GapStatistics(
+            server.count + count, max(server.longest_s, round(longest, 3))
+        )
         return gaps
 
 
-def warnings(gaps: Mapping[str, Gaps]) -> list[str]:
+def warnings(gaps: Mapping[str, GapStatistics]) -> list[str]:
     """What somebody who arms should know of them."""
     return [
         WORDS[side].format(one.count, one.longest_s)

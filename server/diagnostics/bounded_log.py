@@ -10,7 +10,7 @@ import logging
 import re
 from collections import OrderedDict
 
-from server.protocol.session import Bucket
+from server.protocol.session import TokenBucket
 
 FORMAT = "%(asctime)s %(name)s %(levelname)s %(message)s"
 SAME_HZ, SAME_AT_ONCE = 0.2, 10.0
@@ -30,10 +30,10 @@ class Bounded(logging.Filter):
     def __init__(self) -> None:
         """Nothing was said yet."""
         super().__init__()
-        self._kinds: OrderedDict[str, Bucket] = OrderedDict()
+        self._kinds: OrderedDict[str, TokenBucket] = OrderedDict()
         self._kept_back: dict[str, int] = {}
-        self._bytes = Bucket(BYTES_HZ, BYTES_AT_ONCE)
-        self._urgent = Bucket(URGENT_BYTES_HZ, BYTES_AT_ONCE)
+        self._bytes = TokenBucket(BYTES_HZ, BYTES_AT_ONCE)
+        self._urgent = TokenBucket(URGENT_BYTES_HZ, BYTES_AT_ONCE)
         self._formatter = logging.Formatter(FORMAT)
 
     def filter(self, record: logging.LogRecord) -> bool:
@@ -53,9 +53,9 @@ class Bounded(logging.Filter):
         self._kept_back[kind] = kept_back + 1
         return False
 
-    def _bucket(self, kind: str) -> Bucket:
+    def _bucket(self, kind: str) -> TokenBucket:
         if kind not in self._kinds:
-            self._kinds[kind] = Bucket(SAME_HZ, SAME_AT_ONCE)
+            self._kinds[kind] = TokenBucket(SAME_HZ, SAME_AT_ONCE)
             if len(self._kinds) > MAX_KINDS:
                 forgotten, _ = self._kinds.popitem(last=False)
                 self._kept_back.pop(forgotten, None)

@@ -1,13 +1,13 @@
-"""From what `Looking` learnt of a camera to what pages show of it."""
+"""From what `VisualFrontEnd` learnt of a camera to what pages show of it."""
 
 from __future__ import annotations
 
 from pipeline.camera.exposure import ADVICE
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from server.protocol.camera_messages import CameraHealth
 
 
-def health(looking: Looking) -> CameraHealth:
+def health(looking: VisualFrontEnd) -> CameraHealth:
     """Any thread may ask: each value is replaced whole."""
     facts, exposure, hint = looking.watch.facts, looking.exposure.exposure_s, looking.exposure.hint
     told = CameraHealth(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, OrderedDict, deque
 
-from server.protocol.session import Bucket
+from server.protocol.session import TokenBucket
 
 EVENTS, MOST_OF_PAGES = 12, 5
 """Events that are shown, and how many of these may be pages' doing."""
@@ -21,7 +21,7 @@ class Events:
         """None."""
         self.shown: deque[str] = deque(maxlen=EVENTS)
         self._of_pages: deque[bool] = deque(maxlen=EVENTS)
-        self._kinds: OrderedDict[str, Bucket] = OrderedDict()
+        self._kinds: OrderedDict[str, TokenBucket] = OrderedDict()
         self._left_out: Counter[str] = Counter()
 
     def add(self, text: str, of: str = "", now: float = 0.0) -> str:
@@ -62,9 +62,9 @@ class Events:
             oldest = max(n for n, of_page in enumerate(self._of_pages) if of_page)
             del self.shown[oldest], self._of_pages[oldest]
 
-    def _bucket(self, of: str) -> Bucket:
+    def _bucket(self, of: str) -> TokenBucket:
         if of not in self._kinds:
-            self._kinds[of] = Bucket(LINES_HZ, LINES_AT_ONCE)
+            self._kinds[of] = TokenBucket(LINES_HZ, LINES_AT_ONCE)
             if len(self._kinds) > MAX_KINDS:
                 forgotten, _ = self._kinds.popitem(last=False)
                 self._left_out.pop(forgotten, None)

@@ -14,7 +14,7 @@ from server.protocol import session, wire, wire_records
 from server.protocol.wire import Kind
 from server.rtc import answer, link
 from server.rtc.receiving import metadata_trailer
-from server.rtc.signalling_endpoint import OFFERS_HZ, RtcDesk
+from server.rtc.signalling_endpoint import OFFERS_HZ, SignallingEndpoint
 from server.security.pairings import CODE_LETTERS, IDLE_S, KEY_BYTES, LINK_S, WAIT_S
 from server.security.security import COOKIE, PAIR_TRIES, PAIR_WINDOW_S
 from server.view.viser_proxy import routes as view_routes
@@ -112,7 +112,7 @@ def requests() -> str:
     """
     lines = ["| request | least role | |", "|---|---|---|"]
     api, people = Api.__new__(Api), PeopleApi.__new__(PeopleApi)  # only asked for their routes
-    desk = RtcDesk.__new__(RtcDesk)
+    desk = SignallingEndpoint.__new__(SignallingEndpoint)
     others = (*people.routes(), *desk.routes(), *view_routes(Path("nowhere")))
     for route in (*api.routes(), *others):
         assert isinstance(route, (Route, WebSocketRoute))

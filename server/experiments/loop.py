@@ -17,9 +17,9 @@ from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
 from server.common import clock, text
 from server.control.process import teleop_config
-from server.simulation.figures import Result, result_of, rows_of
-from server.simulation.trace import Trace
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.figures import TrackingFigures, result_of, rows_of
+from server.simulation.trace import TrackingTrace
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 Hidden = tuple[float, float, tuple[int, ...]]
 
@@ -38,14 +38,14 @@ HEADINGS = (
 )
 
 
-def table(results: Sequence[Result]) -> str:
+def table(results: Sequence[TrackingFigures]) -> str:
     """One line a flight."""
     lines = text.table(HEADINGS, results).splitlines()
     ends = ["", *(f"  ended: {result.ended}" if result.ended else "" for result in results)]
     return "\n".join(line + end for line, end in zip(lines, ends, strict=True))
 
 
-def draw(traces: Sequence[tuple[Result, Trace]], path: Path) -> None:
+def draw(traces: Sequence[tuple[TrackingFigures, TrackingTrace]], path: Path) -> None:
     """Where the robot was meant to be and was, and how far apart that is, over time."""
     import matplotlib
 
@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live:
         return live(arguments)
     low, high = arguments.latency_ms
-    scene = Scene(
+    scene = SimulationOptions(
         latency_s=(1e-3 * low, 1e-3 * high),
         frame_rate_hz=arguments.fps,
         codec=arguments.codec,
@@ -96,11 +96,11 @@ def run(arguments: argparse.Namespace) -> int:
         f"{cutoff_hz(config.virtual_camera):.2f} Hz, {scene.width}x{scene.height} at "
         f"{scene.frame_rate_hz:g} fps through {scene.codec}, {low:g}-{high:g} ms late"
     )
-    flights: list[tuple[Result, Trace]] = []
+    flights: list[tuple[TrackingFigures, TrackingTrace]] = []
     for hand in arguments.hands:
         flight = replace(scene, hand=hand, seed=arguments.seed)
         cpu = clock.process_cpu()
-        trace = _fly(Lockstep(robot_file, config, flight), arguments.seconds, hand)
+        trace = _fly(VirtualTimeSimulation(robot_file, config, flight), arguments.seconds, hand)
         flights.append((result_of(trace, flight, clock.process_cpu() - cpu), trace))
     print(table([result for result, _ in flights]))
     if arguments.out is not None:
@@ -139,7 +139,7 @@ def live(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _fly(flight: Lockstep, seconds: float, name: str) -> Trace:
+def _fly(flight: VirtualTimeSimulation, seconds: float, name: str) -> TrackingTrace:
     """Run with progress on a terminal."""
     step = seconds / 50.0
     for k in range(50):

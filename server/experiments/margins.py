@@ -23,7 +23,7 @@ ESTIMATORS = ("relative", "paper", "none")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Row:
+class MarginRow:
     """One axis of one gain set with one estimator."""
 
     gains: str
@@ -53,7 +53,7 @@ COLUMNS = (
 )
 
 
-def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[Row]:
+def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[MarginRow]:
     """Every axis of every wanted gain set and estimator."""
     config, robot = TeleopConfig(), robot_file.robot
     dynamics = dynamics_of(robot, robot_file.plant)
@@ -68,10 +68,10 @@ def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[Row]:
                 yield row(gains, loop, int(axis), sensing)
 
 
-def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> Row:
+def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
     """Of one axis."""
     margins = axis_margins(loop, axis, sensing)
-    return Row(
+    return MarginRow(
         gains=gains,
         estimator=sensing.estimator,
         axis=AXES[axis],
@@ -102,7 +102,7 @@ def verdicts(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[s
             yield f"arming with {gains}, {estimator}: {why or 'yes'}"
 
 
-def draw(found: list[Row], path: Path) -> None:
+def draw(found: list[MarginRow], path: Path) -> None:
     """Nyquist and Bode pictures: a column for each axis, a colour for each loop."""
     import matplotlib
 
@@ -165,7 +165,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def told(one: Row) -> dict[str, object]:
+def told(one: MarginRow) -> dict[str, object]:
     """For programs, without the response; null is what has no limit, or isn't there."""
     return text.plain({f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"})
 

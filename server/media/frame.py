@@ -8,7 +8,7 @@ from pipeline.signals import Image
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class MediaFrame:
     """One frame."""
 
     name: str

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.signals import Image
 from server.common.errors import InputError
-from server.media.frame import Shot
+from server.media.frame import MediaFrame
 from server.media.tables import load_times
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
@@ -37,7 +37,7 @@ class Frames(Protocol):
     def notes(self) -> list[str]:
         """What the user should know, complete after the last frame."""
 
-    def __iter__(self) -> Iterator[Shot]:
+    def __iter__(self) -> Iterator[MediaFrame]:
         """In the order of time."""
 
 
@@ -57,9 +57,9 @@ def open_frames(path: Path, fps: float | None = None) -> Frames:
         raise InputError(path, "", "no such folder or film")
     if path.suffix.lower() in SUFFIXES:
         raise InputError(path, "", "is one picture: name the folder of all")
-    from server.media.video import Film
+    from server.media.video import Video
 
-    return Film(path, fps)
+    return Video(path, fps)
 
 
 class Folder:
@@ -90,12 +90,12 @@ class Folder:
         """Times of the first and the last [s]."""
         return self._times[0], self._times[-1]
 
-    def __iter__(self) -> Iterator[Shot]:
+    def __iter__(self) -> Iterator[MediaFrame]:
         """In the order of their names, which is that of time."""
         for file, t in zip(self._files, self._times, strict=True):
             luma = self._read(file)
             problem = "" if luma is not None else "The file can't be read as a picture."
-            yield Shot(file.name, t, luma, True, problem)
+            yield MediaFrame(file.name, t, luma, True, problem)
         if 0 < self._deepest < DEEP:
             self.notes.append(
                 f"16 bit frames never exceed {self._deepest}: scale them to 65535 if that is white"

@@ -16,14 +16,14 @@ from av.video.stream import VideoStream
 
 from pipeline.signals import Image
 from server.common.errors import InputError
-from server.media.frame import Shot
+from server.media.frame import MediaFrame
 
 LUMA_FIRST = ("yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12", "gray")
 """Formats whose first plane is 8 bit luma."""
 DAMAGED = "Damaged: what is shown up to the next key frame is not true."
 
 
-class Film:
+class Video:
     """A video file; a frame's name is its number."""
 
     def __init__(self, path: Path, fps: float | None = None) -> None:
@@ -53,7 +53,7 @@ class Film:
             raise InputError(self._path, "", "holds no video")
         return container.streams.video[0]
 
-    def __iter__(self) -> Iterator[Shot]:
+    def __iter__(self) -> Iterator[MediaFrame]:
         """As decoded.
 
         Raises:
@@ -77,9 +77,9 @@ class Film:
                     )
                 number, last = number + 1, t
                 if whole and isinstance(item, VideoFrame):
-                    yield Shot(name, t, *_luma(item))
+                    yield MediaFrame(name, t, *_luma(item))
                 else:
-                    yield Shot(name, t, None, problem=DAMAGED)
+                    yield MediaFrame(name, t, None, problem=DAMAGED)
         if undated:
             self.notes.append(f"{undated} packets can't be decoded: their frames have no row")
         if number == 0:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from pipeline.signals import Mode
 from server.control.ipc import ControlStatus
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.messages import encode_message
 from server.protocol.wire import WireError
@@ -14,7 +14,7 @@ from server.protocol.wire import WireError
 CALM = (Mode.DISARMED, Mode.STOPPED)
 
 
-class Desk:
+class CalibrationControl:
     """Of one server; phones come and go."""
 
     def __init__(self, push: Callable[[str], object]) -> None:
@@ -23,7 +23,7 @@ class Desk:
         self._phone = ""
         self._told = Calibration("off")
 
-    def wish(self, phone: OperatorPhone, wish: Calibrate, control: ControlStatus | None) -> None:
+    def wish(self, phone: PhoneSession, wish: Calibrate, control: ControlStatus | None) -> None:
         """The phone begins to calibrate its camera, or leaves it.
 
         Raises:
@@ -33,7 +33,7 @@ class Desk:
             raise WireError("order", "calibrate.what", "while the robot is disarmed")
         phone.calibrate(wish)
 
-    def tell(self, phone: OperatorPhone | None, control: ControlStatus | None) -> None:
+    def tell(self, phone: PhoneSession | None, control: ControlStatus | None) -> None:
         """Send what is news; nobody calibrates while a robot is led."""
         if phone is None:
             return

@@ -16,7 +16,7 @@ from pipeline.signals import PhoneImu
 from server.calibration.board import Board, Detector
 from server.calibration.camera_yaml import profile_path, store
 from server.calibration.guide import Guide
-from server.calibration.job import Job, Outcome, Solving
+from server.calibration.job import CalibrationJob, CalibrationOutcome, Solving
 from server.calibration.verdict import Verdict
 from server.calibration.views import look
 from server.common.clock import today
@@ -32,7 +32,7 @@ SHOWN_PER_CELL = 3  # views, by the page's shades of grey
 FAILED = Verdict("refused", ["The calibration failed: look at the server's log."])
 
 
-class Wizard(FrameThread):
+class CalibrationSession(FrameThread):
     """One calibration of one phone at one picture size and orientation."""
 
     def __init__(
@@ -77,9 +77,9 @@ class Wizard(FrameThread):
         """How it stands, for the page; stores the profile when it is there."""
         solving = self._solving
         if self.failed and self._shown.phase == "filming":
-            self._shown = self._finished(Outcome(FAILED, "", []))
+            self._shown = self._finished(CalibrationOutcome(FAILED, "", []))
         if solving is not None and self._shown.phase == "solving" and solving.done:
-            self._shown = self._finished(solving.outcome() or Outcome(FAILED, "", []))
+            self._shown = self._finished(solving.outcome() or CalibrationOutcome(FAILED, "", []))
         return self._shown
 
     def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
@@ -107,11 +107,11 @@ class Wizard(FrameThread):
         if self._solving is not solving:
             solving.stop()
 
-    def _job(self) -> Job:
+    def _job(self) -> CalibrationJob:
         guide = self._guide
         views = sorted({view.t: view for view in guide.views}.values(), key=lambda view: view.t)
         motion = np.array(self._motion).reshape(-1, 4)
-        return Job(
+        return CalibrationJob(
             self._board,
             self.size,
             views,
@@ -151,7 +151,7 @@ class Wizard(FrameThread):
         if self._solving is not None:
             self._solving.stop()
 
-    def _finished(self, outcome: Outcome) -> Calibration:
+    def _finished(self, outcome: CalibrationOutcome) -> Calibration:
         verdict = outcome.verdict
         if outcome.text:
             angle = self.screen_angle_deg

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 
-class Page(Protocol):
+class ClientConnection(Protocol):
     """A connection that things can be sent to, from the event loop; never blocks."""
 
     def push(self, data: str | bytes) -> None:

@@ -1,4 +1,4 @@
-"""From encoded pictures to believed poses: decoding, then what `Looking` does."""
+"""From encoded pictures to believed poses: decoding, then what `VisualFrontEnd` does."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import replace
 from hardware.codec import Decoder
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Frame, PhoneImu, StampOffset
-from pipeline.vision.detection import Sighting
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.detection import Detection
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.media.decoding import MakeDecoder
 from server.phone.decoder import FrameDecoder
 from server.phone.ingest import ARRIVAL_S, EncodedFrame
 
 
-class Sight(FrameDecoder):
+class FramePipeline(FrameDecoder):
     """One phone's pictures of one robot."""
 
     def __init__(
@@ -33,7 +33,7 @@ class Sight(FrameDecoder):
         """`clock` only times the stages; `make` says where pictures are decoded."""
         super().__init__(camera.width, camera.height, make)
         self.camera, self._clock = camera, clock
-        self.looking = Looking(camera, robot.leds_in_b, gates, clock)
+        self.looking = VisualFrontEnd(camera, robot.leds_in_b, gates, clock)
 
     def feel(self, sample: PhoneImu) -> None:
         """Follow the phone's motion."""
@@ -43,7 +43,7 @@ class Sight(FrameDecoder):
         """Follow the robot's motion, for the pictures' time offset."""
         self.looking.feel_body(samples)
 
-    def expect(self, expected: Expected | None) -> None:
+    def expect(self, expected: Prediction | None) -> None:
         """Follow what control's filter says; None: it says nothing."""
         self.looking.expect(expected)
 
@@ -53,7 +53,7 @@ class Sight(FrameDecoder):
 
     def see(
         self, frames: Sequence[EncodedFrame], up_in_b: Array | None, omega_bf_in_b: Array
-    ) -> Sighting | None:
+    ) -> Detection | None:
         """Decode all of `frames` in order, look at the newest; None if it can't be decoded."""
         started = self._clock()
         luma = None

@@ -12,7 +12,7 @@ from server.protocol.wire_records import QUARTERS, Picture
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class ImageFormat:
     """Of the pictures of one stream: with another one it is another camera."""
 
     width: int
@@ -22,7 +22,7 @@ class Shape:
     """By so many quarters the page has made pictures smaller than the camera's."""
 
     @classmethod
-    def of(cls, picture: Picture) -> Shape:
+    def of(cls, picture: Picture) -> ImageFormat:
         """That of one picture."""
         return cls(picture.width, picture.height, picture.screen_angle_deg, picture.shrunk)
 

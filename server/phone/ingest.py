@@ -10,8 +10,8 @@ import numpy as np
 
 from pipeline.camera.extrinsics import SQUARE
 from pipeline.frames import R_cd
-from pipeline.signals import Operator, PhoneImu
-from pipeline.timing.clock_synchronisation import ClockOffset
+from pipeline.signals import PhoneImu, TouchState
+from pipeline.timing.clock_synchronisation import ClockSynchronisation
 from server.protocol.wire import WireError
 from server.protocol.wire_records import Motion, Picture, Ping, Pong, Record, Touch
 
@@ -33,7 +33,7 @@ class EncodedFrame:
     picture: Picture
 
 
-Signal = PhoneImu | Operator | EncodedFrame
+Signal = PhoneImu | TouchState | EncodedFrame
 
 
 class Ingest:
@@ -48,7 +48,7 @@ class Ingest:
         self._last_motion_t = -np.inf
         self._last_touch = -1
         self._pings = 0
-        self.clock = ClockOffset()
+        self.clock = ClockSynchronisation()
         self.mounting = SQUARE
         """Of the camera that films, once it is known: motion comes out in its axes."""
         self.visible = True
@@ -95,7 +95,7 @@ class Ingest:
         self._answered.add(pong.nonce)
         self.clock.add(asked, record.t_us * 1e-6, now)
 
-    def _touch(self, sequence: int, touch: Touch) -> Operator | None:
+    def _touch(self, sequence: int, touch: Touch) -> TouchState | None:
         if sequence <= self._last_touch:  # overtaken, or heard already: it comes by two ways
             return None
         asked = self._asked.get(touch.nonce)
@@ -104,7 +104,7 @@ class Ingest:
         self._last_touch, self.visible = sequence, touch.visible
         if asked is None:  # before the first PING reached the page
             return None
-        return Operator(asked, touch.held and touch.visible, self._press_base + touch.press)
+        return TouchState(asked, touch.held and touch.visible, self._press_base + touch.press)
 
     def _motion(self, record: Record, motion: Motion, now: float) -> PhoneImu | None:
         t = self._dated(record, "motion.time", now)

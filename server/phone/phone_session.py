@@ -15,17 +15,17 @@ from hardware.codec import Decoder
 from pipeline.camera.extrinsics import SQUARE
 from pipeline.camera.lens import Camera
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, Operator, PhoneImu
-from pipeline.vision.detection import Sighting
+from pipeline.signals import BodyImu, PhoneImu, TouchState
+from pipeline.vision.detection import Detection
 from pipeline.vision_config import GatesConfig
 from server.control.ipc import ControlStatus, Input, OperatorInput, PhoneImuInput, expected_of
 from server.control.ipc_vision import SeenInput
 from server.diagnostics.link_log import LinkLog
 from server.diagnostics.meter import Meter
 from server.media.decoding import MakeDecoder
-from server.phone.calibration_session import Wizard
-from server.phone.frame_pipeline import Sight
-from server.phone.image_format import Shape
+from server.phone.calibration_session import CalibrationSession
+from server.phone.frame_pipeline import FramePipeline
+from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
 from server.phone.sensor_check import SensorCheck
 from server.phone.vision_thread import VisionThread
@@ -39,7 +39,7 @@ STALE_S = 1.0
 """A stream silent for longer keeps the robot from being armed."""
 
 
-class OperatorPhone:
+class PhoneSession:
     """From hello to goodbye."""
 
     def __init__(
@@ -66,16 +66,16 @@ class OperatorPhone:
         self._greeted = clock()
         self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
         self.vision: VisionThread | None = None
-        self._shape: Shape | None = None
+        self._shape: ImageFormat | None = None
         self._profiles, self._make_decoder = profiles, make_decoder
-        self.wizard: Wizard | None = None
+        self.wizard: CalibrationSession | None = None
         """The camera's calibration, while one is under way."""
         self.video_path = ""
         """How the pictures come, in words."""
         self.path_choice: PathChoice | None = None
         self.camera_problem = self.camera_text = ""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
-        self.sighting: Sighting | None = None
+        self.sighting: Detection | None = None
         self.latency_ms: dict[str, float] = {}
         self._check = SensorCheck()
         self.link = LinkLog(clock())
@@ -108,7 +108,7 @@ class OperatorPhone:
                 if self.vision is not None:
                     self.vision.feel(sample)
                     self.vision.doubt(self._check.doubts_gravity)
-            case Operator() as operator:
+            case TouchState() as operator:
                 self.meters["operator"].tick(now, operator.t)
                 self._to_control(OperatorInput.of(operator))
             case EncodedFrame() as frame:
@@ -134,7 +134,7 @@ class OperatorPhone:
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)
         self.link.came("pictures", frame.t, now)
-        shape = Shape.of(frame.picture)
+        shape = ImageFormat.of(frame.picture)
         if shape != self._shape:
             self._open_eyes(shape)
         if self.wizard is not None:
@@ -145,7 +145,7 @@ class OperatorPhone:
             raise WireError("calibration", "frame", self.camera_problem)
         self.vision.offer(frame)
 
-    def _open_eyes(self, shape: Shape) -> None:
+    def _open_eyes(self, shape: ImageFormat) -> None:
         """Begin to look, or begin again at another size or angle: that is another camera."""
         is_calibrating = self.wizard is not None and self.wizard.stored is None
         self.close()
@@ -160,12 +160,12 @@ class OperatorPhone:
             return
         self.camera_text = path.read_text(encoding="utf-8")
         self.ingest.mounting = camera.mounting
-        sight = Sight(camera, self._robot, GatesConfig(), self._clock, self._make_decoder)
+        sight = FramePipeline(camera, self._robot, GatesConfig(), self._clock, self._make_decoder)
         self.vision = VisionThread(
             sight, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
         )
 
-    def _sighted(self, camera: Camera, sighting: Sighting, frame: EncodedFrame) -> None:
+    def _sighted(self, camera: Camera, sighting: Detection, frame: EncodedFrame) -> None:
         """In the vision thread: hand on what was seen, remember where the time went."""
         now = self._clock()
         seen = sighting.seen(camera)
@@ -237,12 +237,14 @@ class OperatorPhone:
             # the next picture opens eyes, with what may have been stored, or says what is wrong
             self._shape, self.camera_problem = None, ""
 
-    def _calibrate(self, shape: Shape) -> None:
+    def _calibrate(self, shape: ImageFormat) -> None:
         """Begin, or begin again in another orientation."""
         assert self._profiles is not None
         size = (shape.width, shape.height, shape.screen_angle_deg)
         callbacks = self._on_taken, self._on_key_wanted
-        self.wizard = Wizard(self.device, size, self._profiles, *callbacks, self._make_decoder)
+        self.wizard = CalibrationSession(
+            self.device, size, self._profiles, *callbacks, self._make_decoder
+        )
 
     def calibration(self) -> Calibration:
         """What the page should know of it."""

@@ -6,10 +6,10 @@ from collections import deque
 
 import numpy as np
 
-from pipeline.estimation.sensor_validation import GravityTest
+from pipeline.estimation.sensor_validation import SensorValidation
 from pipeline.estimator_config import GravityTestConfig
 from pipeline.frames import Array
-from pipeline.vision.detection import Sighting
+from pipeline.vision.detection import Detection
 from server.control.ipc import ControlStatus
 from server.protocol.wire_records import Motion
 
@@ -22,7 +22,7 @@ class SensorCheck:
 
     def __init__(self) -> None:
         """Nothing tested."""
-        self._test = GravityTest(GravityTestConfig())
+        self._test = SensorValidation(GravityTestConfig())
         self._poses: deque[tuple[float, Array]] = deque(maxlen=MAX_WAITING)
         self._up_in_b: Array | None = None
 
@@ -40,7 +40,7 @@ class SensorCheck:
         for t, x, y, z, *_ in status.body_samples:
             self._test.add_body(t, np.array((x, y, z)))
 
-    def saw(self, sighting: Sighting) -> None:
+    def saw(self, sighting: Detection) -> None:
         """A picture was looked at."""
         pose = sighting.pose or sighting.unbelieved
         if pose is not None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from server.common.clock import now
-from server.phone.client_connection import Page
+from server.phone.client_connection import ClientConnection
 from server.protocol.messages import Command, encode_message
 from server.protocol.wire import encode
 from server.protocol.wire_records import Credit, Record
@@ -16,7 +16,7 @@ ASK_AGAIN_S = 0.3
 """Between requests for a key frame while the fast path's pictures can't be used."""
 
 
-class FastPath(Protocol):
+class FastTransport(Protocol):
     """Records by datagrams, and pictures."""
 
     def push(self, data: bytes) -> None:
@@ -33,7 +33,7 @@ class FastPath(Protocol):
         """Hang up, soon."""
 
 
-class PictureWay:
+class ImageTransport:
     """Of two ways that pictures come by, which one counts: whoever changes it begins with a key."""
 
     def __init__(self) -> None:
@@ -51,34 +51,34 @@ class PictureWay:
         return True
 
 
-class PhonePaths:
+class Transports:
     """What is open to the phone that leads; nothing if none does."""
 
     def __init__(self, keep: Callable[[bytes], None]) -> None:
         """`keep` records what is said."""
         self._keep = keep
-        self._operator: Page | None = None
-        self._video: Page | None = None
-        self._fast: FastPath | None = None
+        self._operator: ClientConnection | None = None
+        self._video: ClientConnection | None = None
+        self._fast: FastTransport | None = None
         self._t_asked = -float("inf")
-        self.pictures = PictureWay()
+        self.pictures = ImageTransport()
 
-    def begin(self, operator: Page) -> None:
+    def begin(self, operator: ClientConnection) -> None:
         """A phone has said hello on its websocket; so far it has nothing else."""
         self.close()
         self._operator = operator
 
-    def join_video(self, page: Page) -> None:
+    def join_video(self, page: ClientConnection) -> None:
         """Its second websocket, for pictures."""
         self._video = page
 
-    def use(self, fast: FastPath) -> None:
+    def use(self, fast: FastTransport) -> None:
         """A fast path is being opened; it takes the place of the one before."""
         former, self._fast = self._fast, fast
         if former is not None and former is not fast:
             former.close()
 
-    def leave(self, fast: FastPath) -> None:
+    def leave(self, fast: FastTransport) -> None:
         """It has ended."""
         if self._fast is fast:
             self._fast = None
@@ -135,6 +135,6 @@ class PhonePaths:
     def close(self) -> None:
         """The phone has gone."""
         fast, self._fast, self._operator, self._video = self._fast, None, None, None
-        self.pictures = PictureWay()
+        self.pictures = ImageTransport()
         if fast is not None:
             fast.close()

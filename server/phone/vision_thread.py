@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.frames import Array
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.signals import BodyImu, Image, PhoneImu
-from pipeline.vision.detection import Sighting
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.detection import Detection
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from server.common import clock
-from server.phone.frame_pipeline import Sight
+from server.phone.frame_pipeline import FramePipeline
 from server.phone.frame_worker import FrameThread
 from server.phone.ingest import EncodedFrame
 
@@ -25,12 +25,12 @@ Picture = npt.NDArray[np.uint8]
 
 
 class VisionThread(FrameThread):
-    """Owns one phone's `Sight`: pictures go in, sightings come out, nothing queues up between."""
+    """Owns one phone's `FramePipeline`: pictures go in, sightings come out, nothing queues up between."""
 
     def __init__(
         self,
-        sight: Sight,
-        on_sighting: Callable[[Sighting, EncodedFrame], None],
+        sight: FramePipeline,
+        on_sighting: Callable[[Detection, EncodedFrame], None],
         on_taken: Callable[[int], None],
         on_key_wanted: Callable[[], None],
     ) -> None:
@@ -52,7 +52,7 @@ class VisionThread(FrameThread):
         return self._sight.undecodable
 
     @property
-    def looking(self) -> Looking:
+    def looking(self) -> VisualFrontEnd:
         """What it learnt of the camera; to be read."""
         return self._sight.looking
 
@@ -60,7 +60,9 @@ class VisionThread(FrameThread):
         """The phone's motion, for the prior."""
         self._sight.feel(sample)
 
-    def know(self, up_in_b: Array | None, omega_bf_in_b: Array, expected: Expected | None) -> None:
+    def know(
+        self, up_in_b: Array | None, omega_bf_in_b: Array, expected: Prediction | None
+    ) -> None:
         """What control knows of the body, for the prior."""
         self._prior = (up_in_b, omega_bf_in_b)
         self._sight.expect(expected)
@@ -87,7 +89,7 @@ class VisionThread(FrameThread):
             self.thumbnail = draw(self._sight.luma, sighting)
 
 
-def draw(luma: Image, sighting: Sighting) -> Picture:
+def draw(luma: Image, sighting: Detection) -> Picture:
     """A small picture (h, w, 3) RGB: found LEDs circled in green, other lights in orange."""
     scale = THUMBNAIL_WIDTH / luma.shape[1]
     small = cv2.resize(luma, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)

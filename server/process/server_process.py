@@ -33,7 +33,7 @@ from server.process import warm_up
 from server.recording.control import Recordings
 from server.recording.reader import recover_all
 from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
-from server.rtc.signalling_endpoint import RtcDesk
+from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.admission import Admission
 from server.security.audit import Audit
 from server.security.listener import Listener, listener
@@ -45,7 +45,7 @@ from server.view.viser_proxy import routes as view_routes
 from server.view.viser_view import Dashboard
 from server.web.app import Api, make_app
 from server.web.people_api import PeopleApi
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from server.web.websocket import PageServer
 
 ANY_ADDRESS = ("0.0.0.0", "::")
@@ -59,7 +59,7 @@ WebRTC; a vision thread that computes would keep it for Python's usual 5 ms each
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class LaunchContext:
     """What the launcher hands over: it outlives this process, so does what is in here."""
 
     runtime: Path
@@ -76,7 +76,7 @@ def base_url(host: str, port: int) -> str:
     return f"https://[{address}]:{port}" if ":" in address else f"https://{address}:{port}"
 
 
-async def serve(settings: Settings, given: Given) -> None:
+async def serve(settings: Settings, given: LaunchContext) -> None:
     """Serve until SIGTERM or SIGINT."""
     tls = _certificate(settings)
     audit = Audit(settings.state)
@@ -90,7 +90,7 @@ async def serve(settings: Settings, given: Given) -> None:
     base = base_url(settings.host, given.https.getsockname()[1])
     api = Api(hub, tls.authority)
     people = PeopleApi(hub, doors, base, http_url(given))
-    desk = RtcDesk(hub, settings.rtc, settings.video.bitrate_bps)
+    desk = SignallingEndpoint(hub, settings.rtc, settings.video.bitrate_bps)
     routes = [*people.routes(), *view_routes(view), *desk.routes()]
     app = make_app(api, PageServer(hub, settings.video), routes)
     admission = Admission(limits_for(raise_handles()))
@@ -112,12 +112,14 @@ async def serve(settings: Settings, given: Given) -> None:
         decoding.close()
 
 
-def http_url(given: Given) -> str:
+def http_url(given: LaunchContext) -> str:
     """Where this machine reaches the server."""
     return f"http://127.0.0.1:{given.http.getsockname()[1]}"
 
 
-async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, run: str) -> None:
+async def _tell_when_ready(
+    hub: SessionManager, warming: threading.Thread, run_file: Path, run: str
+) -> None:
     """The run file says that a robot can be led: the control process compiles for a while first.
 
     So may this one. What is loaded by then is needed for ever, and frozen before anybody flies.
@@ -130,24 +132,26 @@ async def _tell_when_ready(hub: Hub, warming: threading.Thread, run_file: Path, 
     write_private(run_file, run)
 
 
-def _hub(settings: Settings, given: Given, doors: Doors, decoding: Decoding) -> Hub:
+def _hub(
+    settings: Settings, given: LaunchContext, doors: Doors, decoding: Decoding
+) -> SessionManager:
     folder = private_directory(private_directory(settings.state) / "recordings")
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
     robot = load_robot(settings.robot).robot
     profiles = private_directory(settings.state / PROFILES)
     cameras = [*settings.cameras, profiles, CAMERAS]
-    return Hub(given.runtime, robot, cameras, recordings, profiles, doors, decoding)
+    return SessionManager(given.runtime, robot, cameras, recordings, profiles, doors, decoding)
 
 
-def _dashboard(settings: Settings, hub: Hub, view: Path) -> Dashboard:
+def _dashboard(settings: Settings, hub: SessionManager, view: Path) -> Dashboard:
     robot_file = load_robot(settings.robot)
     dashboard = Dashboard(robot_file.robot, robot_file.plant, robot_file.start, view)
     dashboard.start(lambda: (hub.status, hub.last_thumbnail))
     return dashboard
 
 
-def _run(settings: Settings, given: Given, base: str, doors: Doors) -> dict[str, object]:
+def _run(settings: Settings, given: LaunchContext, base: str, doors: Doors) -> dict[str, object]:
     """What other programs of this user are told."""
     return {
         "http_url": http_url(given),
@@ -167,7 +171,7 @@ def _seen_from_anywhere(robot: str) -> str:
 
 
 def doors_of(
-    app: ASGIApp, tls: Certificate, given: Given, admission: Admission
+    app: ASGIApp, tls: Certificate, given: LaunchContext, admission: Admission
 ) -> list[tuple[Listener, socket.socket]]:
     """HTTPS for phones and HTTP for this machine, with their sockets."""
     return [
@@ -176,7 +180,9 @@ def doors_of(
     ]
 
 
-async def _until_signalled(hub: Hub, listeners: list[tuple[Listener, socket.socket]]) -> None:
+async def _until_signalled(
+    hub: SessionManager, listeners: list[tuple[Listener, socket.socket]]
+) -> None:
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
@@ -218,7 +224,7 @@ def _metadata(settings: Settings) -> dict[str, str]:
     return {ROBOT_KEY: text, SETTINGS_KEY: settings.model_dump_json()}
 
 
-def main(settings: Settings, given: Given) -> int:
+def main(settings: Settings, given: LaunchContext) -> int:
     """Entry of the server process."""
     sys.setswitchinterval(SWITCH_S)
     bounded_log.set_up()

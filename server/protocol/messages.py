@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from pipeline.config import EstimatorName, VirtualCameraMode
-from server.common.runtime_parameters import AdaptiveBeta, CutoffHz, Knobs, SpeedLimit
+from server.common.runtime_parameters import AdaptiveBeta, CutoffHz, RuntimeParameters, SpeedLimit
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.camera_messages import CameraHealth
 from server.protocol.people_messages import Deed, Person
@@ -56,7 +56,7 @@ class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=
 
 
 class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):
-    """Page → server: turn `Knobs` of the virtual camera; those left out or null stay.
+    """Page → server: turn `RuntimeParameters` of the virtual camera; those left out or null stay.
 
     `status` shows how they stand: that is the answer.
     """
@@ -117,10 +117,10 @@ class GapCount(msgspec.Struct, frozen=True):
     longest_ms: float
 
 
-class VirtualCamera(msgspec.Struct, frozen=True):
+class VirtualCameraStatus(msgspec.Struct, frozen=True):
     """The virtual camera in the control process."""
 
-    knobs: Knobs
+    knobs: RuntimeParameters
     """As they stand."""
     lag_deg: float | None
     """Angle from the phone to the virtual camera; None before a phone is there."""
@@ -205,7 +205,7 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms."""
     messages: list[str]
     """The newest events, newest first."""
-    virtual_camera: VirtualCamera | None = None
+    virtual_camera: VirtualCameraStatus | None = None
     """None before the control process has told of it."""
     estimate: Estimate | None = None
     """None before the control process has told of it."""

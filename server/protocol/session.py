@@ -28,7 +28,7 @@ MESSAGES: dict[str, tuple[type, ...]] = {
 }
 
 
-class Bucket:
+class TokenBucket:
     """So many at once, so many a second."""
 
     def __init__(self, rate: float, burst: float) -> None:
@@ -58,10 +58,10 @@ class Session:
         self.hello: Hello | None = None
         self.hopeless = False
         """Too many faults."""
-        self._faults = Bucket(FAULTS_HZ, burst=MAX_FAULTS)
-        self._records = Bucket(RECORDS_HZ, burst=2.0 * RECORDS_HZ)
-        self._bytes = Bucket(BYTES_HZ, burst=BYTES_HZ)
-        self._messages = Bucket(MESSAGES_HZ, burst=2.0 * MESSAGES_HZ)
+        self._faults = TokenBucket(FAULTS_HZ, burst=MAX_FAULTS)
+        self._records = TokenBucket(RECORDS_HZ, burst=2.0 * RECORDS_HZ)
+        self._bytes = TokenBucket(BYTES_HZ, burst=BYTES_HZ)
+        self._messages = TokenBucket(MESSAGES_HZ, burst=2.0 * MESSAGES_HZ)
 
     def receive(self, data: str | bytes, now: float) -> FromPage | Record:
         """What the page said.

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pipeline.timing.clock_synchronisation import ClockOffset
+from pipeline.timing.clock_synchronisation import ClockSynchronisation
 from server.common.access import Access, PhoneClientError, access_of, add_access_arguments
 from server.common.clock import now
 from server.common.options import Parser
@@ -58,7 +58,7 @@ def timed(recording: Recording) -> list[Timed]:
 
 def _clock_offsets(records: list[tuple[float, Record]]) -> list[float]:
     """Phone's clock minus the server's at each record [s]; before it is known, the first known."""
-    clock, offsets = ClockOffset(), list[float | None]()
+    clock, offsets = ClockSynchronisation(), list[float | None]()
     for t, record in records:
         if isinstance(record.body, Pong):
             clock.add(1e-6 * record.body.server_time_us, 1e-6 * record.t_us, t)

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from pipeline.config import TeleopConfig
-from pipeline.signals import BodyImu, Operator, PhoneImu, RelativePose
+from pipeline.signals import BodyImu, PhoneImu, RelativePose, TouchState
 from pipeline.teleop import Output
 from server.control.controller import PERIOD_S, Controller
 from server.control.ipc import Input, OperatorInput, PhoneImuInput, ReadyInput, RequestInput
 from server.control.ipc_vision import SeenInput
-from server.phone.frame_pipeline import Sight
-from server.phone.image_format import Shape
+from server.phone.frame_pipeline import FramePipeline
+from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.messages import Command, Hello, decode_message
 from server.protocol.wire import WireError, decode
@@ -68,7 +68,7 @@ class Offline:
             RecordingError: nobody knows a camera that takes such pictures.
         """
         camera = recorded_camera(self._recording, self._shape)
-        self._sight = Sight(camera, self.robot, self._config.gates)
+        self._sight = FramePipeline(camera, self.robot, self._config.gates)
         self._ingest.mounting = camera.mounting
         self._is_blind = False
 
@@ -131,7 +131,7 @@ class Offline:
             case PhoneImu() as sample:
                 self._sight.feel(sample)
                 self._inbox.append(PhoneImuInput.of(sample))
-            case Operator() as operator:
+            case TouchState() as operator:
                 self._inbox.append(OperatorInput.of(operator))
             case EncodedFrame() as frame:
                 self._see(frame)
@@ -141,7 +141,7 @@ class Offline:
 
     def _fit(self, picture: Picture) -> None:
         """Open other eyes for another size or angle, as the server did; none if it had none."""
-        shape = Shape.of(picture)
+        shape = ImageFormat.of(picture)
         if shape == self._shape:
             return
         self._shape = shape

@@ -13,7 +13,7 @@ from hardware.camera_file import CAMERAS, CameraFileError
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from pipeline.camera.lens import Camera
 from pipeline.signals import BodyImu
-from server.phone.image_format import Shape
+from server.phone.image_format import ImageFormat
 from server.protocol.wire import WireError, decode
 from server.protocol.wire_records import Picture
 from server.recording.reader import Recording, device_of
@@ -38,7 +38,7 @@ def recorded_robot(recording: Recording) -> RobotFile:
         raise _unusable(recording, error) from error
 
 
-def recorded_camera(recording: Recording, shape: Shape) -> Camera:
+def recorded_camera(recording: Recording, shape: ImageFormat) -> Camera:
     """The camera of its pictures of one shape: by its own file, else one we know.
 
     Raises:
@@ -54,7 +54,7 @@ def recorded_camera(recording: Recording, shape: Shape) -> Camera:
         raise _unusable(recording, error) from error
 
 
-def first_shape(recording: Recording) -> Shape:
+def first_shape(recording: Recording) -> ImageFormat:
     """Of its first picture.
 
     Raises:
@@ -64,7 +64,7 @@ def first_shape(recording: Recording) -> Shape:
         with suppress(WireError):
             body = decode(data).body
             if isinstance(body, Picture):
-                return Shape.of(body)
+                return ImageFormat.of(body)
     raise RecordingError(recording.path, "holds no picture", "name another recording")
 
 

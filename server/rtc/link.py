@@ -8,18 +8,18 @@ from collections.abc import Callable
 
 from server.common.clock import now
 from server.common.settings import RtcSettings
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.protocol.messages import Refused, encode_message
 from server.protocol.session import Session
 from server.protocol.wire import WireError, encode
 from server.protocol.wire_records import Codec, Motion, Picture, Pong, Record, Stamp
-from server.rtc.peer import Listener, Peer
+from server.rtc.peer import PeerCallbacks, PeerConnection
 from server.rtc.receiving import metadata_trailer
 from server.rtc.receiving.bitstream import size_of_key
-from server.rtc.receiving.frame_timestamping import Dating
+from server.rtc.receiving.frame_timestamping import FrameTimestamping
 from server.rtc.receiving.jitter import Assembled
 from server.rtc.receiving.round_trip import RoundTrip
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 
 VIDEO_S = 0.5
 """Pictures come this way if one came within this time."""
@@ -32,8 +32,8 @@ class RtcLink:
 
     def __init__(
         self,
-        hub: Hub,
-        phone: OperatorPhone,
+        hub: SessionManager,
+        phone: PhoneSession,
         settings: RtcSettings,
         bitrate_bps: int,
         on_gone: Callable[[RtcLink], None],
@@ -42,7 +42,7 @@ class RtcLink:
         self.id = secrets.token_urlsafe(12)
         self.is_closing = False
         self._hub, self._phone, self._on_gone = hub, phone, on_gone
-        self._dating = Dating()
+        self._dating = FrameTimestamping()
         self._trip = RoundTrip()
         self._size: tuple[int, int] | None = None
         self._screen_angle_deg = 0
@@ -51,10 +51,10 @@ class RtcLink:
         """Pictures that came before anything was known of the phone's clock."""
         self.records, self.frames = Session("rtc"), Session("video")
         self.records.hello = self.frames.hello = phone.hello
-        self.peer = Peer(
+        self.peer = PeerConnection(
             settings,
             bitrate_bps,
-            Listener(self._frame, self._record, self._opened, self._gone, self._round_trip),
+            PeerCallbacks(self._frame, self._record, self._opened, self._gone, self._round_trip),
         )
         loop = asyncio.get_running_loop()
         self._withdrawal = loop.call_later(CONNECT_S, self._gone)

@@ -24,7 +24,7 @@ from server.protocol.wire_records import Codec
 from server.rtc import candidates, stun
 from server.rtc.answer import check_answer
 from server.rtc.offer import bitrates, tuned
-from server.rtc.receiver_adapter import Intake
+from server.rtc.receiver_adapter import ReceiverAdapter
 from server.rtc.receiving.bitstream import begins_key
 from server.rtc.receiving.jitter import Assembled
 from server.security.tls import own_addresses
@@ -46,7 +46,7 @@ candidates.build_wall()
 
 
 @dataclass(frozen=True, slots=True)
-class Listener:
+class PeerCallbacks:
     """Whom a connection tells; all called from the event loop."""
 
     on_frame: Callable[[Codec, Assembled], None]
@@ -58,10 +58,10 @@ class Listener:
     """Of the line, as measured [s]."""
 
 
-class Peer:
+class PeerConnection:
     """Receives one track of pictures, and one data channel of records both ways."""
 
-    def __init__(self, settings: RtcSettings, bitrate_bps: int, listener: Listener) -> None:
+    def __init__(self, settings: RtcSettings, bitrate_bps: int, listener: PeerCallbacks) -> None:
         """Nothing is sent before `offer`."""
         self._listener, self._bitrate_bps = listener, bitrate_bps
         self._codecs: dict[int, Codec] = {}
@@ -72,7 +72,9 @@ class Peer:
         )
         transceiver = self._connection.addTransceiver("video", direction="recvonly")
         transceiver.setCodecPreferences(_preferred())
-        self._intake = Intake(transceiver.receiver, self._is_key, self._frame, listener.round_trip)
+        self._intake = ReceiverAdapter(
+            transceiver.receiver, self._is_key, self._frame, listener.round_trip
+        )
         self._channel: RTCDataChannel = self._connection.createDataChannel(
             CHANNEL, ordered=False, maxRetransmits=0
         )

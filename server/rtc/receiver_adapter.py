@@ -25,7 +25,7 @@ FRAME_S = 1.0 / 30.0
 SHORTEST_FRAME_S, LONGEST_FRAME_S = 1.0 / 60.0, 0.2
 
 
-class Intake:
+class ReceiverAdapter:
     """Takes a receiver's packets in place of its own jitter buffer."""
 
     def __init__(

@@ -13,13 +13,13 @@ from starlette.routing import BaseRoute, Route
 
 from server.common.clock import now
 from server.common.settings import RtcSettings
-from server.protocol.session import Bucket
+from server.protocol.session import TokenBucket
 from server.protocol.signalling import Answer, Ask, Offer
 from server.protocol.wire import WireError
 from server.rtc.answer import MAX_BYTES
 from server.rtc.link import RtcLink
 from server.web.replies import body_of, refusal
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 
 log = logging.getLogger("lightleash")
 
@@ -37,13 +37,13 @@ def address_of(request: Request) -> str:
     return request.client.host if request.client is not None else ""
 
 
-class RtcDesk:
+class SignallingEndpoint:
     """At most one connection: that of the phone that leads."""
 
-    def __init__(self, hub: Hub, settings: RtcSettings, bitrate_bps: int) -> None:
+    def __init__(self, hub: SessionManager, settings: RtcSettings, bitrate_bps: int) -> None:
         """Nobody has asked yet."""
         self._hub, self._settings, self._bitrate_bps = hub, settings, bitrate_bps
-        self._offers = Bucket(OFFERS_HZ, OFFERS_AT_ONCE)
+        self._offers = TokenBucket(OFFERS_HZ, OFFERS_AT_ONCE)
         self._link: RtcLink | None = None
         self._closing: set[asyncio.Task[None]] = set()
 

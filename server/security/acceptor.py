@@ -15,7 +15,7 @@ import struct
 from collections.abc import Callable
 
 from server.common.clock import now
-from server.security.admission import Admission, Peer, Place
+from server.security.admission import Admission, ConnectionSlot, RemotePeer
 
 HELLO_S = 3.0
 """A first byte and the TLS handshake must be through within this."""
@@ -108,9 +108,9 @@ class Acceptor:
                     raise
                 self._back_off(error)
                 return
-            self._admit(conn, Peer(address[0], address[1], self._door))
+            self._admit(conn, RemotePeer(address[0], address[1], self._door))
 
-    def _admit(self, conn: socket.socket, peer: Peer) -> None:
+    def _admit(self, conn: socket.socket, peer: RemotePeer) -> None:
         guest = Guest(fileno=conn.detach())
         place = self._admission.enter(peer, guest.end, now())
         if place is None:
@@ -123,7 +123,7 @@ class Acceptor:
         self._handshakes.add(task)
         task.add_done_callback(lambda done: self._settle(done, guest))
 
-    async def _welcome(self, guest: Guest, place: Place) -> None:
+    async def _welcome(self, guest: Guest, place: ConnectionSlot) -> None:
         """From the first byte to a protocol that takes over."""
         try:
             async with asyncio.timeout(HELLO_S):
@@ -167,6 +167,6 @@ class Acceptor:
         self._waiting = self._loop.call_later(BACK_OFF_S, self.start)
 
 
-def _end_a_stranger(guest: Guest, place: Place) -> None:
+def _end_a_stranger(guest: Guest, place: ConnectionSlot) -> None:
     if not (place.is_known or place.has_role):
         guest.end()

@@ -15,8 +15,8 @@ from typing import Literal, NamedTuple
 
 from starlette.types import Scope
 
-from server.protocol.session import Bucket
-from server.security.places import Limits
+from server.protocol.session import TokenBucket
+from server.security.places import AdmissionLimits
 
 Kind = Literal["here", "known", "stranger"]
 LOOPBACK = ("127.0.0.1", "::1", "::ffff:127.0.0.1")
@@ -26,7 +26,7 @@ MAX_KNOWN, MAX_NETWORKS = 64, 1024
 """Addresses, networks remembered; the oldest is forgotten, so that no flood fills memory."""
 
 
-class Peer(NamedTuple):
+class RemotePeer(NamedTuple):
     """One connection: the other end, and which of our ports it came to."""
 
     host: str
@@ -34,17 +34,17 @@ class Peer(NamedTuple):
     door: int
 
 
-def peer_of(scope: Scope) -> Peer:
+def peer_of(scope: Scope) -> RemotePeer:
     """Who asks."""
     host, port = scope.get("client") or ("", 0)
-    return Peer(host, port, (scope.get("server") or ("", 0))[1])
+    return RemotePeer(host, port, (scope.get("server") or ("", 0))[1])
 
 
 @dataclass(slots=True, eq=False)
-class Place:
+class ConnectionSlot:
     """What a connection holds."""
 
-    peer: Peer
+    peer: RemotePeer
     end: Callable[[], None]
     """Called when somebody else gets this place."""
     group: str
@@ -62,14 +62,14 @@ class Place:
 class Admission:
     """All places of all doors. Not thread-safe: for one event loop."""
 
-    def __init__(self, limits: Limits | None = None) -> None:
+    def __init__(self, limits: AdmissionLimits | None = None) -> None:
         """Empty."""
-        self._limits = limits or Limits()
-        self._places: dict[Peer, Place] = {}  # oldest first
+        self._limits = limits or AdmissionLimits()
+        self._places: dict[RemotePeer, ConnectionSlot] = {}  # oldest first
         self._held: Counter[tuple[Kind, str]] = Counter()
         self._known: OrderedDict[str, float] = OrderedDict()
         self._connections, self._requests = self._shared_buckets()
-        self._own: OrderedDict[tuple[Kind, str], tuple[Bucket, Bucket]] = OrderedDict()
+        self._own: OrderedDict[tuple[Kind, str], tuple[TokenBucket, TokenBucket]] = OrderedDict()
         self.refused = 0
         """Connections without a place, since the start."""
 
@@ -81,10 +81,10 @@ class Admission:
         """Places that strangers hold."""
         return self._held_by("stranger")
 
-    def enter(self, peer: Peer, end: Callable[[], None], now: float) -> Place | None:
+    def enter(self, peer: RemotePeer, end: Callable[[], None], now: float) -> ConnectionSlot | None:
         """A place for `peer`, or None; for that another one may be ended."""
         kind, group = self._kind_of(peer.host, now)
-        place = Place(peer, end, group, kind)
+        place = ConnectionSlot(peer, end, group, kind)
         if not self._may_connect(kind, group, now) or not self._make_room(place):
             self.refused += 1
             return None
@@ -92,13 +92,13 @@ class Admission:
         self._held[kind, group] += 1
         return place
 
-    def leave(self, place: Place) -> None:
+    def leave(self, place: ConnectionSlot) -> None:
         """It is free again."""
         if self._places.get(place.peer) is place:
             del self._places[place.peer]
             self._count_out(place)
 
-    def may_ask(self, peer: Peer, has_role: bool, now: float) -> bool:
+    def may_ask(self, peer: RemotePeer, has_role: bool, now: float) -> bool:
         """Whether to answer, by what strangers ask; with a role, its address is known then.
 
         A connection on which too much is asked is ended. What others may ask `quotas` says.
@@ -135,11 +135,11 @@ class Admission:
         if oldest is not None:
             self._end(oldest)
 
-    def _end(self, place: Place) -> None:
+    def _end(self, place: ConnectionSlot) -> None:
         self.leave(place)
         place.end()
 
-    def _make_room(self, place: Place) -> bool:
+    def _make_room(self, place: ConnectionSlot) -> bool:
         """Whether there is a place, if need be after another one was ended."""
         own, all_held = self._held[place.kind, place.group], self._held_by(place.kind)
         own_limit, limit = self._places_for(place.kind)
@@ -170,18 +170,18 @@ class Admission:
     def _held_by(self, kind: Kind) -> int:
         return sum(n for (of, _), n in self._held.items() if of == kind)
 
-    def _oldest_of_most(self, kind: Kind, own: int) -> Place | None:
+    def _oldest_of_most(self, kind: Kind, own: int) -> ConnectionSlot | None:
         """The oldest place of the group that holds most, if that is more than `own` and one."""
         groups = ((n, group) for (of, group), n in self._held.items() if of == kind)
         most, group = max(groups, default=(0, ""))
         return self._oldest(kind, group) if most > own + 1 else None
 
-    def _oldest(self, kind: Kind, group: str) -> Place | None:
+    def _oldest(self, kind: Kind, group: str) -> ConnectionSlot | None:
         """Of those that have not shown a role."""
         places = (p for p in self._places.values() if (p.kind, p.group) == (kind, group))
         return next((place for place in places if not place.has_role), None)
 
-    def _make_known(self, peer: Peer, now: float) -> None:
+    def _make_known(self, peer: RemotePeer, now: float) -> None:
         place = self._places.get(peer)
         if place is not None:
             place.has_role = True
@@ -198,7 +198,7 @@ class Admission:
                 one.kind, one.group = "known", peer.host
                 self._held[one.kind, one.group] += 1
 
-    def _count_out(self, place: Place) -> None:
+    def _count_out(self, place: ConnectionSlot) -> None:
         key = place.kind, place.group
         self._held[key] -= 1
         if not self._held[key]:
@@ -208,13 +208,13 @@ class Admission:
         own, _ = self._buckets_of(kind, group)
         return own.take(now) and (kind != "stranger" or self._connections.take(now))
 
-    def _shared_buckets(self) -> tuple[Bucket, Bucket]:
+    def _shared_buckets(self) -> tuple[TokenBucket, TokenBucket]:
         limits = self._limits
         rates = (limits.connections_hz, limits.requests_hz)
-        connections, requests = (Bucket(rate, rate * limits.burst_s) for rate in rates)
+        connections, requests = (TokenBucket(rate, rate * limits.burst_s) for rate in rates)
         return connections, requests
 
-    def _buckets_of(self, kind: Kind, group: str) -> tuple[Bucket, Bucket]:
+    def _buckets_of(self, kind: Kind, group: str) -> tuple[TokenBucket, TokenBucket]:
         """(connections, requests) of a group; who is new has full ones."""
         key, limits = (kind, group), self._limits
         if key not in self._own:
@@ -226,7 +226,7 @@ class Admission:
                 }[kind],
                 limits.per_stranger_requests_hz,
             )
-            connections, requests = (Bucket(rate, rate * limits.burst_s) for rate in rates)
+            connections, requests = (TokenBucket(rate, rate * limits.burst_s) for rate in rates)
             self._own[key] = connections, requests
             if len(self._own) > MAX_NETWORKS:
                 self._own.popitem(last=False)

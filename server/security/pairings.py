@@ -42,7 +42,7 @@ class PairingError(Exception):
         self.field, self.allowed = field, allowed
 
 
-class Link(msgspec.Struct):
+class PairingLink(msgspec.Struct):
     """A link that was handed out."""
 
     role: Role
@@ -81,7 +81,7 @@ def of_this_machine(role: Role, address: str = "", since: float = 0.0) -> Member
 class Book(msgspec.Struct):
     """What outlives the server process."""
 
-    links: dict[str, Link] = {}
+    links: dict[str, PairingLink] = {}
     members: dict[str, Member] = {}
 
 
@@ -105,7 +105,7 @@ class Pairings:
     def invite(self, role: Role, now: float, by: str = "") -> str:
         """A new link's key, made by the member with that id: opens once, within `LINK_S`."""
         key, links = self._key(), self.book.links
-        links[digest_of(key)] = Link(role, now + LINK_S, by=by)
+        links[digest_of(key)] = PairingLink(role, now + LINK_S, by=by)
         while len(links) > MAX_LINKS:
             del links[next(iter(links))]
         return key
@@ -119,7 +119,7 @@ class Pairings:
         role = self._link(key, now).role
         return role, role == "operator" and self._confirm == "supervisor"
 
-    def _link(self, key: str, now: float) -> Link:
+    def _link(self, key: str, now: float) -> PairingLink:
         link = self.book.links.get(digest_of(key))
         if link is None:
             raise PairingError("token", "a link of this run: scan the newest code")

@@ -9,7 +9,7 @@ OWN_HANDLES = 192
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class AdmissionLimits:
     """Places, and rates with what may come at once."""
 
     strangers: int = 64
@@ -29,13 +29,13 @@ class Limits:
     """So many seconds' worth may come at once."""
 
 
-def limits_for(handles: int) -> Limits:
+def limits_for(handles: int) -> AdmissionLimits:
     """Limits that fit in so many file handles: strangers give way first."""
-    usual = Limits()
+    usual = AdmissionLimits()
     free = max(handles - OWN_HANDLES, 16)
     known, here = min(usual.known, free * 3 // 5), min(usual.here, free // 5)
     strangers = free - known - here
-    return Limits(
+    return AdmissionLimits(
         strangers=max(4, min(usual.strangers, strangers)),
         per_stranger=max(2, min(usual.per_stranger, strangers // 4)),
         known=known,

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from server.protocol.session import Bucket
+from server.protocol.session import TokenBucket
 
 Kind = Literal["member", "program", "loopback", "address"]
 MAX_POOLS = 256  # one for each who asks; the oldest is forgotten
@@ -54,7 +54,7 @@ class Quotas:
     def __init__(self, quotas: Mapping[Kind, Quota] = QUOTAS) -> None:
         """Full."""
         self._quotas = quotas
-        self._buckets: OrderedDict[Asker, Bucket] = OrderedDict()
+        self._buckets: OrderedDict[Asker, TokenBucket] = OrderedDict()
         self._under_way: Counter[tuple[Asker, bool]] = Counter()
 
     def may_ask(self, asker: Asker | None, path: str, now: float) -> str:
@@ -83,10 +83,10 @@ class Quotas:
             if not self._under_way[key]:
                 del self._under_way[key]
 
-    def _bucket(self, asker: Asker) -> Bucket:
+    def _bucket(self, asker: Asker) -> TokenBucket:
         if asker not in self._buckets:
             quota = self._quotas[asker.kind]
-            self._buckets[asker] = Bucket(quota.hz, quota.at_once)
+            self._buckets[asker] = TokenBucket(quota.hz, quota.at_once)
             if len(self._buckets) > MAX_POOLS:
                 self._buckets.popitem(last=False)
         self._buckets.move_to_end(asker)

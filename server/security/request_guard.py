@@ -11,7 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.common.clock import now
 from server.common.roles import Least, is_enough, least_of
-from server.security.admission import LOOPBACK, Admission, Peer, peer_of
+from server.security.admission import LOOPBACK, Admission, RemotePeer, peer_of
 from server.security.pairings import Member
 from server.security.quotas import Asker, Quotas
 from server.security.rechecked import Rechecked
@@ -109,7 +109,7 @@ class Guard:
         if one.ended:
             await _refuse(SHUT_OUT, scope, receive, extended)
 
-    def _asker(self, member: Member | None, peer: Peer) -> Asker | None:
+    def _asker(self, member: Member | None, peer: RemotePeer) -> Asker | None:
         """Whose pool it is; None: the strangers'."""
         if member is not None:
             return Asker("member" if member.digest else "program", member.id)

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.frames import Array
-from server.simulation.trace import Trace
-from server.simulation.virtual_time import Scene
+from server.simulation.trace import TrackingTrace
+from server.simulation.virtual_time import SimulationOptions
 
 SETTLE_S = 2.0
 """After the press, before tracking counts: the integral must first learn the spring."""
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class TrackingFigures:
     """Figures of one flight; lengths in mm, angles in degrees."""
 
     hand: str
@@ -37,13 +37,15 @@ class Result:
     """Why tracking ended early, or ""."""
 
 
-def result_of(trace: Trace, scene: Scene, cpu_s: float, settle_s: float = SETTLE_S) -> Result:
+def result_of(
+    trace: TrackingTrace, scene: SimulationOptions, cpu_s: float, settle_s: float = SETTLE_S
+) -> TrackingFigures:
     """Figures of a trace, without the first seconds of tracking."""
     skip = round(settle_s / 0.005)
     errors = rows_of(trace.error_in_f)[skip:]
     distance = np.linalg.norm(errors, axis=1)
     steps = np.diff(rows_of(trace.thrusts)[skip:], axis=0)
-    return Result(
+    return TrackingFigures(
         hand=scene.hand,
         seed=scene.seed,
         tracked_s=round(0.005 * len(errors), 2),

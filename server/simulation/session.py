@@ -19,7 +19,7 @@ from server.common import clock
 from server.control.controller import PERIOD_S
 from server.simulation.figures import result_of
 from server.simulation.sweep_keys import ROWS, Value
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 T = TypeVar("T")
 Settings = tuple[tuple[str, Value], ...]
@@ -42,7 +42,7 @@ USUAL: Final[Mapping[str, Any]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
+class SweepSession:
     """What is flown; it is sent to whoever flies it, files and all."""
 
     index: int
@@ -75,7 +75,7 @@ FIGURES: Final = tuple(field.name for field in fields(Figures))
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class SessionOutcome:
     """Figures, and what they cost."""
 
     index: int
@@ -84,28 +84,28 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Flown:
-    """Settings made into what `Lockstep` takes."""
+class SimulationSetup:
+    """Settings made into what `VirtualTimeSimulation` takes."""
 
     robot_file: RobotFile
     config: TeleopConfig
-    scene: Scene
+    scene: SimulationOptions
     wind_in_f: Array
     gust_m_s: float
 
 
-def fly(session: Session) -> Outcome:
+def fly(session: SweepSession) -> SessionOutcome:
     """Fly it. A setting with which nothing can be computed is an outcome, too."""
     started = clock.process_cpu()
     try:
         figures = _fly(prepared(session), session)
     except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
         figures = Figures(ended=f"failed: {type(error).__name__}: {error}")
-    return Outcome(session.index, figures, clock.process_cpu() - started)
+    return SessionOutcome(session.index, figures, clock.process_cpu() - started)
 
 
-def _fly(flown: Flown, session: Session) -> Figures:
-    flight = Lockstep(flown.robot_file, flown.config, flown.scene)
+def _fly(flown: SimulationSetup, session: SweepSession) -> Figures:
+    flight = VirtualTimeSimulation(flown.robot_file, flown.config, flown.scene)
     plant, rng = flight.follower.plant, np.random.default_rng((session.seed, 13))
     stays = exp(-PERIOD_S / GUST_S)
     gust = flown.gust_m_s * rng.standard_normal(3)
@@ -122,7 +122,7 @@ def _fly(flown: Flown, session: Session) -> Figures:
     return Figures(**known)
 
 
-def prepared(session: Session) -> Flown:
+def prepared(session: SweepSession) -> SimulationSetup:
     """Its robot, configuration and scene.
 
     Raises:
@@ -134,7 +134,7 @@ def prepared(session: Session) -> Flown:
     wanted = {**USUAL, **told}
     mean_s = 1e-3 * wanted["latency_ms"]
     half_s = min(0.5e-3 * wanted["jitter_ms"], mean_s)
-    scene = Scene(
+    scene = SimulationOptions(
         hand=wanted["hand"],
         seed=session.seed,
         latency_s=(mean_s - half_s, mean_s + half_s),
@@ -147,7 +147,7 @@ def prepared(session: Session) -> Flown:
         if _is(key, "teleop"):
             config = _with(config, key.split(".")[1:], value)
     wind = np.array([wanted[f"wind_{axis}_m_s"] for axis in "xyz"], dtype=np.float64)
-    return Flown(robot_file, config, scene, wind, wanted["gust_m_s"])
+    return SimulationSetup(robot_file, config, scene, wind, wanted["gust_m_s"])
 
 
 def _is(key: str, root: str) -> bool:

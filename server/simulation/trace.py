@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from hardware.sim.reference_trajectory import Intent, Pose, missed_by
+from hardware.sim.reference_trajectory import Pose, ReferenceTrajectory, missed_by
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
@@ -15,7 +15,7 @@ from pipeline.teleop import Output
 
 
 @dataclass(slots=True)
-class Trace:
+class TrackingTrace:
     """What happened while tracking, short gaps included, one row a tick."""
 
     t: list[float] = field(default_factory=list)
@@ -39,16 +39,16 @@ class Trace:
     """Why tracking ended, if it did."""
 
 
-class Judge:
+class TrackingEvaluator:
     """Keeps the trace: compares with what the hand meant, since the button was pressed."""
 
     def __init__(
         self, config: VirtualCameraConfig, axes: npt.NDArray[np.bool_], period_s: float
     ) -> None:
         """`axes` (6,): which of b are controlled; `period_s`: from one look to the next."""
-        self.trace = Trace()
+        self.trace = TrackingTrace()
         self._config, self._axes, self._period_s = config, axes, period_s
-        self._intent: Intent | None = None
+        self._intent: ReferenceTrajectory | None = None
 
     def look(self, t: float, body: Pose, hand: Pose, output: Output) -> None:
         """Take the true poses of body and camera at `t` [s], and what control made of them."""
@@ -57,7 +57,7 @@ class Judge:
             trace.left = output.failsafe.reason if self._intent is not None else ""
             return
         if self._intent is None:
-            self._intent = Intent(self._config, hand, body)
+            self._intent = ReferenceTrajectory(self._config, hand, body)
         intended = self._intent.step(hand, self._period_s)
         offset_in_f, turn = missed_by(body, intended, self._axes)
         trace.t.append(t)

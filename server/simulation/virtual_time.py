@@ -17,16 +17,16 @@ from hardware.camera_file import find_camera
 from hardware.codec import Encoder
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import make_hand
-from hardware.sim.led_sensor_model import NoisyEye
+from hardware.sim.led_sensor_model import LedSensorModel
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.reference_trajectory import Pose
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from hardware.sim.truth import Truth
-from hardware.sim.virtual_time_follower import LockstepFollower
-from pipeline.camera.extrinsics import SQUARE, Mounting
+from hardware.sim.virtual_time_follower import VirtualTimeFollower
+from pipeline.camera.extrinsics import SQUARE, Extrinsics
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, Operator, PhoneImu, Seen
+from pipeline.signals import BodyImu, PhoneImu, TouchState, VisionMeasurement
 from pipeline.teleop import Output
 from server.control.controller import PERIOD_S, Controller, never_too_late
 from server.control.ipc import (
@@ -40,12 +40,12 @@ from server.control.ipc import (
 from server.control.ipc_vision import SeenInput
 from server.control.process import too_late
 from server.control.robot_clock import RobotLink
-from server.phone.frame_pipeline import Sight
+from server.phone.frame_pipeline import FramePipeline
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.wire import WireError, decode, encode
 from server.protocol.wire_records import Ping, Record, Touch
 from server.simulation.line import Kind, Transit
-from server.simulation.trace import Judge, Trace
+from server.simulation.trace import TrackingEvaluator, TrackingTrace
 from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
 
 EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}
@@ -54,7 +54,7 @@ NETWORK_TICKS = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class SimulationOptions:
     """What is simulated."""
 
     hand: str = "steady"
@@ -70,7 +70,7 @@ class Scene:
     bitrate_bps: int = 3_000_000
     readout_s: float = 0.0
     """Of the rolling shutter."""
-    mounting: Mounting = SQUARE
+    mounting: Extrinsics = SQUARE
     """How the camera sits beside the phone's motion sensors ..."""
     knows_mounting: bool = True
     """... and whether the camera's file says it."""
@@ -85,22 +85,22 @@ class Scene:
         return tuple(sorted({led for leds in covered for led in leds}))
 
 
-class Lockstep:
+class VirtualTimeSimulation:
     """One flight. `advance` moves everything by one control period."""
 
     def __init__(
         self,
         robot_file: RobotFile,
         config: TeleopConfig,
-        scene: Scene,
+        scene: SimulationOptions,
         operator: VirtualOperator | None = None,
     ) -> None:
         """Everything at rest at time 0; the phone is held by the usual `operator` or another."""
         self.scene = scene
-        self.follower = LockstepFollower(robot_file, scene.seed)
+        self.follower = VirtualTimeFollower(robot_file, scene.seed)
         late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
         self.controller = Controller(robot_file.robot, config, too_late=late)
-        self._judge = Judge(config.virtual_camera, robot_file.robot.axes, PERIOD_S)
+        self._judge = TrackingEvaluator(config.virtual_camera, robot_file.robot.axes, PERIOD_S)
         self.trace = self._judge.trace
         self.lost: set[str] = set()
         """What of the phone does not arrive now: motion, picture, touch."""
@@ -116,7 +116,7 @@ class Lockstep:
         camera = self._script.phone.camera
         camera = camera if scene.knows_mounting else replace(camera, mounting=SQUARE)
         self._ingest.mounting = camera.mounting
-        self._sight = Sight(camera, robot_file.robot, config.gates)
+        self._sight = FramePipeline(camera, robot_file.robot, config.gates)
         self._eye = make_eye(robot_file, scene, self._script)
         self._link = RobotLink(self.follower)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
@@ -140,7 +140,7 @@ class Lockstep:
         plant = self.follower.plant
         return self._script.phone.hand.pose(self.t), (plant.R_fb, plant.p_bf_in_f)
 
-    def run(self, seconds: float) -> Trace:
+    def run(self, seconds: float) -> TrackingTrace:
         """Fly until `seconds`, or until tracking ends."""
         while self.t < seconds and not self.trace.left:
             self.advance()
@@ -238,7 +238,7 @@ class Lockstep:
             case PhoneImu() as sample:
                 self._feel(sample)
                 self._inbox.append(PhoneImuInput.of(sample))
-            case Operator() as operator:
+            case TouchState() as operator:
                 self._inbox.append(OperatorInput.of(operator))
             case EncodedFrame() as frame:
                 self._see(frame)
@@ -250,7 +250,7 @@ class Lockstep:
         self.trace.leds.append(len(sighting.rays) if sighting is not None else 0)
         self._tell(sighting.seen(self._sight.camera) if sighting is not None else None)
 
-    def _glimpse(self, eye: NoisyEye, t: float) -> None:
+    def _glimpse(self, eye: LedSensorModel, t: float) -> None:
         """A picture of which only the LEDs' rays exist; dated as others are."""
         clock, phone = self._ingest.clock, self._script.phone
         if not clock.ready:
@@ -262,7 +262,7 @@ class Lockstep:
         self.trace.leds.append(len(seen.rays) if seen is not None else 0)
         self.transit.send(self.t, "picture", partial(self._tell, seen))
 
-    def _tell(self, seen: Seen | None) -> None:
+    def _tell(self, seen: VisionMeasurement | None) -> None:
         if seen is not None:
             self.trace.poses += seen.pose is not None
             self._inbox.append(SeenInput.of(seen))
@@ -278,16 +278,18 @@ class Lockstep:
                 self._sight.feel_body([sample])
 
 
-def make_eye(robot_file: RobotFile, scene: Scene, script: PhoneScript) -> NoisyEye | None:
+def make_eye(
+    robot_file: RobotFile, scene: SimulationOptions, script: PhoneScript
+) -> LedSensorModel | None:
     """What stands for pictures and vision in a scene without them."""
     if scene.led_noise_px is None:
         return None
     rng, leds_in_b = np.random.default_rng((scene.seed, 11)), robot_file.robot.leds_in_b
-    return NoisyEye(script.phone, leds_in_b, scene.led_noise_px, scene.hidden_at, rng)
+    return LedSensorModel(script.phone, leds_in_b, scene.led_noise_px, scene.hidden_at, rng)
 
 
 def make_script(
-    robot_file: RobotFile, scene: Scene, operator: VirtualOperator | None = None
+    robot_file: RobotFile, scene: SimulationOptions, operator: VirtualOperator | None = None
 ) -> PhoneScript:
     """The virtual phone of a scene, with its page and its holder."""
     options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
@@ -296,7 +298,7 @@ def make_script(
         replace(camera, readout_s=scene.readout_s, mounting=scene.mounting),
         make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
         robot_file.robot.leds_in_b,
-        Look(),
+        RenderOptions(),
         np.random.default_rng((scene.seed, 3)),
         options,
         hidden=scene.hidden_at,

@@ -8,16 +8,16 @@ from typing import Final, Protocol
 import numpy as np
 
 from hardware.codec import Encoder
-from hardware.sim.led_sensor_model import NoisyEye
+from hardware.sim.led_sensor_model import LedSensorModel
 from hardware.sim.phone import BodyHistory, Event, VirtualPhone
-from pipeline.estimation.gravity_direction import Vertical
+from pipeline.estimation.gravity_direction import GravityDirection
 from pipeline.frames import Array
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
+from pipeline.signals import BodyImu, PhoneImu, RelativeState, VisionMeasurement
 from pipeline.vision_config import GatesConfig
 from server.common.settings import VideoSettings
-from server.phone.frame_pipeline import Sight
+from server.phone.frame_pipeline import FramePipeline
 from server.phone.ingest import EncodedFrame
 from server.protocol.wire_records import Picture
 from server.virtual_phone.phone_script import PhoneScript, VirtualOperator
@@ -28,7 +28,7 @@ STATUS_PERIODS: Final = 4
 """Vision hears of control's filter every 20 ms, as in the server."""
 
 
-class Eye(Protocol):
+class VisionModel(Protocol):
     """Pictures that arrived, and what vision knows beside them."""
 
     def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
@@ -37,18 +37,18 @@ class Eye(Protocol):
     def expect(self, relative: RelativeState | None, time_offset: float) -> None:
         """Follow what control's filter says at the end of a period."""
 
-    def see(self, pictures: Sequence[Event], body: BodyHistory) -> Seen | None:
+    def see(self, pictures: Sequence[Event], body: BodyHistory) -> VisionMeasurement | None:
         """What the newest of `pictures`, in order and not none, says of the robot."""
 
 
-class SpotsEye:
+class RayVisionModel:
     """Nothing is rendered, searched or named wrongly, and each picture's time is known."""
 
     def __init__(
         self, phone: VirtualPhone, leds_in_b: Array, noise_px: float, rng: np.random.Generator
     ) -> None:
-        """LEDs (n, 3) [m]; `noise_px` as in `NoisyEye`."""
-        self._eye = NoisyEye(phone, leds_in_b, noise_px, lambda _: (), rng)
+        """LEDs (n, 3) [m]; `noise_px` as in `LedSensorModel`."""
+        self._eye = LedSensorModel(phone, leds_in_b, noise_px, lambda _: (), rng)
 
     def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
         """It needs no help."""
@@ -56,13 +56,13 @@ class SpotsEye:
     def expect(self, relative: RelativeState | None, time_offset: float) -> None:
         """It needs no help."""
 
-    def see(self, pictures: Sequence[Event], body: BodyHistory) -> Seen | None:
+    def see(self, pictures: Sequence[Event], body: BodyHistory) -> VisionMeasurement | None:
         """What the newest says; the others are passed over."""
         t = pictures[-1].t_capture
         return self._eye.seen(t, t, body)
 
 
-class PicturesEye:
+class RenderedVisionModel:
     """Pictures are rendered, encoded, decoded and looked at, as a phone and a server do."""
 
     def __init__(self, phone: VirtualPhone, codec: str, robot: Robot, gates: GatesConfig) -> None:
@@ -70,8 +70,8 @@ class PicturesEye:
         camera, rate_hz = phone.camera, phone.options.frame_rate_hz
         encoder = Encoder(camera.width, camera.height, rate_hz, BITRATE_BPS, codec)
         self._script = PhoneScript(phone, encoder, VirtualOperator())
-        self._sight = Sight(camera, robot, gates)
-        self._vertical, self._omega_bf_in_b = Vertical(), np.zeros(3)
+        self._sight = FramePipeline(camera, robot, gates)
+        self._vertical, self._omega_bf_in_b = GravityDirection(), np.zeros(3)
         self._periods = 0
 
     def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
@@ -89,10 +89,10 @@ class PicturesEye:
         if relative is not None:
             self._omega_bf_in_b = relative.omega_bf_in_b
         if self._periods % STATUS_PERIODS == 0:
-            said = Expected.of(relative, time_offset) if relative is not None else None
+            said = Prediction.of(relative, time_offset) if relative is not None else None
             self._sight.expect(said)
 
-    def see(self, pictures: Sequence[Event], body: BodyHistory) -> Seen | None:
+    def see(self, pictures: Sequence[Event], body: BodyHistory) -> VisionMeasurement | None:
         """What the newest says; all are decoded, as each needs the one before it."""
         frames = [self._frame(event, body) for event in pictures]
         sighting = self._sight.see(frames, self._vertical.up, self._omega_bf_in_b)

@@ -56,7 +56,7 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class ViewState:
     """One picture's worth; None is not drawn."""
 
     yaw: float
@@ -68,15 +68,15 @@ class View:
     is_fresh: bool = False
 
 
-def view(status: ControlStatus) -> View:
+def view(status: ControlStatus) -> ViewState:
     """What `status` says; frusta have OpenCV's axes o."""
     R_fc, R_fv = _rotation(status.R_fc_wxyz), _rotation(status.R_fv_wxyz)
     if R_fc is None:
-        return View(0.0)
+        return ViewState(0.0)
     reference = None
     if status.mode == Mode.TRACK:
         reference = _pose(R_fv, status.reference_p_in_v, status.reference_R_wxyz)
-    return View(
+    return ViewState(
         yaw=atan2(R_fc[1, 0], R_fc[0, 0]),
         phone=_frustum(R_fc),
         virtual_camera=None if R_fv is None else _frustum(R_fv),
@@ -122,7 +122,7 @@ class Heading:
         """Nobody is there."""
         self._epoch: int | None = None
 
-    def new_yaw(self, epoch: int, view: View) -> float | None:
+    def new_yaw(self, epoch: int, view: ViewState) -> float | None:
         """The yaw [rad] of a phone that has just appeared; None otherwise."""
         known, self._epoch = self._epoch, None if view.phone is None else epoch
         return view.yaw if self._epoch is not None and self._epoch != known else None

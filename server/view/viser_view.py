@@ -130,7 +130,7 @@ class Dashboard:
             self._show_picture(thumbnail)
             self._show_robot(status, view)
 
-    def _turn(self, status: ControlStatus, view: scene.View) -> None:
+    def _turn(self, status: ControlStatus, view: scene.ViewState) -> None:
         yaw = self._heading.new_yaw(status.epoch, view)
         if yaw is not None:
             self._f.wxyz = scene.yaw_wxyz(-yaw)
@@ -146,7 +146,7 @@ class Dashboard:
                 frustum.aspect, frustum.fov = aspect, scene.fov_y(aspect)
         self._phone.image = thumbnail
 
-    def _show_robot(self, status: ControlStatus, view: scene.View) -> None:
+    def _show_robot(self, status: ControlStatus, view: scene.ViewState) -> None:
         """Cable, trail and thrusts."""
         lines = [node for node in (self._cable, self._trail_lines) if node is not None]
         for node in lines:

@@ -18,8 +18,8 @@ from hardware.follower import FollowerError
 from hardware.robot_file import RobotFile, load_robot
 from hardware.sim.hand import HANDS, REST_S, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
-from hardware.sim.phone_faults import Fault
-from hardware.sim.render import Look
+from hardware.sim.phone_faults import SensorFault
+from hardware.sim.render import RenderOptions
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.common import clock
@@ -45,7 +45,7 @@ def make_script(
     options = PhoneOptions(
         frame_rate_hz=arguments.fps,
         picture_delay_s=arguments.latency_ms,
-        fault=Fault(arguments.fault),
+        fault=SensorFault(arguments.fault),
     )
     rest_s = REST_S if robot_file.start.lift == 0.0 else TAKE_OFF_S
     hand = make_hand(
@@ -58,7 +58,7 @@ def make_script(
     )
     rng = np.random.default_rng(arguments.seed)
     camera = find_camera(DEVICE, WIDTH, HEIGHT)
-    phone = VirtualPhone(camera, hand, robot_file.robot.leds_in_b, Look(), rng, options)
+    phone = VirtualPhone(camera, hand, robot_file.robot.leds_in_b, RenderOptions(), rng, options)
     encoder = Encoder(WIDTH, HEIGHT, arguments.fps, BITRATE_BPS, arguments.codec)
     return PhoneScript(phone, encoder, VirtualOperator())
 
@@ -142,7 +142,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--latency-ms", type=_latency, default=(0.06, 0.12), metavar="60-120")
     parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
-    faults = [fault.value for fault in Fault]
+    faults = [fault.value for fault in SensorFault]
     parser.add_argument("--fault", choices=faults, default="none", help="of its motion sensors")
     parser.add_argument("--seed", type=int, default=0, help="of hand, noise and delays")
     parser.add_argument("--robot", help="robot file with the LEDs; default: the server's")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.follower import FollowerError
-from hardware.sim.phone import Event, Stream
+from hardware.sim.phone import DelayedStream, Event
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from server.common import clock
@@ -25,7 +25,7 @@ from server.virtual_phone.phone_script import (
     SYNCHRONISED_PONGS,
     TOUCH_S,
     PhoneScript,
-    Score,
+    TrackingMetrics,
 )
 
 MakeClient = Callable[
@@ -43,7 +43,7 @@ async def until(t: float) -> None:
     await asyncio.sleep(max(0.0, t - clock.now()))
 
 
-class SeenRobot:
+class RobotTruth:
     """Where the simulated robot was, as one thread may ask; frozen while its process is silent."""
 
     def __init__(self, truth_port: int) -> None:
@@ -83,9 +83,9 @@ class LivePhone:
         `axes` (6,) are those it is controlled on.
         """
         self.script = script
-        self._seen, self._scored = SeenRobot(truth_port), SeenRobot(truth_port)
+        self._seen, self._scored = RobotTruth(truth_port), RobotTruth(truth_port)
         self.client = make_client(access, self._pong, self._status)
-        self.score = Score(script.phone, access.virtual_camera, axes)
+        self.score = TrackingMetrics(script.phone, access.virtual_camera, axes)
         self.skipped = self.sent = 0
         """Pictures not made for want of time or credit; pictures sent."""
         self.status: Status | None = None
@@ -199,7 +199,7 @@ def is_superseded(event: Event, now: float, period: float) -> bool:
     return now > max(event.t_deliver, event.t_capture + EXPOSED_S + period)
 
 
-def _endless(stream: Stream) -> Iterator[Event]:
+def _endless(stream: DelayedStream) -> Iterator[Event]:
     """Captures from now on."""
     t = clock.now()
     while True:

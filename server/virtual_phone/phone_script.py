@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hardware.codec import Encoder
 from hardware.sim.phone import BodyHistory, VirtualPhone
-from hardware.sim.reference_trajectory import Intent, missed_by
+from hardware.sim.reference_trajectory import ReferenceTrajectory, missed_by
 from pipeline.config import VirtualCameraConfig
 from server.protocol.messages import Command
 from server.protocol.wire import Kind
@@ -134,16 +134,16 @@ class PhoneScript:
         return Record(sequence, round(1e6 * self.phone.clock.at(t)), body)
 
 
-class Score:
+class TrackingMetrics:
     """How well the robot kept to what the hand meant: RMS over all the time of tracking."""
 
     def __init__(
         self, phone: VirtualPhone, config: VirtualCameraConfig, axes: npt.NDArray[np.bool_] = ALL
     ) -> None:
         """`config` is the virtual camera's, whose lag is part of the intent; `axes` the robot's."""
-        Intent.warm_up()
+        ReferenceTrajectory.warm_up()
         self._phone, self._config, self._axes = phone, config, axes
-        self._intent: Intent | None = None
+        self._intent: ReferenceTrajectory | None = None
         self._t = -np.inf
         self._sum_m2 = self._sum_rad2 = 0.0
         self.max_m = 0.0
@@ -172,7 +172,7 @@ class Score:
 
     def start(self, t: float, robot: BodyHistory) -> None:
         """The button was pressed at `t` [s]: from here the robot is to be led."""
-        self._intent = Intent(self._config, self._phone.hand.pose(t), robot(t))
+        self._intent = ReferenceTrajectory(self._config, self._phone.hand.pose(t), robot(t))
         self._t = t
 
     def advance(self, t: float, robot: BodyHistory, *, counted: bool = True) -> None:

@@ -23,7 +23,7 @@ from server.protocol.wire import WireError
 from server.recording.writer import RecordingError
 from server.web.metrics import exposition
 from server.web.replies import body_of, refusal
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from server.web.status import mode_of
 from server.web.websocket import PageServer
 
@@ -33,7 +33,7 @@ METRICS_S = 1.0
 """So old they may be: they cost some milliseconds."""
 
 
-class VirtualPhone:
+class VirtualPhoneProcess:
     """The virtual phone of the supervisor's button: a process like any other phone."""
 
     def __init__(self) -> None:
@@ -60,10 +60,10 @@ class VirtualPhone:
 class Api:
     """The HTTP side: few requests, each small."""
 
-    def __init__(self, hub: Hub, authority: Path | None) -> None:
+    def __init__(self, hub: SessionManager, authority: Path | None) -> None:
         """`authority` is the certificate to install on phones."""
         self._hub, self._authority = hub, authority
-        self.phone = VirtualPhone()
+        self.phone = VirtualPhoneProcess()
         self._reports = LinkReports(now)
         self._t_metrics, self._exposed = -float("inf"), b""
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import asyncio
 from typing import Protocol
 
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.security.pairings import Member, PairingError
 from server.security.security import UNSAVED
 from server.web.people import People
 
 
-class Led(Protocol):
+class LeadSubject(Protocol):
     """What is led: the hub."""
 
-    phone: OperatorPhone | None
+    phone: PhoneSession | None
     people: People
 
     def is_flying(self) -> bool:
@@ -23,7 +23,7 @@ class Led(Protocol):
     def disarm(self) -> None:
         """Bring the robot down, whoever leads."""
 
-    def part(self, phone: OperatorPhone) -> None:
+    def part(self, phone: PhoneSession) -> None:
         """A phone has gone."""
 
     def say(self, text: str) -> None:
@@ -33,7 +33,7 @@ class Led(Protocol):
 class Handover:
     """Changes of who leads, beside those by phones that come and go."""
 
-    def __init__(self, hub: Led) -> None:
+    def __init__(self, hub: LeadSubject) -> None:
         """Of this hub's lead."""
         self._hub = hub
 

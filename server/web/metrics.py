@@ -9,11 +9,11 @@ from prometheus_client import CollectorRegistry, Gauge, generate_latest
 
 from pipeline.signals import Mode
 from server.protocol.messages import Estimate, Status
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from server.web.status import build
 
 
-def exposition(hub: Hub) -> bytes:
+def exposition(hub: SessionManager) -> bytes:
     """The present status in Prometheus' text format."""
     registry, status = CollectorRegistry(), build(hub)
     mode = Gauge("lightleash_mode", "1 for the present mode", ["mode"], registry=registry)

@@ -18,7 +18,7 @@ from server.security.pairings import LINK_S, Member, PairingError
 from server.security.security import PAIR_TRIES, Doors, cookie_name
 from server.web.people import LOCAL
 from server.web.replies import body_of, refusal
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 
 Wanted = TypeVar("Wanted", bound=msgspec.Struct)
 Answer = Callable[[Wanted, Member], Awaitable[Response]]
@@ -50,7 +50,7 @@ class PersonRequest(msgspec.Struct, forbid_unknown_fields=True):
 class PeopleApi:
     """Pairing, confirming, shutting out, handing on."""
 
-    def __init__(self, hub: Hub, doors: Doors, phones: str, here: str = "") -> None:
+    def __init__(self, hub: SessionManager, doors: Doors, phones: str, here: str = "") -> None:
         """`phones` is where phones reach this server, `here` where this machine does."""
         self._hub, self._doors, self._phones, self._here = hub, doors, phones, here
 

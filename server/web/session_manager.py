@@ -23,10 +23,10 @@ from server.diagnostics.events import Events
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
 from server.media.decoding import Decoding
-from server.phone.calibration_control import Desk
-from server.phone.client_connection import Page
-from server.phone.phone_session import OperatorPhone
-from server.phone.transports import FastPath, PhonePaths
+from server.phone.calibration_control import CalibrationControl
+from server.phone.client_connection import ClientConnection
+from server.phone.phone_session import PhoneSession
+from server.phone.transports import FastTransport, Transports
 from server.phone.vision_thread import Picture, jpeg
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.messages import Command, Hello, Status, ToPage, Tune, encode_message
@@ -50,7 +50,7 @@ GROUNDED = (Mode.DISARMED, Mode.ARMED, Mode.STOPPED)
 PROGRAM = of_this_machine("operator")
 
 
-class Hub:
+class SessionManager:
     """One robot, at most one operator, any number of supervisors."""
 
     def __init__(
@@ -69,13 +69,13 @@ class Hub:
         """
         self.robot, self.recordings = robot, recordings
         self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
-        self.paths = PhonePaths(lambda data: recordings.record("server", data, now()))
-        self._desk = Desk(self.paths.tell)
+        self.paths = Transports(lambda data: recordings.record("server", data, now()))
+        self._desk = CalibrationControl(self.paths.tell)
         self._control = server_end(runtime)
         self.people = People(doors or Doors(), self._keep_deed)
         self.handover = Handover(self)
-        self.phone: OperatorPhone | None = None
-        self.supervisors: set[Page] = set()
+        self.phone: PhoneSession | None = None
+        self.supervisors: set[ClientConnection] = set()
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
         self._events = Events()
@@ -145,7 +145,7 @@ class Hub:
             self.say(f"{told} did not reach the control process: try again.")
 
     def calibrate(self, wish: Calibrate) -> None:
-        """The operator's phone begins to calibrate its camera, or leaves it; see `Desk.wish`."""
+        """The operator's phone begins to calibrate its camera, or leaves it; see `CalibrationControl.wish`."""
         if (phone := self.phone) is not None:
             self._desk.wish(phone, wish, self.status)
             self.say(f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration")
@@ -159,7 +159,9 @@ class Hub:
         else:
             self.say(f"{request.what} did not reach the control process: try again.")
 
-    def greet(self, hello: Hello, page: Page, who: Member = PROGRAM) -> OperatorPhone | None:
+    def greet(
+        self, hello: Hello, page: ClientConnection, who: Member = PROGRAM
+    ) -> PhoneSession | None:
         """Give the lease to a phone of `who`; None while another one has it, or shall have it.
 
         A robot that somebody else has left in flight comes down first: None until it has.
@@ -177,7 +179,7 @@ class Hub:
             self.people.note("take-over", who, "the phone that led was silent")
             self.part(current)
         soon: Callable[..., Any] = asyncio.get_running_loop().call_soon_threadsafe
-        self.phone = OperatorPhone(
+        self.phone = PhoneSession(
             hello,
             self.robot,
             self._cameras,
@@ -204,22 +206,22 @@ class Hub:
         """Bring the robot down, whoever leads."""
         self._ask(RequestInput("disarm"), INSISTS)
 
-    def join_video(self, session: str, page: Page) -> OperatorPhone | None:
+    def join_video(self, session: str, page: ClientConnection) -> PhoneSession | None:
         """The video socket of the phone that has the lease; None for anyone else."""
         if (phone := self._leading(session)) is not None:
             self.paths.join_video(page)
         return phone
 
-    def join_fast(self, session: str, fast: FastPath) -> OperatorPhone | None:
+    def join_fast(self, session: str, fast: FastTransport) -> PhoneSession | None:
         """A fast path of the phone that has the lease; None for anyone else."""
         if (phone := self._leading(session)) is not None:
             self.paths.use(fast)
         return phone
 
-    def _leading(self, session: str) -> OperatorPhone | None:
+    def _leading(self, session: str) -> PhoneSession | None:
         return self.phone if self.phone is not None and self.phone.id == session else None
 
-    def part(self, phone: OperatorPhone) -> None:
+    def part(self, phone: PhoneSession) -> None:
         """A phone has gone."""
         if self.phone is phone:
             self.phone = None

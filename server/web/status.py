@@ -14,8 +14,8 @@ from server.diagnostics.blame import Blame, warnings
 from server.diagnostics.camera_health import health
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
-from server.phone.phone_session import OperatorPhone
-from server.protocol.messages import Estimate, GapCount, Status, Stream, VirtualCamera
+from server.phone.phone_session import PhoneSession
+from server.protocol.messages import Estimate, GapCount, Status, Stream, VirtualCameraStatus
 from server.recording.control import Recordings
 from server.security.security import UNSAVED
 from server.web.people import People
@@ -25,11 +25,11 @@ LOST_S = 0.3
 ModeName = Literal["DISARMED", "ARMED", "TRACK", "COAST", "HOLD", "RAMP", "STOPPED", "LOST"]
 
 
-class Known(Protocol):
+class StatusSource(Protocol):
     """What a status is built from: the hub has it."""
 
     robot: Robot
-    phone: OperatorPhone | None
+    phone: PhoneSession | None
     status: ControlStatus | None
     control_meter: Meter
     recordings: Recordings
@@ -46,7 +46,7 @@ class Known(Protocol):
         """Pages that watch."""
 
 
-def build(hub: Known) -> Status:
+def build(hub: StatusSource) -> Status:
     """From what the hub knows now."""
     t, control, phone = now(), hub.status, hub.phone
     mode, silence = mode_of(hub, t)
@@ -99,7 +99,7 @@ def build(hub: Known) -> Status:
     )
 
 
-def mode_of(hub: Known, t: float) -> tuple[ModeName, str]:
+def mode_of(hub: StatusSource, t: float) -> tuple[ModeName, str]:
     """The robot's mode at `t` [s], and why it is LOST, or ""."""
     control = hub.status
     silence = _silence(control, hub.control_meter.age(t))
@@ -118,14 +118,14 @@ def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | No
     return None if value is None or not isfinite(value) else round(scale * value, digits)
 
 
-def _virtual_camera(control: ControlStatus | None) -> VirtualCamera | None:
+def _virtual_camera(control: ControlStatus | None) -> VirtualCameraStatus | None:
     if control is None or control.knobs is None:
         return None
     phone, virtual = control.R_fc_wxyz, control.R_fv_wxyz
     lag = None
     if phone is not None and virtual is not None:
         lag = 2.0 * acos(min(1.0, abs(sum(a * b for a, b in zip(phone, virtual, strict=True)))))
-    return VirtualCamera(
+    return VirtualCameraStatus(
         knobs=control.knobs,
         lag_deg=_rounded(lag, 1, degrees(1.0)),
         guarding=round(control.guarding, 2),
@@ -167,7 +167,7 @@ def _control(control: ControlStatus | None) -> dict[str, float]:
     return {**lateness, "missed": missed, "step_ms": round(control.step_ms, 3)}
 
 
-def _latency(hub: Known) -> dict[str, float]:
+def _latency(hub: StatusSource) -> dict[str, float]:
     stages = dict(hub.phone.latency_ms) if hub.phone is not None else {}
     if stages and hub.status is not None:
         stages["to control"] = max(0.0, hub.status.fuse_ms - sum(stages.values()))
@@ -175,7 +175,7 @@ def _latency(hub: Known) -> dict[str, float]:
     return {name: round(max(0.0, ms), 2) for name, ms in stages.items()}
 
 
-def _streams(hub: Known, t: float) -> dict[str, Stream]:
+def _streams(hub: StatusSource, t: float) -> dict[str, Stream]:
     streams = {}
     if hub.phone is not None:
         streams = {name: meter.stream(t) for name, meter in hub.phone.meters.items()}

@@ -1,4 +1,4 @@
-"""Thin shells around `Session` and `Hub`: one coroutine reads a page, one writes to it."""
+"""Thin shells around `Session` and `SessionManager`: one coroutine reads a page, one writes to it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server.common.clock import now
 from server.common.settings import VideoSettings
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.messages import (
     Command,
@@ -30,7 +30,7 @@ from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import VERSION, WireError
 from server.protocol.wire_records import Picture, Record
 from server.security.pairings import Member
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 
 log = logging.getLogger("lightleash")
 
@@ -116,7 +116,7 @@ class Connection:
 class PageServer:
     """Serves the three kinds of socket."""
 
-    def __init__(self, hub: Hub, video: VideoSettings) -> None:
+    def __init__(self, hub: SessionManager, video: VideoSettings) -> None:
         """For the pages of one robot."""
         self._hub, self._video = hub, video
 
@@ -137,7 +137,7 @@ class PageServer:
         member: Member = socket.scope["member"]
         looks_only = role == "supervisor" and member.role != "supervisor"
         page, session = Connection(socket), Session(role, looks_only)
-        phone: OperatorPhone | None = None
+        phone: PhoneSession | None = None
         writer = asyncio.create_task(page.write())
         pinger: asyncio.Task[None] | None = None
         try:
@@ -162,12 +162,12 @@ class PageServer:
 
     async def _greet(
         self, page: Connection, session: Session, member: Member
-    ) -> OperatorPhone | None:
+    ) -> PhoneSession | None:
         """Hear hello, answer welcome, take the place; raises WireError if there is none."""
         hello = session.receive(await asyncio.wait_for(page.read(), HELLO_S), now())
         if not isinstance(hello, Hello):
             raise WireError("order", "message", "hello first")
-        phone: OperatorPhone | None = None
+        phone: PhoneSession | None = None
         if session.role == "operator":
             phone = self._hub.greet(hello, page, member)
             if phone is None:
@@ -196,7 +196,7 @@ class PageServer:
         return phone
 
     async def _listen(
-        self, page: Connection, session: Session, phone: OperatorPhone | None, member: Member
+        self, page: Connection, session: Session, phone: PhoneSession | None, member: Member
     ) -> None:
         """Take one thing the page says; a fault is answered and costs nobody else anything.
 
@@ -231,7 +231,7 @@ class PageServer:
                 self._hub.people.note("refusal", member, str(error))
             page.refuse(error, fatal=session.hopeless)
 
-    def _choose(self, choice: PathChoice, phone: OperatorPhone | None) -> None:
+    def _choose(self, choice: PathChoice, phone: PhoneSession | None) -> None:
         """Hand a supervisor's choice on to the page, which obeys and says so; hear what it says.
 
         Raises:
@@ -258,7 +258,7 @@ class PageServer:
             self._hub.phone.video_path = f"websocket, {said.body.codec.name}"
         return False
 
-    async def _ping(self, phone: OperatorPhone | None) -> None:
+    async def _ping(self, phone: PhoneSession | None) -> None:
         t = now()
         while phone is not None and self._hub.phone is phone:
             self._hub.ping()

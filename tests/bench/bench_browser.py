@@ -20,7 +20,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hardware.sim.scenes.scene import FIRST_REPORTING_SEED, HD, SCENES, at_reference
-from hardware.sim.scenes.video import Film
+from hardware.sim.scenes.video import RenderedVideo
 from pipeline.vision.visual_front_end import warm_up
 from server.common.settings import VideoSettings
 from server.common.text import table
@@ -70,7 +70,7 @@ def rows_of(name: str, told: argparse.Namespace, films: Studio) -> list[Row]:
     scene = at_reference(SCENES[name]) if name in REFERENCE else SCENES[name]
     seen = {way: Seen() for way in WAYS}
     for k in range(told.films):
-        film = Film(scene, told.seed + k, HD, told.frames)
+        film = RenderedVideo(scene, told.seed + k, HD, told.frames)
         shots = list(film)
         look(film, shots, films.filmed([shot.luma for shot in shots]), seen)
     return [row(name, way, one, seen[RAW]) for way, one in seen.items()]

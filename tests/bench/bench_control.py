@@ -164,7 +164,7 @@ def serve_with_thread(folder: Path) -> None:
     try:
         settings = load_settings(["--https-port", "0", "--http-port", "0"])
         sockets = listen("127.0.0.1", 0), listen("127.0.0.1", 0)
-        given = server_process.Given(runtime, truth_port, *sockets, secrets.token_bytes(32))
+        given = server_process.LaunchContext(runtime, truth_port, *sockets, secrets.token_bytes(32))
         server_process.main(settings, given)
     finally:
         stopping.append(1)

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.sensors import feed
-from hardware.sim.world.world import Occlusion, Setup, World
+from hardware.sim.world.world import Occlusion, World, WorldOptions
 from pipeline.estimation import paper_ekf_replay as compiled
 from pipeline.estimation.estimators import warm_up
 from pipeline.estimation.imu_history import BODY, PHONE
@@ -59,7 +59,7 @@ def median_us(call, n):
 def filter_in_flight():
     """The filter after 5 s, 120 ms after its last picture was taken."""
     world = World(
-        Setup(seed=1, duration=6.0, occlusions=(Occlusion(4.88),), body_delay=(0.0, 0.001))
+        WorldOptions(seed=1, duration=6.0, occlusions=(Occlusion(4.88),), body_delay=(0.0, 0.001))
     )
     ekf, now = PaperEkf(CONFIG), 0.0
     for now, _ in feed(ekf, world):
@@ -129,7 +129,7 @@ def one(job):
 
 
 def row(name, pool, seeds, config=CONFIG, **setup):
-    jobs = [(config, Setup(seed=FIRST_HELD_OUT_SEED + k, **setup)) for k in range(seeds)]
+    jobs = [(config, WorldOptions(seed=FIRST_HELD_OUT_SEED + k, **setup)) for k in range(seeds)]
     s = metrics.judge(pool.map(one, jobs))
     figures = (s.now_mm, s.now_deg, s.u_mm_s, s.nees, s.held_mm)
     print(name.ljust(34), "".join(f"{v:9.3f}" for v in figures))

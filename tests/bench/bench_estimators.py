@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.pcrb import bound, rms
-from hardware.sim.world.world import LEDS_IN_B, Occlusion, Setup, World
+from hardware.sim.world.world import LEDS_IN_B, Occlusion, World, WorldOptions
 from pipeline.config import TeleopConfig
 from pipeline.estimation.estimators import make_estimator
 
@@ -42,7 +42,7 @@ ROUGH = {
 @dataclass
 class Job:
     name: str
-    setup: Setup
+    setup: WorldOptions
     wants: str = ""
     """bound, or the end of an occlusion."""
     stop: float = inf
@@ -50,7 +50,7 @@ class Job:
 
 @dataclass
 class Done:
-    track: evaluator.Track
+    track: evaluator.EstimatorRun
     now: list = field(default_factory=list)
     captured: list = field(default_factory=list)
     at_return: np.ndarray | None = None
@@ -78,7 +78,7 @@ class Bench:
 
     def run(self, wants="", stop=inf, alternate=False, **options):
         """All seeds; `alternate` changes the sign of the time offset from one to the next."""
-        setups = [Setup(seed=FIRST_SEED + k, **options) for k in range(self.seeds)]
+        setups = [WorldOptions(seed=FIRST_SEED + k, **options) for k in range(self.seeds)]
         if alternate:
             setups = [replace(s, time_offset=(-1) ** s.seed * s.time_offset) for s in setups]
         jobs = [Job(self.name, setup, wants, stop) for setup in setups]

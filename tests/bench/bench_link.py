@@ -6,12 +6,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from hardware.link.datagram import Command, decode_command, encode_command
+from hardware.link.datagram import CommandDatagram, decode_command, encode_command
 from hardware.link.link_key import mac
 
 SOURCE = Path(__file__).parents[2] / "deploy" / "watchdog"
 KEY, ROUNDS, TRIES = bytes(range(16)), 20_000, 5
-COMMAND = Command(1, 2, 3, 4, True, (1.0,) * 8)
+COMMAND = CommandDatagram(1, 2, 3, 4, True, (1.0,) * 8)
 LOOP = """
 #include "hmac.h"
 #include <string.h>

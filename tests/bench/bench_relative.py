@@ -19,26 +19,28 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from hardware.sim.world.sensors import events, give
-from hardware.sim.world.world import LEDS_IN_B, Occlusion, Setup, World
+from hardware.sim.world.world import LEDS_IN_B, Occlusion, World, WorldOptions
 from pipeline.estimation import gravity_free
 from pipeline.estimation.estimators import warm_up
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
-from pipeline.signals import Seen
+from pipeline.signals import VisionMeasurement
 
 WARM_UP_TICKS = 200
 
 
 def flown(seconds=20.0):
     """The filter after a flight whose last picture is 120 ms old; CPU µs of ticks."""
-    world = World(Setup(seed=1, duration=seconds + 1.0, occlusions=(Occlusion(seconds - 0.12),)))
+    world = World(
+        WorldOptions(seed=1, duration=seconds + 1.0, occlusions=(Occlusion(seconds - 0.12),))
+    )
     relative, queue = RelativeFilter(RelativeConfig(), LEDS_IN_B), iter(events(world))
     event, now = next(queue), 0.0
     quiet, seeing = [], []
     for now in np.arange(0.1, seconds, 0.005).tolist():
         began, has_picture = thread_time_ns(), False
         while event[0] <= now:
-            has_picture |= isinstance(event[1], Seen) and len(event[1].rays) > 0
+            has_picture |= isinstance(event[1], VisionMeasurement) and len(event[1].rays) > 0
             give(relative, event[1], now)
             event = next(queue)
         relative.state(now)
@@ -70,10 +72,10 @@ def main():
     span = now - track.newest.t
     steps = round(span / 0.005)
     here = track.newest
-    felt = gravity_free.Felt(*track.inputs_now().reshape(4, 3))
+    felt = gravity_free.PredictedImu(*track.inputs_now().reshape(4, 3))
 
     def plain():
-        x = gravity_free.Motion(here.x[0:3], here.R, here.x[3:6])
+        x = gravity_free.RelativeMotion(here.x[0:3], here.R, here.x[3:6])
         P = here.P[:9, :9].copy()
         for _ in range(steps):
             F, G = gravity_free.error_jacobian(x, felt)

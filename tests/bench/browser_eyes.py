@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hardware.sim.scenes.video import Film, Shot
+from hardware.sim.scenes.video import RenderedFrame, RenderedVideo
 from pipeline.signals import Frame
-from pipeline.vision.imu_buffer import Felt
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.imu_buffer import ImuBuffer
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.common.settings import VideoSettings
 from server.experiments.vision.channel import Wire
@@ -44,18 +44,21 @@ class Seen:
 class Eye:
     """Looks at one film."""
 
-    def __init__(self, film: Film, seen: Seen) -> None:
+    def __init__(self, film: RenderedVideo, seen: Seen) -> None:
         self._film, self._seen = film, seen
-        self._looking, self._body = Looking(film.camera, film.leds_in_b, GatesConfig()), Felt()
+        self._looking, self._body = (
+            VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig()),
+            ImuBuffer(),
+        )
 
-    def feel(self, shot: Shot) -> None:
+    def feel(self, shot: RenderedFrame) -> None:
         for sample in shot.phone:
             self._looking.feel(sample)
         self._looking.feel_body(shot.body)
         for sample in shot.body:
             self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
 
-    def see(self, k: int, shot: Shot, frame: Frame) -> None:
+    def see(self, k: int, shot: RenderedFrame, frame: Frame) -> None:
         """Picture `k`."""
         seen, film, now = self._seen, self._film, self._body.at(shot.t)
         seen.frames += 1
@@ -76,7 +79,9 @@ class Eye:
                 seen.off_px.append(off)
 
 
-def look(film: Film, shots: list[Shot], got: list[Delivered], seen: Mapping[str, Seen]) -> None:
+def look(
+    film: RenderedVideo, shots: list[RenderedFrame], got: list[Delivered], seen: Mapping[str, Seen]
+) -> None:
     """Every way's pictures, of those that came through Chromium."""
     eyes = {name: Eye(film, one) for name, one in seen.items()}
     wire, came = Wire(f"h264-{MBIT:g}", film.size), {picture.number: picture for picture in got}

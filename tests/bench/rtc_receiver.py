@@ -26,7 +26,7 @@ from server.common.settings import VideoSettings
 from server.phone.decoder import FrameDecoder
 from server.phone.frame_worker import FrameThread
 from server.phone.ingest import EncodedFrame
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.process.server_process import SWITCH_S
 from server.security.request_guard import Guard
 from server.view.viser_proxy import routes as view_routes
@@ -58,7 +58,7 @@ class Seen:
 class Eyes(FrameThread):
     """Decodes, as vision does, and looks at the clock in the picture."""
 
-    def __init__(self, phone: OperatorPhone, shape: tuple[int, int], seen: Seen) -> None:
+    def __init__(self, phone: PhoneSession, shape: tuple[int, int], seen: Seen) -> None:
         super().__init__("eyes", phone._on_taken)
         self._seen, self._want_key = seen, phone._on_key_wanted
         self._decoder = FrameDecoder(*shape)
@@ -98,9 +98,9 @@ class Receiver(RtcHouse):
         routes.append(Route("/stock", self._stock, methods=["POST"]))
         pages = PageServer(self.hub, VideoSettings())
         self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
-        OperatorPhone._see = lambda phone, frame, t: self._see(phone, frame, t)
+        PhoneSession._see = lambda phone, frame, t: self._see(phone, frame, t)
 
-    def _see(self, phone: OperatorPhone, frame: EncodedFrame, t: float) -> None:
+    def _see(self, phone: PhoneSession, frame: EncodedFrame, t: float) -> None:
         phone.meters["video"].tick(t, frame.t)
         if self._eyes is None:
             shape = frame.picture.width, frame.picture.height

@@ -10,15 +10,15 @@ from server.protocol.messages import Hello, encode_message
 from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Ping
 from server.recording.writer import CAMERA_KEY, DEVICE_KEY, ROBOT_KEY, SETTINGS_KEY, Recorder
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 from server.virtual_phone.phone_script import DEVICE
 
-SCENE = Scene(hand="demo", seed=11, frame_rate_hz=20.0, bitrate_bps=450_000)
+SCENE = SimulationOptions(hand="demo", seed=11, frame_rate_hz=20.0, bitrate_bps=450_000)
 SECONDS = 5.5
 STATUS_TICKS = 4
 
 
-class RecordedFlight(Lockstep):
+class RecordedFlight(VirtualTimeSimulation):
     """A flight whose records, wishes and statuses are kept."""
 
     def __init__(self, recorder, scene=SCENE):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hardware.sim.hand import Hand
-from hardware.sim.reference_trajectory import Intent, Pose
+from hardware.sim.reference_trajectory import Pose, ReferenceTrajectory
 from hardware.sim.truth import Truth, TruthClient
 from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
@@ -92,7 +92,7 @@ class PlayedPhone(ABC):
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
         self._witness = Witness()
-        Intent.warm_up()
+        ReferenceTrajectory.warm_up()
 
     @property
     @abstractmethod
@@ -227,7 +227,7 @@ class PlayedPhone(ABC):
         waiting = deque(meanwhile)
         hand, body = self.step()
         started = before = time.monotonic()
-        intent = Intent(VirtualCameraConfig(), hand, body)
+        intent = ReferenceTrajectory(VirtualCameraConfig(), hand, body)
         distances: list[tuple[float, float]] = []
         while (now := time.monotonic()) < started + seconds and not is_over():
             hand, body = self.step()

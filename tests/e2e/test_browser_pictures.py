@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hardware.sim.scenes.scene import HD, SCENES, at_reference
-from hardware.sim.scenes.video import Film
+from hardware.sim.scenes.video import RenderedVideo
 from pipeline.vision.visual_front_end import warm_up
 from server.common.settings import VideoSettings
 from tests.bench.browser_eyes import CHROMIUM, RAW, WAYS, Seen, look, row
@@ -28,7 +28,7 @@ def test_a_picture_says_its_number_in_its_colour(brighter: int) -> None:
 @pytest.mark.e2e
 def test_centroids_of_delivered_pictures_are_those_of_raw_ones(chromium: str) -> None:
     warm_up()
-    film = Film(at_reference(SCENES["typical"]), 7, HD, FRAMES)
+    film = RenderedVideo(at_reference(SCENES["typical"]), 7, HD, FRAMES)
     shots = list(film)
     with studio(chromium, Speed(SLOWER, VideoSettings().bitrate_bps)) as films:
         got = films.filmed([shot.luma for shot in shots])

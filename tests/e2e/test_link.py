@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from hardware.sim.network.channel import CLEAN, Conditions
-from hardware.sim.network.emulated_link import Link
+from hardware.sim.network.emulated_link import EmulatedLink
 from hardware.sim.network.netns import Namespace, NamespaceError
 
 pytestmark = pytest.mark.e2e
@@ -24,9 +24,9 @@ LATE = Conditions(delay_s=0.02)
 
 
 @pytest.fixture
-def link() -> Iterator[Link]:
+def link() -> Iterator[EmulatedLink]:
     try:
-        opened = Link(seed=1)
+        opened = EmulatedLink(seed=1)
     except NamespaceError as error:
         pytest.skip(f"NO LINK EMULATOR, not tested: {error}")
     with opened:
@@ -40,7 +40,7 @@ def bound(namespace: Namespace, kind: socket.SocketKind = socket.SOCK_DGRAM) -> 
     return one
 
 
-def exchange(link: Link, count: int) -> tuple[list[int], list[int]]:
+def exchange(link: EmulatedLink, count: int) -> tuple[list[int], list[int]]:
     """Numbered datagrams both ways; gives those that came (at far, at near), in order."""
     with bound(link.near) as near, bound(link.far) as far:
         for number in range(count):
@@ -63,7 +63,7 @@ def drained(one: socket.socket) -> list[int]:
             return numbers
 
 
-def test_packets_cross_in_both_directions_each_with_its_own_delay(link: Link) -> None:
+def test_packets_cross_in_both_directions_each_with_its_own_delay(link: EmulatedLink) -> None:
     link.shape(to_far=LATE)
     with bound(link.near) as near, bound(link.far) as far:
         begun = time.monotonic()
@@ -79,7 +79,7 @@ def test_what_the_line_loses_is_lost_and_counted_and_the_same_again_with_the_sam
     came = []
     for _ in range(2):
         try:
-            opened = Link(Conditions(loss=0.3), Conditions(duplicate=0.5), seed=5)
+            opened = EmulatedLink(Conditions(loss=0.3), Conditions(duplicate=0.5), seed=5)
         except NamespaceError as error:
             pytest.skip(f"NO LINK EMULATOR, not tested: {error}")
         with opened as link:
@@ -93,7 +93,7 @@ def test_what_the_line_loses_is_lost_and_counted_and_the_same_again_with_the_sam
     assert 50 < len(came[0]) < 90
 
 
-def test_conditions_change_while_packets_flow(link: Link) -> None:
+def test_conditions_change_while_packets_flow(link: EmulatedLink) -> None:
     assert exchange(link, 20) == (list(range(20)), list(range(20)))
     link.shape(to_far=Conditions(dark=True))
     with bound(link.near) as near, bound(link.far) as far:
@@ -105,7 +105,9 @@ def test_conditions_change_while_packets_flow(link: Link) -> None:
         assert far.recv(16) == b"light"
 
 
-def test_tcp_brings_all_of_it_over_a_line_that_loses_reorders_and_spoils(link: Link) -> None:
+def test_tcp_brings_all_of_it_over_a_line_that_loses_reorders_and_spoils(
+    link: EmulatedLink,
+) -> None:
     bad = Conditions(loss=0.02, reorder=0.05, hold_s=0.005, duplicate=0.05, corrupt=0.02)
     link.shape(bad, bad)
     sent = bytes(range(256)) * 400
@@ -122,14 +124,14 @@ def test_tcp_brings_all_of_it_over_a_line_that_loses_reorders_and_spoils(link: L
     assert came == sent
 
 
-def test_a_damaged_datagram_reaches_the_program(link: Link) -> None:
+def test_a_damaged_datagram_reaches_the_program(link: EmulatedLink) -> None:
     link.shape(to_far=Conditions(corrupt=1.0))
     with bound(link.near) as near, bound(link.far) as far:
         near.sendto(bytes(100), (link.far.address, PORT))
         assert sum(byte.bit_count() for byte in far.recv(200)) == 1
 
 
-def test_a_process_starts_inside_and_sees_that_network_alone(link: Link) -> None:
+def test_a_process_starts_inside_and_sees_that_network_alone(link: EmulatedLink) -> None:
     script = "import socket; print(*(name for _, name in socket.if_nameindex()))"
     done = subprocess.run(
         [sys.executable, "-c", script],
@@ -150,7 +152,7 @@ with Link() as link:
 """
 
 
-def test_killed_outright_it_leaves_no_process_and_no_network_behind(link: Link) -> None:
+def test_killed_outright_it_leaves_no_process_and_no_network_behind(link: EmulatedLink) -> None:
     before = named_namespaces()
     holder = subprocess.Popen(
         [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

@@ -8,10 +8,10 @@ from math import isfinite
 
 import pytest
 
-from hardware.sim.network.emulated_link import Link
+from hardware.sim.network.emulated_link import EmulatedLink
 from hardware.sim.network.netns import NamespaceError
 from server.experiments.network.command import row_of
-from server.experiments.network.run import Rig
+from server.experiments.network.run import NetworkTestbed
 from server.experiments.network.scenarios import SCENARIOS
 
 pytestmark = pytest.mark.e2e
@@ -20,20 +20,22 @@ SECONDS, MANY_SECONDS = 6.0, 15.0
 
 
 @pytest.fixture(scope="module")
-def rig() -> Iterator[Rig]:
+def rig() -> Iterator[NetworkTestbed]:
     try:
-        link = Link()
+        link = EmulatedLink()
     except NamespaceError as error:
         pytest.skip(f"NO LINK EMULATOR, not tested: {error}")
     with link:
-        rig = Rig(link)
+        rig = NetworkTestbed(link)
         try:
             yield rig
         finally:
             rig.close()
 
 
-def test_with_15_percent_lost_webrtc_keeps_the_operator_younger_and_more_pictures(rig: Rig) -> None:
+def test_with_15_percent_lost_webrtc_keeps_the_operator_younger_and_more_pictures(
+    rig: NetworkTestbed,
+) -> None:
     line = SCENARIOS["loss15"]
     runs = {path: rig.run(line, path, MANY_SECONDS, seed=1) for path in ("webrtc", "websocket")}
     rows = {path: row_of(line, path, run) for path, run in runs.items()}
@@ -47,7 +49,7 @@ def test_with_15_percent_lost_webrtc_keeps_the_operator_younger_and_more_picture
 
 
 def test_damage_and_a_blackout_cost_pictures_but_neither_the_connection_nor_a_wrong_one(
-    rig: Rig,
+    rig: NetworkTestbed,
 ) -> None:
     dark = SCENARIOS["blackout"]
     line = replace(dark, line=replace(dark.line, corrupt=0.02))

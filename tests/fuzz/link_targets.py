@@ -10,9 +10,9 @@ from hardware.link.datagram import (
     COMMAND_MAGIC,
     MAX_THRUSTERS,
     SAMPLE_MAGIC,
-    Command,
+    CommandDatagram,
     LinkError,
-    Sample,
+    SampleDatagram,
     decode_command,
     decode_sample,
     encode_command,
@@ -39,7 +39,7 @@ def sealed(body: bytes) -> bytes:
 
 def command_seeds():
     for thrusts in ((1.0,), (0.0, 0.5), (0.1,) * MAX_THRUSTERS, (float("nan"), float("inf"))):
-        command = Command(5, 7, 11, 13, True, thrusts, stop=thrusts[0] == 0.0)
+        command = CommandDatagram(5, 7, 11, 13, True, thrusts, stop=thrusts[0] == 0.0)
         yield encode_command(command, KEY)[:-MAC_BYTES]
 
 
@@ -64,7 +64,7 @@ def command(data: bytes) -> None:
 
 def sample_seeds():
     for state in FollowerState:
-        sample = Sample(
+        sample = SampleDatagram(
             state, Refusal.NONE, 10**6, 3, 5, 7, 9, 11, 13, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8),
             (1.0, 2.0),
         )  # fmt: skip
@@ -110,7 +110,7 @@ class RobotRig:
         """The next command of one who means well, with the thrust of the first byte."""
         self.counter += 1
         thrust = LIMITS.f_max * (changes[0] if changes else 0) / 255
-        body = Command(5, self.counter, self.nonce, 1, True, (thrust, thrust))
+        body = CommandDatagram(5, self.counter, self.nonce, 1, True, (thrust, thrust))
         return encode_command(body, KEY)[:-MAC_BYTES]
 
     def step(self, piece: bytes) -> None:
@@ -171,7 +171,7 @@ def control_seeds():
 
 def heard(counter: int, epoch: int = 9) -> bytes:
     """A sample of a robot that has heard the first command, and follows a later epoch."""
-    said = Sample(
+    said = SampleDatagram(
         FollowerState.REFUSING, Refusal.EPOCH, 10**6, 3, 5, epoch, 11, counter, 13, STILL, STILL,
         (0.0, 0.0),
     )  # fmt: skip

@@ -29,7 +29,7 @@ from server.protocol.wire_records import Codec, Picture, Record
 from server.rtc import peer
 from server.rtc.answer import check_answer
 from server.rtc.receiving import bitstream, jitter, metadata_trailer, nack
-from server.rtc.receiving.frame_timestamping import Dating
+from server.rtc.receiving.frame_timestamping import FrameTimestamping
 from tests.fuzz.pictures import encoded
 from tests.fuzz.sequence import pieces, together
 from tests.fuzz.target import target
@@ -291,7 +291,7 @@ def dating_seeds():
 @target("dating", dating_seeds, max_bytes=2048)
 def dating(data: bytes) -> None:
     """Pairs, pictures with and without a record: each date is a whole number a record can carry."""
-    dates = Dating()
+    dates = FrameTimestamping()
     for kind, stamp, t_us, arrival_us in STEP.iter_unpack(
         data[: len(data) // STEP.size * STEP.size]
     ):

@@ -8,14 +8,14 @@ from hardware.link.control_end import ControlEnd
 from hardware.link.udp import UdpFollower
 from hardware.robot_file import RobotFile
 from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
-from hardware.sim.virtual_time_follower import LockstepFollower
+from hardware.sim.virtual_time_follower import VirtualTimeFollower
 
 KEY = bytes(range(16))
 
 
 class LockstepRig:
     def __init__(self, robot_file: RobotFile) -> None:
-        self.follower = LockstepFollower(robot_file)
+        self.follower = VirtualTimeFollower(robot_file)
         self.f_max = robot_file.robot.f_max
 
     def advance(self, dt: float) -> None:

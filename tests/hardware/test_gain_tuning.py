@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from hardware.dynamics import dynamics_of
-from hardware.gain_tuning import Goals, TuningError, keeps, moved, tuned, with_gains
+from hardware.gain_tuning import MarginGoals, TuningError, keeps, moved, tuned, with_gains
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
 from pipeline.control.margins import OMEGA, Loop, S, Sensing
 
-GOALS = Goals(gain=2.0, phase=radians(35.0), delay=0.010)
+GOALS = MarginGoals(gain=2.0, phase=radians(35.0), delay=0.010)
 X, ROLL, YAW = 0, 3, 5
 
 
@@ -81,4 +81,4 @@ def test_motion_by_a_disturbance_is_that_of_a_simulation():
 @pytest.mark.slow
 def test_margins_that_nothing_keeps_are_told_with_their_axis():
     with pytest.raises(TuningError, match="no gains on roll"):
-        tuned(loop("ames"), [ROLL], Sensing("none", 0.25), Goals(4.0, radians(70.0), 0.05))
+        tuned(loop("ames"), [ROLL], Sensing("none", 0.25), MarginGoals(4.0, radians(70.0), 0.05))

@@ -1,4 +1,4 @@
-"""What a camera with a fault shows of a `World`: looks for `CameraWatch`, without any picture."""
+"""What a camera with a fault shows of a `World`: looks for `CalibrationMonitor`, without any picture."""
 
 from dataclasses import dataclass, replace
 
@@ -9,8 +9,8 @@ from scipy.signal import lfilter
 from hardware.sim.world.rotations import exp_each, rpy_each, skew_each
 from hardware.sim.world.sensors import body_samples, phone_samples, tangents_by_place
 from hardware.sim.world.world import GRID_S, LEDS_IN_B
-from pipeline.camera.block import Look
-from pipeline.camera.calibration_monitor import CameraWatch
+from pipeline.camera.block import LedObservation
+from pipeline.camera.calibration_monitor import CalibrationMonitor
 from pipeline.camera.lens import Camera
 from pipeline.signals import StampOffset
 
@@ -58,14 +58,17 @@ def looks(world, faults, seed=0):
     stamps = world.phone_stamps(world.t[i]) - world.setup.time_offset
     C = np.tile((NOISE_PX / FOCAL) ** 2 * np.eye(2), (len(LEDS_IN_B), 1, 1))
     led = np.arange(len(LEDS_IN_B))
-    return [Look(float(stamps[k]), led, z[k], C, parts[k], p[k], R[k]) for k in range(len(stamps))]
+    return [
+        LedObservation(float(stamps[k]), led, z[k], C, parts[k], p[k], R[k])
+        for k in range(len(stamps))
+    ]
 
 
 def watched(
     world, faults, seed=0, coarse=True, hear=lambda watch: None, spoil=lambda sample: sample
 ):
     """The watch after it has seen all; `hear` is asked after each picture."""
-    watch = CameraWatch(CAMERA, LEDS_IN_B)
+    watch = CalibrationMonitor(CAMERA, LEDS_IN_B)
     phone = [
         (arrival, replace(sample, omega_m_cf_in_c=faults.gyro * sample.omega_m_cf_in_c))
         for arrival, sample in phone_samples(world)
@@ -74,7 +77,7 @@ def watched(
     events = sorted([*phone, *body_samples(world), *told], key=lambda event: event[0])
     offset = StampOffset(world.setup.time_offset + 0.002, 0.002) if coarse else None
     for arrival, event in events:
-        if isinstance(event, Look):
+        if isinstance(event, LedObservation):
             watch.saw(event, offset if arrival > 4.0 else None)
             hear(watch)
         elif (sample := spoil(event)) is not None:

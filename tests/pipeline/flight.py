@@ -10,7 +10,7 @@ from hardware.sim.world.sensors import give
 from hardware.sim.world.world import LEDS_IN_B
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import RelativeConfig
-from pipeline.signals import Seen
+from pipeline.signals import VisionMeasurement
 
 
 def new():
@@ -40,7 +40,7 @@ class Flight:
 
     def give(self, sample):
         fusion = give(self.filter, sample, self.now)
-        if isinstance(sample, Seen):
+        if isinstance(sample, VisionMeasurement):
             self.told.append((sample, fusion))
         return fusion
 
@@ -63,7 +63,7 @@ def shifted(seen, dp=(0.0, 0.0), of=(0, 1, 2, 3, 4), dt=0.0):
     q_x = pose.p_bc_in_c[0] + LEDS_IN_B[rays.led] @ pose.R_cb[0]
     moved = np.isin(rays.led, of)[:, None] * np.array(dp) / q_x[:, None]
     p = pose.p_bc_in_c + np.array((0.0, *dp)) * (len(of) == len(LEDS_IN_B))
-    return Seen(
+    return VisionMeasurement(
         seen.t + dt,
         replace(rays, t=rays.t + dt, tangents=rays.tangents + moved),
         replace(pose, t=pose.t + dt, p_bc_in_c=p),

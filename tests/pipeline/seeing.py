@@ -8,10 +8,10 @@ import numpy as np
 import hardware
 from hardware.camera_file import find_camera
 from hardware.robot_file import load_robot
-from hardware.sim.render import Look, render
+from hardware.sim.render import RenderOptions, render
 from pipeline.frames import R_from_rpy, exp, log
-from pipeline.signals import Frame, LedRays, RelativePose, Seen
-from pipeline.vision.detection import Prior
+from pipeline.signals import Frame, LedRays, RelativePose, VisionMeasurement
+from pipeline.vision.detection import FramePrior
 
 CAMERA = find_camera("lightleash-virtual-phone", 1280, 720)
 LEDS_IN_B = load_robot(Path(hardware.__file__).parent / "robots" / "ames.toml").robot.leds_in_b
@@ -32,7 +32,7 @@ class Truth:
         up_in_c = self.R_fc.T @ UP_IN_F
         if rng is not None:
             up_in_c = exp(rng.normal(0.0, sigma_rad, 3)) @ up_in_c
-        return Prior(up_in_c, self.R.T @ self.R_fc.T @ UP_IN_F, np.zeros(3), np.zeros(3))
+        return FramePrior(up_in_c, self.R.T @ self.R_fc.T @ UP_IN_F, np.zeros(3), np.zeros(3))
 
     def pixels(self):
         return CAMERA.pixels(self.p + LEDS_IN_B @ self.R.T)
@@ -61,7 +61,7 @@ def moved(truth, rng, dp=0.004, turn=0.006):
 def picture(truth, rng, look=None, covered=(), camera=CAMERA):
     """Luma of the scene; `covered` LEDs are dark."""
     shown = np.delete(LEDS_IN_B, covered, axis=0)
-    return render(camera, lambda _: (truth.R, truth.p), shown, look or Look(), rng)
+    return render(camera, lambda _: (truth.R, truth.p), shown, look or RenderOptions(), rng)
 
 
 def frame_at(t, truth, rng, look=None, covered=()):
@@ -92,7 +92,7 @@ def seen_at(t, p, R, covariance, leds=None, leds_in_b=LEDS_IN_B):
     """A picture that saw all LEDs of a body at `p`, `R`, or only some: then without a pose."""
     rays = rays_at(t, p, R, leds, leds_in_b=leds_in_b)
     pose = RelativePose(t, p, R, covariance, 0.1, len(rays)) if leds is None else None
-    return Seen(t, rays, pose)
+    return VisionMeasurement(t, rays, pose)
 
 
 def nees(pose, truth):

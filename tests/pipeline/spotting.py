@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.frames import exp
 from pipeline.identification.explanations import SURE, rivals
-from pipeline.identification.relocalisation import Hints, Search
+from pipeline.identification.relocalisation import Relocalisation, SearchHints
 from pipeline.signals import Spots
 from pipeline.vision_config import IdentifyConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, is_wrong
@@ -44,15 +44,15 @@ def seen(truth, rng, leds=range(5), lamps=0):
 
 def hints_of(truth, tilt=None, gravity=True):
     if not gravity:
-        return Hints()
+        return SearchHints()
     prior = truth.prior()
     up_in_c = prior.up_in_c if tilt is None else exp(tilt) @ prior.up_in_c
-    return Hints(up_in_c, prior.up_in_b)
+    return SearchHints(up_in_c, prior.up_in_b)
 
 
 def best(spots, hints, search=None):
     """The explanation that is sure and has no rival."""
-    found = (search or Search(CAMERA, LEDS_IN_B, CONFIG)).explanations(spots, hints)
+    found = (search or Relocalisation(CAMERA, LEDS_IN_B, CONFIG)).explanations(spots, hints)
     if not found or found[0].log_chance > SURE or len(rivals(found)) > 1:
         return None
     return found[0]

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from pipeline.frames import exp
-from pipeline.prediction import MAX_GAP_S, REMEMBERED_S, Expectation, Expected
+from pipeline.prediction import MAX_GAP_S, REMEMBERED_S, Prediction, PredictionHistory
 from pipeline.signals import RelativeState
 
 OMEGA, U, P = np.array([0.2, -0.5, 0.3]), np.array([0.4, 0.1, -0.2]), np.array([2.5, 0.1, 0.0])
 
 
 def said(t, sigma_p=0.01):
-    return Expected(t, P + t * U, exp(t * OMEGA), U, sigma_p, 0.02)
+    return Prediction(t, P + t * U, exp(t * OMEGA), U, sigma_p, 0.02)
 
 
 def filled(times):
-    expectation = Expectation()
+    expectation = PredictionHistory()
     for t in times:
         expectation.add(said(t))
     return expectation
@@ -34,7 +34,7 @@ def test_between_two_predictions_it_is_on_the_way_from_one_to_the_other():
 
 
 def test_it_is_as_unsure_as_the_worse_of_its_neighbours():
-    expectation = Expectation()
+    expectation = PredictionHistory()
     expectation.add(said(0.0, sigma_p=0.01))
     expectation.add(said(0.02, sigma_p=0.05))
     assert expectation.at(0.001).sigma_p == 0.05
@@ -43,7 +43,7 @@ def test_it_is_as_unsure_as_the_worse_of_its_neighbours():
 @pytest.mark.parametrize("t", [-0.001, 0.1801, 5.0])
 def test_outside_of_what_was_said_it_says_nothing(t):
     assert filled(0.02 * np.arange(10)).at(t) is None
-    assert Expectation().at(t) is None
+    assert PredictionHistory().at(t) is None
 
 
 def test_a_silence_is_not_bridged():
@@ -76,7 +76,7 @@ def test_a_filter_whose_time_goes_back_is_another_one():
 
 
 def test_a_picture_stamped_wrong_is_expected_where_it_was_taken():
-    expectation = Expectation()
+    expectation = PredictionHistory()
     for t in 0.02 * np.arange(10):
         expectation.add(replace(said(t), time_offset=-0.03))
     expected = expectation.at(0.1)
@@ -100,7 +100,7 @@ def test_a_filters_state_is_a_prediction_for_its_time(offset, used):
         sigma_theta=0.02,
         age=0.1,
     )
-    expected = Expected.of(state, offset)
+    expected = Prediction.of(state, offset)
     assert (expected.t, expected.sigma_p, expected.sigma_theta) == (3.0, 0.01, 0.02)
     assert expected.time_offset == used
     for name in ("p_bc_in_c", "R_cb", "u_bf_in_c"):

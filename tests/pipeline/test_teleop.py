@@ -11,7 +11,7 @@ import pytest
 from hardware.robot_file import load_robot
 from pipeline.config import EnvelopeConfig, TeleopConfig
 from pipeline.frames import GRAVITY, exp
-from pipeline.signals import BodyImu, Mode, Operator, PhoneImu, Requests
+from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState
 from pipeline.teleop import Inputs, Output, Teleop
 from tests.pipeline.seeing import quiver, seen_at
 
@@ -48,7 +48,7 @@ def run(
                     phone_imu=phone,
                     body_imu=(BodyImu(t, gyro(t), body_a),),
                     seen=(picture,) if k % 6 == 0 and seen > 0.0 else (),
-                    operator=Operator(t - 0.01, held, int(held)),
+                    operator=TouchState(t - 0.01, held, int(held)),
                     requests=Requests(arm=abs(t - arm_at) < 1e-9),
                 )
             )
@@ -105,7 +105,7 @@ def test_timers_go_by_the_measured_time_at_every_rate_of_control(rate_hz: int) -
             phone_imu=(PhoneImu(t - 0.02, STILL, UP),),
             body_imu=(BodyImu(t, quiver(t), UP),),
             seen=(seen,) if k % (rate_hz // 15) == 0 else (),
-            operator=Operator(t - 0.01, False, 1),
+            operator=TouchState(t - 0.01, False, 1),
         )
         times.setdefault(teleop.step(inputs).failsafe.mode, t)
     for mode, after, seconds in (

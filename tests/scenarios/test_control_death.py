@@ -8,16 +8,18 @@ import pytest
 from hardware.follower import FollowerState
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 pytestmark = pytest.mark.slow
 
 
-def flown(name: str, seed: int, seconds: float) -> Lockstep:
+def flown(name: str, seed: int, seconds: float) -> VirtualTimeSimulation:
     """A robot that is led, until control dies."""
     robot_file = load_robot(name)
     config = TeleopConfig(gains=robot_file.gains["phone"])
-    loop = Lockstep(robot_file, config, Scene(hand="moving", seed=seed, led_noise_px=0.3))
+    loop = VirtualTimeSimulation(
+        robot_file, config, SimulationOptions(hand="moving", seed=seed, led_noise_px=0.3)
+    )
     loop.run(seconds)
     assert loop.trace.left == ""
     assert loop.trace.t

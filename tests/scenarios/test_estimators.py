@@ -12,7 +12,7 @@ import pytest
 
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.pcrb import bound, rms
-from hardware.sim.world.world import LEDS_IN_B, Occlusion, Setup, World
+from hardware.sim.world.world import LEDS_IN_B, Occlusion, World, WorldOptions
 from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.estimator_config import NoFilterConfig, RelativeConfig
@@ -23,7 +23,7 @@ FADING = 0.2
 
 
 def worlds(duration=12.0, **options):
-    return [World(Setup(seed=seed, duration=duration, **options)) for seed in SEEDS]
+    return [World(WorldOptions(seed=seed, duration=duration, **options)) for seed in SEEDS]
 
 
 def tracks(there):

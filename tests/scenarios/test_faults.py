@@ -18,22 +18,22 @@ from hardware.sim.virtual_time_follower import whole
 from pipeline.config import TeleopConfig
 from pipeline.signals import Mode
 from server.control.robot_clock import RAMP_BEGUN_S
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 pytestmark = pytest.mark.slow
 ROBOT = load_robot("ames")
 
 
-def tracking(**more: object) -> Lockstep:
-    scene = replace(Scene(hand="steady", seed=8, codec="jpeg"), **more)  # type: ignore[arg-type]
-    loop = Lockstep(ROBOT, TeleopConfig(), scene)
+def tracking(**more: object) -> VirtualTimeSimulation:
+    scene = replace(SimulationOptions(hand="steady", seed=8, codec="jpeg"), **more)  # type: ignore[arg-type]
+    loop = VirtualTimeSimulation(ROBOT, TeleopConfig(), scene)
     while len(loop.trace.t) < 200:
         loop.advance()
         assert loop.t < 8.0, "never tracked"
     return loop
 
 
-def after(loop: Lockstep, seconds: float) -> tuple[dict[str, float], float]:
+def after(loop: VirtualTimeSimulation, seconds: float) -> tuple[dict[str, float], float]:
     """When each mode was entered [s after now], and the largest thrust at the end [N]."""
     started, entered = loop.t, {}
     while loop.t < started + seconds:
@@ -42,7 +42,7 @@ def after(loop: Lockstep, seconds: float) -> tuple[dict[str, float], float]:
     return entered, float(output.thrusts.max())
 
 
-LOSSES: list[tuple[str, Callable[[Lockstep], None], str, float]] = [
+LOSSES: list[tuple[str, Callable[[VirtualTimeSimulation], None], str, float]] = [
     ("picture", lambda loop: loop.lost.add("picture"), "HOLD", 2.6),
     ("motion", lambda loop: loop.lost.add("motion"), "COAST", 0.17),
     ("touch", lambda loop: loop.lost.add("touch"), "COAST", 0.17),
@@ -53,7 +53,7 @@ LOSSES: list[tuple[str, Callable[[Lockstep], None], str, float]] = [
 
 @pytest.mark.parametrize(("what", "happen", "mode", "within"), LOSSES, ids=lambda v: str(v)[:8])
 def test_a_loss_leaves_tracking_in_time_and_ends_in_zero_thrust(
-    what: str, happen: Callable[[Lockstep], None], mode: str, within: float
+    what: str, happen: Callable[[VirtualTimeSimulation], None], mode: str, within: float
 ) -> None:
     loop = tracking()
     loop._script.operator.leaving = what in ("disarm", "stop")
@@ -171,7 +171,9 @@ def test_a_push_is_held_against() -> None:
 
 
 def test_the_machine_never_commands_thrust_outside_its_modes() -> None:
-    loop = Lockstep(ROBOT, TeleopConfig(), Scene(hand="steady", seed=9, codec="jpeg"))
+    loop = VirtualTimeSimulation(
+        ROBOT, TeleopConfig(), SimulationOptions(hand="steady", seed=9, codec="jpeg")
+    )
     while loop.t < 3.0:
         output = loop.advance()
         if output.failsafe.mode in (Mode.DISARMED, Mode.ARMED, Mode.STOPPED):

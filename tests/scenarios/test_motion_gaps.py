@@ -17,7 +17,7 @@ from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
 from server.experiments.gaps.flight import GapFlight
-from server.experiments.gaps.schedule import Gaps, WebRtcLine
+from server.experiments.gaps.schedule import GapSchedule, WebRtcLine
 
 pytestmark = pytest.mark.slow
 SHOVE = np.array([1.5, 2.0, 1.0, 1.0, -1.5, 1.0])
@@ -48,7 +48,7 @@ def test_gravity_stays_where_it_was(name: str, gap_s: float, phase: float) -> No
     hand = loop.phone.hand
     assert isinstance(hand, MovingHand)
     hand._parts += (Shove(back - phase * LASTS_S - hand._t_moves),)
-    loop.transit.line = WebRtcLine(Gaps(gap_s, 1e6, begin))
+    loop.transit.line = WebRtcLine(GapSchedule(gap_s, 1e6, begin))
     modes, told = set(), []
     while loop.t < back + 0.35:
         output = flight.advance()

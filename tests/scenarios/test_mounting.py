@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
-from pipeline.camera.extrinsics import Mounting
+from pipeline.camera.extrinsics import Extrinsics
 from pipeline.config import TeleopConfig
 from pipeline.frames import exp
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 pytestmark = pytest.mark.slow
-ASKEW = Mounting(exp(np.deg2rad([2.0, -3.0, 2.5])), time_offset_s=0.015)
+ASKEW = Extrinsics(exp(np.deg2rad([2.0, -3.0, 2.5])), time_offset_s=0.015)
 """4.4°, and pictures stamped too early."""
 
 
 def flown(**more: object) -> tuple[float, int, str]:
     """Error of the estimate (RMS, mm), ticks of tracking, why it ended."""
-    scene = Scene(hand="moving", seed=8, codec="jpeg", **more)  # type: ignore[arg-type]
-    trace = Lockstep(load_robot("ames"), TeleopConfig(), scene).run(8.0)
+    scene = SimulationOptions(hand="moving", seed=8, codec="jpeg", **more)  # type: ignore[arg-type]
+    trace = VirtualTimeSimulation(load_robot("ames"), TeleopConfig(), scene).run(8.0)
     errors = np.array(trace.estimate_error_in_c)
     return 1e3 * float(np.sqrt((errors**2).sum(axis=1).mean())), len(trace.t), trace.left
 

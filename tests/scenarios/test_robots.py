@@ -15,7 +15,7 @@ from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 pytestmark = pytest.mark.slow
 QUADROTOR, GROUND = load_robot("quadrotor"), load_robot("ground")
@@ -23,13 +23,15 @@ TAKEN_OFF_S = 7.0
 """The hand has been lifted, and the integral has learnt the weight."""
 
 
-def loop_of(name: str, hand: str, seed: int = 5) -> Lockstep:
+def loop_of(name: str, hand: str, seed: int = 5) -> VirtualTimeSimulation:
     robot_file = {"quadrotor": QUADROTOR, "ground": GROUND}[name]
     config = TeleopConfig(gains=robot_file.gains["phone"])
-    return Lockstep(robot_file, config, Scene(hand=hand, seed=seed, codec="jpeg"))
+    return VirtualTimeSimulation(
+        robot_file, config, SimulationOptions(hand=hand, seed=seed, codec="jpeg")
+    )
 
 
-def tilt_deg(loop: Lockstep) -> float:
+def tilt_deg(loop: VirtualTimeSimulation) -> float:
     return float(np.degrees(np.arccos(min(1.0, loop.follower.plant.R_fb[2, 2]))))
 
 
@@ -79,15 +81,15 @@ def test_the_ground_robot_follows_in_x_y_and_yaw_and_lets_the_rest_alone(
     assert np.mean(trace.saturated) < 0.01
 
 
-def lose_the_phone(loop: Lockstep) -> None:
+def lose_the_phone(loop: VirtualTimeSimulation) -> None:
     loop.lost |= {"picture", "motion", "touch"}
 
 
-def lose_the_link(loop: Lockstep) -> None:
+def lose_the_link(loop: VirtualTimeSimulation) -> None:
     loop.follower.connected = False
 
 
-LOSSES: list[Callable[[Lockstep], None]] = [
+LOSSES: list[Callable[[VirtualTimeSimulation], None]] = [
     lose_the_phone,
     lose_the_link,
     lambda loop: loop.wish("disarm"),
@@ -96,7 +98,9 @@ LOSSES: list[Callable[[Lockstep], None]] = [
 WHICH = ["phone", "link", "disarm", "button"]
 
 
-def after_a_loss(name: str, lose: Callable[[Lockstep], None], seconds: float) -> list[Array]:
+def after_a_loss(
+    name: str, lose: Callable[[VirtualTimeSimulation], None], seconds: float
+) -> list[Array]:
     """Places of the robot from 8 s into a flight, when it is lost, on (n, 3); checked all along."""
     loop = loop_of(name, "moving")
     while loop.t < TAKEN_OFF_S + 1.0:
@@ -119,7 +123,7 @@ def after_a_loss(name: str, lose: Callable[[Lockstep], None], seconds: float) ->
 
 @pytest.mark.parametrize("lose", LOSSES, ids=WHICH)
 def test_a_quadrotor_that_loses_what_leads_it_lands_upright_nearby(
-    lose: Callable[[Lockstep], None],
+    lose: Callable[[VirtualTimeSimulation], None],
 ) -> None:
     places = np.array(after_a_loss("quadrotor", lose, 10.0))
     assert places[0, 2] > 0.3
@@ -132,7 +136,9 @@ def test_a_quadrotor_that_loses_what_leads_it_lands_upright_nearby(
 
 
 @pytest.mark.parametrize("lose", LOSSES, ids=WHICH)
-def test_a_ground_robot_that_loses_what_leads_it_stops(lose: Callable[[Lockstep], None]) -> None:
+def test_a_ground_robot_that_loses_what_leads_it_stops(
+    lose: Callable[[VirtualTimeSimulation], None],
+) -> None:
     places = np.array(after_a_loss("ground", lose, 5.0))
     assert np.linalg.norm(places[-1] - places[0]) < 0.1
 

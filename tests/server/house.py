@@ -29,7 +29,7 @@ from server.view.viser_proxy import routes as view_routes
 from server.virtual_phone.phone_script import DEVICE
 from server.web.app import Api, make_app
 from server.web.people_api import PeopleApi
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from server.web.websocket import PageServer
 
 HOST = "127.0.0.1"
@@ -150,7 +150,7 @@ class House:
     def __init__(self, folder: Path) -> None:
         self.doors = Doors(audit=Audit(folder))
         recordings = Recordings(folder / "recordings", {})
-        self.hub = Hub(folder, ROBOT, [CAMERAS], recordings, doors=self.doors)
+        self.hub = SessionManager(folder, ROBOT, [CAMERAS], recordings, doors=self.doors)
         self.control = control_end(folder)
         self.api = Api(self.hub, None)
         self.people = PeopleApi(self.hub, self.doors, "https://robot.lan:8443", "http://here")

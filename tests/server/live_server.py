@@ -17,7 +17,7 @@ from server.common.settings import RtcSettings, VideoSettings
 from server.control.ipc import ControlStatus, Endpoint, control_end
 from server.process.launcher import listen
 from server.recording.control import Recordings
-from server.rtc.signalling_endpoint import RtcDesk
+from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.listener import listener
 from server.security.quotas import QUOTAS, Quota, Quotas
 from server.security.request_guard import Guard
@@ -25,7 +25,7 @@ from server.security.security import Doors
 from server.view.viser_proxy import routes as view_routes
 from server.web.app import Api, make_app
 from server.web.people_api import PeopleApi
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from server.web.websocket import PageServer
 
 HOST = "127.0.0.1"
@@ -53,11 +53,13 @@ class LiveServer:
         self.control: Endpoint = control_end(folder)
         recordings = Recordings(folder / "recordings", {})
         self.doors = Doors()
-        self.hub = Hub(folder, load_robot("ames").robot, [CAMERAS], recordings, doors=self.doors)
+        self.hub = SessionManager(
+            folder, load_robot("ames").robot, [CAMERAS], recordings, doors=self.doors
+        )
         self.api = Api(self.hub, None)
         people = PeopleApi(self.hub, self.doors, "https://robot.lan:8443")
         pages = PageServer(self.hub, VideoSettings())
-        desk = RtcDesk(self.hub, RtcSettings(), 3_000_000)
+        desk = SignallingEndpoint(self.hub, RtcSettings(), 3_000_000)
         view = view_routes(Path("nowhere"))
         self.app = make_app(self.api, pages, [*people.routes(), *view, *desk.routes()])
         self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"], quotas=quotas)

@@ -132,7 +132,7 @@ class _Chance(NamedTuple):
     place: float
 
 
-class Line:
+class ChannelEmulator:
     """One direction. Put packets in, in the order of time; take out what is due."""
 
     def __init__(

@@ -18,7 +18,7 @@ from types import TracebackType
 
 import numpy as np
 
-from hardware.sim.network.channel import CLEAN, Conditions, Counts, Line
+from hardware.sim.network.channel import CLEAN, ChannelEmulator, Conditions, Counts
 from hardware.sim.network.netns import MTU, Namespace
 
 ADDRESSES = ("10.77.0.1", "10.77.0.2")
@@ -43,9 +43,9 @@ class _Direction:
 
     def __init__(self, source: int, sink: int) -> None:
         self.source, self.sink = source, sink
-        self.renew(Line())
+        self.renew(ChannelEmulator())
 
-    def renew(self, line: Line) -> None:
+    def renew(self, line: ChannelEmulator) -> None:
         """Go on as another line."""
         self.line, self.unwritten = line, 0
         self.late: deque[float] = deque(maxlen=REMEMBERED)
@@ -67,7 +67,7 @@ class _Direction:
             self.late.append(time.monotonic() - t_due)
 
 
-class Link:
+class EmulatedLink:
     """`near` and `far`, two networks; packets flow between them while it is open."""
 
     def __init__(
@@ -95,7 +95,7 @@ class Link:
             self._thread.start()
             self._opened = opened.pop_all()
 
-    def __enter__(self) -> Link:
+    def __enter__(self) -> EmulatedLink:
         return self
 
     def __exit__(
@@ -110,8 +110,8 @@ class Link:
         """Begin anew, with other conditions: counts from zero, what is on its way is lost."""
         seeds = np.random.SeedSequence(seed).spawn(2)
         with self._lock:
-            self._to_far.renew(Line(to_far, seeds[0]))
-            self._to_near.renew(Line(to_near, seeds[1]))
+            self._to_far.renew(ChannelEmulator(to_far, seeds[0]))
+            self._to_near.renew(ChannelEmulator(to_near, seeds[1]))
 
     def shape(self, to_far: Conditions | None = None, to_near: Conditions | None = None) -> None:
         """Change the conditions, of one direction or both; packets on their way don't notice."""

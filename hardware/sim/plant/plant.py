@@ -17,7 +17,7 @@ from hardware.plant_parameters import BodyImuParameters, PlantParameters
 from hardware.sim.plant.laser_task import Tube
 from hardware.sim.plant.model import STEP_MS, mjcf
 from hardware.sim.plant.obstacle import Obstacle
-from hardware.sim.plant.touch import Touch, Touched
+from hardware.sim.plant.touch import ContactForce, ContactForceSensor
 from pipeline.frames import Array, R_from_wxyz, wxyz_from_R
 
 SETTLE_MS = 1000
@@ -57,7 +57,7 @@ class Plant:
         self._model.dof_damping[3:6] = parameters.air_damping_rotation
         self._data = mujoco.MjData(self._model)
         self._imu = _Imu(parameters.imu, rng, options)
-        self._touch = Touch(self._model, self._data) if options.obstacle else None
+        self._touch = ContactForceSensor(self._model, self._data) if options.obstacle else None
         thrusters = len(parameters.thruster_torques)
         self._delay_ms = round(1e3 * parameters.delay)
         self._on_their_way: deque[tuple[int, Array]] = deque()
@@ -197,7 +197,7 @@ class Plant:
         return any(floor in (touch.geom1, touch.geom2) for touch in self._data.contact)
 
     @property
-    def touched(self) -> Touched:
+    def touched(self) -> ContactForce:
         """What the obstacle did in the last step; of robots that have one before them.
 
         Raises:

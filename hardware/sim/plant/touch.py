@@ -11,7 +11,7 @@ from pipeline.frames import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Touched:
+class ContactForce:
     """Of the plant's last step."""
 
     force_in_f: Array
@@ -22,7 +22,7 @@ class Touched:
     """Whether they pressed against each other, millisecond by millisecond."""
 
 
-class Touch:
+class ContactForceSensor:
     """Adds up the forces of all contacts of the geom `tool`."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -48,10 +48,12 @@ class Touch:
             total += force_in_f if contact.geom2 == self._tool else -force_in_f
         self._forces.append(total)
 
-    def touched(self) -> Touched:
+    def touched(self) -> ContactForce:
         """Since `start`; nothing before the first step."""
         if not self._forces:
-            return Touched(np.zeros(3), 0.0, ())
+            return ContactForce(np.zeros(3), 0.0, ())
         forces = np.array(self._forces)
         sizes = np.linalg.norm(forces, axis=1)
-        return Touched(forces.mean(axis=0), float(sizes.max()), tuple(bool(n > 0) for n in sizes))
+        return ContactForce(
+            forces.mean(axis=0), float(sizes.max()), tuple(bool(n > 0) for n in sizes)
+        )

@@ -10,9 +10,9 @@ import numpy as np
 from hardware.plant_parameters import BodyImuParameters
 from hardware.robot_file import load_robot
 from hardware.sim.hand import MovingHand, steady_wander, three_poles, tremor
-from hardware.sim.hand_parts import FADE_S, Part, Waves
+from hardware.sim.hand_parts import FADE_S, MotionComponent, Waves
 from hardware.sim.phone import PhoneOptions
-from hardware.sim.scenes.scene import Motion, Range, Scene
+from hardware.sim.scenes.scene import HandMotion, Range, Scene
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu
 
@@ -54,7 +54,7 @@ class Leaving:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Movers:
+class PhoneAndRobotMotion:
     """A phone in a hand and a robot, both smooth functions of time."""
 
     hand: MovingHand
@@ -66,7 +66,7 @@ class Movers:
         return R_fc.T @ R_fb, R_fc.T @ (p_bf_in_f - p_cf_in_f)
 
 
-def movers(scene: Scene, rng: np.random.Generator) -> Movers:
+def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion:
     """Phone before robot, as the scene's ranges say."""
     tilt = np.deg2rad(within(rng, scene.tilt_deg))
     way = rng.uniform(0.0, 2.0 * np.pi)
@@ -81,19 +81,19 @@ def movers(scene: Scene, rng: np.random.Generator) -> Movers:
     rpy_c = aim + np.array([0.0, atan2(above, ahead), atan2(-side, ahead)])
     place = np.array([-ahead, side, above])
     hand = MovingHand((*_parts(scene.motion, rng), tremor(rng)), place, rpy_c, 0.0)
-    return Movers(hand, robot)
+    return PhoneAndRobotMotion(hand, robot)
 
 
-def _parts(motion: Motion, rng: np.random.Generator) -> tuple[Part, ...]:
+def _parts(motion: HandMotion, rng: np.random.Generator) -> tuple[MotionComponent, ...]:
     steady = steady_wander(rng)
-    if motion is Motion.SHAKEN:
+    if motion is HandMotion.SHAKEN:
         phase = rng.uniform(0.0, 2.0 * np.pi, (1, 6))
         hz = SHAKE_HZ * rng.uniform(0.9, 1.1)
         return steady, Waves(SHAKE[None], 2.0 * np.pi * hz[None], phase)
-    if motion is Motion.LEAVING:
+    if motion is HandMotion.LEAVING:
         side, period = float(rng.choice((-1.0, 1.0))), LEAVE_S * float(rng.uniform(0.9, 1.2))
         return steady, Leaving(side, period, START_S + float(rng.uniform(0.1, 0.4)))
-    if motion is Motion.LEADING:
+    if motion is HandMotion.LEADING:
         return steady, three_poles(rng, 0.4, 0.04, 2.0)
     return (steady,)
 
@@ -106,7 +106,7 @@ def within(rng: np.random.Generator, limits: Range) -> float:
     return float(rng.uniform(low, high))
 
 
-class Felt:
+class SimulatedImu:
     """Noisy, biased and rounded readings of one motion sensor at its own rate."""
 
     def __init__(
@@ -146,7 +146,7 @@ class Sensors:
 
     def __init__(
         self,
-        moving: Movers,
+        moving: PhoneAndRobotMotion,
         phone_turn: Array,
         of_phone: np.random.Generator,
         of_body: np.random.Generator,
@@ -154,7 +154,7 @@ class Sensors:
         """`phone_turn` (3, 3) turns the true camera axes into those the phone believes in."""
         o, imu = PhoneOptions(), load_robot("ames").plant.imu
         self._turn = phone_turn
-        self._phone = Felt(
+        self._phone = SimulatedImu(
             moving.hand,
             PHONE_HZ,
             (o.sigma_omega, o.sigma_a),
@@ -162,7 +162,7 @@ class Sensors:
             (o.step_omega, o.step_a),
             of_phone,
         )
-        self._body = Felt(moving.robot, BODY_HZ, *_of_body(imu), of_body)
+        self._body = SimulatedImu(moving.robot, BODY_HZ, *_of_body(imu), of_body)
 
     def phone(self, t: float) -> tuple[PhoneImu, ...]:
         """New readings until `t` [s]."""

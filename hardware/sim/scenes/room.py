@@ -70,7 +70,7 @@ def _furnished(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lights:
+class RoomLights:
     """Round lights that stand still in f, and windows."""
 
     places_in_f: Array
@@ -92,14 +92,14 @@ def lights_around(
     p_cf_in_f: Array,
     half_field: tuple[float, float],
     rng: np.random.Generator,
-) -> Lights:
+) -> RoomLights:
     """Lamps and windows all over what a camera there sees, at any distance."""
     tangents = rng.uniform(-0.95, 0.95, (count, 2)) * half_field
     depth = rng.uniform(1.5, 7.0, count)
     places = np.column_stack((np.ones(count), tangents)) * depth[:, None]
     radii = np.exp(rng.uniform(np.log(0.003), np.log(0.03), count))
     corners = [_window(half_field, rng) for _ in range(windows)]
-    return Lights(
+    return RoomLights(
         p_cf_in_f + places @ R_fc.T,
         radii,
         np.exp(rng.uniform(np.log(0.4), np.log(12.0), count)),

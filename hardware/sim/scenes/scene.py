@@ -1,4 +1,4 @@
-"""The family of scenes that seeing is tuned on and judged by; `video.Film` films one.
+"""The family of scenes that seeing is tuned on and judged by; `video.Video` films one.
 
 Every range below is drawn from anew for each seed: distances, lights, lamps, noise, motion. Seeds
 below `FIRST_REPORTING_SEED` are for tuning and tests; what is reported uses seeds from there on,
@@ -23,7 +23,7 @@ FULL_HD: Final[Size] = (1920, 1080)
 SIZES: Final = (VGA, HD, FULL_HD)
 
 
-class Picture(Enum):
+class ImageOrientation(Enum):
     """How a picture is delivered; all but the first must be refused."""
 
     UPRIGHT = "upright"
@@ -34,7 +34,7 @@ class Picture(Enum):
     """As a front camera's preview is."""
 
 
-class Motion(Enum):
+class HandMotion(Enum):
     """How the phone is held."""
 
     STEADY = "steady"
@@ -76,14 +76,14 @@ class Scene:
     """LEDs that something hides all the time."""
     bar: bool = False
     """Passes before the robot."""
-    motion: Motion = Motion.STEADY
+    motion: HandMotion = HandMotion.STEADY
     tilt_deg: Range = (0.0, 8.0)
     """Of the robot."""
     yaw_deg: Range = (0.0, 35.0)
     """Of the robot, to either side."""
     is_flat: bool = False
     """All LEDs in one plane."""
-    picture: Picture = Picture.UPRIGHT
+    picture: ImageOrientation = ImageOrientation.UPRIGHT
 
 
 CLEAN = Scene(
@@ -119,7 +119,7 @@ _ALL: Final = (
         "motion_blur",
         "long exposures of a fast hand",
         exposure_s=(0.012, 0.017),
-        motion=Motion.SHAKEN,
+        motion=HandMotion.SHAKEN,
         led_light=(3.0, 8.0),
         lamps=(0, 4),
     ),
@@ -128,7 +128,7 @@ _ALL: Final = (
         "rows read slowly while the hand turns at 60°/s",
         readout_s=(0.024, 0.031),
         exposure_s=(0.001, 0.003),
-        motion=Motion.SHAKEN,
+        motion=HandMotion.SHAKEN,
         lamps=(0, 4),
     ),
     Scene(
@@ -176,12 +176,12 @@ _ALL: Final = (
     Scene(
         "leave_return",
         "the robot leaves the picture and comes back",
-        motion=Motion.LEAVING,
+        motion=HandMotion.LEAVING,
         lamps=(2, 6),
     ),
-    Scene("turned_90", "turned against the motion sensors", picture=Picture.TURNED_90),
-    Scene("turned_180", "turned against the motion sensors", picture=Picture.TURNED_180),
-    Scene("mirrored", "left and right exchanged", picture=Picture.MIRRORED),
+    Scene("turned_90", "turned against the motion sensors", picture=ImageOrientation.TURNED_90),
+    Scene("turned_180", "turned against the motion sensors", picture=ImageOrientation.TURNED_180),
+    Scene("mirrored", "left and right exchanged", picture=ImageOrientation.MIRRORED),
 )
 SCENES: Final = {scene.name: scene for scene in _ALL}
 LEARNING: Final = Scene(
@@ -189,7 +189,7 @@ LEARNING: Final = Scene(
     "a camera whose readout and dates are to be learnt while somebody leads a robot",
     readout_s=(0.012, 0.03),
     lamps=(2, 6),
-    motion=Motion.LEADING,
+    motion=HandMotion.LEADING,
 )
 
 

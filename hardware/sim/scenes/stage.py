@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.sim.scenes.crlb import is_merged, place_information
-from hardware.sim.scenes.motion import Movers
+from hardware.sim.scenes.motion import PhoneAndRobotMotion
 from hardware.sim.scenes.optics import Lamp, Pane, Sensor
-from hardware.sim.scenes.room import Bar, Lights, Mirror, Room
+from hardware.sim.scenes.room import Bar, Mirror, Room, RoomLights
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rpy_from_R
 from pipeline.signals import Image
@@ -25,8 +25,8 @@ EVERYWHERE = (-1e4, 1e4)  # beyond any picture [px]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Drawn:
-    """A picture and where its LEDs are; see `video.Shot`."""
+class DrawnFrame:
+    """A picture and where its LEDs are; see `video.RenderedFrame`."""
 
     luma: Image
     pixels: Array
@@ -36,7 +36,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ways:
+class ImageTrajectories:
     """How points move over the picture around the times at which their rows are exposed."""
 
     rows: Array
@@ -55,7 +55,7 @@ class Stage:
     """(n,) of their surfaces."""
     shown: Flags
     """(n,) not covered."""
-    lights: Lights
+    lights: RoomLights
     mirror: Mirror | None
     bar: Bar | None
     room: Room
@@ -65,11 +65,11 @@ class Stage:
         self,
         sensor: Sensor,
         camera: Camera,
-        moving: Movers,
+        moving: PhoneAndRobotMotion,
         t: float,
         shift: tuple[int, int],
         bound: bool,
-    ) -> Drawn:
+    ) -> DrawnFrame:
         """The picture whose middle row is exposed around `t` [s]."""
         ways = self._ways(sensor, camera, moving, t)
         n = len(self.leds_in_b)
@@ -87,9 +87,9 @@ class Stage:
                 merged[led] = is_merged(sensor, room, lamps, panes, lamp)
                 if bound:
                     information[led] = place_information(sensor, lamp)
-        return Drawn(luma, ways.rows[:n, :2], visible, merged, information)
+        return DrawnFrame(luma, ways.rows[:n, :2], visible, merged, information)
 
-    def _points(self, moving: Movers, t: float) -> tuple[Array, Array]:
+    def _points(self, moving: PhoneAndRobotMotion, t: float) -> tuple[Array, Array]:
         """Points in f (m, 3): LEDs, their mirror images, lamps, windows, the bar; and in c."""
         (R_fc, p_cf_in_f), (R_fb, p_bf_in_f) = moving.hand.pose(t), moving.robot.pose(t)
         leds = p_bf_in_f + self.leds_in_b @ R_fb.T
@@ -102,7 +102,9 @@ class Stage:
         in_f = np.concatenate(points)
         return in_f, (in_f - p_cf_in_f) @ R_fc
 
-    def _ways(self, sensor: Sensor, camera: Camera, moving: Movers, t: float) -> Ways:
+    def _ways(
+        self, sensor: Sensor, camera: Camera, moving: PhoneAndRobotMotion, t: float
+    ) -> ImageTrajectories:
         span = 0.5 * (abs(camera.readout_s) + sensor.optics.exposure_s) + 1e-4
         nodes = np.linspace(-1.0, 1.0, NODES)
         points = np.array([self._points(moving, t + span * s)[1] for s in nodes])
@@ -113,9 +115,9 @@ class Stage:
         powers: Array = np.linalg.inv(np.vander(nodes, increasing=True)).astype(np.float64) @ pixels
         powers = (powers / span ** np.arange(NODES)[:, None]).reshape(NODES, -1, 2)
         rows = _at_their_rows(powers, camera)
-        return Ways(rows, np.where(seen, depth, np.nan))
+        return ImageTrajectories(rows, np.where(seen, depth, np.nan))
 
-    def _lamps(self, camera: Camera, ways: Ways) -> tuple[list[Lamp], list[int]]:
+    def _lamps(self, camera: Camera, ways: ImageTrajectories) -> tuple[list[Lamp], list[int]]:
         """Round lights, and which LED each is; −1: none."""
         n, k = len(self.leds_in_b), len(self.lights.radii_m)
         radii = np.repeat(self.led_radius_m, n)
@@ -134,7 +136,7 @@ class Stage:
         ]
         return lamps, [int(owners[j]) for j in drawn]
 
-    def _panes(self, sensor: Sensor, ways: Ways) -> list[Pane]:
+    def _panes(self, sensor: Sensor, ways: ImageTrajectories) -> list[Pane]:
         o = sensor.optics
         first = len(self.leds_in_b) * (2 if self.mirror else 1) + len(self.lights.radii_m)
         panes: list[Pane] = []
@@ -153,7 +155,7 @@ class Stage:
         return panes
 
     def _room(
-        self, camera: Camera, moving: Movers, t: float
+        self, camera: Camera, moving: PhoneAndRobotMotion, t: float
     ) -> tuple[npt.NDArray[np.float32], Image]:
         """The background as a camera sees it that has turned since the start."""
         turned = rpy_from_R(self.R_fc_start.T @ moving.hand.pose(t)[0])

@@ -13,8 +13,8 @@ from hardware.robot_file import load_robot
 from hardware.sim.scenes.motion import FLAT_LEDS, START_S, Sensors, movers, within
 from hardware.sim.scenes.optics import BANK, Optics, Sensor
 from hardware.sim.scenes.room import Room, bar_before, lights_around, mirror_near
-from hardware.sim.scenes.scene import HD, VGA, Picture, Scene, Size
-from hardware.sim.scenes.stage import Drawn, Stage
+from hardware.sim.scenes.scene import HD, VGA, ImageOrientation, Scene, Size
+from hardware.sim.scenes.stage import DrawnFrame, Stage
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rotation_about_x
 from pipeline.signals import BodyImu, Image, PhoneImu
@@ -27,11 +27,11 @@ LED_RADIUS_M = 0.004
 GAMMA, CONTRAST = (2.0, 2.4), (0.0, 0.15)
 """Every phone has its own tone curve, and nobody tells it."""
 DISTORTION = np.array([0.05, -0.12, 0.0005, -0.0004, 0.02])
-TURNS = {Picture.TURNED_90: 0.5 * np.pi, Picture.TURNED_180: np.pi}
+TURNS = {ImageOrientation.TURNED_90: 0.5 * np.pi, ImageOrientation.TURNED_180: np.pi}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class RenderedFrame:
     """One picture, what is true of it, and the readings that came since the one before."""
 
     t: float
@@ -70,7 +70,7 @@ def leds_of(scene: Scene) -> Array:
     return FLAT_LEDS if scene.is_flat else load_robot("ames").robot.leds_in_b
 
 
-class Film:
+class RenderedVideo:
     """A scene with everything drawn for one seed; going through it again gives the same shots."""
 
     def __init__(
@@ -130,7 +130,7 @@ class Film:
         """Count of the shots."""
         return self.frames
 
-    def __iter__(self) -> Iterator[Shot]:
+    def __iter__(self) -> Iterator[RenderedFrame]:
         """Shots in order of time, each drawn when asked for."""
         camera, o = self.camera, self.optics
         first, second = camera.row_delays(np.array([0.0, 1.0]))
@@ -144,14 +144,14 @@ class Film:
             drawn = self._stage.draw(sensor, camera, self.moving, t, (du, dv), self._bound)
             yield self._shot(t, drawn, felt)
 
-    def _shot(self, t: float, drawn: Drawn, felt: Sensors) -> Shot:
+    def _shot(self, t: float, drawn: DrawnFrame, felt: Sensors) -> RenderedFrame:
         R_cb, p_bc_in_c = self.moving.relative(t)
         enough = int((drawn.visible & ~drawn.merged).sum()) >= MIN_LEDS
         luma, pixels = drawn.luma, drawn.pixels
-        if self.scene.picture is Picture.MIRRORED:
+        if self.scene.picture is ImageOrientation.MIRRORED:
             luma = np.ascontiguousarray(luma[:, ::-1])
             pixels = np.column_stack((self.camera.width - 1 - pixels[:, 0], pixels[:, 1]))
-        return Shot(
+        return RenderedFrame(
             t=t,
             luma=luma,
             R_cb=R_cb,
@@ -159,7 +159,7 @@ class Film:
             pixels=pixels,
             visible=drawn.visible,
             merged=drawn.merged,
-            solvable=enough and self.scene.picture is Picture.UPRIGHT,
+            solvable=enough and self.scene.picture is ImageOrientation.UPRIGHT,
             information=drawn.information,
             phone=felt.phone(t + IMU_AHEAD_S),
             body=felt.body(t + IMU_AHEAD_S),

@@ -13,7 +13,7 @@ from hardware.sim.world.sensors import Sample, feed
 from hardware.sim.world.world import World
 from pipeline.estimation.estimator import Estimator, Fusion
 from pipeline.frames import Array
-from pipeline.signals import PhoneImu, RelativeState, Seen
+from pipeline.signals import PhoneImu, RelativeState, VisionMeasurement
 
 HEALTH_TICKS: Final = 20
 """Telemetry is noted so rarely."""
@@ -53,7 +53,7 @@ class Errors:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Track:
+class EstimatorRun:
     """One run of one estimator through one world."""
 
     now: Errors
@@ -69,7 +69,7 @@ class Track:
     """(m, 4) t [s], NIS/dof, time offset [s], its σ [s]."""
 
 
-def run(estimator: Estimator, world: World) -> Track:
+def run(estimator: Estimator, world: World) -> EstimatorRun:
     """Feed the world to the estimator, ask it every 5 ms, and compare."""
     notes = _Notes(estimator, world)
     for now, state in feed(estimator, world, hear=notes.hear):
@@ -94,7 +94,11 @@ class _Notes:
         """Note the phone's newest sample, and what is known at a fused picture."""
         if isinstance(sample, PhoneImu):
             self._newest = max(self._newest, sample.t)
-        elif isinstance(sample, Seen) and fusion and isinstance(self._estimator, KnowsCapture):
+        elif (
+            isinstance(sample, VisionMeasurement)
+            and fusion
+            and isinstance(self._estimator, KnowsCapture)
+        ):
             known = self._estimator.last_fused()
             if known is not None and sample.t > self._stamp:  # it tells of the newest only
                 self._stamp = sample.t
@@ -117,10 +121,10 @@ class _Notes:
         R_ic = self._world.R_fc[last].T @ self._world.R_fc[k]
         self._held.append(R_ic @ self._world.p[k] - state.R_ic @ state.p_bc_in_c)
 
-    def track(self) -> Track:
+    def track(self) -> EstimatorRun:
         """All of it against the truth."""
         t = np.array(self._t)
-        return Track(
+        return EstimatorRun(
             now=_compare(self._world, t, self._now),
             captured=_compare(
                 self._world,

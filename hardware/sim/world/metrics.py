@@ -9,7 +9,7 @@ from math import inf, nan
 import numpy as np
 from scipy.stats import chi2
 
-from hardware.sim.world.evaluator import Errors, Track
+from hardware.sim.world.evaluator import Errors, EstimatorRun
 from hardware.sim.world.world import Flags, World
 from pipeline.frames import Array
 
@@ -18,7 +18,7 @@ BAND = (0.025, 0.975)
 
 
 @dataclass(frozen=True, slots=True)
-class Score:
+class EstimatorMetrics:
     """RMS errors over all times judged of all runs; NaN for what is not known."""
 
     now_mm: float
@@ -41,7 +41,9 @@ class Score:
     """Ticks with an estimate."""
 
 
-def judge(tracks: Sequence[Track], start: float = 5.0, stop: float = inf) -> Score:
+def judge(
+    tracks: Sequence[EstimatorRun], start: float = 5.0, stop: float = inf
+) -> EstimatorMetrics:
     """Of the times start ≤ t < stop [s]."""
     now = [track.now.during(start, stop) for track in tracks]
     captured = [track.captured.during(start, stop) for track in tracks]
@@ -49,7 +51,7 @@ def judge(tracks: Sequence[Track], start: float = 5.0, stop: float = inf) -> Sco
     nees = np.array([errors.nees() for errors in now])
     now_mm, now_deg = size(_stack(now))
     captured_mm, captured_deg = size(_stack(captured))
-    return Score(
+    return EstimatorMetrics(
         now_mm=now_mm,
         now_deg=now_deg,
         captured_mm=captured_mm,
@@ -72,7 +74,7 @@ def in_band(nees: Array) -> float:
     return float(np.mean((mean >= low) & (mean <= high)))
 
 
-def at_return(track: Track, world: World, stop: float) -> Array:
+def at_return(track: EstimatorRun, world: World, stop: float) -> Array:
     """(6,) error at the last tick before the first picture taken after `stop` [s] arrives."""
     after = world.t[world.pictures.i] >= stop
     k = int(np.searchsorted(track.now.t, world.pictures.arrival[after][0])) - 1
@@ -86,7 +88,7 @@ def size(e: Array) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
-class OffsetScore:
+class OffsetMetrics:
     """How well the time offset of the pictures' stamps is known, over many runs."""
 
     rms_ms: float
@@ -95,7 +97,9 @@ class OffsetScore:
     """Runs that end more than 2 ms and 5 σ off: wrong, and sure of it."""
 
 
-def judge_offset(tracks: Sequence[Track], offsets: Sequence[float], start: float) -> OffsetScore:
+def judge_offset(
+    tracks: Sequence[EstimatorRun], offsets: Sequence[float], start: float
+) -> OffsetMetrics:
     """What is told from `start` [s] on, against the true `offsets` [s]; NaN if nothing is."""
     errors, wrong = [], 0
     for track, offset in zip(tracks, offsets, strict=True):
@@ -105,12 +109,12 @@ def judge_offset(tracks: Sequence[Track], offsets: Sequence[float], start: float
     e = np.concatenate(errors)
     known = e[np.isfinite(e)]
     if not len(known):
-        return OffsetScore(nan, nan, wrong)
+        return OffsetMetrics(nan, nan, wrong)
     rms = float(np.sqrt(np.mean(known**2)))
-    return OffsetScore(1e3 * rms, 1e3 * float(np.abs(known).max()), wrong)
+    return OffsetMetrics(1e3 * rms, 1e3 * float(np.abs(known).max()), wrong)
 
 
-def _told(track: Track, start: float, stop: float) -> Array:
+def _told(track: EstimatorRun, start: float, stop: float) -> Array:
     t = track.health[:, 0]
     told: Array = track.health[(t >= start) & (t < stop)]
     return told

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from hardware.sim.world import sensors
-from hardware.sim.world.random_motion import TREMOR_SIGMA, Process, three_pole, tremor
+from hardware.sim.world.random_motion import TREMOR_SIGMA, LinearProcess, three_pole, tremor
 from hardware.sim.world.rotations import rates_each, rpy_each, skew_each
 from hardware.sim.world.world import LEDS_IN_B, Indices, World
 from pipeline.frames import Array
@@ -147,7 +147,7 @@ def _slow(where: slice) -> Array:
     return H
 
 
-def _processes(world: World) -> list[tuple[float, Process]]:
+def _processes(world: World) -> list[tuple[float, LinearProcess]]:
     """(σ [m or rad], process): 18 of three states."""
     relaxation, setup = world.setup.tremor_relaxation, world.setup
     tremors = [tremor(omega, relaxation) for omega in world.tremor_omega.tolist()]

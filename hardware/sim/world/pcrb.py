@@ -22,7 +22,7 @@ Step = Callable[[int], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bound:
+class PosteriorBound:
     """Covariances (n, 6, 6) of (δp in c [m], θ in b [rad]), and their times (n,) [s]."""
 
     t: Array
@@ -58,7 +58,7 @@ class Oracle:
             self.i = i
 
 
-def bound(world: World, every: float = 0.25, start: float = 5.0) -> Bound:
+def bound(world: World, every: float = 0.25, start: float = 5.0) -> PosteriorBound:
     """Evaluate `now` every so often from `start` on [s], `captured` at every picture from then."""
     step = _steps(world)
     oracle = Oracle(0, model.prior(world))
@@ -78,7 +78,7 @@ def bound(world: World, every: float = 0.25, start: float = 5.0) -> Bound:
     pose = model.pose_by_state(world, world.index(t))
     i = np.array([k for k, _ in captured], dtype=np.intp)
     captured_pose = model.pose_by_state(world, i)
-    return Bound(
+    return PosteriorBound(
         t=t,
         now=pose @ np.array(now) @ pose.transpose(0, 2, 1),
         t_captured=world.t[i],

@@ -25,7 +25,7 @@ MUSCLE_S: Final = 0.008
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Process:
+class LinearProcess:
     """A linear process of σ = 1 driven by white noise, or by nothing."""
 
     A: Array
@@ -40,15 +40,15 @@ class Process:
         return Phi, 0.5 * (Q + Q.T)
 
 
-def three_pole() -> Process:
+def three_pole() -> LinearProcess:
     """Value, rate, acceleration of white jerk through three poles."""
     w = POLES
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(w**3), -3.0 * w**2, -3.0 * w]])
     v, a = w**2 / 3.0, w**4
-    return Process(A, np.array([[1.0, 0.0, -v], [0.0, v, 0.0], [-v, 0.0, a]]))
+    return LinearProcess(A, np.array([[1.0, 0.0, -v], [0.0, v, 0.0], [-v, 0.0, a]]))
 
 
-def tremor(omega: float, relaxation: float) -> Process:
+def tremor(omega: float, relaxation: float) -> LinearProcess:
     """Value, rate, muscle force of an oscillation of `omega` [rad/s] that forgets itself.
 
     Physiological tremor is a second order linear stochastic process (Timmer et al. 1998,
@@ -57,12 +57,12 @@ def tremor(omega: float, relaxation: float) -> Process:
     damping = 2.0 / relaxation
     A = np.array([[0.0, 1.0, 0.0], [-(omega**2), -damping, 1.0], [0.0, 0.0, -1.0 / MUSCLE_S]])
     if not np.isfinite(relaxation):
-        return Process(A, np.diag((1.0, omega**2, 0.0)))
+        return LinearProcess(A, np.diag((1.0, omega**2, 0.0)))
     C: Array = solve_continuous_lyapunov(A, np.diag((0.0, 0.0, -1.0)))
-    return Process(A, C / C[0, 0])
+    return LinearProcess(A, C / C[0, 0])
 
 
-def wander(rng: np.random.Generator, n: int, h: float, processes: Sequence[Process]) -> Array:
+def wander(rng: np.random.Generator, n: int, h: float, processes: Sequence[LinearProcess]) -> Array:
     """(n, m, k) states of the k processes, a step of `h` [s]."""
     Phi, Q = (np.array(each) for each in zip(*(p.step(h) for p in processes), strict=True))
     start = np.array([p.stationary for p in processes])

@@ -17,10 +17,17 @@ from hardware.sim.world.rotations import exp_each, skew_each
 from hardware.sim.world.world import LEDS_IN_B, Flags, Indices, World
 from pipeline.estimation.estimator import Estimator, Fusion
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, LedRays, PhoneImu, RelativePose, RelativeState, Seen
-from pipeline.timing.camera_imu_delay import StampOffsetSearch
+from pipeline.signals import (
+    BodyImu,
+    LedRays,
+    PhoneImu,
+    RelativePose,
+    RelativeState,
+    VisionMeasurement,
+)
+from pipeline.timing.camera_imu_delay import CameraImuDelay
 
-Sample = PhoneImu | BodyImu | Seen
+Sample = PhoneImu | BodyImu | VisionMeasurement
 Event = tuple[float, Sample]
 """(arrival [s], what)."""
 Listener = Callable[[Sample, Fusion | None], None]
@@ -79,7 +86,7 @@ def pictures(world: World) -> list[Event]:
     poses = _poses(world, stamps, noise_px)
     rows = zip(world.pictures.arrival.tolist(), stamps.tolist(), told, poses, strict=True)
     return [
-        (arrival, Seen(t, _rays(t, place, visible), pose))
+        (arrival, VisionMeasurement(t, _rays(t, place, visible), pose))
         for (arrival, t, place, pose), visible in zip(rows, world.visible, strict=True)
     ]
 
@@ -108,9 +115,9 @@ def feed(
 
 def stamped(arriving: Iterable[Event]) -> Iterator[Event]:
     """The same; each picture with the coarse time offset found so far, as the server sends it."""
-    search = StampOffsetSearch()
+    search = CameraImuDelay()
     for arrival, sample in arriving:
-        if not isinstance(sample, Seen):
+        if not isinstance(sample, VisionMeasurement):
             search.feel(sample)
             yield arrival, sample
             continue
@@ -134,7 +141,7 @@ def play(
 
 def give(estimator: Estimator, sample: Sample, now: float) -> Fusion | None:
     """Hand a sample over at `now` [s]; what became of it, if it is a picture."""
-    if isinstance(sample, Seen):
+    if isinstance(sample, VisionMeasurement):
         return estimator.add_seen(sample, now)
     if isinstance(sample, PhoneImu):
         estimator.add_phone_imu(sample)

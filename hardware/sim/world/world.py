@@ -49,7 +49,7 @@ class Occlusion:
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class WorldOptions:
     """What differs between worlds; SI and radians."""
 
     seed: int = 0
@@ -91,7 +91,7 @@ class Setup:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Schedule:
+class SampleTimes:
     """When a sensor sampled, and when that was known."""
 
     i: Indices
@@ -103,7 +103,7 @@ class Schedule:
 class World:
     """Truth on the grid; rows are times."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: WorldOptions) -> None:
         """Draws a motion of hand and robot; the same for the same seed, duration and σ."""
         self.setup = setup
         rng = np.random.default_rng(setup.seed)
@@ -146,20 +146,20 @@ class World:
         return np.random.default_rng((self.setup.seed, what))
 
     @cached_property
-    def phone(self) -> Schedule:
+    def phone(self) -> SampleTimes:
         """Of the phone's IMU."""
         return self._schedule(1, PHONE_PERIOD_S, self.setup.phone_delay)
 
     @cached_property
-    def body(self) -> Schedule:
+    def body(self) -> SampleTimes:
         """Of the robot's IMU."""
         return self._schedule(2, BODY_PERIOD_S, self.setup.body_delay)
 
     @cached_property
-    def pictures(self) -> Schedule:
+    def pictures(self) -> SampleTimes:
         """Of the camera; a decoder keeps the order."""
         drawn = self._schedule(3, self.setup.picture_period, self.setup.picture_delay)
-        return Schedule(drawn.i, np.maximum.accumulate(drawn.arrival))
+        return SampleTimes(drawn.i, np.maximum.accumulate(drawn.arrival))
 
     @cached_property
     def visible(self) -> Flags:
@@ -179,13 +179,13 @@ class World:
         outliers: Flags = drawn < self.setup.outliers
         return outliers
 
-    def _schedule(self, what: int, period: float, delay: tuple[float, float]) -> Schedule:
+    def _schedule(self, what: int, period: float, delay: tuple[float, float]) -> SampleTimes:
         rng = self.rng(what)
         i = self.index(np.arange(rng.uniform(0.0, period), self.t[-1], period))
-        return Schedule(i, self.t[i] + rng.uniform(*delay, len(i)))
+        return SampleTimes(i, self.t[i] + rng.uniform(*delay, len(i)))
 
 
-def _hand(rng: np.random.Generator, t: Array, setup: Setup) -> tuple[Array, Array]:
+def _hand(rng: np.random.Generator, t: Array, setup: WorldOptions) -> tuple[Array, Array]:
     slow = slow_motion(rng, len(t), GRID_S, setup.hand_sigma)
     fast, omega = tremor_motion(rng, t, setup.tremor_relaxation, setup.tremor_hz)
     return slow + setup.tremor * fast, omega

@@ -12,8 +12,8 @@ from typing import Final
 from hardware.robot_file import load_robot
 from server.experiments.all import provenance, results, running
 from server.experiments.all.page import Chapter, Ending, page
-from server.experiments.all.parts import PARTS, Part
-from server.experiments.all.running import FINISHED, FolderError, Record
+from server.experiments.all.parts import PARTS, ReportPart
+from server.experiments.all.running import FINISHED, FolderError, RunRecord
 from server.experiments.all.tables import table
 
 PAGE, FOLDER = "index.html", "parts"
@@ -85,24 +85,24 @@ class Report:
         states = [kept.status for part in self._wanted if (kept := self._kept(part))]
         return 0 if all(state == "done" for state in states) else 1
 
-    def _fly(self, part: Part, fresh: bool, words: str) -> Record:
+    def _fly(self, part: ReportPart, fresh: bool, words: str) -> RunRecord:
         folder, wanted = self._place(part), self._record(part)
         running.prepare(folder, wanted, fresh)
         return running.fly(part.words(self._quick), folder, wanted, _ticking(words))
 
-    def _place(self, part: Part) -> Path:
+    def _place(self, part: ReportPart) -> Path:
         return self._folder / FOLDER / part.name
 
-    def _record(self, part: Part) -> Record:
+    def _record(self, part: ReportPart) -> RunRecord:
         command = shlex.join(part.words(self._quick))
-        return Record(command, self._versions, self._machine, running.stamp())
+        return RunRecord(command, self._versions, self._machine, running.stamp())
 
-    def _kept(self, part: Part) -> Record | None:
+    def _kept(self, part: ReportPart) -> RunRecord | None:
         """What is there of it, if this command with these versions made it."""
         kept = running.record_of(self._place(part))
         return kept if kept and kept.same(self._record(part)) else None
 
-    def _is_finished(self, part: Part) -> bool:
+    def _is_finished(self, part: ReportPart) -> bool:
         kept = self._kept(part)
         return kept is not None and kept.status in FINISHED
 
@@ -124,12 +124,12 @@ class Report:
         written.write_text(text, encoding="utf-8", errors="replace")
         written.replace(self._folder / PAGE)
 
-    def _chapter(self, part: Part) -> Chapter:
+    def _chapter(self, part: ReportPart) -> Chapter:
         words, kept = part.words(self._quick), self._kept(part)
         found = (
             results.read(self._place(part), words[0], self._assumptions)
             if kept
-            else results.Results()
+            else results.PartResults()
         )
         seeds = results.seeds_of(words) or found.seeds or (NOT_SAID if kept else "not known yet")
         command = shlex.join(["lightleash", "experiments", *words, "--out", part.name])
@@ -144,10 +144,10 @@ class Report:
 def assumptions() -> list[dict[str, str]]:
     """Of the paper's experiments with the AMES."""
     from server.experiments.paper.setup import assumptions as paper
-    from server.experiments.paper.setup.measure import Setup
+    from server.experiments.paper.setup.measure import ExperimentSetup
     from server.simulation.sensors import PAPER
 
-    return paper.json(paper.of(Setup(load_robot("ames"), PAPER, (1,))))
+    return paper.json(paper.of(ExperimentSetup(load_robot("ames"), PAPER, (1,))))
 
 
 def _say(words: str) -> None:

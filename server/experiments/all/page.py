@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from server.experiments.all.markup import Markup, document, element
-from server.experiments.all.parts import Part
-from server.experiments.all.results import Results
-from server.experiments.all.running import Record
+from server.experiments.all.parts import ReportPart
+from server.experiments.all.results import PartResults
+from server.experiments.all.running import RunRecord
 from server.experiments.all.show import pictured, shown, table_of
 from server.experiments.all.tables import GOAL, Cell, Table
 
@@ -30,12 +30,12 @@ STATES: Final = {
 class Chapter:
     """A part with what became of it."""
 
-    part: Part
+    part: ReportPart
     command: str
     """To repeat it alone."""
     seeds: str
-    record: Record | None
-    results: Results
+    record: RunRecord | None
+    results: PartResults
 
     @property
     def state(self) -> tuple[str, str]:
@@ -117,7 +117,7 @@ def _told(chapter: Chapter, ending: Ending) -> str:
     return " ".join(words)
 
 
-def _took(record: Record | None) -> str:
+def _took(record: RunRecord | None) -> str:
     if record is None or not record.seconds:
         return "–"
     if record.seconds < 60.0:
@@ -126,7 +126,7 @@ def _took(record: Record | None) -> str:
     return f"{minutes} min {seconds} s"
 
 
-def _reason(record: Record) -> Markup:
+def _reason(record: RunRecord) -> Markup:
     kind = "bad" if record.status in ("failed", "refused") else "dim"
     return element("p", record.reason, class_=f"box {kind}")
 
@@ -136,7 +136,7 @@ def _state(chapter: Chapter) -> Markup:
     return element("span", words, class_=f"mark {kind}")
 
 
-def _printed(results: Results) -> Iterator[Markup]:
+def _printed(results: PartResults) -> Iterator[Markup]:
     for what, text in (("printed", results.output), ("told on its way", results.errors)):
         if text:
             summary = element("summary", f"What the command {what}")

@@ -9,7 +9,7 @@ from typing import Final
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ReportPart:
     """One experiment of the page."""
 
     name: str
@@ -27,8 +27,8 @@ class Part:
         return shlex.split(self.quick if quick else self.command)
 
 
-PARTS: Final[tuple[Part, ...]] = (
-    Part(
+PARTS: Final[tuple[ReportPart, ...]] = (
+    ReportPart(
         "paper",
         "paper --seeds 3",
         "paper --seeds 1 --only table_1 table_4 disturbance",
@@ -36,7 +36,7 @@ PARTS: Final[tuple[Part, ...]] = (
         "The experiments of the paper's section V flown again in virtual time with its sensors and "
         "gains, beside its figures; and whether a phone, or our own way, does as well.",
     ),
-    Part(
+    ReportPart(
         "margins",
         "margins",
         "margins --gains phone paper_with_ekf",
@@ -44,7 +44,7 @@ PARTS: Final[tuple[Part, ...]] = (
         "How much delay, gain and phase each axis' loop can lose before it is unstable, and which "
         "gains may be armed at this latency.",
     ),
-    Part(
+    ReportPart(
         "loop",
         "loop --seconds 60 --seed 1",
         "loop --seconds 12 --seed 1 --hands moving",
@@ -52,7 +52,7 @@ PARTS: Final[tuple[Part, ...]] = (
         "How closely the robot follows a phone's hand in virtual time, through rendered and "
         "encoded pictures that come as late as a phone's.",
     ),
-    Part(
+    ReportPart(
         "contact",
         "contact --seeds 3",
         "contact --seeds 1",
@@ -60,14 +60,14 @@ PARTS: Final[tuple[Part, ...]] = (
         "Pushing a wall and plugging into a socket: what force the robot holds with compliance and "
         "without, and what compliance costs in free flight.",
     ),
-    Part(
+    ReportPart(
         "sweep",
         "sweep latency",
         "sweep latency_quick",
         "Latency and gains",
         "What the tracking error does as pictures come later, with lower and higher gains.",
     ),
-    Part(
+    ReportPart(
         "estimators",
         "estimators --seeds 3 --seed 1000",
         "estimators --seeds 1 --seed 1000 --seconds 10",
@@ -75,7 +75,7 @@ PARTS: Final[tuple[Part, ...]] = (
         "How well three estimators know where the robot is now, on the same data, beside the bound "
         "of what anybody could know.",
     ),
-    Part(
+    ReportPart(
         "tremor",
         "tremor --seed 1",
         "tremor --seed 1 --seconds 20",
@@ -83,7 +83,7 @@ PARTS: Final[tuple[Part, ...]] = (
         "What of the trembling of a hand reaches the robot, by frequency, with each kind of "
         "virtual camera.",
     ),
-    Part(
+    ReportPart(
         "gaps",
         "gaps --seeds 2",
         "gaps --quick --no-traces --vanish 0 --seeds 1",
@@ -92,7 +92,7 @@ PARTS: Final[tuple[Part, ...]] = (
         "server, is dark for a while, by gaps of our own and by recorded radio, and what becomes "
         "of a phone that vanishes; in virtual time.",
     ),
-    Part(
+    ReportPart(
         "faults",
         "faults --seeds 5",
         "faults --seeds 1 --only STOP",
@@ -101,7 +101,7 @@ PARTS: Final[tuple[Part, ...]] = (
         "and ramps, when the robot does so by itself, when there is no thrust, and how far it "
         "strays.",
     ),
-    Part(
+    ReportPart(
         "network",
         "network --seconds 32 --seed 0",
         "network --seconds 8 --seed 0 --scenarios clean",

@@ -36,7 +36,7 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class Results:
+class PartResults:
     """Of a part."""
 
     blocks: tuple[Block, ...] = ()
@@ -49,7 +49,7 @@ class Results:
     """As its files say."""
 
 
-def read(folder: Path, name: str, assumed: Sequence[object] = ()) -> Results:
+def read(folder: Path, name: str, assumed: Sequence[object] = ()) -> PartResults:
     """Everything that the experiment `name` has left in a folder, but what is `assumed` of all."""
     found: list[Block] = []
     notes: list[str] = []
@@ -67,7 +67,7 @@ def read(folder: Path, name: str, assumed: Sequence[object] = ()) -> Results:
         except (OSError, ValueError, RecursionError, csv.Error, UnshownError) as error:
             notes.append(f"{path.name}: {error or type(error).__name__}")
     figures, unseen = _figures(files, name)
-    return Results(
+    return PartResults(
         tuple(found),
         figures,
         _said(folder / OUTPUT),

@@ -54,7 +54,7 @@ class FolderError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class RunRecord:
     """What became of a part."""
 
     command: str
@@ -68,15 +68,15 @@ class Record:
     reason: str = ""
     """Why there is nothing, or not all."""
 
-    def same(self, other: Record) -> bool:
+    def same(self, other: RunRecord) -> bool:
         """Whether the figures would be the same."""
         return self.command == other.command and self.versions == other.versions
 
 
-def record_of(folder: Path) -> Record | None:
+def record_of(folder: Path) -> RunRecord | None:
     """Of a part's folder; None if there is none that can be read."""
     try:
-        return msgspec.json.decode((folder / RECORD).read_bytes(), type=Record)
+        return msgspec.json.decode((folder / RECORD).read_bytes(), type=RunRecord)
     except (OSError, msgspec.DecodeError):
         return None
 
@@ -91,7 +91,7 @@ def check(folder: Path) -> None:
         raise FolderError(folder)
 
 
-def prepare(folder: Path, wanted: Record, fresh: bool) -> None:
+def prepare(folder: Path, wanted: RunRecord, fresh: bool) -> None:
     """Make the folder ready: what the same command was interrupted in, it goes on with.
 
     Raises:
@@ -106,7 +106,9 @@ def prepare(folder: Path, wanted: Record, fresh: bool) -> None:
     _write(folder, wanted)
 
 
-def fly(words: list[str], folder: Path, wanted: Record, tick: Callable[[float], None]) -> Record:
+def fly(
+    words: list[str], folder: Path, wanted: RunRecord, tick: Callable[[float], None]
+) -> RunRecord:
     """Run the command into `folder`; `tick` hears how long it takes [s]. Gives how it ended."""
     started = now()
     with (folder / OUTPUT).open("wb") as output, (folder / ERRORS).open("wb") as errors:
@@ -178,7 +180,7 @@ def _judged(code: int, folder: Path) -> tuple[Status, str]:
     return "failed", f"{ending}: {reason}" if reason else ending
 
 
-def _write(folder: Path, record: Record) -> None:
+def _write(folder: Path, record: RunRecord) -> None:
     written = folder / f"{RECORD}.new"
     written.write_bytes(msgspec.json.format(msgspec.json.encode(record), indent=1))
     written.replace(folder / RECORD)

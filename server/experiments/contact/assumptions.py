@@ -14,7 +14,7 @@ from server.experiments.contact.setting import (
     GO_S,
     HOVER_S,
     STAY_S,
-    Scene,
+    ContactScene,
     spring_n_m,
 )
 from server.experiments.paper.setup.assumption import Assumption
@@ -26,14 +26,14 @@ from server.simulation.sensors import PAPER, Leader
 
 
 def of(
-    plant: PlantParameters, leader: Leader, scenes: Sequence[Scene], seeds: int
+    plant: PlantParameters, leader: Leader, scenes: Sequence[ContactScene], seeds: int
 ) -> list[Assumption]:
     """Of the experiment as it is set up."""
     felt = sensors(leader) if leader == PAPER else phone_sensors(leader)
     return [*_touching(plant, scenes), *_judging(plant, seeds), *felt, *plant_parts(plant)]
 
 
-def _touching(plant: PlantParameters, scenes: Sequence[Scene]) -> Iterator[Assumption]:
+def _touching(plant: PlantParameters, scenes: Sequence[ContactScene]) -> Iterator[Assumption]:
     """Tool, wall, socket, hand."""
     tool = Obstacle()
     yield Assumption(

@@ -15,10 +15,10 @@ from hardware.sim.plant.obstacle import Socket
 from server.common.ranges import number, whole
 from server.common.text import plain, statements
 from server.experiments.contact import assumptions, picture
-from server.experiments.contact.flight import Trace, fly
+from server.experiments.contact.flight import ContactTrace, fly
 from server.experiments.contact.free import NEAR, Free, free_flights, free_table
-from server.experiments.contact.measure import Row, row_of, table_of
-from server.experiments.contact.setting import LEAST_N, Scene, Way, foretold_n
+from server.experiments.contact.measure import ContactRow, row_of, table_of
+from server.experiments.contact.setting import LEAST_N, ContactScene, Way, foretold_n
 from server.experiments.paper.setup.variants import check_gains
 from server.simulation.sensors import PAPER, Leader, phone
 
@@ -40,8 +40,8 @@ def run(arguments: argparse.Namespace) -> int:
     seeds = range(1, arguments.seeds + 1)
     said = assumptions.of(robot_file.plant, leader, [scene for scene, _ in flown], arguments.seeds)
     print(assumptions.lines(said), flush=True)
-    rows: list[Row] = []
-    shown: list[tuple[Row, Trace]] = []
+    rows: list[ContactRow] = []
+    shown: list[tuple[ContactRow, ContactTrace]] = []
     for scene, way in flown:
         foretold = foretold_n(way.limit_n or max(arguments.limit_n), scene, robot_file.plant)
         traces = [_flown(robot_file, leader, scene, way, seed) for seed in seeds]
@@ -66,7 +66,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(holds.values()) else 1
 
 
-def flown_of(arguments: argparse.Namespace, robot_file: RobotFile) -> list[tuple[Scene, Way]]:
+def flown_of(
+    arguments: argparse.Namespace, robot_file: RobotFile
+) -> list[tuple[ContactScene, Way]]:
     """Each scene with each controller; a socket only with limits that reach its bottom.
 
     Raises:
@@ -75,7 +77,7 @@ def flown_of(arguments: argparse.Namespace, robot_file: RobotFile) -> list[tuple
     gap, beyond = 1e-3 * arguments.gap_mm, 1e-3 * arguments.depth_mm
     socket = Socket(1e-3 * arguments.clearance_mm, 1e-3 * arguments.chamfer_mm)
     flown = []
-    for scene in (Scene("wall", gap, beyond), Scene("socket", gap, beyond, socket)):
+    for scene in (ContactScene("wall", gap, beyond), ContactScene("socket", gap, beyond, socket)):
         soft = [
             way
             for way in _soft(arguments)
@@ -95,14 +97,16 @@ def _soft(arguments: argparse.Namespace) -> list[Way]:
     return [Way(f"compliant {limit:g} N", limit) for limit in arguments.limit_n]
 
 
-def _flown(robot_file: RobotFile, leader: Leader, scene: Scene, way: Way, seed: int) -> Trace:
+def _flown(
+    robot_file: RobotFile, leader: Leader, scene: ContactScene, way: Way, seed: int
+) -> ContactTrace:
     """A flight, and a word of progress."""
     trace = fly(robot_file, leader, scene, way, seed)
     print(f"flown: {scene.name}, {way.name}, seed {seed}", file=sys.stderr, flush=True)
     return trace
 
 
-def goals(rows: Sequence[Row], free: Sequence[Free]) -> dict[str, bool]:
+def goals(rows: Sequence[ContactRow], free: Sequence[Free]) -> dict[str, bool]:
     """What is to be shown, and whether it was."""
     soft = [row for row in rows if row.way != STIFF.name]
     plugs = [row for row in soft if row.plugged]

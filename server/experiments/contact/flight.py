@@ -10,13 +10,13 @@ import numpy.typing as npt
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import PlantOptions
 from pipeline.frames import Array
-from server.experiments.contact.setting import FLIGHT_S, HOVER_S, Scene, Way
-from server.simulation.led_robot import PERIOD_S, Led
+from server.experiments.contact.setting import FLIGHT_S, HOVER_S, ContactScene, Way
+from server.simulation.leader_follower import PERIOD_S, LeaderFollowerSimulation
 from server.simulation.sensors import Leader
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trace:
+class ContactTrace:
     """Rows since the hand's move, one a control period; the truth."""
 
     t: Array
@@ -38,14 +38,14 @@ class Trace:
 def fly(
     robot_file: RobotFile,
     leader: Leader,
-    scene: Scene,
+    scene: ContactScene,
     way: Way,
     seed: int,
     seconds: float = FLIGHT_S,
-) -> Trace:
+) -> ContactTrace:
     """Until `seconds` after the hand's move, or until tracking ends."""
     obstacle = scene.obstacle(seed)
-    led = Led(
+    led = LeaderFollowerSimulation(
         robot_file,
         way.config(robot_file, leader),
         leader,
@@ -70,8 +70,8 @@ def fly(
     ended = f"{led.t - HOVER_S:+.2f} s: {why}" if why else ""
     t_s, force_n, peak_n, depth_m, side_m = columns
     touches = np.array(pushes, dtype=np.bool_)
-    return Trace(t_s, force_n, peak_n, touches, depth_m, side_m, ended)
+    return ContactTrace(t_s, force_n, peak_n, touches, depth_m, side_m, ended)
 
 
 PER_PERIOD = round(1e3 * PERIOD_S)
-"""Of `Trace.pushes`, for each row of the others."""
+"""Of `ContactTrace.pushes`, for each row of the others."""

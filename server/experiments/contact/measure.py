@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 from server.common.text import Column, flights
-from server.experiments.contact.flight import PER_PERIOD, Trace
-from server.experiments.contact.setting import BAND_N, FULL, GO_S, STAY_S, Scene, Way
+from server.experiments.contact.flight import PER_PERIOD, ContactTrace
+from server.experiments.contact.setting import BAND_N, FULL, GO_S, STAY_S, ContactScene, Way
 from server.experiments.paper.setup.measure import rms
-from server.simulation.led_robot import PERIOD_S
+from server.simulation.leader_follower import PERIOD_S
 
 SETTLE_S: Final = 2.0
 """After the hand has arrived; from then on until it goes back the force is to be in the band."""
@@ -59,7 +59,7 @@ class Touching:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ContactRow:
     """A way of controlling in a scene: means over the seeds, `bounces` and `lost` in all."""
 
     scene: str
@@ -103,7 +103,7 @@ COLUMNS: Final[tuple[Column, ...]] = (
 )
 
 
-def table_of(rows: Sequence[Row]) -> str:
+def table_of(rows: Sequence[ContactRow]) -> str:
     """One line a row."""
     return flights(COLUMNS, rows)
 
@@ -116,7 +116,7 @@ def smooth(force_n: Array) -> Array:
     return averaged
 
 
-def touching(trace: Trace, foretold_n: float) -> Touching:
+def touching(trace: ContactTrace, foretold_n: float) -> Touching:
     """Figures of a flight that did not end early."""
     pressing = (trace.t >= GO_S + SETTLE_S) & (trace.t < GO_S + STAY_S)
     force = smooth(trace.force_n)
@@ -155,7 +155,9 @@ def gaps(within: npt.NDArray[np.bool_], pushes: npt.NDArray[np.bool_]) -> int:
     return int((np.diff(touched) > LOST_MS).sum())
 
 
-def row_of(scene: Scene, way: Way, foretold_n: float, traces: Sequence[Trace]) -> Row:
+def row_of(
+    scene: ContactScene, way: Way, foretold_n: float, traces: Sequence[ContactTrace]
+) -> ContactRow:
     """Over the flights of a controller in a scene."""
     ended = next((trace.ended for trace in traces if trace.ended), "")
     ones = [] if ended else [touching(trace, foretold_n) for trace in traces]
@@ -165,7 +167,7 @@ def row_of(scene: Scene, way: Way, foretold_n: float, traces: Sequence[Trace]) -
 
     depth_mm = 1e3 * scene.socket.depth_m if scene.socket else nan
     plugged = sum(one.deepest_mm >= FULL * depth_mm for one in ones)
-    return Row(
+    return ContactRow(
         scene=scene.name,
         way=way.name,
         foretold_n=foretold_n,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from server.experiments.contact.flight import Trace
-from server.experiments.contact.measure import Row, smooth
+from server.experiments.contact.flight import ContactTrace
+from server.experiments.contact.measure import ContactRow, smooth
 from server.experiments.contact.setting import BAND_N, GO_S, STAY_S
 from server.experiments.paper.picture import TIME, panels, save
 
 
-def draw(shown: Sequence[tuple[Row, Trace]], path: Path) -> Path:
+def draw(shown: Sequence[tuple[ContactRow, ContactTrace]], path: Path) -> Path:
     """A figure; gives its file."""
     scenes = list(dict.fromkeys(row.scene for row, _ in shown))
     figure, axes = panels(len(scenes))

@@ -14,7 +14,7 @@ from hardware.sim.hand_parts import Stroke
 from hardware.sim.plant.obstacle import Obstacle, Socket
 from pipeline.config import ComplianceConfig, TeleopConfig, VirtualCameraConfig
 from pipeline.frames import GRAVITY
-from server.experiments.paper.setup.variants import Wishes, config_of, ours
+from server.experiments.paper.setup.variants import VariantRequest, config_of, ours
 from server.simulation.sensors import Leader
 
 HOVER_S: Final = 4.0
@@ -36,7 +36,7 @@ FULL: Final = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class ContactScene:
     """A wall, or a socket in it, and how far the hand goes."""
 
     name: str
@@ -77,7 +77,7 @@ class Way:
 
     def config(self, robot_file: RobotFile, leader: Leader) -> TeleopConfig:
         """This project's way, with compliance or without."""
-        config = config_of(robot_file, ours(leader, Wishes()), leader)
+        config = config_of(robot_file, ours(leader, VariantRequest()), leader)
         soft = ComplianceConfig(enabled=self.limit_n is not None, limit_n=self.limit_n or 3.0)
         return replace(config, virtual_camera=VirtualCameraConfig(), compliance=soft)
 
@@ -88,7 +88,7 @@ def spring_n_m(plant: PlantParameters) -> float:
     return plant.mass * GRAVITY / hangs.length if hangs is not None else 0.0
 
 
-def foretold_n(limit_n: float, scene: Scene, plant: PlantParameters) -> float:
+def foretold_n(limit_n: float, scene: ContactScene, plant: PlantParameters) -> float:
     """The force on the wall, or on the socket's bottom [N].
 
     The law gives the limit beyond what held the robot at the start, however far behind the

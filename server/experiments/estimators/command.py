@@ -18,10 +18,10 @@ from typing import Final, get_args
 import numpy as np
 
 from hardware.sim.world import evaluator, metrics
-from hardware.sim.world.evaluator import Track
-from hardware.sim.world.metrics import Score
+from hardware.sim.world.evaluator import EstimatorRun
+from hardware.sim.world.metrics import EstimatorMetrics
 from hardware.sim.world.pcrb import bound, rms
-from hardware.sim.world.world import LEDS_IN_B, Setup, World
+from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.estimation.estimator import Estimator
 from pipeline.estimation.estimators import make_estimator
@@ -32,15 +32,15 @@ from server.experiments.estimators.recording import play_recording
 from server.recording.reader import read
 from server.recording.writer import RecordingError
 
-Tracks = dict[EstimatorName, list[Track]]
+Tracks = dict[EstimatorName, list[EstimatorRun]]
 ESTIMATORS: Final[tuple[EstimatorName, ...]] = get_args(EstimatorName)
 UNJUDGED: Final = 0.25
 """Share of a run at its start that does not count: biases are learnt in it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """One line of the table: the figures of `Score`, and the error in units of the bound's."""
+class EstimatorRow:
+    """One line of the table: the figures of `EstimatorMetrics`, and the error in units of the bound's."""
 
     name: str
     now_mm: float
@@ -90,10 +90,10 @@ def estimator_of(name: EstimatorName, leds_in_b: Array) -> Estimator:
     return make_estimator(replace(TeleopConfig(), estimator=name), leds_in_b)
 
 
-def row_of(name: str, score: Score, limit: Row | None) -> Row:
+def row_of(name: str, score: EstimatorMetrics, limit: EstimatorRow | None) -> EstimatorRow:
     """A line of the table; `limit` is the bound's."""
     known = {key: value for key, value in asdict(score).items() if key != "captured_nees"}
-    row = Row(name, **known)
+    row = EstimatorRow(name, **known)
     if limit is None:
         return row
     return replace(
@@ -126,14 +126,14 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _tells(row: Row, name: str) -> bool:
+def _tells(row: EstimatorRow, name: str) -> bool:
     value = getattr(row, name)
     return isinstance(value, str) or bool(np.isfinite(value))
 
 
-def _simulated(arguments: argparse.Namespace) -> tuple[Tracks, Row, float]:
+def _simulated(arguments: argparse.Namespace) -> tuple[Tracks, EstimatorRow, float]:
     low, high = (1e-3 * ms for ms in arguments.latency_ms)
-    setup = Setup(
+    setup = WorldOptions(
         seed=arguments.seed,
         duration=arguments.seconds,
         picture_period=1.0 / arguments.fps,
@@ -144,7 +144,10 @@ def _simulated(arguments: argparse.Namespace) -> tuple[Tracks, Row, float]:
         f"{arguments.seeds} × {arguments.seconds:g} s, {arguments.fps:g} pictures/s, "
         f"{1e3 * low:g}-{1e3 * high:g} ms late; the first {UNJUDGED:.0%} not judged"
     )
-    start, tracks = UNJUDGED * arguments.seconds, {name: list[Track]() for name in ESTIMATORS}
+    start, tracks = (
+        UNJUDGED * arguments.seconds,
+        {name: list[EstimatorRun]() for name in ESTIMATORS},
+    )
     now, captured = [], []
     for k in range(arguments.seeds):
         world = World(replace(setup, seed=arguments.seed + k))
@@ -155,7 +158,7 @@ def _simulated(arguments: argparse.Namespace) -> tuple[Tracks, Row, float]:
         captured.append(limit.captured)
         _progress(f"{k + 1} of {arguments.seeds}")
     _progress("")
-    best = Row("bound", *rms(np.concatenate(now)), *rms(np.concatenate(captured)))
+    best = EstimatorRow("bound", *rms(np.concatenate(now)), *rms(np.concatenate(captured)))
     return tracks, best, start
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.sim.world.evaluator import Track
+from hardware.sim.world.evaluator import EstimatorRun
 from pipeline.frames import Array
 
 
-def draw(tracks: Mapping[str, Track], path: Path) -> None:
+def draw(tracks: Mapping[str, EstimatorRun], path: Path) -> None:
     """A row per estimator, a column per component of the position, ±3 σ as a band."""
     import matplotlib
 

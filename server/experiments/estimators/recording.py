@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from hardware.sim.world.evaluator import Errors, Track
+from hardware.sim.world.evaluator import Errors, EstimatorRun
 from hardware.sim.world.sensors import Event, Sample, play
 from pipeline.config import EstimatorName
 from pipeline.estimation.estimator import Estimator, Fusion
@@ -33,7 +33,7 @@ Prediction = tuple[float, RelativeState, Array]
 
 
 @dataclass(slots=True)
-class Tape:
+class EstimatorInputs:
     """What control heard."""
 
     times: list[float] = field(default_factory=list)
@@ -57,13 +57,13 @@ class Tape:
 
 def play_recording(
     recording: Recording, names: Iterable[EstimatorName], make: Maker
-) -> tuple[dict[EstimatorName, Track], float]:
+) -> tuple[dict[EstimatorName, EstimatorRun], float]:
     """A track of each estimator, its times since the recording's begin, and from when to judge.
 
     Raises:
         RecordingError: damaged, or the robot is seen in none of its pictures.
     """
-    tape = Tape()
+    tape = EstimatorInputs()
     offline = Offline(recording, tape.tap)
     for _ in offline.rows():
         pass
@@ -74,7 +74,7 @@ def play_recording(
     return tracks, tape.poses[0][0] - first + SETTLE_S
 
 
-def _track(tape: Tape, estimator: Estimator, t_first: float) -> Track:
+def _track(tape: EstimatorInputs, estimator: Estimator, t_first: float) -> EstimatorRun:
     predicted: list[Prediction] = []
     health = []
     for now, state in play(estimator, tape.events, tape.times, _nobody):
@@ -86,7 +86,7 @@ def _track(tape: Tape, estimator: Estimator, t_first: float) -> Track:
     errors = _compare(predicted, tape.poses, offset, t_first)
     unknown = np.full((len(errors.t), 3), nan)
     nothing = Errors(np.empty(0), np.empty((0, 6)), np.empty((0, 6, 6)))
-    return Track(errors, nothing, unknown, unknown, np.array(health))
+    return EstimatorRun(errors, nothing, unknown, unknown, np.array(health))
 
 
 def _compare(

@@ -19,9 +19,9 @@ from server.common.text import dashed, plain, statements
 from server.control.process import teleop_config
 from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
-from server.experiments.faults.fault import Fault, Outcome, suffer
+from server.experiments.faults.fault import Fault, FaultOutcome, suffer
 from server.experiments.faults.live import LiveOutcome
-from server.experiments.faults.measure import Row, row_of, times_of, vanish_times
+from server.experiments.faults.measure import FaultRow, row_of, times_of, vanish_times
 from server.experiments.forked import forked
 from server.experiments.gaps import vanish
 from server.experiments.gaps.flight import GapFlight
@@ -57,7 +57,7 @@ TIMES: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class FaultJob:
     """Some faults in one flight."""
 
     robot_file: RobotFile
@@ -66,7 +66,7 @@ class Job:
     names: tuple[str, ...]
 
 
-def flown(job: Job) -> list[Outcome]:
+def flown(job: FaultJob) -> list[FaultOutcome]:
     """Fly once; each fault happens to a copy of the flight.
 
     Raises:
@@ -151,21 +151,23 @@ def _outcomes(
     config: TeleopConfig,
     faults: Sequence[Fault],
     arguments: argparse.Namespace,
-) -> list[Outcome]:
+) -> list[FaultOutcome]:
     names = [fault.name for fault in faults]
     jobs = [
-        Job(robot_file, config, seed, tuple(names[k : k + SHARED]))
+        FaultJob(robot_file, config, seed, tuple(names[k : k + SHARED]))
         for seed in range(1, arguments.seeds + 1)
         for k in range(0, len(names), SHARED)
     ]
-    outcomes: list[Outcome] = []
+    outcomes: list[FaultOutcome] = []
     for some in processes.each(flown, jobs, arguments.workers):
         outcomes += some
         print(f"flown: {len(outcomes)} of {len(names) * arguments.seeds}", file=sys.stderr)
     return sorted(outcomes, key=lambda one: one.seed)
 
 
-def goals(rows: Sequence[Row], seeds: int, vanished: Sequence[Vanished] = ()) -> dict[str, bool]:
+def goals(
+    rows: Sequence[FaultRow], seeds: int, vanished: Sequence[Vanished] = ()
+) -> dict[str, bool]:
     """What is to be shown, and whether it was."""
     thrust = sum(row.after_zero for row in rows)
     silent = f"{thrust} samples with thrust after zero, in {len(rows)} faults of {seeds} seeds"

@@ -19,7 +19,7 @@ QUIET_S: Final = 1.0
 """Without thrust, until no more is waited for."""
 End = Literal["flies", "zero", "any"]
 """It follows again, or still; there is no thrust any more; or either, as it is noticed or not."""
-Happening = Callable[["World"], None]
+Happening = Callable[["FaultyFlight"], None]
 Event = Literal["COAST", "HOLD", "RAMP", "DISARMED", "STOPPED", "TRACK", "robot", "zero"]
 """Modes of control as entered after the fault; the robot coasts or ramps by itself; no thrust."""
 
@@ -43,7 +43,7 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class FaultOutcome:
     """What a fault led to."""
 
     fault: str
@@ -62,7 +62,7 @@ class Outcome:
     """Of the last mode but TRACK."""
 
 
-class World:
+class FaultyFlight:
     """A flight that something happens to; times count from `begin`."""
 
     def __init__(self, flight: GapFlight) -> None:
@@ -89,9 +89,9 @@ class World:
         return self.flight.advance().failsafe.mode
 
 
-def suffer(flight: GapFlight, fault: Fault, seed: int) -> Outcome:
+def suffer(flight: GapFlight, fault: Fault, seed: int) -> FaultOutcome:
     """Let it happen now, and watch. Spoils the flight."""
-    world = World(flight)
+    world = FaultyFlight(flight)
     watch = _Watch(world, fault)
     fault.happens(world)
     while world.t < fault.watch_s and watch.goes_on():
@@ -103,7 +103,7 @@ def suffer(flight: GapFlight, fault: Fault, seed: int) -> Outcome:
 
 
 class _Watch:
-    def __init__(self, world: World, fault: Fault) -> None:
+    def __init__(self, world: FaultyFlight, fault: Fault) -> None:
         self._world, self._fault = world, fault
         self._first: dict[str, float] = {}
         places = np.array([*world.flight.log.body_in_f, *world.flight.log.due_in_f])
@@ -135,9 +135,9 @@ class _Watch:
         self._farthest_m = max(self._farthest_m, float(np.linalg.norm(plant.p_bf_in_f)))
         self._tilt = max(self._tilt, float(np.arccos(min(1.0, plant.R_fb[2, 2]))))
 
-    def outcome(self, seed: int) -> Outcome:
+    def outcome(self, seed: int) -> FaultOutcome:
         reasons = [one for one in self._world.flight.log.reasons if not one.startswith("DISARMED")]
-        return Outcome(
+        return FaultOutcome(
             fault=self._fault.name,
             seed=seed,
             first=dict(self._first),
@@ -150,7 +150,7 @@ class _Watch:
         )
 
 
-def misses(fault: Fault, one: Outcome) -> list[str]:
+def misses(fault: Fault, one: FaultOutcome) -> list[str]:
     """Which of its goals an outcome misses, in words."""
     missed = [
         f"{event} {one.first.get(event, float('inf')):.3f} s > {limit:g}"

@@ -1,4 +1,4 @@
-"""What happens to a flight: each gives a function that lets it happen to a `World`."""
+"""What happens to a flight: each gives a function that lets it happen to a `FaultyFlight`."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Final
 import numpy as np
 
 from pipeline.frames import Array
-from server.experiments.faults.fault import Happening, World
+from server.experiments.faults.fault import FaultyFlight, Happening
 from server.experiments.faults.tampering import Datagrams, Inputs
-from server.experiments.gaps.schedule import Gaps, WebRtcLine
+from server.experiments.gaps.schedule import GapSchedule, WebRtcLine
 from server.simulation.line import CleanLine, Kind
 
 FOR_EVER_S: Final = 1e6
@@ -51,8 +51,8 @@ SIGNS: Final[tuple[Kind, ...]] = ("touch", "pong")
 def dark(seconds: float) -> Happening:
     """The phone's line loses all for so long."""
 
-    def happen(world: World) -> None:
-        gaps = Gaps(seconds, 2.0 * FOR_EVER_S, world.begin)
+    def happen(world: FaultyFlight) -> None:
+        gaps = GapSchedule(seconds, 2.0 * FOR_EVER_S, world.begin)
         world.loop.transit.line = WebRtcLine(gaps)
 
     return happen
@@ -61,7 +61,7 @@ def dark(seconds: float) -> Happening:
 def selective(kinds: tuple[Kind, ...], seconds: float, *, holds: bool = False) -> Happening:
     """Some kinds are lost, or held back, for so long."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         world.loop.transit.line = Selective(kinds, world.begin + seconds, holds=holds)
 
     return happen
@@ -70,7 +70,7 @@ def selective(kinds: tuple[Kind, ...], seconds: float, *, holds: bool = False) -
 def slow_pictures(later_s: float) -> Happening:
     """They come so much later from now on."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         world.loop.transit.line = Slow(later_s)
 
     return happen
@@ -79,7 +79,7 @@ def slow_pictures(later_s: float) -> Happening:
 def lifted(at: float, dark_s: float = 0.0, *, again: float = FOR_EVER_S) -> Happening:
     """The finger lifts `at` [s], in a gap of `dark_s`; pressed again if `again` is sooner."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         def lift() -> None:
             world.flight.person.lifted = True
 
@@ -97,7 +97,7 @@ def lifted(at: float, dark_s: float = 0.0, *, again: float = FOR_EVER_S) -> Happ
 def tampered(inputs: Inputs) -> Happening:
     """Control's inputs are replaced from now on."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         world.loop.tamper = inputs
 
     return happen
@@ -106,7 +106,7 @@ def tampered(inputs: Inputs) -> Happening:
 def tampered_with_memory(make: Callable[[], Inputs]) -> Happening:
     """The same, for what has a memory of its own: `make` gives it."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         world.loop.tamper = make()
 
     return happen
@@ -115,7 +115,7 @@ def tampered_with_memory(make: Callable[[], Inputs]) -> Happening:
 def clock(step_s: float) -> Happening:
     """The phone's clock jumps."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         phone = world.loop.phone
         phone.clock = replace(phone.clock, offset_s=phone.clock.offset_s + step_s)
 
@@ -125,7 +125,7 @@ def clock(step_s: float) -> Happening:
 def robot_link(seconds: float) -> Happening:
     """The robot's link loses all, both ways, for so long."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         def mend() -> None:
             world.loop.follower.connected = True
 
@@ -138,7 +138,7 @@ def robot_link(seconds: float) -> Happening:
 def to_robot(make: Callable[[int], Datagrams]) -> Happening:
     """Something becomes of commands; `make` takes a seed."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         world.loop.follower.to_robot = make(world.loop.scene.seed)
 
     return happen
@@ -147,13 +147,13 @@ def to_robot(make: Callable[[int], Datagrams]) -> Happening:
 def to_control(make: Callable[[int], Datagrams]) -> Happening:
     """Something becomes of the robot's samples; `make` takes a seed."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         world.loop.follower.to_control = make(world.loop.scene.seed)
 
     return happen
 
 
-def restarts(world: World) -> None:
+def restarts(world: FaultyFlight) -> None:
     """The robot's computer starts anew."""
     world.loop.follower.restart()
 
@@ -161,7 +161,7 @@ def restarts(world: World) -> None:
 def control(every: int, seconds: float = FOR_EVER_S) -> Happening:
     """Control ticks so seldom (0: never) for so long."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         def mend() -> None:
             world.loop.control_every = 1
 
@@ -174,7 +174,7 @@ def control(every: int, seconds: float = FOR_EVER_S) -> Happening:
 def requested(what: str, at: float = 0.0, before: Happening | None = None) -> Happening:
     """Somebody asks for something, while `before` goes on."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         def request() -> None:
             world.begin = world.loop.t
             world.loop.wish(what)
@@ -194,7 +194,7 @@ def requested(what: str, at: float = 0.0, before: Happening | None = None) -> Ha
 def requested_every_tick(what: str) -> Happening:
     """The same request with each tick, for a second."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         for k in range(200):
             world.at(0.005 * k, partial(world.loop.wish, what))
 
@@ -204,7 +204,7 @@ def requested_every_tick(what: str) -> Happening:
 def body_imu(spoil: str) -> Happening:
     """The robot's motion sensors fail."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         plant = world.loop.follower.plant
         honest, last = plant.imu, plant.imu()
 
@@ -227,7 +227,7 @@ def body_imu(spoil: str) -> Happening:
 def thruster(health: float) -> Happening:
     """One gives less than is commanded."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         world.loop.follower.plant.thruster_health[2] = health
 
     return happen
@@ -236,13 +236,13 @@ def thruster(health: float) -> Happening:
 def pushed(force_n: float, seconds: float) -> Happening:
     """A person pushes."""
 
-    def happen(world: World) -> None:
+    def happen(world: FaultyFlight) -> None:
         wrench = np.array([0.0, force_n, 0.0, 0.0, 0.0, 0.0])
         world.loop.follower.plant.push(wrench, seconds)
 
     return happen
 
 
-def clean(world: World) -> None:
+def clean(world: FaultyFlight) -> None:
     """Nothing."""
     world.loop.transit.line = CleanLine()

@@ -81,7 +81,7 @@ class LiveOutcome:
     missed: str
 
 
-class Rig:
+class LiveServer:
     """A running `lightleash serve` and who asks it."""
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -157,7 +157,7 @@ def fly(robot: str, gains: str, repeats: int) -> Iterator[LiveOutcome]:
         RuntimeError: it did not start, or did not come back.
     """
     with live_loop.server(robot, gains) as environment:
-        rig = Rig(environment)
+        rig = LiveServer(environment)
         (launcher,) = (int(p) for p in _launchers())
         for repeat in range(repeats):
             for fault in LIVE:
@@ -172,7 +172,7 @@ def _launchers() -> list[str]:
     return [pid for pid, said in words.items() if "serve" in said]
 
 
-def _suffered(rig: Rig, launcher: int, fault: LiveFault, seed: int) -> LiveOutcome:
+def _suffered(rig: LiveServer, launcher: int, fault: LiveFault, seed: int) -> LiveOutcome:
     with rig.phone(seed) as phone:
         before = _watch(rig, FLIES_S)
         mode = rig.mode()
@@ -190,7 +190,7 @@ def _suffered(rig: Rig, launcher: int, fault: LiveFault, seed: int) -> LiveOutco
     return outcome_of(fault, before, after, mode)
 
 
-def _watch(rig: Rig, seconds: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _watch(rig: LiveServer, seconds: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """(n, 3): time [s], largest thrust [N], distance from rest [m]."""
     begin, rows = clock.now(), []
     while (t := clock.now() - begin) < seconds:

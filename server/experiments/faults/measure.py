@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from server.experiments.faults.fault import Fault, Outcome, misses
+from server.experiments.faults.fault import Fault, FaultOutcome, misses
 from server.experiments.gaps.vanish import Vanished
 
 EVENTS = ("COAST", "HOLD", "RAMP", "robot", "zero")
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class FaultRow:
     """The latest of each event [s], NaN where it did not follow; the largest of what is a size."""
 
     fault: str
@@ -33,7 +33,7 @@ class Row:
     missed: str
 
 
-def row_of(fault: Fault, outcomes: Sequence[Outcome]) -> Row:
+def row_of(fault: Fault, outcomes: Sequence[FaultOutcome]) -> FaultRow:
     """Figures of a fault."""
 
     def latest(event: str) -> float:
@@ -42,7 +42,7 @@ def row_of(fault: Fault, outcomes: Sequence[Outcome]) -> Row:
 
     missed = dict.fromkeys(why for one in outcomes for why in misses(fault, one))
     said = [one.words for one in outcomes if one.words]
-    return Row(
+    return FaultRow(
         fault=fault.name,
         hazard=fault.hazard,
         **{event: latest(event) for event in EVENTS},
@@ -55,7 +55,7 @@ def row_of(fault: Fault, outcomes: Sequence[Outcome]) -> Row:
     )
 
 
-def percentile(outcomes: Sequence[Outcome], event: str, percent: float) -> float:
+def percentile(outcomes: Sequence[FaultOutcome], event: str, percent: float) -> float:
     """When an event followed [s]; infinite if it did not often enough; NaN of none."""
     times = [one.first.get(event, float("inf")) for one in outcomes]
     return float(np.percentile(times, percent, method="higher")) if times else float("nan")
@@ -73,7 +73,7 @@ class Times:
     p99_9: float
 
 
-def times_of(faults: Sequence[Fault], outcomes: Sequence[Outcome]) -> list[Times]:
+def times_of(faults: Sequence[Fault], outcomes: Sequence[FaultOutcome]) -> list[Times]:
     """Of each fault, the events that it is to lead to."""
     found = []
     for fault in faults:
@@ -86,12 +86,14 @@ def vanish_times(vanished: Sequence[Vanished]) -> list[Times]:
     """Of phones that vanish at many moments."""
     name = "phone vanishes, at any moment"
     outcomes = [
-        Outcome(name, 0, {"COAST": one.coast_s, "RAMP": one.ramp_s}, 0.0, 0.0, 0, False, 0.0, "")
+        FaultOutcome(
+            name, 0, {"COAST": one.coast_s, "RAMP": one.ramp_s}, 0.0, 0.0, 0, False, 0.0, ""
+        )
         for one in vanished
     ]
     return [_times(name, event, outcomes) for event in ("COAST", "RAMP")]
 
 
-def _times(fault: str, event: str, outcomes: Sequence[Outcome]) -> Times:
+def _times(fault: str, event: str, outcomes: Sequence[FaultOutcome]) -> Times:
     p50, p99, p99_9 = (percentile(outcomes, event, percent) for percent in (50.0, 99.0, 99.9))
     return Times(fault, event, len(outcomes), p50, p99, p99_9)

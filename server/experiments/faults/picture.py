@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from server.experiments.faults.measure import EVENTS, Row
+from server.experiments.faults.measure import EVENTS, FaultRow
 
 MARKS = {"COAST": ("o", "C7"), "HOLD": ("s", "C1"), "RAMP": ("v", "C3"), "robot": ("d", "C4")}
 MARKS |= {"zero": ("|", "k")}
 
 
-def draw(rows: Sequence[Row], path: Path) -> Path:
+def draw(rows: Sequence[FaultRow], path: Path) -> Path:
     """A figure; gives its file."""
     import matplotlib
 

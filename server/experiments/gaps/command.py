@@ -17,9 +17,9 @@ from server.common.ranges import number, whole
 from server.common.text import dashed, plain, statements
 from server.control.process import teleop_config
 from server.experiments.gaps import picture, vanish
-from server.experiments.gaps.flight import Case, Log, fly
+from server.experiments.gaps.flight import Case, FlightLog, fly
 from server.experiments.gaps.goals import goals
-from server.experiments.gaps.measure import Flight, Row, flight_of, row_of
+from server.experiments.gaps.measure import FlightFigures, GapRow, flight_of, row_of
 from server.experiments.gaps.traces import MINUTE_S, minutes
 from server.experiments.gaps.vanish import Vanished
 
@@ -54,7 +54,7 @@ COLUMNS: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class GapJob:
     """One flight."""
 
     robot_file: RobotFile
@@ -64,7 +64,7 @@ class Job:
     seconds: float
 
 
-def flown(job: Job) -> tuple[Job, Flight, Log | None]:
+def flown(job: GapJob) -> tuple[GapJob, FlightFigures, FlightLog | None]:
     """Figures of a flight, and its log if it is to be drawn."""
     log = fly(job.robot_file, job.config, job.case, job.seed, job.seconds)
     return job, flight_of(log), log if job.case == SHOWN and job.seed == 1 else None
@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"lightleash experiments gaps: {error}", file=sys.stderr)
         return 2
     jobs = [
-        Job(robot_file, config, case, seed, MINUTE_S if case.minute else arguments.seconds)
+        GapJob(robot_file, config, case, seed, MINUTE_S if case.minute else arguments.seconds)
         for case in cases(arguments)
         for seed in range(1, arguments.seeds + 1)
     ]
@@ -120,9 +120,9 @@ def _about() -> str:
     )
 
 
-def _rows(jobs: list[Job], workers: int) -> tuple[list[Row], Log | None]:
+def _rows(jobs: list[GapJob], workers: int) -> tuple[list[GapRow], FlightLog | None]:
     """A row a case in the order of the jobs, and the flight to be drawn."""
-    found: dict[tuple[Case, int], Flight] = {}
+    found: dict[tuple[Case, int], FlightFigures] = {}
     shown = None
     for job, flight, log in processes.each(flown, jobs, workers):
         found[job.case, job.seed] = flight
@@ -135,7 +135,11 @@ def _rows(jobs: list[Job], workers: int) -> tuple[list[Row], Log | None]:
 
 
 def _write(
-    folder: Path, rows: list[Row], gone: list[Vanished], holds: dict[str, bool], log: Log | None
+    folder: Path,
+    rows: list[GapRow],
+    gone: list[Vanished],
+    holds: dict[str, bool],
+    log: FlightLog | None,
 ) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     figures = {

@@ -9,17 +9,17 @@ from typing import Final, Literal
 import numpy as np
 
 from hardware.robot_file import RobotFile
-from hardware.sim.reference_trajectory import Intent
+from hardware.sim.reference_trajectory import ReferenceTrajectory
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
 from pipeline.teleop import Output
 from server.control.controller import PERIOD_S
 from server.experiments.gaps.person import Holder
-from server.experiments.gaps.schedule import Gaps, WebRtcLine, WebSocketLine
+from server.experiments.gaps.schedule import GapSchedule, WebRtcLine, WebSocketLine
 from server.experiments.gaps.traces import minutes
 from server.simulation.line import CleanLine, PhoneLine
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 LED_NOISE_PX: Final = 0.02
 """As vision's of rendered pictures."""
@@ -36,7 +36,7 @@ Way = Literal["webrtc", "websocket", "radio", "udp"]
 
 
 @dataclass(slots=True)
-class Log:
+class FlightLog:
     """A row a tick, from the first gap's time on; metres and seconds."""
 
     t: list[float] = field(default_factory=list)
@@ -63,12 +63,12 @@ class GapFlight:
         self, robot_file: RobotFile, config: TeleopConfig, seed: int, hand: str = "moving"
     ) -> None:
         """On the ground."""
-        scene = Scene(hand=hand, seed=seed, led_noise_px=LED_NOISE_PX)
+        scene = SimulationOptions(hand=hand, seed=seed, led_noise_px=LED_NOISE_PX)
         self.person = Holder()
-        self.loop = Lockstep(robot_file, config, scene, self.person)
-        self.log = Log()
+        self.loop = VirtualTimeSimulation(robot_file, config, scene, self.person)
+        self.log = FlightLog()
         self._config = config
-        self._intent: Intent | None = None
+        self._intent: ReferenceTrajectory | None = None
         self._ideal_in_f = self._due_in_f = np.zeros(3)
         self._mode = Mode.DISARMED
 
@@ -88,7 +88,7 @@ class GapFlight:
             tracked = tracked + PERIOD_S if self.advance().failsafe.mode == Mode.TRACK else 0.0
             if self.loop.t > GIVEN_UP_S:
                 raise RuntimeError("never tracked in a clean flight")
-        self.log = Log()
+        self.log = FlightLog()
         return self.loop.t
 
     def advance(self) -> Output:
@@ -109,7 +109,7 @@ class GapFlight:
         """Carry on where the robot should be, `before` being the mode before TRACK."""
         hand, body = self.loop.truth()
         if self._intent is None or before not in (Mode.TRACK, Mode.COAST):
-            self._intent = Intent(self._config.virtual_camera, hand, body)
+            self._intent = ReferenceTrajectory(self._config.virtual_camera, hand, body)
             self._ideal_in_f = self._due_in_f = body[1]
             return
         behind = (body[1] if before == Mode.COAST else self._due_in_f) - self._ideal_in_f
@@ -159,12 +159,14 @@ class Case:
         gaps = self.gaps(begin, phase)
         return WebRtcLine(gaps) if self.way == "webrtc" else WebSocketLine(gaps)
 
-    def gaps(self, begin: float, phase: float) -> Gaps:
+    def gaps(self, begin: float, phase: float) -> GapSchedule:
         """When its link is dark, whichever it is."""
-        return Gaps(self.gap_s, self.every_s, begin + phase * self.every_s)
+        return GapSchedule(self.gap_s, self.every_s, begin + phase * self.every_s)
 
 
-def fly(robot_file: RobotFile, config: TeleopConfig, case: Case, seed: int, seconds: float) -> Log:
+def fly(
+    robot_file: RobotFile, config: TeleopConfig, case: Case, seed: int, seconds: float
+) -> FlightLog:
     """A flight of so many seconds beyond a clean take-off.
 
     Raises:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from server.experiments.gaps import vanish
-from server.experiments.gaps.measure import Row
+from server.experiments.gaps.measure import GapRow
 from server.experiments.gaps.schedule import heard_again
 from server.experiments.gaps.vanish import Vanished
 
@@ -20,7 +20,7 @@ BORNE_MS: Final = 400.0
 """Longer gaps are flown, and asked nothing."""
 
 
-def goals(rows: Sequence[Row], vanished: Sequence[Vanished]) -> dict[str, bool]:
+def goals(rows: Sequence[GapRow], vanished: Sequence[Vanished]) -> dict[str, bool]:
     """What is to be shown, and whether it was; nothing is said of what was not flown."""
     phones = [row for row in rows if row.link == "phone's link"]
     traces = [row for row in rows if row.way == "radio"]
@@ -48,7 +48,7 @@ def goals(rows: Sequence[Row], vanished: Sequence[Vanished]) -> dict[str, bool]:
     return held | vanish.goals(vanished)
 
 
-def _reference(rows: Sequence[Row]) -> dict[str, bool]:
+def _reference(rows: Sequence[GapRow]) -> dict[str, bool]:
     return {
         f"gaps and traces: excursion within {EXCURSION_MM:g} mm": all(
             row.excursion_mm <= EXCURSION_MM for row in rows

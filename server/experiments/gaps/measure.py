@@ -12,7 +12,7 @@ import numpy.typing as npt
 from pipeline.frames import Array
 from pipeline.signals import Mode
 from server.control.controller import PERIOD_S
-from server.experiments.gaps.flight import Case, Log
+from server.experiments.gaps.flight import Case, FlightLog
 
 WINDOW_TICKS: Final = 20
 """0.1 s: over which the reference's speed is taken; an estimate's noise of a millimetre is then
@@ -24,7 +24,7 @@ WAITING: Final = (Mode.COAST, Mode.HOLD)
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
+class FlightFigures:
     """Figures of one flight; NaN where nothing of the kind happened."""
 
     follows_pct: float
@@ -39,7 +39,7 @@ class Flight:
     holds: int
     ramps: int
     excursion_mm: float
-    """Farthest from where the robot should be (`Log.due_in_f`)."""
+    """Farthest from where the robot should be (`FlightLog.due_in_f`)."""
     behind_mm: float
     """Farthest from where an ideal virtual camera has it that sees the hand through gaps."""
     drift_mm: float
@@ -55,7 +55,7 @@ class Flight:
     """Of each mode but TRACK that was entered."""
 
 
-def flight_of(log: Log) -> Flight:
+def flight_of(log: FlightLog) -> FlightFigures:
     """Figures of a log."""
     modes = np.array(log.mode, dtype=int)
     before, after = modes[:-1], modes[1:]
@@ -72,7 +72,7 @@ def flight_of(log: Log) -> Flight:
     away = np.linalg.norm(body - due, axis=1)[flying]
     behind = np.linalg.norm(body - ideal, axis=1)[np.isin(modes, (Mode.TRACK, Mode.COAST))]
     released, quiet = _speeds(modes, reference - ideal)
-    return Flight(
+    return FlightFigures(
         follows_pct=100.0 * float(np.mean(modes == Mode.TRACK)),
         ended=entered(*ENDED),
         resumed=changed(Mode.COAST, Mode.TRACK),
@@ -129,7 +129,7 @@ def _largest(values: Sequence[float]) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class GapRow:
     """All seeds of a case: the mean of what it follows, sums of counts, else the worst."""
 
     link: str
@@ -153,7 +153,7 @@ class Row:
     reasons: tuple[str, ...]
 
 
-def row_of(case: Case, flights: Sequence[Flight]) -> Row:
+def row_of(case: Case, flights: Sequence[FlightFigures]) -> GapRow:
     """Figures of a case."""
 
     def total(name: str) -> int:
@@ -163,7 +163,7 @@ def row_of(case: Case, flights: Sequence[Flight]) -> Row:
         values = [getattr(one, name) for one in flights]
         return max((value for value in values if value == value), default=float("nan"))
 
-    return Row(
+    return GapRow(
         link=case.minute or f"{case.side}'s link",
         gap_ms=1e3 * case.gap_s if not case.minute else float("nan"),
         every_s=case.every_s if not case.minute else float("nan"),

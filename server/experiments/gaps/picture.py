@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.signals import Mode
-from server.experiments.gaps.flight import Log
+from server.experiments.gaps.flight import FlightLog
 from server.experiments.gaps.goals import EXCURSION_MM, FOLLOWS_PCT
-from server.experiments.gaps.measure import Row, spans
+from server.experiments.gaps.measure import GapRow, spans
 
 if TYPE_CHECKING:  # loaded only when something is drawn
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ SHADES = {Mode.COAST: "0.85", Mode.HOLD: "C1", Mode.RAMP: "C3"}
 SHOWN_S = 12.0
 
 
-def draw(rows: Sequence[Row], shown: tuple[str, Log] | None, path: Path) -> Path:
+def draw(rows: Sequence[GapRow], shown: tuple[str, FlightLog] | None, path: Path) -> Path:
     """A figure; gives its file."""
     import matplotlib
 
@@ -59,7 +59,7 @@ def draw(rows: Sequence[Row], shown: tuple[str, Log] | None, path: Path) -> Path
     return path
 
 
-def _flight(axis: Axes, title: str, log: Log) -> None:
+def _flight(axis: Axes, title: str, log: FlightLog) -> None:
     """Where the robot was and should have been, along y; the modes shaded."""
     t = np.array(log.t) - log.t[0]
     end = int(np.searchsorted(t, SHOWN_S))

@@ -19,7 +19,7 @@ with Linux' least of 200 ms)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Gaps:
+class GapSchedule:
     """So long, so often."""
 
     gap_s: float
@@ -45,7 +45,7 @@ class Gaps:
 class WebRtcLine:
     """Unordered and never sent again: what is sent in a gap is lost."""
 
-    gaps: Gaps
+    gaps: GapSchedule
 
     def out(self, t: float, kind: Kind) -> float | None:
         """See `PhoneLine`."""
@@ -60,7 +60,7 @@ class WebRtcLine:
 class WebSocketLine:
     """Ordered and sent until it is heard: what a gap holds back comes at once, and late."""
 
-    gaps: Gaps
+    gaps: GapSchedule
 
     def out(self, t: float, _: Kind) -> float | None:
         """See `PhoneLine`."""

@@ -15,7 +15,7 @@ from pipeline.signals import Mode
 from server.common import processes
 from server.experiments.forked import forked
 from server.experiments.gaps.flight import GapFlight
-from server.experiments.gaps.schedule import Gaps, WebRtcLine
+from server.experiments.gaps.schedule import GapSchedule, WebRtcLine
 
 COAST_S: Final = 0.17
 RAMP_S: Final = 1.1
@@ -38,7 +38,7 @@ class Vanished:
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class VanishJob:
     """So many phones that vanish in one flight."""
 
     robot_file: RobotFile
@@ -47,7 +47,7 @@ class Job:
     runs: int
 
 
-def vanish(job: Job) -> list[Vanished]:
+def vanish(job: VanishJob) -> list[Vanished]:
     """Fly once; at random moments a copy of the process sees what follows if the phone is gone.
 
     Raises:
@@ -67,7 +67,7 @@ def vanish(job: Job) -> list[Vanished]:
 
 def _watch(flight: GapFlight) -> Vanished:
     begin = flight.loop.t
-    flight.loop.transit.line = WebRtcLine(Gaps(FOR_EVER_S, 2.0 * FOR_EVER_S, begin))
+    flight.loop.transit.line = WebRtcLine(GapSchedule(FOR_EVER_S, 2.0 * FOR_EVER_S, begin))
     first: dict[Mode, float] = {}
     while flight.loop.t < begin + WATCHED_S and Mode.RAMP not in first:
         mode = flight.advance().failsafe.mode
@@ -80,7 +80,7 @@ def fly(robot_file: RobotFile, config: TeleopConfig, phones: int, workers: int) 
     """About so many phones vanish, in flights of their own seeds."""
     flights = max(1, round(phones / A_FLIGHT)) if phones else 0
     each = -(-phones // max(1, flights))
-    jobs = [Job(robot_file, config, seed, each) for seed in range(100, 100 + flights)]
+    jobs = [VanishJob(robot_file, config, seed, each) for seed in range(100, 100 + flights)]
     return [one for some in processes.each(vanish, jobs, workers) for one in some]
 
 

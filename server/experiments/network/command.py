@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.sim.network.emulated_link import Link
+from hardware.sim.network.emulated_link import EmulatedLink
 from hardware.sim.network.netns import NamespaceError
 from server.common.text import table
 from server.experiments.network.figures import drops, percentile, recovery
 from server.experiments.network.phone import CLIENTS, FRAME_RATE_HZ
-from server.experiments.network.run import Rig, Run, RunError
+from server.experiments.network.run import NetworkTestbed, Run, RunError
 from server.experiments.network.scenarios import SCENARIOS, Scenario
 
 COLUMNS = (
@@ -38,7 +38,7 @@ NEEDS_TIME_S = 8.0
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class NetworkRow:
     """Figures of one run; times in ms unless the name says otherwise."""
 
     scenario: str
@@ -65,13 +65,13 @@ class Row:
     verdict: str
 
 
-def row_of(scenario: Scenario, path: str, run: Run) -> Row:
+def row_of(scenario: Scenario, path: str, run: Run) -> NetworkRow:
     """Figures of a run."""
     begin, end = run.begin, run.end
     frames = 1e3 * run.frames.within(begin, end).ages
     operator = 1e3 * run.records.ages_of_newest(begin, end)
     again = [recovery(run.frames, t_over) for t_over in run.fault_ends]
-    row = Row(
+    row = NetworkRow(
         scenario.name,
         path,
         percentile(frames, 50.0),
@@ -92,7 +92,7 @@ def row_of(scenario: Scenario, path: str, run: Run) -> Row:
     return replace(row, verdict=verdict_of(scenario, row) if path == "webrtc" else "")
 
 
-def misses(scenario: Scenario, row: Row) -> Iterator[str]:
+def misses(scenario: Scenario, row: NetworkRow) -> Iterator[str]:
     """Which goals were not met, in words."""
     if row.ended:
         yield row.ended
@@ -101,7 +101,7 @@ def misses(scenario: Scenario, row: Row) -> Iterator[str]:
             yield f"{name} > {goal:g}"
 
 
-def verdict_of(scenario: Scenario, row: Row) -> str:
+def verdict_of(scenario: Scenario, row: NetworkRow) -> str:
     """What was missed, or "met"; "" if nothing is asked."""
     is_asked = any(goal is not None for goal in asdict(scenario.goals).values())
     return ", ".join(misses(scenario, row)) or ("met" if is_asked else "")
@@ -114,8 +114,8 @@ def measure(arguments: argparse.Namespace) -> Iterator[tuple[Scenario, str, Run]
         NamespaceError: this machine, or this user, can't make networks.
         RunError: a process did not do its part.
     """
-    with Link() as link:
-        rig = Rig(link)
+    with EmulatedLink() as link:
+        rig = NetworkTestbed(link)
         try:
             for name in arguments.scenarios:
                 for path in arguments.paths:
@@ -125,7 +125,7 @@ def measure(arguments: argparse.Namespace) -> Iterator[tuple[Scenario, str, Run]
             rig.close()
 
 
-def write(rows: list[Row], runs: list[Run], folder: Path) -> None:
+def write(rows: list[NetworkRow], runs: list[Run], folder: Path) -> None:
     """JSON and the picture."""
     from server.experiments.network.picture import draw
 
@@ -150,7 +150,7 @@ def _told(value: str | float) -> str | float | None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, print, draw; 1 if a goal was missed, 2 if it can't be measured here."""
-    rows: list[Row] = []
+    rows: list[NetworkRow] = []
     runs: list[Run] = []
     try:
         for scenario, path, one in measure(arguments):

@@ -19,7 +19,7 @@ from hardware.codec import Encoder
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from server.common import clock
 from server.common.access import Access, PhoneClientError
 from server.virtual_phone.live_phone import EXPOSED_S, LivePhone
@@ -53,7 +53,7 @@ def script(seed: int) -> PhoneScript:
     )
     camera = find_camera(DEVICE, WIDTH, HEIGHT)
     rng = np.random.default_rng(seed)
-    phone = VirtualPhone(camera, hand, robot_file.robot.leds_in_b, Look(), rng, options)
+    phone = VirtualPhone(camera, hand, robot_file.robot.leds_in_b, RenderOptions(), rng, options)
     return PhoneScript(phone, Encoder(WIDTH, HEIGHT, FRAME_RATE_HZ, BITRATE_BPS), VirtualOperator())
 
 

@@ -17,13 +17,13 @@ import msgspec
 import numpy as np
 
 from hardware.sim.network.channel import CLEAN, Counts
-from hardware.sim.network.emulated_link import Lateness, Link
+from hardware.sim.network.emulated_link import EmulatedLink, Lateness
 from hardware.sim.network.netns import Namespace
 from hardware.sim.phone import PhoneClock
 from server.common import clock
 from server.experiments.network.figures import Arrivals
 from server.experiments.network.scenarios import Scenario
-from server.experiments.network.server import Heard, Place
+from server.experiments.network.server import ArrivalLog, ServerAddress
 from server.protocol.wire import Kind
 from server.virtual_phone.live_phone import EXPOSED_S
 
@@ -68,10 +68,10 @@ class Run:
     """Of the emulator itself."""
 
 
-class Rig:
+class NetworkTestbed:
     """The server in the near network, the phone in the far one."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: EmulatedLink) -> None:
         """Starts both.
 
         Raises:
@@ -81,7 +81,7 @@ class Rig:
         with contextlib.ExitStack() as started:
             self._server = _start(link.near, "server.experiments.network.server", link.near.address)
             started.callback(_end, self._server)
-            place = msgspec.json.decode(_line(self._server, START_S), type=Place)
+            place = msgspec.json.decode(_line(self._server, START_S), type=ServerAddress)
             self._phone = _start(
                 link.far, "server.experiments.network.phone", place.url, place.token
             )
@@ -114,7 +114,7 @@ class Rig:
         self._phone.send_signal(signal.SIGUSR1)
         told: dict[str, object] = msgspec.json.decode(_line(self._phone, END_S))
         self._server.send_signal(signal.SIGUSR1)
-        heard = msgspec.json.decode(_line(self._server, END_S), type=Heard)
+        heard = msgspec.json.decode(_line(self._server, END_S), type=ArrivalLog)
         return Run(
             begin,
             end,
@@ -168,7 +168,7 @@ class Rig:
                 self._link.shape(line, line)
 
 
-def _arrivals(heard: Heard, kinds: tuple[Kind, ...], after_s: float = 0.0) -> Arrivals:
+def _arrivals(heard: ArrivalLog, kinds: tuple[Kind, ...], after_s: float = 0.0) -> Arrivals:
     """Of these kinds, by the true time they were taken, `after_s` later."""
     clock = PhoneClock()
     rate = 1.0 + 1e-6 * clock.drift_ppm

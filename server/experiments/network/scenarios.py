@@ -14,7 +14,7 @@ NEAR = Conditions(delay_s=0.004, jitter_s=0.003)
 
 
 @dataclass(frozen=True, slots=True)
-class Goals:
+class LinkGoals:
     """What the path by WebRTC shall keep to; None: nothing is asked."""
 
     frame_p95_ms: float | None = None
@@ -32,7 +32,7 @@ class Scenario:
     line: Conditions
     fault: Fault | None = None
     fault_s: float = 1.0
-    goals: Goals = Goals()
+    goals: LinkGoals = LinkGoals()
 
 
 SCENARIOS = {
@@ -43,19 +43,19 @@ SCENARIOS = {
             "loss1",
             "1 % loss, RTT 11 ms",
             Conditions(delay_s=0.004, jitter_s=0.003, loss=0.01),
-            goals=Goals(frame_p95_ms=100.0, drops_pct=2.0),
+            goals=LinkGoals(frame_p95_ms=100.0, drops_pct=2.0),
         ),
         Scenario(
             "loss3",
             "3 % loss, RTT 35 ms",
             Conditions(delay_s=0.015, jitter_s=0.005, loss=0.03),
-            goals=Goals(frame_p95_ms=250.0),
+            goals=LinkGoals(frame_p95_ms=250.0),
         ),
         Scenario(
             "loss15",
             "15 % loss, RTT 11 ms",
             Conditions(delay_s=0.004, jitter_s=0.003, loss=0.15),
-            goals=Goals(operator_p999_ms=120.0),
+            goals=LinkGoals(operator_p999_ms=120.0),
         ),
         Scenario(
             "burst",
@@ -83,7 +83,7 @@ SCENARIOS = {
             "the server stands still for 1 s, every 5 s",
             NEAR,
             "stall",
-            goals=Goals(recovery_s=0.5),
+            goals=LinkGoals(recovery_s=0.5),
         ),
     )
 }

@@ -20,28 +20,28 @@ from pipeline.vision.visual_front_end import warm_up
 from server.common.clock import now
 from server.common.settings import RtcSettings, VideoSettings
 from server.control.ipc import Input, OperatorInput, control_end
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.process.launcher import listen
 from server.protocol.wire import HEADER, MAGIC
 from server.recording.control import Recordings
-from server.rtc.signalling_endpoint import RtcDesk
+from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.admission import Admission
 from server.security.listener import listener
 from server.security.request_guard import Guard
 from server.security.security import Doors
 from server.web.app import Api, make_app
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from server.web.websocket import PageServer
 
 
-class Place(msgspec.Struct, frozen=True):
+class ServerAddress(msgspec.Struct, frozen=True):
     """Where it is, and what opens its door."""
 
     url: str
     token: str
 
 
-class Heard(msgspec.Struct):
+class ArrivalLog(msgspec.Struct):
     """What came since the last time it was asked."""
 
     records: list[tuple[int, int, int, float]] = []
@@ -56,10 +56,10 @@ class Heard(msgspec.Struct):
     """Phones that went."""
 
 
-class NotingHub(Hub):
+class NotingSessionManager(SessionManager):
     """A hub that remembers arrivals."""
 
-    heard = Heard()
+    heard = ArrivalLog()
 
     def record(self, data: str | bytes, t: float) -> None:
         """Note it."""
@@ -74,7 +74,7 @@ class NotingHub(Hub):
         if isinstance(message, OperatorInput):
             self.heard.echoes.append((message.t, now()))
 
-    def part(self, phone: OperatorPhone) -> None:
+    def part(self, phone: PhoneSession) -> None:
         """Note how its pictures came."""
         self._look_back(phone)
         self.heard.partings += 1
@@ -86,9 +86,9 @@ class NotingHub(Hub):
             self._look_back(self.phone)
         sys.stdout.buffer.write(msgspec.json.encode(self.heard) + b"\n")
         sys.stdout.buffer.flush()
-        self.heard = Heard()
+        self.heard = ArrivalLog()
 
-    def _look_back(self, phone: OperatorPhone) -> None:
+    def _look_back(self, phone: PhoneSession) -> None:
         self.heard.video_path = phone.video_path
         if phone.vision is not None:
             self.heard.undecodable = phone.vision.undecodable
@@ -99,12 +99,12 @@ async def serve(host: str, folder: Path) -> None:
     robot = load_robot("ames").robot
     doors = Doors()
     recordings = Recordings(folder / "recordings", {})
-    hub = NotingHub(folder, robot, [CAMERAS], recordings, doors=doors)
+    hub = NotingSessionManager(folder, robot, [CAMERAS], recordings, doors=doors)
     control = control_end(folder)  # nobody's: what goes there is read and forgotten
     video = VideoSettings(width=640, height=480, bitrate_bps=1_500_000)
     with listen(host, 0) as bound:
         url = f"http://{host}:{bound.getsockname()[1]}"
-        desk = RtcDesk(hub, RtcSettings(), video.bitrate_bps)
+        desk = SignallingEndpoint(hub, RtcSettings(), video.bitrate_bps)
         api = Api(hub, None)
         admission = Admission()
         inner = make_app(api, PageServer(hub, video), desk.routes())
@@ -115,7 +115,9 @@ async def serve(host: str, folder: Path) -> None:
         loop.add_signal_handler(signal.SIGUSR1, hub.tell_heard)
         server = listener(app, None, admission)
         tasks = [asyncio.create_task(server.serve(sockets=[bound])), asyncio.create_task(hub.run())]
-        sys.stdout.buffer.write(msgspec.json.encode(Place(url, doors.operator_token)) + b"\n")
+        sys.stdout.buffer.write(
+            msgspec.json.encode(ServerAddress(url, doors.operator_token)) + b"\n"
+        )
         sys.stdout.buffer.flush()
         await stop.wait()
         await desk.close()

@@ -15,12 +15,12 @@ from server.common import processes
 from server.common.ranges import number, whole
 from server.experiments.paper import comparison, disturbance, table_1, table_3, table_4
 from server.experiments.paper.setup import assumptions, published
-from server.experiments.paper.setup.measure import Setup
-from server.experiments.paper.setup.variants import Variant, Wishes, check_gains, ours
+from server.experiments.paper.setup.measure import ExperimentSetup
+from server.experiments.paper.setup.variants import Variant, VariantRequest, check_gains, ours
 from server.simulation.sensors import PAPER, Leader, Pictures, phone
 
 
-class Outcome(Protocol):
+class Reported(Protocol):
     """What an experiment gives."""
 
     @property
@@ -41,7 +41,7 @@ class Outcome(Protocol):
         """Pictures."""
 
 
-Measure = Callable[[Setup, Sequence[Variant]], Outcome]
+Measure = Callable[[ExperimentSetup, Sequence[Variant]], Reported]
 EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
     table_1.NAME: (table_1.measure, "off"),
     table_3.NAME: (table_3.measure, "off"),
@@ -62,7 +62,9 @@ def run(arguments: argparse.Namespace) -> int:
     except (RobotFileError, ValueError) as error:
         print(f"lightleash experiments paper: {error}", file=sys.stderr)
         return 2
-    setup = Setup(robot_file, leader, tuple(range(1, arguments.seeds + 1)), arguments.workers)
+    setup = ExperimentSetup(
+        robot_file, leader, tuple(range(1, arguments.seeds + 1)), arguments.workers
+    )
     print(published.SOURCE)
     print(assumptions.lines(assumptions.of(setup)))
     adds = bool(wishes) or leader.name != PAPER.name
@@ -78,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if good or leader.name != PAPER.name else 1
 
 
-def write(outcomes: Sequence[Outcome], setup: Setup, folder: Path) -> list[Path]:
+def write(outcomes: Sequence[Reported], setup: ExperimentSetup, folder: Path) -> list[Path]:
     """JSON and pictures; gives the files."""
     folder.mkdir(parents=True, exist_ok=True)
     head = {"source": published.SOURCE, "assumptions": assumptions.json(assumptions.of(setup))}
@@ -106,9 +108,9 @@ def leader_of(arguments: argparse.Namespace) -> Leader:
     return phone(arguments.fps, (1e-3 * low, 1e-3 * high), arguments.pictures)
 
 
-def wishes_of(arguments: argparse.Namespace) -> Wishes:
+def wishes_of(arguments: argparse.Namespace) -> VariantRequest:
     """What was asked for."""
-    return Wishes(
+    return VariantRequest(
         arguments.estimator,
         arguments.gains,
         arguments.vci,

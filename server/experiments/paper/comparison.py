@@ -16,8 +16,8 @@ from hardware.robot_file import RobotFile
 from pipeline.config import VirtualCameraMode
 from server.common.text import Column, flights, plain
 from server.experiments.paper.setup import assumptions, published
-from server.experiments.paper.setup.measure import Cell, Setup, cell_of
-from server.experiments.paper.setup.variants import Variant, Wishes, ours
+from server.experiments.paper.setup.measure import ComparedFigure, ExperimentSetup, cell_of
+from server.experiments.paper.setup.variants import Variant, VariantRequest, ours
 from server.simulation.sensors import PAPER, PERFECT, Leader, Pictures, phone
 
 NAME: Final = "beaten"
@@ -55,7 +55,7 @@ def goals(pictures: Pictures = "spots") -> list[Goal]:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class GoalRow:
     """A goal and what became of it; NaN: not flown."""
 
     leader: str
@@ -91,7 +91,7 @@ COLUMNS: Final[tuple[Column, ...]] = (
 class Summary:
     """The experiment's result."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[GoalRow, ...]
     phone: Leader
     name: str = NAME
 
@@ -117,7 +117,7 @@ class Summary:
         return []
 
 
-def measure(setup: Setup, _: Sequence[Variant] = ()) -> Summary:
+def measure(setup: ExperimentSetup, _: Sequence[Variant] = ()) -> Summary:
     """Fly what the goals ask for, whatever leader and further variants are set.
 
     Of the leader set, its phones only take the kind of pictures.
@@ -127,9 +127,9 @@ def measure(setup: Setup, _: Sequence[Variant] = ()) -> Summary:
     return Summary(rows, phone(pictures=pictures))
 
 
-def _judged(setup: Setup, goal: Goal) -> Row:
+def _judged(setup: ExperimentSetup, goal: Goal) -> GoalRow:
     cell = _flown(replace(setup, leader=goal.leader), goal)
-    row = Row(
+    row = GoalRow(
         leader=goal.leader.name,
         table=goal.table,
         axis=goal.axis,
@@ -155,18 +155,18 @@ def _missed_by(true: float, limit: float) -> str:
     return f"missed by {100.0 * (true / limit - 1.0):.0f} %"
 
 
-def _flown(setup: Setup, goal: Goal) -> Cell:
+def _flown(setup: ExperimentSetup, goal: Goal) -> ComparedFigure:
     """With our way, as it is for the goal's own leader."""
-    variant = ours(goal.leader, Wishes(), goal.vci)
+    variant = ours(goal.leader, VariantRequest(), goal.vci)
     return cell_of(variant.name, goal.axis, goal.limit, setup.fly(variant, goal.hand, SECONDS))
 
 
-def _no_lag(setup: Setup) -> Setup:
+def _no_lag(setup: ExperimentSetup) -> ExperimentSetup:
     plant = replace(setup.robot_file.plant, lag=NO_LAG_S, delay=0.0)
     return replace(setup, robot_file=replace(setup.robot_file, plant=plant))
 
 
-def _twice(setup: Setup) -> Setup:
+def _twice(setup: ExperimentSetup) -> ExperimentSetup:
     file: RobotFile = setup.robot_file
     f_max = 2.0 * file.robot.f_max
     robot, plant = replace(file.robot, f_max=f_max), replace(file.plant, f_max=f_max)

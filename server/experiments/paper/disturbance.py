@@ -14,8 +14,8 @@ from pipeline.frames import Array
 from server.common.text import Column, flights, plain, statements
 from server.experiments.paper.picture import figure_9
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.flight import Push, Trace
-from server.experiments.paper.setup.measure import Setup
+from server.experiments.paper.setup.flight import ExperimentTrace, Push
+from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.variants import WITH_VCI, Variant
 
 NAME: Final = "disturbance"
@@ -60,7 +60,7 @@ class Pushed:
     """The experiment's result."""
 
     rows: tuple[Rejection, ...]
-    shown: Trace
+    shown: ExperimentTrace
     name: str = NAME
 
     @property
@@ -89,7 +89,7 @@ class Pushed:
         return [figure_9(self.shown, folder / "fig_9.png")]
 
 
-def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Pushed:
+def measure(setup: ExperimentSetup, extra: Sequence[Variant] = ()) -> Pushed:
     """Fly with the push and without; the paper's variant first."""
     rows, shown = [], []
     for variant in (WITH_VCI, *extra):
@@ -100,7 +100,9 @@ def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Pushed:
     return Pushed(tuple(rows), next(flown, shown[0]))
 
 
-def rejection(name: str, pushed: Sequence[Trace], left: Sequence[Trace]) -> Rejection:
+def rejection(
+    name: str, pushed: Sequence[ExperimentTrace], left: Sequence[ExperimentTrace]
+) -> Rejection:
     """Figures of flights with the push, against those left alone with the same seeds."""
     ended = next((trace.ended for trace in (*pushed, *left) if trace.ended), "")
     if ended:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from hardware.sim.hand import STEP_M
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.flight import Trace
+from server.experiments.paper.setup.flight import ExperimentTrace
 
 if TYPE_CHECKING:  # loaded only when something is drawn
     from matplotlib.axes import Axes
@@ -50,7 +50,7 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-def figure_6(traces: Mapping[str, Trace], path: Path) -> Path:
+def figure_6(traces: Mapping[str, ExperimentTrace], path: Path) -> Path:
     """Fig. 6: error along x_b while the camera moves along x_c; thrust along x_b."""
     figure, (top, bottom) = panels(2)
     for name, trace in traces.items():
@@ -70,7 +70,7 @@ def figure_6(traces: Mapping[str, Trace], path: Path) -> Path:
     return save(figure, path)
 
 
-def figure_7(traces: Mapping[str, Trace], path: Path) -> Path:
+def figure_7(traces: Mapping[str, ExperimentTrace], path: Path) -> Path:
     """Fig. 7: error and controller output along y_b, with and without the VCI."""
     figure, (top, bottom) = panels(2)
     for name, trace in traces.items():
@@ -84,7 +84,7 @@ def figure_7(traces: Mapping[str, Trace], path: Path) -> Path:
     return save(figure, path)
 
 
-def figure_8(traces: Mapping[str, Trace], f_max: float, path: Path) -> Path:
+def figure_8(traces: Mapping[str, ExperimentTrace], f_max: float, path: Path) -> Path:
     """Fig. 8: what each thruster is asked for, with the VCI and without; its limit `f_max` [N]."""
     shown = ("with VCI", "without VCI")
     figure, axes = panels(len(shown), sharey=True)
@@ -101,7 +101,7 @@ def figure_8(traces: Mapping[str, Trace], f_max: float, path: Path) -> Path:
     return save(figure, path)
 
 
-def figure_9(pushed: Trace, path: Path) -> Path:
+def figure_9(pushed: ExperimentTrace, path: Path) -> Path:
     """Fig. 9: relative position along y_c and controller output along y_b, turned and pushed."""
     figure, (top, bottom) = panels(2)
     t = pushed.t + published.MOVE_AT_S

@@ -7,17 +7,17 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from server.common.text import plain, statements
-from server.experiments.paper.setup.measure import Cell, table_of
+from server.experiments.paper.setup.measure import ComparedFigure, table_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Result:
+class PaperResult:
     """Of one of the paper's experiments."""
 
     name: str
     """Of its file."""
     title: str
-    cells: tuple[Cell, ...]
+    cells: tuple[ComparedFigure, ...]
     holds: Mapping[str, bool]
     """Statements of the paper, and whether they hold here."""
     draw: Callable[[Path], list[Path]]

@@ -7,10 +7,10 @@ from math import nan
 from pathlib import Path
 
 from server.experiments.paper.picture import figure_6
-from server.experiments.paper.result import Result
+from server.experiments.paper.result import PaperResult
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.flight import Trace
-from server.experiments.paper.setup.measure import Cell, Setup, cell_of
+from server.experiments.paper.setup.flight import ExperimentTrace
+from server.experiments.paper.setup.measure import ComparedFigure, ExperimentSetup, cell_of
 from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Variant
 
 NAME = "table_1"
@@ -18,10 +18,10 @@ TITLE = "Table I, Fig. 6: 3 cm in 0.3 s along each axis, RMS in mm"
 SECONDS = 4.0  # after each step
 
 
-def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Result:
+def measure(setup: ExperimentSetup, extra: Sequence[Variant] = ()) -> PaperResult:
     """Fly every axis with each variant; the paper's two columns and `extra` ones."""
-    cells: list[Cell] = []
-    shown: dict[str, Trace] = {}
+    cells: list[ComparedFigure] = []
+    shown: dict[str, ExperimentTrace] = {}
     for variant in (WITHOUT_EKF, WITH_EKF, *extra):
         for axis in "xyz":
             traces = setup.fly(variant, f"step_{axis}", SECONDS)
@@ -33,10 +33,10 @@ def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Result:
     def draw(folder: Path) -> list[Path]:
         return [figure_6(shown, folder / "fig_6.png")]
 
-    return Result(NAME, TITLE, tuple(cells), orderings(cells), draw)
+    return PaperResult(NAME, TITLE, tuple(cells), orderings(cells), draw)
 
 
-def orderings(cells: Sequence[Cell]) -> dict[str, bool]:
+def orderings(cells: Sequence[ComparedFigure]) -> dict[str, bool]:
     """What the paper's table says, whether it holds here."""
     rms = {(cell.variant, cell.axis): cell.ours for cell in cells}
     return {

@@ -20,7 +20,7 @@ from server.common.progress import Progress
 from server.common.text import Column, dashed, plain, statements
 from server.experiments.paper.picture_task import figure_beam, figure_times
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.measure import Setup
+from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.task import PEOPLE, Attempt
 from server.experiments.paper.setup.trials import Trial, flown, trials_of
 from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Variant
@@ -33,7 +33,7 @@ TITLE: Final = (
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class ComparedTime:
     """A mean time of the table."""
 
     operator: str
@@ -83,15 +83,15 @@ class Study:
     name: str = NAME
 
     @property
-    def cells(self) -> list[Cell]:
+    def cells(self) -> list[ComparedTime]:
         """One for each person and variant."""
         variants = dict.fromkeys(trial.variant for trial, _ in self.flown)
         return [self._cell(person.name, variant) for person in PEOPLE for variant in variants]
 
-    def _cell(self, operator: str, variant: str) -> Cell:
+    def _cell(self, operator: str, variant: str) -> ComparedTime:
         ones = [a for t, a in self.flown if (t.name, t.variant) == (operator, variant)]
         seconds = np.array([one.seconds for one in ones])
-        return Cell(
+        return ComparedTime(
             operator,
             variant,
             paper=published.TABLE_III.get(variant, {}).get(operator, nan),
@@ -156,7 +156,7 @@ class Study:
         ]
 
 
-def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Study:
+def measure(setup: ExperimentSetup, extra: Sequence[Variant] = ()) -> Study:
     """Fly all attempts with each variant; the paper's two columns and `extra` ones."""
     trials = list(trials_of(setup, (WITHOUT_EKF, WITH_EKF, *extra)))
     results: dict[int, Attempt] = {}

@@ -7,10 +7,10 @@ from math import nan
 from pathlib import Path
 
 from server.experiments.paper.picture import figure_7, figure_8
-from server.experiments.paper.result import Result
+from server.experiments.paper.result import PaperResult
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.flight import Trace
-from server.experiments.paper.setup.measure import Cell, Setup, cell_of
+from server.experiments.paper.setup.flight import ExperimentTrace
+from server.experiments.paper.setup.measure import ComparedFigure, ExperimentSetup, cell_of
 from server.experiments.paper.setup.variants import WITH_VCI, WITHOUT_VCI, Variant
 
 NAME = "table_4"
@@ -21,10 +21,10 @@ FAR_BELOW = 0.5
 """What "≪" is taken to mean."""
 
 
-def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Result:
+def measure(setup: ExperimentSetup, extra: Sequence[Variant] = ()) -> PaperResult:
     """Fly with each variant; the paper's two columns and `extra` ones."""
-    cells: list[Cell] = []
-    shown: dict[str, Trace] = {}
+    cells: list[ComparedFigure] = []
+    shown: dict[str, ExperimentTrace] = {}
     for variant in (WITHOUT_VCI, WITH_VCI, *extra):
         traces = setup.fly(variant, HAND, SECONDS)
         shown[variant.name] = traces[0]
@@ -39,10 +39,10 @@ def measure(setup: Setup, extra: Sequence[Variant] = ()) -> Result:
             figure_8(shown, f_max, folder / "fig_8.png"),
         ]
 
-    return Result(NAME, TITLE, tuple(cells), orderings(cells), draw)
+    return PaperResult(NAME, TITLE, tuple(cells), orderings(cells), draw)
 
 
-def orderings(cells: Sequence[Cell]) -> dict[str, bool]:
+def orderings(cells: Sequence[ComparedFigure]) -> dict[str, bool]:
     """What the paper says of table and figures, whether it holds here."""
     rms = {(cell.variant, cell.axis): cell.ours for cell in cells}
     saturated = {cell.variant: cell.saturated_pct for cell in cells}

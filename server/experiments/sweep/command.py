@@ -15,10 +15,10 @@ from server.common.progress import Progress
 from server.common.ranges import whole
 from server.experiments.sweep import picture, summary
 from server.experiments.sweep.errors import SweepError
-from server.experiments.sweep.results import Results
+from server.experiments.sweep.results import SweepResults
 from server.experiments.sweep.sweep_file import Sweep, examples, read
 from server.experiments.sweep.workers import on_cluster, on_processes
-from server.simulation.session import Outcome, Session
+from server.simulation.session import SessionOutcome, SweepSession
 from server.simulation.sweep_keys import Number, Switch, Word, known_keys
 
 INTERRUPTED, KILLED = 130, 3  # exit codes
@@ -47,14 +47,14 @@ def run(arguments: argparse.Namespace) -> int:
             raise SweepError("--workers", "not with --scheduler, whose cluster has its own")
         sweep = read(examples().get(str(arguments.file), arguments.file))
         folder = arguments.out or arguments.file.with_suffix("")
-        with Results(folder, sweep, arguments.mix) as results:
+        with SweepResults(folder, sweep, arguments.mix) as results:
             return _flown(sweep, results, folder, arguments)
     except SweepError as error:
         print(f"lightleash experiments sweep: {error}", file=sys.stderr)
         return 2
 
 
-def _flown(sweep: Sweep, results: Results, folder: Path, arguments: argparse.Namespace) -> int:
+def _flown(sweep: Sweep, results: SweepResults, folder: Path, arguments: argparse.Namespace) -> int:
     sessions = sweep.sessions()
     missing = [session for session in sessions if session.index not in results.done]
     already = f", {len(results.done)} of them done before" if results.done else ""
@@ -82,7 +82,7 @@ def _flown(sweep: Sweep, results: Results, folder: Path, arguments: argparse.Nam
 
 
 def _fill(
-    results: Results, missing: list[Session], arguments: argparse.Namespace, total: int
+    results: SweepResults, missing: list[SweepSession], arguments: argparse.Namespace, total: int
 ) -> int:
     """Fly what is missing; whatever stops it, what is done stays."""
     progress = Progress(len(missing), sys.stderr)
@@ -106,8 +106,8 @@ def _stopped(why: str, code: int) -> int:
 
 
 def _outcomes(
-    missing: list[Session], arguments: argparse.Namespace
-) -> Generator[Outcome, None, None]:
+    missing: list[SweepSession], arguments: argparse.Namespace
+) -> Generator[SessionOutcome, None, None]:
     if arguments.scheduler:
         return on_cluster(missing, arguments.scheduler)
     return on_processes(missing, min(arguments.workers or cores(), len(missing)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from server.experiments.sweep.summary import by_value, went_well, worded
 from server.experiments.sweep.sweep_file import Sweep
-from server.simulation.session import Outcome
+from server.simulation.session import SessionOutcome
 from server.simulation.sweep_keys import Value
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ SPREAD: Final = 0.32
 """How far from its value a point may stand, for those that would cover each other."""
 
 
-def draw(sweep: Sweep, done: Mapping[int, Outcome], path: Path) -> None:
+def draw(sweep: Sweep, done: Mapping[int, SessionOutcome], path: Path) -> None:
     """A panel a key; colours are the values of the key after it; what ended early stands on top."""
     import matplotlib
 
@@ -57,7 +57,9 @@ def draw(sweep: Sweep, done: Mapping[int, Outcome], path: Path) -> None:
     pyplot.close(figure)
 
 
-def _panel(axis: Axes, sweep: Sweep, done: Mapping[int, Outcome], key: str, other: str) -> None:
+def _panel(
+    axis: Axes, sweep: Sweep, done: Mapping[int, SessionOutcome], key: str, other: str
+) -> None:
     if not key:
         _series(axis, [0.0], [list(done.values())], 0, 1, "")
         axis.set_xticks([0.0], ["all"])
@@ -79,7 +81,7 @@ def _panel(axis: Axes, sweep: Sweep, done: Mapping[int, Outcome], key: str, othe
 def _series(
     axis: Axes,
     places: Sequence[float],
-    outcomes: Sequence[Sequence[Outcome]],
+    outcomes: Sequence[Sequence[SessionOutcome]],
     j: int,
     of: int,
     label: str,

@@ -21,10 +21,10 @@ from server.experiments.sweep import summary
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.provenance import other, versions
 from server.experiments.sweep.sweep_file import Sweep
-from server.simulation.session import FIGURES, Figures, Outcome
+from server.simulation.session import FIGURES, Figures, SessionOutcome
 
 
-class Results:
+class SweepResults:
     """Of one sweep in one directory."""
 
     def __init__(self, folder: Path, sweep: Sweep, mix: bool = False) -> None:
@@ -83,10 +83,10 @@ class Results:
             )
         return now, [*mixed, was]
 
-    def _taken_up(self) -> dict[int, Outcome]:
+    def _taken_up(self) -> dict[int, SessionOutcome]:
         """Outcomes of before; a last line that was cut off by a crash is flown again."""
         path = self._folder / "sessions.jsonl"
-        done: dict[int, Outcome] = {}
+        done: dict[int, SessionOutcome] = {}
         if not path.exists():
             return done
         whole = 0
@@ -104,13 +104,13 @@ class Results:
             file.truncate(whole)
         return done
 
-    def add(self, outcome: Outcome) -> None:
+    def add(self, outcome: SessionOutcome) -> None:
         """Another session is done."""
         self.done[outcome.index] = outcome
         self._journal.write(json.dumps(_line(outcome)) + "\n")
         self._journal.flush()
 
-    def __enter__(self) -> Results:
+    def __enter__(self) -> SweepResults:
         """To be left when no more is added."""
         return self
 
@@ -179,7 +179,7 @@ def _digest(text: str) -> str:
     return sha256(text.encode()).hexdigest()[:12]
 
 
-def _line(outcome: Outcome) -> dict[str, Any]:
+def _line(outcome: SessionOutcome) -> dict[str, Any]:
     figures = {name: _known(value) for name, value in asdict(outcome.figures).items()}
     return {"index": outcome.index, "cpu_s": round(outcome.cpu_s, 4), **figures}
 
@@ -189,9 +189,9 @@ def _known(value: object) -> object:
     return None if isinstance(value, float) and isnan(value) else value
 
 
-def _outcome(line: Mapping[str, Any]) -> Outcome:
+def _outcome(line: Mapping[str, Any]) -> SessionOutcome:
     figures: dict[str, Any] = {name: nan if line[name] is None else line[name] for name in FIGURES}
-    return Outcome(line["index"], Figures(**figures), line["cpu_s"])
+    return SessionOutcome(line["index"], Figures(**figures), line["cpu_s"])
 
 
 def _cell(value: object) -> object:

@@ -10,12 +10,12 @@ import numpy as np
 
 from server.common import text
 from server.experiments.sweep.sweep_file import Sweep
-from server.simulation.session import Outcome
+from server.simulation.session import SessionOutcome
 from server.simulation.sweep_keys import Value
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class SweepRow:
     """One value of one key."""
 
     key: str
@@ -40,7 +40,7 @@ COLUMNS = (
 )
 
 
-def rows(sweep: Sweep, done: Mapping[int, Outcome]) -> Iterator[Row]:
+def rows(sweep: Sweep, done: Mapping[int, SessionOutcome]) -> Iterator[SweepRow]:
     """A row for each value; one for all if nothing varies but the seed."""
     if not sweep.varied:
         yield _row("all", "", list(done.values()))
@@ -49,15 +49,17 @@ def rows(sweep: Sweep, done: Mapping[int, Outcome]) -> Iterator[Row]:
             yield _row(key, worded(value), outcomes)
 
 
-def by_value(sweep: Sweep, done: Mapping[int, Outcome], key: str) -> dict[Value, list[Outcome]]:
+def by_value(
+    sweep: Sweep, done: Mapping[int, SessionOutcome], key: str
+) -> dict[Value, list[SessionOutcome]]:
     """Outcomes for each value of a varied key, in the order of the file."""
-    found: dict[Value, list[Outcome]] = {}
+    found: dict[Value, list[SessionOutcome]] = {}
     for index in sorted(done):
         found.setdefault(dict(sweep.point_of(index))[key], []).append(done[index])
     return found
 
 
-def went_well(outcome: Outcome) -> bool:
+def went_well(outcome: SessionOutcome) -> bool:
     """Whether its RMS is that of a whole session."""
     return not outcome.figures.ended and not isnan(outcome.figures.rms_mm)
 
@@ -71,16 +73,16 @@ def worded(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _row(key: str, value: str, outcomes: list[Outcome]) -> Row:
+def _row(key: str, value: str, outcomes: list[SessionOutcome]) -> SweepRow:
     good = [one.figures.rms_mm for one in outcomes if went_well(one)]
     low, middle, high = np.quantile(good or [np.nan], (0.1, 0.5, 0.9)).tolist()
-    return Row(key, value, len(outcomes), len(outcomes) - len(good), low, middle, high)
+    return SweepRow(key, value, len(outcomes), len(outcomes) - len(good), low, middle, high)
 
 
-def table(sweep: Sweep, done: Mapping[int, Outcome]) -> str:
+def table(sweep: Sweep, done: Mapping[int, SessionOutcome]) -> str:
     """As printed, with the best combination below."""
     told = text.table(COLUMNS, rows(sweep, done))
-    points: dict[int, list[Outcome]] = {}
+    points: dict[int, list[SessionOutcome]] = {}
     for index, outcome in done.items():
         points.setdefault(index // len(sweep.seeds), []).append(outcome)
     whole = {

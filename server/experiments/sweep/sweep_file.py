@@ -24,7 +24,7 @@ from typing import Any, Final, cast
 
 from hardware.robot_file import RobotFileError, robot_of, robot_path, robot_table
 from server.experiments.sweep.errors import SweepError
-from server.simulation.session import Session, Settings, prepared
+from server.simulation.session import Settings, SweepSession, prepared
 from server.simulation.sweep_keys import Allowed, Number, Value, known_keys, nearest
 
 TOP: Final = ("robot", "seeds", "seconds", "settle_s", "fixed", "grid", "list")
@@ -52,11 +52,13 @@ class Sweep:
     points: tuple[Settings, ...]
     """Every combination of theirs."""
 
-    def sessions(self) -> list[Session]:
+    def sessions(self) -> list[SweepSession]:
         """All of them; those of a combination side by side."""
         pairs = [(point, seed) for point in self.points for seed in self.seeds]
         return [
-            Session(k, seed, self.seconds, self.settle_s, self.robot, merged((*self.fixed, *point)))
+            SweepSession(
+                k, seed, self.seconds, self.settle_s, self.robot, merged((*self.fixed, *point))
+            )
             for k, (point, seed) in enumerate(pairs)
         ]
 
@@ -111,7 +113,7 @@ def _checked(table: Mapping[str, Any], folder: Path) -> Sweep:
     if total > MOST:
         raise SweepError("seeds", f"{total} sessions; allowed: {MOST}")
     for robot_point in dict.fromkeys(map(_robot_part, sweep.points)):
-        prepared(Session(0, 0, 1.0, 0.0, robot, merged((*sweep.fixed, *robot_point))))
+        prepared(SweepSession(0, 0, 1.0, 0.0, robot, merged((*sweep.fixed, *robot_point))))
     return sweep
 
 

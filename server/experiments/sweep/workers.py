@@ -16,7 +16,7 @@ from server.common import processes
 from server.common.processes import AHEAD
 from server.experiments.sweep import provenance
 from server.experiments.sweep.errors import SweepError
-from server.simulation.session import Outcome, Session, fly
+from server.simulation.session import SessionOutcome, SweepSession, fly
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 
 
-def on_processes(sessions: Iterable[Session], workers: int) -> Generator[Outcome, None, None]:
+def on_processes(
+    sessions: Iterable[SweepSession], workers: int
+) -> Generator[SessionOutcome, None, None]:
     """Outcomes as they come, by so many fresh processes; closing it ends them at once.
 
     Raises:
@@ -38,7 +40,9 @@ def version() -> str:
     return f"{server.__version__}, code {provenance.code()}"
 
 
-def on_cluster(sessions: Iterable[Session], address: str) -> Generator[Outcome, None, None]:
+def on_cluster(
+    sessions: Iterable[SweepSession], address: str
+) -> Generator[SessionOutcome, None, None]:
     """Outcomes as they come, by the workers of the Dask scheduler at `address`.
 
     Raises:
@@ -60,7 +64,7 @@ def on_cluster(sessions: Iterable[Session], address: str) -> Generator[Outcome, 
         for session in islice(waiting, AHEAD * hands):
             coming.add(client.submit(fly, session, pure=False))
         for future in coming:
-            outcome: Outcome = future.result()
+            outcome: SessionOutcome = future.result()
             yield outcome
             for session in islice(waiting, 1):
                 coming.add(client.submit(fly, session, pure=False))

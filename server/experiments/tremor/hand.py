@@ -13,7 +13,7 @@ import numpy as np
 
 from hardware.sim.hand import Hand, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from pipeline.camera.lens import Camera
 from pipeline.estimation.attitude import Attitude
 from pipeline.frames import Array, R_cd, exp
@@ -37,7 +37,9 @@ def simulated(hand: Hand, seconds: float, seed: int) -> Iterator[Arrival]:
     """What the sensors of a virtual phone in that hand deliver."""
     options = PhoneOptions()
     blind, nothing = Camera(1, 1, np.eye(3), "plumb_bob", np.zeros(4)), np.zeros((0, 3))
-    phone = VirtualPhone(blind, hand, nothing, Look(), np.random.default_rng(seed), options)
+    phone = VirtualPhone(
+        blind, hand, nothing, RenderOptions(), np.random.default_rng(seed), options
+    )
     R = R_cd(options.screen_angle_deg)
     for event in phone.motions.deliveries(0.0, seconds):
         reading = phone.motion(event.t_capture)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hardware.sim.scenes.video import Shot
+from hardware.sim.scenes.video import RenderedFrame
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, exp, log
 from pipeline.signals import RelativePose
@@ -39,20 +39,20 @@ class Error:
     """Standard deviations at the bound; NaN as above."""
 
 
-def error_of(pose: RelativePose, shot: Shot) -> Array:
+def error_of(pose: RelativePose, shot: RenderedFrame) -> Array:
     """(6,): δp in c [m] and θ in b [rad], with truth = estimate ⊞ error."""
     turn = log(pose.R_cb.T @ shot.R_cb)
     return np.concatenate((shot.p_bc_in_c - pose.p_bc_in_c, turn))
 
 
-def is_wrong(pose: RelativePose, shot: Shot) -> bool:
+def is_wrong(pose: RelativePose, shot: RenderedFrame) -> bool:
     """Whether a reported pose is none of this robot."""
     error = error_of(pose, shot)
     far = WRONG_M + WRONG_SHARE * float(np.linalg.norm(shot.p_bc_in_c))
     return bool(np.linalg.norm(error[:3]) > far or np.linalg.norm(error[3:]) > WRONG_RAD)
 
 
-def measured(pose: RelativePose, shot: Shot, camera: Camera, leds_in_b: Array) -> Error:
+def measured(pose: RelativePose, shot: RenderedFrame, camera: Camera, leds_in_b: Array) -> Error:
     """All figures of a pose."""
     error = error_of(pose, shot)
     sight = shot.p_bc_in_c / np.linalg.norm(shot.p_bc_in_c)
@@ -76,7 +76,7 @@ def measured(pose: RelativePose, shot: Shot, camera: Camera, leds_in_b: Array) -
     )
 
 
-def jacobian(shot: Shot, camera: Camera, leds_in_b: Array) -> Array:
+def jacobian(shot: RenderedFrame, camera: Camera, leds_in_b: Array) -> Array:
     """(n, 2, 6): how the LEDs' pixels follow the true pose (δp in c, θ in b)."""
     steps = STEP * np.vstack((np.eye(6), -np.eye(6)))
     points = [shot.p_bc_in_c + s[:3] + leds_in_b @ (shot.R_cb @ exp(s[3:])).T for s in steps]

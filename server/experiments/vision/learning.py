@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hardware.sim.scenes.scene import HD, LEARNING
-from hardware.sim.scenes.video import RATE_HZ, Film
+from hardware.sim.scenes.video import RATE_HZ, RenderedVideo
 from pipeline.signals import Frame
-from pipeline.vision.imu_buffer import Felt
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.imu_buffer import ImuBuffer
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 
 LEARN_S = 20.0
@@ -21,7 +21,7 @@ OFFSET_S = 0.025
 
 
 @dataclass(frozen=True, slots=True)
-class Learnt:
+class LearningFigures:
     """After twenty seconds of one film."""
 
     seed: int
@@ -45,15 +45,15 @@ class Learnt:
         return abs(self.learnt_offset_s - self.offset_s)
 
 
-def learn(seed: int) -> Learnt:
+def learn(seed: int) -> LearningFigures:
     """Twenty seconds of leading a robot with a camera file that is wrong."""
-    film = Film(LEARNING, seed, HD, round(LEARN_S * RATE_HZ))
+    film = RenderedVideo(LEARNING, seed, HD, round(LEARN_S * RATE_HZ))
     rng = np.random.default_rng(seed)
     true_s = film.camera.readout_s
     told_s = true_s * float(rng.choice(READOUT_ERROR))
     offset_s = float(rng.uniform(-OFFSET_S, OFFSET_S))
     camera = replace(film.camera, readout_s=told_s)
-    looking, body = Looking(camera, film.leds_in_b, GatesConfig()), Felt()
+    looking, body = VisualFrontEnd(camera, film.leds_in_b, GatesConfig()), ImuBuffer()
     for shot in film:
         for sample in shot.phone:
             looking.feel(sample)
@@ -63,4 +63,6 @@ def learn(seed: int) -> Learnt:
         stamp = shot.t - offset_s
         now = body.at(stamp)
         looking.look(Frame(stamp, shot.luma), now.up if now else None, now.omega if now else None)
-    return Learnt(seed, true_s, told_s, looking.readout.in_use_s, offset_s, looking.offset_s)
+    return LearningFigures(
+        seed, true_s, told_s, looking.readout.in_use_s, offset_s, looking.offset_s
+    )

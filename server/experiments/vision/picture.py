@@ -9,10 +9,10 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from server.experiments.vision.rows import Row
+from server.experiments.vision.rows import VisionRow
 from server.experiments.vision.verdicts import NEES
 
-Figures = tuple[str, Callable[[Row], float], bool, tuple[float, ...]]
+Figures = tuple[str, Callable[[VisionRow], float], bool, tuple[float, ...]]
 PANELS: tuple[Figures, ...] = (
     ("found of solvable [%]", lambda r: r.found_percent, False, (95.0, 99.0)),
     ("effective pixel noise [px]", lambda r: r.effective_px, True, ()),
@@ -21,7 +21,7 @@ PANELS: tuple[Figures, ...] = (
 )
 
 
-def draw(rows: list[Row], path: Path) -> None:
+def draw(rows: list[VisionRow], path: Path) -> None:
     """Scenes side by side, a mark for each size and channel."""
     scenes = list(dict.fromkeys(row.scene for row in rows))
     channels = list(dict.fromkeys(row.channel for row in rows if row.frames))
@@ -35,7 +35,7 @@ def draw(rows: list[Row], path: Path) -> None:
 
 
 def _panel(
-    axis: Axes, panel: Figures, rows: list[Row], scenes: list[str], channels: list[str]
+    axis: Axes, panel: Figures, rows: list[VisionRow], scenes: list[str], channels: list[str]
 ) -> None:
     title, figure_of, is_log, lines = panel
     for k, channel in enumerate(channels):

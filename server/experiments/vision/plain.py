@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from hardware.sim.scenes.video import Shot
+from hardware.sim.scenes.video import RenderedFrame
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, exp
 from pipeline.signals import Image, RelativePose
@@ -18,7 +18,7 @@ REACH_PX = 20.0
 MIN_LEDS = 4  # for a pose without a prior
 
 
-class Plain:
+class PlainTracker:
     """Follows as most scripts do; told the first pose, and again whenever it has lost the robot."""
 
     def __init__(self, camera: Camera, leds_in_b: Array) -> None:
@@ -29,7 +29,7 @@ class Plain:
         self.took_s = 0.0
         """Of the last picture, CPU time."""
 
-    def look(self, shot: Shot) -> RelativePose | None:
+    def look(self, shot: RenderedFrame) -> RelativePose | None:
         """The pose in a shot's picture."""
         told = self._last or (shot.p_bc_in_c, shot.R_cb)
         begin = thread_cpu()
@@ -38,7 +38,7 @@ class Plain:
         self._last = (pose.p_bc_in_c, pose.R_cb) if pose is not None else None
         return pose
 
-    def _pose(self, shot: Shot, p_bc_in_c: Array, R_cb: Array) -> RelativePose | None:
+    def _pose(self, shot: RenderedFrame, p_bc_in_c: Array, R_cb: Array) -> RelativePose | None:
         cv2.threshold(shot.luma, THRESHOLD, 255, cv2.THRESH_BINARY, dst=self._mask)
         count, _, stats, centres = cv2.connectedComponentsWithStats(self._mask)
         area = stats[:count, cv2.CC_STAT_AREA]

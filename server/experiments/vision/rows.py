@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.frames import Array
 from server.common.text import table
 from server.experiments.vision.errors import MEDIAN_CHI2_6, Error
-from server.experiments.vision.watch import STAGES, Record
+from server.experiments.vision.watch import STAGES, SceneRecord
 
 NAN = float("nan")
 COLUMNS = (
@@ -39,7 +39,7 @@ COLUMNS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class VisionRow:
     """Figures of one record; NaN where there is nothing to tell."""
 
     scene: str
@@ -94,10 +94,10 @@ class Row:
     """(seed, picture); −1 − picture if tried from nothing."""
 
 
-def row(record: Record) -> Row:
+def row(record: SceneRecord) -> VisionRow:
     """The figures of a record."""
     tracking, starting = _sums(record.tracking_s), _sums(record.starting_s)
-    return Row(
+    return VisionRow(
         scene=record.scene,
         width=record.size[0],
         height=record.size[1],
@@ -145,7 +145,7 @@ def _accuracy(errors: list[Error]) -> dict[str, float]:
     }
 
 
-def _stages(record: Record) -> dict[str, float]:
+def _stages(record: SceneRecord) -> dict[str, float]:
     times = 1e3 * np.array(record.tracking_s).reshape(-1, len(STAGES))
     return {name: _at(times[:, k], 50) for k, name in enumerate(STAGES)}
 
@@ -170,12 +170,12 @@ def _percent(part: int, whole: int) -> float:
     return 100.0 * part / whole if whole else NAN
 
 
-def text(rows: list[Row]) -> str:
+def text(rows: list[VisionRow]) -> str:
     """A table."""
     return table(COLUMNS, rows)
 
 
-def plain_values(rows: list[Row]) -> list[dict[str, Any]]:
+def plain_values(rows: list[VisionRow]) -> list[dict[str, Any]]:
     """For JSON, which has no NaN."""
     return [
         {k: None if isinstance(v, float) and v != v else v for k, v in asdict(one).items()}

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hardware.sim.scenes.scene import FULL_HD, HD, SCENES, Picture
-from server.experiments.vision.learning import Learnt
-from server.experiments.vision.rows import Row
+from hardware.sim.scenes.scene import FULL_HD, HD, SCENES, ImageOrientation
+from server.experiments.vision.learning import LearningFigures
+from server.experiments.vision.rows import VisionRow
 
 PLAIN = "plain OpenCV"
 FRAMES_WANTED = 20_000
@@ -30,7 +30,7 @@ EFFECTIVE_PX = {"typical": 0.05, "rolling_shutter": 0.10, "motion_blur": 0.25}
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class GoalVerdict:
     """On one goal."""
 
     goal: str
@@ -45,7 +45,7 @@ class Verdict:
         return f"{word}  {self.goal}: {self.found}"
 
 
-def verdicts(rows: list[Row], pools: list[Row]) -> list[Verdict]:
+def verdicts(rows: list[VisionRow], pools: list[VisionRow]) -> list[GoalVerdict]:
     """On every goal that rows of a bench can judge.
 
     `pools` are rows of a scene and channel, all sizes together: errors of one film are alike, so it
@@ -55,26 +55,26 @@ def verdicts(rows: list[Row], pools: list[Row]) -> list[Verdict]:
     return [*_right(ours), *_honest(pools), *_precise(ours), *_exact(ours), *_fast(ours)]
 
 
-def verdicts_on_learning(learnt: list[Learnt]) -> list[Verdict]:
+def verdicts_on_learning(learnt: list[LearningFigures]) -> list[GoalVerdict]:
     """On what is learnt of a camera in flight."""
     if not learnt:
         return []
     readout, offset = max(x.readout_share for x in learnt), max(x.offset_error_s for x in learnt)
     films = f"worst of {len(learnt)} films"
     return [
-        Verdict("readout learnt to 15 %", readout <= 0.15, f"{100.0 * readout:.1f} %, {films}"),
-        Verdict("date learnt to 5 ms", offset <= 0.005, f"{1e3 * offset:.2f} ms, {films}"),
+        GoalVerdict("readout learnt to 15 %", readout <= 0.15, f"{100.0 * readout:.1f} %, {films}"),
+        GoalVerdict("date learnt to 5 ms", offset <= 0.005, f"{1e3 * offset:.2f} ms, {films}"),
     ]
 
 
-def _right(rows: list[Row]) -> Iterator[Verdict]:
+def _right(rows: list[VisionRow]) -> Iterator[GoalVerdict]:
     scenes = {row.scene for row in rows}
-    judged = {s for s in scenes if SCENES[s].picture is Picture.UPRIGHT}
-    yield Verdict("at least 16 scenarios", len(judged) >= 16, f"{len(judged)}")
+    judged = {s for s in scenes if SCENES[s].picture is ImageOrientation.UPRIGHT}
+    yield GoalVerdict("at least 16 scenarios", len(judged) >= 16, f"{len(judged)}")
     wrong, frames = sum(row.wrong for row in rows), sum(row.frames for row in rows)
     met = False if wrong else True if frames >= FRAMES_WANTED else None
-    yield Verdict(f"no wrong pose in {FRAMES_WANTED} frames", met, f"{wrong} of {frames}")
-    refused = [row for row in rows if SCENES[row.scene].picture is not Picture.UPRIGHT]
+    yield GoalVerdict(f"no wrong pose in {FRAMES_WANTED} frames", met, f"{wrong} of {frames}")
+    refused = [row for row in rows if SCENES[row.scene].picture is not ImageOrientation.UPRIGHT]
     yield _none_wrong("turned and mirrored pictures refused", refused)
     yield _none_wrong("no wrong pose without motion sensors", [r for r in rows if _blind(r)])
     with_imu = [row for row in rows if not _blind(row)]
@@ -85,17 +85,17 @@ def _right(rows: list[Row]) -> Iterator[Verdict]:
         worst = min(shares, key=lambda s: shares[s])
         row = min((r for r in with_imu if r.solvable), key=lambda r: r.found_percent)
         told = f"{worst} {shares[worst]:.1f} %; worst row {_name(row)} {row.found_percent:.1f} %"
-        yield Verdict("no scenario under 95 %", shares[worst] >= 95.0, told)
+        yield GoalVerdict("no scenario under 95 %", shares[worst] >= 95.0, told)
     covered = [row for row in with_imu if row.scene == "one_covered"]
     yield _share("tracks with any 4 of 5 LEDs", covered, 95.0)
     started = [row.fresh_percent for row in covered if row.fresh_percent == row.fresh_percent]
     mean = float(np.mean(started)) if started else float("nan")
     met = mean >= 95.0 if started else None
-    yield Verdict("starts with any 4 of 5 LEDs (95 %)", met, f"{mean:.1f} %")
+    yield GoalVerdict("starts with any 4 of 5 LEDs (95 %)", met, f"{mean:.1f} %")
     yield _worst("found again within 3 frames", with_imu, lambda r: r.return_worst, 3.0, "frames")
 
 
-def _honest(pools: list[Row]) -> Iterator[Verdict]:
+def _honest(pools: list[VisionRow]) -> Iterator[GoalVerdict]:
     known = [row for row in pools if row.found >= FEWEST and row.nees == row.nees]
     for goal, of in (
         (
@@ -109,18 +109,18 @@ def _honest(pools: list[Row]) -> Iterator[Verdict]:
             low, high = min(row.nees for row in of), max(row.nees for row in of)
             names = ", ".join(f"{row.scene} {row.channel} {row.nees:.2f}" for row in outside[:9])
             told = f"{low:.2f} to {high:.2f}; {len(outside)} of {len(of)} outside {names}"
-            yield Verdict(goal, not outside if "no goal" not in goal else None, told)
+            yield GoalVerdict(goal, not outside if "no goal" not in goal else None, told)
 
 
-def _precise(rows: list[Row]) -> Iterator[Verdict]:
+def _precise(rows: list[VisionRow]) -> Iterator[GoalVerdict]:
     for scene, limit in EFFECTIVE_PX.items():
         row = _find(rows, scene, "raw")
         if row is not None:
             goal = f"effective pixel noise ≤ {limit} px, {scene}"
-            yield Verdict(goal, row.effective_px <= limit, f"{row.effective_px:.3f} px")
+            yield GoalVerdict(goal, row.effective_px <= limit, f"{row.effective_px:.3f} px")
 
 
-def _exact(rows: list[Row]) -> Iterator[Verdict]:
+def _exact(rows: list[VisionRow]) -> Iterator[GoalVerdict]:
     for scene, limits in REFERENCE.items():
         row, coded = _find(rows, scene, "raw"), _find(rows, scene, "h264-2")
         if row is None:
@@ -130,28 +130,30 @@ def _exact(rows: list[Row]) -> Iterator[Verdict]:
         goal = f"{scene}, 720p, 2.5 m ≤ {limited} (mm lateral / mm depth / °)"
         met = all(x <= limit for x, limit in zip(seen, limits, strict=True))
         told = " / ".join(f"{x:.3f}" for x in seen) + f", {row.to_bound:.1f} × the bound"
-        yield Verdict(goal, met, told)
+        yield GoalVerdict(goal, met, told)
         if coded is not None:
             ratios = [b / a for a, b in zip(seen, _medians(coded), strict=True)]
             told = " / ".join(f"{ratio:.2f}" for ratio in ratios)
-            yield Verdict(f"{scene} through H.264 2 Mbit/s ≤ 1.5 × raw", max(ratios) <= 1.5, told)
+            yield GoalVerdict(
+                f"{scene} through H.264 2 Mbit/s ≤ 1.5 × raw", max(ratios) <= 1.5, told
+            )
 
 
-def _fast(rows: list[Row]) -> Iterator[Verdict]:
+def _fast(rows: list[VisionRow]) -> Iterator[GoalVerdict]:
     ours = [row for row in rows if row.tracking_ms == row.tracking_ms and not _blind(row)]
     hd = [row for row in ours if (row.width, row.height) == HD]
     full = [row for row in ours if (row.width, row.height) == FULL_HD]
     if hd:
         median = float(np.median([row.tracking_ms for row in hd]))
-        yield Verdict("tracking at 720p ≤ 0.3 ms", median <= 0.3, f"{median:.3f} ms")
+        yield GoalVerdict("tracking at 720p ≤ 0.3 ms", median <= 0.3, f"{median:.3f} ms")
         yield _worst("tracking at 720p, p99 ≤ 1 ms", hd, lambda r: r.tracking_p99_ms, 1.0, "ms")
         if full:
             ratio = float(np.median([row.tracking_ms for row in full])) / median
-            yield Verdict("1080p ≤ 1.3 × 720p", ratio <= 1.3, f"{ratio:.2f}")
+            yield GoalVerdict("1080p ≤ 1.3 × 720p", ratio <= 1.3, f"{ratio:.2f}")
     starts = [row for row in rows if row.starting_ms == row.starting_ms]
     if starts:
         median = float(np.median([row.starting_ms for row in starts]))
-        yield Verdict("from nothing ≤ 5 ms", median <= 5.0, f"{median:.2f} ms")
+        yield GoalVerdict("from nothing ≤ 5 ms", median <= 5.0, f"{median:.2f} ms")
     many = [row for row in starts if row.scene == CROWDED]
     goal = "from nothing, p95 ≤ 10 ms with 25 blobs or more"
     yield _worst(goal, many, lambda r: r.starting_p95_ms, 10.0, "ms")
@@ -159,35 +161,35 @@ def _fast(rows: list[Row]) -> Iterator[Verdict]:
 
 
 def _worst(
-    goal: str, rows: list[Row], figure: Callable[[Row], float], limit: float, unit: str
-) -> Verdict:
+    goal: str, rows: list[VisionRow], figure: Callable[[VisionRow], float], limit: float, unit: str
+) -> GoalVerdict:
     known = [row for row in rows if figure(row) == figure(row)]
     if not known:
-        return Verdict(goal, None, "nothing measured")
+        return GoalVerdict(goal, None, "nothing measured")
     worst = max(known, key=figure)
-    return Verdict(goal, figure(worst) <= limit, f"{figure(worst):.2f} {unit} ({_name(worst)})")
+    return GoalVerdict(goal, figure(worst) <= limit, f"{figure(worst):.2f} {unit} ({_name(worst)})")
 
 
-def _none_wrong(goal: str, rows: list[Row]) -> Verdict:
+def _none_wrong(goal: str, rows: list[VisionRow]) -> GoalVerdict:
     wrong, frames = sum(row.wrong for row in rows), sum(row.frames for row in rows)
-    return Verdict(goal, wrong == 0 if frames else None, f"{wrong} wrong of {frames}")
+    return GoalVerdict(goal, wrong == 0 if frames else None, f"{wrong} wrong of {frames}")
 
 
-def _share(goal: str, rows: list[Row], percent: float) -> Verdict:
+def _share(goal: str, rows: list[VisionRow], percent: float) -> GoalVerdict:
     share = _percent(rows)
-    return Verdict(goal, share >= percent if share == share else None, f"{share:.2f} %")
+    return GoalVerdict(goal, share >= percent if share == share else None, f"{share:.2f} %")
 
 
-def _percent(rows: list[Row]) -> float:
+def _percent(rows: list[VisionRow]) -> float:
     solvable = sum(row.solvable for row in rows)
     return 100.0 * sum(row.found for row in rows) / solvable if solvable else float("nan")
 
 
-def _blind(row: Row) -> bool:
+def _blind(row: VisionRow) -> bool:
     return row.channel.endswith("-noimu")
 
 
-def _find(rows: list[Row], scene: str, channel: str) -> Row | None:
+def _find(rows: list[VisionRow], scene: str, channel: str) -> VisionRow | None:
     return next(
         (
             row
@@ -199,9 +201,9 @@ def _find(rows: list[Row], scene: str, channel: str) -> Row | None:
     )
 
 
-def _medians(row: Row) -> tuple[float, float, float]:
+def _medians(row: VisionRow) -> tuple[float, float, float]:
     return row.lateral_mm, row.depth_mm, row.turn_deg
 
 
-def _name(row: Row) -> str:
+def _name(row: VisionRow) -> str:
     return f"{row.scene} {row.height} {row.channel}"

@@ -25,18 +25,18 @@ from hardware.sim.scenes.scene import (
     HD,
     SCENES,
     SIZES,
-    Motion,
+    HandMotion,
     Scene,
     Size,
     at_reference,
 )
-from hardware.sim.scenes.video import Film
+from hardware.sim.scenes.video import RenderedVideo
 from pipeline.vision.visual_front_end import warm_up
 from server.experiments.vision.channel import DEFAULT_CODECS, WITHOUT_IMU, Channel, channel
-from server.experiments.vision.learning import Learnt, learn
-from server.experiments.vision.rows import Row, plain_values, row, text
+from server.experiments.vision.learning import LearningFigures, learn
+from server.experiments.vision.rows import VisionRow, plain_values, row, text
 from server.experiments.vision.verdicts import REFERENCE, verdicts, verdicts_on_learning
-from server.experiments.vision.watch import Record, watch
+from server.experiments.vision.watch import SceneRecord, watch
 from server.experiments.vision.write import write_film
 
 FRAMES = 90
@@ -95,21 +95,23 @@ def run(arguments: argparse.Namespace) -> int:
         return 2
     if arguments.write is not None:
         return _write(tasks, arguments.write)
-    records: dict[tuple[str, Size, str], Record] = {}
-    pools: dict[tuple[str, str], Record] = {}
+    records: dict[tuple[str, Size, str], SceneRecord] = {}
+    pools: dict[tuple[str, str], SceneRecord] = {}
     for done, part in enumerate(_watched(tasks, arguments.jobs), 1):
         _progress(done, len(tasks))
         for record in part:
             key = (record.scene, record.size, record.channel)
-            records.setdefault(key, Record(*key)).add(record)
-            pool = Record(record.scene, ALL_SIZES, record.channel)
+            records.setdefault(key, SceneRecord(*key)).add(record)
+            pool = SceneRecord(record.scene, ALL_SIZES, record.channel)
             pools.setdefault((record.scene, record.channel), pool).add(record)
     learnt = [learn(tasks[0].seed + k) for k in range(arguments.learn)]
     pooled = [row(record) for record in pools.values()]
     return _report([row(record) for record in _sorted(records)], pooled, learnt, arguments.out)
 
 
-def _report(rows: list[Row], pools: list[Row], learnt: list[Learnt], out: Path | None) -> int:
+def _report(
+    rows: list[VisionRow], pools: list[VisionRow], learnt: list[LearningFigures], out: Path | None
+) -> int:
     print(text([one for one in rows if one.frames]))
     floors = {one.height: f"{1e3 * one.pass_ms:.0f} µs" for one in rows if one.pass_ms > 0.0}
     told = ", ".join(f"{height} rows {floor}" for height, floor in floors.items())
@@ -151,14 +153,14 @@ def _tasks(arguments: argparse.Namespace) -> Iterator[Task]:
             scene = (
                 at_reference(SCENES[name]) if (name in REFERENCE and size == HD) else SCENES[name]
             )
-            is_long = scene.motion is Motion.LEAVING or scene.bar
+            is_long = scene.motion is HandMotion.LEAVING or scene.bar
             length = LONG_FILM_FRAMES if is_long else FILM_FRAMES
             for k, begin in enumerate(range(0, arguments.frames, length)):
                 frames = min(length, arguments.frames - begin)
                 yield Task(scene, size, first + k, frames, tuple(channels), not arguments.no_plain)
 
 
-def _watched(tasks: list[Task], jobs: int) -> Iterator[list[Record]]:
+def _watched(tasks: list[Task], jobs: int) -> Iterator[list[SceneRecord]]:
     if jobs == 1:
         _warm()
         yield from map(_watch, tasks)
@@ -173,11 +175,11 @@ def _warm() -> None:
     warm_up()
 
 
-def _watch(task: Task) -> list[Record]:
+def _watch(task: Task) -> list[SceneRecord]:
     return watch(task.scene, task.size, task.seed, task.frames, list(task.channels), task.plain)
 
 
-def _sorted(records: dict[tuple[str, Size, str], Record]) -> list[Record]:
+def _sorted(records: dict[tuple[str, Size, str], SceneRecord]) -> list[SceneRecord]:
     """By scene as in the family, then size; channels as given."""
     order = list(SCENES)
     return sorted(records.values(), key=lambda r: (order.index(r.scene), r.size))
@@ -185,7 +187,7 @@ def _sorted(records: dict[tuple[str, Size, str], Record]) -> list[Record]:
 
 def _write(tasks: list[Task], out: Path) -> int:
     for done, task in enumerate(tasks, 1):
-        film = Film(task.scene, task.seed, task.size, task.frames)
+        film = RenderedVideo(task.scene, task.seed, task.size, task.frames)
         folder = out / f"{task.scene.name}-{task.size[0]}x{task.size[1]}-{task.seed}"
         write_film(film, folder)
         _progress(done, len(tasks))

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field, replace
 
-from hardware.sim.scenes.scene import Picture, Scene, Size
-from hardware.sim.scenes.video import Film, Shot
+from hardware.sim.scenes.scene import ImageOrientation, Scene, Size
+from hardware.sim.scenes.video import RenderedFrame, RenderedVideo
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
-from pipeline.vision.detection import Sighting
-from pipeline.vision.imu_buffer import Felt
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.detection import Detection
+from pipeline.vision.imu_buffer import ImuBuffer
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.common.clock import thread_cpu
 from server.experiments.vision.channel import Channel, Wire
 from server.experiments.vision.errors import Error, is_wrong, measured
-from server.experiments.vision.plain import Plain, pass_s
+from server.experiments.vision.plain import PlainTracker, pass_s
 
 STAGES = ("detect", "identify", "pose")
 FRESH_EVERY = 10
@@ -29,7 +29,7 @@ GAP = 3
 
 
 @dataclass(slots=True)
-class Record:
+class SceneRecord:
     """What came of all pictures of a scene at a size through a channel."""
 
     scene: str
@@ -62,7 +62,7 @@ class Record:
     wrong_at: list[tuple[int, int]] = field(default_factory=list)
     """(seed, picture) of the wrong ones."""
 
-    def add(self, other: Record) -> None:
+    def add(self, other: SceneRecord) -> None:
         """Take in what came of another film."""
         for name in self.__slots__:
             value = getattr(self, name)
@@ -70,27 +70,27 @@ class Record:
                 setattr(self, name, value + getattr(other, name))
 
 
-class Eye:
+class ChannelRun:
     """The live stages behind one channel."""
 
-    def __init__(self, film: Film, channel: Channel) -> None:
+    def __init__(self, film: RenderedVideo, channel: Channel) -> None:
         """Nothing seen yet."""
         self.channel, self._film = channel, film
         self._looking = self._new()
         self._wire = Wire(channel.codec, film.size)
-        self.record = Record(film.scene.name, film.size, channel.name)
+        self.record = SceneRecord(film.scene.name, film.size, channel.name)
         self._phone: deque[PhoneImu] = deque()
         self._body: deque[BodyImu] = deque()
-        self._felt = Felt()
+        self._felt = ImuBuffer()
         self._had_pose = False
-        self._fresh: Looking | None = None
+        self._fresh: VisualFrontEnd | None = None
         self._fresh_left, self._fresh_fair = 0, False
         self._unsolvable, self._waiting = 0, 0
 
-    def _new(self) -> Looking:
-        return Looking(self._film.camera, self._film.leds_in_b, GatesConfig(), thread_cpu)
+    def _new(self) -> VisualFrontEnd:
+        return VisualFrontEnd(self._film.camera, self._film.leds_in_b, GatesConfig(), thread_cpu)
 
-    def see(self, k: int, shot: Shot) -> None:
+    def see(self, k: int, shot: RenderedFrame) -> None:
         """The film's next shot, picture `k`."""
         if self.channel.imu:
             self._feel(shot)
@@ -111,7 +111,7 @@ class Eye:
         self._judge(k, shot, sighting)
         self._see_afresh(k, shot, frame)
 
-    def _feel(self, shot: Shot) -> None:
+    def _feel(self, shot: RenderedFrame) -> None:
         for looking in (self._looking, self._fresh):
             if looking is not None:
                 _tell(looking, shot.phone, shot.body)
@@ -123,34 +123,34 @@ class Eye:
         for sample in shot.body:
             self._felt.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
 
-    def _look(self, looking: Looking, frame: Frame) -> Sighting:
+    def _look(self, looking: VisualFrontEnd, frame: Frame) -> Detection:
         body = self._felt.at(frame.t) if self.channel.imu else None
         begin = thread_cpu()
         sighting = looking.look(frame, body.up if body else None, body.omega if body else None)
         self.record.whole_s.append(thread_cpu() - begin)
         return sighting
 
-    def _clocked(self, sighting: Sighting, was_tracking: bool) -> None:
+    def _clocked(self, sighting: Detection, was_tracking: bool) -> None:
         took = sighting.took_s
         times = (took.get("detect", 0.0), took.get("identify", 0.0), took.get("pose", 0.0))
         (self.record.tracking_s if was_tracking else self.record.starting_s).append(times)
         if not was_tracking:
             self.record.blobs.append(len(sighting.spots))
 
-    def _judge(self, k: int, shot: Shot, sighting: Sighting) -> None:
+    def _judge(self, k: int, shot: RenderedFrame, sighting: Detection) -> None:
         pose, film = sighting.pose, self._film
         if pose is not None and not self._accuse(k, shot, pose) and shot.visible.sum() >= 3:
             self.record.errors.append(measured(pose, shot, film.camera, film.leds_in_b))
 
-    def _accuse(self, k: int, shot: Shot, pose: RelativePose) -> bool:
+    def _accuse(self, k: int, shot: RenderedFrame, pose: RelativePose) -> bool:
         """Count a pose that is none of the robot."""
-        wrong = self._film.scene.picture is not Picture.UPRIGHT or is_wrong(pose, shot)
+        wrong = self._film.scene.picture is not ImageOrientation.UPRIGHT or is_wrong(pose, shot)
         if wrong:
             self.record.wrong += 1
             self.record.wrong_at.append((self._film.seed, k))
         return wrong
 
-    def _see_afresh(self, k: int, shot: Shot, frame: Frame) -> None:
+    def _see_afresh(self, k: int, shot: RenderedFrame, frame: Frame) -> None:
         """Now and then somebody starts from nothing, and has a few pictures for it."""
         if k % FRESH_EVERY == 0:
             self._fresh, self._fresh_left, self._fresh_fair = self._new(), FRESH_LOOKS, True
@@ -170,7 +170,7 @@ class Eye:
             self.record.fresh_found += self._fresh_fair and found
             self._fresh = None
 
-    def _count_return(self, shot: Shot, is_found: bool) -> None:
+    def _count_return(self, shot: RenderedFrame, is_found: bool) -> None:
         """How long after its return the robot is found."""
         if not shot.solvable:
             if self._waiting:
@@ -185,7 +185,7 @@ class Eye:
             self._waiting = 0
 
 
-def _tell(looking: Looking, phone: tuple[PhoneImu, ...], body: tuple[BodyImu, ...]) -> None:
+def _tell(looking: VisualFrontEnd, phone: tuple[PhoneImu, ...], body: tuple[BodyImu, ...]) -> None:
     for sample in phone:
         looking.feel(sample)
     looking.feel_body(body)
@@ -193,12 +193,12 @@ def _tell(looking: Looking, phone: tuple[PhoneImu, ...], body: tuple[BodyImu, ..
 
 def watch(
     scene: Scene, size: Size, seed: int, frames: int, channels: list[Channel], plain: bool
-) -> list[Record]:
+) -> list[SceneRecord]:
     """Every channel's record of one film; the last one is plain OpenCV's, if wanted."""
-    film = Film(scene, seed, size, frames, bound=True)
-    eyes = [Eye(film, channel) for channel in channels if _is_fair(scene, channel)]
-    script = Plain(film.camera, film.leds_in_b)
-    record = Record(scene.name, size, "plain OpenCV")
+    film = RenderedVideo(scene, seed, size, frames, bound=True)
+    eyes = [ChannelRun(film, channel) for channel in channels if _is_fair(scene, channel)]
+    script = PlainTracker(film.camera, film.leds_in_b)
+    record = SceneRecord(scene.name, size, "plain OpenCV")
     for k, shot in enumerate(film):
         record.pass_s.append(pass_s(shot.luma))
         for eye in eyes:
@@ -210,10 +210,12 @@ def watch(
 
 def _is_fair(scene: Scene, channel: Channel) -> bool:
     """Without motion sensors a turned picture is one of a turned robot."""
-    return channel.imu or scene.picture in (Picture.UPRIGHT, Picture.MIRRORED)
+    return channel.imu or scene.picture in (ImageOrientation.UPRIGHT, ImageOrientation.MIRRORED)
 
 
-def _try_plain(script: Plain, record: Record, film: Film, shot: Shot) -> None:
+def _try_plain(
+    script: PlainTracker, record: SceneRecord, film: RenderedVideo, shot: RenderedFrame
+) -> None:
     pose = script.look(shot)
     record.frames += 1
     record.solvable += shot.solvable
@@ -221,7 +223,7 @@ def _try_plain(script: Plain, record: Record, film: Film, shot: Shot) -> None:
     if pose is None:
         return
     record.found += shot.solvable
-    if film.scene.picture is not Picture.UPRIGHT or is_wrong(pose, shot):
+    if film.scene.picture is not ImageOrientation.UPRIGHT or is_wrong(pose, shot):
         record.wrong += 1
     elif shot.visible.sum() >= 3:
         error = measured(pose, shot, film.camera, film.leds_in_b)

@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import yaml
 
-from hardware.sim.scenes.video import Film, Shot
+from hardware.sim.scenes.video import RenderedFrame, RenderedVideo
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, wxyz_from_R
 
@@ -22,7 +22,7 @@ TRUTH_HEADING = (
 ROBOT_NAME = "bench"
 
 
-def write_film(film: Film, folder: Path) -> None:
+def write_film(film: RenderedVideo, folder: Path) -> None:
     """Frames as PNG, times.csv, imu.csv, body.csv, camera.yaml, robot.toml, truth.csv.
 
     Truth is the body in the OpenCV optical frame at the middle row, rotation as R_ob.
@@ -71,7 +71,7 @@ def robot_text(leds_in_b: Array) -> str:
     return f'name = "{ROBOT_NAME}"\n\n' + "\n".join(rows)
 
 
-def _truth(shot: Shot) -> tuple[object, ...]:
+def _truth(shot: RenderedFrame) -> tuple[object, ...]:
     p_bo_in_o, R_ob = R_co.T @ shot.p_bc_in_c, R_co.T @ shot.R_cb
     flags = (int(shot.solvable), "".join(str(int(x)) for x in shot.visible))
     return (_number(shot.t), *flags, *map(_number, (*p_bo_in_o, *wxyz_from_R(R_ob))))

@@ -18,7 +18,7 @@ WINDOW = 150
 
 
 @dataclass(frozen=True, slots=True)
-class Date:
+class FrameTimestamp:
     """When a picture was taken."""
 
     t_us: int
@@ -26,7 +26,7 @@ class Date:
     source: Source
 
 
-class Dating:
+class FrameTimestamping:
     """The dates of one stream of pictures."""
 
     def __init__(self) -> None:
@@ -45,13 +45,19 @@ class Dating:
         while len(self._pairs) > REMEMBERED_PAIRS:
             self._pairs.popitem(last=False)
 
-    def date(self, record: FrameRecord | None, rtp_timestamp: int, arrival_us: float) -> Date:
+    def date(
+        self, record: FrameRecord | None, rtp_timestamp: int, arrival_us: float
+    ) -> FrameTimestamp:
         """Of a picture that arrived at `arrival_us`, on the phone's clock [µs]."""
         by_arrival = self._by_arrival(rtp_timestamp, arrival_us)
         if record is not None:
-            return Date(record.t_us, "record")
+            return FrameTimestamp(record.t_us, "record")
         by_pair = self._by_pair(rtp_timestamp)
-        return Date(by_pair, "pair") if by_pair is not None else Date(by_arrival, "arrival")
+        return (
+            FrameTimestamp(by_pair, "pair")
+            if by_pair is not None
+            else FrameTimestamp(by_arrival, "arrival")
+        )
 
     def _by_pair(self, rtp_timestamp: int) -> int | None:
         """The pair of this picture, else the newest one and the time between."""

@@ -14,7 +14,7 @@ from server.calibration.board import DICTIONARIES, Board, BoardError, parse
 from server.calibration.camera_imu import ImuError, gyro_of
 from server.calibration.camera_yaml import PROFILES, profile_path, store, yaml_of
 from server.calibration.lens import COEFFICIENTS
-from server.calibration.solve import Solution, solve
+from server.calibration.solve import CalibrationSolution, solve
 from server.calibration.verdict import Verdict, judge, judge_views
 from server.common.clock import today
 from server.common.errors import InputError
@@ -23,7 +23,7 @@ from server.common.settings import state_directory
 from server.media.tables import IMU_HEADER, load_imu
 from server.tools.calibrate.draw_board import write_board
 from server.tools.calibrate.report import draw
-from server.tools.calibrate.video import Filmed, FilmError, watch
+from server.tools.calibrate.video import BoardVideo, FilmError, watch
 
 BAR = 30  # letters wide
 
@@ -144,7 +144,7 @@ def _tell(verdict: Verdict) -> None:
         print(f"  - {advice}")
 
 
-def table(found: Solution, filmed: Filmed) -> list[str]:
+def table(found: CalibrationSolution, filmed: BoardVideo) -> list[str]:
     """The calibration as lines of text."""
     value, sigma = found.shared, found.sigma
     rows = [

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from server.calibration.choice import CELLS, coverage
-from server.calibration.solve import Solution, ray_sigma
+from server.calibration.solve import CalibrationSolution, ray_sigma
 from server.calibration.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 COLOURS = {"good": "#15703a", "usable": "#92640a", "refused": "#9f1239"}
 
 
-def draw(solution: Solution, verdict: Verdict, name: str, path: Path) -> None:
+def draw(solution: CalibrationSolution, verdict: Verdict, name: str, path: Path) -> None:
     """Write the picture."""
     import matplotlib
 
@@ -42,7 +42,7 @@ def draw(solution: Solution, verdict: Verdict, name: str, path: Path) -> None:
     pyplot.close(figure)
 
 
-def _coverage(solution: Solution, axis: Axes) -> None:
+def _coverage(solution: CalibrationSolution, axis: Axes) -> None:
     counts = coverage(solution.choice.fit, solution.size)
     width, height = solution.size
     for row, column in np.argwhere(counts == 0):
@@ -60,7 +60,7 @@ def _coverage(solution: Solution, axis: Axes) -> None:
     axis.set_title(f"corners of {len(solution.choice.fit)} views (red: never seen)")
 
 
-def _residuals(solution: Solution, axis: Axes) -> None:
+def _residuals(solution: CalibrationSolution, axis: Axes) -> None:
     left = solution.fit.residuals
     axis.scatter(left[:, 0], left[:, 1], s=3, c=solution.film.view, cmap="viridis", lw=0.0)
     reach = 1.2 * float(np.percentile(np.abs(left), 99.5))
@@ -74,7 +74,7 @@ def _residuals(solution: Solution, axis: Axes) -> None:
     axis.set_ylabel("down [px]")
 
 
-def _certainty(solution: Solution, axis: Axes, figure: Figure) -> None:
+def _certainty(solution: CalibrationSolution, axis: Axes, figure: Figure) -> None:
     width, height = solution.size
     sigma = ray_sigma(solution)
     shown = axis.imshow(
@@ -84,7 +84,7 @@ def _certainty(solution: Solution, axis: Axes, figure: Figure) -> None:
     axis.set_title("how uncertain a direction's pixel is")
 
 
-def _rates(solution: Solution, axis: Axes) -> None:
+def _rates(solution: CalibrationSolution, axis: Axes) -> None:
     imu = solution.imu
     readout = solution.shared[-1], solution.sigma[-1]
     words = f"readout {1e3 * readout[0]:.1f} ± {1e3 * readout[1]:.1f} ms"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.calibration.board import Board, Detector
-from server.calibration.views import View, look
+from server.calibration.views import BoardView, look
 from server.media.frame_source import TIMES, open_frames
 
 MOST_PICTURES = 1500
@@ -17,10 +17,10 @@ RUN = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Filmed:
+class BoardVideo:
     """What a film shows of a board."""
 
-    views: list[View]
+    views: list[BoardView]
     size: tuple[int, int]
     """Width and height [px]."""
     pictures: int
@@ -35,7 +35,7 @@ class FilmError(ValueError):
 
 def watch(
     path: Path, fps: float | None, board: Board, on_picture: Callable[[int, int | None], object]
-) -> Filmed:
+) -> BoardVideo:
     """Look at a folder of pictures or a video; `on_picture` gets (done, of all).
 
     Raises:
@@ -44,7 +44,7 @@ def watch(
     """
     source, detector = open_frames(path, fps), Detector(board)
     every = -(-source.count // MOST_PICTURES) if source.count else 1
-    views: list[View] = []
+    views: list[BoardView] = []
     size: tuple[int, int] | None = None
     looked = 0
     for index, shot in enumerate(source):
@@ -64,4 +64,4 @@ def watch(
     if size is None:
         raise FilmError(f"{path}: no picture could be read")
     timed = path.is_file() or fps is not None or (path / TIMES).exists()
-    return Filmed(views, size, looked, timed)
+    return BoardVideo(views, size, looked, timed)

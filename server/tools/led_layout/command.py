@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.led_layout.anneal import Search, improve
+from hardware.led_layout.anneal import AnnealingOptions, improve
 from hardware.led_layout.file import Layout, load_layout
 from hardware.led_layout.margins import Margins, Progress, margins
 from hardware.led_layout.reach import Ball, Reach
-from hardware.led_layout.viewpoints import LedLayoutError, Looks, looks_about
+from hardware.led_layout.viewpoints import LedLayoutError, Viewpoints, looks_about
 from hardware.link.link_key import LinkKeyError
 from hardware.robot_file import RobotFileError
 from pipeline.frames import Array
@@ -27,7 +27,7 @@ from server.common.options import Parser
 from server.common.progress import Progress as Progressing
 from server.process import robot_key
 from server.tools.led_layout.files import OutError, changes, figures, make_folder, toml, write
-from server.tools.led_layout.report import Judged, judged, lines
+from server.tools.led_layout.report import LayoutReport, judged, lines
 
 SEARCH_VIEWS = 100
 """Of all, spread evenly, that a search looks at; what it finds is judged by all."""
@@ -130,7 +130,7 @@ def _run(arguments: argparse.Namespace) -> int:
     return 1 if layouts[-1].grade == "bad" else 0
 
 
-def _looks(arguments: argparse.Namespace, layout: Layout) -> tuple[Looks, int]:
+def _looks(arguments: argparse.Namespace, layout: Layout) -> tuple[Viewpoints, int]:
     """The views asked for, and which distance is nearest to the usual one."""
     distances = arguments.distances or [
         round(share * layout.distance, 2) for share in (0.6, 1.0, 1.6)
@@ -149,13 +149,15 @@ def _looks(arguments: argparse.Namespace, layout: Layout) -> tuple[Looks, int]:
 
 
 def _judge(
-    name: str, leds_in_b: Array, looks: Looks, usual: int, arguments: argparse.Namespace
-) -> Judged:
+    name: str, leds_in_b: Array, looks: Viewpoints, usual: int, arguments: argparse.Namespace
+) -> LayoutReport:
     found: Margins = margins(leds_in_b, looks, _bar(f"{name}: views", len(looks.angles)))
     return judged(name, leds_in_b, looks, usual, arguments.noise_px, found)
 
 
-def _improved(layout: Layout, looks: Looks, usual: int, arguments: argparse.Namespace) -> Array:
+def _improved(
+    layout: Layout, looks: Viewpoints, usual: int, arguments: argparse.Namespace
+) -> Array:
     radius = 0.05 if arguments.reach is None else arguments.reach
     reaches: list[Reach] = [
         reach or Ball(led, radius)
@@ -165,7 +167,9 @@ def _improved(layout: Layout, looks: Looks, usual: int, arguments: argparse.Name
     some = replace(
         looks, angles=looks.angles[chosen.astype(int)], distances=looks.distances[usual : usual + 1]
     )
-    search = Search(arguments.turns, arguments.starts, arguments.seed, arguments.enough_px)
+    search = AnnealingOptions(
+        arguments.turns, arguments.starts, arguments.seed, arguments.enough_px
+    )
     bar = _bar("layouts", search.turns * search.starts)
     return improve(layout.leds_in_b, reaches, some, search, bar)
 
@@ -182,7 +186,7 @@ def _bar(label: str, total: int) -> Progress:
     return show
 
 
-def _text(layouts: list[Judged], asked: bool) -> Iterator[str]:
+def _text(layouts: list[LayoutReport], asked: bool) -> Iterator[str]:
     yield from lines(layouts[0])
     if not asked:
         return

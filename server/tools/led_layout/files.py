@@ -14,7 +14,7 @@ import numpy as np
 from hardware.led_layout.margins import KNOWN
 from pipeline.frames import Array
 from server.tools.led_layout.picture import draw
-from server.tools.led_layout.report import Judged
+from server.tools.led_layout.report import LayoutReport
 
 
 class OutError(ValueError):
@@ -42,10 +42,10 @@ class Change:
     after: float
 
 
-def changes(before: Judged, after: Judged) -> list[Change]:
+def changes(before: LayoutReport, after: LayoutReport) -> list[Change]:
     """What an improvement improved, at the usual distance."""
     d = before.usual
-    pairs: list[tuple[str, Callable[[Judged], float]]] = [
+    pairs: list[tuple[str, Callable[[LayoutReport], float]]] = [
         ("four named, gravity known: smallest margin [px]", lambda it: it.least(d, 0, 1)),
         ("four named, attitude known [px]", lambda it: it.least(d, 0, 2)),
         ("all named, nothing known [px]", lambda it: it.least(d, 1, 0)),
@@ -65,7 +65,7 @@ def toml(leds_in_b: Array) -> Iterator[str]:
         yield f"position_in_body_m = [{', '.join(f'{x:.4g}' for x in np.round(led, 4) + 0.0)}]"
 
 
-def figures(it: Judged) -> dict[str, object]:
+def figures(it: LayoutReport) -> dict[str, object]:
     """As JSON can hold it: finite numbers or null."""
     by_distance = []
     for d, distance in enumerate(it.looks.distances):
@@ -94,7 +94,7 @@ def figures(it: Judged) -> dict[str, object]:
     }
 
 
-def write(layouts: list[Judged], folder: Path) -> None:
+def write(layouts: list[LayoutReport], folder: Path) -> None:
     """Picture, figures and, when there is a better layout, [[leds]] to paste.
 
     Raises:

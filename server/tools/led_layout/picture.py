@@ -12,7 +12,7 @@ import numpy as np
 from hardware.led_layout.margins import FAR_PX
 from hardware.led_layout.viewpoints import attitude, direction, seen
 from pipeline.frames import Array
-from server.tools.led_layout.report import GOOD_PX, MERGED_PX, Judged
+from server.tools.led_layout.report import GOOD_PX, MERGED_PX, LayoutReport
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,7 @@ class _Map:
     """What it is there."""
 
 
-def draw(layouts: list[Judged], path: Path) -> None:
+def draw(layouts: list[LayoutReport], path: Path) -> None:
     """Two rows of maps per layout, all at its usual distance, each with one scale for all."""
     import matplotlib
 
@@ -60,7 +60,7 @@ def draw(layouts: list[Judged], path: Path) -> None:
     pyplot.close(figure)
 
 
-def _headline(it: Judged) -> str:
+def _headline(it: LayoutReport) -> str:
     return (
         f"{it.name}: {it.grade} at {it.looks.distances[it.usual]:.2f} m,"
         f" f {it.looks.focal_px:.0f} px, {len(it.looks.angles)} views"
@@ -68,7 +68,7 @@ def _headline(it: Judged) -> str:
     )
 
 
-def _maps(it: Judged) -> list[_Map]:
+def _maps(it: LayoutReport) -> list[_Map]:
     d = it.usual
     gravity = degrees(it.looks.gravity_rad)
     four, every = "margin, any four LEDs,\n", f"margin, all {len(it.leds_in_b)} LEDs,\n"
@@ -83,14 +83,14 @@ def _maps(it: Judged) -> list[_Map]:
     ]
 
 
-def _margin(it: Judged, title: str, size: int, known: int) -> _Map:
+def _margin(it: LayoutReport, title: str, size: int, known: int) -> _Map:
     d = it.usual
     values, found = it.margins.wrong[:, d, size, known], it.worst.get((d, size, known))
     worst = it.looks.angles[int(values.argmin())] if found is None else found.angles
     return _Map(title, "px", values, GOOD_PX, worst, it.least(d, size, known))
 
 
-def _draw_map(figure: Figure, axis: Axes, it: Judged, shown: _Map, same: Array) -> None:
+def _draw_map(figure: Figure, axis: Axes, it: LayoutReport, shown: _Map, same: Array) -> None:
     """Each view colours what is nearest to it; `same` are the values that share its scale."""
     x, y = np.degrees(it.looks.angles).T
     (left, right), (bottom, top) = np.degrees(it.looks.window)
@@ -124,7 +124,7 @@ def _scale(shown: _Map, same: Array) -> tuple[str, Normalize, str]:
     return "RdYlGn", LogNorm(shown.enough / DECADE, shown.enough * DECADE, clip=True), "both"
 
 
-def _draw_leds(axis: Axes, it: Judged) -> None:
+def _draw_leds(axis: Axes, it: LayoutReport) -> None:
     """As the picture shows them from the middle of the views."""
     middle = np.mean(np.array(it.looks.window), axis=1)
     distance = float(it.looks.distances[it.usual])

@@ -10,7 +10,7 @@ import numpy as np
 
 from hardware.led_layout.crlb import Sigmas, one_hidden, sigmas
 from hardware.led_layout.margins import KNOWN, Margins, Worst, thickness, worst
-from hardware.led_layout.viewpoints import Looks
+from hardware.led_layout.viewpoints import Viewpoints
 from pipeline.frames import Array
 
 GOOD_PX = 3.0
@@ -26,12 +26,12 @@ ASKED = ((0, 1), (0, 2), (1, 0), (1, 1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class LayoutReport:
     """A layout and all that was found of it."""
 
     name: str
     leds_in_b: Array
-    looks: Looks
+    looks: Viewpoints
     usual: int
     """Index of the distance that verdicts are about."""
     noise_px: float
@@ -64,8 +64,8 @@ class Judged:
 
 
 def judged(
-    name: str, leds_in_b: Array, looks: Looks, usual: int, noise_px: float, found: Margins
-) -> Judged:
+    name: str, leds_in_b: Array, looks: Viewpoints, usual: int, noise_px: float, found: Margins
+) -> LayoutReport:
     """All figures of a layout whose margins were found."""
     worsts = {
         (d, size, known): worst(leds_in_b, looks, found, d, size, known)
@@ -74,10 +74,10 @@ def judged(
     }
     bound = sigmas(leds_in_b, looks, noise_px)
     hidden = one_hidden(leds_in_b, looks, noise_px)
-    return Judged(name, leds_in_b, looks, usual, noise_px, found, worsts, bound, hidden)
+    return LayoutReport(name, leds_in_b, looks, usual, noise_px, found, worsts, bound, hidden)
 
 
-def lines(it: Judged) -> Iterator[str]:
+def lines(it: LayoutReport) -> Iterator[str]:
     """The report: tables, then the verdict."""
     (left, right), (low, high) = it.looks.window
     yield (
@@ -93,7 +93,7 @@ def lines(it: Judged) -> Iterator[str]:
     yield from verdict(it)
 
 
-def _margin_lines(it: Judged) -> Iterator[str]:
+def _margin_lines(it: LayoutReport) -> Iterator[str]:
     gravity, turn = degrees(it.looks.gravity_rad), degrees(it.looks.attitude_rad)
     yield "Smallest margin of a wrong naming [px RMS] (share of views under 3 px)"
     for size, named in enumerate(("any four LEDs", f"all {len(it.leds_in_b)} LEDs")):
@@ -107,7 +107,7 @@ def _margin_lines(it: Judged) -> Iterator[str]:
             yield f"  {distance:>10.2f} m  " + "".join(f"{cell:>18}" for cell in cells)
 
 
-def _sigma_lines(it: Judged) -> Iterator[str]:
+def _sigma_lines(it: LayoutReport) -> Iterator[str]:
     yield f"Pose, with {it.noise_px:g} px of noise per coordinate: median / worst view / worst with"
     yield "one LED hidden; spots nearest to each other; second pose that fits all, any four LEDs"
     yield (
@@ -138,7 +138,7 @@ def _figure(value: float) -> str:
     return f"{value:6.2f}" if value < 999.0 else f"{'none':>6}"
 
 
-def verdict(it: Judged) -> Iterator[str]:
+def verdict(it: LayoutReport) -> Iterator[str]:
     """What it means, in words, at the usual distance."""
     d = it.usual
     yield f"Verdict at {it.looks.distances[d]:.2f} m: {it.grade}."
@@ -157,7 +157,7 @@ def verdict(it: Judged) -> Iterator[str]:
     )
 
 
-def _naming_words(it: Judged, d: int) -> Iterator[str]:
+def _naming_words(it: LayoutReport, d: int) -> Iterator[str]:
     gravity = degrees(it.looks.gravity_rad)
     subjects = {
         (0, 1): f"Any four LEDs, gravity known to {gravity:.0f}°",
@@ -190,7 +190,7 @@ def _where(found: Worst) -> str:
     return f" from {azimuth:.0f}°, {elevation:.0f}°: LED {swaps}"
 
 
-def _shape_words(it: Judged, d: int) -> Iterator[str]:
+def _shape_words(it: LayoutReport, d: int) -> Iterator[str]:
     flat, line = thickness(it.leds_in_b)
     away = it.leds_in_b - it.leds_in_b.mean(axis=0)
     size = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))

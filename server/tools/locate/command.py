@@ -28,7 +28,7 @@ from server.tools.locate.optical import COLUMNS, row
 from server.tools.locate.options import outputs_of, parser
 from server.tools.locate.outputs import check_places, whole_file, whole_folder
 from server.tools.locate.summary import camera_lines, summary
-from server.tools.locate.work import Located, Locator, Motion
+from server.tools.locate.work import ImuRecordings, Located, Locator
 
 COMPILING_S = 4.0
 """What is compiled already is loaded in less."""
@@ -43,7 +43,9 @@ def _run(given: argparse.Namespace) -> None:
     check_places(list(outputs.items()), inputs, given.frames)
     _, camera = load_camera(given.camera)
     _, leds_in_b = load_leds(given.robot)
-    motion = Motion(*(load_imu(p) if p is not None else None for p in (given.imu, given.body_imu)))
+    motion = ImuRecordings(
+        *(load_imu(p) if p is not None else None for p in (given.imu, given.body_imu))
+    )
     frames = open_frames(given.frames, given.fps)
     files = (given.imu, given.body_imu)
     for file, table in zip(files, (motion.camera, motion.body), strict=True):
@@ -131,7 +133,7 @@ def _check_clock(file: Path | None, table: Array | None, frames: Frames) -> None
         )
 
 
-def _missing(motion: Motion, leds_in_b: Array) -> list[str]:
+def _missing(motion: ImuRecordings, leds_in_b: Array) -> list[str]:
     """What would help, and isn't there."""
     missing: list[str] = []
     if motion.camera is None and motion.body is None:

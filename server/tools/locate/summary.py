@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from server.tools.locate.history import History
 
 LABEL = 15
@@ -35,7 +35,7 @@ def summary(history: History) -> str:
     return "\n".join(lines)
 
 
-def camera_lines(camera: Camera, looking: Looking) -> list[str]:
+def camera_lines(camera: Camera, looking: VisualFrontEnd) -> list[str]:
     """What pictures and gyroscopes together say of the camera; nothing without enough motion."""
     facts = looking.watch.facts
     if facts is None:

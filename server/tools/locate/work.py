@@ -10,13 +10,13 @@ import numpy as np
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
-from pipeline.vision.detection import Sighting
-from pipeline.vision.imu_buffer import Feeling, Felt
-from pipeline.vision.visual_front_end import Looking
+from pipeline.vision.detection import Detection
+from pipeline.vision.imu_buffer import BufferedImu, ImuBuffer
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.common.clock import thread_cpu
 from server.common.errors import InputError
-from server.media.frame import Shot
+from server.media.frame import MediaFrame
 from server.media.frame_source import Frames
 
 AHEAD_S = 0.2
@@ -24,7 +24,7 @@ AHEAD_S = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class ImuRecordings:
     """What motion sensors recorded: (n, 7) t [s], rate [rad/s], specific force [m/s²]."""
 
     camera: Array | None = None
@@ -37,12 +37,12 @@ class Motion:
 class Located:
     """What came of one frame."""
 
-    shot: Shot
-    sighting: Sighting | None
+    shot: MediaFrame
+    sighting: Detection | None
     """None: it could not be read."""
     read_s: float
     """CPU time of getting the picture [s]."""
-    felt: tuple[Feeling | None, Feeling | None]
+    felt: tuple[BufferedImu | None, BufferedImu | None]
     """What the camera's and the body's sensors said about its time."""
 
     @property
@@ -72,14 +72,14 @@ class Located:
 class Locator:
     """Frames of one camera and one robot, looked at in the order of time."""
 
-    def __init__(self, camera: Camera, leds_in_b: Array, motion: Motion) -> None:
+    def __init__(self, camera: Camera, leds_in_b: Array, motion: ImuRecordings) -> None:
         """`leds_in_b` (n, 3) [m]."""
         self.camera = camera
-        self.looking = Looking(camera, leds_in_b, GatesConfig(), thread_cpu)
+        self.looking = VisualFrontEnd(camera, leds_in_b, GatesConfig(), thread_cpu)
         self.looking.doubts_gravity = True  # told in the end, if it was wrong
         self._camera_samples = _Samples(motion.camera)
         self._body_samples = _Samples(motion.body)
-        self._camera_felt, self._body_felt = Felt(), Felt()
+        self._camera_felt, self._body_felt = ImuBuffer(), ImuBuffer()
 
     def locate(self, frames: Frames) -> Iterator[Located]:
         """One after the other.
@@ -93,7 +93,7 @@ class Locator:
             yield self._located(shot, read_s)
             started = thread_cpu()
 
-    def _located(self, shot: Shot, read_s: float) -> Located:
+    def _located(self, shot: MediaFrame, read_s: float) -> Located:
         self._feel(shot.t)
         t = shot.t + self.looking.offset_s
         body = self._body_felt.at(t)

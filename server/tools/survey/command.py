@@ -21,11 +21,11 @@ from server.common.options import Parser
 from server.media.tables import load_imu
 from server.tools.survey import options
 from server.tools.survey.picture import draw
-from server.tools.survey.reconstruction.bundle import Tape
+from server.tools.survey.reconstruction.bundle import DistanceConstraint
 from server.tools.survey.reconstruction.datum import fitted, levelled, matched, on_a_line
-from server.tools.survey.reconstruction.detections import Seen
+from server.tools.survey.reconstruction.detections import FrameSpots
 from server.tools.survey.reconstruction.errors import SurveyError
-from server.tools.survey.reconstruction.gyro import Gyro
+from server.tools.survey.reconstruction.gyro import GyroAttitude
 from server.tools.survey.reconstruction.structure import COUNTS, Structure, measured, shape
 from server.tools.survey.report import Survey, figures, lines, toml
 from server.tools.survey.video import picture, read, times
@@ -92,7 +92,7 @@ def _run(arguments: argparse.Namespace) -> int:
     film = read(arguments.film, camera, arguments.fps, arguments.every)
     gyro = None
     if arguments.imu is not None:
-        gyro = Gyro(load_imu(arguments.imu), times(film))
+        gyro = GyroAttitude(load_imu(arguments.imu), times(film))
     survey = _surveyed(arguments, camera, film, design, gyro)
     print(json.dumps(figures(survey), indent=1) if arguments.json else "\n".join(lines(survey)))
     _write(arguments, camera, film, survey)
@@ -126,14 +126,16 @@ def _check(arguments: argparse.Namespace) -> None:
 def _surveyed(
     arguments: argparse.Namespace,
     camera: Camera,
-    film: list[Seen],
+    film: list[FrameSpots],
     design: Array | None,
-    gyro: Gyro | None,
+    gyro: GyroAttitude | None,
 ) -> Survey:
     found = shape(camera, film, arguments.leds, gyro)
     order = range(arguments.leds) if design is None else matched(found.scene.points, design)
     sigma = 1e-3 * arguments.distance_sigma_mm
-    tapes = tuple(Tape(tape.a, tape.b, tape.metres, sigma) for tape in arguments.distance)
+    tapes = tuple(
+        DistanceConstraint(tape.a, tape.b, tape.metres, sigma) for tape in arguments.distance
+    )
     structure = measured(camera, film, found, order, tapes, gyro)
     body = _in_body(structure, design, arguments.known, gyro)
     turn = np.kron(np.eye(arguments.leds), body.R)
@@ -170,8 +172,8 @@ class _Body:
 def _in_body(
     structure: Structure,
     design: Array | None,
-    known: Sequence[options.Known] | None,
-    gyro: Gyro | None,
+    known: Sequence[options.KnownLed] | None,
+    gyro: GyroAttitude | None,
 ) -> _Body:
     points = structure.scene.points
     if design is not None:
@@ -194,7 +196,7 @@ def _in_body(
 
 
 def _write(
-    arguments: argparse.Namespace, camera: Camera, film: Sequence[Seen], survey: Survey
+    arguments: argparse.Namespace, camera: Camera, film: Sequence[FrameSpots], survey: Survey
 ) -> None:
     out: Path = arguments.out
     luma = picture(arguments.film, arguments.fps, film[survey.structure.frames[0]].name)

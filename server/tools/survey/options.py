@@ -21,7 +21,7 @@ class Distance:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class KnownLed:
     """An LED, counted from 0, and where it is in the body [m]."""
 
     led: int
@@ -45,7 +45,7 @@ def distance(text: str) -> Distance:
     return Distance(a, b, metres)
 
 
-def known(text: str) -> Known:
+def known(text: str) -> KnownLed:
     """Of `--known`: LEDs count from 1 there."""
     name, is_said, place = text.partition("=")
     parts = place.split(",")
@@ -54,7 +54,7 @@ def known(text: str) -> Known:
     x, y, z = (_number(part, text) for part in parts)
     if max(abs(x), abs(y), abs(z)) > PLACE_M:
         raise argparse.ArgumentTypeError(f"within {PLACE_M:g} m of the origin, not {text!r}")
-    return Known(_led(name, text), (x, y, z))
+    return KnownLed(_led(name, text), (x, y, z))
 
 
 def _led(name: str, text: str) -> int:

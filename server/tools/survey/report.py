@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from pipeline.frames import Array
-from server.tools.survey.reconstruction.bundle import Scene, Tape
+from server.tools.survey.reconstruction.bundle import DistanceConstraint, PointsAndPoses
 from server.tools.survey.reconstruction.structure import Structure
 
 GOOD_PX, POOR_PX = 0.3, 1.0
@@ -31,14 +31,14 @@ class Survey:
     """(n, 3) [m]."""
     covariance: Array
     """(3 n, 3 n) in b, as a rigid body [m²]."""
-    scene: Scene
+    scene: PointsAndPoses
     """In b, with the poses of the frames adjusted to."""
     structure: Structure
     axes: str
     """In words, what b is."""
     design: Array | None
     """(n, 3) what the LEDs were meant to be [m]."""
-    tapes: tuple[Tape, ...]
+    tapes: tuple[DistanceConstraint, ...]
     frames: int
     """Of the film."""
     named: int

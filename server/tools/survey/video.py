@@ -14,7 +14,7 @@ from pipeline.spots.leds import find_spots
 from pipeline.vision_config import LedsConfig
 from server.common.progress import Progress
 from server.media.frame_source import open_frames
-from server.tools.survey.reconstruction.detections import Seen
+from server.tools.survey.reconstruction.detections import FrameSpots
 from server.tools.survey.reconstruction.errors import SurveyError
 
 MOST_SPOTS = 24
@@ -22,7 +22,7 @@ MOST_FRAMES = 3000
 """Of a frame, the brightest; of a film, so that all fit into memory."""
 
 
-def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Seen]:
+def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[FrameSpots]:
     """Spots of every so many frames.
 
     Raises:
@@ -31,7 +31,7 @@ def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Seen
     """
     frames = open_frames(path, fps)
     progress = Progress(frames.count, sys.stderr)
-    film: list[Seen] = []
+    film: list[FrameSpots] = []
     for k, shot in enumerate(frames):
         progress.advance("spots")
         if k % every or shot.luma is None:
@@ -45,7 +45,7 @@ def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Seen
         if len(film) == MOST_FRAMES:
             raise SurveyError(f"{path}: more than {MOST_FRAMES} frames; take --every {every + 1}")
         spots = find_spots(Frame(shot.t, shot.luma, shot.full_range), LedsConfig())
-        film.append(Seen(shot.name, shot.t, _brightest(spots)))
+        film.append(FrameSpots(shot.name, shot.t, _brightest(spots)))
     progress.close()
     if not film:
         raise SurveyError(f"{path}: none of its frames can be read")
@@ -70,6 +70,6 @@ def picture(path: Path, fps: float | None, name: str) -> Image | None:
     return None
 
 
-def times(film: Sequence[Seen]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def times(film: Sequence[FrameSpots]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """(f,) [s]."""
     return np.array([seen.t for seen in film])

@@ -17,7 +17,7 @@ from typing import Any, Final, cast, get_args
 import numpy as np
 
 from hardware.dynamics import dynamics_of
-from hardware.gain_tuning import Goals, TuningError, tuned
+from hardware.gain_tuning import MarginGoals, TuningError, tuned
 from hardware.gains_text import GainsTextError, with_gains
 from hardware.robot_file import (
     ROBOTS,
@@ -32,7 +32,7 @@ from pipeline.control.margins import Loop, Sensing
 from pipeline.gains import Gains
 from server.common.options import Parser
 from server.common.ranges import number
-from server.simulation.session import Figures, Session, fly
+from server.simulation.session import Figures, SweepSession, fly
 from server.tools.tune import table
 
 SECONDS: Final = 8.0
@@ -135,7 +135,7 @@ def _loop(robot_file: RobotFile, gains: str) -> Loop:
 
 
 def _found(robot_file: RobotFile, loop: Loop, arguments: argparse.Namespace) -> Gains:
-    goals = Goals(
+    goals = MarginGoals(
         10.0 ** (arguments.gain_margin / 20.0),
         radians(arguments.phase_margin),
         loop.config.min_delay_s,
@@ -185,7 +185,7 @@ def _flown(
         **scene,
     }
     for seed in range(1, arguments.flights + 1):
-        session = Session(seed, seed, SECONDS, SETTLE_S, table, tuple(settings.items()))
+        session = SweepSession(seed, seed, SECONDS, SETTLE_S, table, tuple(settings.items()))
         yield fly(session).figures
 
 

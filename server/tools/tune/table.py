@@ -14,7 +14,7 @@ from server.common import text
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class AxisRow:
     """One axis before or after; margins are the worse of with and without feed-forward."""
 
     set: str
@@ -52,11 +52,11 @@ def table(loops: Mapping[str, Loop], axes: Sequence[int], sensing: Sensing) -> s
     return text.table(COLUMNS, rows)
 
 
-def _row(name: str, loop: Loop, axis: int, sensing: Sensing) -> Row:
+def _row(name: str, loop: Loop, axis: int, sensing: Sensing) -> AxisRow:
     found = [axis_margins(one, axis, sensing) for one in variants(loop)]
     gains, unit = loop.gains, 1e3 if axis < 3 else degrees(1.0)
     least = min(min(one.gain_up, 1.0 / one.gain_down if one.gain_down else inf) for one in found)
-    return Row(
+    return AxisRow(
         set=name,
         axis=AXES[axis],
         Kp=float(gains.Kp[axis]),

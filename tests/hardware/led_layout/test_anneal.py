@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hardware.led_layout.anneal import Search, apart_px, improve
+from hardware.led_layout.anneal import AnnealingOptions, apart_px, improve
 from hardware.led_layout.crlb import sigmas
 from hardware.led_layout.file import load_layout
 from hardware.led_layout.margins import margins
@@ -15,7 +15,7 @@ from pipeline.identification.pnp import refine
 
 LEDS = load_robot("quadrotor").robot.leds_in_b
 LOOKS = looks_about((0.0, 0.35), (0.6, 0.35), 5, np.array([2.5]), 914.0)
-SEARCH = Search(turns=4, starts=2, seed=1)
+SEARCH = AnnealingOptions(turns=4, starts=2, seed=1)
 REACHES = [
     Ball(np.array([0.1, -0.2, 0.3]), 0.05),
     Box(np.array([-0.1, -0.2, 0.0]), np.array([0.1, 0.0, 0.3])),
@@ -51,7 +51,7 @@ def scatter(leds, angles):
 @pytest.mark.slow
 def test_a_search_finds_more_margin_within_reach():
     reaches = [Ball(led, 0.05) for led in LEDS]
-    better = improve(LEDS, reaches, LOOKS, Search(turns=60, starts=2))
+    better = improve(LEDS, reaches, LOOKS, AnnealingOptions(turns=60, starts=2))
     assert smallest(better) > 1.2 * smallest(LEDS)
     assert np.linalg.norm(better - LEDS, axis=1).max() < 0.05 + 1e-9
     before, after = sigmas(LEDS, LOOKS, 0.1), sigmas(better, LOOKS, 0.1)
@@ -73,7 +73,7 @@ def test_a_search_repeats_itself_and_tells_how_far_it_is():
 @pytest.mark.slow
 def test_leds_that_can_not_move_stay():
     reaches = [Segment(led, led) for led in LEDS]
-    still = improve(LEDS, reaches, LOOKS, Search(turns=1, starts=1))
+    still = improve(LEDS, reaches, LOOKS, AnnealingOptions(turns=1, starts=1))
     assert still == pytest.approx(LEDS, abs=1e-12)
 
 

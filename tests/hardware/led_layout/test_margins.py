@@ -10,7 +10,7 @@ from hardware.led_layout.crlb import one_hidden, sigmas
 from hardware.led_layout.margins import check, margins, namings, thickness, worst, wrong
 from hardware.led_layout.viewpoints import (
     LedLayoutError,
-    Looks,
+    Viewpoints,
     attitude,
     direction,
     looks_about,
@@ -134,7 +134,7 @@ def test_a_symmetric_layout_has_no_margin():
 def test_a_flat_layout_has_a_second_pose_and_is_thin():
     flat = AMES * np.array([0.0, 1.0, 1.0])
     assert thickness(flat)[0] < 1e-12 < 0.05 < thickness(AMES)[0]
-    aside = Looks(np.array([[0.4, 0.1]]), np.array([6.0]), F)
+    aside = Viewpoints(np.array([[0.4, 0.1]]), np.array([6.0]), F)
     assert margins(flat, aside).other[0, 0, 1] < 1.0
     assert margins(AMES, aside).other[0, 0, 1] > 3.0
 

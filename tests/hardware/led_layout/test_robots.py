@@ -6,8 +6,8 @@ import pytest
 from hardware.camera_file import find_camera
 from hardware.robot_file import load_robot
 from pipeline.frames import R_from_rpy, exp
-from pipeline.identification.initialisation import Starting
-from pipeline.identification.relocalisation import Hints
+from pipeline.identification.initialisation import Initialisation
+from pipeline.identification.relocalisation import SearchHints
 from pipeline.signals import Spots
 from pipeline.vision_config import IdentifyConfig
 
@@ -53,8 +53,8 @@ def test_no_led_is_taken_for_another_or_a_lamp(name):
         spots = spots_of(rng, leds_px)
         off = rng.normal(0.0, 1.0, 3)
         up_in_c = exp(GRAVITY_RAD * off / np.linalg.norm(off)) @ R_fc.T @ UP
-        starting = Starting(CAMERA, leds_in_b, IdentifyConfig())
-        naming = starting.step(0.0, spots, Hints(up_in_c, R_fb.T @ UP), None)
+        starting = Initialisation(CAMERA, leds_in_b, IdentifyConfig())
+        naming = starting.step(0.0, spots, SearchHints(up_in_c, R_fb.T @ UP), None)
         if naming is not None:
             found += 1
             apart = spots.pixels[naming.match.spot] - leds_px[naming.match.led]

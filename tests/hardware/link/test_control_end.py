@@ -14,7 +14,14 @@ from hypothesis import strategies as st
 from hardware.follower import FollowerState, Refusal, ThrustCommand
 from hardware.link import control_end
 from hardware.link.control_end import ControlEnd, random_u64
-from hardware.link.datagram import U32, U64, Command, Sample, decode_command, encode_sample
+from hardware.link.datagram import (
+    U32,
+    U64,
+    CommandDatagram,
+    SampleDatagram,
+    decode_command,
+    encode_sample,
+)
 
 KEY = bytes(range(16))
 THRUSTERS, F_MAX, MAX_RISE, EPOCH = 3, 4.0, 0.5, 10
@@ -29,8 +36,8 @@ class Bench:
     def __init__(self, epoch: int = EPOCH) -> None:
         challenges = count(1000)
         self.end = ControlEnd(THRUSTERS, F_MAX, MAX_RISE, epoch, KEY, lambda: next(challenges))
-        self.sent: Command | None = None
-        self.robot = Sample(
+        self.sent: CommandDatagram | None = None
+        self.robot = SampleDatagram(
             state=FollowerState.IDLE,
             refusal=Refusal.NONE,
             t_us=0,
@@ -45,7 +52,7 @@ class Bench:
             thrusts=(0.0,) * THRUSTERS,
         )
 
-    def send(self, *thrusts: float, now: float = 0.0, **flags: bool) -> Command:
+    def send(self, *thrusts: float, now: float = 0.0, **flags: bool) -> CommandDatagram:
         values = np.array(thrusts or (0.0,) * THRUSTERS)
         flags = {"armed": bool(values.any()), **flags}
         self.sent = decode_command(self.end.command(ThrustCommand(values, **flags), now), KEY)

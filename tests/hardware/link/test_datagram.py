@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from hardware.follower import EXPLANATIONS, FollowerState, Refusal
 from hardware.link.datagram import (
     MAX_BYTES,
-    Command,
+    CommandDatagram,
     LinkError,
-    Sample,
+    SampleDatagram,
     decode_command,
     decode_sample,
     encode_command,
@@ -31,9 +31,9 @@ u64 = st.integers(0, 2**64 - 1)
 f32 = st.floats(width=32, allow_nan=False, allow_infinity=False)
 rows = st.lists(f32, min_size=1, max_size=16).map(tuple)
 threes = st.tuples(f32, f32, f32)
-commands = st.builds(Command, u64, u32, u64, u64, st.booleans(), rows, st.booleans())
+commands = st.builds(CommandDatagram, u64, u32, u64, u64, st.booleans(), rows, st.booleans())
 samples = st.builds(
-    Sample,
+    SampleDatagram,
     st.sampled_from(FollowerState),
     st.sampled_from(Refusal),
     st.integers(0, 2**60 - 1),
@@ -131,7 +131,7 @@ def test_the_bytes_are_the_recorded_ones(vector):
 
 
 def test_the_offsets_are_the_documented_ones():
-    data = encode_command(Command(1, 2, 3, 4, True, (5.0, 6.0)), KEY)
+    data = encode_command(CommandDatagram(1, 2, 3, 4, True, (5.0, 6.0)), KEY)
     assert len(data) == 60
     assert data[:8] == b"LLcm\x02\x02\x01\x00"
     assert struct.unpack_from("<QQQI", data, 8) == (1, 3, 4, 2)
@@ -147,7 +147,7 @@ def test_the_offsets_are_the_documented_ones():
 
 def sample_of(value):
     told = (FollowerState.RAMP, Refusal.SILENT, 1, 2, 3, 4, 5, 6, 7)
-    return Sample(*told, (value, 8.0, 9.0), (10.0, 11.0, 12.0), (13.0,))
+    return SampleDatagram(*told, (value, 8.0, 9.0), (10.0, 11.0, 12.0), (13.0,))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hardware.follower import FollowerState, Refusal
-from hardware.link.datagram import Command, decode_sample, encode_command
+from hardware.link.datagram import CommandDatagram, decode_sample, encode_command
 from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
 
@@ -46,7 +46,7 @@ class Bench:
 
     def command(self, *thrusts, **changes):
         """A good one, with changes; not counted until sent."""
-        command = Command(
+        command = CommandDatagram(
             self.epoch,
             (self.counter + 1) % 2**32,
             self.nonce,

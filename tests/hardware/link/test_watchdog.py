@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from hardware.follower import FollowerState, Refusal
-from hardware.link.datagram import Command, encode_command
+from hardware.link.datagram import CommandDatagram, encode_command
 from hardware.link.link_key import LinkKeyError, mac, read_key
 from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
@@ -140,7 +140,7 @@ class Traffic:
         thrusts = [rnd.uniform(0.0, 1.9) if thrusting else 0.0] * self.thrusters
         if self.often(0.01):
             thrusts[1] = rnd.choice((float("nan"), float("inf"), -1.0, 3.5, 3.0, -0.0))
-        command = Command(
+        command = CommandDatagram(
             epoch=self.epoch,
             counter=self.counter,
             nonce=nonce if self.often(0.99) else rnd.choice((0, max(1, nonce - 12))),
@@ -212,7 +212,7 @@ def test_limits_that_limit_nothing_are_refused_and_then_no_command_is_taken(libr
     assert not robot.started
     for nonce, now_us in enumerate(range(1_000_000, 2_000_000, 5000), 1):
         robot.sample(now_us, nonce, (0.0,) * 3, (0.0,) * 3, np.zeros(3))
-        command = Command(5, nonce, nonce, nonce, False, (0.0,) * 3)
+        command = CommandDatagram(5, nonce, nonce, nonce, False, (0.0,) * 3)
         assert robot.receive(encode_command(command, KEY), None, now_us) == Refusal.THRUSTERS
 
 

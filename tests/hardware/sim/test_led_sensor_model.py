@@ -10,9 +10,9 @@ import pytest
 from hardware.camera_file import find_camera
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
-from hardware.sim.led_sensor_model import NoisyEye
+from hardware.sim.led_sensor_model import LedSensorModel
 from hardware.sim.phone import VirtualPhone
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from pipeline.frames import Array
 
 LEDS = load_robot("ames").robot.leds_in_b
@@ -22,11 +22,11 @@ def at_rest(t: float) -> tuple[Array, Array]:
     return np.eye(3), np.zeros(3)
 
 
-def eye(noise_px: float, hidden: tuple[int, ...] = (), readout_s: float = 0.0) -> NoisyEye:
+def eye(noise_px: float, hidden: tuple[int, ...] = (), readout_s: float = 0.0) -> LedSensorModel:
     camera = replace(find_camera("lightleash-virtual-phone", 1280, 720), readout_s=readout_s)
     rng = np.random.default_rng(1)
-    phone = VirtualPhone(camera, make_hand("moving", seed=2), LEDS, Look(), rng)
-    return NoisyEye(phone, LEDS, noise_px, lambda t: hidden, np.random.default_rng(3))
+    phone = VirtualPhone(camera, make_hand("moving", seed=2), LEDS, RenderOptions(), rng)
+    return LedSensorModel(phone, LEDS, noise_px, lambda t: hidden, np.random.default_rng(3))
 
 
 def test_without_noise_it_tells_the_truth() -> None:

@@ -8,7 +8,7 @@ from math import radians
 import numpy as np
 import pytest
 
-from hardware.sim.person import SPEED_M_S, GuidingHand, Person, misalignment, remedy
+from hardware.sim.person import SPEED_M_S, GuidingHand, Participant, misalignment, remedy
 from hardware.sim.plant.laser_task import UP, Laser, Tube
 from pipeline.frames import exp
 
@@ -17,7 +17,7 @@ LASER = Laser(np.array([0.0, 0.0, -0.2]), -UP)
 AXIS = exp(np.array([radians(15.0), 0.0, 0.0])) @ UP
 TUBE = Tube(-0.5 * AXIS, AXIS, 0.2, 0.015)
 HAND = np.eye(3), np.array([-2.5, 0.0, 0.0])
-PERSON = Person("", 0.25, 1.0, 0.1, 3e-4, 3e-3, 0.004, 5e-5, 3e-4, 0.2, 0.2)
+PERSON = Participant("", 0.25, 1.0, 0.1, 3e-4, 3e-3, 0.004, 5e-5, 3e-4, 0.2, 0.2)
 STEADY = replace(PERSON, acuity_rad=0.0, effort_noise=0.0)
 
 
@@ -43,7 +43,7 @@ def test_shift_and_turn_bring_the_beam_onto_the_axis() -> None:
     assert TUBE.clearance(LASER.beam(*there)) >= 0.0
 
 
-def guided(person: Person, seconds: float, seed: int = 0) -> tuple[GuidingHand, list[float]]:
+def guided(person: Participant, seconds: float, seed: int = 0) -> tuple[GuidingHand, list[float]]:
     """A robot that is where the hand wants it at once; clearance of its beam each period [m]."""
     hand = GuidingHand(person, LASER, TUBE, np.random.default_rng(seed), H)
     clearances = []

@@ -8,8 +8,8 @@ import pytest
 from hardware.camera_file import find_camera
 from hardware.sim.hand import make_hand
 from hardware.sim.phone import PERFECT, EventKind, PhoneClock, PhoneOptions, VirtualPhone
-from hardware.sim.phone_faults import Fault
-from hardware.sim.render import Look
+from hardware.sim.phone_faults import SensorFault
+from hardware.sim.render import RenderOptions
 from pipeline.frames import GRAVITY, R_cd, R_from_wxyz, log
 
 LEDS_IN_B = np.array(
@@ -23,7 +23,13 @@ def make_phone(kind="moving", seed=1, options=None, clock=None):
     hand = make_hand(kind, seed=seed)
     rng = np.random.default_rng(seed)
     return VirtualPhone(
-        CAMERA, hand, LEDS_IN_B, Look(), rng, options or PhoneOptions(), clock or PhoneClock()
+        CAMERA,
+        hand,
+        LEDS_IN_B,
+        RenderOptions(),
+        rng,
+        options or PhoneOptions(),
+        clock or PhoneClock(),
     )
 
 
@@ -141,7 +147,7 @@ def test_a_hidden_led_is_dark_as_long_as_it_is_hidden():
 
     seen = make_phone()
     covered = VirtualPhone(
-        CAMERA, seen.hand, LEDS_IN_B, Look(), np.random.default_rng(1), hidden=hidden
+        CAMERA, seen.hand, LEDS_IN_B, RenderOptions(), np.random.default_rng(1), hidden=hidden
     )
     for t in (1.9, 2.5, 3.0):
         R, p = seen.relative_pose(t, hanging_still)
@@ -163,21 +169,21 @@ def test_each_fault_spoils_what_it_says_and_nothing_else():
     def same(a, b):
         return np.array_equal(a, b)
 
-    for good, bad in faulty(Fault.IOS_SIGN):
+    for good, bad in faulty(SensorFault.IOS_SIGN):
         assert same(bad.a_m_in_d, -good.a_m_in_d)
         assert same(bad.omega_m_in_d, good.omega_m_in_d)
-    for good, bad in faulty(Fault.RATE_ORDER):
+    for good, bad in faulty(SensorFault.RATE_ORDER):
         assert same(bad.omega_m_in_d, good.omega_m_in_d[[1, 2, 0]])
         assert same(bad.a_m_in_d, good.a_m_in_d)
-    for good, bad in faulty(Fault.SCREEN_ANGLE):
+    for good, bad in faulty(SensorFault.SCREEN_ANGLE):
         assert (good.screen_angle_deg, bad.screen_angle_deg) == (90, 0)
         assert same(bad.a_m_in_d, good.a_m_in_d)
-    for good, bad in faulty(Fault.G_UNITS):
+    for good, bad in faulty(SensorFault.G_UNITS):
         assert bad.a_m_in_d == pytest.approx(good.a_m_in_d / GRAVITY)
-    for good, bad in faulty(Fault.NONE):
+    for good, bad in faulty(SensorFault.NONE):
         assert same(bad.a_m_in_d, good.a_m_in_d)
 
 
 def test_without_gravity_rest_feels_like_nothing():
-    phone = make_phone("still", options=replace(PERFECT, fault=Fault.NO_GRAVITY))
+    phone = make_phone("still", options=replace(PERFECT, fault=SensorFault.NO_GRAVITY))
     assert phone.motion(1.0).a_m_in_d == pytest.approx(np.zeros(3), abs=1e-9)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hardware.sim.reference_trajectory import Intent
+from hardware.sim.reference_trajectory import ReferenceTrajectory
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import exp
 
@@ -21,7 +21,7 @@ def turned(angle):
 
 
 def test_a_hand_at_rest_means_the_place_where_the_body_was():
-    intent = Intent(VirtualCameraConfig(), HAND, BODY)
+    intent = ReferenceTrajectory(VirtualCameraConfig(), HAND, BODY)
     for _ in range(100):
         R_fr, p_rf_in_f = intent.step(HAND, H)
     np.testing.assert_allclose(R_fr, BODY[0], atol=1e-12)
@@ -29,14 +29,17 @@ def test_a_hand_at_rest_means_the_place_where_the_body_was():
 
 
 def test_a_moved_hand_moves_it_at_once_and_alike():
-    intent, shift = Intent(VirtualCameraConfig(), HAND, BODY), np.array([0.03, -0.02, 0.05])
+    intent, shift = (
+        ReferenceTrajectory(VirtualCameraConfig(), HAND, BODY),
+        np.array([0.03, -0.02, 0.05]),
+    )
     R_fr, p_rf_in_f = intent.step((HAND[0], HAND[1] + shift), H)
     np.testing.assert_allclose(R_fr, BODY[0], atol=1e-12)
     np.testing.assert_allclose(p_rf_in_f, BODY[1] + shift, atol=1e-12)
 
 
 def test_a_turned_hand_swings_it_about_the_camera_after_the_low_pass():
-    intent, hand = Intent(VirtualCameraConfig(), HAND, BODY), turned(0.1)
+    intent, hand = ReferenceTrajectory(VirtualCameraConfig(), HAND, BODY), turned(0.1)
     _, first = intent.step(hand, H)
     assert np.linalg.norm(first - BODY[1]) < 1e-3
     for _ in range(4000):
@@ -47,14 +50,14 @@ def test_a_turned_hand_swings_it_about_the_camera_after_the_low_pass():
 
 def test_without_a_low_pass_it_is_rigid_with_the_hand():
     free = replace(VirtualCameraConfig(), mode="off", max_speed_m_s=0.0)
-    intent, hand = Intent(free, HAND, BODY), turned(0.1)
+    intent, hand = ReferenceTrajectory(free, HAND, BODY), turned(0.1)
     R_fr, p_rf_in_f = intent.step(hand, H)
     np.testing.assert_allclose(R_fr, hand[0] @ BODY[0], atol=1e-9)
     np.testing.assert_allclose(p_rf_in_f, HAND[1] + hand[0] @ (BODY[1] - HAND[1]), atol=1e-9)
 
 
 def test_knobs_turned_in_flight_leave_what_was_meant_where_it_is():
-    intent = Intent(VirtualCameraConfig(), HAND, BODY)
+    intent = ReferenceTrajectory(VirtualCameraConfig(), HAND, BODY)
     intent.step(turned(0.1), H)
     _, before = intent.step(turned(0.1), H)
     intent.tune(replace(VirtualCameraConfig(), mode="selective"))

@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.render import Look, render
+from hardware.sim.render import RenderOptions, render
 from pipeline.signals import Frame
 from pipeline.spots.leds import find_spots
 from pipeline.vision_config import LedsConfig
 from tests.pipeline.seeing import CAMERA
 
 ONE = np.zeros((1, 3))
-DARK = Look(noise=0.0, halo=0.0)
+DARK = RenderOptions(noise=0.0, halo=0.0)
 
 
 def still(x=2.5, y=0.1, z=0.05):
@@ -81,7 +81,7 @@ def test_a_led_on_the_border_is_cut_not_wrapped():
 
 
 def test_the_same_seed_gives_the_same_picture_and_another_one_other_noise():
-    look = Look()
+    look = RenderOptions()
     assert np.array_equal(shot(still(), look, seed=1), shot(still(), look, seed=1))
     difference = shot(still(), look, seed=1).astype(int) - shot(still(), look, seed=2)
     assert 0.5 < difference.std() < 10.0

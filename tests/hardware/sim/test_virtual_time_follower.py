@@ -5,7 +5,7 @@ import pytest
 
 from hardware.follower import FollowerState, ThrustCommand
 from hardware.robot_file import load_robot
-from hardware.sim.virtual_time_follower import LockstepFollower
+from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from tests.hardware.follower_contract import FollowerContract, exchange
 from tests.hardware.rigs import LockstepRig
 
@@ -19,7 +19,7 @@ class TestContract(FollowerContract):
 
 
 def flight(seed):
-    follower = LockstepFollower(AMES, seed)
+    follower = VirtualTimeFollower(AMES, seed)
     rows = []
     for k in range(400):
         thrust = 0.0 if k < 120 else 0.5 + 0.4 * np.sin(0.1 * k)
@@ -36,7 +36,7 @@ def test_flights_of_a_seed_are_equal_and_of_another_are_not():
 
 
 def test_time_passes_only_when_advanced():
-    follower = LockstepFollower(AMES)
+    follower = VirtualTimeFollower(AMES)
     for _ in range(10):
         exchange(follower, ThrustCommand.zero(8))
     assert follower.t == follower.plant.t == 0.0
@@ -46,7 +46,7 @@ def test_time_passes_only_when_advanced():
 
 
 def test_one_sample_per_tick_with_equal_clocks_and_a_round_trip_of_a_tick():
-    follower = LockstepFollower(AMES)
+    follower = VirtualTimeFollower(AMES)
     follower.send(ThrustCommand.zero(8))
     for _ in range(150):
         follower.advance()

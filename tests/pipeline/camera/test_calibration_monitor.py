@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from hardware.sim.world.sensors import body_samples, phone_samples
-from hardware.sim.world.world import LEDS_IN_B, Setup, World
+from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
 from pipeline.camera import verdict as camera_verdict
-from pipeline.camera.calibration_monitor import CameraWatch
+from pipeline.camera.calibration_monitor import CalibrationMonitor
 from pipeline.signals import BodyImu, PhoneImu, RelativePose
-from pipeline.timing.camera_imu_delay import StampOffsetSearch
+from pipeline.timing.camera_imu_delay import CameraImuDelay
 from tests.pipeline.faulty_camera import CAMERA, Faults, looks, watched
 
 FOUND_S = 20.0
@@ -25,7 +25,7 @@ DATED_S = 0.03
 @cache
 def world(hand=MOVING, duration=20.5, seed=5):
     return World(
-        Setup(
+        WorldOptions(
             seed=seed,
             duration=duration,
             hand_sigma=hand,
@@ -102,7 +102,7 @@ def test_a_hand_that_only_trembles_is_not_judged():
 
 
 def test_pictures_without_motion_samples_teach_nothing():
-    watch = CameraWatch(CAMERA, LEDS_IN_B)
+    watch = CalibrationMonitor(CAMERA, LEDS_IN_B)
     assert not any(watch.saw(look, None) for look in looks(world(), Faults()))
     assert watch.facts is None
 
@@ -144,7 +144,7 @@ def test_ten_minutes_of_usual_use_raise_no_false_alarm(seed, hand):
 def test_the_coarse_offset_of_the_stamps_bears_a_rolling_shutter_nobody_models(readout):
     """To 5 ms within 20 s of motion, poses untreated."""
     search, samples = (
-        StampOffsetSearch(),
+        CameraImuDelay(),
         sorted([*phone_samples(world()), *body_samples(world())], key=lambda event: event[0]),
     )
     for look, arrival in zip(

@@ -3,7 +3,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from pipeline.camera.extrinsics import Mounting
+from pipeline.camera.extrinsics import Extrinsics
 from pipeline.camera.lens import Camera, points_of
 
 K = np.array([[930.0, 0.0, 646.0], [0.0, 931.5, 354.0], [0.0, 0.0, 1.0]])
@@ -72,7 +72,7 @@ def test_in_a_picture_made_smaller_each_point_keeps_its_share_of_width_and_heigh
 
 
 def test_a_camera_of_another_picture_size_keeps_all_else_it_knows():
-    turned = Mounting(R_ci=np.diag([1.0, -1.0, -1.0]), time_offset_s=0.012)
+    turned = Extrinsics(R_ci=np.diag([1.0, -1.0, -1.0]), time_offset_s=0.012)
     whole = replace(camera(), readout_s=-0.02, mounting=turned)
     small = whole.resized(640, 360)
     kept = {one.name for one in fields(Camera)} - {"width", "height", "K", "lens"}

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.render import Look, render
-from pipeline.camera.rolling_shutter import Motion, unrolled
+from hardware.sim.render import RenderOptions, render
+from pipeline.camera.rolling_shutter import FrameMotion, unrolled
 from pipeline.frames import cross, exp
 from pipeline.signals import Frame, Spots
 from pipeline.spots.leds import find_spots
-from pipeline.vision.detection import Prior
+from pipeline.vision.detection import FramePrior
 from pipeline.vision.vision import Vision
 from pipeline.vision_config import LedsConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, error_of, truth_at
@@ -45,7 +45,7 @@ def test_known_motion_puts_the_spots_where_a_global_shutter_would():
     for seed in range(5):
         truth = truth_at(np.random.default_rng(seed))
         rolled, whole = rolled_pixels(truth), truth.pixels()
-        motion = Motion(OMEGA, U, float(truth.p[0]))
+        motion = FrameMotion(OMEGA, U, float(truth.p[0]))
         righted = unrolled(ROLLING, spots_of(rolled), motion).pixels
         before, after = np.abs(rolled - whole).max(), np.abs(righted - whole).max()
         assert after < 0.05 * before
@@ -54,7 +54,7 @@ def test_known_motion_puts_the_spots_where_a_global_shutter_would():
 def test_without_a_distance_the_cameras_turning_alone_is_taken_out():
     truth = truth_at(np.random.default_rng(3))
     rolled = spots_of(rolled_pixels(truth))
-    motion = Motion(OMEGA, np.zeros(3), np.inf)
+    motion = FrameMotion(OMEGA, np.zeros(3), np.inf)
     righted = unrolled(ROLLING, rolled, motion)
     off = np.abs(righted.pixels - truth.pixels()).max()
     assert off < 0.5 * np.abs(rolled.pixels - truth.pixels()).max()
@@ -62,13 +62,13 @@ def test_without_a_distance_the_cameras_turning_alone_is_taken_out():
 
 def test_without_rolling_or_motion_nothing_changes():
     spots = spots_of(truth_at(np.random.default_rng(4)).pixels())
-    assert unrolled(CAMERA, spots, Motion(OMEGA, U, 2.0)) is spots
+    assert unrolled(CAMERA, spots, FrameMotion(OMEGA, U, 2.0)) is spots
     assert unrolled(ROLLING, spots, None) is spots
 
 
 def test_the_renderer_draws_each_led_at_its_rows_time():
     truth = truth_at(np.random.default_rng(5))
-    look = Look(exposure_s=0.001)
+    look = RenderOptions(exposure_s=0.001)
     rng = np.random.default_rng(6)
     luma = render(ROLLING, lambda t: moving(truth, t), LEDS_IN_B, look, rng)
     spots = find_spots(Frame(0.0, luma), LedsConfig())
@@ -89,7 +89,7 @@ def test_vision_sees_through_the_shutter_if_it_knows_the_motion(knows):
 
         eye, known = Vision(ROLLING, LEDS_IN_B), truth.prior()
         prior = replace(known, omega_cf_in_c=OMEGA if knows else None)
-        luma = render(ROLLING, pose, LEDS_IN_B, Look(), rng)
+        luma = render(ROLLING, pose, LEDS_IN_B, RenderOptions(), rng)
         sighting = eye.step(Frame(0.0, luma), prior)
         if sighting.pose is None:
             assert not knows
@@ -100,8 +100,10 @@ def test_vision_sees_through_the_shutter_if_it_knows_the_motion(knows):
 
 def test_rays_stay_as_the_rows_saw_them():
     truth = truth_at(np.random.default_rng(8))
-    luma = render(ROLLING, lambda t: moving(truth, t), LEDS_IN_B, Look(), np.random.default_rng(9))
-    prior = Prior(*(truth.prior().up_in_c, truth.prior().up_in_b), OMEGA, np.zeros(3))
+    luma = render(
+        ROLLING, lambda t: moving(truth, t), LEDS_IN_B, RenderOptions(), np.random.default_rng(9)
+    )
+    prior = FramePrior(*(truth.prior().up_in_c, truth.prior().up_in_b), OMEGA, np.zeros(3))
     rays = Vision(ROLLING, LEDS_IN_B).step(Frame(4.0, luma), prior).rays
     for led, t, tangents in zip(rays.led, rays.t, rays.tangents, strict=True):
         R, p = moving(truth, t - 4.0)
@@ -117,5 +119,5 @@ def test_the_flow_is_that_of_a_point_that_moves_in_turning_axes():
     pixels = small.pixels(q)
     rate = U - cross(OMEGA, q[0])
     moved = small.pixels(q - rate * small.row_delays(pixels[:, 1])[:, None])
-    righted = unrolled(small, spots_of(pixels), Motion(OMEGA, U, 2.0)).pixels
+    righted = unrolled(small, spots_of(pixels), FrameMotion(OMEGA, U, 2.0)).pixels
     np.testing.assert_allclose(righted, moved, atol=1e-5)

@@ -8,18 +8,18 @@ import pytest
 
 from pipeline.config import FailsafeConfig
 from pipeline.control import failsafe
-from pipeline.control.failsafe import Failsafe, Inputs, Limits
+from pipeline.control.failsafe import Failsafe, FailsafeInputs, FailsafeTimers
 from pipeline.signals import Mode, Requests
 
-LIMITS = Limits.of(FailsafeConfig(), ramp_s=2.0)
-GOOD = Inputs(held=False, press=0, operator_ms=20, pose_ms=100, phone_imu_ms=30, robot_ms=5)
+LIMITS = FailsafeTimers.of(FailsafeConfig(), ramp_s=2.0)
+GOOD = FailsafeInputs(held=False, press=0, operator_ms=20, pose_ms=100, phone_imu_ms=30, robot_ms=5)
 HELD = replace(GOOD, held=True, press=1)
 LIFTED = replace(HELD, held=False)
 ARM, DISARM = Requests(arm=True), Requests(disarm=True)
 STOP, RESET = Requests(stop=True), Requests(reset=True)
 
 
-def run(state: Failsafe, inputs: Inputs, ms: int) -> Failsafe:
+def run(state: Failsafe, inputs: FailsafeInputs, ms: int) -> Failsafe:
     for _ in range(ms // 5):
         state = failsafe.step(state, inputs, 5, LIMITS)
     return state
@@ -170,7 +170,7 @@ def test_what_is_armed_is_disarmed_by_request_or_when_idle_for_as_long_as_is_all
 
 
 def test_one_that_does_not_hang_hovers_without_a_phone_for_as_long_as_hold_may_last() -> None:
-    flier = Limits.of(FailsafeConfig(), ramp_s=2.0, hangs=False)
+    flier = FailsafeTimers.of(FailsafeConfig(), ramp_s=2.0, hangs=False)
     modes, state = {}, tracking()
     for ms in range(5, 4_000, 5):
         state = failsafe.step(state, replace(HELD, operator_ms=146 + ms), 5, flier)
@@ -221,7 +221,7 @@ def test_stop_latches_until_a_reset_with_the_button_free() -> None:
 
 
 def test_an_estimator_that_cannot_bridge_holds_as_soon_as_the_picture_is_old() -> None:
-    short = Limits.of(FailsafeConfig(), ramp_s=2.0, bridges=False)
+    short = FailsafeTimers.of(FailsafeConfig(), ramp_s=2.0, bridges=False)
     assert failsafe.step(tracking(), replace(HELD, pose_ms=301), 5, LIMITS).mode == Mode.TRACK
     assert failsafe.step(tracking(), replace(HELD, pose_ms=301), 5, short).mode == Mode.HOLD
 

@@ -15,12 +15,19 @@ import pytest
 
 from pipeline.config import FailsafeConfig
 from pipeline.control import failsafe
-from pipeline.control.failsafe import FLYING, FOREVER_MS, NO_REQUESTS, Failsafe, Inputs, Limits
+from pipeline.control.failsafe import (
+    FLYING,
+    FOREVER_MS,
+    NO_REQUESTS,
+    Failsafe,
+    FailsafeInputs,
+    FailsafeTimers,
+)
 from pipeline.signals import Mode, Requests
 
 D = 10
 """Step [ms]."""
-LIMITS = Limits(
+LIMITS = FailsafeTimers(
     silent=D,
     fresh=2 * D,
     coast=4 * D,
@@ -56,7 +63,7 @@ POWERED = (*FLYING, Mode.RAMP)
 LONGEST_MS = 14 * D
 
 
-def inputs() -> list[Inputs]:
+def inputs() -> list[FailsafeInputs]:
     """At, below and above each limit; two unusual things at once where both are of consequence."""
     well = (0, 0, 0, 0)
     silent, gone, robot = (D + 1, 0, 0, 0), (3 * D + 1, 0, 0, 0), (0, 0, 0, 3 * D + 1)
@@ -77,9 +84,9 @@ def inputs() -> list[Inputs]:
     told += [(age, one, NO_REQUESTS) for age in (silent, gone, robot) for one in complaints]
     told += [(age, fine, wish) for age in (silent, gone, robot) for wish in wishes]
     told += [(well, one, wish) for one in complaints for wish in wishes]
-    coasts = [Inputs(True, 1, *well, "deaf", robot_left_ms=left) for left in (0, D)]
+    coasts = [FailsafeInputs(True, 1, *well, "deaf", robot_left_ms=left) for left in (0, D)]
     return coasts + [
-        Inputs(held, press, *age, *complaint, wish)
+        FailsafeInputs(held, press, *age, *complaint, wish)
         for held, press in product((False, True), range(2))
         for age, complaint, wish in told
     ]
@@ -98,7 +105,9 @@ class Monitor:
     """For how long nothing has been good, without a break."""
 
 
-def after(seen: Monitor, inputs: Inputs, before: Failsafe, now: Failsafe, good: bool) -> Monitor:
+def after(
+    seen: Monitor, inputs: FailsafeInputs, before: Failsafe, now: Failsafe, good: bool
+) -> Monitor:
     entered = now.mode == Mode.TRACK and before.mode in (Mode.ARMED, Mode.HOLD)
     flew = before.mode in (Mode.TRACK, Mode.COAST)
     let_go = not inputs.held or (flew and inputs.press != seen.over)
@@ -122,7 +131,12 @@ def canonical(state: Failsafe) -> Failsafe:
 
 
 def check(
-    before: Failsafe, told: Inputs, now: Failsafe, seen: Monitor, later: Monitor, limits: Limits
+    before: Failsafe,
+    told: FailsafeInputs,
+    now: Failsafe,
+    seen: Monitor,
+    later: Monitor,
+    limits: FailsafeTimers,
 ) -> None:
     """Every law, on one step."""
     power, wish = failsafe.ceiling(now, limits), told.requests
@@ -169,7 +183,7 @@ def check(
     _check_words(told, now, limits)
 
 
-def _check_words(told: Inputs, now: Failsafe, limits: Limits) -> None:
+def _check_words(told: FailsafeInputs, now: Failsafe, limits: FailsafeTimers) -> None:
     """What the pages are told is true."""
     left = failsafe.until_ramp(now, told, limits)
     assert (left is None) == (now.mode not in (Mode.COAST, Mode.HOLD))
@@ -179,7 +193,7 @@ def _check_words(told: Inputs, now: Failsafe, limits: Limits) -> None:
         assert now.mode in (Mode.COAST, Mode.HOLD)
 
 
-def search(limits: Limits) -> tuple[set[Mode], set[tuple[Mode, Mode]], int]:
+def search(limits: FailsafeTimers) -> tuple[set[Mode], set[tuple[Mode, Mode]], int]:
     """Modes and edges visited, and how many states there are."""
     every = inputs()
     start = canonical(Failsafe()), Monitor()
@@ -201,8 +215,8 @@ def search(limits: Limits) -> tuple[set[Mode], set[tuple[Mode, Mode]], int]:
 
 
 def steps(
-    state: Failsafe, seen: Monitor, every: list[Inputs], limits: Limits
-) -> Iterator[tuple[Inputs, Failsafe, Monitor]]:
+    state: Failsafe, seen: Monitor, every: list[FailsafeInputs], limits: FailsafeTimers
+) -> Iterator[tuple[FailsafeInputs, Failsafe, Monitor]]:
     for told in every:
         now = failsafe.step(state, told, D, limits)
         yield told, now, after(seen, told, state, now, good=now.good_ms > 0)
@@ -211,7 +225,7 @@ def steps(
 @pytest.mark.slow
 @pytest.mark.parametrize("limits", [LIMITS, HOVERS], ids=["hangs", "hovers"])
 def test_every_reachable_state_keeps_every_law_by_the_documented_edges_and_no_others(
-    limits: Limits,
+    limits: FailsafeTimers,
 ) -> None:
     modes, edges, states = search(limits)
     assert modes == {*Mode}
@@ -220,7 +234,7 @@ def test_every_reachable_state_keeps_every_law_by_the_documented_edges_and_no_ot
 
 
 def test_the_searched_limits_are_in_the_order_of_the_shipped_ones() -> None:
-    hangs, hovers = (Limits.of(FailsafeConfig(), 2.3, hangs=one) for one in (True, False))
+    hangs, hovers = (FailsafeTimers.of(FailsafeConfig(), 2.3, hangs=one) for one in (True, False))
     assert LIMITS.robot_ramp == LIMITS.phone_ramp
     assert hangs.robot_ramp == hangs.phone_ramp
     assert HOVERS.phone_ramp == hovers.phone_ramp == FOREVER_MS

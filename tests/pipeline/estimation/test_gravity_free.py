@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation import gravity_free, relative_model
-from pipeline.estimation.gravity_free import Felt, Motion
+from pipeline.estimation.gravity_free import PredictedImu, RelativeMotion
 from pipeline.estimation.relative_model import States
 from pipeline.frames import R_from_rpy, S_in_b, cross, exp, log
 from tests.pipeline.moving import H, felt, p_bc_in_c, pose_in_f, rate, vee, worst
@@ -22,12 +22,12 @@ def u_bf_in_c(t):
 
 
 def true_motion(t):
-    return Motion(p_bc_in_c(t), R_cb(t), u_bf_in_c(t))
+    return RelativeMotion(p_bc_in_c(t), R_cb(t), u_bf_in_c(t))
 
 
 def true_felt(t):
     (_, omega_c, _, f_c), (_, omega_b, _, f_b) = felt(0, t), felt(1, t)
-    return Felt(omega_b, f_b, omega_c, f_c)
+    return PredictedImu(omega_b, f_b, omega_c, f_c)
 
 
 def drawn(seed, pitch=None):
@@ -37,15 +37,15 @@ def drawn(seed, pitch=None):
     if pitch is not None:
         eta[1] = pitch
     omega_b, f_b, omega_c, f_c = rng.normal(size=(4, 3)) * np.array([[1.0], [9.0], [1.0], [9.0]])
-    x = Motion(
+    x = RelativeMotion(
         np.array([2.5, 0.0, 0.0]) + 0.3 * rng.normal(size=3), R_from_rpy(eta), rng.normal(size=3)
     )
-    return x, Felt(omega_b, f_b, omega_c, f_c)
+    return x, PredictedImu(omega_b, f_b, omega_c, f_c)
 
 
 def moved(x, error):
     """`x` with (δp, θ, δu) added."""
-    return Motion(x.p + error[:3], x.R @ exp(error[3:6]), x.u + error[6:])
+    return RelativeMotion(x.p + error[:3], x.R @ exp(error[3:6]), x.u + error[6:])
 
 
 def apart(a, b):
@@ -55,7 +55,7 @@ def apart(a, b):
 
 def changed(inputs, by):
     by = by.reshape(4, 3)
-    return Felt(
+    return PredictedImu(
         inputs.omega_b + by[0], inputs.f_b + by[1], inputs.omega_c + by[2], inputs.f_c + by[3]
     )
 
@@ -87,7 +87,7 @@ def test_it_is_the_papers_motion_in_other_words(seed):
     delta = np.random.default_rng(seed).normal(size=3)
     paper = np.zeros(relative_model.N)
     eta = paper[States.eta_bc] = np.array([0.4, -1.2, 2.0]) * (seed - 2.5) / 2.5
-    x = Motion(x.p, R_from_rpy(eta), x.u)
+    x = RelativeMotion(x.p, R_from_rpy(eta), x.u)
     paper[States.p_bc_in_c] = x.p
     paper[States.v_bc_in_c] = x.u - cross(inputs.omega_c, x.p)
     paper[States.omega_bf_in_b], paper[States.omega_cf_in_c] = inputs.omega_b, inputs.omega_c
@@ -148,7 +148,7 @@ def test_a_step_turns_exactly():
 
 def test_a_step_without_turning_is_a_parabola():
     x, inputs = drawn(5)
-    still = Felt(np.zeros(3), inputs.f_b, np.zeros(3), inputs.f_c)
+    still = PredictedImu(np.zeros(3), inputs.f_b, np.zeros(3), inputs.f_c)
     h, a = 0.7, x.R @ inputs.f_b - inputs.f_c
     after = gravity_free.step(x, still, h)
     assert np.abs(after.p - (x.p + h * x.u + 0.5 * h * h * a)).max() < 1e-13
@@ -162,8 +162,8 @@ def test_gravity_makes_no_difference():
         R_from_rpy(np.array([0.3, -0.9, 2.0])),
         R_from_rpy(np.array([-1.0, 1.2, 0.2])),
     )
-    x = Motion(np.array([2.0, 0.1, 0.2]), R_fc.T @ R_fb, np.zeros(3))
-    rest = Felt(np.zeros(3), R_fb.T @ up, np.zeros(3), R_fc.T @ up)
+    x = RelativeMotion(np.array([2.0, 0.1, 0.2]), R_fc.T @ R_fb, np.zeros(3))
+    rest = PredictedImu(np.zeros(3), R_fb.T @ up, np.zeros(3), R_fc.T @ up)
     assert np.abs(apart(gravity_free.step(x, rest, 1.0), x)).max() < 1e-13
 
 

@@ -14,7 +14,7 @@ FAST = np.array([25.0, 6.0, 25.0, 6.0])
 
 def scaled(inputs, by):
     rows = np.stack((inputs.omega_b, inputs.f_b, inputs.omega_c, inputs.f_c))
-    return gravity_free.Felt(*(rows * by[:, None]))
+    return gravity_free.PredictedImu(*(rows * by[:, None]))
 
 
 def compiled(x, inputs, h):
@@ -25,7 +25,7 @@ def compiled(x, inputs, h):
     rows = np.concatenate((inputs.omega_b, inputs.f_b, inputs.omega_c, inputs.f_c))
     gravity_free_kernels.step(state, R, rows, h, scratch, f, g)
     assert (state[6:] == 7.0).all()
-    return gravity_free.Motion(state[:3], R, state[3:6]), f, g
+    return gravity_free.RelativeMotion(state[:3], R, state[3:6]), f, g
 
 
 def columns(n, f, step):

@@ -9,7 +9,7 @@ from pipeline.estimation.estimator import Fusion
 from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.frames import GRAVITY, cross, exp
-from pipeline.signals import BodyImu, LedRays, PhoneImu, RelativePose, Seen
+from pipeline.signals import BodyImu, LedRays, PhoneImu, RelativePose, VisionMeasurement
 
 UP, ZERO = np.array([0.0, 0.0, GRAVITY]), np.zeros(3)
 P0 = np.array([2.5, 0.1, -0.2])
@@ -18,7 +18,9 @@ NO_RAYS = LedRays(np.empty(0, np.intp), np.empty(0), np.empty((0, 2)), np.empty(
 
 
 def seen(t, p=P0, R=None, C=C0):
-    return Seen(t, NO_RAYS, RelativePose(t, p, np.eye(3) if R is None else R, C, 0.4, 5))
+    return VisionMeasurement(
+        t, NO_RAYS, RelativePose(t, p, np.eye(3) if R is None else R, C, 0.4, 5)
+    )
 
 
 def ready(omega_c=ZERO):
@@ -92,8 +94,8 @@ def test_what_becomes_of_a_picture_is_told_and_counted():
         estimator.add_seen(seen(0.1), 0.2),
         estimator.add_seen(seen(0.05), 0.2),
         estimator.add_seen(seen(0.3), 0.2),
-        estimator.add_seen(Seen(0.2, NO_RAYS, None), 0.25),
-        estimator.add_seen(Seen(0.3, NO_RAYS, crooked), 0.3),
+        estimator.add_seen(VisionMeasurement(0.2, NO_RAYS, None), 0.25),
+        estimator.add_seen(VisionMeasurement(0.3, NO_RAYS, crooked), 0.3),
         estimator.add_seen(seen(0.2, C=-C0), 0.3),
         estimator.add_seen(seen(0.2), 0.8),
         estimator.add_seen(seen(0.2), 0.3),

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from hardware.sim.world.sensors import events, feed, give
-from hardware.sim.world.world import Occlusion, Setup, World
+from hardware.sim.world.world import Occlusion, World, WorldOptions
 from pipeline.estimation.estimator import Fusion
 from pipeline.estimation.paper_ekf import PaperEkf
 from pipeline.estimator_config import EkfConfig
-from pipeline.signals import BodyImu, PhoneImu, Seen
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from tests.pipeline.scoring import assert_same
 
 
 @pytest.fixture(scope="module")
 def world():
-    return World(Setup(seed=11, duration=2.0))
+    return World(WorldOptions(seed=11, duration=2.0))
 
 
 def in_order(samples):
@@ -50,7 +50,7 @@ def test_late_fusion_is_the_same_as_fusion_in_order(world, shuffled):
     """Pictures 60-90 ms late, IMU samples up to 40 ms, in disorder when shuffled."""
     rng = np.random.default_rng(5)
     samples = [event for event in events(world) if event[1].t < 1.2]
-    wait = {PhoneImu: 0.020, BodyImu: 0.003, Seen: 0.060}
+    wait = {PhoneImu: 0.020, BodyImu: 0.003, VisionMeasurement: 0.060}
 
     def delay(sample):
         return wait[type(sample)] + (rng.uniform(0.0, 0.03) if shuffled else 0.0)
@@ -65,7 +65,7 @@ def test_late_fusion_is_the_same_as_fusion_in_order(world, shuffled):
 def test_pictures_that_overtake_the_phone_imu_wait_for_it(world):
     """Nothing is lost when pictures take 10 ms and phone samples 40 ms."""
     samples = [event for event in events(world) if event[1].t < 1.2]
-    wait = {PhoneImu: 0.040, BodyImu: 0.003, Seen: 0.010}
+    wait = {PhoneImu: 0.040, BodyImu: 0.003, VisionMeasurement: 0.010}
     direct, expected = run(in_order(samples), 1.4)
     late, state = run(delayed(samples, lambda sample: wait[type(sample)]), 1.4)
     assert late.samples_late == 0
@@ -98,7 +98,7 @@ def test_repeated_samples_and_pictures_change_nothing_and_are_counted(world):
 
 def test_two_seconds_without_a_picture_stay_finite_grow_uncertain_and_cost_no_more():
     """The checkpoint follows, so no replay is longer than the horizon."""
-    world = World(Setup(seed=2, duration=7.0, occlusions=(Occlusion(4.0, 6.0),)))
+    world = World(WorldOptions(seed=2, duration=7.0, occlusions=(Occlusion(4.0, 6.0),)))
     ekf, sigma, kept = PaperEkf(EkfConfig()), {}, 0
     for now, state in feed(ekf, world):
         if state is None:
@@ -119,7 +119,7 @@ def test_two_seconds_without_a_picture_stay_finite_grow_uncertain_and_cost_no_mo
 
 @pytest.mark.parametrize("silent", [PhoneImu, BodyImu])
 def test_a_silent_imu_makes_it_uncertain_not_wrong(silent):
-    world = World(Setup(seed=4, duration=3.0))
+    world = World(WorldOptions(seed=4, duration=3.0))
     ekf = PaperEkf(EkfConfig())
     samples = [e for e in events(world) if not (isinstance(e[1], silent) and 1.5 < e[1].t < 2.3)]
     queue, sigmas = iter(samples), []

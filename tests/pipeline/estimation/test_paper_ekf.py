@@ -7,7 +7,7 @@ import pytest
 
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.sensors import body_samples, feed
-from hardware.sim.world.world import Setup, World
+from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimation.estimator import Fusion
 from pipeline.estimation.paper_ekf import PaperEkf
 from pipeline.estimator_config import EkfConfig
@@ -232,7 +232,7 @@ def test_the_states_are_the_callers_own():
 
 def test_it_is_accurate_and_knows_how_accurate():
     """Phone latency, seeds not tuned on: honest means a mean NEES near 6."""
-    worlds = [World(Setup(seed=seed, duration=8.0)) for seed in (31, 32)]
+    worlds = [World(WorldOptions(seed=seed, duration=8.0)) for seed in (31, 32)]
     both = metrics.judge(
         [evaluator.run(PaperEkf(EkfConfig()), world) for world in worlds], start=4.0
     )
@@ -243,7 +243,7 @@ def test_it_is_accurate_and_knows_how_accurate():
 
 
 def test_it_learns_the_biases_of_the_body():
-    world = World(Setup(seed=33, duration=8.0))
+    world = World(WorldOptions(seed=33, duration=8.0))
     ekf = PaperEkf(EkfConfig())
     for _ in feed(ekf, world):
         pass

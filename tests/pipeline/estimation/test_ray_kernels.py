@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation import gravity_free, ray_kernels
-from pipeline.estimation.gravity_free import Felt, Motion
+from pipeline.estimation.gravity_free import PredictedImu, RelativeMotion
 from pipeline.estimation.ray_kernels import TOUCHED, correct, fuse_rays, is_sound
 from pipeline.estimation.relative_kernels import OFFSET, X_OFFSET, N, X
 from pipeline.frames import R_from_rpy, exp, log
@@ -27,7 +27,7 @@ def state(pitch=0.3):
 
 def expected(x, R, led, ahead=0.0):
     """Tangents, H (2, 22); the readable way."""
-    motion, felt = Motion(x[:3], R, x[3:6]), Felt(*FELT.reshape(4, 3))
+    motion, felt = RelativeMotion(x[:3], R, x[3:6]), PredictedImu(*FELT.reshape(4, 3))
     H_z, z_rate = gravity_free.seen_jacobian(motion, felt, led)
     H = np.zeros((2, N))
     H[:, :6], H[:, OFFSET] = H_z, z_rate
@@ -71,7 +71,7 @@ def test_the_compiled_jacobian_is_that_of_finite_differences():
     place, H, e = np.empty(2), np.empty((2, 7)), 1e-5
 
     def seen(error):
-        moved = Motion(x[:3] + error[:3], R @ exp(error[3:6]), x[3:6])
+        moved = RelativeMotion(x[:3] + error[:3], R @ exp(error[3:6]), x[3:6])
         return gravity_free.seen_at(moved, LEDS[0])
 
     ray_kernels._expect(x, R, FELT, LEDS[0], 0.0, place, H)
@@ -147,8 +147,8 @@ def test_decisions_made_before_are_kept():
 def test_a_row_exposed_later_is_compared_with_where_the_led_will_be():
     """30 ms of rolling shutter over a moving robot agree with the state at its middle."""
     x, R, P = state()
-    inputs, ahead = Felt(*FELT.reshape(4, 3)), np.array([-0.015, -0.005, 0.005, 0.015])
-    at = [gravity_free.step(Motion(x[:3], R, x[3:6]), inputs, h) for h in ahead]
+    inputs, ahead = PredictedImu(*FELT.reshape(4, 3)), np.array([-0.015, -0.005, 0.005, 0.015])
+    at = [gravity_free.step(RelativeMotion(x[:3], R, x[3:6]), inputs, h) for h in ahead]
     tangents = np.array([gravity_free.seen_at(m, led) for m, led in zip(at, LEDS, strict=True)])
     C = np.tile(1e-7 * np.eye(2), (4, 1, 1))
     dated, ignorant = (

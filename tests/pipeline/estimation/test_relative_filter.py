@@ -7,15 +7,15 @@ import pytest
 
 from hardware.sim.world.evaluator import run
 from hardware.sim.world.sensors import events, give
-from hardware.sim.world.world import Occlusion, Setup, World
+from hardware.sim.world.world import Occlusion, World, WorldOptions
 from pipeline.estimation.estimator import Fusion
-from pipeline.signals import BodyImu, PhoneImu, Seen
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from tests.pipeline.flight import Flight, is_finite, new, shifted
 
 
 @pytest.fixture(scope="module")
 def world():
-    return World(Setup(seed=11, duration=4.0))
+    return World(WorldOptions(seed=11, duration=4.0))
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def test_nothing_is_known_before_the_first_picture(arriving):
     assert np.isinf(np.diag(estimator.covariance)).all()
     assert np.isnan(estimator.health.time_offset)
     for arrival, sample in arriving[:60]:
-        if not isinstance(sample, Seen):
+        if not isinstance(sample, VisionMeasurement):
             give(estimator, sample, arrival)
     assert estimator.state(0.3) is None
     assert estimator.health.fused == 0
@@ -56,7 +56,7 @@ def test_a_start_waits_for_samples_of_both_imus(world, arriving, missing):
 def test_a_start_needs_a_pose_that_fits_and_is_in_front(world, arriving, change):
     flight = Flight(world, arriving)
     doubtful = flight.to(
-        0.6, lambda s: replace(s, pose=change(s.pose)) if isinstance(s, Seen) else s
+        0.6, lambda s: replace(s, pose=change(s.pose)) if isinstance(s, VisionMeasurement) else s
     )
     assert doubtful is None
     assert {fusion for _, fusion in flight.told} == {Fusion.BLIND}
@@ -67,7 +67,7 @@ def test_a_start_needs_a_pose_that_fits_and_is_in_front(world, arriving, change)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_errors_are_small_and_as_large_as_it_says(seed):
     """NEES of 6 degrees of freedom, at the pictures' times and now; NIS."""
-    world, estimator = World(Setup(seed=seed, duration=8.0)), new()
+    world, estimator = World(WorldOptions(seed=seed, duration=8.0)), new()
     track = run(estimator, world)
     for errors, most in (
         (track.now.during(3.0, 8.0), 0.007),
@@ -82,7 +82,7 @@ def test_errors_are_small_and_as_large_as_it_says(seed):
 
 
 def test_a_time_offset_of_ten_milliseconds_is_learnt():
-    world, estimator = World(Setup(seed=5, duration=5.0, time_offset=0.010)), new()
+    world, estimator = World(WorldOptions(seed=5, duration=5.0, time_offset=0.010)), new()
     track = run(estimator, world)
     errors = track.now.during(3.5, 5.0)
     assert estimator.health.time_offset == pytest.approx(0.010, abs=1e-3)
@@ -93,7 +93,7 @@ def test_a_time_offset_of_ten_milliseconds_is_learnt():
 @pytest.mark.parametrize("pitch_deg", [90.0, -90.0])
 def test_a_relative_pitch_of_ninety_degrees_is_nothing_special(pitch_deg):
     eta = (0.1, float(np.deg2rad(pitch_deg)), 0.4)
-    world, estimator = World(Setup(seed=2, duration=4.0, eta_bc=eta)), new()
+    world, estimator = World(WorldOptions(seed=2, duration=4.0, eta_bc=eta)), new()
     errors = run(estimator, world).now.during(2.0, 4.0)
     assert np.sqrt(np.square(errors.e[:, :3]).sum(axis=1).mean()) < 0.01
     assert np.rad2deg(np.sqrt(np.square(errors.e[:, 3:]).sum(axis=1).mean())) < 0.3
@@ -102,7 +102,7 @@ def test_a_relative_pitch_of_ninety_degrees_is_nothing_special(pitch_deg):
 
 @pytest.mark.parametrize("visible", [(), (2,), (0, 3)], ids=["none", "one", "two"])
 def test_a_second_with_few_leds(visible):
-    world = World(Setup(seed=4, duration=4.5, occlusions=(Occlusion(2.5, 3.5, visible),)))
+    world = World(WorldOptions(seed=4, duration=4.5, occlusions=(Occlusion(2.5, 3.5, visible),)))
     flight = Flight(world, events(world))
     before, last = flight.to(2.5), flight.to(3.55)
     assert is_finite(last)
@@ -121,7 +121,7 @@ def test_a_second_with_few_leds(visible):
 
 def test_after_half_a_minute_in_the_dark_it_begins_anew_at_the_first_picture():
     """What the LEDs say of an error of metres is not linear in it: fused, it would be far off."""
-    world = World(Setup(seed=6, duration=15.0, occlusions=(Occlusion(1.5, 14.0),)))
+    world = World(WorldOptions(seed=6, duration=15.0, occlusions=(Occlusion(1.5, 14.0),)))
     flight = Flight(world, events(world))
     dark = flight.to(13.9)
     assert is_finite(dark)
@@ -139,7 +139,9 @@ def test_after_half_a_minute_in_the_dark_it_begins_anew_at_the_first_picture():
 def test_one_led_that_lies_does_not_cost_the_others(world, arriving):
     honest, lied_to = Flight(world, arriving), Flight(world, arriving)
     expected = honest.to(3.0)
-    state = lied_to.to(3.0, lambda s: shifted(s, (0.3, 0.0), of=(2,)) if isinstance(s, Seen) else s)
+    state = lied_to.to(
+        3.0, lambda s: shifted(s, (0.3, 0.0), of=(2,)) if isinstance(s, VisionMeasurement) else s
+    )
     assert lied_to.filter.pictures == honest.filter.pictures
     assert 0 <= lied_to.filter.leds_rejected - lied_to.filter.pictures[Fusion.FUSED] <= 3
     assert lied_to.error(state) < 0.012
@@ -147,7 +149,7 @@ def test_one_led_that_lies_does_not_cost_the_others(world, arriving):
 
 
 def elsewhere(seen):
-    return shifted(seen, (0.5, 0.2)) if isinstance(seen, Seen) else seen
+    return shifted(seen, (0.5, 0.2)) if isinstance(seen, VisionMeasurement) else seen
 
 
 def test_three_pictures_in_a_row_that_do_not_fit_are_a_new_beginning(world, arriving):
@@ -182,7 +184,7 @@ def test_a_restart_soon_after_another_forgets_what_was_learnt():
             return replace(s, omega_m_bf_in_b=s.omega_m_bf_in_b + np.array([0.0, 0.2, 0.0]))
         return s
 
-    world = World(Setup(seed=0, duration=6.0))
+    world = World(WorldOptions(seed=0, duration=6.0))
     flight = Flight(world, events(world))
     flight.to(4.5, jumped)
     restarts = flight.filter.pictures[Fusion.STARTED]

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 from hardware.sim.world.sensors import events
-from hardware.sim.world.world import Setup, World
+from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimation import ray_kernels, relative_kernels
 from pipeline.estimation.estimator import Fusion
 from pipeline.estimation.estimators import warm_up
 from pipeline.estimation.relative_track import KEPT
-from pipeline.signals import BodyImu, PhoneImu, Seen
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from tests.pipeline.flight import Flight, is_finite, shifted
 from tests.pipeline.scoring import assert_same
 
 
 @pytest.fixture(scope="module")
 def world():
-    return World(Setup(seed=11, duration=4.0))
+    return World(WorldOptions(seed=11, duration=4.0))
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_an_imu_that_is_silent_for_a_second_makes_it_unsure_not_wrong(world, arr
 
 def test_silence_in_the_dark_costs_no_more_from_second_to_second():
     """Both IMUs and the camera stop; it is asked on until it gives up, and begins again."""
-    world = World(Setup(seed=3, duration=2.0))
+    world = World(WorldOptions(seed=3, duration=2.0))
     flight = Flight(world, events(world))
     flight.to(1.8)
     for now in np.arange(1.805, 6.0, 0.005):
@@ -62,7 +62,7 @@ def test_a_clock_that_is_an_hour_off_starts_nothing_and_spoils_nothing(world, ar
     flight, off = Flight(world, arriving), 3600.0 * hours
 
     def wrong(s):
-        if isinstance(s, Seen):
+        if isinstance(s, VisionMeasurement):
             return shifted(s, dt=off)
         return replace(s, t=s.t + off) if isinstance(s, PhoneImu) else s
 
@@ -173,7 +173,7 @@ def test_lies_of_every_kind_leave_it_finite(world, arriving, seed):
     def lie(s):
         if rng.uniform() > 0.3:
             return s
-        if isinstance(s, Seen):
+        if isinstance(s, VisionMeasurement):
             t, scale = float(rng.normal(0.0, 0.2)), 10.0 ** rng.uniform(-6.0, 4.0)
             told = shifted(s, rng.normal(0.0, 1.0, 2), rng.integers(0, 5, 3), t)
             rays = replace(told.rays, covariances=scale * told.rays.covariances)

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from hardware.sim.world.sensors import events, feed, give
-from hardware.sim.world.world import Setup, World
+from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimation.estimator import Fusion
-from pipeline.signals import Seen
+from pipeline.signals import VisionMeasurement
 from tests.pipeline.flight import Flight, new, shifted
 from tests.pipeline.scoring import assert_same
 
 
 @pytest.fixture(scope="module")
 def world():
-    return World(Setup(seed=11, duration=4.0))
+    return World(WorldOptions(seed=11, duration=4.0))
 
 
 @pytest.fixture(scope="module")
@@ -36,10 +36,10 @@ def test_what_arrives_late_twice_or_too_early_is_counted(world, arriving):
     assert health.fused + health.dropped == estimator.pictures.total() == len(flight.told)
     assert health.late == 1
     for _, sample in arriving[:40]:
-        if not isinstance(sample, Seen):
+        if not isinstance(sample, VisionMeasurement):
             flight.give(sample)
     assert estimator.samples_late > 20
-    recent = [s for _, s in arriving if not isinstance(s, Seen) and 1.8 < s.t < 1.9]
+    recent = [s for _, s in arriving if not isinstance(s, VisionMeasurement) and 1.8 < s.t < 1.9]
     for sample in recent:
         flight.give(sample)
     assert estimator.samples_duplicate == len(recent)
@@ -62,7 +62,7 @@ def test_asking_more_or_less_often_changes_nothing(world, arriving):
 def test_lost_repeated_and_delayed_messages():
     """A tenth of each: 100 ms late, twice, never."""
     world, estimator = (
-        World(Setup(seed=8, duration=4.0, lost=0.1, repeated=0.1, delayed=0.1)),
+        World(WorldOptions(seed=8, duration=4.0, lost=0.1, repeated=0.1, delayed=0.1)),
         new(),
     )
     for now, state in feed(estimator, world):
@@ -87,12 +87,14 @@ def test_time_can_not_go_back_before_the_last_picture(world, arriving):
 
 def test_a_start_is_never_in_the_future():
     """Pictures 10 ms old and taken, as was learnt, 20 ms after their stamps."""
-    setup = Setup(seed=5, duration=5.0, time_offset=0.02, picture_delay=(0.022, 0.024))
+    setup = WorldOptions(seed=5, duration=5.0, time_offset=0.02, picture_delay=(0.022, 0.024))
     world = World(setup)
     flight = Flight(world, events(world))
     flight.to(4.0)
     assert flight.filter.health.time_offset == pytest.approx(0.02, abs=2e-3)
-    flight.to(4.5, lambda s: shifted(s, (0.5, 0.2), dt=0.03) if isinstance(s, Seen) else s)
+    flight.to(
+        4.5, lambda s: shifted(s, (0.5, 0.2), dt=0.03) if isinstance(s, VisionMeasurement) else s
+    )
     assert flight.filter.pictures[Fusion.STARTED] > 1
 
 
@@ -115,7 +117,7 @@ def test_whoever_sleeps_forgets(world, arriving):
 def test_a_codec_s_dead_zone_before_a_phone_at_rest_is_no_time_offset(stick_px, seed):
     """The robot sways by millimetres, its LEDs lag behind by a part of a pixel."""
     still = {"hand_sigma": (0.0, 0.0), "tremor": 0.0, "robot_sigma": (0.003, np.deg2rad(0.05))}
-    world = World(Setup(seed=seed, duration=12.0, stick_px=stick_px, **still))
+    world = World(WorldOptions(seed=seed, duration=12.0, stick_px=stick_px, **still))
     estimator = new()
     offsets = []
     for _ in feed(estimator, world):

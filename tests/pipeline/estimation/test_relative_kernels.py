@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.estimation import gravity_free
-from pipeline.estimation.gravity_free import Felt, Motion
+from pipeline.estimation.gravity_free import PredictedImu, RelativeMotion
 from pipeline.estimation.imu_interpolation_kernels import sample_at
 from pipeline.estimation.relative_kernels import (
     BIASES,
@@ -92,12 +92,12 @@ def test_a_transit_is_a_step_for_each_stretch_between_samples():
     way = Way()
     knots = np.unique(np.concatenate((BODY[0], PHONE[0], (0.1017, 0.4021))))
     knots = knots[(knots >= 0.1017) & (knots <= 0.4021)]
-    x = Motion(way.x[:3].copy(), way.R.copy(), way.x[3:6].copy())
+    x = RelativeMotion(way.x[:3].copy(), way.R.copy(), way.x[3:6].copy())
     assert way.go(0.1017, 0.4021) == len(knots) - 1
     for t, until in pairwise(knots.tolist()):
         middle = 0.5 * (t + until)
         inputs = np.concatenate((interpolated(BODY, middle), interpolated(PHONE, middle))) - BIAS
-        x = gravity_free.step(x, Felt(*inputs.reshape(4, 3)), until - t)
+        x = gravity_free.step(x, PredictedImu(*inputs.reshape(4, 3)), until - t)
     assert np.abs(way.x[:3] - x.p).max() < 1e-11
     assert np.abs(way.R - x.R).max() < 1e-11
     assert np.abs(way.x[3:6] - x.u).max() < 1e-11

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from hardware.sim.world.sensors import body_samples, phone_samples, pictures
-from hardware.sim.world.world import LEDS_IN_B, Setup, World
+from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
 from pipeline.estimation.ray_kernels import fuse_rays
 from pipeline.estimation.relative_kernels import BIASES, OFFSET
-from pipeline.estimation.relative_track import KEPT, Anchor, RelativeTrack
+from pipeline.estimation.relative_track import KEPT, Checkpoint, RelativeTrack
 from pipeline.estimator_config import RelativeConfig
-from pipeline.signals import BodyImu, PhoneImu, Seen
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 
 OPEN = replace(RelativeConfig(), gate_chi2=np.inf)
 """What is thought of an LED depends on what else has arrived: the gate is open."""
@@ -21,7 +21,7 @@ START_S, END_S = 0.1, 0.9
 @pytest.fixture(scope="module")
 def samples():
     """All that was sensed up to `END_S`, in the order of its times."""
-    world = World(Setup(seed=3, duration=1.1))
+    world = World(WorldOptions(seed=3, duration=1.1))
     events = [*body_samples(world), *phone_samples(world), *pictures(world)]
     return sorted((s for _, s in events if s.t < END_S), key=lambda s: (s.t, str(type(s))))
 
@@ -29,8 +29,8 @@ def samples():
 def begun(samples, config=OPEN):
     """A track that begins at the first picture after `START_S`; its time offset is known."""
     track = RelativeTrack(config, LEDS_IN_B)
-    pose = next(s for s in samples if isinstance(s, Seen) and s.t > START_S).pose
-    anchor = Anchor.empty()
+    pose = next(s for s in samples if isinstance(s, VisionMeasurement) and s.t > START_S).pose
+    anchor = Checkpoint.empty()
     anchor.t, anchor.x[:3], anchor.R[:] = pose.t, pose.p_bc_in_c, pose.R_cb
     anchor.P[:6, :6], anchor.P[6:9, 6:9] = 4.0 * pose.covariance, 0.25 * np.eye(3)
     anchor.P[BIASES:OFFSET, BIASES:OFFSET] = np.diag(np.repeat((0.03, 0.3, 0.005, 0.1), 3) ** 2)
@@ -46,7 +46,7 @@ def insert(track, s):
 
 def take(track, s):
     """As the filter does: nothing from before the base."""
-    if not isinstance(s, Seen):
+    if not isinstance(s, VisionMeasurement):
         return insert(track, s)
     return track.fuse(track.foretold(s.t), s) if s.t > track.anchors[0].t else None
 
@@ -76,7 +76,9 @@ def shuffled(samples, spread, seed):
     return sorted(samples, key=lambda s: s.t + rng.uniform(0.0, spread(s)))
 
 
-@pytest.mark.parametrize("late", [BodyImu, PhoneImu, Seen, object], ids=lambda late: late.__name__)
+@pytest.mark.parametrize(
+    "late", [BodyImu, PhoneImu, VisionMeasurement, object], ids=lambda late: late.__name__
+)
 def test_the_order_of_arrival_does_not_matter(samples, late):
     """Late by up to 0.2 s: IMU samples between others, pictures between others."""
     in_order = run(samples, settle=samples)
@@ -87,8 +89,8 @@ def test_the_order_of_arrival_does_not_matter(samples, late):
 
 
 def test_pictures_before_all_motion_samples_after_all_motion_samples(samples):
-    seen = [s for s in samples if isinstance(s, Seen)]
-    felt = [s for s in samples if not isinstance(s, Seen)]
+    seen = [s for s in samples if isinstance(s, VisionMeasurement)]
+    felt = [s for s in samples if not isinstance(s, VisionMeasurement)]
     at_start = [s for s in felt if s.t < START_S]
     first = run(at_start + seen + [s for s in felt if s.t >= START_S], settle=samples)
     assert_same(first, run(felt + seen, settle=samples))
@@ -114,7 +116,7 @@ def test_time_may_go_back_to_the_newest_picture(samples):
 def test_what_is_there_already_changes_nothing(samples):
     track = run(samples)
     x = track.now.x.copy()
-    assert not any(insert(track, s) for s in samples if not isinstance(s, Seen))
+    assert not any(insert(track, s) for s in samples if not isinstance(s, VisionMeasurement))
     assert track.to_now(track.now.t)
     assert np.array_equal(track.now.x, x)
 
@@ -132,7 +134,7 @@ def test_decisions_on_outliers_are_kept_when_pictures_are_made_anew(samples):
     rest = [s for s in samples if s is not missing]
     track = begun(samples, RelativeConfig())
     for s in rest:
-        take(track, deceived(s) if isinstance(s, Seen) and s.t > 0.5 else s)
+        take(track, deceived(s) if isinstance(s, VisionMeasurement) and s.t > 0.5 else s)
     before = [a.use.tolist() for a in track.anchors[1:]]
     assert any(0 in use for use in before)
     assert take(track, missing)
@@ -182,7 +184,7 @@ def test_rays_of_any_memory_layout_are_the_same_to_the_compiler(samples):
     compiled = None
     for s in samples:
         take(plain, s)
-        if isinstance(s, Seen):
+        if isinstance(s, VisionMeasurement):
             compiled = compiled or len(fuse_rays.signatures)
             rays = s.rays
             twisted = replace(

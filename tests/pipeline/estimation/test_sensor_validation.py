@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.estimation import sensor_validation
 from pipeline.estimation.rate_axes import WAYS, RateAxes, words
-from pipeline.estimation.sensor_validation import GravityTest
+from pipeline.estimation.sensor_validation import SensorValidation
 from pipeline.estimator_config import GravityTestConfig
 from pipeline.frames import GRAVITY, R_cd, exp, log, rotation_about_x
 
@@ -25,7 +25,7 @@ class Phone:
     """In a hand that looks `pitch` downwards; what it says passes through `rate` and `force`."""
 
     def __init__(self, rate=same, force=same, told=None, screen=90, pitch=0.2):
-        self.test = GravityTest(GravityTestConfig())
+        self.test = SensorValidation(GravityTestConfig())
         self.rate, self.force, self.pitch = rate, force, pitch
         self.screen, self.told = screen, screen if told is None else told
         self.t = 0.0

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.frames import R_from_rpy, exp, log
-from pipeline.identification.initialisation import CONFIRMED, Starting
+from pipeline.identification.initialisation import CONFIRMED, Initialisation
 from pipeline.identification.pnp import pose_of
-from pipeline.identification.relocalisation import Hints
+from pipeline.identification.relocalisation import SearchHints
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, UP_IN_F, Truth, is_wrong, truth_at
 from tests.pipeline.spotting import CONFIG, NOISE_PX, hints_of, lamps_beside, seen, spots_of
 
@@ -16,7 +16,7 @@ STILL = np.zeros((2, 3))
 
 
 def starting(leds_in_b=LEDS_IN_B):
-    return Starting(CAMERA, leds_in_b, CONFIG)
+    return Initialisation(CAMERA, leds_in_b, CONFIG)
 
 
 def turning(truth, k, rate=0.03):
@@ -39,7 +39,7 @@ def test_four_leds_without_gravity_wait_until_the_robot_has_turned():
         start, eye, found = truth_at(rng), starting(), None
         for k in range(12):
             truth, _ = turning(start, k)
-            naming = eye.step(k * DT, seen(truth, rng, range(4), lamps=0), Hints(), None)
+            naming = eye.step(k * DT, seen(truth, rng, range(4), lamps=0), SearchHints(), None)
             if naming is not None:
                 assert not is_wrong(pose_of(naming.fit, 0.0), truth)
                 found = k if found is None else found
@@ -57,7 +57,7 @@ def test_a_weak_explanation_that_never_moves_is_never_told():
         told = 0
         for k in range(12):
             spots = spots_of(pixels + rng.normal(0.0, NOISE_PX, pixels.shape))
-            told += eye.step(k * DT, spots, Hints(), None) is not None
+            told += eye.step(k * DT, spots, SearchHints(), None) is not None
         assert told == 0
 
 
@@ -66,7 +66,7 @@ def test_a_pause_ends_what_was_pending():
     start, eye = truth_at(rng), starting()
     for k in range(6):
         truth, _ = turning(start, k, 0.1)
-        assert eye.step(5.0 * k, seen(truth, rng, range(4)), Hints(), None) is None
+        assert eye.step(5.0 * k, seen(truth, rng, range(4)), SearchHints(), None) is None
 
 
 FLAT = np.column_stack((np.zeros(5), LEDS_IN_B[:, 1:]))
@@ -81,7 +81,7 @@ def flat_view(yaw, distance, rng, noise_px=0.05):
 
 
 def upright(truth):
-    return Hints(truth.R_fc.T @ UP_IN_F, truth.R.T @ truth.R_fc.T @ UP_IN_F)
+    return SearchHints(truth.R_fc.T @ UP_IN_F, truth.R.T @ truth.R_fc.T @ UP_IN_F)
 
 
 def test_of_two_branches_none_is_told_while_both_fit():
@@ -143,7 +143,7 @@ def test_of_thirty_two_leds_the_near_half_is_enough_without_gravity():
             pixels = np.vstack((shown[near], lamps_beside(shown, 3, rng)))
             pixels += rng.normal(0.0, NOISE_PX, pixels.shape)
             spots = spots_of(pixels, brightness=rng.uniform(1.0, 2.0, len(pixels)))
-            naming, k = eye.step(k * DT, spots, Hints(), None), k + 1
+            naming, k = eye.step(k * DT, spots, SearchHints(), None), k + 1
         assert not is_wrong(pose_of(naming.fit, 0.0), truth)
         assert set(naming.match.led) == set(near)
 

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from pipeline.identification.initialisation_kernels import FIT_COST
-from pipeline.identification.relocalisation import ALL, FEWER, LOOSE, TIGHT, Hints, Search
+from pipeline.identification.relocalisation import (
+    ALL,
+    FEWER,
+    LOOSE,
+    TIGHT,
+    Relocalisation,
+    SearchHints,
+)
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, Truth, is_wrong, truth_at
 from tests.pipeline.spotting import (
     CONFIG,
@@ -117,17 +124,17 @@ def test_without_gravity_all_leds_are_enough():
     for lamps in (0, 1, 8):
         truth = truth_at(rng)
         spots = seen(truth, rng, lamps=lamps)
-        assert explains_truly(best(spots, Hints()), truth, spots)
+        assert explains_truly(best(spots, SearchHints()), truth, spots)
 
 
 def test_work_left_undone_goes_on_in_the_next_picture():
     """Too many lamps for one picture if nothing is known; a few pictures find the robot."""
     rng = np.random.default_rng(39)
     for _ in range(3):
-        truth, search, first = truth_at(rng), Search(CAMERA, LEDS_IN_B, CONFIG), None
+        truth, search, first = truth_at(rng), Relocalisation(CAMERA, LEDS_IN_B, CONFIG), None
         spots, bounded = seen(truth, rng, lamps=25), 0
         for picture in range(8):
-            one = best(spots, Hints(), search)
+            one = best(spots, SearchHints(), search)
             bounded += search.bounded
             first = picture if first is None and one is not None else first
             assert one is None or explains_truly(one, truth, spots)
@@ -167,7 +174,7 @@ def test_more_lamps_never_make_a_wrong_pose(gravity):
 @GRAVITY
 def test_two_hundred_lights_are_bounded_work(gravity):
     rng = np.random.default_rng(42)
-    truth, search = truth_at(rng), Search(CAMERA, LEDS_IN_B, CONFIG)
+    truth, search = truth_at(rng), Relocalisation(CAMERA, LEDS_IN_B, CONFIG)
     spots = seen(truth, rng, lamps=195)
     for _ in range(3):
         one = best(spots, hints_of(truth, gravity=gravity), search)
@@ -184,7 +191,7 @@ def test_a_remembered_attitude_makes_four_leds_surer(gravity):
         spots = seen(truth, rng, leds=(0, 1, 2, 4), lamps=5)
         blind = hints_of(truth, gravity=gravity)
         known = replace(blind, R_cb=truth.R, turn=0.25)
-        search = Search(CAMERA, LEDS_IN_B, CONFIG)
+        search = Relocalisation(CAMERA, LEDS_IN_B, CONFIG)
         sure, unsure = (search.explanations(spots, hints)[0] for hints in (known, blind))
         assert explains_truly(sure, truth, spots)
         assert sure.log_chance < unsure.log_chance - 2.0
@@ -206,6 +213,6 @@ def test_spots_of_very_different_sizes_are_no_robot():
 
 
 def test_nothing_seen_is_nothing_found():
-    search = Search(CAMERA, LEDS_IN_B, CONFIG)
-    assert search.explanations(spots_of(np.zeros((0, 2))), Hints()) == []
-    assert search.explanations(spots_of(np.full((9, 2), 300.0)), Hints()) == []
+    search = Relocalisation(CAMERA, LEDS_IN_B, CONFIG)
+    assert search.explanations(spots_of(np.zeros((0, 2))), SearchHints()) == []
+    assert search.explanations(spots_of(np.full((9, 2), 300.0)), SearchHints()) == []

@@ -1,7 +1,7 @@
 import numpy as np
 
 from pipeline.frames import exp
-from pipeline.identification.tilt_bias import Leaning
+from pipeline.identification.tilt_bias import TiltBias
 from tests.pipeline.seeing import truth_at
 
 
@@ -11,7 +11,7 @@ def angle(a, b):
 
 def test_a_vertical_that_is_off_is_put_right_by_believed_poses():
     rng = np.random.default_rng(90)
-    leaning, bias = Leaning(), np.array([0.09, -0.06, 0.02])
+    leaning, bias = TiltBias(), np.array([0.09, -0.06, 0.02])
     for _ in range(60):
         truth = truth_at(rng)
         prior = truth.prior(rng, 0.005)
@@ -23,7 +23,7 @@ def test_a_vertical_that_is_off_is_put_right_by_believed_poses():
 
 
 def test_without_verticals_nothing_is_learnt_and_nothing_changed():
-    leaning, up = Leaning(), np.array([0.0, 0.6, 0.8])
+    leaning, up = TiltBias(), np.array([0.0, 0.6, 0.8])
     leaning.learn(None, up, np.eye(3))
     leaning.learn(up, None, np.eye(3))
     np.testing.assert_array_equal(leaning.corrected(up), up)

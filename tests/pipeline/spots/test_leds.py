@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from pipeline.signals import Frame
 from pipeline.spots import leds
 from pipeline.spots.leds import find_spots, spots_near
@@ -30,11 +30,11 @@ def nearest_distance(pixels, spots):
 
 
 LOOKS = {
-    "saturated": Look(),
-    "not saturated": Look(led_light=0.7),
-    "blurred": Look(blur_px=1.6),
-    "noisy": Look(noise=0.01),
-    "bright room": Look(room=0.1),
+    "saturated": RenderOptions(),
+    "not saturated": RenderOptions(led_light=0.7),
+    "blurred": RenderOptions(blur_px=1.6),
+    "noisy": RenderOptions(noise=0.01),
+    "bright room": RenderOptions(room=0.1),
 }
 
 
@@ -123,7 +123,7 @@ def test_a_room_full_of_lamps_is_bounded_work_and_says_so(monkeypatch):
         return measure(luma, light, slope, places, *arguments)
 
     monkeypatch.setattr(leds, "measure", counting)
-    lamps = picture(truth_at(rng), rng, Look(distractors=400))
+    lamps = picture(truth_at(rng), rng, RenderOptions(distractors=400))
     static = rng.integers(0, 256, (720, 1280), dtype=np.uint8)
     for luma in (lamps, static):
         spots = find_spots(Frame(0.0, luma), CONFIG)

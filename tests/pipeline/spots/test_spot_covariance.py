@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hardware.codec import Decoder, Encoder
-from hardware.sim.render import Look, render
+from hardware.sim.render import RenderOptions, render
 from pipeline.frames import exp
 from pipeline.signals import Frame
 from pipeline.spots.leds import find_spots
@@ -12,10 +12,10 @@ from pipeline.vision_config import LedsConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B, moved, picture, truth_at
 
 LOOKS = {
-    "clean": Look(),
-    "ordinary room": Look(room=0.06, noise=0.004, exposure_s=0.008),
-    "low light": Look(led_light=0.6, room=0.01, noise=0.012),
-    "trembling": Look(exposure_s=0.008, sub_exposures=8),
+    "clean": RenderOptions(),
+    "ordinary room": RenderOptions(room=0.06, noise=0.004, exposure_s=0.008),
+    "low light": RenderOptions(led_light=0.6, room=0.01, noise=0.012),
+    "trembling": RenderOptions(exposure_s=0.008, sub_exposures=8),
 }
 TREMOR_RAD, TREMOR_HZ, HAND_RAD_S = 0.0005, 9.0, 0.1
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from pipeline.frames import R_from_wxyz, exp, log, wxyz_from_R
 from pipeline.timing.attitude_buffer import (
     CAPACITY,
-    Turns,
+    AttitudeBuffer,
     conjugate,
     matrices,
     product,
@@ -37,7 +37,7 @@ def test_small_vectors_are_rotation_vectors(a):
 
 
 def test_a_constant_rate_is_followed_exactly_between_samples():
-    turns, omega = Turns(), np.array([0.3, -1.0, 0.5])
+    turns, omega = AttitudeBuffer(), np.array([0.3, -1.0, 0.5])
     for k in range(100):
         turns.add(0.01 * k, omega)
     t = np.array([0.0, 0.123, 0.9899])
@@ -46,7 +46,7 @@ def test_a_constant_rate_is_followed_exactly_between_samples():
 
 
 def test_a_changing_rate_is_followed_to_second_order():
-    turns = Turns()
+    turns = AttitudeBuffer()
     for k in range(200):
         turns.add(0.01 * k, np.array([np.sin(3.0 * 0.01 * k), 0.0, 0.0]))
     (q,) = turns.at(np.array([1.5]))
@@ -54,7 +54,7 @@ def test_a_changing_rate_is_followed_to_second_order():
 
 
 def test_a_gap_forgets_and_old_samples_are_ignored():
-    turns = Turns()
+    turns = AttitudeBuffer()
     assert turns.newest == -np.inf
     assert turns.add(0.0, np.zeros(3))
     assert turns.add(0.05, np.ones(3))
@@ -65,7 +65,7 @@ def test_a_gap_forgets_and_old_samples_are_ignored():
 
 
 def test_the_oldest_half_goes_when_there_is_no_room():
-    turns = Turns()
+    turns = AttitudeBuffer()
     for k in range(CAPACITY + 10):
         turns.add(0.01 * k, np.array([0.1, 0.0, 0.0]))
     assert turns.newest == 0.01 * (CAPACITY + 9)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.timing.clock_line import MAX_DRIFT
-from pipeline.timing.clock_synchronisation import MAX_SLEW, ClockOffset
+from pipeline.timing.clock_synchronisation import MAX_SLEW, ClockSynchronisation
 
 PERIOD_S = 0.05
 
@@ -59,7 +59,7 @@ def ask(clock, remote, t_from, t_to, period=PERIOD_S):
 
 
 def test_ten_minutes_of_drift_jitter_and_spikes():
-    t, error, bound = ask(ClockOffset(), Remote(), 0.0, 600.0, period=0.1).T
+    t, error, bound = ask(ClockSynchronisation(), Remote(), 0.0, 600.0, period=0.1).T
     assert (np.abs(error) <= bound).all()
     assert np.abs(error[t > 5.0]).max() < 6e-3
     assert np.abs(error[t > 60.0]).max() < 2e-3
@@ -77,7 +77,7 @@ def test_ten_minutes_of_drift_jitter_and_spikes():
 )
 def test_the_error_is_never_beyond_its_bound(seed, offset, ppm, least, jitter, spikes):
     remote = Remote(seed, offset, 1e-6 * ppm, (least, least + jitter), spikes)
-    clock = ClockOffset()
+    clock = ClockSynchronisation()
     t, error, bound = ask(clock, remote, 0.0, 20.0).T
     assert len(t) > 390
     assert (np.abs(error) <= bound + 1e-4).all()
@@ -86,7 +86,7 @@ def test_the_error_is_never_beyond_its_bound(seed, offset, ppm, least, jitter, s
 
 
 def test_delays_that_always_differ_are_within_the_bound_nobody_can_beat():
-    remote, clock = Remote(spikes=0.0, delay=(0.002, 0.002)), ClockOffset()
+    remote, clock = Remote(spikes=0.0, delay=(0.002, 0.002)), ClockSynchronisation()
     for t in np.arange(0.0, 5.0, PERIOD_S):
         clock.add(t, remote.reads(t + 0.010), t + 0.012)
     error = clock.local(remote.reads(5.0)) - 5.0
@@ -98,7 +98,7 @@ def test_delays_that_always_differ_are_within_the_bound_nobody_can_beat():
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10_000), jump=st.sampled_from((-3000.0, -2.0, -0.5, 0.5, 2.0, 3000.0)))
 def test_a_jump_is_found_and_mended_within_a_second(seed, jump):
-    remote, clock = Remote(seed, delay=(0.0025, 0.04)), ClockOffset()
+    remote, clock = Remote(seed, delay=(0.0025, 0.04)), ClockSynchronisation()
     ask(clock, remote, 0.0, 10.0)
     remote.offset += jump
     rows = ask(clock, remote, 10.5, 11.5)
@@ -110,7 +110,7 @@ def test_a_jump_is_found_and_mended_within_a_second(seed, jump):
 
 
 def test_one_false_answer_dates_nothing_and_changes_nothing():
-    remote, clock = Remote(delay=(0.002, 0.004), spikes=0.0), ClockOffset()
+    remote, clock = Remote(delay=(0.002, 0.004), spikes=0.0), ClockSynchronisation()
     ask(clock, remote, 0.0, 5.0)
     before = clock.local(remote.reads(5.0))
     clock.add(5.0, remote.reads(5.0) + 7.0, 5.004)
@@ -122,7 +122,7 @@ def test_one_false_answer_dates_nothing_and_changes_nothing():
 
 
 def test_a_clock_that_is_slewed_is_followed():
-    remote, clock = Remote(delay=(0.002, 0.008), drift=0.0), ClockOffset()
+    remote, clock = Remote(delay=(0.002, 0.008), drift=0.0), ClockSynchronisation()
     ask(clock, remote, 0.0, 60.0)
     remote.drift = 500e-6
     remote.offset -= 500e-6 * 60.0
@@ -136,7 +136,7 @@ def test_a_clock_that_is_slewed_is_followed():
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_dates_keep_their_order_and_never_step(seed):
-    remote, clock = Remote(seed), ClockOffset()
+    remote, clock = Remote(seed), ClockSynchronisation()
     ask(clock, remote, 0.0, 1.0)
     step = 1e-3
     t_remote, last = remote.reads(1.6), None
@@ -153,7 +153,7 @@ def test_dates_keep_their_order_and_never_step(seed):
 
 
 def test_is_not_ready_before_five_answers_and_refuses_answers_before_their_question():
-    clock = ClockOffset()
+    clock = ClockSynchronisation()
     with pytest.raises(ValueError, match="no answer"):
         _ = clock.offset
     for k in range(4):

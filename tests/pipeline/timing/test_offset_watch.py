@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipeline.signals import StampOffset
-from pipeline.timing.offset_watch import DRIFTING, STRAY_S, UNKNOWN, UNSURE, OffsetWatch
+from pipeline.timing.offset_watch import DRIFTING, STRAY_S, UNKNOWN, UNSURE, OffsetMonitor
 
 
 @pytest.mark.parametrize(
@@ -21,13 +21,13 @@ from pipeline.timing.offset_watch import DRIFTING, STRAY_S, UNKNOWN, UNSURE, Off
 def test_without_a_coarse_one_it_must_be_near_none_as_far_as_it_is_sure(
     value: float, sigma: float, complaint: str
 ) -> None:
-    watch = OffsetWatch()
+    watch = OffsetMonitor()
     assert not watch.must_begin_again(value, sigma, 1.0)
     assert watch.complaint == complaint
 
 
 def test_one_that_the_coarse_one_refutes_begins_again_and_soon_after_complains() -> None:
-    watch = OffsetWatch()
+    watch = OffsetMonitor()
     watch.coarse = StampOffset(0.08, 0.002)
     assert not watch.must_begin_again(0.07, 1e-3, 1.0)
     assert watch.must_begin_again(0.0, 1.0, 2.0)  # however unsure of itself it is

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from hardware.sim.world import random_motion
 from hardware.sim.world.sensors import events
-from hardware.sim.world.world import Setup, World
+from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimator_config import TimeOffsetConfig
 from pipeline.frames import exp
 from pipeline.signals import BodyImu, PhoneImu
@@ -48,7 +48,7 @@ def found(answers):
 @pytest.mark.parametrize("td", [0.0, -0.02, 0.04, -0.08])
 def test_offsets_are_found_within_seconds_and_with_an_honest_sigma(hand, td):
     seed = round(1e3 * td + 1e5 * hand[0])
-    answers = listen(Setup(seed=abs(seed), duration=5.0, time_offset=td, hand_sigma=hand))
+    answers = listen(WorldOptions(seed=abs(seed), duration=5.0, time_offset=td, hand_sigma=hand))
     offsets = found(answers)
     assert offsets[0][0] < 4.5
     errors = np.array([(offset.value_s - td) for _, offset in offsets])
@@ -62,7 +62,9 @@ def test_offsets_are_found_within_seconds_and_with_an_honest_sigma(hand, td):
 @pytest.mark.parametrize("seed", range(2))
 def test_a_tremor_alone_locks_nothing(seed):
     quiet = (0.0005, float(np.deg2rad(0.03)))
-    setup = Setup(seed=seed, duration=5.0, time_offset=0.08, hand_sigma=quiet, robot_sigma=quiet)
+    setup = WorldOptions(
+        seed=seed, duration=5.0, time_offset=0.08, hand_sigma=quiet, robot_sigma=quiet
+    )
     answers = listen(setup)
     assert not found(answers)
     reasons = Counter(reason for _, _, reason in answers)
@@ -73,19 +75,21 @@ def test_a_tremor_alone_locks_nothing(seed):
 def test_a_strong_tremor_locks_no_other_cycle(td, monkeypatch):
     monkeypatch.setattr(random_motion, "TREMOR_SIGMA", (1e-3, float(np.deg2rad(0.3))))
     for robot in (STEADY, STILL):
-        setup = Setup(seed=5, duration=4.0, time_offset=td, hand_sigma=STEADY, robot_sigma=robot)
+        setup = WorldOptions(
+            seed=5, duration=4.0, time_offset=td, hand_sigma=STEADY, robot_sigma=robot
+        )
         assert all(abs(offset.value_s - td) < WRONG_S for _, offset in found(listen(setup)))
 
 
 @pytest.mark.parametrize("td", [0.15])
 def test_an_offset_beyond_reach_is_refused_and_named(td):
-    answers = listen(Setup(seed=2, duration=4.0, time_offset=td))
+    answers = listen(WorldOptions(seed=2, duration=4.0, time_offset=td))
     assert not found(answers)
     assert f"{1e3 * td:+.0f} ms" in answers[-1][2]
 
 
 def test_hands_at_rest_are_asked_to_move():
-    answers = listen(Setup(seed=1, duration=3.0, hand_sigma=STILL, robot_sigma=STILL))
+    answers = listen(WorldOptions(seed=1, duration=3.0, hand_sigma=STILL, robot_sigma=STILL))
     assert not found(answers)
     assert "Move the phone a little" in answers[-1][2]
 
@@ -96,7 +100,7 @@ def test_a_gyroscope_with_other_axes_fits_nowhere():
             return replace(sample, omega_m_cf_in_c=sample.omega_m_cf_in_c[[2, 0, 1]])
         return sample
 
-    answers = listen(Setup(seed=3, duration=4.0), swap)
+    answers = listen(WorldOptions(seed=3, duration=4.0), swap)
     assert not [offset for _, offset in found(answers) if abs(offset.value_s) > WRONG_S]
     assert answers[-1][2] != ""
 
@@ -106,12 +110,12 @@ def test_no_attitude_is_measured_across_a_gap():
         is_lost = isinstance(sample, PhoneImu) and 1.5 < sample.t < 2.2
         return None if is_lost else sample
 
-    for t, offset in found(listen(Setup(seed=4, duration=6.0, time_offset=0.03), lose)):
+    for t, offset in found(listen(WorldOptions(seed=4, duration=6.0, time_offset=0.03), lose)):
         assert abs(offset.value_s - 0.03) < WRONG_S, t
 
 
 def test_duplicates_and_disorder_change_nothing():
-    setup = Setup(seed=6, duration=5.0, time_offset=-0.03, repeated=0.2)
+    setup = WorldOptions(seed=6, duration=5.0, time_offset=-0.03, repeated=0.2)
     offsets = found(listen(setup))
     assert offsets
     assert all(abs(offset.value_s + 0.03) < WRONG_S for _, offset in offsets)
@@ -130,7 +134,7 @@ def test_the_fixed_attitude_between_the_gyroscopes_does_not_matter():
         C[3:, 3:] = turn @ pose.covariance[3:, 3:] @ turn.T
         return replace(sample, pose=replace(pose, R_cb=pose.R_cb @ turn.T, covariance=C))
 
-    setup = Setup(seed=7, duration=4.0, time_offset=0.02)
+    setup = WorldOptions(seed=7, duration=4.0, time_offset=0.02)
     straight, other = found(listen(setup)), found(listen(setup, turned))
     assert len(straight) == len(other) > 0
     ours, theirs = ([o.value_s for _, o in row] for row in (straight, other))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from pipeline.frames import exp
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.signals import Frame, Spots
-from pipeline.vision.detection import Prior
+from pipeline.vision.detection import FramePrior
 from pipeline.vision.few_leds import name_few, places
 from pipeline.vision.vision import Vision
 from pipeline.vision_config import IdentifyConfig
@@ -35,7 +35,7 @@ def expected_of(truth, sigma_p=0.005, sigma_theta=0.004, rng=None, t=0.0):
     if rng is not None:
         p = p + rng.normal(0.0, sigma_p, 3)
         R = R @ exp(rng.normal(0.0, sigma_theta, 3))
-    return Expected(t, p, R, np.zeros(3), sigma_p, sigma_theta)
+    return Prediction(t, p, R, np.zeros(3), sigma_p, sigma_theta)
 
 
 def spots_of(pixels, area=60.0):
@@ -152,7 +152,7 @@ def test_an_led_expected_outside_the_picture_is_not_looked_for():
 
 def looked(eye, frame, truth, expected, sensors=True):
     """As the server does it: what is found is believed."""
-    known = truth.prior() if sensors else Prior()
+    known = truth.prior() if sensors else FramePrior()
     sighting = eye.step(frame, replace(known, expected=expected))
     if sighting.pose is not None:
         eye.keep(sighting.pose)
@@ -269,7 +269,7 @@ def test_a_picture_full_of_lamps_costs_no_names():
     right = 0
     for k in range(6):
         truth = moved(truth, rng)
-        luma = picture(truth, rng, Look(distractors=10), covered=(0, 3, 4))
+        luma = picture(truth, rng, RenderOptions(distractors=10), covered=(0, 3, 4))
         expected = expected_of(truth, 0.005, rng=rng, t=k * DT)
         sighting = looked(eye, Frame(k * DT, luma), truth, expected)
         assert set(sighting.rays.led.tolist()) <= {1, 2}

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.sim.render import Look, render
-from pipeline.camera.rolling_shutter import Motion
+from hardware.sim.render import RenderOptions, render
+from pipeline.camera.rolling_shutter import FrameMotion
 from pipeline.frames import exp
 from pipeline.identification.pnp import pose_of
 from pipeline.signals import Frame
-from pipeline.spots.noise_scale import Doubt
+from pipeline.spots.noise_scale import NoiseScale
 from pipeline.spots.spot_kernels import measure
-from pipeline.vision.led_tracker import THREE_IN_A_ROW, Follower
-from pipeline.vision.motion_blur import Smear
+from pipeline.vision.led_tracker import THREE_IN_A_ROW, LedTracker
+from pipeline.vision.motion_blur import MotionBlur
 from tests.pipeline.seeing import (
     CAMERA,
     LEDS_IN_B,
@@ -25,11 +25,11 @@ from tests.pipeline.seeing import (
 )
 from tests.pipeline.spotting import seen, spots_of
 
-STILL = Motion(np.zeros(3), np.zeros(3), 2.5)
+STILL = FrameMotion(np.zeros(3), np.zeros(3), 2.5)
 
 
 def named(truth, spots, foreseen, follower=None):
-    follower = follower or Follower(CAMERA, LEDS_IN_B)
+    follower = follower or LedTracker(CAMERA, LEDS_IN_B)
     return follower.name(spots, (foreseen.p, foreseen.R), None)
 
 
@@ -65,7 +65,7 @@ def test_a_covered_led_is_preferred_to_a_lamp_beside_it(covered):
 def test_three_leds_do_for_a_while_two_never():
     rng = np.random.default_rng(41)
     truth = truth_at(rng)
-    follower = Follower(CAMERA, LEDS_IN_B)
+    follower = LedTracker(CAMERA, LEDS_IN_B)
     three, two = seen(truth, rng, leds=(0, 1, 3)), seen(truth, rng, leds=(0, 3))
     assert named(truth, two, truth, follower) is None
     for _ in range(THREE_IN_A_ROW):
@@ -86,7 +86,7 @@ def test_nothing_seen_is_nothing_named():
     truth = truth_at(np.random.default_rng(43))
     assert named(truth, spots_of(np.zeros((0, 2))), truth) is None
     dark = Frame(0.0, np.zeros((CAMERA.height, CAMERA.width), np.uint8))
-    assert Follower(CAMERA, LEDS_IN_B).look(dark, (truth.p, truth.R), None).naming is None
+    assert LedTracker(CAMERA, LEDS_IN_B).look(dark, (truth.p, truth.R), None).naming is None
 
 
 def test_who_jumps_is_another():
@@ -98,7 +98,7 @@ def test_who_jumps_is_another():
 
 def test_a_picture_gives_a_pose_to_a_tenth_of_a_millimetre():
     rng = np.random.default_rng(45)
-    follower, truth = Follower(CAMERA, LEDS_IN_B), truth_at(rng)
+    follower, truth = LedTracker(CAMERA, LEDS_IN_B), truth_at(rng)
     errors = []
     for k in range(8):
         foreseen = truth
@@ -115,7 +115,7 @@ def test_a_turn_that_changes_is_taken_out_of_a_rolling_shutter():
     rng = np.random.default_rng(46)
     rolling, truth = replace(CAMERA, readout_s=0.03), truth_at(rng)
     omega, alpha = np.array([0.2, 0.5, -0.4]), np.array([1.0, 8.0, -6.0])
-    follower, errors = Follower(rolling, LEDS_IN_B), []
+    follower, errors = LedTracker(rolling, LEDS_IN_B), []
     for k in range(-2, 1):
         t = k / 30.0
 
@@ -125,8 +125,8 @@ def test_a_turn_that_changes_is_taken_out_of_a_rolling_shutter():
             return turn @ truth.R, turn @ truth.p
 
         R, p = pose(0.0)
-        motion = Motion(omega + alpha * t, np.zeros(3), 2.5)
-        luma = render(rolling, pose, LEDS_IN_B, Look(exposure_s=0.001), rng)
+        motion = FrameMotion(omega + alpha * t, np.zeros(3), 2.5)
+        luma = render(rolling, pose, LEDS_IN_B, RenderOptions(exposure_s=0.001), rng)
         naming = follower.look(Frame(t, luma), (p, R), motion).naming
         errors.append(np.linalg.norm(pose_of(naming.fit, 0.0).p_bc_in_c - p))
     assert errors[-1] < 0.5 * errors[0]
@@ -135,20 +135,25 @@ def test_a_turn_that_changes_is_taken_out_of_a_rolling_shutter():
 def test_an_exposure_is_learnt_from_how_far_moving_spots_are_smeared():
     rng = np.random.default_rng(47)
     truth, omega = truth_at(rng), np.array([0.1, 0.9, 0.6])
-    follower, look = Follower(CAMERA, LEDS_IN_B), Look(exposure_s=0.015, sub_exposures=24)
+    follower, look = (
+        LedTracker(CAMERA, LEDS_IN_B),
+        RenderOptions(exposure_s=0.015, sub_exposures=24),
+    )
     for k in range(4):
         luma = render(
             CAMERA, lambda t: (exp(-omega * t) @ truth.R, exp(-omega * t) @ truth.p), LEDS_IN_B,
             look, rng,
         )  # fmt: skip
-        follower.look(Frame(0.03 * k, luma), (truth.p, truth.R), Motion(omega, np.zeros(3), 2.5))
+        follower.look(
+            Frame(0.03 * k, luma), (truth.p, truth.R), FrameMotion(omega, np.zeros(3), 2.5)
+        )
     assert follower.smear.exposure_s == pytest.approx(look.exposure_s, rel=0.15)
-    assert Smear().exposure_s == 0.0
+    assert MotionBlur().exposure_s == 0.0
 
 
 def test_doubt_follows_the_residuals_and_forgets_one_outlier():
     rng = np.random.default_rng(48)
-    doubt = Doubt()
+    doubt = NoiseScale()
     assert doubt.factor == 1.0
     for chi2 in rng.chisquare(4, 300):
         doubt.learn(6.0 * chi2, 4)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from hardware.codec import Decoder, Encoder
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from pipeline.frames import R_from_rpy
 from pipeline.signals import Frame
-from pipeline.vision.detection import Prior
+from pipeline.vision.detection import FramePrior
 from pipeline.vision.gating import disbelief
 from pipeline.vision.last_pose import FORGET_MISSES
 from pipeline.vision.vision import Vision, warm_up
@@ -73,7 +73,9 @@ def test_tracking_survives_a_covered_led():
     eye = vision()
     follow(eye, truths[:2], rng)
     for sighting, truth in zip(
-        follow(eye, truths[2:], rng, start=2, covered=(1,), prior=Prior()), truths[2:], strict=True
+        follow(eye, truths[2:], rng, start=2, covered=(1,), prior=FramePrior()),
+        truths[2:],
+        strict=True,
     ):
         assert not is_wrong(sighting.pose, truth)
         assert sighting.pose.leds == 4
@@ -87,8 +89,8 @@ def test_a_few_misses_and_it_is_forgotten(misses, found):
     eye = vision()
     follow(eye, [truth], rng)
     for k in range(misses):
-        assert eye.step(Frame((1 + k) * DT, DARK), Prior()).pose is None
-    (sighting,) = follow(eye, [truth], rng, start=1 + misses, covered=(2,), prior=Prior())
+        assert eye.step(Frame((1 + k) * DT, DARK), FramePrior()).pose is None
+    (sighting,) = follow(eye, [truth], rng, start=1 + misses, covered=(2,), prior=FramePrior())
     assert (sighting.pose is not None) == found
 
 
@@ -97,7 +99,7 @@ def test_who_comes_back_is_known_by_the_attitude_that_the_gyroscopes_kept():
     rng = np.random.default_rng(66)
     truth = truth_at(rng)
     eye, still = vision(), np.zeros(3)
-    sensors = Prior(None, None, still, still)
+    sensors = FramePrior(None, None, still, still)
     follow(eye, [truth], rng)
     for k in range(30):
         assert eye.step(Frame((1 + k) * DT, DARK), sensors).pose is None
@@ -112,7 +114,7 @@ def test_forgetting_is_immediate():
     eye = vision()
     follow(eye, [truth], rng)
     eye.forget()
-    (sighting,) = follow(eye, [truth], rng, start=1, covered=(2,), prior=Prior())
+    (sighting,) = follow(eye, [truth], rng, start=1, covered=(2,), prior=FramePrior())
     assert sighting.pose is None
 
 
@@ -165,7 +167,7 @@ def test_lights_that_are_no_robot_are_called_so():
     truth = truth_at(rng)
     frame = frame_at(0.0, truth, rng)
     mirrored = Frame(0.0, frame.luma[:, ::-1])
-    sighting = vision().step(mirrored, Prior())
+    sighting = vision().step(mirrored, FramePrior())
     assert sighting.pose is None
     assert sighting.reason == "5 lights seen, but they do not look like the robot."
 
@@ -246,12 +248,12 @@ def test_after_warming_up_nothing_is_left_to_compile():
     warm_up()
     before = compiled()
     rng = np.random.default_rng(65)
-    for prior in (None, Prior()):
+    for prior in (None, FramePrior()):
         truth = truth_at(rng)
         for covered in ((), (1,), (1, 2, 3, 4), ()):
             eye = vision()
             for k in range(3):
-                frame = frame_at(k * DT, truth, rng, Look(distractors=4), covered)
+                frame = frame_at(k * DT, truth, rng, RenderOptions(distractors=4), covered)
                 frame.luma.setflags(write=False)
                 sighting = eye.step(frame, truth.prior() if prior is None else prior)
                 if sighting.pose is not None:
@@ -263,7 +265,7 @@ def test_after_warming_up_nothing_is_left_to_compile():
 def test_lamps_by_the_dozen_are_said_to_be_more_than_could_be_tried():
     rng = np.random.default_rng(67)
     truth = truth_at(rng)
-    sighting = vision().step(frame_at(0.0, truth, rng, Look(distractors=60)), Prior())
+    sighting = vision().step(frame_at(0.0, truth, rng, RenderOptions(distractors=60)), FramePrior())
     assert sighting.pose is None or not is_wrong(sighting.pose, truth)
     assert sighting.bounded
-    assert not vision().step(frame_at(0.0, truth, rng), Prior()).bounded
+    assert not vision().step(frame_at(0.0, truth, rng), FramePrior()).bounded

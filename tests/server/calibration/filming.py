@@ -11,7 +11,7 @@ from pipeline.frames import R_co, exp, log
 from server.calibration.board import Board
 from server.calibration.lens import normalised, project
 from server.calibration.projection import rotated
-from server.calibration.views import View
+from server.calibration.views import BoardView
 
 BOARD = Board(9, 6, 0.03, 0.0225)
 
@@ -116,7 +116,7 @@ def seen(phone, motion, t, noise_px, rng, blur_px=2.5):
         rows = np.clip(pixels[:, 1] / phone.height - 0.5, -0.5, 0.5)
     inside = (pixels > 3).all(axis=1) & (pixels < np.array(phone.size) - 4).all(axis=1)
     ids = np.flatnonzero(inside)
-    return View(t, ids, pixels[ids] + rng.normal(0, noise_px, (len(ids), 2)), blur_px)
+    return BoardView(t, ids, pixels[ids] + rng.normal(0, noise_px, (len(ids), 2)), blur_px)
 
 
 def corner_film(phone, motion, seconds=20.0, fps=30.0, noise_px=0.1, seed=0):

@@ -11,12 +11,12 @@ import pytest
 
 from pipeline.frames import exp
 from server.calibration.board import Board, BoardError, Detector, parse
-from server.calibration.camera_imu import Gyro, ImuError, align, gyro_of
+from server.calibration.camera_imu import GyroSpline, ImuError, align, gyro_of
 from server.calibration.choice import choose, farthest_first
 from server.calibration.lens import normalised, project
 from server.calibration.motion import rates
 from server.calibration.projection import rotated
-from server.calibration.views import View, aspect, edge_width, look
+from server.calibration.views import BoardView, aspect, edge_width, look
 from server.tools.calibrate.draw_board import MARGIN, PNG_SQUARE_PX, pdf, png, svg, write_board
 from tests.server.calibration.filming import BOARD, Motion, Phone, at_rows, corner_film
 
@@ -136,7 +136,7 @@ def test_tilt_is_the_slope_of_the_depth_wherever_the_board_stands(turn, slope):
     lens = np.array([960.0, 960.0, 640.0, 360.0, *np.zeros(5)])
     for place in ((-0.1, -0.1, 0.5), (0.02, 0.05, 0.6)):
         pixels = project("plumb_bob", lens, BOARD.corners() @ R.T + place)[0]
-        view = View(0.0, np.arange(len(pixels)), pixels, 2.0)
+        view = BoardView(0.0, np.arange(len(pixels)), pixels, 2.0)
         one = aspect(view, BOARD, phone.size, 960.0)
         assert one.tilt == pytest.approx(np.tan(0.5) * np.array(slope), abs=0.02)
         assert one.tilt_deg == pytest.approx(np.rad2deg(0.5), abs=1.0)
@@ -150,7 +150,7 @@ def test_farthest_first_takes_the_outermost_and_no_twins():
 
 def test_blurred_views_are_not_chosen():
     views = corner_film(Phone(), Motion(), seconds=2.0, fps=15.0)
-    bad = [View(v.t + 100.0, v.ids, v.pixels, 20.0) for v in views]
+    bad = [BoardView(v.t + 100.0, v.ids, v.pixels, 20.0) for v in views]
     choice = choose(views + bad, BOARD, Phone().size)
     assert len(choice.sharp) == len(views)
     assert all(view.t < 50.0 for view in choice.fit + choice.held_out)
@@ -179,7 +179,7 @@ def test_too_little_motion_for_the_sensors_is_told_with_what_to_do():
     with pytest.raises(ImuError, match="at least"):
         gyro_of(np.zeros((3, 7)))
     t = np.arange(90) / 30.0
-    still = Gyro(t, np.zeros((90, 3)))
+    still = GyroSpline(t, np.zeros((90, 3)))
     with pytest.raises(ImuError, match="about all three axes"):
         align(t, np.tile(np.eye(3), (90, 1, 1)), still)
     with pytest.raises(ImuError, match="start both together"):

@@ -11,10 +11,10 @@ from hardware.camera_file import find_camera_file, load_camera
 from pipeline.frames import exp, log
 from server.calibration.camera_imu import gyro_of
 from server.calibration.camera_yaml import profile_path, store, yaml_of
-from server.calibration.job import Job, run
+from server.calibration.job import CalibrationJob, run
 from server.calibration.solve import ray_sigma, solve
 from server.calibration.verdict import Verdict, bare_side, judge, judge_views
-from server.calibration.views import View
+from server.calibration.views import BoardView
 from tests.server.calibration.filming import BOARD, Motion, Phone, corner_film, gyro_rows
 
 R_CI = exp(np.array([0.03, -0.02, 0.01]))
@@ -160,7 +160,7 @@ def test_a_film_without_a_board_is_refused():
 def test_a_bent_board_is_seen_in_the_error():
     rng = np.random.default_rng(0)
     views = [
-        View(v.t, v.ids, v.pixels + rng.normal(0, 3.0, v.pixels.shape), v.blur_px)
+        BoardView(v.t, v.ids, v.pixels + rng.normal(0, 3.0, v.pixels.shape), v.blur_px)
         for v in corner_film(Phone(), Motion(), 3.0)
     ]
     assert "from where they should" in refused(views)
@@ -185,6 +185,6 @@ def test_the_bare_side_is_named():
 
 
 def test_a_job_without_enough_views_says_so():
-    job = Job(BOARD, (1280, 720), [], 50, np.zeros((0, 4)), "a phone", 90, "2026-01-01")
+    job = CalibrationJob(BOARD, (1280, 720), [], 50, np.zeros((0, 4)), "a phone", 90, "2026-01-01")
     outcome = run(job)
     assert (outcome.verdict.level, outcome.text) == ("refused", "")

@@ -6,7 +6,7 @@ import pytest
 
 from server.common.access import Access, PhoneClientError, running_server
 from server.common.runtime import RUN_FILE
-from server.common.runtime_parameters import Knobs
+from server.common.runtime_parameters import RuntimeParameters
 
 BAD_KNOBS = '{"http_url": "http://127.0.0.1:1", "operator_token": "t", "virtual_camera": {"x": 1}}'
 KNOBS = {
@@ -25,7 +25,7 @@ def test_run_file_tells_where_the_server_is(tmp_path):
     (tmp_path / RUN_FILE).write_text(json.dumps(run | {"robot": "quadrotor"}))
     assert running_server(tmp_path).robot == "quadrotor"
     (tmp_path / RUN_FILE).write_text(json.dumps(run | {"virtual_camera": KNOBS}))
-    assert running_server(tmp_path).virtual_camera == Knobs(**KNOBS).config()
+    assert running_server(tmp_path).virtual_camera == RuntimeParameters(**KNOBS).config()
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"http_url": 1', BAD_KNOBS])

@@ -16,7 +16,7 @@ from server.common.runtime_parameters import (
     DEFAULT_KNOBS,
     FASTEST_HZ,
     SLOWEST_HZ,
-    Knobs,
+    RuntimeParameters,
     TuneInput,
     turned,
 )
@@ -25,7 +25,7 @@ from server.protocol.messages import decode_message
 from server.protocol.wire import WireError
 
 knobs = st.builds(
-    Knobs,
+    RuntimeParameters,
     cutoff_hz=st.floats(SLOWEST_HZ, FASTEST_HZ),
     mode=st.sampled_from(["full", "selective", "off"]),
     adaptive_beta=st.floats(0.0, 10.0),
@@ -36,14 +36,16 @@ knobs = st.builds(
 
 @given(one=knobs)
 def test_what_is_set_is_what_stands(one):
-    stands = Knobs.of(one.config())
+    stands = RuntimeParameters.of(one.config())
     assert stands.cutoff_hz == pytest.approx(one.cutoff_hz, abs=6e-5)
     assert msgspec.structs.replace(stands, cutoff_hz=one.cutoff_hz) == one
 
 
 def test_the_defaults_are_the_pipelines():
     config = VirtualCameraConfig()
-    assert Knobs(0.28, config.mode, 0.0, config.max_speed_m_s, guard=True) == DEFAULT_KNOBS
+    assert (
+        RuntimeParameters(0.28, config.mode, 0.0, config.max_speed_m_s, guard=True) == DEFAULT_KNOBS
+    )
     assert DEFAULT_KNOBS.config().tau_1 == pytest.approx(config.tau_1, rel=1e-3)
 
 
@@ -54,7 +56,7 @@ def test_a_wish_turns_what_it_names_and_nothing_else(one, other):
     for name, value in wanted.items():
         after = turned(before, TuneInput(**{name: value}))
         if name == "cutoff_hz":
-            assert Knobs.of(after).cutoff_hz == pytest.approx(value, abs=6e-5)
+            assert RuntimeParameters.of(after).cutoff_hz == pytest.approx(value, abs=6e-5)
             assert replace(after, tau_1=before.tau_1, tau_2=before.tau_2) == before
         else:
             assert after == replace(before, **{name: value})
@@ -63,9 +65,9 @@ def test_a_wish_turns_what_it_names_and_nothing_else(one, other):
 @pytest.mark.parametrize("mode", ["full", "selective", "off"])
 def test_a_configuration_without_bounds_stands_at_the_end_of_its_range(mode):
     unbounded = VirtualCameraConfig(tau_1=0.0, tau_2=0.0, mode=mode, max_speed_m_s=inf)
-    stands = Knobs.of(unbounded)
+    stands = RuntimeParameters.of(unbounded)
     assert (stands.cutoff_hz, stands.max_speed_m_s) == (FASTEST_HZ, 0.0)
-    assert Knobs.of(VirtualCameraConfig(tau_1=1e4)).cutoff_hz == SLOWEST_HZ
+    assert RuntimeParameters.of(VirtualCameraConfig(tau_1=1e4)).cutoff_hz == SLOWEST_HZ
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import tomllib
 import pytest
 
 from pipeline.config import VirtualCameraConfig
-from server.common.runtime_parameters import Knobs
+from server.common.runtime_parameters import RuntimeParameters
 from server.common.settings import (
     PREFIX,
     Settings,
@@ -51,14 +51,14 @@ def test_the_picture_is_a_table_of_its_own_everywhere(tmp_path, monkeypatch):
 
 
 def test_the_virtual_camera_defaults_to_the_pipelines():
-    assert load([]).virtual_camera.knobs == Knobs.of(VirtualCameraConfig())
+    assert load([]).virtual_camera.knobs == RuntimeParameters.of(VirtualCameraConfig())
 
 
 def test_the_virtual_camera_is_a_table_of_its_own(tmp_path, monkeypatch):
     file = toml(tmp_path, '[virtual_camera]\ncutoff_hz = 0.05\nmode = "selective"')
     monkeypatch.setenv("LIGHTLEASH_VIRTUAL_CAMERA__MAX_SPEED_M_S", "0.5")
     knobs = load(["--virtual-camera.adaptive-beta", "0.6"], file).virtual_camera.knobs
-    assert knobs == Knobs(0.05, "selective", 0.6, 0.5, guard=True)
+    assert knobs == RuntimeParameters(0.05, "selective", 0.6, 0.5, guard=True)
     assert not load(["--no-virtual-camera.guard"]).virtual_camera.guard
 
 

@@ -11,7 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.signals import LedRays, Operator, PhoneImu, RelativePose, Seen, StampOffset
+from pipeline.signals import (
+    LedRays,
+    PhoneImu,
+    RelativePose,
+    StampOffset,
+    TouchState,
+    VisionMeasurement,
+)
 from pipeline.vision.rays import NO_RAYS
 from server.control.ipc import (
     LARGEST,
@@ -175,7 +182,9 @@ def test_signals_survive_the_journey():
     rays = LedRays(
         np.array([4, 1]), rng.normal(size=2), rng.normal(size=(2, 2)), rng.normal(size=(2, 2, 2))
     )
-    seen = SeenInput.of(Seen(2.5, rays, measured, (0.7, 0.4), StampOffset(0.05, 0.002))).seen()
+    seen = SeenInput.of(
+        VisionMeasurement(2.5, rays, measured, (0.7, 0.4), StampOffset(0.05, 0.002))
+    ).seen()
     assert (seen.t, seen.half_field) == (2.5, (0.7, 0.4))
     assert seen.offset == StampOffset(0.05, 0.002)
     for name in ("led", "t", "tangents", "covariances"):
@@ -184,10 +193,10 @@ def test_signals_survive_the_journey():
     np.testing.assert_array_equal(seen.pose.R_cb, measured.R_cb)
     np.testing.assert_array_equal(seen.pose.covariance, measured.covariance)
     assert (seen.pose.t, seen.pose.reprojection_px, seen.pose.leds) == (2.5, 0.4, 6)
-    nothing = SeenInput.of(Seen(2.5, NO_RAYS, None)).seen()
+    nothing = SeenInput.of(VisionMeasurement(2.5, NO_RAYS, None)).seen()
     assert nothing.pose is None
     assert nothing.offset is None
     assert nothing.rays.tangents.shape == (0, 2)
     assert nothing.rays.covariances.shape == (0, 2, 2)
-    operator = OperatorInput.of(Operator(3.5, True, 9)).operator()
+    operator = OperatorInput.of(TouchState(3.5, True, 9)).operator()
     assert (operator.t, operator.held, operator.press) == (3.5, True, 9)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hardware.follower import FollowerState, Refusal, ThrustCommand
 from hardware.link.control_end import ControlEnd
-from hardware.link.datagram import Sample, decode_command, encode_sample
+from hardware.link.datagram import SampleDatagram, decode_command, encode_sample
 from server.control.robot_epoch import RENEWALS, next_epoch
 
 KEY = bytes(range(16))
@@ -27,7 +27,7 @@ def epoch_after_renewals(epoch, times):
 
 def refusing(command, counter):
     """Of a robot that has followed `command` and lost it."""
-    return Sample(
+    return SampleDatagram(
         state=FollowerState.REFUSING,
         refusal=Refusal.SILENT,
         t_us=counter,

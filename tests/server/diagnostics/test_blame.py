@@ -3,11 +3,11 @@
 import pytest
 
 from pipeline.signals import Mode
-from server.control.gap_log import MANY, Gaps
+from server.control.gap_log import MANY, GapStatistics
 from server.diagnostics.blame import RECENT_S, SILENT, STALL_S, TOO_BUSY, Blame, warnings
 from tests.server.house import control_status
 
-NONE = Gaps(0, 0.0)
+NONE = GapStatistics(0, 0.0)
 
 
 def coasting(reason=SILENT[0], **more):
@@ -37,19 +37,27 @@ def test_without_a_stall_just_before_control_is_believed():
 
 def test_gaps_that_were_the_servers_are_counted_as_its_own():
     blame = Blame()
-    gaps = {"phone": Gaps(3, 0.4), "robot": NONE, "server": Gaps(1, 0.09)}
+    gaps = {"phone": GapStatistics(3, 0.4), "robot": NONE, "server": GapStatistics(1, 0.09)}
     control = coasting(gaps=gaps)
     assert blame.gaps(control, 10.0) == gaps
     for t in (10.0, 20.0):
         blame.stalled(t, 0.25)
-    assert blame.gaps(control, 21.0) == {**gaps, "phone": Gaps(1, 0.4), "server": Gaps(3, 0.25)}
-    assert blame.gaps(control, 75.0) == {**gaps, "phone": Gaps(2, 0.4), "server": Gaps(2, 0.25)}
+    assert blame.gaps(control, 21.0) == {
+        **gaps,
+        "phone": GapStatistics(1, 0.4),
+        "server": GapStatistics(3, 0.25),
+    }
+    assert blame.gaps(control, 75.0) == {
+        **gaps,
+        "phone": GapStatistics(2, 0.4),
+        "server": GapStatistics(2, 0.25),
+    }
     assert blame.gaps(control, 100.0) == gaps
     assert blame.gaps(control_status(gaps={}), 100.0) == {}
 
 
 def test_who_arms_is_warned_of_the_side_that_has_many_gaps():
-    assert warnings({"phone": Gaps(MANY - 1, 0.3), "robot": NONE, "server": NONE}) == []
-    (told,) = warnings({"phone": NONE, "robot": NONE, "server": Gaps(MANY, 0.31)})
+    assert warnings({"phone": GapStatistics(MANY - 1, 0.3), "robot": NONE, "server": NONE}) == []
+    (told,) = warnings({"phone": NONE, "robot": NONE, "server": GapStatistics(MANY, 0.31)})
     assert "computer" in told
     assert "0.31 s" in told

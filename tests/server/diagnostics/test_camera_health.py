@@ -5,9 +5,9 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from pipeline.camera.exposure import ADVICE, Hint
+from pipeline.camera.exposure import ADVICE, ExposureHint
 from pipeline.camera.fit import CameraFacts
-from pipeline.vision.visual_front_end import Looking, warm_up
+from pipeline.vision.visual_front_end import VisualFrontEnd, warm_up
 from pipeline.vision_config import GatesConfig
 from server.diagnostics.camera_health import health
 from server.protocol.camera_messages import CameraHealth
@@ -19,7 +19,7 @@ FACTS = CameraFacts(
 
 
 def looking():
-    return Looking(CAMERA, LEDS_IN_B, GatesConfig())
+    return VisualFrontEnd(CAMERA, LEDS_IN_B, GatesConfig())
 
 
 def test_before_the_phone_moved_only_the_calibration_is_known():
@@ -31,11 +31,11 @@ def test_before_the_phone_moved_only_the_calibration_is_known():
 def test_what_was_learnt_is_told_in_the_units_of_screens():
     eye = looking()
     eye.watch.facts, eye.watch.complaint = FACTS, "Another lens."
-    eye.exposure.hint = Hint.TOO_BRIGHT
+    eye.exposure.hint = ExposureHint.TOO_BRIGHT
     assert eye.readout.learn(FACTS)
     told = health(eye)
     assert (told.complaint, told.hint) == ("Another lens.", "too_bright")
-    assert told.advice == ADVICE[Hint.TOO_BRIGHT]
+    assert told.advice == ADVICE[ExposureHint.TOO_BRIGHT]
     assert (told.readout_ms, told.readout_sigma_ms, told.readout_learnt) == (20.3, 0.4, True)
     assert (told.time_offset_ms, told.time_offset_sigma_ms) == (30.1, 0.2)
     assert (told.larger_percent, told.larger_sigma_percent) == (3.1, 0.3)

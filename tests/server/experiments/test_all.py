@@ -13,15 +13,15 @@ import pytest
 
 from server.experiments import EXPERIMENTS, MODULES, main
 from server.experiments.all import command, provenance, running
-from server.experiments.all.parts import CAPTIONS, LEFT_OUT, PARTS, Part
+from server.experiments.all.parts import CAPTIONS, LEFT_OUT, PARTS, ReportPart
 
 GOOD = "margins ground --gains phone --estimator relative"
 FLOWN = (
-    Part("good", GOOD, GOOD, "Good", "It runs."),
-    Part("bad", "margins --gains sport", "margins --gains sport", "Bad", "It fails."),
-    Part("not_here", "fly", "fly", "Not here", "It refuses."),
+    ReportPart("good", GOOD, GOOD, "Good", "It runs."),
+    ReportPart("bad", "margins --gains sport", "margins --gains sport", "Bad", "It fails."),
+    ReportPart("not_here", "fly", "fly", "Not here", "It refuses."),
 )
-MADE_UP = Part("made_up", "margins", "margins", "Made up", "By the test.")
+MADE_UP = ReportPart("made_up", "margins", "margins", "Made up", "By the test.")
 EVIL = '"><script>alert(1)</script><img src=x onerror=alert(2)>\ud800&amp;</pre>'
 ONE_PIXEL = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010806000000"
@@ -58,10 +58,12 @@ def page_of(folder: Path) -> Seen:
     return Seen((folder / "index.html").read_text(encoding="utf-8"))
 
 
-def finished(folder: Path, part: Part, status: running.Status = "done", reason: str = "") -> Path:
+def finished(
+    folder: Path, part: ReportPart, status: running.Status = "done", reason: str = ""
+) -> Path:
     """A part's folder as an earlier run has left it."""
     place = folder / "parts" / part.name
-    record = running.Record(
+    record = running.RunRecord(
         part.command, provenance.versions(), provenance.machine(), "2026", "begun", 2.0, reason
     )
     running.prepare(place, record, fresh=True)
@@ -186,7 +188,7 @@ def test_text_of_results_never_becomes_markup(tmp_path, monkeypatch) -> None:
 
 def test_an_interruption_ends_the_command_and_what_it_was_in_is_gone_on_with(tmp_path) -> None:
     place = tmp_path / "loop"
-    wanted = running.Record("loop", {}, {}, "now")
+    wanted = running.RunRecord("loop", {}, {}, "now")
     running.prepare(place, wanted, fresh=False)
 
     def interrupt(seconds: float) -> None:
@@ -231,7 +233,9 @@ def test_every_experiment_is_a_part_or_is_left_out_with_a_reason() -> None:
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
 @pytest.mark.parametrize("quick", [False, True], ids=["whole", "quick"])
-def test_each_part_is_a_command_that_names_its_seeds(part: Part, quick: bool, tmp_path) -> None:
+def test_each_part_is_a_command_that_names_its_seeds(
+    part: ReportPart, quick: bool, tmp_path
+) -> None:
     experiment, *words = part.words(quick)
     parser = argparse.ArgumentParser(exit_on_error=False)
     import_module(MODULES[experiment]).add_arguments(parser)

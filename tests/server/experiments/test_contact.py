@@ -14,14 +14,14 @@ from hardware.robot_file import load_robot
 from hardware.sim.plant.obstacle import Socket
 from server.experiments import main
 from server.experiments.contact import command, free, picture
-from server.experiments.contact.flight import Trace, fly
+from server.experiments.contact.flight import ContactTrace, fly
 from server.experiments.contact.free import Free
 from server.experiments.contact.measure import gaps, row_of, settling, smooth, table_of, touching
 from server.experiments.contact.setting import (
     BAND_N,
     GO_S,
     STAY_S,
-    Scene,
+    ContactScene,
     Way,
     foretold_n,
     spring_n_m,
@@ -30,16 +30,16 @@ from server.experiments.paper.setup import flight as paper_flight
 from server.simulation.sensors import phone
 
 AMES = load_robot("ames")
-WALL = Scene("wall", 0.02, 0.05)
-SOCKET = Scene("socket", 0.02, 0.03, Socket())
+WALL = ContactScene("wall", 0.02, 0.05)
+SOCKET = ContactScene("socket", 0.02, 0.03, Socket())
 SOFT = Way("compliant 3 N", 3.0)
 TIMES = np.arange(0.005, 20.0, 0.005)
 
 
-def trace_of(force_n: np.ndarray, ended: str = "") -> Trace:
+def trace_of(force_n: np.ndarray, ended: str = "") -> ContactTrace:
     touches = force_n > 0.0
     depth = np.where(touches, 0.0, -0.02)
-    return Trace(TIMES, force_n, force_n, np.repeat(touches, 5), depth, 0.0 * depth, ended)
+    return ContactTrace(TIMES, force_n, force_n, np.repeat(touches, 5), depth, 0.0 * depth, ended)
 
 
 def pressed(force_n: float) -> np.ndarray:

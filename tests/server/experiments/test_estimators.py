@@ -11,8 +11,8 @@ import pytest
 
 from hardware.sim.world.metrics import judge
 from hardware.sim.world.sensors import events
-from hardware.sim.world.world import LEDS_IN_B, Setup, World
-from pipeline.signals import BodyImu, PhoneImu, Seen
+from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from server.common.text import table
 from server.control.ipc import PhoneImuInput
 from server.control.ipc_vision import SeenInput
@@ -65,19 +65,19 @@ def test_senseless_options_are_refused(words, capsys):
 
 def tape_of(world, period=0.005):
     """A tape as a recording of this world would give it."""
-    tape, waiting = recorded.Tape(), events(world)
+    tape, waiting = recorded.EstimatorInputs(), events(world)
     for now in np.arange(0.1, world.t[-1], period).tolist():
         heard = [sample for arrival, sample in waiting if arrival <= now]
         waiting = waiting[len(heard) :]
         messages = [PhoneImuInput.of(s) for s in heard if isinstance(s, PhoneImu)]
-        messages += [SeenInput.of(s) for s in heard if isinstance(s, Seen)]
+        messages += [SeenInput.of(s) for s in heard if isinstance(s, VisionMeasurement)]
         tape.tap(now, messages, [s for s in heard if isinstance(s, BodyImu)])
     return tape
 
 
 def test_against_later_pictures_an_honest_filter_is_found_honest():
     """Without truth, the pose that came later does: NEES near 6."""
-    world = World(Setup(seed=7, duration=5.0))
+    world = World(WorldOptions(seed=7, duration=5.0))
     tape = tape_of(world)
     track = recorded._track(tape, command.estimator_of("paper", LEDS_IN_B), 0.0)
     score = judge([track], 2.0)
@@ -86,13 +86,13 @@ def test_against_later_pictures_an_honest_filter_is_found_honest():
 
 
 def test_a_pose_that_is_not_later_than_the_prediction_judges_nothing():
-    world = World(Setup(seed=7, duration=2.0, picture_delay=(0.0, 0.001)))
+    world = World(WorldOptions(seed=7, duration=2.0, picture_delay=(0.0, 0.001)))
     tape = tape_of(world)
     track = recorded._track(tape, command.estimator_of("none", LEDS_IN_B), 0.0)
     assert np.isnan(track.now.e).all()
 
 
 def test_tables_are_aligned():
-    row = command.Row("x", 1.0, 2.0)
+    row = command.EstimatorRow("x", 1.0, 2.0)
     lines = table((("name", "estimator", "{}"), ("now_mm", "mm", "{:.2f}")), [row, replace(row)])
     assert lines.splitlines() == ["estimator    mm", "        x  1.00", "        x  1.00"]

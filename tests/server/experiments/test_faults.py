@@ -16,7 +16,7 @@ from server.experiments import main
 from server.experiments.faults import hazards, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import goals
-from server.experiments.faults.fault import Fault, Outcome, misses
+from server.experiments.faults.fault import Fault, FaultOutcome, misses
 from server.experiments.faults.live import LIVE, outcome_of
 from server.experiments.faults.measure import percentile, row_of
 from server.experiments.forked import ForkError, forked
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[3]
 DATAGRAMS = st.lists(st.binary(min_size=1, max_size=40), max_size=60)
 
 
-def outcome(**more: object) -> Outcome:
+def outcome(**more: object) -> FaultOutcome:
     usual: dict[str, object] = {
         "fault": "made up",
         "seed": 1,
@@ -37,7 +37,7 @@ def outcome(**more: object) -> Outcome:
         "thrust_n": 0.0,
         "words": "No word from the phone.",
     }
-    return Outcome(**(usual | more))  # type: ignore[arg-type]
+    return FaultOutcome(**(usual | more))  # type: ignore[arg-type]
 
 
 MADE_UP = Fault(

@@ -13,22 +13,22 @@ from hypothesis import strategies as st
 
 from pipeline.signals import Mode
 from server.experiments import main
-from server.experiments.gaps.flight import Case, Log, released
+from server.experiments.gaps.flight import Case, FlightLog, released
 from server.experiments.gaps.goals import goals, waits_longer_pct
-from server.experiments.gaps.measure import Flight, flight_of, row_of, spans
-from server.experiments.gaps.schedule import Gaps, WebRtcLine, WebSocketLine, heard_again
+from server.experiments.gaps.measure import FlightFigures, flight_of, row_of, spans
+from server.experiments.gaps.schedule import GapSchedule, WebRtcLine, WebSocketLine, heard_again
 from server.experiments.gaps.traces import MINUTE_S, Minute, minutes
 from server.experiments.gaps.vanish import Vanished
 from server.simulation.line import Kind
 
-GAPS = st.builds(Gaps, st.floats(0.01, 0.9), st.floats(2.0, 10.0), st.floats(0.0, 5.0))
+GAPS = st.builds(GapSchedule, st.floats(0.01, 0.9), st.floats(2.0, 10.0), st.floats(0.0, 5.0))
 TIMES = st.lists(st.floats(0.0, 40.0), min_size=2, max_size=60).map(sorted)
 KINDS: tuple[Kind, ...] = ("motion", "picture", "touch", "ping", "pong")
 
 
 @given(GAPS, TIMES)
 def test_by_webrtc_what_is_sent_in_a_gap_is_lost_and_all_else_comes_at_once(
-    gaps: Gaps, times: list[float]
+    gaps: GapSchedule, times: list[float]
 ) -> None:
     for t in times:
         assert WebRtcLine(gaps).out(t, "motion") == (None if gaps.dark(t) else t)
@@ -38,7 +38,7 @@ def test_by_webrtc_what_is_sent_in_a_gap_is_lost_and_all_else_comes_at_once(
 
 @given(GAPS, TIMES, st.sampled_from(KINDS))
 def test_by_websocket_nothing_is_lost_and_the_order_is_kept(
-    gaps: Gaps, times: list[float], kind: Kind
+    gaps: GapSchedule, times: list[float], kind: Kind
 ) -> None:
     line = WebSocketLine(gaps)
     came = [line.out(t, kind) for t in times]
@@ -95,12 +95,14 @@ def test_a_release_is_never_faster_than_allowed_and_ends() -> None:
     assert lefts[-1] < 1e-3
 
 
-def log_of(modes: list[Mode], body_y: list[float], reference_y: list[float] | None = None) -> Log:
+def log_of(
+    modes: list[Mode], body_y: list[float], reference_y: list[float] | None = None
+) -> FlightLog:
     def places(ys: list[float]) -> list[np.ndarray]:
         return [np.array([0.0, y, 0.0]) for y in ys]
 
     zeros = [0.0] * len(modes)
-    return Log(
+    return FlightLog(
         t=(0.005 * np.arange(len(modes))).tolist(),
         mode=modes,
         body_in_f=places(body_y),
@@ -149,9 +151,9 @@ def test_runs_are_found_at_both_ends_and_in_between() -> None:
     assert spans(np.zeros(3, dtype=np.bool_)) == []
 
 
-def flown(**figures: float) -> Flight:
-    usual = dict.fromkeys(Flight.__slots__, 0.0) | {"follows_pct": 99.0, "reasons": ()}
-    return Flight(**(usual | figures))  # type: ignore[arg-type]
+def flown(**figures: float) -> FlightFigures:
+    usual = dict.fromkeys(FlightFigures.__slots__, 0.0) | {"follows_pct": 99.0, "reasons": ()}
+    return FlightFigures(**(usual | figures))  # type: ignore[arg-type]
 
 
 def test_goals_are_met_or_missed_by_the_figures_and_silent_about_what_was_not_flown() -> None:

@@ -17,7 +17,7 @@ from server.experiments import main
 from server.experiments.network import command
 from server.experiments.network.figures import FRESH_S, Arrivals, drops, percentile, recovery
 from server.experiments.network.run import Run, RunError
-from server.experiments.network.scenarios import SCENARIOS, Goals
+from server.experiments.network.scenarios import SCENARIOS, LinkGoals
 
 RATE_HZ = 30.0
 DELAYS = st.lists(st.floats(0.0, 0.5), min_size=2, max_size=60)
@@ -89,7 +89,7 @@ def test_percentiles_of_nothing_and_of_forever():
 
 
 def test_a_row_judges_the_path_by_webrtc_by_its_goals_alone():
-    goals = Goals(frame_p95_ms=100.0, drops_pct=2.0, recovery_s=0.5)
+    goals = LinkGoals(frame_p95_ms=100.0, drops_pct=2.0, recovery_s=0.5)
     scenario = replace(SCENARIOS["clean"], goals=goals)
     slow = run_of(arrivals([0.15] * 60), fault_ends=[0.5])
     row = command.row_of(scenario, "webrtc", slow)

@@ -14,29 +14,29 @@ from hardware.robot_file import load_robot
 from server.cli import main
 from server.experiments.paper import comparison, disturbance, picture, table_1, table_4
 from server.experiments.paper.setup import assumptions, flight, published
-from server.experiments.paper.setup.flight import Push, Trace
-from server.experiments.paper.setup.measure import WINDOW_S, Setup, cell_of
+from server.experiments.paper.setup.flight import ExperimentTrace, Push
+from server.experiments.paper.setup.measure import WINDOW_S, ExperimentSetup, cell_of
 from server.experiments.paper.setup.variants import (
     WITH_EKF,
     WITH_VCI,
     WITHOUT_EKF,
-    Wishes,
+    VariantRequest,
     config_of,
     ours,
 )
 from server.simulation.sensors import PAPER, phone
 
 AMES = load_robot("ames")
-SETUP = Setup(AMES, PAPER, (1,))
+SETUP = ExperimentSetup(AMES, PAPER, (1,))
 
 
-def trace_of(error_mm: float, t: np.ndarray, ended: str = "") -> Trace:
+def trace_of(error_mm: float, t: np.ndarray, ended: str = "") -> ExperimentTrace:
     """Of a controller that errs by so much along x, and truly by half of it."""
     n = len(t)
     error = np.zeros((n, 6))
     error[:, 0] = 1e-3 * error_mm
     thrusts = np.full((n, 8), 0.5)
-    return Trace(
+    return ExperimentTrace(
         t, error, 0.5 * error, np.zeros((n, 3)), thrusts, np.zeros((n, 6)), np.zeros(n),
         np.zeros((n, 3)), ended,
     )  # fmt: skip
@@ -174,7 +174,7 @@ def test_beaten_flies_its_phones_with_the_pictures_asked_for() -> None:
 
 
 def test_wishes_are_flown() -> None:
-    wishes = Wishes("none", "paper_without_ekf", "full", 0.28, False)
+    wishes = VariantRequest("none", "paper_without_ekf", "full", 0.28, False)
     config = config_of(AMES, ours(phone(), wishes, "off"), phone())
     assert config.estimator == "none"
     assert config.gains is AMES.gains["paper_without_ekf"]
@@ -185,7 +185,7 @@ def test_wishes_are_flown() -> None:
 
 def test_every_number_says_what_it_rests_on() -> None:
     leaders = (PAPER, phone(), phone(pictures="h264"))
-    for setup in (Setup(AMES, leader, (1,)) for leader in leaders):
+    for setup in (ExperimentSetup(AMES, leader, (1,)) for leader in leaders):
         said = assumptions.json(assumptions.of(setup))
         assert {one["status"] for one in said} == {"known", "identified", "chosen"}
         assert len({one["what"] for one in said}) == len(said)

@@ -13,15 +13,21 @@ import pytest
 from hardware.robot_file import load_robot
 from server.cli import main
 from server.experiments.paper.setup import assumptions, published, task, trials
-from server.experiments.paper.setup.measure import Setup
+from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.task import Attempt
 from server.experiments.paper.setup.trials import flown, trials_of
-from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Wishes, config_of, ours
+from server.experiments.paper.setup.variants import (
+    WITH_EKF,
+    WITHOUT_EKF,
+    VariantRequest,
+    config_of,
+    ours,
+)
 from server.experiments.paper.table_3 import Study
 from server.simulation.sensors import PAPER, PERFECT
 
 AMES = load_robot("ames")
-SETUP = Setup(AMES, PAPER, (1, 2))
+SETUP = ExperimentSetup(AMES, PAPER, (1, 2))
 STEADY = replace(
     task.QUICKER, wander_m=0.0, wander_rad=0.0, tremor_rad=0.0, acuity_rad=1e-5, effort_noise=0.0
 )
@@ -95,7 +101,7 @@ def test_people_fly_five_times_each_way_in_opposite_orders_and_learn_all_the_whi
 
 
 def test_a_variant_of_ours_is_flown_with_as_much_practice_as_the_ekf() -> None:
-    listed = list(trials_of(SETUP, (WITH_EKF, ours(PAPER, Wishes()))))
+    listed = list(trials_of(SETUP, (WITH_EKF, ours(PAPER, VariantRequest()))))
     practice = {
         variant: [(t.name, t.number) for t in listed if t.variant == variant]
         for variant in ("with EKF", "ours")
@@ -128,7 +134,7 @@ def test_the_statements_are_those_of_the_paper() -> None:
 
 
 def test_its_json_has_no_nan_and_every_attempt() -> None:
-    listed = trials_of(SETUP, (WITHOUT_EKF, WITH_EKF, ours(PAPER, Wishes())))
+    listed = trials_of(SETUP, (WITHOUT_EKF, WITH_EKF, ours(PAPER, VariantRequest())))
     whole = Study(tuple((trial, came(10.0)) for trial in listed))
     assert isnan(whole.cells[2].paper)
     told = json.loads(json.dumps(whole.json(), allow_nan=False))

@@ -17,9 +17,9 @@ from pipeline.config import TeleopConfig
 from server.experiments import main
 from server.experiments.sweep import command, provenance, results, workers
 from server.experiments.sweep.errors import SweepError
-from server.experiments.sweep.results import Results
+from server.experiments.sweep.results import SweepResults
 from server.experiments.sweep.sweep_file import Sweep, examples, read
-from server.simulation.session import Figures, Outcome, Session, fly, prepared
+from server.simulation.session import Figures, SessionOutcome, SweepSession, fly, prepared
 from server.simulation.sweep_keys import RobotNumber, known_keys
 
 SHORT = """
@@ -39,7 +39,7 @@ def swept(folder: Path, text: str) -> Sweep:
     return read(path)
 
 
-def session(sweep: Sweep, index: int = 0) -> Session:
+def session(sweep: Sweep, index: int = 0) -> SweepSession:
     return sweep.sessions()[index]
 
 
@@ -87,7 +87,7 @@ def flown_here(monkeypatch, stop_after: int = 10**9) -> list[int]:
             if len(flown) == stop_after:
                 raise KeyboardInterrupt
             flown.append(one.index)
-            yield Outcome(one.index, Figures(1.0, 2.0 + one.index, 3.0), 0.5)
+            yield SessionOutcome(one.index, Figures(1.0, 2.0 + one.index, 3.0), 0.5)
 
     monkeypatch.setattr(command, "on_processes", here)
     return flown
@@ -109,13 +109,13 @@ def test_what_was_done_before_an_interruption_is_not_flown_again(tmp_path, capsy
 
 def test_a_line_that_a_crash_cut_off_is_flown_again(tmp_path):
     sweep = swept(tmp_path, SHORT)
-    with Results(tmp_path / "out", sweep) as begun:
+    with SweepResults(tmp_path / "out", sweep) as begun:
         begun.write(["sweep"], "nobody")
-        begun.add(Outcome(0, Figures(1.0, 2.0), 0.1))
+        begun.add(SessionOutcome(0, Figures(1.0, 2.0), 0.1))
     journal = tmp_path / "out" / "sessions.jsonl"
     whole = journal.read_text()
     journal.write_text(whole + '{"index": 1, "cpu')
-    with Results(tmp_path / "out", sweep) as again:
+    with SweepResults(tmp_path / "out", sweep) as again:
         assert set(again.done) == {0}
     assert journal.read_text() == whole
 
@@ -123,11 +123,11 @@ def test_a_line_that_a_crash_cut_off_is_flown_again(tmp_path):
 @pytest.mark.parametrize("line", ["bananas", '{"index": 1}', '{"index": 99'])
 def test_a_damaged_line_is_no_traceback(line, tmp_path):
     sweep = swept(tmp_path, SHORT)
-    with Results(tmp_path / "out", sweep) as begun:
+    with SweepResults(tmp_path / "out", sweep) as begun:
         begun.write(["sweep"], "nobody")
     (tmp_path / "out" / "sessions.jsonl").write_text(line + "\n")
     with pytest.raises(SweepError, match="a line is damaged"):
-        Results(tmp_path / "out", sweep)
+        SweepResults(tmp_path / "out", sweep)
 
 
 def test_another_sweep_in_the_same_folder_is_refused_and_says_why(tmp_path, capsys, monkeypatch):

@@ -7,23 +7,23 @@ import numpy as np
 import pytest
 
 from hardware.sim.scenes.scene import HD, SCENES, VGA
-from hardware.sim.scenes.video import Film
+from hardware.sim.scenes.video import RenderedVideo
 from pipeline.frames import R_co, exp
 from pipeline.signals import RelativePose
 from server.experiments.vision import main
 from server.experiments.vision.channel import Channel, Wire, channel
 from server.experiments.vision.errors import is_wrong, jacobian, measured
-from server.experiments.vision.learning import Learnt
-from server.experiments.vision.plain import Plain
-from server.experiments.vision.rows import Row, plain_values, row, text
+from server.experiments.vision.learning import LearningFigures
+from server.experiments.vision.plain import PlainTracker
+from server.experiments.vision.rows import VisionRow, plain_values, row, text
 from server.experiments.vision.verdicts import PLAIN, verdicts, verdicts_on_learning
-from server.experiments.vision.watch import Eye, Record, watch
+from server.experiments.vision.watch import ChannelRun, SceneRecord, watch
 from server.experiments.vision.write import write_film
 
 
 @pytest.fixture(scope="module")
 def film():
-    return Film(SCENES["clean"], 3, VGA, 2, bound=True)
+    return RenderedVideo(SCENES["clean"], 3, VGA, 2, bound=True)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def pose_off(shot, dp=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0), sigma=1e-3):
     return RelativePose(shot.t, p, R, sigma**2 * np.eye(6), 0.1, 5)
 
 
-FLAWLESS = Row(
+FLAWLESS = VisionRow(
     scene="clean", width=1280, height=720, channel="raw", frames=30_000, solvable=100, found=100,
     found_percent=100.0, fresh_percent=100.0, wrong=0, undecoded=0, lateral_mm=0.01,
     depth_mm=0.01, turn_deg=0.001, lateral_p95_mm=0.1, depth_p95_mm=0.1, turn_p95_deg=0.1,
@@ -83,7 +83,7 @@ def test_effective_pixel_noise_is_that_of_the_pixels_behind_the_error(film, shot
         step = np.linalg.lstsq(J, rng.normal(0.0, 0.2, len(J)), rcond=None)[0]
         pose = pose_off(shot, step[:3], step[3:])
         found.append(measured(pose, shot, film.camera, film.leds_in_b))
-    record = Record("clean", VGA, "raw", errors=found)
+    record = SceneRecord("clean", VGA, "raw", errors=found)
     assert row(record).effective_px == pytest.approx(0.2, rel=0.1)
 
 
@@ -114,7 +114,7 @@ def test_a_picture_arrives_like_itself(shot):
 
 
 def test_plain_opencv_follows_a_clean_robot(film, shot):
-    script = Plain(film.camera, film.leds_in_b)
+    script = PlainTracker(film.camera, film.leds_in_b)
     pose = script.look(shot)
     assert pose is not None
     assert not is_wrong(pose, shot)
@@ -167,8 +167,8 @@ def test_what_was_not_run_is_unknown_and_plain_opencv_is_not_judged():
 
 
 def test_what_is_learnt_is_judged_by_the_worst_film():
-    good = Learnt(0, 0.020, 0.010, 0.021, 0.012, 0.013)
-    bad = Learnt(1, 0.020, 0.010, 0.010, 0.012, 0.020)
+    good = LearningFigures(0, 0.020, 0.010, 0.021, 0.012, 0.013)
+    bad = LearningFigures(1, 0.020, 0.010, 0.010, 0.012, 0.020)
     assert [v.met for v in verdicts_on_learning([good])] == [True, True]
     assert [v.met for v in verdicts_on_learning([good, bad])] == [False, False]
 
@@ -179,13 +179,13 @@ def test_values_for_files_have_no_nan():
 
 
 def test_records_of_films_add_up(shot):
-    one, two = (Record("clean", VGA, "raw", frames=n, returns=[n]) for n in (2, 3))
+    one, two = (SceneRecord("clean", VGA, "raw", frames=n, returns=[n]) for n in (2, 3))
     one.add(two)
     assert (one.frames, one.returns, one.scene) == (5, [2, 3], "clean")
 
 
 def test_a_return_counts_pictures_until_found(film, shot):
-    eye = Eye(film, Channel("raw"))
+    eye = ChannelRun(film, Channel("raw"))
     away, here = replace(shot, solvable=False), shot
     for seen, is_found in [(away, False)] * 3 + [(here, False), (here, False), (here, True)]:
         eye._count_return(seen, is_found)
@@ -193,7 +193,7 @@ def test_a_return_counts_pictures_until_found(film, shot):
 
 
 def test_a_short_gap_is_no_return_and_one_never_found_counts_whole(film, shot):
-    eye = Eye(film, Channel("raw"))
+    eye = ChannelRun(film, Channel("raw"))
     away, here = replace(shot, solvable=False), shot
     for seen, is_found in [(away, False), (here, True)]:
         eye._count_return(seen, is_found)

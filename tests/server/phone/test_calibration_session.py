@@ -8,10 +8,10 @@ import pytest
 
 from hardware.camera_file import CAMERAS, load_camera
 from pipeline.signals import Mode
-from server.phone.calibration_control import Desk
-from server.phone.calibration_session import Wizard
+from server.phone.calibration_control import CalibrationControl
+from server.phone.calibration_session import CalibrationSession
 from server.phone.ingest import EncodedFrame
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.messages import Hello, decode_from_server, encode_message
 from server.protocol.wire import MAX_MESSAGE_BYTES, VERSION, WireError
@@ -37,7 +37,7 @@ def board():
 @pytest.fixture
 def wizard(tmp_path):
     wanted = []
-    made = Wizard("a phone", SHAPE, tmp_path, lambda _n: None, lambda: wanted.append(1))
+    made = CalibrationSession("a phone", SHAPE, tmp_path, lambda _n: None, lambda: wanted.append(1))
     made.wanted = wanted
     yield made
     made.stop()
@@ -76,7 +76,7 @@ def test_a_thread_that_died_is_a_refusal(wizard):
 @pytest.mark.slow
 def test_enough_is_solved_in_a_process_and_stored(tmp_path, board):
     phone, shape = Phone(), (1280, 720, 90)
-    wizard = Wizard("a phone", shape, tmp_path, lambda _n: None, lambda: None)
+    wizard = CalibrationSession("a phone", shape, tmp_path, lambda _n: None, lambda: None)
     try:
         for view in corner_film(phone, Motion(seed=1), 12.0, 15.0):
             wizard._guide.add(view.t, view)
@@ -97,7 +97,7 @@ def test_enough_is_solved_in_a_process_and_stored(tmp_path, board):
 
 @pytest.mark.slow
 def test_a_solver_that_dies_is_a_refusal_and_leaves_nothing(tmp_path):
-    wizard = Wizard("a phone", (1280, 720, 90), tmp_path, lambda _n: None, lambda: None)
+    wizard = CalibrationSession("a phone", (1280, 720, 90), tmp_path, lambda _n: None, lambda: None)
     try:
         for view in corner_film(Phone(), Motion(seed=1), 12.0, 15.0):
             wizard._guide.add(view.t, view)
@@ -117,7 +117,7 @@ class Front:
     def __init__(self, profiles):
         hello = Hello(VERSION, "operator", "Nobody's phone")
         self.taken = []
-        self.phone = OperatorPhone(
+        self.phone = PhoneSession(
             hello,
             ROBOT,
             [profiles, CAMERAS],
@@ -128,7 +128,7 @@ class Front:
             profiles,
         )
         self.told = []
-        self.desk = Desk(lambda text: self.told.append(decode_from_server(text)))
+        self.desk = CalibrationControl(lambda text: self.told.append(decode_from_server(text)))
 
     def see(self, sequence, luma, shape=SHAPE):
         self.phone._see(frame(sequence, luma, shape), 50.0)

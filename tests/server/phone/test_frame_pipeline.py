@@ -8,12 +8,12 @@ import pytest
 import hardware
 from hardware.codec import Encoder
 from hardware.robot_file import load_robot
-from pipeline.camera.extrinsics import Mounting
+from pipeline.camera.extrinsics import Extrinsics
 from pipeline.frames import GRAVITY, exp
-from pipeline.prediction import Expected
+from pipeline.prediction import Prediction
 from pipeline.signals import PhoneImu, StampOffset
 from pipeline.vision_config import GatesConfig
-from server.phone.frame_pipeline import Sight
+from server.phone.frame_pipeline import FramePipeline
 from server.phone.ingest import ARRIVAL_S, EncodedFrame
 from server.protocol.wire_records import Codec, Picture
 from tests.pipeline.seeing import CAMERA, is_wrong, moved, picture, truth_at
@@ -25,7 +25,7 @@ CODECS = {"h264": Codec.H264, "vp8": Codec.VP8, "jpeg": Codec.JPEG}
 
 
 def sight(**gates):
-    return Sight(CAMERA, ROBOT, GatesConfig(**gates))
+    return FramePipeline(CAMERA, ROBOT, GatesConfig(**gates))
 
 
 def encoder(codec="h264"):
@@ -73,8 +73,8 @@ def test_encoded_pictures_become_poses(codec):
 
 def test_pictures_are_dated_as_the_profile_of_the_camera_says():
     rng = np.random.default_rng(80)
-    camera = replace(CAMERA, mounting=Mounting(np.eye(3), time_offset_s=-0.02))
-    eye = Sight(camera, ROBOT, GatesConfig())
+    camera = replace(CAMERA, mounting=Extrinsics(np.eye(3), time_offset_s=-0.02))
+    eye = FramePipeline(camera, ROBOT, GatesConfig())
     frame, truth = next(iter(shots(rng, 1)))
     assert look(eye, [frame], truth).t == pytest.approx(frame.t - 0.02)
 
@@ -170,7 +170,7 @@ def test_why_nothing_is_seen_is_passed_on():
 def test_the_stages_are_timed():
     rng = np.random.default_rng(89)
     ticks = count()
-    eye = Sight(CAMERA, ROBOT, GatesConfig(), lambda: next(ticks))
+    eye = FramePipeline(CAMERA, ROBOT, GatesConfig(), lambda: next(ticks))
     ((frame, truth),) = shots(rng, 1)
     assert set(look(eye, [frame], truth).took_s) == {"decode", "detect", "identify", "pose"}
 
@@ -190,7 +190,7 @@ def test_a_few_leds_where_control_expects_them_are_rays_without_a_pose():
     eye, truth, camera_side = sight(), truth_at(rng), encoder()
     for k in range(8):
         for t in (k * DT - 0.01, k * DT + 0.01):
-            eye.expect(Expected(t, truth.p, truth.R, ZERO, 0.005, 0.005))
+            eye.expect(Prediction(t, truth.p, truth.R, ZERO, 0.005, 0.005))
         covered = () if k < 3 else (0, 2, 4)
         shot = sent(k, *camera_side.encode(picture(truth, rng, covered=covered)))
         sighting = look(eye, [shot], truth)

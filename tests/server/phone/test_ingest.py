@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.camera.extrinsics import Mounting
+from pipeline.camera.extrinsics import Extrinsics
 from pipeline.frames import GRAVITY, exp
-from pipeline.signals import Operator, PhoneImu
+from pipeline.signals import PhoneImu, TouchState
 from server.phone.ingest import REMEMBERED_NONCES, EncodedFrame, Ingest
 from server.protocol.wire import WireError
 from server.protocol.wire_records import Codec, Motion, Picture, Ping, Pong, Record, Touch
@@ -85,7 +85,7 @@ def test_looking_along_the_back_of_the_phone_is_forward() -> None:
 
 def test_motion_comes_out_in_the_axes_of_a_camera_that_sits_askew() -> None:
     ingest, R_ci = synchronised(), exp(np.array([0.05, -0.04, 0.03]))
-    ingest.mounting = Mounting(R_ci)
+    ingest.mounting = Extrinsics(R_ci)
     motion = replace(FLAT, rotation_rate=(0.1, -0.2, 0.3))
     sample, plain = (
         one.record(Record(1, at(1.0), motion), 1.0) for one in (ingest, synchronised())
@@ -100,7 +100,7 @@ def test_the_operator_is_as_old_as_the_nonce_it_echoes() -> None:
     ingest = synchronised()
     ping = ingest.ping(2.0)
     said = ingest.record(Record(9, at(2.5), Touch(True, True, 4, nonce_of(ping))), 2.5)
-    assert isinstance(said, Operator)
+    assert isinstance(said, TouchState)
     assert (said.t, said.held, said.press & 0xFFFFFFFF) == (2.0, True, 4)
 
 
@@ -122,7 +122,7 @@ def test_the_first_press_of_another_phone_is_another_press() -> None:
         ingest = Ingest(lambda numbers=nonces: next(numbers))
         nonce = nonce_of(ingest.ping(2.0))
         said = ingest.record(Record(1, 1, Touch(True, True, 1, nonce)), 2.0)
-        assert isinstance(said, Operator)
+        assert isinstance(said, TouchState)
         presses.append(said.press)
     assert presses[0] != presses[1]
 
@@ -131,7 +131,7 @@ def test_a_hidden_page_holds_nothing() -> None:
     ingest = synchronised()
     nonce = nonce_of(ingest.ping(2.0))
     said = ingest.record(Record(9, 1, Touch(True, False, 4, nonce)), 2.5)
-    assert isinstance(said, Operator)
+    assert isinstance(said, TouchState)
     assert not said.held
 
 

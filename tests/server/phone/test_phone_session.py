@@ -14,12 +14,12 @@ from pipeline.camera import verdict as camera_verdict
 from pipeline.estimation import sensor_validation
 from pipeline.frames import exp
 from pipeline.signals import LedRays, RelativePose, Spots
-from pipeline.vision.detection import Sighting
+from pipeline.vision.detection import Detection
 from pipeline.vision.rays import NO_RAYS
 from server.control.ipc import OperatorInput, PhoneImuInput
 from server.control.ipc_vision import SeenInput
 from server.phone.ingest import EncodedFrame
-from server.phone.phone_session import STALE_S, OperatorPhone
+from server.phone.phone_session import STALE_S, PhoneSession
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.messages import Hello
 from server.protocol.wire import VERSION, WireError
@@ -41,7 +41,7 @@ class Rig:
         self.to_control: list[object] = []
         self.taken: list[int] = []
         hello = Hello(VERSION, "operator", device)
-        self.phone = OperatorPhone(
+        self.phone = PhoneSession(
             hello,
             ROBOT,
             [cameras],
@@ -199,8 +199,8 @@ SHOT = EncodedFrame(49.9, 50.0, 1, JPEG)
 FEW = rays_at(49.9, np.array([2.5, 0.0, 0.0]), np.eye(3), leds=[0, 2])
 
 
-def sighting_of(pose: RelativePose | None, rays: LedRays) -> Sighting:
-    return Sighting(49.9, pose, rays, NO_SPOTS, None, "2 of 5 LEDs seen.")
+def sighting_of(pose: RelativePose | None, rays: LedRays) -> Detection:
+    return Detection(49.9, pose, rays, NO_SPOTS, None, "2 of 5 LEDs seen.")
 
 
 def test_a_few_leds_reach_control_without_a_pose_and_nothing_as_nothing(rig):

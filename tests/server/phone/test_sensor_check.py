@@ -14,13 +14,13 @@ from hardware.camera_file import CAMERAS, find_camera
 from hardware.codec import Encoder
 from hardware.sim.hand import MovingHand, Waves, make_hand
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
-from hardware.sim.phone_faults import Fault
-from hardware.sim.render import Look
+from hardware.sim.phone_faults import SensorFault
+from hardware.sim.render import RenderOptions
 from pipeline.estimation import sensor_validation
 from pipeline.estimation.attitude import Attitude
 from pipeline.frames import R_cd, R_from_wxyz, exp, log, wxyz_from_R
 from server.control.ipc import PhoneImuInput
-from server.phone.phone_session import OperatorPhone
+from server.phone.phone_session import PhoneSession
 from server.protocol.messages import Hello
 from server.protocol.wire import VERSION, decode, encode
 from server.protocol.wire_records import Motion, Ping
@@ -50,18 +50,18 @@ def waving():
 
 
 class Rig:
-    """A virtual phone whose bytes reach an `OperatorPhone` in virtual time."""
+    """A virtual phone whose bytes reach an `PhoneSession` in virtual time."""
 
-    def __init__(self, fault=Fault.NONE, hand=None):
+    def __init__(self, fault=SensorFault.NONE, hand=None):
         self.t, self.heard = 0.0, []
         options = PhoneOptions(fault=fault, frame_rate_hz=10.0)
         camera = find_camera(DEVICE, *SIZE)
         hand = hand or make_hand("steady")
         rng = np.random.default_rng(1)
-        phone = VirtualPhone(camera, hand, ROBOT.leds_in_b, Look(), rng, options)
+        phone = VirtualPhone(camera, hand, ROBOT.leds_in_b, RenderOptions(), rng, options)
         encoder = Encoder(*SIZE, 10.0, 1_000_000, "jpeg")
         self.script = PhoneScript(phone, encoder, VirtualOperator())
-        self.phone = OperatorPhone(
+        self.phone = PhoneSession(
             Hello(VERSION, "operator", DEVICE),
             ROBOT,
             [CAMERAS],
@@ -124,33 +124,38 @@ def test_a_good_phone_may_arm_as_soon_as_the_robot_was_seen(rig):
 
 
 def test_the_sign_of_ios_is_refused_and_named(rig):
-    assert rig(Fault.IOS_SIGN, tilted(12.0)).run(2.6) == [sensor_validation.SIGN]
+    assert rig(SensorFault.IOS_SIGN, tilted(12.0)).run(2.6) == [sensor_validation.SIGN]
 
 
 def test_a_level_phone_with_that_sign_is_refused_too(rig):
-    assert rig(Fault.IOS_SIGN, make_hand("still")).run(2.6) == [sensor_validation.SIGN_OR_TURN]
+    assert rig(SensorFault.IOS_SIGN, make_hand("still")).run(2.6) == [
+        sensor_validation.SIGN_OR_TURN
+    ]
 
 
 def test_a_wrong_screen_angle_is_refused_and_named(rig):
-    (why,) = rig(Fault.SCREEN_ANGLE).run(2.6)
+    (why,) = rig(SensorFault.SCREEN_ANGLE).run(2.6)
     assert "told as 0°, it is 90°" in why
 
 
 @pytest.mark.parametrize(
     ("fault", "words"),
-    [(Fault.NO_GRAVITY, sensor_validation.NO_GRAVITY), (Fault.G_UNITS, sensor_validation.G_UNITS)],
+    [
+        (SensorFault.NO_GRAVITY, sensor_validation.NO_GRAVITY),
+        (SensorFault.G_UNITS, sensor_validation.G_UNITS),
+    ],
 )
 def test_an_acceleration_that_is_none_is_refused_and_named(rig, fault, words):
     assert words in rig(fault).run(2.0, pictures=False)
 
 
 def test_mixed_up_rates_are_refused_and_named_once_the_hand_has_turned(rig):
-    (why,) = rig(Fault.RATE_ORDER, waving()).run(4.5)
+    (why,) = rig(SensorFault.RATE_ORDER, waving()).run(4.5)
     assert why == sensor_validation.RATES.format(words="+y, +z, +x")
 
 
 def test_a_good_phone_that_turns_alike_may_arm(rig):
-    assert rig(Fault.NONE, waving()).run(4.5) == []
+    assert rig(SensorFault.NONE, waving()).run(4.5) == []
 
 
 def test_a_jump_of_the_magnetometer_moves_nothing():

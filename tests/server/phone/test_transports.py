@@ -1,6 +1,6 @@
 """Pictures by two ways: those of one count, and a change begins with a key picture."""
 
-from server.phone.transports import KEY_WANTED, PhonePaths, PictureWay
+from server.phone.transports import KEY_WANTED, ImageTransport, Transports
 from server.protocol.wire import decode
 from server.protocol.wire_records import Credit
 from tests.server.web.test_session_manager import Fast
@@ -21,7 +21,7 @@ class Page:
 
 
 def house():
-    paths, operator, video, fast = PhonePaths(lambda _: None), Page(), Page(), Fast()
+    paths, operator, video, fast = Transports(lambda _: None), Page(), Page(), Fast()
     paths.begin(operator)
     paths.join_video(video)
     paths.use(fast)
@@ -32,7 +32,7 @@ FAST, SOCKET = True, False
 
 
 def test_the_way_changes_only_with_a_key_picture_taken_after_all_that_were_seen():
-    way = PictureWay()
+    way = ImageTransport()
     story = [
         (SOCKET, 10, True, True),
         (SOCKET, 20, False, True),

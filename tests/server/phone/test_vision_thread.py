@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pipeline.signals import Match, Spots
-from pipeline.vision.detection import Sighting
+from pipeline.vision.detection import Detection
 from pipeline.vision.rays import NO_RAYS
 from server.phone import frame_worker
 from server.phone.frame_worker import MAX_WAITING
@@ -29,7 +29,7 @@ def frame(sequence: int, key: bool = False) -> EncodedFrame:
 
 
 class Eyes:
-    """A `Sight` that waits for permission before each look."""
+    """A `FramePipeline` that waits for permission before each look."""
 
     def __init__(self) -> None:
         self.needs_key = True
@@ -42,7 +42,7 @@ class Eyes:
 
     def feel(self, sample: object) -> None: ...
 
-    def see(self, frames: list[EncodedFrame], up: object, omega: object) -> Sighting | None:
+    def see(self, frames: list[EncodedFrame], up: object, omega: object) -> Detection | None:
         self.looking.release()
         assert self.may.acquire(timeout=5.0)
         if self.fails:
@@ -51,7 +51,7 @@ class Eyes:
         if self.needs_key and not frames[0].picture.key:
             return None
         self.needs_key = False
-        return Sighting(frames[-1].t, None, NO_RAYS, NO_SPOTS, None, "Nothing.")
+        return Detection(frames[-1].t, None, NO_RAYS, NO_SPOTS, None, "Nothing.")
 
 
 class Rig:
@@ -229,7 +229,7 @@ def test_found_lights_and_others_are_circled_in_different_colours():
     pixels = np.array([[320.0, 360.0], [960.0, 360.0]])
     spots = Spots(pixels, np.zeros((2, 2, 2)), np.ones(2), np.ones(2))
     match = Match(np.array([0]), np.array([1]))
-    picture = draw(luma, Sighting(0.0, None, NO_RAYS, spots, match, ""))
+    picture = draw(luma, Detection(0.0, None, NO_RAYS, spots, match, ""))
     assert picture.shape == (270, THUMBNAIL_WIDTH, 3)
     left, right = picture[:, :240].reshape(-1, 3), picture[:, 240:].reshape(-1, 3)
     assert left.sum(axis=0).argmax() == 0

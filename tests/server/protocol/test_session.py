@@ -13,7 +13,14 @@ from hypothesis import strategies as st
 
 from server.protocol import wire, wire_records
 from server.protocol.messages import Command, Hello, Log, Tune, encode_message
-from server.protocol.session import BYTES_HZ, MAX_FAULTS, MESSAGES_HZ, RECORDS_HZ, Bucket, Session
+from server.protocol.session import (
+    BYTES_HZ,
+    MAX_FAULTS,
+    MESSAGES_HZ,
+    RECORDS_HZ,
+    Session,
+    TokenBucket,
+)
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import WireError
 from server.protocol.wire_records import Record
@@ -201,7 +208,7 @@ def test_what_is_too_much_a_second_is_refused_and_what_is_not_is_taken(
 def test_a_bucket_never_gives_more_than_its_burst_and_its_rate(
     gaps: list[float], rate: float
 ) -> None:
-    bucket, t, taken = Bucket(rate, burst=rate), 0.0, 0
+    bucket, t, taken = TokenBucket(rate, burst=rate), 0.0, 0
     for gap in gaps:
         t += gap
         taken += bucket.take(t)
@@ -209,7 +216,7 @@ def test_a_bucket_never_gives_more_than_its_burst_and_its_rate(
 
 
 def test_a_clock_that_goes_back_gives_nothing() -> None:
-    bucket = Bucket(1.0, burst=1.0)
+    bucket = TokenBucket(1.0, burst=1.0)
     assert bucket.take(100.0)
     assert not bucket.take(0.0)
     assert not bucket.take(0.5)

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from pipeline.signals import Operator, PhoneImu
+from pipeline.signals import PhoneImu, TouchState
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.messages import encode_message
 from server.protocol.wire import decode, encode
@@ -85,7 +85,7 @@ def test_latencies_are_the_recorded_ones_at_the_speed_of_the_replay(flight, spee
         if isinstance(signal, PhoneImu | EncodedFrame):
             latencies.append((t - signal.t, recorded.latency_s / speed))
         kinds.add(type(signal))
-    assert kinds == {PhoneImu, EncodedFrame, Operator}
+    assert kinds == {PhoneImu, EncodedFrame, TouchState}
     now, then = np.array(latencies).T
     assert np.abs(now - then).max() < 1e-3
     phone = [r for r in records if not isinstance(r.record.body, Pong)]

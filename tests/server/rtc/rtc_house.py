@@ -17,7 +17,7 @@ from server.common.clock import now
 from server.common.settings import RtcSettings, VideoSettings
 from server.protocol.messages import Status
 from server.protocol.wire_records import Motion, Picture, Pong, Record, Touch
-from server.rtc.signalling_endpoint import RtcDesk
+from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.request_guard import Guard
 from server.view.viser_proxy import routes as view_routes
 from server.virtual_phone.phone_script import CODECS, DEVICE
@@ -35,7 +35,7 @@ class RtcHouse(House):
 
     def __init__(self, folder: Path, settings: RtcSettings | None = None) -> None:
         super().__init__(folder)
-        self.desk = RtcDesk(self.hub, settings or RtcSettings(), 3_000_000)
+        self.desk = SignallingEndpoint(self.hub, settings or RtcSettings(), 3_000_000)
         pages = PageServer(self.hub, VideoSettings())
         routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.desk.routes()]
         self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])

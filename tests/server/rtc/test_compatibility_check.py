@@ -7,7 +7,7 @@ from aiortc import RTCConfiguration, RTCPeerConnection
 from aiortc.rtcrtpsender import RTCRtpSender
 
 from server.rtc import compatibility_check
-from server.rtc.receiver_adapter import Intake
+from server.rtc.receiver_adapter import ReceiverAdapter
 from server.virtual_phone.rtc_client import RTP_TIMESTAMP
 
 
@@ -32,7 +32,7 @@ def test_its_own_parts_have_the_shape_of_ours():
     def look(transceiver):
         receiver = transceiver.receiver
         stock = [getattr(receiver, name) for name in compatibility_check.REPLACED]
-        intake = Intake(receiver, lambda *_: True, lambda _: None, lambda: None)
+        intake = ReceiverAdapter(receiver, lambda *_: True, lambda _: None, lambda: None)
         ours = [getattr(receiver, name) for name in compatibility_check.REPLACED]
         assert ours[0] is intake
         assert ours[2] is None
@@ -56,7 +56,9 @@ def test_a_part_that_is_gone_is_named(monkeypatch):
         (*compatibility_check.REPLACED, "_RTCRtpReceiver__crystal_ball"),
     )
     with pytest.raises(compatibility_check.AiortcMismatchError, match="crystal_ball") as refused:
-        with_connection(lambda t: Intake(t.receiver, lambda *_: True, lambda _: None, lambda: None))
+        with_connection(
+            lambda t: ReceiverAdapter(t.receiver, lambda *_: True, lambda _: None, lambda: None)
+        )
     assert "Install the locked version" in str(refused.value)
 
 

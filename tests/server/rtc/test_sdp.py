@@ -16,18 +16,18 @@ from server.protocol.wire import WireError
 from server.protocol.wire_records import Codec
 from server.rtc.answer import MAX_BYTES, MAX_CANDIDATES, check_answer
 from server.rtc.offer import Bitrates, bitrates, tuned
-from server.rtc.peer import Listener, Peer
+from server.rtc.peer import PeerCallbacks, PeerConnection
 from server.virtual_phone.rtc_client import EncodedTrack
 
 SOURCE = "127.0.0.1"
-SILENT = Listener(*[lambda *_: None] * 5)
+SILENT = PeerCallbacks(*[lambda *_: None] * 5)
 
 
 def talk(settings=None, answering=None):
     """(offer, answer) of our peer and a page made of aiortc."""
 
     async def run():
-        peer = Peer(settings or RtcSettings(), 3_000_000, SILENT)
+        peer = PeerConnection(settings or RtcSettings(), 3_000_000, SILENT)
         page = RTCPeerConnection(RTCConfiguration(iceServers=[]))
         try:
             offer = await peer.offer()
@@ -169,7 +169,7 @@ def test_mutilated_answers_are_taken_or_refused_with_a_reason(descriptions):
     rng = random.Random(5)
 
     async def tell(sdp):
-        peer = Peer(RtcSettings(), 3_000_000, SILENT)
+        peer = PeerConnection(RtcSettings(), 3_000_000, SILENT)
         try:
             await peer.offer()
             await peer.answer(sdp, SOURCE)

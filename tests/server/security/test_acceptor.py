@@ -16,7 +16,7 @@ import pytest
 
 from server.security import acceptor
 from server.security.acceptor import Acceptor
-from server.security.admission import Admission, Limits
+from server.security.admission import Admission, AdmissionLimits
 from server.security.tls import certificate
 from tests.server.house import eventually
 
@@ -158,7 +158,7 @@ def test_who_shakes_hands_is_served_and_its_place_given_back(secure, with_tls):
 
 def test_a_flood_of_strangers_is_turned_away_at_once_and_others_are_served(secure):
     async def run():
-        limits = Limits(strangers=8, per_stranger=4)
+        limits = AdmissionLimits(strangers=8, per_stranger=4)
         async with door(secure.context, limits) as here:
             flood = [knock(here.port, STRANGER) for _ in range(300)]
             await eventually(lambda: here.admission.refused == 296)

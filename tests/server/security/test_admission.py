@@ -6,13 +6,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.security.admission import KNOWN_S, MAX_KNOWN, MAX_NETWORKS, Admission, Peer, network_of
-from server.security.places import OWN_HANDLES, Limits, limits_for
+from server.security.admission import (
+    KNOWN_S,
+    MAX_KNOWN,
+    MAX_NETWORKS,
+    Admission,
+    RemotePeer,
+    network_of,
+)
+from server.security.places import OWN_HANDLES, AdmissionLimits, limits_for
 
-LIMITS = Limits()
+LIMITS = AdmissionLimits()
 DOOR = 8443
 PHONE = "192.0.2.7"
-FEW = Limits(strangers=6, per_stranger=3, known=8, per_known=4, here=4)
+FEW = AdmissionLimits(strangers=6, per_stranger=3, known=8, per_known=4, here=4)
 
 
 class Street:
@@ -23,7 +30,7 @@ class Street:
         self.ended, self.ports = [], iter(range(1, 10**6))
 
     def come(self, host, now=0.0):
-        peer = Peer(host, next(self.ports), DOOR)
+        peer = RemotePeer(host, next(self.ports), DOOR)
         return self.admission.enter(peer, lambda: self.ended.append(peer), now)
 
     def flood(self, hosts, each, now=0.0):
@@ -69,7 +76,7 @@ def test_one_stranger_gets_no_more_than_its_own_places():
 
 def test_strangers_take_no_place_of_a_paired_phone_nor_of_this_machine():
     street = Street()
-    street.admission.may_ask(Peer(PHONE, 5, DOOR), True, 0.0)
+    street.admission.may_ask(RemotePeer(PHONE, 5, DOOR), True, 0.0)
     street.flood(attackers(250), 8)
     assert street.come(attackers(251)[250]) is None
     assert all(street.flood([PHONE, "127.0.0.1", "::1"], 32))
@@ -79,7 +86,7 @@ def test_phones_and_this_machine_take_no_place_of_each_other_even_when_each_show
     street = Street()
     phones = [f"192.0.2.{n}" for n in range(LIMITS.known // LIMITS.per_known + 1)]
     for host in phones:
-        street.admission.may_ask(Peer(host, 5, DOOR), True, 0.0)
+        street.admission.may_ask(RemotePeer(host, 5, DOOR), True, 0.0)
     for place in filter(None, street.flood(phones, LIMITS.per_known)):
         street.admission.may_ask(place.peer, True, 0.0)
     assert street.come(phones[-1]) is None
@@ -99,7 +106,7 @@ def test_phones_and_this_machine_take_no_place_of_each_other_even_when_each_show
 def test_connections_of_who_is_known_are_bounded_in_time_and_each_by_itself(host, hz):
     street, other, taken = Street(), "192.0.2.8", 0
     for known in (PHONE, other):
-        street.admission.may_ask(Peer(known, 5, DOOR), True, 0.0)
+        street.admission.may_ask(RemotePeer(known, 5, DOOR), True, 0.0)
     for tick in range(5000):
         place = street.come(host, 0.001 * tick)
         if place is not None:
@@ -110,7 +117,7 @@ def test_connections_of_who_is_known_are_bounded_in_time_and_each_by_itself(host
 
 
 def test_who_holds_most_gives_way_so_that_a_new_phone_gets_in():
-    street = Street(Limits(strangers=12, per_stranger=4))
+    street = Street(AdmissionLimits(strangers=12, per_stranger=4))
     assert all(street.flood(attackers(3), 4))
     assert street.come(PHONE, 9.0) is not None
     assert [peer.host for peer in street.ended] == [attackers(3)[2]]
@@ -118,7 +125,7 @@ def test_who_holds_most_gives_way_so_that_a_new_phone_gets_in():
 
 
 def test_equals_do_not_displace_each_other():
-    street = Street(Limits(strangers=4, per_stranger=4))
+    street = Street(AdmissionLimits(strangers=4, per_stranger=4))
     assert all(street.flood(attackers(4), 1))
     assert street.come(PHONE) is None
     assert street.ended == []
@@ -142,7 +149,7 @@ def test_connections_of_strangers_are_bounded_in_time_too():
 
 
 def test_of_one_known_address_the_oldest_without_a_role_gives_way():
-    street = Street(Limits(here=4))
+    street = Street(AdmissionLimits(here=4))
     first, second, *_ = street.flood(["127.0.0.1"], 4)
     street.admission.may_ask(first.peer, True, 0.0)
     assert street.come("127.0.0.1") is not None
@@ -150,7 +157,7 @@ def test_of_one_known_address_the_oldest_without_a_role_gives_way():
 
 
 def test_a_connection_that_showed_a_role_is_never_displaced():
-    street = Street(Limits(here=4))
+    street = Street(AdmissionLimits(here=4))
     for place in street.flood(["127.0.0.1"], 4):
         street.admission.may_ask(place.peer, True, 0.0)
     assert street.come("127.0.0.1") is None
@@ -169,10 +176,10 @@ def test_a_stranger_that_shows_a_role_becomes_known_with_all_its_connections():
 
 def test_an_address_is_forgotten_after_a_while_or_at_once_when_told():
     street = Street()
-    street.admission.may_ask(Peer(PHONE, 5, DOOR), True, 0.0)
+    street.admission.may_ask(RemotePeer(PHONE, 5, DOOR), True, 0.0)
     assert street.admission.is_known(PHONE, KNOWN_S - 1.0)
     assert not street.admission.is_known(PHONE, KNOWN_S + 1.0)
-    street.admission.may_ask(Peer(PHONE, 5, DOOR), True, 0.0)
+    street.admission.may_ask(RemotePeer(PHONE, 5, DOOR), True, 0.0)
     street.admission.forget(PHONE)
     assert not street.admission.is_known(PHONE, 0.0)
 
@@ -190,24 +197,26 @@ def test_a_strangers_requests_are_bounded_and_its_connection_ends():
 
 def test_requests_with_a_role_and_of_known_addresses_are_not_counted():
     street = Street()
-    peer = Peer(PHONE, 5, DOOR)
+    peer = RemotePeer(PHONE, 5, DOOR)
     assert all(street.admission.may_ask(peer, n % 2 == 0, 0.0) for n in range(5000))
-    assert all(street.admission.may_ask(Peer("::1", 1, DOOR), False, 0.0) for _ in range(5000))
+    assert all(
+        street.admission.may_ask(RemotePeer("::1", 1, DOOR), False, 0.0) for _ in range(5000)
+    )
 
 
 def test_what_is_remembered_of_strangers_is_bounded():
     street = Street()
     for n in range(3 * MAX_NETWORKS):
-        street.admission.may_ask(Peer(f"2001:db8:{n:x}::1", 1, DOOR), False, 0.0)
+        street.admission.may_ask(RemotePeer(f"2001:db8:{n:x}::1", 1, DOOR), False, 0.0)
     assert len(street.admission._own) == MAX_NETWORKS
     for n in range(3 * MAX_KNOWN):
-        street.admission.may_ask(Peer(f"10.0.0.{n}", 1, DOOR), True, 0.0)
+        street.admission.may_ask(RemotePeer(f"10.0.0.{n}", 1, DOOR), True, 0.0)
     assert len(street.admission._known) == MAX_KNOWN
 
 
 def test_the_same_address_and_port_again_replaces_the_connection_before():
     street = Street()
-    ended, peer = [], Peer(PHONE, 5, DOOR)
+    ended, peer = [], RemotePeer(PHONE, 5, DOOR)
     former = street.admission.enter(peer, lambda: ended.append(1), 0.0)
     newer = street.admission.enter(peer, lambda: ended.append(2), 1.0)
     street.admission.leave(former)
@@ -240,4 +249,4 @@ def test_places_fit_in_the_file_handles_there_are(handles):
     if handles >= OWN_HANDLES + 32:
         assert limits.strangers + limits.known <= handles - OWN_HANDLES
     if handles >= 512:
-        assert limits == Limits()
+        assert limits == AdmissionLimits()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
 from server.simulation.line import Kind, Transit
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 TICKS = st.lists(st.integers(0, 400), max_size=40).map(sorted)
 
@@ -68,7 +68,9 @@ class Dark:
 
 
 def test_a_dark_line_keeps_everything_of_the_phone_from_control() -> None:
-    loop = Lockstep(load_robot("ames"), TeleopConfig(), Scene(seed=3, led_noise_px=0.02))
+    loop = VirtualTimeSimulation(
+        load_robot("ames"), TeleopConfig(), SimulationOptions(seed=3, led_noise_px=0.02)
+    )
     loop.transit.line = Dark()
     ages = loop.advance().ages
     while loop.t < 1.5:

@@ -9,13 +9,13 @@ import pytest
 
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
-from server.simulation.trace import Trace
-from server.simulation.virtual_time import Lockstep, Scene
+from server.simulation.trace import TrackingTrace
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 
-def flight(seconds: float, seed: int = 5) -> Trace:
-    scene = Scene(hand="steady", seed=seed, codec="jpeg")
-    return Lockstep(load_robot("ames"), TeleopConfig(), scene).run(seconds)
+def flight(seconds: float, seed: int = 5) -> TrackingTrace:
+    scene = SimulationOptions(hand="steady", seed=seed, codec="jpeg")
+    return VirtualTimeSimulation(load_robot("ames"), TeleopConfig(), scene).run(seconds)
 
 
 def test_the_robot_keeps_its_pose_to_a_hand_that_tries_to_be_still() -> None:
@@ -35,14 +35,14 @@ def test_the_same_seed_flies_the_same_flight() -> None:
     np.testing.assert_array_equal(np.array(first.body_in_f), np.array(second.body_in_f))
 
 
-HALF_HIDDEN = Scene(
+HALF_HIDDEN = SimulationOptions(
     hand="moving", seed=6, codec="jpeg", hidden=((3.0, 3.6, (0, 2, 4)), (3.6, 4.0, (0, 1, 2, 3)))
 )
 
 
 @pytest.mark.slow
 def test_two_leds_and_then_one_are_enough_to_fly_on() -> None:
-    trace = Lockstep(load_robot("ames"), TeleopConfig(), HALF_HIDDEN).run(4.6)
+    trace = VirtualTimeSimulation(load_robot("ames"), TeleopConfig(), HALF_HIDDEN).run(4.6)
     assert trace.left == ""
     assert {0, 1, 2, 4, 5} >= set(trace.leds) >= {1, 2, 5}
     assert trace.leds.count(2) >= 16
@@ -53,7 +53,7 @@ def test_two_leds_and_then_one_are_enough_to_fly_on() -> None:
 
 
 def test_a_scene_says_which_leds_are_hidden_when() -> None:
-    scene = Scene(hidden=((1.0, 2.0, (0, 3)), (1.5, 3.0, (3, 4))))
+    scene = SimulationOptions(hidden=((1.0, 2.0, (0, 3)), (1.5, 3.0, (3, 4))))
     assert [scene.hidden_at(t) for t in (0.9, 1.0, 1.5, 2.0, 3.0)] == [
         (),
         (0, 3),
@@ -66,8 +66,8 @@ def test_a_scene_says_which_leds_are_hidden_when() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("change", [{"latency_s": (0.2, 0.2)}, {"readout_s": 0.03}], ids=str)
 def test_late_pictures_and_a_rolling_shutter_are_flown_with(change: dict[str, object]) -> None:
-    scene = replace(Scene(hand="moving", seed=7, codec="jpeg"), **change)  # type: ignore[arg-type]
-    trace = Lockstep(load_robot("ames"), TeleopConfig(), scene).run(4.5)
+    scene = replace(SimulationOptions(hand="moving", seed=7, codec="jpeg"), **change)  # type: ignore[arg-type]
+    trace = VirtualTimeSimulation(load_robot("ames"), TeleopConfig(), scene).run(4.5)
     assert trace.left == ""
     assert trace.poses > 0.95 * trace.pictures
     distances = np.linalg.norm(np.array(trace.error_in_f), axis=1)

@@ -10,12 +10,12 @@ import pytest
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
 from pipeline.frames import Array
-from pipeline.signals import PhoneImu, Seen
+from pipeline.signals import PhoneImu, VisionMeasurement
 from pipeline.vision_config import GatesConfig
 from server.experiments.paper.setup import flight
-from server.experiments.paper.setup.measure import Setup, cell_of
-from server.experiments.paper.setup.variants import Wishes, ours
-from server.simulation.sensor_rig import Rig
+from server.experiments.paper.setup.measure import ExperimentSetup, cell_of
+from server.experiments.paper.setup.variants import VariantRequest, ours
+from server.simulation.leader_sensor_model import LeaderSensorModel
 from server.simulation.sensors import Leader, Pictures, phone
 
 AMES = load_robot("ames")
@@ -27,12 +27,12 @@ def robot(t: float) -> tuple[Array, Array]:
     return np.eye(3), AT
 
 
-def looked(leader: Leader, seconds: float = 0.7) -> tuple[list[PhoneImu], list[Seen]]:
+def looked(leader: Leader, seconds: float = 0.7) -> tuple[list[PhoneImu], list[VisionMeasurement]]:
     """All that reaches control of a phone at rest, in periods of 5 ms."""
     hand = make_hand("still", seed=1, start=AMES.start)
-    rig = Rig(leader, hand, AMES.robot, GatesConfig(), seed=1)
+    rig = LeaderSensorModel(leader, hand, AMES.robot, GatesConfig(), seed=1)
     motions: list[PhoneImu] = []
-    pictures: list[Seen] = []
+    pictures: list[VisionMeasurement] = []
     for k in range(round(seconds / 0.005)):
         felt, seen = rig.arrivals(0.005 * k, 0.005 * (k + 1), robot)
         motions += felt
@@ -72,9 +72,9 @@ def test_a_codec_costs_less_than_a_fifth_of_the_error(
 ) -> None:
     monkeypatch.setattr(flight, "HOVER_S", 4.0)
     spots, film = phone(fps, latency_s), phone(fps, latency_s, "h264")
-    way = ours(film, Wishes())
+    way = ours(film, VariantRequest())
     near, far = (
-        cell_of("ours", "y", 1.0, Setup(AMES, leader, (1,)).fly(way, "step_y", 1.5))
+        cell_of("ours", "y", 1.0, ExperimentSetup(AMES, leader, (1,)).fly(way, "step_y", 1.5))
         for leader in (spots, film)
     )
     assert not far.ended

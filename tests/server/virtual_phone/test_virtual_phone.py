@@ -11,17 +11,17 @@ from hardware.camera_file import find_camera
 from hardware.codec import Encoder
 from hardware.sim.hand import make_hand
 from hardware.sim.phone import PERFECT, Event, EventKind, PhoneOptions, VirtualPhone
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import exp
-from pipeline.signals import Operator, PhoneImu
+from pipeline.signals import PhoneImu, TouchState
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.messages import encode_message
 from server.protocol.wire import decode, encode
 from server.protocol.wire_records import Codec, Motion, Picture, Ping, Pong, Record, Touch
 from server.virtual_phone.command import main, summary
 from server.virtual_phone.live_phone import EXPOSED_S, LivePhone, is_superseded
-from server.virtual_phone.phone_script import Manners, PhoneScript, Score, VirtualOperator
+from server.virtual_phone.phone_script import Manners, PhoneScript, TrackingMetrics, VirtualOperator
 from tests.server.page_server import WELCOME, PageServer, status
 
 LEDS_IN_B = np.array(
@@ -32,7 +32,9 @@ LEDS_IN_B = np.array(
 def make_script(kind="steady", codec="jpeg", options=None):
     camera = find_camera("lightleash-virtual-phone", 1280, 720)
     rng = np.random.default_rng(2)
-    phone = VirtualPhone(camera, make_hand(kind), LEDS_IN_B, Look(), rng, options or PhoneOptions())
+    phone = VirtualPhone(
+        camera, make_hand(kind), LEDS_IN_B, RenderOptions(), rng, options or PhoneOptions()
+    )
     return PhoneScript(
         phone, Encoder(camera.width, camera.height, 30.0, 3_000_000, codec), VirtualOperator()
     )
@@ -140,7 +142,7 @@ def test_touch_echoes_the_newest_nonce():
     record = decode(encode(script.touch(1.0)))
     assert isinstance(record.body, Touch)
     operator = ingest.record(record, 1.0)
-    assert isinstance(operator, Operator)
+    assert isinstance(operator, TouchState)
     assert operator.t == pytest.approx(0.95)
     assert not operator.held
 
@@ -278,7 +280,7 @@ def test_command_says_what_is_wrong(arguments, words, capsys):
 
 def test_a_robot_that_follows_exactly_scores_nothing():
     script = make_script("step_y")
-    score = Score(script.phone, VirtualCameraConfig())
+    score = TrackingMetrics(script.phone, VirtualCameraConfig())
     hand = script.phone.hand
     start = hand.pose(1.0)[1]
 
@@ -294,7 +296,7 @@ def test_a_robot_that_follows_exactly_scores_nothing():
 
 def test_a_robot_that_hangs_still_scores_the_hands_step():
     script = make_script("step_y")
-    score = Score(script.phone, VirtualCameraConfig())
+    score = TrackingMetrics(script.phone, VirtualCameraConfig())
     score.start(2.0, hanging_still)
     score.advance(3.0, hanging_still, counted=False)
     score.advance(5.0, hanging_still)
@@ -305,7 +307,7 @@ def test_a_robot_that_hangs_still_scores_the_hands_step():
 
 def test_a_turned_robot_scores_its_angle():
     script = make_script("still")
-    score = Score(script.phone, VirtualCameraConfig())
+    score = TrackingMetrics(script.phone, VirtualCameraConfig())
     score.start(1.0, hanging_still)
     score.advance(3.0, lambda _t: (exp(np.array([0.0, 0.0, 0.1])), np.zeros(3)))
     assert score.rms_rad == pytest.approx(0.1)

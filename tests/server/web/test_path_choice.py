@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from tests.server.house import house_in
 
 pytestmark = pytest.mark.e2e
@@ -17,7 +17,7 @@ def chosen(wish: str, by: str) -> dict[str, str]:
     return {"type": "path", "wish": wish, "by": by}
 
 
-def told(hub: Hub) -> list[str]:
+def told(hub: SessionManager) -> list[str]:
     return [event for event in hub.events if event.startswith("pictures")]
 
 

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from server.common.clock import now
-from server.common.runtime_parameters import Knobs
+from server.common.runtime_parameters import RuntimeParameters
 from server.protocol.messages import encode_message
 from server.web import status
 from server.web.status import LOST_S
@@ -80,7 +80,7 @@ def test_it_is_json_even_if_a_number_is_none(hub, bad):
 
 
 def test_the_knobs_are_shown_as_control_has_them_with_the_lag_they_cause(hub):
-    knobs = Knobs(0.28, "selective", 0.0, 1.0, guard=True)
+    knobs = RuntimeParameters(0.28, "selective", 0.0, 1.0, guard=True)
     turn = (cos(radians(5.0)), 0.0, 0.0, -sin(radians(5.0)))
     tell(hub, knobs=knobs, guarding=0.456, R_fc_wxyz=(-1.0, 0.0, 0.0, 0.0), R_fv_wxyz=turn)
     shown = status.build(hub).virtual_camera
@@ -91,7 +91,7 @@ def test_before_control_has_told_of_its_knobs_none_are_shown(hub):
     assert status.build(hub).virtual_camera is None
     tell(hub)
     assert status.build(hub).virtual_camera is None
-    tell(hub, knobs=Knobs(0.28, "full", 0.0, 1.0, guard=True))
+    tell(hub, knobs=RuntimeParameters(0.28, "full", 0.0, 1.0, guard=True))
     assert status.build(hub).virtual_camera.lag_deg is None
 
 

@@ -12,7 +12,7 @@ from server.control.ipc_vision import SeenInput
 from server.protocol.session import MAX_FAULTS
 from server.protocol.wire import MAX_RECORD_BYTES, encode
 from server.protocol.wire_records import Codec, Credit, Motion, Picture, Record, Touch
-from server.web.session_manager import Hub
+from server.web.session_manager import SessionManager
 from server.web.websocket import Connection
 from tests.server.house import JPEG, control_status, eventually, house_in, is_request
 
@@ -309,7 +309,7 @@ def test_a_hub_whose_control_is_gone_says_that_a_stop_did_not_arrive(server, mon
     async def scene():
         async with server.supervisor() as watcher:
             await watcher.say(type="command", what="stop")
-            hub: Hub = server.hub
+            hub: SessionManager = server.hub
             await eventually(lambda: any("did not reach" in text for text in hub.events))
 
     play(server, scene)

@@ -1,6 +1,6 @@
 /** The virtual camera's knobs: what a slider's place means, and what is shown while a wish is on its way. */
 
-/** @import {Knobs, Tune, VirtualCamera} from '../wire/protocol_types.js' */
+/** @import {RuntimeParameters, Tune, VirtualCameraStatus} from '../wire/protocol_types.js' */
 
 import { Elements } from './elements.js';
 import { number } from './format.js';
@@ -47,7 +47,7 @@ export function placeOfLimit(limit) {
 
 /**
  * What a person reads beside each knob.
- * @param {Knobs} knobs
+ * @param {RuntimeParameters} knobs
  */
 export function words(knobs) {
   const { cutoff_hz, adaptive_beta, max_speed_m_s } = knobs;
@@ -66,7 +66,7 @@ export class Wishes {
   }
 
   /**
-   * @param {Partial<Knobs>} change
+   * @param {Partial<RuntimeParameters>} change
    * @param {number} now [ms]
    */
   turn(change, now) {
@@ -87,9 +87,9 @@ export class Wishes {
 
   /**
    * The knobs to show, and those wishes forgotten that came true or never will.
-   * @param {Knobs} standing
+   * @param {RuntimeParameters} standing
    * @param {number} now [ms]
-   * @returns {Knobs}
+   * @returns {RuntimeParameters}
    */
   over(standing, now) {
     const shown = /** @type {Record<string, unknown>} */ ({ ...standing });
@@ -98,7 +98,7 @@ export class Wishes {
       if (done) this.pending.delete(name);
       else shown[name] = value;
     }
-    return /** @type {Knobs} */ (/** @type {unknown} */ (shown));
+    return /** @type {RuntimeParameters} */ (/** @type {unknown} */ (shown));
   }
 }
 
@@ -113,9 +113,9 @@ export class KnobPanel extends Elements {
     this.send = send;
     this.now = now;
     this.wishes = new Wishes();
-    /** @type {Knobs | null} */
+    /** @type {RuntimeParameters | null} */
     this.standing = null;
-    this.listen('knob-mode', (input) => ({ mode: /** @type {Knobs['mode']} */ (input.value) }));
+    this.listen('knob-mode', (input) => ({ mode: /** @type {RuntimeParameters['mode']} */ (input.value) }));
     this.listen('knob-cutoff', (input) => ({ cutoff_hz: hzOf(Number(input.value)) }));
     this.listen('knob-adaptive', (input) => ({ adaptive_beta: Number(input.value) }));
     this.listen('knob-limit', (input) => ({ max_speed_m_s: limitOf(Number(input.value)) }));
@@ -124,7 +124,7 @@ export class KnobPanel extends Elements {
 
   /**
    * @param {string} id
-   * @param {(input: HTMLInputElement) => Partial<Knobs>} changeOf
+   * @param {(input: HTMLInputElement) => Partial<RuntimeParameters>} changeOf
    */
   listen(id, changeOf) {
     this.input(id).addEventListener('input', () => {
@@ -138,7 +138,7 @@ export class KnobPanel extends Elements {
     return /** @type {HTMLInputElement} */ (this.find(id));
   }
 
-  /** @param {VirtualCamera | null} camera What control says of it; null: nothing. */
+  /** @param {VirtualCameraStatus | null} camera What control says of it; null: nothing. */
   take(camera) {
     this.standing = camera?.knobs ?? null;
     const lag = `lag ${number(camera?.lag_deg, 1)}°`;

@@ -25,7 +25,7 @@
  */
 
 /**
- * Page → server: turn `Knobs` of the virtual camera; those left out or null stay. `status` shows how they stand: that is the answer.
+ * Page → server: turn `RuntimeParameters` of the virtual camera; those left out or null stay. `status` shows how they stand: that is the answer.
  * @typedef {object} Tune
  * @property {'tune'} type
  * @property {number | null} cutoff_hz
@@ -118,7 +118,7 @@
 
 /**
  * How the virtual camera smooths the turns of the phone.
- * @typedef {object} Knobs
+ * @typedef {object} RuntimeParameters
  * @property {number} cutoff_hz −3 dB of the low pass [Hz].
  * @property {'full' | 'selective' | 'off'} mode `full`: all turns are smoothed; `selective`: not those about the line of sight; `off`.
  * @property {number} adaptive_beta How much the cut-off rises with the speed of a turn [Hz/(rad/s)].
@@ -128,8 +128,8 @@
 
 /**
  * The virtual camera in the control process.
- * @typedef {object} VirtualCamera
- * @property {Knobs} knobs As they stand.
+ * @typedef {object} VirtualCameraStatus
+ * @property {RuntimeParameters} knobs As they stand.
  * @property {number | null} lag_deg Angle from the phone to the virtual camera; null before a phone is there.
  * @property {number} guarding 0 to 1: how much it hurries now.
  */
@@ -213,7 +213,7 @@
  * @property {string} realtime Class of the control loop: what holds its schedule.
  * @property {Record<string, number>} control Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms.
  * @property {string[]} messages The newest events, newest first.
- * @property {VirtualCamera | null} virtual_camera null before the control process has told of it.
+ * @property {VirtualCameraStatus | null} virtual_camera null before the control process has told of it.
  * @property {Estimate | null} estimate null before the control process has told of it.
  * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
  * @property {PathChoice | null} path_choice As the operator's page says; null: it lets nobody choose.

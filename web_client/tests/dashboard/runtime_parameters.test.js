@@ -3,12 +3,12 @@ import { test } from 'node:test';
 
 import { KnobPanel, PATIENCE_MS, Wishes, hzOf, limitOf, placeOfHz, placeOfLimit, words } from '../../src/dashboard/runtime_parameters.js';
 
-/** @import {Knobs, Tune} from '../../src/wire/protocol_types.js' */
+/** @import {RuntimeParameters, Tune} from '../../src/wire/protocol_types.js' */
 
-/** @type {Knobs} */
+/** @type {RuntimeParameters} */
 const STANDING = { cutoff_hz: 0.28, mode: 'full', adaptive_beta: 0, max_speed_m_s: 1, guard: true };
 
-/** @param {Partial<Knobs>} knobs */
+/** @param {Partial<RuntimeParameters>} knobs */
 const camera = (knobs = {}, lag = 3.24, guarding = 0) => ({ knobs: { ...STANDING, ...knobs }, lag_deg: lag, guarding });
 
 test('every place of the cut-off slider is within the range and found again from its value', () => {

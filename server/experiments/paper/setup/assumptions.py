@@ -10,18 +10,18 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 
 from hardware.plant_parameters import PlantParameters
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.assumption import Assumption
 from server.experiments.paper.setup.assumptions_task import of_task
 from server.experiments.paper.setup.flight import HOVER_S, REST_S
-from server.experiments.paper.setup.measure import WINDOW_S, Setup
-from server.simulation.led_robot import PERIOD_S
+from server.experiments.paper.setup.measure import WINDOW_S, ExperimentSetup
+from server.simulation.leader_follower import PERIOD_S
 from server.simulation.sensors import PAPER, Leader, Pictures
 from server.simulation.vision_models import BITRATE_BPS
 
 
-def of(setup: Setup) -> list[Assumption]:
+def of(setup: ExperimentSetup) -> list[Assumption]:
     """Of the experiments as they are set up."""
     leader = sensors(setup.leader) if setup.leader == PAPER else phone_sensors(setup.leader)
     return [*method(), *leader, *plant(setup.robot_file.plant), *of_task()]
@@ -84,7 +84,7 @@ def phone_sensors(leader: Leader) -> Iterator[Assumption]:
 
 def _filmed(codec: Pictures) -> Iterator[Assumption]:
     """Pictures that are rendered."""
-    look = Look()
+    look = RenderOptions()
     # a JPEG's size follows from its quality
     rate = "" if codec == "jpeg" else f" at {1e-6 * BITRATE_BPS:g} Mbit/s"
     yield Assumption(

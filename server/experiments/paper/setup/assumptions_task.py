@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import degrees
 
 from hardware.sim import person as people
-from hardware.sim.person import Person
+from hardware.sim.person import Participant
 from pipeline.frames import Array
 from server.experiments.paper.setup import published, task
 from server.experiments.paper.setup.assumption import Assumption
@@ -50,7 +50,7 @@ def of_task() -> Iterator[Assumption]:
     )
 
 
-def _who(one: Person) -> str:
+def _who(one: Participant) -> str:
     return (
         f"{one.delay_s:g} s late, {one.crossover:g} rad/s, muscles {one.muscle_s:g} s, sees "
         f"{60.0 * degrees(one.acuity_rad):g}', drifts by {1e3 * one.wander_m:g} mm and "

@@ -8,11 +8,11 @@ import numpy as np
 
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import make_hand
-from hardware.sim.reference_trajectory import Intent, missed_by
+from hardware.sim.reference_trajectory import ReferenceTrajectory, missed_by
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.teleop import Output
-from server.simulation.led_robot import PERIOD_S, Led
+from server.simulation.leader_follower import PERIOD_S, LeaderFollowerSimulation
 from server.simulation.sensors import Leader
 
 HOVER_S = 8.0
@@ -32,7 +32,7 @@ class Push:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trace:
+class ExperimentTrace:
     """Rows since `REST_S` before the arm's move, one a control period; SI."""
 
     t: Array
@@ -77,12 +77,12 @@ class Flight:
         robot = robot_file.robot
         self._robot, self._config, self._push = robot, config, push
         self._hand = make_hand(hand, seed=seed, start=robot_file.start, rest_s=HOVER_S)
-        self._led = Led(robot_file, config, leader, self._hand, seed)
+        self._led = LeaderFollowerSimulation(robot_file, config, leader, self._hand, seed)
         self._push_in_b = np.zeros(6)
-        self._intent: Intent | None = None
+        self._intent: ReferenceTrajectory | None = None
         self._rows, self._ended = _Rows(), ""
 
-    def run(self, seconds: float) -> Trace:
+    def run(self, seconds: float) -> ExperimentTrace:
         """Fly until `seconds` after the arm's move, or until tracking ends."""
         for _ in range(round((HOVER_S + seconds) / PERIOD_S)):
             self._advance()
@@ -107,7 +107,7 @@ class Flight:
     def _measure(self, now: float, output: Output) -> None:
         body, hand = self._led.body, self._hand.pose(now)
         if self._intent is None:
-            self._intent = Intent(self._config.virtual_camera, hand, body)
+            self._intent = ReferenceTrajectory(self._config.virtual_camera, hand, body)
         offset_in_f, turn = missed_by(body, self._intent.step(hand, PERIOD_S), self._robot.axes)
         error, view, relative = output.error, output.view, output.relative
         if now < HOVER_S - REST_S or error is None or view is None or relative is None:
@@ -129,14 +129,14 @@ class Flight:
             )
         )
 
-    def _trace(self) -> Trace:
+    def _trace(self) -> ExperimentTrace:
         t, robot = np.array(self._rows.t), self._robot
         width = 25 + robot.A.shape[1]
         rows = np.array(self._rows.values).reshape(-1, width)
         missed = rows[:, 6:12]
         if len(t):
             missed = missed - missed[t < 0.0].mean(axis=0)
-        return Trace(
+        return ExperimentTrace(
             t,
             rows[:, :6],
             missed,

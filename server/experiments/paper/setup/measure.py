@@ -13,7 +13,7 @@ from hardware.robot_file import RobotFile
 from hardware.robot_schema import AXES
 from pipeline.frames import Array
 from server.common.text import Column, flights
-from server.experiments.paper.setup.flight import Flight, Push, Trace
+from server.experiments.paper.setup.flight import ExperimentTrace, Flight, Push
 from server.experiments.paper.setup.variants import Variant, config_of
 from server.simulation.sensors import Leader
 
@@ -23,7 +23,7 @@ UNITS: Final = {"x": "mm", "y": "mm", "z": "mm", "roll": "°", "pitch": "°", "y
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup:
+class ExperimentSetup:
     """What all experiments share."""
 
     robot_file: RobotFile
@@ -34,7 +34,7 @@ class Setup:
 
     def fly(
         self, variant: Variant, hand: str, seconds: float, push: Push | None = None
-    ) -> list[Trace]:
+    ) -> list[ExperimentTrace]:
         """One flight for each seed, until `seconds` after the arm's move."""
         config = config_of(self.robot_file, variant, self.leader)
         flights = (
@@ -44,7 +44,7 @@ class Setup:
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class ComparedFigure:
     """One figure of a table beside the paper's; in mm or degrees, means over the seeds."""
 
     variant: str
@@ -87,12 +87,14 @@ COLUMNS: Final[tuple[Column, ...]] = (
 )
 
 
-def table_of(cells: Sequence[Cell]) -> str:
+def table_of(cells: Sequence[ComparedFigure]) -> str:
     """One line a figure."""
     return flights(COLUMNS, cells)
 
 
-def cell_of(variant: str, axis: str, paper: float, traces: Sequence[Trace]) -> Cell:
+def cell_of(
+    variant: str, axis: str, paper: float, traces: Sequence[ExperimentTrace]
+) -> ComparedFigure:
     """The figure of an axis (of `AXES`) over the flights of a variant."""
     k = AXES.index(axis)
     scale = 1e3 if k < 3 else float(np.rad2deg(1.0))
@@ -101,7 +103,7 @@ def cell_of(variant: str, axis: str, paper: float, traces: Sequence[Trace]) -> C
     missed = [scale * within(trace, trace.missed_in_b[:, k]) for trace in traces]
     saturated = [within(trace, trace.saturated) for trace in traces]
     every = [nan if ended else rms(error) for error in errors]
-    return Cell(
+    return ComparedFigure(
         variant=variant,
         axis=axis,
         unit=UNITS[axis],
@@ -116,7 +118,7 @@ def cell_of(variant: str, axis: str, paper: float, traces: Sequence[Trace]) -> C
     )
 
 
-def within(trace: Trace, rows: Array) -> Array:
+def within(trace: ExperimentTrace, rows: Array) -> Array:
     """Those of the window."""
     return rows[(trace.t >= 0.0) & (trace.t < WINDOW_S)]
 

@@ -11,13 +11,13 @@ import numpy as np
 
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import MovingHand, steady_wander, tremor
-from hardware.sim.person import GuidingHand, Person
+from hardware.sim.person import GuidingHand, Participant
 from hardware.sim.plant.laser_task import Laser, Tube
 from hardware.sim.plant.plant import PlantOptions
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from server.experiments.paper.setup import published
-from server.simulation.led_robot import PERIOD_S, Led
+from server.simulation.leader_follower import PERIOD_S, LeaderFollowerSimulation
 from server.simulation.sensors import Leader
 
 START_S: Final = 3.0
@@ -41,7 +41,7 @@ TUBE: Final = Tube(
 # drifts are near the project's steady hand. Tremors are half of it and less: with all of its 0.03°
 # the gains of Table II (a) keep the thrusters at their limits for a quarter of the time, and nobody
 # succeeds with the EKF; the paper's operators did.
-SLOWER: Final = Person(
+SLOWER: Final = Participant(
     name="1",
     delay_s=0.30,
     crossover=1.2,
@@ -54,7 +54,7 @@ SLOWER: Final = Person(
     effort_noise=0.2,
     practice=0.2,
 )
-QUICKER: Final = Person(
+QUICKER: Final = Participant(
     name="2",
     delay_s=0.22,
     crossover=1.5,
@@ -86,7 +86,7 @@ class Attempt:
 
 
 def attempt(
-    robot_file: RobotFile, config: TeleopConfig, leader: Leader, person: Person, seed: int
+    robot_file: RobotFile, config: TeleopConfig, leader: Leader, person: Participant, seed: int
 ) -> Attempt:
     """Fly one; `person` is as practised as at this attempt."""
     rng = np.random.default_rng((seed, 5))
@@ -95,7 +95,7 @@ def attempt(
     start = np.array([-robot_file.start.distance, 0.0, 0.0])
     shake = tremor(rng, person.tremor_m, degrees(person.tremor_rad))
     hand = MovingHand((guiding, drift, shake), start, np.zeros(3), START_S)
-    led = Led(robot_file, config, leader, hand, seed, PlantOptions(tube=TUBE))
+    led = LeaderFollowerSimulation(robot_file, config, leader, hand, seed, PlantOptions(tube=TUBE))
     while led.t < START_S:
         led.advance()
 

@@ -12,7 +12,7 @@ from hardware.robot_file import RobotFile
 from pipeline.config import TeleopConfig
 from server.common import processes
 from server.experiments.paper.setup import published
-from server.experiments.paper.setup.measure import Setup
+from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.task import PEOPLE, Attempt, attempt
 from server.experiments.paper.setup.variants import WITH_EKF, WITHOUT_EKF, Variant, config_of
 from server.simulation.sensors import Leader
@@ -74,7 +74,7 @@ def flown(trials: Sequence[Trial], workers: int) -> Generator[tuple[int, Attempt
     return (_fly(numbered) for numbered in enumerate(trials))
 
 
-def trials_of(setup: Setup, variants: Sequence[Variant]) -> Iterator[Trial]:
+def trials_of(setup: ExperimentSetup, variants: Sequence[Variant]) -> Iterator[Trial]:
     """In order of seed, person, variant, repetition."""
     for seed in setup.seeds:
         for person in range(len(PEOPLE)):

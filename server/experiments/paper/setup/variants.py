@@ -46,7 +46,7 @@ WITH_VCI: Final = replace(WITHOUT_EKF, name="with VCI", vci="full")
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
+class VariantRequest:
     """What was asked for on the command line; None: the default."""
 
     estimator: EstimatorName | None = None
@@ -57,10 +57,10 @@ class Wishes:
 
     def __bool__(self) -> bool:
         """Whether anything was."""
-        return self != Wishes()
+        return self != VariantRequest()
 
 
-def ours(leader: Leader, wishes: Wishes, vci: VirtualCameraMode = "off") -> Variant:
+def ours(leader: Leader, wishes: VariantRequest, vci: VirtualCameraMode = "off") -> Variant:
     """This project's way: relative filter and feed-forward, unless wished otherwise.
 
     `vci` is that of the experiment, if none is wished.

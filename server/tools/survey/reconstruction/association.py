@@ -9,10 +9,10 @@ import numpy as np
 
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
-from server.tools.survey.reconstruction.bundle import Observations, Scene
-from server.tools.survey.reconstruction.detections import Seen, Track, paired
+from server.tools.survey.reconstruction.bundle import Observations, PointsAndPoses
+from server.tools.survey.reconstruction.detections import FrameSpots, LightTrack, paired
 from server.tools.survey.reconstruction.errors import SurveyError
-from server.tools.survey.reconstruction.gyro import Gyro
+from server.tools.survey.reconstruction.gyro import GyroAttitude
 from server.tools.survey.reconstruction.poses import each_posed
 
 Names = dict[int, dict[int, int]]
@@ -28,13 +28,13 @@ NEAR_PX = 4.0
 """Of a named spot from its LED's projection."""
 
 
-def chosen_tracks(tracks: Sequence[Track], count: int, frames: int) -> list[Track]:
+def chosen_tracks(tracks: Sequence[LightTrack], count: int, frames: int) -> list[LightTrack]:
     """The lights that are the LEDs: seen together for the longest time.
 
     Raises:
         SurveyError: there are too few or too many.
     """
-    best: list[Track] = []
+    best: list[LightTrack] = []
     best_frames = 0
     longest = sorted(tracks, key=lambda track: -len(track.spots))[: 8 * count]
     for frame in range(frames):
@@ -49,7 +49,7 @@ def chosen_tracks(tracks: Sequence[Track], count: int, frames: int) -> list[Trac
     return _undisputed(best, longest)
 
 
-def _undisputed(chosen: list[Track], tracks: list[Track]) -> list[Track]:
+def _undisputed(chosen: list[LightTrack], tracks: list[LightTrack]) -> list[LightTrack]:
     """The brightest, when more lights than LEDs are steadily there.
 
     Raises:
@@ -72,7 +72,7 @@ def _undisputed(chosen: list[Track], tracks: list[Track]) -> list[Track]:
     return ranked[:count]
 
 
-def together(tracks: Sequence[Track]) -> list[int]:
+def together(tracks: Sequence[LightTrack]) -> list[int]:
     """Frames that see all of them, in order."""
     return sorted(set.intersection(*(set(track.spots) for track in tracks)))
 
@@ -80,7 +80,9 @@ def together(tracks: Sequence[Track]) -> list[int]:
 class Rays:
     """Named spots as observations for bundle adjustment."""
 
-    def __init__(self, camera: Camera, film: Sequence[Seen], gyro: Gyro | None = None) -> None:
+    def __init__(
+        self, camera: Camera, film: Sequence[FrameSpots], gyro: GyroAttitude | None = None
+    ) -> None:
         """For these frames; with a gyroscope the rolling shutter is undone better."""
         self._camera, self._film, self._gyro = camera, film, gyro
 
@@ -138,17 +140,17 @@ class Rays:
 
 def named_by_pose(
     camera: Camera,
-    film: Sequence[Seen],
-    pose: Scene,
+    film: Sequence[FrameSpots],
+    pose: PointsAndPoses,
     from_frame: int,
-    gyro: Gyro | None = None,
-) -> tuple[Names, Scene]:
+    gyro: GyroAttitude | None = None,
+) -> tuple[Names, PointsAndPoses]:
     """Names in all frames that follow from a structure and one frame's pose, both ways in time.
 
     The scene has the poses of those frames, in their order.
     """
     names: Names = {}
-    poses: dict[int, Scene] = {}
+    poses: dict[int, PointsAndPoses] = {}
     for step in (1, -1):
         last, k = pose, from_frame
         while 0 <= k < len(film):
@@ -158,10 +160,10 @@ def named_by_pose(
             k += step
     frames = sorted(names)
     R, p = (np.array([getattr(poses[k], part)[0] for k in frames]) for part in ("R", "p"))
-    return {k: names[k] for k in frames}, Scene(pose.points, R, p)
+    return {k: names[k] for k in frames}, PointsAndPoses(pose.points, R, p)
 
 
-def _turned(pose: Scene, a: int, b: int, gyro: Gyro | None) -> Scene:
+def _turned(pose: PointsAndPoses, a: int, b: int, gyro: GyroAttitude | None) -> PointsAndPoses:
     """A pose in frame a as frame b would have it, had the camera only turned."""
     if gyro is None or not 0 <= a < len(gyro.R_os):
         return pose
@@ -169,7 +171,9 @@ def _turned(pose: Scene, a: int, b: int, gyro: Gyro | None) -> Scene:
     return replace(pose, R=(turn @ pose.R[0])[None], p=(turn @ pose.p[0])[None])
 
 
-def _named(camera: Camera, film: Sequence[Seen], k: int, pose: Scene, names: Names) -> Scene:
+def _named(
+    camera: Camera, film: Sequence[FrameSpots], k: int, pose: PointsAndPoses, names: Names
+) -> PointsAndPoses:
     """Names of one frame, and its pose; that of the frame before where it can't be told."""
     foreseen = projected(camera, pose, 0)
     pairs, _ = paired(foreseen, film[k].spots.pixels)
@@ -191,7 +195,7 @@ def _named(camera: Camera, film: Sequence[Seen], k: int, pose: Scene, names: Nam
     return moved
 
 
-def projected(camera: Camera, scene: Scene, row: int) -> Array:
+def projected(camera: Camera, scene: PointsAndPoses, row: int) -> Array:
     """Pixels (n, 2) of a scene's points in one of its frames."""
     q = scene.points @ scene.R[row].T + scene.p[row]
     return camera.pixels(np.column_stack((q[:, 2], -q[:, 0], -q[:, 1])))

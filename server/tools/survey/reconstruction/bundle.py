@@ -33,7 +33,7 @@ class Observations:
 
 
 @dataclass(frozen=True, slots=True)
-class Tape:
+class DistanceConstraint:
     """A measured distance of two points."""
 
     a: int
@@ -43,7 +43,7 @@ class Tape:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class PointsAndPoses:
     """Points and poses."""
 
     points: Array
@@ -53,16 +53,16 @@ class Scene:
     p: Array
     """(f, 3)."""
 
-    def scaled(self, scale: float) -> Scene:
+    def scaled(self, scale: float) -> PointsAndPoses:
         """The same picture of something larger."""
-        return Scene(scale * self.points, self.R, scale * self.p)
+        return PointsAndPoses(scale * self.points, self.R, scale * self.p)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solution:
+class BundleSolution:
     """Where it ended."""
 
-    scene: Scene
+    scene: PointsAndPoses
     cost: float
     """Robust sum of squares."""
     residuals: Array
@@ -84,7 +84,9 @@ class Linear:
     g_x: Array
 
 
-def solve(start: Scene, seen: Observations, tapes: tuple[Tape, ...] = ()) -> Solution:
+def solve(
+    start: PointsAndPoses, seen: Observations, tapes: tuple[DistanceConstraint, ...] = ()
+) -> BundleSolution:
     """Maximum likelihood with outliers toned down, by Levenberg-Marquardt."""
     scene, damping = start, 1e-4
     linear = linearised(scene, seen, tapes)
@@ -100,17 +102,17 @@ def solve(start: Scene, seen: Observations, tapes: tuple[Tape, ...] = ()) -> Sol
         scene, linear, damping = moved, tried, max(0.1 * damping, 1e-9)
         if gained < 1e-8 * linear.cost + 1e-12:
             break
-    return Solution(scene, linear.cost, linear.residuals, _reduced(linear, 0.0)[0])
+    return BundleSolution(scene, linear.cost, linear.residuals, _reduced(linear, 0.0)[0])
 
 
-def residuals(scene: Scene, seen: Observations) -> Array:
+def residuals(scene: PointsAndPoses, seen: Observations) -> Array:
     """(m, 2) of the tangents."""
     q = np.einsum("mij,mj->mi", scene.R[seen.frame], scene.points[seen.point]) + scene.p[seen.frame]
     off: Array = seen.tangents - q[:, :2] / q[:, 2:]
     return off
 
 
-def _errors(scene: Scene, seen: Observations) -> tuple[Array, Array, Array]:
+def _errors(scene: PointsAndPoses, seen: Observations) -> tuple[Array, Array, Array]:
     """Whitened residuals (m, 2), points turned (m, 3) and their places in o (m, 3)."""
     turned = np.einsum("mij,mj->mi", scene.R[seen.frame], scene.points[seen.point])
     q = turned + scene.p[seen.frame]
@@ -125,7 +127,7 @@ def _skews(v: Array) -> Array:
     return np.stack((zero, -z, y, z, zero, -x, -y, x, zero), axis=1).reshape(-1, 3, 3)
 
 
-def squares(scene: Scene, seen: Observations) -> Array:
+def squares(scene: PointsAndPoses, seen: Observations) -> Array:
     """(f,) robust sum of squares of each frame; inf with a point behind the camera."""
     r, _, q = _errors(scene, seen)
     cost = np.zeros(len(scene.R))
@@ -140,7 +142,9 @@ def _robust(r: Array) -> tuple[Array, Array]:
     return weight, np.where(size > HUBER, 2.0 * HUBER * size - HUBER**2, size**2)
 
 
-def linearised(scene: Scene, seen: Observations, tapes: tuple[Tape, ...]) -> Linear:
+def linearised(
+    scene: PointsAndPoses, seen: Observations, tapes: tuple[DistanceConstraint, ...]
+) -> Linear:
     """Normal equations of steps (δp, φ) of poses, R ← Exp(φ) R, and of points."""
     frames, points = len(scene.R), len(scene.points)
     r, turned, q = _errors(scene, seen)
@@ -169,7 +173,7 @@ def linearised(scene: Scene, seen: Observations, tapes: tuple[Tape, ...]) -> Lin
     return Linear(r, cost, H_pp, wide, all_xx, g_p, g_x.ravel())
 
 
-def add_tapes(points: Array, tapes: tuple[Tape, ...], H: Array, g: Array) -> float:
+def add_tapes(points: Array, tapes: tuple[DistanceConstraint, ...], H: Array, g: Array) -> float:
     """Adds tapes to normal equations of points H (3 n, 3 n), g (n, 3); their squares."""
     cost = 0.0
     for tape in tapes:
@@ -195,7 +199,7 @@ def _reduced(linear: Linear, damping: float) -> tuple[Array, Array, Array, Array
     return S, g, K, np.einsum("fij,fj->fi", inverse, linear.g_p)
 
 
-def _stepped(scene: Scene, linear: Linear, damping: float) -> Scene:
+def _stepped(scene: PointsAndPoses, linear: Linear, damping: float) -> PointsAndPoses:
     S, g, K, alone = _reduced(linear, damping)
     diagonal = np.diag(linear.H_xx)
     d_x = np.linalg.solve(S + np.diag(damping * diagonal + 1e-9 * diagonal.max()), g)
@@ -209,7 +213,7 @@ def _stepped(scene: Scene, linear: Linear, damping: float) -> Scene:
     )
 
 
-def covariance(scene: Scene, information: Array) -> Array:
+def covariance(scene: PointsAndPoses, information: Array) -> Array:
     """(3 n, 3 n) of the points, fitted onto any other layout as a rigid body.
 
     Where the whole is and how it is turned nobody knows: that part is taken out.

@@ -22,7 +22,7 @@ Turned = Callable[[int, int, Array], Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class FrameSpots:
     """One frame."""
 
     name: str
@@ -31,7 +31,7 @@ class Seen:
 
 
 @dataclass(slots=True, eq=False)
-class Track:
+class LightTrack:
     """One light: which spot it is, frame by frame."""
 
     spots: dict[int, int] = field(default_factory=dict)
@@ -81,9 +81,9 @@ def paired(foreseen: Array, pixels: Array) -> tuple[list[tuple[int, int]], Array
     return [(int(i), int(j)) for i, j in pairs if apart[i, j] < GATE_PX], shift
 
 
-def tracks_of(film: Sequence[Seen], turned: Turned | None = None) -> list[Track]:
+def tracks_of(film: Sequence[FrameSpots], turned: Turned | None = None) -> list[LightTrack]:
     """All lights of the film; foreseen by the camera's turn if it is known, else by their speed."""
-    tracks: list[Track] = []
+    tracks: list[LightTrack] = []
     for k, seen in enumerate(film):
         alive = [track for track in tracks if k - track.last <= PATIENCE]
         foreseen = np.array([_foreseen(film, track, k, turned) for track in alive]).reshape(-1, 2)
@@ -95,12 +95,14 @@ def tracks_of(film: Sequence[Seen], turned: Turned | None = None) -> list[Track]
             else:
                 track.places.append(foreseen[i] + shift)
         for j in set(range(len(seen.spots))) - set(found.values()):
-            tracks.append(Track())
+            tracks.append(LightTrack())
             tracks[-1].see(k, j, seen.spots)
     return tracks
 
 
-def _foreseen(film: Sequence[Seen], track: Track, k: int, turned: Turned | None) -> Array:
+def _foreseen(
+    film: Sequence[FrameSpots], track: LightTrack, k: int, turned: Turned | None
+) -> Array:
     last = track.places[-1]
     if turned is not None:
         moved: Array = turned(k - 1, k, last[None])[0]

@@ -13,7 +13,7 @@ STILL_S = 0.5
 MOMENT_S = 1e-3
 
 
-class Gyro:
+class GyroAttitude:
     """Attitudes of the camera over the film, as a gyroscope integrates them."""
 
     def __init__(self, samples: Array, times: Array) -> None:

@@ -8,15 +8,20 @@ import cv2
 import numpy as np
 
 from pipeline.frames import Array, exp
-from server.tools.survey.reconstruction.bundle import Observations, Scene, linearised, squares
+from server.tools.survey.reconstruction.bundle import (
+    Observations,
+    PointsAndPoses,
+    linearised,
+    squares,
+)
 
 ITERATIONS = 25  # at most, of Levenberg and Marquardt
 FEWEST = 4  # LEDs a frame must show
 
 
 def each_posed(
-    start: Scene, seen: Observations, iterations: int = ITERATIONS
-) -> tuple[Scene, Array]:
+    start: PointsAndPoses, seen: Observations, iterations: int = ITERATIONS
+) -> tuple[PointsAndPoses, Array]:
     """Maximum likelihood of each frame's pose from a start, and its robust squares (f,)."""
     frames = len(start.R)
     scene, damping = start, np.full(frames, 1e-4)
@@ -45,7 +50,7 @@ def each_posed(
     return scene, cost
 
 
-def untangled(scene: Scene, seen: Observations) -> Scene:
+def untangled(scene: PointsAndPoses, seen: Observations) -> PointsAndPoses:
     """Each frame's best pose of its own, its neighbours', its mirror image's and algebra's.
 
     Few or flat LEDs have two poses that fit about equally, and a search stays in its valley.
@@ -63,11 +68,11 @@ def untangled(scene: Scene, seen: Observations) -> Scene:
     return best
 
 
-def _shifted(scene: Scene, by: int) -> Scene:
+def _shifted(scene: PointsAndPoses, by: int) -> PointsAndPoses:
     return replace(scene, R=np.roll(scene.R, by, axis=0), p=np.roll(scene.p, by, axis=0))
 
 
-def _mirrored(scene: Scene) -> Scene:
+def _mirrored(scene: PointsAndPoses) -> PointsAndPoses:
     """Turned such that the plane nearest to all points leans the other way."""
     middle = scene.points.mean(axis=0)
     normal = np.linalg.svd(scene.points - middle)[2][2]
@@ -87,7 +92,7 @@ def _unit(v: Array) -> Array:
     return v / length if length > 1e-9 else np.zeros(3)
 
 
-def _by_algebra(scene: Scene, seen: Observations) -> Scene:
+def _by_algebra(scene: PointsAndPoses, seen: Observations) -> PointsAndPoses:
     R, p = scene.R.copy(), scene.p.copy()
     for k in range(len(R)):
         of = seen.frame == k

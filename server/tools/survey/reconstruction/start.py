@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.frames import Array, R_between
-from server.tools.survey.reconstruction.bundle import Observations, Scene
+from server.tools.survey.reconstruction.bundle import Observations, PointsAndPoses
 from server.tools.survey.reconstruction.poses import each_posed
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
@@ -19,7 +19,9 @@ COARSE = 0.01
 """What a tangent is taken to be off by, at first."""
 
 
-def starts(tangents: Array, turns: Array | None, rng: np.random.Generator) -> Iterator[Scene]:
+def starts(
+    tangents: Array, turns: Array | None, rng: np.random.Generator
+) -> Iterator[PointsAndPoses]:
     """Scenes of points seen in every frame, about the size of 1 in unknown units.
 
     Args:
@@ -52,7 +54,7 @@ def _centred(tangents: Array) -> tuple[Array, Array]:
     return rays[..., :2] / rays[..., 2:], turned
 
 
-def _factorised(aligned: Array, turned: Array) -> Iterator[Scene]:
+def _factorised(aligned: Array, turned: Array) -> Iterator[PointsAndPoses]:
     """Tomasi and Kanade's factorisation under weak perspective, and its mirror image."""
     frames = len(aligned)
     centres = aligned.mean(axis=1)
@@ -74,7 +76,7 @@ def _factorised(aligned: Array, turned: Array) -> Iterator[Scene]:
             u, _, vt = np.linalg.svd(np.vstack((row, np.cross(row[0], row[1]) / scale)))
             R.append(turn.T @ u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
             p.append(turn.T @ np.array([*centre, 1.0]) / scale)
-        yield Scene(points @ mirror, np.array(R), np.array(p))
+        yield PointsAndPoses(points @ mirror, np.array(R), np.array(p))
 
 
 def _metric(rows: Array) -> Array | None:
@@ -98,7 +100,7 @@ def _metric(rows: Array) -> Array | None:
     return metric
 
 
-def _known_turns(tangents: Array, turns: Array) -> Scene | None:
+def _known_turns(tangents: Array, turns: Array) -> PointsAndPoses | None:
     """Places of points and cameras when attitudes are known: linear but for the scale."""
     frames, count = tangents.shape[:2]
     rays = np.concatenate((tangents, np.ones((frames, count, 1))), axis=2)
@@ -121,10 +123,10 @@ def _known_turns(tangents: Array, turns: Array) -> Scene | None:
     size = float(np.linalg.norm(points, axis=1).mean())
     if depth.min() <= 0.0 or size < 1e-9:
         return None
-    return Scene(points / size, turns, p / size)
+    return PointsAndPoses(points / size, turns, p / size)
 
 
-def _flat(tangents: Array, middle: int, depths: Array) -> Scene | None:
+def _flat(tangents: Array, middle: int, depths: Array) -> PointsAndPoses | None:
     """A structure as one frame sees it, with depths; poses follow from frame to frame."""
     seen = tangents[middle]
     centre = seen.mean(axis=0)
@@ -134,12 +136,12 @@ def _flat(tangents: Array, middle: int, depths: Array) -> Scene | None:
     count, frames = len(seen), len(tangents)
     R, p = np.zeros((frames, 3, 3)), np.zeros((frames, 3))
     for step in (1, -1):
-        pose = Scene(points, np.eye(3)[None], np.array([[*centre, 1.0]]) / spread)
+        pose = PointsAndPoses(points, np.eye(3)[None], np.array([[*centre, 1.0]]) / spread)
         for k in range(middle, frames if step > 0 else -1, step):
             whiten = np.tile(np.eye(2) / COARSE, (count, 1, 1))
             at = Observations(np.zeros(count, np.intp), np.arange(count), tangents[k], whiten)
             pose, _ = each_posed(pose, at, SHORT)
             R[k], p[k] = pose.R[0], pose.p[0]
-    scene = Scene(points, R, p)
+    scene = PointsAndPoses(points, R, p)
     ahead = np.einsum("fj,nj->fn", R[:, 2], points) + p[:, 2:]
     return scene if ahead.min() > 1e-3 else None

@@ -20,10 +20,10 @@ from server.tools.survey.reconstruction.association import (
 )
 from server.tools.survey.reconstruction.bundle import (
     HUBER,
+    BundleSolution,
+    DistanceConstraint,
     Observations,
-    Scene,
-    Solution,
-    Tape,
+    PointsAndPoses,
     add_tapes,
     covariance,
     residuals,
@@ -31,9 +31,9 @@ from server.tools.survey.reconstruction.bundle import (
     squares,
 )
 from server.tools.survey.reconstruction.datum import fitted
-from server.tools.survey.reconstruction.detections import Seen, tracks_of
+from server.tools.survey.reconstruction.detections import FrameSpots, tracks_of
 from server.tools.survey.reconstruction.errors import SurveyError
-from server.tools.survey.reconstruction.gyro import Gyro
+from server.tools.survey.reconstruction.gyro import GyroAttitude
 from server.tools.survey.reconstruction.observability import check_sigma, check_views
 from server.tools.survey.reconstruction.poses import untangled
 from server.tools.survey.reconstruction.start import starts
@@ -54,10 +54,10 @@ DIFFERENT = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shape:
+class LedShape:
     """LEDs but for their size, numbered from left to right in the first frame that sees all."""
 
-    scene: Scene
+    scene: PointsAndPoses
     """Points in units of their own, and poses of the named frames."""
     names: Names
     first: int
@@ -72,7 +72,7 @@ class Shape:
 class Structure:
     """LEDs but for where the whole is and how it is turned."""
 
-    scene: Scene
+    scene: PointsAndPoses
     """Points [m] and the poses of the frames adjusted to."""
     frames: tuple[int, ...]
     """Which frames of the film those are."""
@@ -90,7 +90,9 @@ class Structure:
     """Frames that fit nothing: misnamed or blurred."""
 
 
-def shape(camera: Camera, film: Sequence[Seen], count: int, gyro: Gyro | None) -> Shape:
+def shape(
+    camera: Camera, film: Sequence[FrameSpots], count: int, gyro: GyroAttitude | None
+) -> LedShape:
     """Tracks lights, guesses, and keeps what explains the film best.
 
     Raises:
@@ -107,7 +109,7 @@ def shape(camera: Camera, film: Sequence[Seen], count: int, gyro: Gyro | None) -
     seen = Rays(camera, film, gyro).observations(names, rows, ROUGH_PX)
     tangents = seen.tangents.reshape(len(frames), count, 2)
     turns = None if gyro is None else gyro.R_os[frames]
-    found: list[Solution] = []
+    found: list[BundleSolution] = []
     for k, scene in enumerate(starts(tangents, turns, np.random.default_rng(0))):
         if k >= SURE_STARTS and min(it.cost for it in found) < tangents.size:
             break  # it fits already: drawn starts would find the same
@@ -121,7 +123,7 @@ def shape(camera: Camera, film: Sequence[Seen], count: int, gyro: Gyro | None) -
         best.scene, R=best.scene.R[middle : middle + 1], p=best.scene.p[middle : middle + 1]
     )
     all_names, scene = named_by_pose(camera, film, one, frames[middle], gyro)
-    result = Shape(scene, all_names, first, _rival(best, found), _spread(scene))
+    result = LedShape(scene, all_names, first, _rival(best, found), _spread(scene))
     check_views(result.spread_rad, result.rival)
     return result
 
@@ -131,7 +133,7 @@ def _evenly(frames: Sequence[int], most: int) -> list[int]:
     return [frames[k] for k in picked]
 
 
-def _rival(best: Solution, found: Sequence[Solution]) -> float:
+def _rival(best: BundleSolution, found: Sequence[BundleSolution]) -> float:
     """How much larger the squares of the best shape are that is another one."""
     size = float(np.linalg.norm(best.scene.points - best.scene.points.mean(axis=0)))
     true = best.scene.points
@@ -146,11 +148,11 @@ def _rival(best: Solution, found: Sequence[Solution]) -> float:
 
 def measured(
     camera: Camera,
-    film: Sequence[Seen],
-    found: Shape,
+    film: Sequence[FrameSpots],
+    found: LedShape,
     order: Sequence[int],
-    tapes: tuple[Tape, ...],
-    gyro: Gyro | None = None,
+    tapes: tuple[DistanceConstraint, ...],
+    gyro: GyroAttitude | None = None,
 ) -> Structure:
     """The LEDs in metres by all frames; LED k is number `order[k]` of the shape.
 
@@ -187,7 +189,9 @@ def measured(
     return result
 
 
-def _numbered(found: Shape, order: Sequence[int], tapes: tuple[Tape, ...]) -> tuple[Names, Scene]:
+def _numbered(
+    found: LedShape, order: Sequence[int], tapes: tuple[DistanceConstraint, ...]
+) -> tuple[Names, PointsAndPoses]:
     """LED k being number `order[k]` of the shape, and as large as tapes say."""
     number = {led: k for k, led in enumerate(order)}
     names = {k: {number[led]: spot for led, spot in row.items()} for k, row in found.names.items()}
@@ -196,7 +200,7 @@ def _numbered(found: Shape, order: Sequence[int], tapes: tuple[Tape, ...]) -> tu
     return names, replace(found.scene, points=points).scaled(float(np.mean(scales)))
 
 
-def _between(names: Names, scene: Scene) -> tuple[Names, Scene]:
+def _between(names: Names, scene: PointsAndPoses) -> tuple[Names, PointsAndPoses]:
     """Frames with both neighbours: those tell how fast spots moved across a rolling shutter."""
     kept = np.array([k - 1 in names and k + 1 in names for k in names])
     if kept.sum() < FEWEST_FRAMES:
@@ -205,7 +209,9 @@ def _between(names: Names, scene: Scene) -> tuple[Names, Scene]:
     return some, replace(scene, R=scene.R[kept], p=scene.p[kept])
 
 
-def _without_strays(rays: Rays, names: Names, scene: Scene) -> tuple[Names, Scene]:
+def _without_strays(
+    rays: Rays, names: Names, scene: PointsAndPoses
+) -> tuple[Names, PointsAndPoses]:
     """Frames that fit much worse than usual are left out; the rest is adjusted already."""
     frames = _evenly(list(names), MOST_FRAMES)
     start, seen = _part(rays, names, scene, frames)
@@ -219,7 +225,9 @@ def _without_strays(rays: Rays, names: Names, scene: Scene) -> tuple[Names, Scen
     return some, replace(posed, R=posed.R[kept], p=posed.p[kept])
 
 
-def _part(rays: Rays, names: Names, scene: Scene, frames: list[int]) -> tuple[Scene, Observations]:
+def _part(
+    rays: Rays, names: Names, scene: PointsAndPoses, frames: list[int]
+) -> tuple[PointsAndPoses, Observations]:
     """Some of the named frames, and what they see."""
     place = {k: row for row, k in enumerate(names)}
     rows = [place[k] for k in frames]
@@ -227,7 +235,9 @@ def _part(rays: Rays, names: Names, scene: Scene, frames: list[int]) -> tuple[Sc
     return replace(scene, R=scene.R[rows], p=scene.p[rows]), seen
 
 
-def _information(answer: Solution, tapes: tuple[Tape, ...], excess: float) -> Array:
+def _information(
+    answer: BundleSolution, tapes: tuple[DistanceConstraint, ...], excess: float
+) -> Array:
     """Of the LEDs, with spots as unsure as the residuals say and tapes as they are."""
     H, g = np.zeros_like(answer.information), np.zeros_like(answer.scene.points)
     add_tapes(answer.scene.points, tapes, H, g)
@@ -235,13 +245,13 @@ def _information(answer: Solution, tapes: tuple[Tape, ...], excess: float) -> Ar
     return information
 
 
-def _px(camera: Camera, scene: Scene, seen: Observations, freedom: int) -> float:
+def _px(camera: Camera, scene: PointsAndPoses, seen: Observations, freedom: int) -> float:
     """RMS of a coordinate's residual [px]."""
     off = camera.focal_px * residuals(scene, seen)
     return float(np.sqrt((off**2).sum() / freedom))
 
 
-def _spread(scene: Scene) -> float:
+def _spread(scene: PointsAndPoses) -> float:
     """Largest angle between directions from the LEDs to the camera."""
     centres = -np.einsum("fji,fj->fi", scene.R, scene.p) - scene.points.mean(axis=0)
     rays = centres / np.linalg.norm(centres, axis=1, keepdims=True)

@@ -10,7 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hardware.sim.network.channel import CLEAN, Burst, Conditions, ConditionsError, Line, spoilt
+from hardware.sim.network.channel import (
+    CLEAN,
+    Burst,
+    ChannelEmulator,
+    Conditions,
+    ConditionsError,
+    spoilt,
+)
 
 CHANCES = st.floats(0.0, 1.0)
 TIMES = st.floats(0.0, 0.2)
@@ -45,7 +52,7 @@ def number(packet: bytes) -> int:
     return int(struct.unpack("!I", packet[:4])[0])
 
 
-def through(line: Line, put: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
+def through(line: ChannelEmulator, put: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
     for t, packet in put:
         line.put(t, packet)
     return line.take(END)
@@ -54,12 +61,14 @@ def through(line: Line, put: list[tuple[float, bytes]]) -> list[tuple[float, byt
 @given(LINES, SEEDS, INPUTS)
 def test_the_same_seed_does_the_same_to_the_same_packets(conditions, seed, inputs):
     put = packets(inputs)
-    assert through(Line(conditions, seed), put) == through(Line(conditions, seed), put)
+    assert through(ChannelEmulator(conditions, seed), put) == through(
+        ChannelEmulator(conditions, seed), put
+    )
 
 
 @given(LINES, SEEDS, INPUTS)
 def test_every_packet_is_accounted_for(conditions, seed, inputs):
-    line = Line(conditions, seed)
+    line = ChannelEmulator(conditions, seed)
     out = through(line, packets(inputs))
     counts = line.counts
     gone = counts.lost + counts.burst_lost + counts.dark_lost + counts.overflowed
@@ -73,7 +82,7 @@ def test_every_packet_is_accounted_for(conditions, seed, inputs):
 @given(LINES, SEEDS, INPUTS)
 def test_nothing_comes_before_its_delay_nor_after_all_that_may_hold_it(conditions, seed, inputs):
     put = packets(inputs)
-    out = through(Line(replace(conditions, rate_bps=float("inf")), seed), put)
+    out = through(ChannelEmulator(replace(conditions, rate_bps=float("inf")), seed), put)
     for t, packet in out:
         late = t - put[number(packet)][0]
         most = conditions.delay_s + conditions.jitter_s + conditions.hold_s
@@ -82,7 +91,7 @@ def test_nothing_comes_before_its_delay_nor_after_all_that_may_hold_it(condition
 
 @given(LINES, SEEDS, INPUTS)
 def test_only_packets_that_are_held_back_are_overtaken(conditions, seed, inputs):
-    line = Line(conditions, seed)
+    line = ChannelEmulator(conditions, seed)
     numbers = list(dict.fromkeys(number(packet) for _, packet in through(line, packets(inputs))))
     in_order = [n for k, n in enumerate(numbers) if n == max(numbers[: k + 1])]
     assert len(numbers) - len(in_order) <= line.counts.held_back
@@ -92,8 +101,8 @@ def test_only_packets_that_are_held_back_are_overtaken(conditions, seed, inputs)
 def test_what_a_line_loses_a_worse_one_loses_too(seed, inputs, one, other):
     put = packets(inputs)
     low, high = sorted((one, other))
-    better = {number(p) for _, p in through(Line(Conditions(loss=low), seed), put)}
-    worse = {number(p) for _, p in through(Line(Conditions(loss=high), seed), put)}
+    better = {number(p) for _, p in through(ChannelEmulator(Conditions(loss=low), seed), put)}
+    worse = {number(p) for _, p in through(ChannelEmulator(Conditions(loss=high), seed), put)}
     assert worse <= better
 
 
@@ -103,7 +112,7 @@ def test_conditions_that_change_and_change_back_leave_the_rest_of_the_fate_alone
 ):
     line = replace(conditions, rate_bps=float("inf"), burst=None)
     put = packets(inputs)
-    plain, changed = Line(line, seed), Line(line, seed)
+    plain, changed = ChannelEmulator(line, seed), ChannelEmulator(line, seed)
     for k, (t, packet) in enumerate(put):
         plain.put(t, packet)
         changed.conditions = replace(line, dark=True) if k == at else line
@@ -115,7 +124,7 @@ def test_conditions_that_change_and_change_back_leave_the_rest_of_the_fate_alone
 @given(st.sampled_from([64e3, 500e3, 2e6]), SEEDS, INPUTS)
 def test_no_stretch_of_time_carries_more_than_rate_and_bucket(rate_bps, seed, inputs):
     conditions = Conditions(rate_bps=rate_bps)
-    line = Line(conditions, seed)
+    line = ChannelEmulator(conditions, seed)
     out = through(line, packets(inputs))
     for first, (begin, _) in enumerate(out):
         size = 0
@@ -129,7 +138,7 @@ def test_no_stretch_of_time_carries_more_than_rate_and_bucket(rate_bps, seed, in
 @given(LINES, SEEDS, INPUTS, st.lists(st.floats(0.0, 2.0), max_size=10))
 def test_taking_often_or_once_gives_the_same(conditions, seed, inputs, pauses):
     put = packets(inputs)
-    once, often = Line(conditions, seed), Line(conditions, seed)
+    once, often = ChannelEmulator(conditions, seed), ChannelEmulator(conditions, seed)
     expected = through(once, put)
     for t, packet in put:
         often.put(t, packet)
@@ -146,7 +155,7 @@ def test_taking_often_or_once_gives_the_same(conditions, seed, inputs, pauses):
 
 def test_a_burst_loses_in_runs():
     burst = Conditions(burst=Burst(enter=0.02, leave=0.15, loss=0.9))
-    line = Line(burst, seed=4)
+    line = ChannelEmulator(burst, seed=4)
     out = {number(p) for _, p in through(line, packets([(0.001, 100)] * 20_000))}
     lost = [n not in out for n in range(20_000)]
     share = sum(lost) / len(lost)
@@ -158,7 +167,7 @@ def test_a_burst_loses_in_runs():
 
 @pytest.mark.parametrize("name", ["loss", "reorder", "duplicate", "corrupt"])
 def test_shares_are_kept(name):
-    line = Line(Conditions(**{name: 0.05}), seed=1)
+    line = ChannelEmulator(Conditions(**{name: 0.05}), seed=1)
     through(line, packets([(0.0, 40)] * 20_000))
     counted = {"loss": "lost", "reorder": "held_back", "duplicate": "duplicated"}
     happened = getattr(line.counts, counted.get(name, "corrupted"))

@@ -12,12 +12,12 @@ from hardware.sim.scenes.scene import (
     SCENES,
     SIZES,
     VGA,
-    Motion,
-    Picture,
+    HandMotion,
+    ImageOrientation,
     at_reference,
     is_reporting,
 )
-from hardware.sim.scenes.video import Film, camera_of
+from hardware.sim.scenes.video import RenderedVideo, camera_of
 from pipeline.frames import log
 
 FINE = np.linspace(0.0, 1.0, 2000)
@@ -27,7 +27,7 @@ DARK = {"room_light": (1e-4, 1e-4), "texture": 0.0, "lamps": (0, 0), "halo": (0.
 
 
 def shots(name, seed=3, frames=3, size=VGA, **changes):
-    return list(Film(replace(SCENES[name], **changes), seed, size, frames))
+    return list(RenderedVideo(replace(SCENES[name], **changes), seed, size, frames))
 
 
 def centroid(luma, place, half, optics=PLAIN):
@@ -57,7 +57,7 @@ def drawn(eye, lamps=(), panes=(), room=1e-4):
 @pytest.mark.parametrize("name", ["clean", "rolling_shutter"])
 def test_an_unsaturated_leds_centroid_is_its_projection_at_its_rows_time(name):
     near = {"led_light": (0.6, 0.6), "distance_m": (1.5, 1.5)}
-    film = Film(replace(SCENES[name], **near, **QUIET, **DARK), 3, HD, 1)
+    film = RenderedVideo(replace(SCENES[name], **near, **QUIET, **DARK), 3, HD, 1)
     (shot,) = film
     assert shot.visible.all()
     for place in shot.pixels:
@@ -74,7 +74,7 @@ def test_a_streak_of_even_motion_is_centred_on_its_middle():
 
 
 def test_pixels_are_the_exact_pose_of_the_rows_time():
-    film = Film(SCENES["rolling_shutter"], 5, VGA, 4)
+    film = RenderedVideo(SCENES["rolling_shutter"], 5, VGA, 4)
     for shot in film:
         delays = film.camera.row_delays(shot.pixels[:, 1])
         for led, (place, delay) in enumerate(zip(shot.pixels, delays, strict=True)):
@@ -84,7 +84,7 @@ def test_pixels_are_the_exact_pose_of_the_rows_time():
 
 
 def test_the_pose_is_the_middle_rows():
-    film = Film(SCENES["typical"], 2, VGA, 2)
+    film = RenderedVideo(SCENES["typical"], 2, VGA, 2)
     for k, shot in enumerate(film):
         R_cb, p_bc_in_c = film.moving.relative(START_S + k / 30.0)
         np.testing.assert_array_equal(shot.R_cb, R_cb)
@@ -92,8 +92,8 @@ def test_the_pose_is_the_middle_rows():
 
 
 def test_a_film_seen_again_is_the_same_and_another_seeds_is_another():
-    film = Film(SCENES["distractors"], 4, VGA, 3)
-    again, other = list(film), list(Film(SCENES["distractors"], 5, VGA, 3))
+    film = RenderedVideo(SCENES["distractors"], 4, VGA, 3)
+    again, other = list(film), list(RenderedVideo(SCENES["distractors"], 5, VGA, 3))
     for one, two, three in zip(film, again, other, strict=True):
         assert np.array_equal(one.luma, two.luma)
         assert one.phone[-1].t == two.phone[-1].t
@@ -102,7 +102,7 @@ def test_a_film_seen_again_is_the_same_and_another_seeds_is_another():
 
 
 def test_seeds_vary_distance_light_and_lamps():
-    films = [Film(SCENES["distractors"], seed, VGA, 1) for seed in (1, 2, 1001)]
+    films = [RenderedVideo(SCENES["distractors"], seed, VGA, 1) for seed in (1, 2, 1001)]
     distances = {round(float(next(iter(f)).p_bc_in_c[0]), 3) for f in films}
     assert len(distances) == 3
     assert len({f.optics for f in films}) == 3
@@ -114,11 +114,11 @@ def test_every_scene_can_be_filmed(name):
     (shot,) = shots(name, frames=1)
     assert shot.luma.shape == (480, 640)
     assert shot.luma.dtype == np.uint8
-    assert shot.solvable == (shot.solvable and SCENES[name].picture is Picture.UPRIGHT)
+    assert shot.solvable == (shot.solvable and SCENES[name].picture is ImageOrientation.UPRIGHT)
 
 
 def test_the_family_has_enough_scenes_at_every_size():
-    upright = [s for s in SCENES.values() if s.picture is Picture.UPRIGHT]
+    upright = [s for s in SCENES.values() if s.picture is ImageOrientation.UPRIGHT]
     assert len(upright) >= 16
     assert all(sum(size in s.sizes for s in upright) >= 16 for size in SIZES)
     assert at_reference(SCENES["far"]).distance_m == (2.5, 2.5)
@@ -137,7 +137,7 @@ def test_each_led_is_the_covered_one_for_some_seed():
 
 
 def test_who_leaves_comes_back():
-    film = Film(SCENES["leave_return"], 1, VGA, 90)
+    film = RenderedVideo(SCENES["leave_return"], 1, VGA, 90)
     out = [not s.solvable for s in film]
     assert not out[0]
     assert 10 < sum(out) < 70
@@ -145,7 +145,7 @@ def test_who_leaves_comes_back():
 
 
 def test_a_bar_hides_leds_for_a_while():
-    hidden = [5 - int(s.visible.sum()) for s in Film(SCENES["bar"], 1, VGA, 90)]
+    hidden = [5 - int(s.visible.sum()) for s in RenderedVideo(SCENES["bar"], 1, VGA, 90)]
     assert max(hidden) > 0
     assert min(hidden) == 0
 
@@ -156,14 +156,14 @@ def test_pictures_to_be_refused_are_never_solvable(name):
 
 
 def test_a_mirrored_picture_has_its_leds_on_the_other_side():
-    (plain,) = shots("mirrored", frames=1, picture=Picture.UPRIGHT)
+    (plain,) = shots("mirrored", frames=1, picture=ImageOrientation.UPRIGHT)
     (mirrored,) = shots("mirrored", frames=1)
     np.testing.assert_array_equal(mirrored.luma, plain.luma[:, ::-1])
     np.testing.assert_allclose(mirrored.pixels[:, 0], 639 - plain.pixels[:, 0])
 
 
 def test_a_turned_pictures_motion_sensors_disagree_by_the_turn():
-    (plain,) = shots("turned_90", frames=1, picture=Picture.UPRIGHT)
+    (plain,) = shots("turned_90", frames=1, picture=ImageOrientation.UPRIGHT)
     (turned,) = shots("turned_90", frames=1)
     a, b = (np.mean([s.a_m_cf_in_c for s in x.phone], axis=0) for x in (plain, turned))
     assert a[2] == pytest.approx(9.8, abs=0.5)
@@ -172,7 +172,7 @@ def test_a_turned_pictures_motion_sensors_disagree_by_the_turn():
 
 @pytest.mark.parametrize("seed", [1, 7])
 def test_gyroscopes_turn_as_the_poses_do(seed):
-    film = Film(SCENES["rolling_shutter"], seed, VGA, 10)
+    film = RenderedVideo(SCENES["rolling_shutter"], seed, VGA, 10)
     samples = [s for shot in film for s in shot.phone if s.t > START_S]
     t, rates = [s.t for s in samples], np.array([s.omega_m_cf_in_c for s in samples])
     turned = log(film.moving.hand.pose(t[0])[0].T @ film.moving.hand.pose(t[-1])[0])
@@ -187,7 +187,7 @@ def test_the_shaken_hand_turns_at_up_to_60_degrees_a_second():
 
 
 def test_readings_come_in_order_and_only_once():
-    film = Film(SCENES["typical"], 1, VGA, 5)
+    film = RenderedVideo(SCENES["typical"], 1, VGA, 5)
     for stream in ("phone", "body"):
         times = [s.t for shot in film for s in getattr(shot, stream)]
         assert np.all(np.diff(times) > 0.0)
@@ -256,5 +256,5 @@ def test_an_opaque_bar_hides_what_is_behind_it():
 
 def test_a_flat_rig_is_flat_and_leaving_is_a_motion():
     assert np.ptp(FLAT_LEDS[:, 0]) == 0.0
-    assert SCENES["leave_return"].motion is Motion.LEAVING
+    assert SCENES["leave_return"].motion is HandMotion.LEAVING
     assert camera_of(HD, 0.01).readout_s == 0.01

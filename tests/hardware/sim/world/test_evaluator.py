@@ -7,11 +7,11 @@ import pytest
 
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.rotations import exp_each, log_each
-from hardware.sim.world.world import Occlusion, Setup, World
+from hardware.sim.world.world import Occlusion, World, WorldOptions
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.signals import RelativeState
 
-SETUP = Setup(seed=2, duration=4.0)
+SETUP = WorldOptions(seed=2, duration=4.0)
 SIGMA = np.repeat((3e-3, 2e-3), 3)
 
 

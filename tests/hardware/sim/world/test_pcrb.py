@@ -9,9 +9,9 @@ from hardware.sim.world import model, sensors
 from hardware.sim.world.pcrb import bound, rms
 from hardware.sim.world.random_motion import felt
 from hardware.sim.world.rotations import log_each, turn_each
-from hardware.sim.world.world import GRID_S, LEDS_IN_B, Occlusion, Setup, World
+from hardware.sim.world.world import GRID_S, LEDS_IN_B, Occlusion, World, WorldOptions
 
-SHORT = Setup(
+SHORT = WorldOptions(
     seed=5, duration=0.3, tremor_relaxation=0.15, occlusions=(Occlusion(0.08, 0.12, (1, 4)),)
 )
 
@@ -111,7 +111,7 @@ def test_the_truth_of_the_world_is_what_the_model_observes(world):
 
 def test_later_pictures_and_a_tremor_without_memory_make_now_less_certain():
     def now(**options):
-        return rms(bound(World(Setup(seed=1, duration=2.5, **options)), start=2.0).now)[0]
+        return rms(bound(World(WorldOptions(seed=1, duration=2.5, **options)), start=2.0).now)[0]
 
     usual = now()
     assert now(picture_delay=(0.02, 0.03)) < usual < now(picture_delay=(0.2, 0.2))

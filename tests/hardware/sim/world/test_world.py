@@ -8,10 +8,10 @@ import pytest
 from hardware.sim.world import sensors
 from hardware.sim.world.random_motion import three_pole, tremor
 from hardware.sim.world.rotations import exp_each, log_each, skew_each, turn_each
-from hardware.sim.world.world import GRID_S, LEDS_IN_B, Occlusion, Setup, World
-from pipeline.signals import BodyImu, PhoneImu, Seen
+from hardware.sim.world.world import GRID_S, LEDS_IN_B, Occlusion, World, WorldOptions
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 
-SETUP = Setup(seed=3, duration=4.0)
+SETUP = WorldOptions(seed=3, duration=4.0)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_a_tremor_forgets_its_phase_in_its_relaxation():
 
 @pytest.mark.parametrize("relaxation", [np.inf, 0.15])
 def test_hand_and_robot_have_the_amplitudes_asked_for(relaxation):
-    setup = Setup(duration=40.0, tremor_relaxation=relaxation, hand_sigma=(0.0, 0.0))
+    setup = WorldOptions(duration=40.0, tremor_relaxation=relaxation, hand_sigma=(0.0, 0.0))
     world = World(setup)
     tremors = world.hand[0].std(axis=0)
     assert tremors[:3] == pytest.approx(np.full(3, 5e-5), rel=0.25)
@@ -83,7 +83,7 @@ def test_the_same_seed_gives_the_same_world_and_options_do_not_mix(world):
     for (a_t, a), (b_t, b) in zip(sensors.events(world), sensors.events(hidden), strict=True):
         assert a_t == b_t
         assert a.t == b.t
-        if isinstance(a, Seen):
+        if isinstance(a, VisionMeasurement):
             told = np.isin(a.rays.led, b.rays.led)
             assert np.array_equal(a.rays.tangents[told], b.rays.tangents)
             assert list(b.rays.led) == ([0, 2] if 1.0 <= a.t < 2.0 else [0, 1, 2, 3, 4])
@@ -120,8 +120,8 @@ def misfit(seen, p, R):
 
 
 def test_poses_know_how_wrong_they_are():
-    seen = seen_of(Setup(seed=8, duration=20.0))
-    world = World(Setup(seed=8, duration=20.0))
+    seen = seen_of(WorldOptions(seed=8, duration=20.0))
+    world = World(WorldOptions(seed=8, duration=20.0))
     i = world.index([s.t for s in seen])
     p = np.array([s.pose.p_bc_in_c for s in seen])
     R = np.array([s.pose.R_cb for s in seen])
@@ -170,11 +170,11 @@ def test_things_get_lost_repeated_and_disordered_as_often_as_asked():
 
 
 def test_arrivals_are_as_late_as_asked_and_pictures_keep_their_order():
-    late = {PhoneImu: [], BodyImu: [], Seen: []}
+    late = {PhoneImu: [], BodyImu: [], VisionMeasurement: []}
     for arrival, sample in sensors.events(World(SETUP)):
         late[type(sample)].append(arrival - sample.t)
     for kind, (low, high) in zip(late, ((0.015, 0.04), (0.001, 0.004), (0.06, 0.12)), strict=True):
         assert low <= min(late[kind]) + 1e-9
         assert max(late[kind]) <= high + 1e-9
-    order = [s.t for _, s in sensors.events(World(SETUP)) if isinstance(s, Seen)]
+    order = [s.t for _, s in sensors.events(World(SETUP)) if isinstance(s, VisionMeasurement)]
     assert order == sorted(order)

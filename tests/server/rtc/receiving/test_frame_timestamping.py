@@ -5,7 +5,11 @@ import random
 import pytest
 
 from server.phone.ingest import ARRIVAL_S
-from server.rtc.receiving.frame_timestamping import OLDEST_PAIR_S, REMEMBERED_PAIRS, Dating
+from server.rtc.receiving.frame_timestamping import (
+    OLDEST_PAIR_S,
+    REMEMBERED_PAIRS,
+    FrameTimestamping,
+)
 from server.rtc.receiving.metadata_trailer import FrameRecord
 
 RECORD = FrameRecord(1, 42, 0, None)
@@ -16,14 +20,14 @@ def ticks(t_s, begin=2**32 - 1000):
 
 
 def test_its_own_record_is_believed_first():
-    dating = Dating()
+    dating = FrameTimestamping()
     dating.pair(ticks(1.0), 999)
     date = dating.date(RECORD, ticks(1.0), 5e6)
     assert (date.t_us, date.source) == (42, "record")
 
 
 def test_the_pair_of_the_picture_then_the_newest_pair_and_the_time_between():
-    dating = Dating()
+    dating = FrameTimestamping()
     dating.pair(ticks(1.0), 7_000_000)
     assert dating.date(None, ticks(1.0), 9e6).t_us == 7_000_000
     later = dating.date(None, ticks(1.1), 9e6)
@@ -32,14 +36,14 @@ def test_the_pair_of_the_picture_then_the_newest_pair_and_the_time_between():
 
 
 def test_old_pairs_are_forgotten():
-    dating = Dating()
+    dating = FrameTimestamping()
     for k in range(3 * REMEMBERED_PAIRS):
         dating.pair(k, k)
     assert len(dating._pairs) == REMEMBERED_PAIRS
 
 
 def test_by_arrival_the_jitter_of_the_line_goes_and_its_least_delay_stays():
-    rng, dating = random.Random(3), Dating()
+    rng, dating = random.Random(3), FrameTimestamping()
     errors = []
     for k in range(600):
         taken = k / 30.0
@@ -54,7 +58,7 @@ def test_by_arrival_the_jitter_of_the_line_goes_and_its_least_delay_stays():
 
 
 def test_by_arrival_a_stream_that_begins_anew_is_dated_anew():
-    dating = Dating()
+    dating = FrameTimestamping()
     for k in range(10):
         dating.date(None, ticks(k / 30.0), 1e6 * (5.0 + k / 30.0))
     assert dating.date(None, ticks(3600.0), 6e6).t_us == pytest.approx(6_000_000)

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 
 from hardware.sim.scenes.scene import SCENES, VGA
-from hardware.sim.scenes.video import Film
+from hardware.sim.scenes.video import RenderedVideo
 from pipeline.frames import R_from_wxyz, log
 from server.cli import main
 from server.experiments.vision.write import write_film
@@ -15,7 +15,7 @@ FRAMES, SEED = 24, 7
 
 def write_scene(name, folder):
     """Frames, motion samples, camera and robot file, truth."""
-    write_film(Film(SCENES[name], seed=SEED, size=VGA, frames=FRAMES), folder)
+    write_film(RenderedVideo(SCENES[name], seed=SEED, size=VGA, frames=FRAMES), folder)
     return folder
 
 

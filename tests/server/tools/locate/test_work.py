@@ -10,14 +10,14 @@ import yaml
 
 from hardware.codec import Encoder
 from hardware.sim.scenes.scene import SCENES, VGA
-from hardware.sim.scenes.video import Film
+from hardware.sim.scenes.video import RenderedVideo
 from pipeline.frames import R_co, R_from_wxyz
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, PhoneImu
-from pipeline.vision.imu_buffer import Felt
+from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision_config import GatesConfig
 from server.media.tables import load_imu
-from server.phone.frame_pipeline import Sight
+from server.phone.frame_pipeline import FramePipeline
 from server.phone.ingest import EncodedFrame
 from server.protocol.wire_records import Codec, Picture
 from server.tools.locate.optical import COLUMNS, SIGMAS, optical
@@ -116,11 +116,11 @@ def test_it_sees_what_the_live_pipeline_sees(films, tmp_path):
     """The same JPEGs and motion samples through the live path give the very same poses."""
     folder = copied(films["typical"], tmp_path / "film", "camera.yaml", "robot.toml")
     source = films["typical"]
-    film = Film(SCENES["typical"], seed=SEED, size=VGA, frames=FRAMES)
+    film = RenderedVideo(SCENES["typical"], seed=SEED, size=VGA, frames=FRAMES)
     encoder = Encoder(*VGA, 30.0, 1_000_000, "jpeg")
-    sight = Sight(film.camera, _robot(film.leds_in_b), GatesConfig())
+    sight = FramePipeline(film.camera, _robot(film.leds_in_b), GatesConfig())
     phone, body = (load_imu(source / name) for name in ("imu.csv", "body.csv"))
-    felt, live, at = Felt(), [], [0, 0]
+    felt, live, at = ImuBuffer(), [], [0, 0]
     for k, row in enumerate(table(source / "times.csv")):
         luma = cv2.imread(str(source / row["frame"]), cv2.IMREAD_GRAYSCALE)
         data, _ = encoder.encode(luma)

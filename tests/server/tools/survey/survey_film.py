@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 
 from hardware.led_layout.viewpoints import attitude
-from hardware.sim.render import Look, render
+from hardware.sim.render import RenderOptions, render
 from pipeline.frames import exp, log
 from pipeline.signals import Spots
-from server.tools.survey.reconstruction.detections import Seen
+from server.tools.survey.reconstruction.detections import FrameSpots
 
 TREMOR_RAD, TREMOR_HZ = np.radians(0.15), 9.0
 SWAY_RAD = np.radians(3.0)
@@ -68,7 +68,7 @@ def spots_only(camera, walk, leds_in_b, frames, rng, noise_px=0.05, hidden=0.0):
         px = rng.permutation(px[rng.uniform(size=len(px)) >= hidden])
         n = len(px)
         covariances = np.tile(noise_px**2 * np.eye(2), (n, 1, 1))
-        film.append(Seen(str(k), t, Spots(px, covariances, np.ones(n), np.full(n, 20.0))))
+        film.append(FrameSpots(str(k), t, Spots(px, covariances, np.ones(n), np.full(n, 20.0))))
     return film
 
 
@@ -78,7 +78,7 @@ def write_film(folder, camera, walk, leds_in_b, frames, seed=1):
     rows = ["frame,t_s"]
     for k in range(frames):
         t = walk.seconds * k / frames
-        picture = render(camera, lambda dt, t=t: walk.pose(t + dt), leds_in_b, Look(), rng)
+        picture = render(camera, lambda dt, t=t: walk.pose(t + dt), leds_in_b, RenderOptions(), rng)
         cv2.imwrite(str(folder / f"{k:05d}.png"), picture)
         rows.append(f"{k:05d}.png,{t:.6f}")
     (folder / "times.csv").write_text("\n".join(rows) + "\n")

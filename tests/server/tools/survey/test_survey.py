@@ -11,11 +11,11 @@ import yaml
 from hardware.camera_file import find_camera, find_camera_file
 from hardware.robot_file import load_robot
 from server.tools.survey.command import main
-from server.tools.survey.reconstruction.bundle import Tape
+from server.tools.survey.reconstruction.bundle import DistanceConstraint
 from server.tools.survey.reconstruction.datum import fitted, levelled, matched
 from server.tools.survey.reconstruction.detections import tracks_of
 from server.tools.survey.reconstruction.errors import SurveyError
-from server.tools.survey.reconstruction.gyro import Gyro
+from server.tools.survey.reconstruction.gyro import GyroAttitude
 from server.tools.survey.reconstruction.structure import measured, shape
 from tests.server.tools.survey.survey_film import Walk, spots_only, write_film
 
@@ -30,11 +30,11 @@ def surveyed(
     leds, walk=WALK, camera=CAMERA, gyro=False, seed=1, tape_off=0.0, frames=FRAMES, **film
 ):
     seen = spots_only(camera, walk, leds, frames, np.random.default_rng(seed), **film)
-    felt = Gyro(walk.imu(), np.array([s.t for s in seen])) if gyro else None
+    felt = GyroAttitude(walk.imu(), np.array([s.t for s in seen])) if gyro else None
     found = shape(camera, seen, len(leds), felt)
     order = matched(found.scene.points, leds)
     length = float(np.linalg.norm(leds[0] - leds[1])) + tape_off
-    return measured(camera, seen, found, order, (Tape(0, 1, length, 1e-4),), felt)
+    return measured(camera, seen, found, order, (DistanceConstraint(0, 1, length, 1e-4),), felt)
 
 
 def errors(answer, leds):
@@ -93,7 +93,7 @@ def test_the_mirror_image_is_refuted_and_the_size_is_the_measured_one():
     with pytest.raises(SurveyError, match=r"laid out otherwise|two ways"):
         matched(points * [1.0, 1.0, -1.0], AMES)
     assert found.rival > 1.5
-    answer = measured(CAMERA, seen, found, order, (Tape(0, 1, 0.7, 1e-4),))
+    answer = measured(CAMERA, seen, found, order, (DistanceConstraint(0, 1, 0.7, 1e-4),))
     a, b = answer.scene.points[:2]
     assert np.linalg.norm(a - b) == pytest.approx(0.7, abs=1e-6)
     near, _, _, scale = fitted(answer.scene.points, AMES, scale=True)
@@ -151,7 +151,7 @@ def test_a_fit_is_a_rotation_even_of_a_mirror_image():
 def test_a_gyroscope_that_misses_a_part_is_refused():
     times = np.linspace(0.0, 2.0, 20)
     with pytest.raises(SurveyError, match="must cover the film"):
-        Gyro(WALK.imu()[:200], times)
+        GyroAttitude(WALK.imu()[:200], times)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from hardware.robot_file import ROBOTS, load_robot
-from server.simulation.session import Figures, Outcome
+from server.simulation.session import Figures, SessionOutcome
 from server.tools.tune import command
 
 
@@ -44,7 +44,7 @@ def test_a_file_of_another_system_keeps_its_line_ends(mine, monkeypatch):
     robot_file = load_robot(mine)
     monkeypatch.setattr(command, "tuned", lambda *_: robot_file.gains["phone"])
     flown = Figures(3.0, 4.0, chatter_n=0.1)
-    monkeypatch.setattr(command, "fly", lambda session: Outcome(session.index, flown, 0.1))
+    monkeypatch.setattr(command, "fly", lambda session: SessionOutcome(session.index, flown, 0.1))
     assert command.main([str(mine), "--latency-ms", "90", "--name", "late"]) == 0
     written = mine.read_bytes()
     assert b"[gains.late]" in written
@@ -59,7 +59,7 @@ def test_what_does_not_fly_is_not_written(mine, capsys, monkeypatch):
 
     def fallen(session):
         ended = "lost" if dict(session.settings)["gains.set"] == "late" else ""
-        return Outcome(session.index, Figures(3.0, 4.0, chatter_n=0.1, ended=ended), 0.1)
+        return SessionOutcome(session.index, Figures(3.0, 4.0, chatter_n=0.1, ended=ended), 0.1)
 
     monkeypatch.setattr(command, "fly", fallen)
     assert command.main([str(mine), "--latency-ms", "90", "--name", "late"]) == 1

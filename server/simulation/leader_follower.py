@@ -12,19 +12,19 @@ from hardware.sim.hand import Hand
 from hardware.sim.plant.plant import Plant, PlantOptions
 from hardware.sim.reference_trajectory import Pose
 from hardware.sim.truth import Truth
-from hardware.sim.virtual_time_follower import LockstepFollower
+from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from pipeline.signals import Mode, Operator, Requests
+from pipeline.signals import Mode, Requests, TouchState
 from pipeline.teleop import Inputs, Output, Teleop
 from server.control.robot_clock import RobotLink
-from server.simulation.sensor_rig import Rig
+from server.simulation.leader_sensor_model import LeaderSensorModel
 from server.simulation.sensors import Leader
 
 PERIOD_S = 0.005
 
 
-class Led:
+class LeaderFollowerSimulation:
     """It arms itself as soon as it may, with the button held; `advance` moves everything."""
 
     def __init__(
@@ -37,8 +37,8 @@ class Led:
         options: PlantOptions | None = None,
     ) -> None:
         """Everything at rest."""
-        self._rig = Rig(leader, hand, robot_file.robot, config.gates, seed)
-        self._follower = LockstepFollower(robot_file, seed, options=options)
+        self._rig = LeaderSensorModel(leader, hand, robot_file.robot, config.gates, seed)
+        self._follower = VirtualTimeFollower(robot_file, seed, options=options)
         self._link = RobotLink(self._follower)
         self._teleop = Teleop(robot_file.robot, config, PERIOD_S)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
@@ -85,7 +85,7 @@ class Led:
             phone_imu=tuple(felt),
             body_imu=tuple(body),
             seen=tuple(seen),
-            operator=Operator(now, held, press=int(held)),
+            operator=TouchState(now, held, press=int(held)),
             requests=Requests(arm=self._ready),
             gap=self._link.gap,
             refusals=(self._link.reason,) if self._link.reason else (),

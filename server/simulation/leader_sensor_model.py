@@ -8,16 +8,16 @@ import numpy as np
 
 from hardware.sim.hand import Hand
 from hardware.sim.phone import BodyHistory, EventKind, VirtualPhone
-from hardware.sim.render import Look
+from hardware.sim.render import RenderOptions
 from pipeline.frames import R_cd
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, PhoneImu, RelativeState, Seen
+from pipeline.signals import BodyImu, PhoneImu, RelativeState, VisionMeasurement
 from pipeline.vision_config import GatesConfig
 from server.simulation.sensors import Leader
-from server.simulation.vision_models import Eye, PicturesEye, SpotsEye
+from server.simulation.vision_models import RayVisionModel, RenderedVisionModel, VisionModel
 
 
-class Rig:
+class LeaderSensorModel:
     """Its clock is known exactly."""
 
     def __init__(
@@ -27,16 +27,18 @@ class Rig:
         leds_in_b = robot.leds_in_b
         rng, spots_rng = np.random.default_rng((seed, 3)).spawn(2)
         self._R_cd = R_cd(leader.options.screen_angle_deg)
-        self._phone = VirtualPhone(leader.camera, hand, leds_in_b, Look(), rng, leader.options)
-        self._eye: Eye
+        self._phone = VirtualPhone(
+            leader.camera, hand, leds_in_b, RenderOptions(), rng, leader.options
+        )
+        self._eye: VisionModel
         if leader.pictures == "spots":
-            self._eye = SpotsEye(self._phone, leds_in_b, leader.noise_px, spots_rng)
+            self._eye = RayVisionModel(self._phone, leds_in_b, leader.noise_px, spots_rng)
         else:
-            self._eye = PicturesEye(self._phone, leader.pictures, robot, gates)
+            self._eye = RenderedVisionModel(self._phone, leader.pictures, robot, gates)
 
     def arrivals(
         self, t_from: float, t_to: float, body: BodyHistory
-    ) -> tuple[list[PhoneImu], list[Seen]]:
+    ) -> tuple[list[PhoneImu], list[VisionMeasurement]]:
         """What reaches control within [t_from, t_to) [s]: all samples, the newest picture.
 
         `body` gives where the robot was at a time.
