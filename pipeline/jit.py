@@ -75,7 +75,7 @@ class UserProvided(caching.UserProvidedCacheLocator):
 
 
 class InTree(caching.InTreeCacheLocator):
-    """In `__pycache__` beside the source, where that can be written."""
+    """In the cache folder beside the source, where that can be written."""
 
     def get_source_stamp(self) -> tuple[Any, str]:
         """Numba's own stamp and ours."""

@@ -118,7 +118,7 @@ def remedy(seen: Array, p_tb_in_f: Array, axis_in_f: Array) -> Array:
 
 
 class GuidingHand:
-    """A hand's own motion (a `Part`): each `look` sees the robot and moves the hand by a period.
+    """A hand's own motion (a `MotionComponent`): each `look` moves it by a period at what it sees.
 
     It goes around the robot where it turns, so that turns do not shift the robot.
     """

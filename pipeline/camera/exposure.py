@@ -52,8 +52,12 @@ ADVICE: Final[Mapping[ExposureHint, str]] = {
     ExposureHint.NONE: "",
     ExposureHint.TOO_BRIGHT: "The LEDs are too bright in the picture: expose shorter, or dim them.",
     ExposureHint.OUT_OF_FOCUS: "The LEDs are out of focus: set the focus to the robot's distance.",
-    ExposureHint.BLURRED: "The picture smears when the phone moves: expose shorter, or light the room.",
-    ExposureHint.TOO_DIM: "The LEDs are dim in the picture: come nearer, expose longer, or brighten them.",
+    ExposureHint.BLURRED: (
+        "The picture smears when the phone moves: expose shorter, or light the room."
+    ),
+    ExposureHint.TOO_DIM: (
+        "The LEDs are dim in the picture: come nearer, expose longer, or brighten them."
+    ),
 }
 
 

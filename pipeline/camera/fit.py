@@ -1,8 +1,8 @@
 """What is wrong with a camera, from blocks of seconds in which it moved: least squares that doubts.
 
-Each block says the same eight unknowns (`camera_watch_kernels`) apart from its own nuisances. How
-far the blocks contradict each other is part of the variance: gyroscopes drift, robot files are a
-millimetre off, tremor falls between samples, and none of that is white noise.
+Each block says the same eight unknowns (`calibration_monitor_kernels`) apart from its own
+nuisances. How far the blocks contradict each other is part of the variance: gyroscopes drift, robot
+files are a millimetre off, tremor falls between samples, and none of that is white noise.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class Camera:
     """Beside the phone's motion sensors."""
 
     lens: Array = field(init=False, repr=False)
-    """The same numbers for `camera_kernels`."""
+    """The same numbers for `lens_kernels`."""
 
     def __post_init__(self) -> None:
         """Gather the lens."""

@@ -1,11 +1,12 @@
 """The paper's 30-state filter, with each measurement fused at the time it was taken. Eq. (5)-(13).
 
-A phone's picture is 60-120 ms old when its pose is known and its IMU samples 15-40 ms: `OutOfSequenceEkf`
-fuses both in the past and predicts to now.
+A phone's picture is 60-120 ms old when its pose is known and its IMU samples 15-40 ms:
+`OutOfSequenceEkf` fuses both in the past and predicts to now.
 
 Deviations from the paper: gravity stays in the accelerations (see `relative_model`); δ_c of
 Eq. (11) fades with `tau_delta_c`, because the straight line through two 60 Hz gyroscope samples is
-a bad guess 50 ms beyond them (a hand trembles at 9 Hz): 4.8 instead of 5.6 mm in `bench_ekf`.
+a bad guess 50 ms beyond them (a hand trembles at 9 Hz): 4.8 instead of 5.6 mm by
+`tests/bench/bench_ekf.py`.
 
 Limit: roll, pitch and yaw are singular at a relative pitch of ±90°. Within 1.1° of it the filter
 forgets everything, counts it, and starts again at the first picture away from it.

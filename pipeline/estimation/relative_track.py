@@ -2,10 +2,11 @@
 
     base ── picture ── picture ── … ── frontier ── now
 
-An `Checkpoint` is the filter right after a picture. What arrives late (a picture between two others, an
-IMU sample that was held or interpolated over) spoils the anchors after it; they are made anew from
-the last good one, with the decisions on outliers they were made with. The *frontier* is as far as
-both IMUs' samples reach; from there to now the newest samples are held, with growing doubt.
+A `Checkpoint` is the filter right after a picture. What arrives late (a picture between two others,
+an IMU sample that was held or interpolated over) spoils the checkpoints after it; they are made
+anew from the last good one, with the decisions on outliers they were made with. The *frontier* is
+as far as both IMUs' samples reach; from there to now the newest samples are held, with growing
+doubt.
 """
 
 from __future__ import annotations
@@ -146,7 +147,9 @@ class RelativeTrack:
         return P
 
     def fuse(self, anchor: Checkpoint, seen: VisionMeasurement, stretch: float = 1.0) -> float:
-        """Fuse the rays of `seen` into what was `foretold` of its time; `stretch` as in `Checkpoint`.
+        """Fuse the rays of `seen` into what was `foretold` of its time.
+
+        `stretch` is as in `Checkpoint`.
 
         Gives χ² (two degrees of freedom for each LED used); NaN: the filter can't be believed.
         """

@@ -89,7 +89,7 @@ def put_sights(
     """What each named LED says of the pose at the middle row, as `pnp_kernels.refine` takes it.
 
     Args:
-        lens: As `camera_kernels` takes it.
+        lens: As `lens_kernels` takes it.
         size: (4,).
         leds_in_b: (n, 3) [m].
         pixels: (m, 2) of the spots, as they stand in the picture.
@@ -164,7 +164,7 @@ def identify(
     """Name the spots, solve: how many LEDs the pose rests on (0: none is believed) and its χ².
 
     Args:
-        lens: As `camera_kernels` takes it.
+        lens: As `lens_kernels` takes it.
         size: (4,).
         leds_in_b: (n, 3) [m].
         table: (m, FIELDS) spots as they stand in the picture.

@@ -41,7 +41,7 @@ def add_smears(
     sums[2:] are the largest distance from where an LED was foreseen [px] and the largest area.
 
     Args:
-        lens: As `camera_kernels` takes it.
+        lens: As `lens_kernels` takes it.
         size: (4,).
         leds_in_b: (n, 3) [m].
         led: (k,) LEDs with a name.

@@ -146,7 +146,7 @@ def detect(
         light: (256,).
         slope_of: (256,).
         limits: (5,).
-        lens: As `camera_kernels` takes it.
+        lens: As `lens_kernels` takes it.
         size: (4,).
         leds_in_b: (n, 3) [m].
         p: Foreseen p_bc_in_c.

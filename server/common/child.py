@@ -132,7 +132,7 @@ def set_oom_score(score: int) -> None:
 def set_niceness(niceness: int) -> None:
     """Let this process run before ordinary ones (down to -20) or behind them (up to 19).
 
-    For the leader of a session. Where Linux groups processes by session (`autogroup`), groups take
+    For the leader of a session. Where Linux groups processes by session (autogroups), groups take
     equal turns whatever the niceness of those within, so the group is told, too. Behind is always
     permitted, before takes CAP_SYS_NICE: without it things stay as they are.
     """

@@ -103,7 +103,7 @@ def limits() -> dict[str, str]:
 
 @cache
 def docs(module: types.ModuleType) -> dict[str, str]:
-    """Words below each field, by `Class.field`."""
+    """Words below each field, by class and field with a dot between."""
     found: dict[str, str] = {}
     body = ast.parse(inspect.getsource(module)).body
     for node in (one for one in body if isinstance(one, ast.ClassDef)):

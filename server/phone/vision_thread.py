@@ -25,7 +25,7 @@ Picture = npt.NDArray[np.uint8]
 
 
 class VisionThread(FrameThread):
-    """Owns one phone's `FramePipeline`: pictures go in, sightings come out, nothing queues up between."""
+    """Owns one phone's `FramePipeline`: frames go in, detections come out, nothing queues up."""
 
     def __init__(
         self,

@@ -145,7 +145,7 @@ class SessionManager:
             self.say(f"{told} did not reach the control process: try again.")
 
     def calibrate(self, wish: Calibrate) -> None:
-        """The operator's phone begins to calibrate its camera, or leaves it; see `CalibrationControl.wish`."""
+        """Let the operator's phone begin its camera's calibration, or leave it."""
         if (phone := self.phone) is not None:
             self._desk.wish(phone, wish, self.status)
             self.say(f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration")

@@ -1,4 +1,4 @@
-"""Thin shells around `Session` and `SessionManager`: one coroutine reads a page, one writes to it."""
+"""Shells around `Session` and `SessionManager`: one coroutine reads a page, one writes to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a camera with a fault shows of a `World`: looks for `CalibrationMonitor`, without any picture."""
+"""What a faulty camera shows of a `World`: observations for `CalibrationMonitor`, no pictures."""
 
 from dataclasses import dataclass, replace
 

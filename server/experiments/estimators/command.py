@@ -40,7 +40,7 @@ UNJUDGED: Final = 0.25
 
 @dataclass(frozen=True, slots=True)
 class EstimatorRow:
-    """One line of the table: the figures of `EstimatorMetrics`, and the error in units of the bound's."""
+    """One line of the table: `EstimatorMetrics`, and the error in units of the bound's."""
 
     name: str
     now_mm: float

@@ -29,7 +29,7 @@ from server.experiments.tremor.hand import (
     attitudes_of_hand,
     attitudes_of_recording,
 )
-from server.experiments.tremor.picture import Turn, draw
+from server.experiments.tremor.picture import Spectrum, Turn, draw
 from server.recording.reader import read
 from server.recording.writer import RecordingError
 
@@ -57,15 +57,6 @@ class Tremor:
     all_mm_s: float
     """Speed and acceleration of the reference, RMS, all frequencies."""
     all_m_s2: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Spectrum:
-    """Power spectral density of turns across and about the line of sight [°²/Hz]."""
-
-    hz: Array
-    across: Array
-    about: Array
 
 
 COLUMNS: tuple[Column, ...] = (

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from pipeline.frames import Array
 
@@ -24,20 +23,13 @@ class Turn:
     deg: Array
 
 
-class Spectrum(Protocol):
-    """Power spectral densities [°²/Hz]."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectrum:
+    """Power spectral densities of turns across and about the line of sight, (m,) [°²/Hz]."""
 
-    @property
-    def hz(self) -> Array:
-        """(m,)."""
-
-    @property
-    def across(self) -> Array:
-        """(m,) of turns across the line of sight."""
-
-    @property
-    def about(self) -> Array:
-        """(m,) of turns about it."""
+    hz: Array
+    across: Array
+    about: Array
 
 
 def draw(
