@@ -175,8 +175,10 @@ def soak(minutes: float, flight_s: float) -> tuple[list[Sample], int, int]:
             if records:
                 server.request("DELETE", "/api/recording")
             time.sleep(SETTLE_S)
-            samples += sampled(server, time.monotonic() - began)
-            print(f"{flown} flights, {followed} followed", file=sys.stderr, flush=True)
+            read = list(sampled(server, time.monotonic() - began))
+            samples += read
+            sizes = ", ".join(f"{one.process} {one.rss_mb:.1f}" for one in read)
+            print(f"{flown} flights, {followed} followed; MB: {sizes}", file=sys.stderr, flush=True)
     return samples, followed, flown
 
 
