@@ -44,6 +44,8 @@ class Detection:
     """Coarse, of the picture's stamp, for who knows it."""
     bounded: bool = False
     """There was more light in the picture than time to try it all: the next one goes on."""
+    prior: FramePrior = field(default_factory=FramePrior)
+    """What was known before."""
 
     def seen(self, camera: Camera) -> VisionMeasurement | None:
         """For a filter; None if it says nothing of the robot."""

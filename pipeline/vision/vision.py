@@ -86,7 +86,8 @@ class Vision:
         started = clock()
         sighting = self._told(frame.t, found)
         took_s[2] += clock() - started
-        return replace(sighting, took_s=dict(zip(STAGES, took_s.tolist(), strict=True)))
+        took = dict(zip(STAGES, took_s.tolist(), strict=True))
+        return replace(sighting, took_s=took, prior=prior)
 
     def _told(self, t: float, found: _Found) -> Detection:
         spots, naming, few = found.spots, found.naming, found.few

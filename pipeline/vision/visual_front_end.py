@@ -1,4 +1,4 @@
-"""Pictures and both motion sensors → judged poses: what a live phone and a folder of frames share.
+"""Frames and both motion sensors → judged poses: what a live phone and a folder of frames share.
 
 Nothing here decodes, reads a file or knows a clock: `server.phone.frame_pipeline` puts a decoder
 before it, and `lightleash locate` files.
@@ -6,7 +6,7 @@ before it, and `lightleash locate` files.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -57,16 +57,13 @@ class VisualFrontEnd:
         """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
         self._t_doubt = -np.inf
 
-    def feel(self, sample: PhoneImu) -> None:
-        """Follow the phone's motion."""
-        self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
-        self._stamps.feel(sample)
-        self.watch.feel(sample)
-
-    def feel_body(self, samples: Iterable[BodyImu]) -> None:
-        """Follow the robot's motion."""
+    def add_imu(self, *samples: PhoneImu | BodyImu) -> None:
+        """Follow the motion of phone and robot: of each, samples in the order of time."""
         for sample in samples:
-            self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+            if isinstance(sample, PhoneImu):
+                self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
+            else:
+                self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
             self._stamps.feel(sample)
             self.watch.feel(sample)
 
@@ -74,9 +71,9 @@ class VisualFrontEnd:
         """Follow what a filter says; None: it says nothing."""
         self._expectation.add(expected)
 
-    def look(self, frame: Frame, up_in_b: Array | None, omega_bf_in_b: Array | None) -> Detection:
-        """What a picture shows, with what the robot's own sensors said (3,) (3,) [rad/s]."""
-        prior = self._prior(frame.t, up_in_b, omega_bf_in_b)
+    def process(self, frame: Frame) -> Detection:
+        """Find the robot in a frame, with what both motion sensors said of its time."""
+        prior = self.prior(frame.t)
         judged = self._judged(self._vision.step(frame, prior, self._clock), prior)
         if judged.pose is not None:
             self._watched(frame, judged, judged.pose, prior)
@@ -92,15 +89,15 @@ class VisualFrontEnd:
             return facts.offset_s
         return coarse.value if coarse is not None else 0.0
 
-    def _prior(self, t: float, up_in_b: Array | None, omega_bf_in_b: Array | None) -> FramePrior:
+    def prior(self, t: float) -> FramePrior:
         """What is known before a picture with stamp `t` [s] is looked at."""
         phone = self._phone.at(t + self.offset_s)
         body = self._body.at(t + self.offset_s)
         return FramePrior(
             phone.up if phone is not None else None,
-            up_in_b,
+            body.up if body is not None else None,
             phone.omega if phone is not None else None,
-            body.omega if body is not None else omega_bf_in_b,
+            body.omega if body is not None else None,
             self._expectation.at(t),
         )
 

@@ -10,7 +10,6 @@ import numpy as np
 from hardware.follower import ThrustCommand
 from hardware.link.robot_end import SILENCE_US
 from pipeline.config import TeleopConfig
-from pipeline.estimation.gravity_direction import GravityDirection
 from pipeline.frames import Array, wxyz_from_R
 from pipeline.prediction import Prediction
 from pipeline.robot import Robot
@@ -90,15 +89,8 @@ class Controller:
         silent_s = config.failsafe.silent
         self._gaps = GapLog({"phone": silent_s, "robot": STOOD_STILL_S, "server": STOOD_STILL_S})
         self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
-        self._vertical = GravityDirection()
-        self.omega_bf_in_b = np.zeros(3)
         self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
         self._fuse_ms = 0.0
-
-    @property
-    def up_in_b(self) -> Array | None:
-        """Opposite of gravity in the body (3,), for vision; None before the first sample."""
-        return self._vertical.up
 
     def expected(self, output: Output) -> Prediction | None:
         """Where the filter says that the robot is, for vision; None if it doesn't."""
@@ -127,7 +119,6 @@ class Controller:
         """
         phone, seen, operator, wishes = self._sort(messages, now)
         for sample in body:
-            self._vertical.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
             self._body_samples.append(
                 (sample.t, *triple(sample.omega_m_bf_in_b), *triple(sample.a_m_bf_in_b))
             )
@@ -148,8 +139,6 @@ class Controller:
         )
         self._t_tick, self._armed = now, output.failsafe.mode not in (Mode.DISARMED, Mode.STOPPED)
         self._note_gaps(output, stall_s, robot_gap)
-        if output.relative is not None:
-            self.omega_bf_in_b = output.relative.omega_bf_in_b
         for one in seen:
             self._fuse_ms = 1e3 * (now - one.t)
             self._picture_age.add(now - one.t)
@@ -248,8 +237,6 @@ class Controller:
             time_offset=finite(health.time_offset),
             thrusts=output.thrusts.tolist(),
             saturated=output.saturated,
-            up_in_b=triple(self.up_in_b) if self.up_in_b is not None else None,
-            omega_b=triple(self.omega_bf_in_b),
             body_samples=samples,
             poses_fused=health.fused,
             poses_dropped=health.dropped,

@@ -123,9 +123,6 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Of the pictures' stamps, if the filter knows: taken at the stamp plus this [s]."""
     thrusts: list[float]
     saturated: bool
-    up_in_b: Triple | None
-    """Direction of gravity's opposite in the body, for vision's prior and gate."""
-    omega_b: Triple
     body_samples: list[tuple[float, float, float, float, float, float, float]]
     """Body IMU since the last status, for recordings: t, ω in b, specific force in b."""
     poses_fused: int

@@ -106,8 +106,8 @@ class PhoneSession:
                 if self.wizard is not None:
                     self.wizard.feel(sample)
                 if self.vision is not None:
-                    self.vision.feel(sample)
-                    self.vision.doubt(self._check.doubts_gravity)
+                    self.vision.looking.add_imu(sample)
+                    self.vision.looking.doubts_gravity = self._check.doubts_gravity
             case TouchState() as operator:
                 self.meters["operator"].tick(now, operator.t)
                 self._to_control(OperatorInput.of(operator))
@@ -126,10 +126,9 @@ class PhoneSession:
         """What control says of the robot, for eyes and tests."""
         self._check.know(status)
         if self.vision is not None:
-            up_in_b = np.array(status.up_in_b) if status.up_in_b is not None else None
-            self.vision.know(up_in_b, np.array(status.omega_b), expected_of(status))
-            rows = np.array(status.body_samples).reshape(-1, 7)
-            self.vision.feel_body([BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows])
+            looking, rows = self.vision.looking, np.array(status.body_samples).reshape(-1, 7)
+            looking.expect(expected_of(status))
+            looking.add_imu(*(BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows))
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)

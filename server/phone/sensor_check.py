@@ -23,28 +23,25 @@ class SensorCheck:
     def __init__(self) -> None:
         """Nothing tested."""
         self._test = SensorValidation(GravityTestConfig())
-        self._poses: deque[tuple[float, Array]] = deque(maxlen=MAX_WAITING)
-        self._up_in_b: Array | None = None
+        self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=MAX_WAITING)
 
     def feel(self, t: float, motion: Motion) -> None:
         """A sample of the phone, taken at `t` [s] on our clock, as it came."""
         rate, force = np.array(motion.rotation_rate), np.array(motion.acceleration)
         self._test.add_motion(t, rate, force, motion.screen_angle_deg)
-        while self._poses and self._up_in_b is not None:
-            t_pose, R_cb = self._poses.popleft()
-            self._test.add_pose(t_pose, R_cb, self._up_in_b)
+        while self._poses:
+            self._test.add_pose(*self._poses.popleft())
 
     def know(self, status: ControlStatus) -> None:
         """What the robot's own sensors said."""
-        self._up_in_b = np.array(status.up_in_b) if status.up_in_b is not None else None
         for t, x, y, z, *_ in status.body_samples:
             self._test.add_body(t, np.array((x, y, z)))
 
     def saw(self, sighting: Detection) -> None:
         """A picture was looked at."""
-        pose = sighting.pose or sighting.unbelieved
-        if pose is not None:
-            self._poses.append((pose.t, pose.R_cb))
+        pose, up_in_b = sighting.pose or sighting.unbelieved, sighting.prior.up_in_b
+        if pose is not None and up_in_b is not None:
+            self._poses.append((pose.t, pose.R_cb, up_in_b))
 
     @property
     def doubts_gravity(self) -> bool:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.frames import Array
-from pipeline.prediction import Prediction
-from pipeline.signals import BodyImu, Image, PhoneImu
+from pipeline.signals import Image
 from pipeline.vision.detection import Detection
 from pipeline.vision.visual_front_end import VisualFrontEnd
 from server.common import clock
@@ -38,7 +36,6 @@ class VisionThread(FrameThread):
         super().__init__("vision", on_taken)
         self._sight = sight
         self._on_sighting, self._on_key_wanted = on_sighting, on_key_wanted
-        self._prior: tuple[Array | None, Array] = (None, np.zeros(3))
         self._t_thumbnail = 0.0
         self.watched = False
         """Whether anyone wants thumbnails."""
@@ -53,32 +50,13 @@ class VisionThread(FrameThread):
 
     @property
     def looking(self) -> VisualFrontEnd:
-        """What it learnt of the camera; to be read."""
+        """Any thread may tell it of motion, and read what it learnt of the camera."""
         return self._sight.looking
-
-    def feel(self, sample: PhoneImu) -> None:
-        """The phone's motion, for the prior."""
-        self._sight.feel(sample)
-
-    def know(
-        self, up_in_b: Array | None, omega_bf_in_b: Array, expected: Prediction | None
-    ) -> None:
-        """What control knows of the body, for the prior."""
-        self._prior = (up_in_b, omega_bf_in_b)
-        self._sight.expect(expected)
-
-    def feel_body(self, samples: Sequence[BodyImu]) -> None:
-        """The robot's motion, for the pictures' time offset."""
-        self._sight.feel_body(samples)
-
-    def doubt(self, gravity: bool) -> None:
-        """Whether the phone's gravity is yet to be tested."""
-        self._sight.doubt(gravity)
 
     def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
         if has_gap:
             self._sight.needs_key = True
-        sighting = self._sight.see(frames, *self._prior)
+        sighting = self._sight.see(frames)
         if sighting is None:
             self._tell(self._on_key_wanted)
             return

@@ -91,7 +91,7 @@ class Offline:
                 self._inbox.append(ReadyInput([]))
             output = self._tick(now)
             if k % EXPECT_EVERY == 0:
-                self._sight.expect(self._controller.expected(output))
+                self._sight.looking.expect(self._controller.expected(output))
             for frame, pose in self._seen:
                 yield row_of(frame, pose, output, recording.t_first)
             self._seen.clear()
@@ -100,7 +100,7 @@ class Offline:
         body: list[BodyImu] = []
         while self._body and self._body[0].t <= now:
             body.append(self._body.popleft())
-        self._sight.feel_body(body)
+        self._sight.looking.add_imu(*body)
         inbox, self._inbox = self._inbox, []
         self._tap(now, inbox, body)
         _, output = self._controller.tick(now, inbox, body, "")
@@ -129,7 +129,7 @@ class Offline:
         """A record of the phone."""
         match self._ingest.record(record, now):
             case PhoneImu() as sample:
-                self._sight.feel(sample)
+                self._sight.looking.add_imu(sample)
                 self._inbox.append(PhoneImuInput.of(sample))
             case TouchState() as operator:
                 self._inbox.append(OperatorInput.of(operator))
@@ -152,10 +152,7 @@ class Offline:
 
     def _see(self, frame: EncodedFrame) -> None:
         self._fit(frame.picture)
-        controller, sighting = self._controller, None
-        if not self._is_blind:
-            known = controller.up_in_b, controller.omega_bf_in_b
-            sighting = self._sight.see([frame], *known)
+        sighting = None if self._is_blind else self._sight.see([frame])
         self._seen.append((frame, sighting.pose if sighting is not None else None))
         seen = sighting.seen(self._sight.camera) if sighting is not None else None
         if seen is not None:

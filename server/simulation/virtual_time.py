@@ -174,7 +174,7 @@ class VirtualTimeSimulation:
             self.t, inbox, felt, self._link.reason, self._link.gap, self._link.left_s
         )
         if self._ticks % EVERY_TICKS["status"] == 0:
-            self._sight.expect(self.controller.expected(output))
+            self._sight.looking.expect(self.controller.expected(output))
         self.follower.send(command)
         self._feel(*felt)
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
@@ -244,8 +244,7 @@ class VirtualTimeSimulation:
                 self._see(frame)
 
     def _see(self, frame: EncodedFrame) -> None:
-        up_in_b, omega = self.controller.up_in_b, self.controller.omega_bf_in_b
-        sighting = self._sight.see([frame], up_in_b, omega)
+        sighting = self._sight.see([frame])
         self.trace.pictures += 1
         self.trace.leds.append(len(sighting.rays) if sighting is not None else 0)
         self._tell(sighting.seen(self._sight.camera) if sighting is not None else None)
@@ -269,13 +268,11 @@ class VirtualTimeSimulation:
 
     def _feel(self, *samples: PhoneImu | BodyImu) -> None:
         """Motion samples, for whoever looks."""
+        if self._eye is None:
+            self._sight.looking.add_imu(*samples)
+            return
         for sample in samples:
-            if self._eye is not None:
-                self._eye.feel(sample)
-            elif isinstance(sample, PhoneImu):
-                self._sight.feel(sample)
-            else:
-                self._sight.feel_body([sample])
+            self._eye.feel(sample)
 
 
 def make_eye(

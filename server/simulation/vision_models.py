@@ -10,7 +10,6 @@ import numpy as np
 from hardware.codec import Encoder
 from hardware.sim.led_sensor_model import LedSensorModel
 from hardware.sim.phone import BodyHistory, Event, VirtualPhone
-from pipeline.estimation.gravity_direction import GravityDirection
 from pipeline.frames import Array
 from pipeline.prediction import Prediction
 from pipeline.robot import Robot
@@ -71,31 +70,23 @@ class RenderedVisionModel:
         encoder = Encoder(camera.width, camera.height, rate_hz, BITRATE_BPS, codec)
         self._script = PhoneScript(phone, encoder, VirtualOperator())
         self._sight = FramePipeline(camera, robot, gates)
-        self._vertical, self._omega_bf_in_b = GravityDirection(), np.zeros(3)
         self._periods = 0
 
     def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
         """Follow the motion of both sides."""
-        for sample in samples:
-            if isinstance(sample, PhoneImu):
-                self._sight.feel(sample)
-            else:
-                self._sight.feel_body((sample,))
-                self._vertical.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+        self._sight.looking.add_imu(*samples)
 
     def expect(self, relative: RelativeState | None, time_offset: float) -> None:
         """Follow what control's filter says at the end of a period."""
         self._periods += 1
-        if relative is not None:
-            self._omega_bf_in_b = relative.omega_bf_in_b
         if self._periods % STATUS_PERIODS == 0:
             said = Prediction.of(relative, time_offset) if relative is not None else None
-            self._sight.expect(said)
+            self._sight.looking.expect(said)
 
     def see(self, pictures: Sequence[Event], body: BodyHistory) -> VisionMeasurement | None:
         """What the newest says; all are decoded, as each needs the one before it."""
         frames = [self._frame(event, body) for event in pictures]
-        sighting = self._sight.see(frames, self._vertical.up, self._omega_bf_in_b)
+        sighting = self._sight.see(frames)
         return sighting.seen(self._sight.camera) if sighting is not None else None
 
     def _frame(self, event: Event, body: BodyHistory) -> EncodedFrame:

@@ -9,7 +9,6 @@ import numpy as np
 
 from hardware.sim.scenes.video import RenderedFrame, RenderedVideo
 from pipeline.signals import Frame
-from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.common.settings import VideoSettings
@@ -46,24 +45,17 @@ class Eye:
 
     def __init__(self, film: RenderedVideo, seen: Seen) -> None:
         self._film, self._seen = film, seen
-        self._looking, self._body = (
-            VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig()),
-            ImuBuffer(),
-        )
+        self._looking = VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig())
 
     def feel(self, shot: RenderedFrame) -> None:
-        for sample in shot.phone:
-            self._looking.feel(sample)
-        self._looking.feel_body(shot.body)
-        for sample in shot.body:
-            self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+        self._looking.add_imu(*shot.phone, *shot.body)
 
     def see(self, k: int, shot: RenderedFrame, frame: Frame) -> None:
         """Picture `k`."""
-        seen, film, now = self._seen, self._film, self._body.at(shot.t)
+        seen, film = self._seen, self._film
         seen.frames += 1
         seen.solvable += shot.solvable
-        sighting = self._looking.look(frame, now.up if now else None, now.omega if now else None)
+        sighting = self._looking.process(frame)
         pose, match = sighting.pose, sighting.match
         if pose is None or match is None:
             return

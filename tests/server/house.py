@@ -52,8 +52,6 @@ def control_status(**changes: object) -> ControlStatus:
         "body_imu_rate_hz": 200.0,
         "thrusts": [0.0] * 8,
         "saturated": False,
-        "up_in_b": (0.0, 0.0, 1.0),
-        "omega_b": (0.0, 0.0, 0.0),
         "body_samples": [],
         "realtime": "SCHED_FIFO 50",
         "lateness_ms": {"p50": 0.1, "p99": 0.2, "p999": 0.4, "max": 1.0, "missed": 3.0},

@@ -9,7 +9,6 @@ import numpy as np
 from hardware.sim.scenes.scene import HD, LEARNING
 from hardware.sim.scenes.video import RATE_HZ, RenderedVideo
 from pipeline.signals import Frame
-from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 
@@ -53,16 +52,10 @@ def learn(seed: int) -> LearningFigures:
     told_s = true_s * float(rng.choice(READOUT_ERROR))
     offset_s = float(rng.uniform(-OFFSET_S, OFFSET_S))
     camera = replace(film.camera, readout_s=told_s)
-    looking, body = VisualFrontEnd(camera, film.leds_in_b, GatesConfig()), ImuBuffer()
+    looking = VisualFrontEnd(camera, film.leds_in_b, GatesConfig())
     for shot in film:
-        for sample in shot.phone:
-            looking.feel(sample)
-        looking.feel_body(shot.body)
-        for felt in shot.body:
-            body.add(felt.t, felt.omega_m_bf_in_b, felt.a_m_bf_in_b)
-        stamp = shot.t - offset_s
-        now = body.at(stamp)
-        looking.look(Frame(stamp, shot.luma), now.up if now else None, now.omega if now else None)
+        looking.add_imu(*shot.phone, *shot.body)
+        looking.process(Frame(shot.t - offset_s, shot.luma))
     return LearningFigures(
         seed, true_s, told_s, looking.readout.in_use_s, offset_s, looking.offset_s
     )

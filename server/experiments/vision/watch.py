@@ -9,7 +9,6 @@ from hardware.sim.scenes.scene import ImageOrientation, Scene, Size
 from hardware.sim.scenes.video import RenderedFrame, RenderedVideo
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
 from pipeline.vision.detection import Detection
-from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.common.clock import thread_cpu
@@ -81,7 +80,6 @@ class ChannelRun:
         self.record = SceneRecord(film.scene.name, film.size, channel.name)
         self._phone: deque[PhoneImu] = deque()
         self._body: deque[BodyImu] = deque()
-        self._felt = ImuBuffer()
         self._had_pose = False
         self._fresh: VisualFrontEnd | None = None
         self._fresh_left, self._fresh_fair = 0, False
@@ -114,19 +112,16 @@ class ChannelRun:
     def _feel(self, shot: RenderedFrame) -> None:
         for looking in (self._looking, self._fresh):
             if looking is not None:
-                _tell(looking, shot.phone, shot.body)
+                looking.add_imu(*shot.phone, *shot.body)
         self._phone.extend(shot.phone)
         self._body.extend(shot.body)
         for samples in (self._phone, self._body):
             while samples and samples[0].t < shot.t - REMEMBERED_S:
                 samples.popleft()
-        for sample in shot.body:
-            self._felt.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
 
     def _look(self, looking: VisualFrontEnd, frame: Frame) -> Detection:
-        body = self._felt.at(frame.t) if self.channel.imu else None
         begin = thread_cpu()
-        sighting = looking.look(frame, body.up if body else None, body.omega if body else None)
+        sighting = looking.process(frame)
         self.record.whole_s.append(thread_cpu() - begin)
         return sighting
 
@@ -154,7 +149,7 @@ class ChannelRun:
         """Now and then somebody starts from nothing, and has a few pictures for it."""
         if k % FRESH_EVERY == 0:
             self._fresh, self._fresh_left, self._fresh_fair = self._new(), FRESH_LOOKS, True
-            _tell(self._fresh, tuple(self._phone), tuple(self._body))
+            self._fresh.add_imu(*self._phone, *self._body)
         if self._fresh is None:
             return
         self._fresh_left -= 1
@@ -183,12 +178,6 @@ class ChannelRun:
         if is_found and self._waiting:
             self.record.returns.append(self._waiting)
             self._waiting = 0
-
-
-def _tell(looking: VisualFrontEnd, phone: tuple[PhoneImu, ...], body: tuple[BodyImu, ...]) -> None:
-    for sample in phone:
-        looking.feel(sample)
-    looking.feel_body(body)
 
 
 def watch(

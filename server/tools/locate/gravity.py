@@ -33,7 +33,7 @@ class GravityDoubt:
 
     def add(self, located: Located) -> None:
         """Take a frame."""
-        up_in_c, up_in_b = located.ups
+        up_in_c, up_in_b = located.prior.up_in_c, located.prior.up_in_b
         self._confirmed += located.pose is not None
         denied = located.sighting.unbelieved if located.sighting is not None else None
         if denied is not None and up_in_c is not None and up_in_b is not None:

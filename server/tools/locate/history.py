@@ -49,8 +49,8 @@ class History:
         took = located.sighting.took_s if located.sighting is not None else {}
         for stage, s in {"read": located.read_s, **took}.items():
             self.took_s.setdefault(stage, []).append(s)
-        for sensor, feeling in enumerate(located.felt):
-            self.without_motion[sensor] += feeling is None
+        for sensor, omega in enumerate((located.prior.omega_cf_in_c, located.prior.omega_bf_in_b)):
+            self.without_motion[sensor] += omega is None
         self.gravity.add(located)
 
     def __len__(self) -> int:

@@ -10,8 +10,7 @@ import numpy as np
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
-from pipeline.vision.detection import Detection
-from pipeline.vision.imu_buffer import BufferedImu, ImuBuffer
+from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.common.clock import thread_cpu
@@ -42,14 +41,8 @@ class Located:
     """None: it could not be read."""
     read_s: float
     """CPU time of getting the picture [s]."""
-    felt: tuple[BufferedImu | None, BufferedImu | None]
+    prior: FramePrior
     """What the camera's and the body's sensors said about its time."""
-
-    @property
-    def ups(self) -> tuple[Array | None, Array | None]:
-        """The opposite of gravity in c and in b (3,), as far as known."""
-        camera, body = self.felt
-        return camera.up if camera is not None else None, body.up if body is not None else None
 
     @property
     def pose(self) -> RelativePose | None:
@@ -79,7 +72,6 @@ class Locator:
         self.looking.doubts_gravity = True  # told in the end, if it was wrong
         self._camera_samples = _Samples(motion.camera)
         self._body_samples = _Samples(motion.body)
-        self._camera_felt, self._body_felt = ImuBuffer(), ImuBuffer()
 
     def locate(self, frames: Frames) -> Iterator[Located]:
         """One after the other.
@@ -95,24 +87,19 @@ class Locator:
 
     def _located(self, shot: MediaFrame, read_s: float) -> Located:
         self._feel(shot.t)
-        t = shot.t + self.looking.offset_s
-        body = self._body_felt.at(t)
-        felt = (self._camera_felt.at(t), body)
         if shot.luma is None:
-            return Located(shot, None, read_s, felt)
+            return Located(shot, None, read_s, self.looking.prior(shot.t))
         self._check_size(shot.name, shot.luma.shape)
         frame = Frame(shot.t, shot.luma, shot.full_range)
-        up_in_b, omega_bf_in_b = (body.up, body.omega) if body is not None else (None, None)
-        return Located(shot, self.looking.look(frame, up_in_b, omega_bf_in_b), read_s, felt)
+        sighting = self.looking.process(frame)
+        return Located(shot, sighting, read_s, sighting.prior)
 
     def _feel(self, t: float) -> None:
         """All that was felt up to a little after `t` [s]: the frames' clock may differ by that."""
         for row in self._camera_samples.until(t + AHEAD_S):
-            self._camera_felt.add(row[0], row[1:4], row[4:])
-            self.looking.feel(PhoneImu(float(row[0]), row[1:4], row[4:]))
+            self.looking.add_imu(PhoneImu(float(row[0]), row[1:4], row[4:]))
         for row in self._body_samples.until(t + AHEAD_S):
-            self._body_felt.add(row[0], row[1:4], row[4:])
-            self.looking.feel_body([BodyImu(float(row[0]), row[1:4], row[4:])])
+            self.looking.add_imu(BodyImu(float(row[0]), row[1:4], row[4:]))
 
     def _check_size(self, name: str, shape: tuple[int, ...]) -> None:
         camera = self.camera

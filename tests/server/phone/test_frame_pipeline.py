@@ -11,7 +11,7 @@ from hardware.robot_file import load_robot
 from pipeline.camera.extrinsics import Extrinsics
 from pipeline.frames import GRAVITY, exp
 from pipeline.prediction import Prediction
-from pipeline.signals import PhoneImu, StampOffset
+from pipeline.signals import BodyImu, PhoneImu, StampOffset
 from pipeline.vision_config import GatesConfig
 from server.phone.frame_pipeline import FramePipeline
 from server.phone.ingest import ARRIVAL_S, EncodedFrame
@@ -46,14 +46,14 @@ def shots(rng, n, codec="h264", with_=None, truth=None):
         truth = moved(truth, rng)
 
 
-def hold(eye, truth, t):
-    """The phone's motion sensors when held still as in `truth`."""
-    eye.feel(PhoneImu(t, ZERO, GRAVITY * truth.prior().up_in_c))
+def hold(eye, t, up_in_c, up_in_b):
+    """What motion sensors of the phone and of the robot feel when held still."""
+    eye.looking.add_imu(PhoneImu(t, ZERO, GRAVITY * up_in_c), BodyImu(t, ZERO, GRAVITY * up_in_b))
 
 
 def look(eye, frames, truth):
-    hold(eye, truth, frames[-1].t)
-    return eye.see(frames, truth.prior().up_in_b, ZERO)
+    hold(eye, frames[-1].t, truth.prior().up_in_c, truth.prior().up_in_b)
+    return eye.see(frames)
 
 
 @pytest.mark.parametrize("codec", CODECS)
@@ -89,7 +89,7 @@ def test_of_several_pictures_all_are_decoded_and_the_newest_is_looked_at():
 
 
 def test_no_pictures_are_no_sighting():
-    assert sight().see([], None, ZERO) is None
+    assert sight().see([]) is None
 
 
 def test_a_stream_begins_with_a_key_picture():
@@ -144,10 +144,10 @@ def test_a_pose_that_gravity_contradicts_is_not_believed():
     rng = np.random.default_rng(86)
     eye = sight()
     (first, second), (truth, after) = zip(*shots(rng, 2), strict=True)
-    assert eye.see([first], None, ZERO).pose is not None  # nothing contradicts
-    hold(eye, after, second.t)
+    assert eye.see([first]).pose is not None  # nothing contradicts
     upset = exp(np.array([0.5, 0.0, 0.0])) @ truth.prior().up_in_b
-    sighting = eye.see([second], upset, ZERO)
+    hold(eye, second.t, after.prior().up_in_c, upset)
+    sighting = eye.see([second])
     assert sighting.pose is None
     assert sighting.reason.startswith("Not believed: gravity disagrees by")
 
@@ -190,14 +190,14 @@ def test_a_few_leds_where_control_expects_them_are_rays_without_a_pose():
     eye, truth, camera_side = sight(), truth_at(rng), encoder()
     for k in range(8):
         for t in (k * DT - 0.01, k * DT + 0.01):
-            eye.expect(Prediction(t, truth.p, truth.R, ZERO, 0.005, 0.005))
+            eye.looking.expect(Prediction(t, truth.p, truth.R, ZERO, 0.005, 0.005))
         covered = () if k < 3 else (0, 2, 4)
         shot = sent(k, *camera_side.encode(picture(truth, rng, covered=covered)))
         sighting = look(eye, [shot], truth)
         assert (sighting.pose is None) == (k >= 3)
     assert sorted(sighting.rays.led.tolist()) == [1, 3]
     assert sighting.reason == "2 of 5 LEDs seen."
-    eye.expect(None)
+    eye.looking.expect(None)
     shot = sent(8, *camera_side.encode(picture(truth, rng, covered=(0, 2, 4))))
     assert len(look(eye, [shot], truth).rays) == 0
 

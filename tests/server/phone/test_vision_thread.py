@@ -40,9 +40,7 @@ class Eyes:
         self.looking = threading.Semaphore(0)
         self.fails = False
 
-    def feel(self, sample: object) -> None: ...
-
-    def see(self, frames: list[EncodedFrame], up: object, omega: object) -> Detection | None:
+    def see(self, frames: list[EncodedFrame]) -> Detection | None:
         self.looking.release()
         assert self.may.acquire(timeout=5.0)
         if self.fails:

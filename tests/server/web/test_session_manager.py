@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from pipeline.prediction import Prediction
 from server.common.clock import now
 from server.common.runtime_parameters import TuneInput
 from server.control.ipc import ReadyInput, RequestInput
@@ -243,15 +244,16 @@ def test_a_change_of_mode_is_an_event_and_every_page_is_told(house):
 
 
 class Eyes:
-    """A vision thread that keeps what it is told."""
+    """A vision thread and its front-end, which keep what control expects."""
 
     def __init__(self) -> None:
-        self.known: list[tuple[object, ...]] = []
+        self.looking = self
+        self.expected: list[Prediction | None] = []
 
-    def know(self, *what: object) -> None:
-        self.known.append(what)
+    def expect(self, expected: Prediction | None) -> None:
+        self.expected.append(expected)
 
-    def feel_body(self, samples: object) -> None: ...
+    def add_imu(self, *samples: object) -> None: ...
 
     def stop(self) -> None: ...
 
@@ -265,7 +267,7 @@ def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
         for fields in ({}, {**pose, **sure}):
             house.control.send(control_status(**fields))
         house.hub._hear_control()
-        (_, _, before), (_, _, after) = eyes.known
+        before, after = eyes.expected
         assert before is None
         assert (after.sigma_p, after.sigma_theta, after.time_offset) == (0.01, 0.02, 0.0)
         assert after.p_bc_in_c.tolist() == [2.5, 0.0, 0.0]

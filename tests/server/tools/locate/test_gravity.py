@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.frames import R_cd, R_co, R_from_rpy
+from pipeline.vision.detection import FramePrior
 from server.tools.locate.gravity import GravityDoubt
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -18,7 +19,7 @@ def told(R_wrong, n=20, confirmed=0):
         is_denied = k < n
         doubt.add(
             SimpleNamespace(
-                ups=(R_wrong @ R_fc.T @ UP, R_fb.T @ UP),
+                prior=FramePrior(R_wrong @ R_fc.T @ UP, R_fb.T @ UP),
                 pose=None if is_denied else denied,
                 sighting=SimpleNamespace(unbelieved=denied if is_denied else None),
             )
@@ -58,6 +59,6 @@ def test_without_both_verticals_nothing_is_said():
     doubt = GravityDoubt()
     sighting = SimpleNamespace(unbelieved=SimpleNamespace(R_cb=np.eye(3)))
     for ups in ((None, UP), (UP, None)) * 10:
-        doubt.add(SimpleNamespace(ups=ups, pose=None, sighting=sighting))
-    doubt.add(SimpleNamespace(ups=(UP, UP), pose=None, sighting=None))
+        doubt.add(SimpleNamespace(prior=FramePrior(*ups), pose=None, sighting=sighting))
+    doubt.add(SimpleNamespace(prior=FramePrior(UP, UP), pose=None, sighting=None))
     assert doubt.words("imu.csv", "body.csv") == []

@@ -5,6 +5,7 @@ import numpy as np
 from pipeline.camera.fit import CameraFacts
 from pipeline.camera.lens import Camera
 from pipeline.signals import RelativePose
+from pipeline.vision.detection import FramePrior
 from server.media.frame import MediaFrame
 from server.tools.locate.history import History
 from server.tools.locate.summary import camera_lines, summary
@@ -17,7 +18,7 @@ def located(k, pose=None, reason=""):
     sighting = SimpleNamespace(
         pose=pose, reason=reason, match=None, unbelieved=None, took_s={"detect": 1e-4 * (k + 1)}
     )
-    return Located(MediaFrame(f"{k}.png", 0.1 * k, None), sighting, 0.002, (None, None))
+    return Located(MediaFrame(f"{k}.png", 0.1 * k, None), sighting, 0.002, FramePrior())
 
 
 def pose(leds):

@@ -14,7 +14,6 @@ from hardware.sim.scenes.video import RenderedVideo
 from pipeline.frames import R_co, R_from_wxyz
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, PhoneImu
-from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision_config import GatesConfig
 from server.media.tables import load_imu
 from server.phone.frame_pipeline import FramePipeline
@@ -120,22 +119,20 @@ def test_it_sees_what_the_live_pipeline_sees(films, tmp_path):
     encoder = Encoder(*VGA, 30.0, 1_000_000, "jpeg")
     sight = FramePipeline(film.camera, _robot(film.leds_in_b), GatesConfig())
     phone, body = (load_imu(source / name) for name in ("imu.csv", "body.csv"))
-    felt, live, at = ImuBuffer(), [], [0, 0]
+    live, at = [], [0, 0]
     for k, row in enumerate(table(source / "times.csv")):
         luma = cv2.imread(str(source / row["frame"]), cv2.IMREAD_GRAYSCALE)
         data, _ = encoder.encode(luma)
         (folder / f"{k:03}.jpg").write_bytes(data)
         t = float(row["t_s"])
         for s in phone[at[0] : (stop := int(np.sum(phone[:, 0] <= t + AHEAD_S)))]:
-            sight.feel(PhoneImu(s[0], s[1:4], s[4:]))
+            sight.looking.add_imu(PhoneImu(s[0], s[1:4], s[4:]))
         at[0] = stop
         for s in body[at[1] : (stop := int(np.sum(body[:, 0] <= t + AHEAD_S)))]:
-            felt.add(s[0], s[1:4], s[4:])
-            sight.feel_body([BodyImu(s[0], s[1:4], s[4:])])
+            sight.looking.add_imu(BodyImu(s[0], s[1:4], s[4:]))
         at[1] = stop
         sent = EncodedFrame(t, t, k, Picture(Codec.JPEG, True, *VGA, 0, data))
-        known = felt.at(t + sight.looking.offset_s)
-        live.append(sight.see([sent], known.up, known.omega).pose)
+        live.append(sight.see([sent]).pose)
     times = [f"{k:03}.jpg,{row['t_s']}" for k, row in enumerate(table(source / "times.csv"))]
     (folder / "times.csv").write_text("\n".join(["frame,t_s", *times]) + "\n")
     out = tmp_path / "poses.csv"
