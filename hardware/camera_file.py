@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 import yaml
 
-from pipeline.camera.extrinsics import SQUARE, Extrinsics
+from pipeline.camera.extrinsics import IDENTITY, Extrinsics
 from pipeline.camera.lens import MODELS, Camera
 from pipeline.frames import Array
 
@@ -139,7 +139,7 @@ class _CameraFileReader:
             distortion,
             self._readout_s(),
         )
-        camera = replace(camera, mounting=self._mounting())
+        camera = replace(camera, extrinsics=self._mounting())
         return self._word(table.get("camera_name", Path(self._file).stem), "camera_name"), camera
 
     def kalibr(self, name: str) -> tuple[str, Camera]:
@@ -174,7 +174,7 @@ class _CameraFileReader:
         """How the camera sits beside the motion sensors; the key may be missing."""
         table = self._table.get("camera_imu")
         if table is None:
-            return SQUARE
+            return IDENTITY
         if not isinstance(table, dict):
             self._refuse("camera_imu", "a mapping with rotation and time_offset_s")
         key = "camera_imu.rotation"

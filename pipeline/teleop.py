@@ -125,7 +125,7 @@ class Teleop:
         R_fc = self._R_fc_now(relative)
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
-            self._tracking.feel(known, self._given_in_b, self._h)
+            self._tracking.observe(known, self._given_in_b, self._h)
             self._propagate_station(known, inputs.t)
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()

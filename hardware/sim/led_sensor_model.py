@@ -39,9 +39,9 @@ class LedSensorModel:
         self._noise_px, self._rng = noise_px, rng
         self._stamps = CameraImuDelay()
 
-    def feel(self, sample: PhoneImu | BodyImu) -> None:
+    def add_imu(self, sample: PhoneImu | BodyImu) -> None:
         """Follow a motion sample, for the pictures' time offset."""
-        self._stamps.feel(sample)
+        self._stamps.add_imu(sample)
 
     def seen(self, t: float, stamp: float, body: BodyHistory) -> VisionMeasurement | None:
         """What a picture taken at `t` [s], and dated `stamp` [s], says; None without any LED."""

@@ -168,7 +168,7 @@ class VirtualPhone:
         self._bias_omega = schedule.normal(0.0, 1.0, 3) * options.bias_omega
         self._bias_a = schedule.normal(0.0, 1.0, 3) * options.bias_a
         # the sensors are taken to be the device, and the camera to sit beside its place
-        self._R_cd = camera.mounting.R_ci @ R_cd(options.screen_angle_deg)
+        self._R_cd = camera.extrinsics.R_ci @ R_cd(options.screen_angle_deg)
         self.motions = DelayedStream(
             EventKind.MOTION, options.motion_rate_hz, options.motion_delay_s, schedule
         )

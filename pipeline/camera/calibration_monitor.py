@@ -73,7 +73,7 @@ class CalibrationMonitor:
         self.complaint = ""
         """Why nobody should fly with this camera; empty if all is well, or not known yet."""
 
-    def feel(self, sample: PhoneImu | BodyImu) -> None:
+    def add_imu(self, sample: PhoneImu | BodyImu) -> None:
         """Take a motion sample of either side, in order."""
         self._waiting.append(sample)
 

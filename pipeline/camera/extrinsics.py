@@ -25,5 +25,5 @@ class Extrinsics:
         return PhoneImu(sample.t, R @ sample.omega_m_cf_in_c, R @ sample.a_m_cf_in_c)
 
 
-SQUARE = Extrinsics()
+IDENTITY = Extrinsics()
 """Nothing is known better."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.camera.extrinsics import SQUARE, Extrinsics
+from pipeline.camera.extrinsics import IDENTITY, Extrinsics
 from pipeline.camera.lens_kernels import LENS, put_normalised, put_pixels, put_slopes
 from pipeline.frames import Array
 
@@ -30,7 +30,7 @@ class Camera:
     readout_s: float = 0.0
     """Rolling shutter: how much later a row below the last would be exposed than the first one [s];
     negative if the last row is read first."""
-    mounting: Extrinsics = SQUARE
+    extrinsics: Extrinsics = IDENTITY
     """Beside the phone's motion sensors."""
 
     lens: Array = field(init=False, repr=False)

@@ -31,7 +31,7 @@ G_IN_F.setflags(write=False)
 
 
 class FeedForward:
-    """Call `feel` every period, `start` when tracking starts, `wrench` while it lasts."""
+    """Call `observe` every period, `start` when tracking starts, `wrench` while it lasts."""
 
     def __init__(self, robot: Robot, config: FeedForwardConfig) -> None:
         """At rest, thrusters off."""
@@ -53,7 +53,7 @@ class FeedForward:
         self._a_slow_in_f: Array | None = None
         self._a_in_f = np.zeros(3), np.zeros(3)
 
-    def feel(self, f_bf_in_b: Array, R_fb: Array, force_in_b: Array, h: float) -> None:
+    def observe(self, f_bf_in_b: Array, R_fb: Array, force_in_b: Array, h: float) -> None:
         """Follow what pulls at the body.
 
         Args:

@@ -53,10 +53,10 @@ class Tracking:
         if self._compliance is not None:
             self._compliance.start(self._pid.constant_force_in_f)
 
-    def feel(self, now: Situation, given_force_in_b: Array, h: float) -> None:
+    def observe(self, now: Situation, given_force_in_b: Array, h: float) -> None:
         """Every period `h` [s], whatever is done: what else than the thrusters (3,) [N] pulls."""
         R_fb = now.view.R_fv @ now.view.R_vb
-        self._ahead.feel(now.relative.f_bf_in_b, R_fb, given_force_in_b, h)
+        self._ahead.observe(now.relative.f_bf_in_b, R_fb, given_force_in_b, h)
 
     def wrench(self, now: Situation, reference: Reference, error: PoseError, h: float) -> Array:
         """Force and torque in b (6,) [N, N m], `h` [s] after the last. Eq. (20)."""

@@ -62,11 +62,11 @@ class AdaptiveNoise:
         self._log = min(max(self._log + step, 0.0), math.log(MOST))
         if misfit <= FAR:
             return 1.0
-        stretch = 2.0
-        while stretch * self.factor <= MOST:
-            if _misfit(e, stretch * P + pose.covariance) <= 1.0:
-                return stretch
-            stretch *= 2.0
+        inflation = 2.0
+        while inflation * self.factor <= MOST:
+            if _misfit(e, inflation * P + pose.covariance) <= 1.0:
+                return inflation
+            inflation *= 2.0
         return 1.0
 
 

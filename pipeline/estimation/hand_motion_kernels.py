@@ -60,7 +60,7 @@ def learn(times: Array, rates: Array, bias: Array, hand: Array, L: Array, alpha:
 
 
 @kernel
-def foresee(
+def extrapolate(
     times: Array, n: int, t: float, hand: Array, L: Array, alpha: Array, out: Array
 ) -> float:
     """Rate (3,) at `t` after the last sample, bias taken off; gives its standard deviation."""

@@ -93,10 +93,10 @@ class OutOfSequenceEkf:
         final = not self._waiting and pose.t <= min(self.history.newest)
         if not final and not self._renew_frontier():
             return nan
-        anchor = self.checkpoint if final else self._frontier
-        if not self._advance(anchor, pose.t):
+        checkpoint = self.checkpoint if final else self._frontier
+        if not self._advance(checkpoint, pose.t):
             return nan
-        chi2 = self._update(anchor, pose, gate)
+        chi2 = self._update(checkpoint, pose, gate)
         if final:
             self.history.forget_until(pose.t)
             self._frontier_good = False
@@ -144,17 +144,17 @@ class OutOfSequenceEkf:
             self._update(self._frontier, pose, inf)
         return True
 
-    def _update(self, anchor: EkfCheckpoint, pose: PoseMeasurement, gate: float) -> float:
-        return float(fuse_pose(anchor.x, anchor.P, pose.y, pose.C, gate, self._work))
+    def _update(self, checkpoint: EkfCheckpoint, pose: PoseMeasurement, gate: float) -> float:
+        return float(fuse_pose(checkpoint.x, checkpoint.P, pose.y, pose.C, gate, self._work))
 
-    def _advance(self, anchor: EkfCheckpoint, t: float) -> bool:
+    def _advance(self, checkpoint: EkfCheckpoint, t: float) -> bool:
         """Replay the samples up to time `t` [s]; False: the filter can't be believed."""
         history = self.history
         used = replay(
-            anchor.x,
-            anchor.P,
-            anchor.R_ic,
-            (anchor.t, t),
+            checkpoint.x,
+            checkpoint.P,
+            checkpoint.R_ic,
+            (checkpoint.t, t),
             history.times,
             history.kinds,
             history.values,
@@ -163,7 +163,7 @@ class OutOfSequenceEkf:
             self._steps,
             self._work,
         )
-        anchor.t = t
+        checkpoint.t = t
         return bool(used != FAILED)
 
 

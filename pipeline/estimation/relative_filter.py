@@ -68,7 +68,7 @@ class RelativeFilter:
         self._misses, self._t_seen, self._t_start = 0, -np.inf, -np.inf
         self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
         self._offset = OffsetMonitor()
-        self._doubt = AdaptiveNoise()
+        self._adaptive_noise = AdaptiveNoise()
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
@@ -83,7 +83,7 @@ class RelativeFilter:
     def _remember(self, history: ImuHistory, t: float, rate: Array, force: Array) -> None:
         if not is_felt(t, rate, force) or t > self._now + MAX_SLEEP_S:
             self.samples_invalid += 1
-        elif self._started and t <= self._track.anchors[0].t:
+        elif self._started and t <= self._track.checkpoints[0].t:
             self.samples_late += 1
         elif not self._track.insert(history, t, rate, force):
             self.samples_duplicate += 1
@@ -111,28 +111,28 @@ class RelativeFilter:
         if not self._started:
             return self._start(seen, now)
         t = seen.t + float(self._track.newest.x[X_OFFSET])
-        if t <= self._track.anchors[0].t:
+        if t <= self._track.checkpoints[0].t:
             return Fusion.LATE
-        foretold = self._track.foretold(min(t, now))
-        if is_better_start(seen, foretold.P, self._config) and self._start(seen, now):
+        predicted = self._track.predicted(min(t, now))
+        if is_better_start(seen, predicted.P, self._config) and self._start(seen, now):
             return Fusion.STARTED
-        return self._fuse(seen, foretold, now)
+        return self._fuse(seen, predicted, now)
 
-    def _doubted(self, seen: VisionMeasurement, foretold: Checkpoint) -> float:
+    def _doubted(self, seen: VisionMeasurement, predicted: Checkpoint) -> float:
         """How far what is foretold must be stretched for this picture; learns of the sensors."""
         dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
             return 1.0
-        P = self._track.in_picture(foretold)
-        stretch = self._doubt.judge(foretold.x[0:3], foretold.R, P, seen.pose)
-        self._track.doubt_phone(self._doubt.factor)
-        return stretch
+        P = self._track.in_picture(predicted)
+        inflation = self._adaptive_noise.judge(predicted.x[0:3], predicted.R, P, seen.pose)
+        self._track.doubt_phone(self._adaptive_noise.factor)
+        return inflation
 
-    def _fuse(self, seen: VisionMeasurement, anchor: Checkpoint, now: float) -> Fusion:
+    def _fuse(self, seen: VisionMeasurement, checkpoint: Checkpoint, now: float) -> Fusion:
         """Fuse, or begin again when too many pictures in a row didn't fit."""
-        chi2 = self._track.fuse(anchor, seen, self._doubted(seen, anchor))
+        chi2 = self._track.fuse(checkpoint, seen, self._doubted(seen, checkpoint))
         self._recent.append(seen.t)
-        used = int((anchor.use == 1).sum()) if anchor.use is not None else 0
+        used = int((checkpoint.use == 1).sum()) if checkpoint.use is not None else 0
         self.leds_rejected += len(seen.rays) - used
         if not np.isfinite(chi2):
             self._give_up()
@@ -185,7 +185,7 @@ class RelativeFilter:
         self._now = now
         if not self._started:
             return
-        if now - self._track.anchors[0].t > MAX_SLEEP_S:
+        if now - self._track.checkpoints[0].t > MAX_SLEEP_S:
             self._give_up()
         else:
             self._track.settle(now - self._config.horizon_s)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.estimation.gravity_free_kernels import step
-from pipeline.estimation.hand_motion_kernels import TAPS, foresee, learn
+from pipeline.estimation.hand_motion_kernels import TAPS, extrapolate, learn
 from pipeline.estimation.imu_interpolation_kernels import put_noise, sample_at
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel, put_exp
@@ -167,7 +167,7 @@ def transit(
                 if taps == 0:
                     taps = learn(t_c, v_c, x[X_BIASES + 6 : X_BIASES + 9], hand, L, alpha)
                     doubt = 0.0 if t <= t_c[last] else _doubt(t_c, taps, t, hand, L, alpha, turn_c)
-                sigma = foresee(t_c, taps, middle, hand, L, alpha, inputs[6:9])
+                sigma = extrapolate(t_c, taps, middle, hand, L, alpha, inputs[6:9])
                 for k in range(6, 9):  # in place of the drift
                     s[k] -= (noise[1, 2, 0] * beyond) ** 2 * beyond
                     s[k] += LASTING * sigma * (doubt + 0.5 * h * sigma)
@@ -193,7 +193,7 @@ def _doubt(
     """∫ σ dt from the last sample to `t`, of a transit that begins beyond it."""
     h, doubt = (t - t_c[-1]) / DOUBT_STEPS, 0.0
     for k in range(DOUBT_STEPS):
-        doubt += h * foresee(t_c, taps, t_c[-1] + (k + 0.5) * h, hand, L, alpha, out[0])
+        doubt += h * extrapolate(t_c, taps, t_c[-1] + (k + 0.5) * h, hand, L, alpha, out[0])
     return doubt
 
 
@@ -212,5 +212,5 @@ def inputs_at(
     if c == t_c.shape[0] - 1 and hand[0] > 0.0:
         L, alpha = np.empty((TAPS + 1, TAPS)), np.empty((TAPS, 3))
         taps = learn(t_c, v_c, x[X_BIASES + 6 : X_BIASES + 9], hand, L, alpha)
-        foresee(t_c, taps, t, hand, L, alpha, inputs[6:9])
+        extrapolate(t_c, taps, t, hand, L, alpha, inputs[6:9])
     return inputs

@@ -62,19 +62,19 @@ def first_anchor(
     """
     if seen.pose is None:
         raise ValueError("a start needs a pose")
-    anchor = Checkpoint.empty()
+    checkpoint = Checkpoint.empty()
     if learnt is not None:
-        anchor.x[X_BIASES:], anchor.P[BIASES:, BIASES:] = learnt
+        checkpoint.x[X_BIASES:], checkpoint.P[BIASES:, BIASES:] = learnt
     else:
-        anchor.P[BIASES:, BIASES:] = np.diag(_initial_variances(config))
+        checkpoint.P[BIASES:, BIASES:] = np.diag(_initial_variances(config))
         if seen.offset is not None:
-            anchor.x[X_OFFSET] = seen.offset.value
-            anchor.P[OFFSET, OFFSET] = seen.offset.sigma**2
-    anchor.t = min(seen.t + float(anchor.x[X_OFFSET]), now)
-    anchor.x[0:3], anchor.R[:] = seen.pose.p_bc_in_c, seen.pose.R_cb
-    anchor.P[:6, :6] = config.start_doubt**2 * seen.pose.covariance
-    anchor.P[6:9, 6:9] = config.initial_u**2 * np.eye(3)
-    return anchor
+            checkpoint.x[X_OFFSET] = seen.offset.value
+            checkpoint.P[OFFSET, OFFSET] = seen.offset.sigma**2
+    checkpoint.t = min(seen.t + float(checkpoint.x[X_OFFSET]), now)
+    checkpoint.x[0:3], checkpoint.R[:] = seen.pose.p_bc_in_c, seen.pose.R_cb
+    checkpoint.P[:6, :6] = config.start_doubt**2 * seen.pose.covariance
+    checkpoint.P[6:9, 6:9] = config.initial_u**2 * np.eye(3)
+    return checkpoint
 
 
 def _initial_variances(c: RelativeConfig) -> Array:

@@ -58,7 +58,7 @@ class Checkpoint:
     """The picture that was fused here."""
     use: Flags | None = None
     """(m,) which of its LEDs were."""
-    stretch: float = 1.0
+    inflation: float = 1.0
     """Factor of the variances of place, velocity and attitude that were foretold for it."""
 
     @staticmethod
@@ -80,7 +80,7 @@ class RelativeTrack:
         """Empty: `begin` before anything but `insert`."""
         self._leds_in_b = np.ascontiguousarray(leds_in_b)
         self.body, self.phone = ImuHistory(), ImuHistory()
-        self.anchors: list[Checkpoint] = []
+        self.checkpoints: list[Checkpoint] = []
         self.now = Checkpoint.empty()
         self._frontier = Checkpoint.empty()
         self._spoilt_from = -inf
@@ -105,16 +105,16 @@ class RelativeTrack:
     @property
     def newest(self) -> Checkpoint:
         """Of the last picture, or the base."""
-        return self.anchors[-1]
+        return self.checkpoints[-1]
 
     @property
     def complete(self) -> float:
         """Both IMUs' samples have come up to this time [s]."""
         return min(self.body.newest[0], self.phone.newest[0])
 
-    def begin(self, anchor: Checkpoint) -> None:
-        """Start from `anchor`."""
-        self.anchors = [anchor]
+    def begin(self, checkpoint: Checkpoint) -> None:
+        """Start from `checkpoint`."""
+        self.checkpoints = [checkpoint]
         self._spoilt_from = -inf
 
     def insert(self, history: ImuHistory, t: float, rate: Array, force: Array) -> bool:
@@ -126,67 +126,69 @@ class RelativeTrack:
         self._spoilt_from = min(self._spoilt_from, before)
         return True
 
-    def foretold(self, t: float) -> Checkpoint:
+    def predicted(self, t: float) -> Checkpoint:
         """The filter at time `t` [s], later than the base, as if no picture had come then."""
         self._repair()
-        anchor = Checkpoint.empty()
-        anchor.copy(next(a for a in reversed(self.anchors) if a.t <= t))
-        self._advance(anchor, t)
-        return anchor
+        checkpoint = Checkpoint.empty()
+        checkpoint.copy(next(a for a in reversed(self.checkpoints) if a.t <= t))
+        self._advance(checkpoint, t)
+        return checkpoint
 
-    def in_picture(self, anchor: Checkpoint) -> Array:
-        """P (6, 6) of the pose in a picture stamped for the time of `anchor`: that is doubted too.
+    def in_picture(self, checkpoint: Checkpoint) -> Array:
+        """P (6, 6) of the pose in a picture stamped for the time of `checkpoint`: that is doubted too.
 
         The pose passes at ṗ = u − ω_c × p, Ṙ = R [ω_b − Rᵀ ω_c]×.
         """
-        felt, p = self._inputs(anchor), anchor.x[0:3]
+        felt, p = self._inputs(checkpoint), checkpoint.x[0:3]
         passing = np.eye(6, 7)
-        passing[0:3, 6] = anchor.x[3:6] - cross(felt[6:9], p)
-        passing[3:6, 6] = felt[0:3] - anchor.R.T @ felt[6:9]
-        P: Array = passing @ anchor.P[TOUCHED[:, None], TOUCHED] @ passing.T
+        passing[0:3, 6] = checkpoint.x[3:6] - cross(felt[6:9], p)
+        passing[3:6, 6] = felt[0:3] - checkpoint.R.T @ felt[6:9]
+        P: Array = passing @ checkpoint.P[TOUCHED[:, None], TOUCHED] @ passing.T
         return P
 
-    def fuse(self, anchor: Checkpoint, seen: VisionMeasurement, stretch: float = 1.0) -> float:
-        """Fuse the rays of `seen` into what was `foretold` of its time.
+    def fuse(
+        self, checkpoint: Checkpoint, seen: VisionMeasurement, inflation: float = 1.0
+    ) -> float:
+        """Fuse the rays of `seen` into what was `predicted` of its time.
 
-        `stretch` is as in `Checkpoint`.
+        `inflation` is as in `Checkpoint`.
 
         Gives χ² (two degrees of freedom for each LED used); NaN: the filter can't be believed.
         """
-        k = len(self.anchors)
-        while self.anchors[k - 1].t > anchor.t:
+        k = len(self.checkpoints)
+        while self.checkpoints[k - 1].t > checkpoint.t:
             k -= 1
-        self.anchors.insert(k, anchor)
-        anchor.seen, anchor.use = seen, np.full(len(seen.rays), -1, dtype=np.int8)
-        anchor.stretch = stretch
-        chi2 = self._look(anchor, seen, anchor.use)
-        self._spoilt_from = anchor.t
+        self.checkpoints.insert(k, checkpoint)
+        checkpoint.seen, checkpoint.use = seen, np.full(len(seen.rays), -1, dtype=np.int8)
+        checkpoint.inflation = inflation
+        chi2 = self._look(checkpoint, seen, checkpoint.use)
+        self._spoilt_from = checkpoint.t
         self._repair()
         return chi2
 
     def _remake(self, k: int) -> None:
         """Anchor k from the one before it."""
-        anchor = self.anchors[k]
-        t = anchor.t
-        anchor.copy(self.anchors[k - 1])
-        self._advance(anchor, t)
-        if anchor.seen is not None and anchor.use is not None:
-            self._look(anchor, anchor.seen, anchor.use)
+        checkpoint = self.checkpoints[k]
+        t = checkpoint.t
+        checkpoint.copy(self.checkpoints[k - 1])
+        self._advance(checkpoint, t)
+        if checkpoint.seen is not None and checkpoint.use is not None:
+            self._look(checkpoint, checkpoint.seen, checkpoint.use)
 
-    def _look(self, anchor: Checkpoint, seen: VisionMeasurement, use: Flags) -> float:
-        if anchor.stretch != 1.0:
-            anchor.P[:MOVING] *= sqrt(anchor.stretch)
-            anchor.P[:, :MOVING] *= sqrt(anchor.stretch)
+    def _look(self, checkpoint: Checkpoint, seen: VisionMeasurement, use: Flags) -> float:
+        if checkpoint.inflation != 1.0:
+            checkpoint.P[:MOVING] *= sqrt(checkpoint.inflation)
+            checkpoint.P[:, :MOVING] *= sqrt(checkpoint.inflation)
         rays = seen.rays
-        felt = self._inputs(anchor)
+        felt = self._inputs(checkpoint)
         return float(
             fuse_rays(
-                anchor.x,
-                anchor.R,
-                anchor.P,
+                checkpoint.x,
+                checkpoint.R,
+                checkpoint.P,
                 felt,
                 self._leds_in_b[rays.led],
-                rays.t + (anchor.x[X_OFFSET] - anchor.t),
+                rays.t + (checkpoint.x[X_OFFSET] - checkpoint.t),
                 np.array(rays.tangents, dtype=np.float64, order="C"),  # compiled for such alone
                 np.array(rays.covariances, dtype=np.float64, order="C"),
                 self._gate,
@@ -199,8 +201,8 @@ class RelativeTrack:
         """Make anew what was spoilt; the base can't be."""
         if self._spoilt_from == inf:
             return
-        for k in range(1, len(self.anchors)):
-            if self.anchors[k].t > self._spoilt_from:
+        for k in range(1, len(self.checkpoints)):
+            if self.checkpoints[k].t > self._spoilt_from:
                 self._remake(k)
         if self._frontier.t > self._spoilt_from or self._frontier.t <= self.newest.t:
             self._frontier.copy(self.newest)
@@ -209,15 +211,15 @@ class RelativeTrack:
     def settle(self, oldest: float) -> None:
         """Let the base follow at time `oldest` [s]: nothing from before it will be made anew."""
         self._repair()
-        while len(self.anchors) > 1 and self.anchors[1].t <= oldest:
-            self.anchors.pop(0)
-        if len(self.anchors) == 1 and self.anchors[0].t < oldest:
-            self._advance(self.anchors[0], oldest)
-            self.anchors[0].seen = self.anchors[0].use = None
+        while len(self.checkpoints) > 1 and self.checkpoints[1].t <= oldest:
+            self.checkpoints.pop(0)
+        if len(self.checkpoints) == 1 and self.checkpoints[0].t < oldest:
+            self._advance(self.checkpoints[0], oldest)
+            self.checkpoints[0].seen = self.checkpoints[0].use = None
         if self._frontier.t < self.newest.t:
             self._frontier.copy(self.newest)
         for history in (self.body, self.phone):
-            kept = int(np.searchsorted(history.times, self.anchors[0].t, side="right")) - KEPT
+            kept = int(np.searchsorted(history.times, self.checkpoints[0].t, side="right")) - KEPT
             if kept > 0:
                 history.forget_until(float(history.times[kept - 1]))
 
@@ -237,24 +239,30 @@ class RelativeTrack:
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
         return self._inputs(self.now)
 
-    def _inputs(self, anchor: Checkpoint) -> Array:
+    def _inputs(self, checkpoint: Checkpoint) -> Array:
         body, phone = self.body, self.phone
         return np.asarray(
             inputs_at(
-                anchor.t, anchor.x, body.times, body.values, phone.times, phone.values, self._hand
+                checkpoint.t,
+                checkpoint.x,
+                body.times,
+                body.values,
+                phone.times,
+                phone.values,
+                self._hand,
             )
         )
 
-    def _advance(self, anchor: Checkpoint, t: float) -> None:
+    def _advance(self, checkpoint: Checkpoint, t: float) -> None:
         body, phone = self.body, self.phone
         transit(
-            anchor.x,
-            anchor.R,
-            anchor.R_ic,
+            checkpoint.x,
+            checkpoint.R,
+            checkpoint.R_ic,
             self._F,
             self._G,
             self._Q,
-            (anchor.t, t),
+            (checkpoint.t, t),
             body.times,
             body.values,
             phone.times,
@@ -263,5 +271,7 @@ class RelativeTrack:
             self._hand,
             self._steps,
         )
-        apply(anchor.P, self._F, self._G, self._Q, self._walks, t - anchor.t, self._products)
-        anchor.t = t
+        apply(
+            checkpoint.P, self._F, self._G, self._Q, self._walks, t - checkpoint.t, self._products
+        )
+        checkpoint.t = t

@@ -109,7 +109,7 @@ def _try_triple(
 
 
 @kernel
-def any_way(
+def p3p_hypotheses(
     which: Integers, start: int, budget: int, wanted: Wanted, lights: BinnedSpots, work: Work
 ) -> int:
     """Explain spots of a robot in any attitude.

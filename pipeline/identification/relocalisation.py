@@ -26,7 +26,7 @@ from pipeline.identification.initialisation_kernels import (
     Work,
 )
 from pipeline.identification.initialisation_kernels import FIT_COST as FIT
-from pipeline.identification.p3p_hypothesis_kernels import any_way
+from pipeline.identification.p3p_hypothesis_kernels import p3p_hypotheses
 from pipeline.signals import Spots
 from pipeline.vision_config import IdentifyConfig
 
@@ -186,7 +186,7 @@ class Relocalisation:
     def _try(self, number: int, wanted: Wanted, lights: BinnedSpots, budget: int) -> None:
         """From where it was left in the last picture."""
         start, most = self._at.get((wanted.least, number), 0), len(lights.tangents) ** 3
-        self._at[wanted.least, number] = any_way(
+        self._at[wanted.least, number] = p3p_hypotheses(
             self._triples[number],
             start if start < most else 0,
             self.looked + budget,

@@ -28,7 +28,7 @@ class CameraImuDelay:
         self.offset: StampOffset | None = None
         """As of the last search that found one."""
 
-    def feel(self, sample: PhoneImu | BodyImu) -> None:
+    def add_imu(self, sample: PhoneImu | BodyImu) -> None:
         """Take a motion sample of either side, in order."""
         self._waiting.append(sample)
 

@@ -31,32 +31,32 @@ class ImuBuffer:
 
     def __init__(self) -> None:
         """Nothing felt."""
-        self._vertical = GravityDirection()
-        self._feelings: tuple[BufferedImu, ...] = ()
+        self._gravity_direction = GravityDirection()
+        self._samples: tuple[BufferedImu, ...] = ()
 
     def add(self, t: float, omega: Array, specific_force: Array) -> None:
         """Take a sample of `t` [s]: `omega` (3,) [rad/s], `specific_force` (3,) [m/s²]."""
-        self._vertical.add(t, omega, specific_force)
-        kept = self._feelings[-MAX_REMEMBERED:]
+        self._gravity_direction.add(t, omega, specific_force)
+        kept = self._samples[-MAX_REMEMBERED:]
         first = 0
         while first < len(kept) and kept[first].t < t - REMEMBERED_S:
             first += 1
         # a new tuple each time: who reads one in another thread keeps it whole
-        self._feelings = (*kept[first:], BufferedImu(t, self._vertical.up, omega))
+        self._samples = (*kept[first:], BufferedImu(t, self._gravity_direction.up, omega))
 
     def at(self, t: float) -> BufferedImu | None:
         """Between the samples around `t` [s], or that of the nearest; None if all are far."""
-        feelings = self._feelings
-        if not feelings or not feelings[0].t - STALE_S <= t <= feelings[-1].t + STALE_S:
+        samples = self._samples
+        if not samples or not samples[0].t - STALE_S <= t <= samples[-1].t + STALE_S:
             return None
-        later = len(feelings)
-        while later > 0 and feelings[later - 1].t > t:
+        later = len(samples)
+        while later > 0 and samples[later - 1].t > t:
             later -= 1
         if later == 0:
-            return feelings[0]._replace(t=t)
-        if later == len(feelings):
-            return feelings[-1]._replace(t=t)
-        return _between(feelings[later - 1], feelings[later], t)
+            return samples[0]._replace(t=t)
+        if later == len(samples):
+            return samples[-1]._replace(t=t)
+        return _between(samples[later - 1], samples[later], t)
 
 
 def _between(a: BufferedImu, b: BufferedImu, t: float) -> BufferedImu:

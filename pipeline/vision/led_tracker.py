@@ -50,7 +50,7 @@ class TrackedLeds:
 
     spots: Spots
     """As they stand in the picture."""
-    naming: Association | None
+    association: Association | None
     took_s: Array
     """(3,) to detect, to name and solve, and to learn from it [s]."""
 
@@ -62,12 +62,12 @@ class _Attempt:
     spots: Spots
     table: Array
     """(n, FIELDS)."""
-    naming: Association | None
+    association: Association | None
     took_s: Array
 
     def names(self) -> int:
         """How many LEDs the pose rests on."""
-        return 0 if self.naming is None else len(self.naming.match.led)
+        return 0 if self.association is None else len(self.association.match.led)
 
 
 class LedTracker:
@@ -85,7 +85,7 @@ class LedTracker:
         self._leds_in_b = np.ascontiguousarray(leds_in_b, dtype=np.float64)
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
-        self.doubt, self.smear = NoiseScale(), MotionBlur()
+        self.noise_scale, self.motion_blur = NoiseScale(), MotionBlur()
         self._threes = 0
         """Poses of three LEDs in a row."""
         config = self._identify
@@ -111,17 +111,19 @@ class LedTracker:
             motion: During the readout; None if unknown.
             clock: Times the stages.
         """
-        row = self.smear.row(frame.t, motion)
+        row = self.motion_blur.row(frame.t, motion)
         first = self._look(frame, place, motion, row, self._reach, clock)
         if self._reach < self._full and first.names() < self._known:
             again = self._look(frame, place, motion, row, self._full, clock)
-            first = _Attempt(again.spots, again.table, again.naming, first.took_s + again.took_s)
+            first = _Attempt(
+                again.spots, again.table, again.association, first.took_s + again.took_s
+            )
         started = clock()
         self._known, self._reach = first.names(), self._full
-        if first.naming is not None:
-            self._learn(first.naming, first.table)
+        if first.association is not None:
+            self._learn(first.association, first.table)
         first.took_s[2] += clock() - started
-        return TrackedLeds(first.spots, first.naming, first.took_s)
+        return TrackedLeds(first.spots, first.association, first.took_s)
 
     def _look(
         self,
@@ -136,15 +138,15 @@ class LedTracker:
         table, spots = self._measured(frame, place, row, reach)
         detected = clock()
         own = table[:, [C_UU, C_UV, C_UV, C_VV]].reshape(-1, 2, 2)
-        naming = self._named(table, own, place, row, motion)
+        association = self._named(table, own, place, row, motion)
         took_s = np.array([detected - started, clock() - detected, 0.0])
-        return _Attempt(spots, table, naming, took_s)
+        return _Attempt(spots, table, association, took_s)
 
     def name(self, spots: Spots, place: Place, motion: FrameMotion | None) -> Association | None:
         """The same for spots as they stand in the picture, wherever they were looked for."""
         table = np.zeros((len(spots), FIELDS))
         table[:, :2] = spots.pixels
-        return self._named(table, spots.covariances, place, self.smear.again(motion), motion)
+        return self._named(table, spots.covariances, place, self.motion_blur.again(motion), motion)
 
     def forget(self) -> None:
         """The robot was lost."""
@@ -153,7 +155,9 @@ class LedTracker:
     @property
     def _size(self) -> Array:
         camera = self.camera
-        return np.array([camera.width, camera.height, camera.readout_s, self.smear.exposure_s])
+        return np.array(
+            [camera.width, camera.height, camera.readout_s, self.motion_blur.exposure_s]
+        )
 
     def _measured(
         self, frame: Frame, place: Place, row: Array, reach: float
@@ -163,7 +167,7 @@ class LedTracker:
         table, covariances = np.empty((most, FIELDS)), np.empty((most, 2, 2))
         n = detect(
             frame.luma, *leds.light_of(full), leds.limits_of(full, config),
-            self.camera.lens, self._size, self._leds_in_b, *place, row, reach, self.doubt.factor,
+            self.camera.lens, self._size, self._leds_in_b, *place, row, reach, self.noise_scale.factor,
             self._expected, table, covariances,
         )  # fmt: skip
         table = table[:n]
@@ -184,7 +188,7 @@ class LedTracker:
         pose, residuals = np.empty(12), np.empty((n, 2))
         information, shared = np.empty((6, 6)), np.empty((6, 6))
         pose[:3], pose[3:] = place[0], place[1].ravel()
-        limits = np.array([*self._limits, sigma_u, UNEVEN_PX_S2, self.doubt.common])
+        limits = np.array([*self._limits, sigma_u, UNEVEN_PX_S2, self.noise_scale.common])
         left, chi2 = identify(
             self.camera.lens, self._size, self._leds_in_b, table, covariances, row, limits,
             self._expected, led, spot, pose, information, residuals, shared,
@@ -197,15 +201,15 @@ class LedTracker:
         )
         if not _near(fit, place, JUMP_M, JUMP_RAD):
             return None
-        naming = Association(Match(led[:n], spot[:n]), fit)
+        association = Association(Match(led[:n], spot[:n]), fit)
         self._threes = self._threes + 1 if n == THREE else 0
-        if n == THREE and not self._three_do(naming, table[:, :2], place):
+        if n == THREE and not self._three_do(association, table[:, :2], place):
             return None
-        return naming
+        return association
 
-    def _three_do(self, naming: Association, pixels: Array, place: Place) -> bool:
+    def _three_do(self, association: Association, pixels: Array, place: Place) -> bool:
         """Whether they are where they are foreseen, and no other spot could be one of them."""
-        fit, match = naming.fit, naming.match
+        fit, match = association.fit, association.match
         if self._threes > THREE_IN_A_ROW:
             return False
         if not _near(fit, place, THREE_JUMP * float(fit.p_bc_in_c[0]), THREE_JUMP_RAD):
@@ -216,14 +220,16 @@ class LedTracker:
         near[:, match.spot] = False
         return not near.any()
 
-    def _learn(self, naming: Association, table: Array) -> None:
+    def _learn(self, association: Association, table: Array) -> None:
         """From the residuals, from how spots are smeared, and from how well they were foreseen."""
-        fit = naming.fit
+        fit = association.fit
         freedoms = fit.residuals_px.size - 6
         if freedoms > 0:
-            self.doubt.learn(fit.chi2 * self.doubt.factor, freedoms)
+            self.noise_scale.learn(fit.chi2 * self.noise_scale.factor, freedoms)
         robot, expected = self._leds_in_b, self._expected
-        off, area = self.smear.learn(self.camera, self._size, robot, naming, table, expected)
+        off, area = self.motion_blur.learn(
+            self.camera, self._size, robot, association, table, expected
+        )
         if off < CALM_PX:
             self._reach = min(self._full, CALM_REACH_PX + CALM_RADII * sqrt(area / pi))
 

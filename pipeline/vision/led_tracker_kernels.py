@@ -17,11 +17,11 @@ from pipeline.vision.predicted_windows_kernels import (
     NEAREST_M,
     OMEGA_B,
     OMEGA_C,
-    expect,
     led_at,
+    predict_pixels,
     put_turn,
 )
-from pipeline.vision.robust_refinement_kernels import believe
+from pipeline.vision.robust_refinement_kernels import refine_robustly
 from pipeline.vision.translation_voting_kernels import Names, name_by_shift
 
 FEWEST = 3  # LEDs a pose needs
@@ -184,7 +184,7 @@ def identify(
     n, R = len(leds_in_b), np.empty((3, 3))
     for i in range(9):
         R[i // 3, i % 3] = pose[3 + i]
-    expect(lens, size, leds_in_b, pose[:3], R, motion, expected)
+    predict_pixels(lens, size, leds_in_b, pose[:3], R, motion, expected)
     names, used = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     m = name_by_shift(expected, table, limits[0], names)
     if m < FEWEST:
@@ -196,7 +196,7 @@ def identify(
         weights, delays,
     )  # fmt: skip
     f = 0.5 * (lens[1] + lens[2])
-    left, chi2 = believe(
+    left, chi2 = refine_robustly(
         leds, flat, shifts, weights, f, limits[1], int(limits[2]), used[:m], pose, information,
         residuals,
     )  # fmt: skip

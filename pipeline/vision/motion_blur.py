@@ -45,7 +45,7 @@ class MotionBlur:
         camera: Camera,
         size: Array,
         leds_in_b: Array,
-        naming: Association,
+        association: Association,
         table: Array,
         expected: Array,
     ) -> tuple[float, float]:
@@ -53,7 +53,7 @@ class MotionBlur:
 
         Gives the largest distance from where one was `expected` (n, 2) [px], and the largest area.
         """
-        fit, match, sums = naming.fit, naming.match, self.sums
+        fit, match, sums = association.fit, association.match, self.sums
         sums *= KEPT
         add_smears(
             camera.lens, size, leds_in_b, match.led, match.spot, table, expected, self._row,

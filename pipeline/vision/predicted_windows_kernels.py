@@ -63,7 +63,7 @@ def led_at(
 
 
 @kernel
-def expect(
+def predict_pixels(
     lens: Array,
     size: Array,
     leds_in_b: Array,
@@ -158,7 +158,7 @@ def detect(
         table: (m, FIELDS) written.
         covariances: (m, 2, 2) written: all of a spot's error [px²].
     """
-    expect(lens, size, leds_in_b, p, R, motion, expected)
+    predict_pixels(lens, size, leds_in_b, p, R, motion, expected)
     windows = np.empty((len(leds_in_b), 3), dtype=np.int64)
     n = put_windows(expected, size, reach, windows)
     n = measure(luma, light, slope_of, windows[:n], limits, table)

@@ -118,7 +118,7 @@ def _worst(
     cache=True,
     error_model="numpy",
 )
-def believe(
+def refine_robustly(
     leds: Array,
     flat: Array,
     shifts: Array,

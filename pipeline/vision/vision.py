@@ -36,7 +36,7 @@ class _Found:
     """The spots of a picture and what they are called: all LEDs that a pose needs, or a few."""
 
     spots: Spots
-    naming: Association | None = None
+    association: Association | None = None
     few: Match | None = None
     bounded: bool = False
     """Not all was tried."""
@@ -56,13 +56,13 @@ class Vision:
         self.camera, self._leds_in_b = camera, leds_in_b
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
-        self._last, self._leaning = LastPose(), TiltBias()
+        self._last, self._tilt_bias = LastPose(), TiltBias()
         self._prior = FramePrior()
         """Of the newest picture."""
         self._places: few_leds.PredictedLeds | None = None
         """Where a filter that is trusted expects the LEDs in this picture."""
-        self._follower = LedTracker(camera, leds_in_b, self._leds, self._identify)
-        self._starting = Initialisation(camera, leds_in_b, self._identify)
+        self._tracker = LedTracker(camera, leds_in_b, self._leds, self._identify)
+        self._initialisation = Initialisation(camera, leds_in_b, self._identify)
         self._area_px_m2 = 0.0
         """Of the last named spots, times their depth squared: what an LED looks like."""
 
@@ -74,29 +74,29 @@ class Vision:
         motion = self._motion(predicted, prior)
         found, took_s = None, UNTIMED
         if predicted:
-            followed = self._follower.look(frame, predicted[0], motion, clock)
+            followed = self._tracker.look(frame, predicted[0], motion, clock)
             took_s = took_s + followed.took_s
-            if followed.naming is not None:
-                found = _Found(followed.spots, followed.naming)
+            if followed.association is not None:
+                found = _Found(followed.spots, followed.association)
         if found is None:
             found, searched_s = self._search(frame, motion, predicted, clock)
             took_s = took_s + searched_s
         else:
-            self._starting.forget()
+            self._initialisation.forget()
         started = clock()
-        sighting = self._told(frame.t, found)
+        detection = self._told(frame.t, found)
         took_s[2] += clock() - started
         took = dict(zip(STAGES, took_s.tolist(), strict=True))
-        return replace(sighting, took_s=took, prior=prior)
+        return replace(detection, took_s=took, prior=prior)
 
     def _told(self, t: float, found: _Found) -> Detection:
-        spots, naming, few = found.spots, found.naming, found.few
-        if naming is not None:
-            depth = float(naming.fit.p_bc_in_c[0])
-            areas = sorted(spots.area[naming.match.spot].tolist())
+        spots, association, few = found.spots, found.association, found.few
+        if association is not None:
+            depth = float(association.fit.p_bc_in_c[0])
+            areas = sorted(spots.area[association.match.spot].tolist())
             self._area_px_m2 = areas[len(areas) // 2] * depth**2
-            rays = rays_of(self.camera, spots, naming.match, t, naming.fit.excess)
-            return Detection(t, pnp.pose_of(naming.fit, t), rays, spots, naming.match, "")
+            rays = rays_of(self.camera, spots, association.match, t, association.fit.excess)
+            return Detection(t, pnp.pose_of(association.fit, t), rays, spots, association.match, "")
         if few is not None:
             reason = f"{len(few.led)} of {len(self._leds_in_b)} LEDs seen."
             rays = rays_of(self.camera, spots, few, t)
@@ -108,18 +108,18 @@ class Vision:
     def keep(self, pose: RelativePose) -> None:
         """`pose`, of the last picture, was believed: predict from it."""
         self._last.keep(pose, self._prior.expected)
-        self._leaning.learn(self._prior.up_in_c, self._prior.up_in_b, pose.R_cb)
+        self._tilt_bias.learn(self._prior.up_in_c, self._prior.up_in_b, pose.R_cb)
 
     def roll(self, readout_s: float) -> None:
         """From the next picture on, the camera's rows are read in so long [s]."""
-        self.camera = self._follower.camera = replace(self.camera, readout_s=readout_s)
+        self.camera = self._tracker.camera = replace(self.camera, readout_s=readout_s)
 
     def forget(self) -> None:
         """The next picture is searched from nothing."""
         self._last.forget()
-        self._starting.forget()
-        self._follower.forget()
-        self._leaning = TiltBias()
+        self._initialisation.forget()
+        self._tracker.forget()
+        self._tilt_bias = TiltBias()
 
     def _predictions(self, prior: FramePrior) -> list[Place]:
         """Where the robot may be, likeliest first: by a sure filter, by the last pose."""
@@ -162,28 +162,28 @@ class Vision:
         self, t: float, spots: Spots, motion: FrameMotion | None, predicted: list[Place]
     ) -> _Found:
         for place in predicted:
-            naming = self._follower.name(spots, place, motion)
-            if naming is not None:
-                self._starting.forget()
-                return _Found(spots, naming)
+            association = self._tracker.name(spots, place, motion)
+            if association is not None:
+                self._initialisation.forget()
+                return _Found(spots, association)
         upright = unrolled(self.camera, spots, motion)
-        naming = self._starting.step(t, upright, self._hints(), self._last.turned)
-        bounded = self._starting.bounded or spots.bounded
-        if naming is not None:
-            return _Found(spots, self._exactly(naming, spots), bounded=bounded)
+        association = self._initialisation.step(t, upright, self._hints(), self._last.turned)
+        bounded = self._initialisation.bounded or spots.bounded
+        if association is not None:
+            return _Found(spots, self._exactly(association, spots), bounded=bounded)
         return _Found(spots, few=self._few(upright), bounded=bounded)
 
-    def _exactly(self, naming: Association, spots: Spots) -> Association:
+    def _exactly(self, association: Association, spots: Spots) -> Association:
         """With each LED's own motion during the readout, now that it has a name."""
-        place = naming.fit.p_bc_in_c, naming.fit.R_cb
-        again = self._follower.name(spots, place, self._motion([place], self._prior))
-        if again is None or len(again.match.led) < len(naming.match.led):
-            return naming
+        place = association.fit.p_bc_in_c, association.fit.R_cb
+        again = self._tracker.name(spots, place, self._motion([place], self._prior))
+        if again is None or len(again.match.led) < len(association.match.led):
+            return association
         return again
 
     def _hints(self) -> SearchHints:
         """For a search from nothing: the verticals, and what is remembered."""
-        up_in_c, up_in_b = self._prior.up_in_c, self._leaning.corrected(self._prior.up_in_b)
+        up_in_c, up_in_b = self._prior.up_in_c, self._tilt_bias.corrected(self._prior.up_in_b)
         memory = self._last.attitude()
         if memory is None:
             return SearchHints(up_in_c, up_in_b)
@@ -205,7 +205,7 @@ class Vision:
             return "No light in the picture is bright enough."
         if n < needed:
             return f"{n} of {len(self._leds_in_b)} LEDs seen: {needed} are needed."
-        if self._starting.ambiguous:
+        if self._initialisation.ambiguous:
             return f"{n} lights seen, and more than one way to see the robot in them."
         return f"{n} lights seen, but they do not look like the robot."
 
@@ -224,6 +224,6 @@ def warm_up() -> None:
     for prior in (FramePrior(up, up, still, still), FramePrior()):
         vision = Vision(camera, robot)
         for k, picture in enumerate((luma, luma, dark, luma)):
-            sighting = vision.step(Frame(0.03 * k, picture), prior)
-            if sighting.pose is not None:
-                vision.keep(sighting.pose)
+            detection = vision.step(Frame(0.03 * k, picture), prior)
+            if detection.pose is not None:
+                vision.keep(detection.pose)

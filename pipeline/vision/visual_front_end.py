@@ -47,8 +47,8 @@ class VisualFrontEnd:
         self._gates, self._clock, self._leds_in_b = gates, clock, leds_in_b
         self._vision = Vision(camera, leds_in_b)
         self._phone, self._body = ImuBuffer(), ImuBuffer()
-        self._expectation, self._stamps = PredictionHistory(), CameraImuDelay()
-        self.watch, self.readout = (
+        self._predictions, self._stamps = PredictionHistory(), CameraImuDelay()
+        self.monitor, self.readout = (
             CalibrationMonitor(camera, leds_in_b),
             LineDelay(camera.readout_s),
         )
@@ -64,12 +64,12 @@ class VisualFrontEnd:
                 self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
             else:
                 self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
-            self._stamps.feel(sample)
-            self.watch.feel(sample)
+            self._stamps.add_imu(sample)
+            self.monitor.add_imu(sample)
 
-    def expect(self, expected: Prediction | None) -> None:
+    def add_prediction(self, expected: Prediction | None) -> None:
         """Follow what a filter says; None: it says nothing."""
-        self._expectation.add(expected)
+        self._predictions.add(expected)
 
     def process(self, frame: Frame) -> Detection:
         """Find the robot in a frame, with what both motion sensors said of its time."""
@@ -84,7 +84,7 @@ class VisualFrontEnd:
     @property
     def offset_s(self) -> float:
         """A picture was taken at its stamp plus this [s], as far as known."""
-        facts, coarse = self.watch.facts, self._stamps.offset
+        facts, coarse = self.monitor.facts, self._stamps.offset
         if facts is not None:
             return facts.offset_s
         return coarse.value if coarse is not None else 0.0
@@ -98,40 +98,40 @@ class VisualFrontEnd:
             body.up if body is not None else None,
             phone.omega if phone is not None else None,
             body.omega if body is not None else None,
-            self._expectation.at(t),
+            self._predictions.at(t),
         )
 
-    def _judged(self, sighting: Detection, prior: FramePrior) -> Detection:
-        if sighting.pose is None:
-            return sighting
-        lie = disbelief(sighting.pose, prior.up_in_c, prior.up_in_b, self._gates)
+    def _judged(self, detection: Detection, prior: FramePrior) -> Detection:
+        if detection.pose is None:
+            return detection
+        lie = disbelief(detection.pose, prior.up_in_c, prior.up_in_b, self._gates)
         if lie is not None:
             self._vision.forget()
-            alone = disbelief(sighting.pose, None, None, self._gates) is None
+            alone = disbelief(detection.pose, None, None, self._gates) is None
             return replace(
-                sighting,
+                detection,
                 pose=None,
                 rays=NO_RAYS,
                 reason=f"Not believed: {lie}.",
-                unbelieved=sighting.pose if alone else None,
+                unbelieved=detection.pose if alone else None,
             )
-        self._vision.keep(sighting.pose)
-        self._stamps.saw(sighting.pose)
-        return replace(sighting, offset=self._stamps.offset)
+        self._vision.keep(detection.pose)
+        self._stamps.saw(detection.pose)
+        return replace(detection, offset=self._stamps.offset)
 
     def _watched(
-        self, frame: Frame, sighting: Detection, pose: RelativePose, prior: FramePrior
+        self, frame: Frame, detection: Detection, pose: RelativePose, prior: FramePrior
     ) -> None:
         """Learn about the camera from a believed pose."""
-        rays, match = sighting.rays, sighting.match
+        rays, match = detection.rays, detection.match
         if match is None or len(rays) == 0:
             return
-        pixels = sighting.spots.pixels[match.spot]
+        pixels = detection.spots.pixels[match.spot]
         if prior.omega_cf_in_c is not None:
             depth_m = float(pose.p_bc_in_c[0])
             self.exposure.see(frame, pixels, depth_m, prior.omega_cf_in_c)
         look = LedObservation(
-            sighting.t,
+            detection.t,
             rays.led,
             rays.tangents,
             rays.covariances,
@@ -139,8 +139,8 @@ class VisualFrontEnd:
             pose.p_bc_in_c,
             pose.R_cb,
         )
-        news, facts = self.watch.saw(look, self._stamps.offset), self.watch.facts
-        if news and facts is not None and not self.watch.complaint and self.readout.learn(facts):
+        news, facts = self.monitor.saw(look, self._stamps.offset), self.monitor.facts
+        if news and facts is not None and not self.monitor.complaint and self.readout.learn(facts):
             self.camera = replace(self.camera, readout_s=self.readout.in_use_s)
             self._vision.roll(self.readout.in_use_s)
 
@@ -160,15 +160,15 @@ def warm_up() -> None:
     K = np.array([[400.0, 0.0, 160.0], [0.0, 400.0, 120.0], [0.0, 0.0, 1.0]])
     leds = np.array([[0.1, 0.3, 0.2], [0.0, -0.3, 0.1], [-0.1, 0.2, -0.3], [0.2, -0.1, -0.2]])
     camera, place = Camera(320, 240, K, "plumb_bob", np.zeros(5)), np.array([2.5, 0.0, 0.0])
-    watch, still = CalibrationMonitor(camera, leds), np.zeros(3)
+    monitor, still = CalibrationMonitor(camera, leds), np.zeros(3)
     for k in range(160):
-        watch.feel(PhoneImu(0.02 * k, still, still))
-        watch.feel(BodyImu(0.02 * k, still, still))
+        monitor.add_imu(PhoneImu(0.02 * k, still, still))
+        monitor.add_imu(BodyImu(0.02 * k, still, still))
     tangents = (leds[:, 1:]) / (place[0] + leds[:, :1])
     C, names = np.tile(1e-6 * np.eye(2), (len(leds), 1, 1)), np.arange(len(leds))
     for k in range(30):
         t = 0.1 * k + 0.1
-        watch.saw(
+        monitor.saw(
             LedObservation(t, names, tangents, C, np.zeros(len(leds)), place, np.eye(3)), None
         )
     luma = np.zeros((240, 320), dtype=np.uint8)

@@ -7,16 +7,20 @@ from pipeline.vision.visual_front_end import VisualFrontEnd
 from server.protocol.camera_messages import CameraHealth
 
 
-def health(looking: VisualFrontEnd) -> CameraHealth:
+def health(front_end: VisualFrontEnd) -> CameraHealth:
     """Any thread may ask: each value is replaced whole."""
-    facts, exposure, hint = looking.watch.facts, looking.exposure.exposure_s, looking.exposure.hint
+    facts, exposure, hint = (
+        front_end.monitor.facts,
+        front_end.exposure.exposure_s,
+        front_end.exposure.hint,
+    )
     told = CameraHealth(
-        complaint=looking.watch.complaint,
+        complaint=front_end.monitor.complaint,
         hint=hint.value,
         advice=ADVICE[hint],
         exposure_ms=None if exposure is None else round(1e3 * exposure, 1),
-        readout_ms=round(1e3 * looking.readout.in_use_s, 2),
-        readout_learnt=looking.readout.is_learnt,
+        readout_ms=round(1e3 * front_end.readout.in_use_s, 2),
+        readout_learnt=front_end.readout.is_learnt,
     )
     if facts is None:
         return told

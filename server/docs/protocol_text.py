@@ -112,8 +112,8 @@ def requests() -> str:
     """
     lines = ["| request | least role | |", "|---|---|---|"]
     api, people = Api.__new__(Api), PeopleApi.__new__(PeopleApi)  # only asked for their routes
-    desk = SignallingEndpoint.__new__(SignallingEndpoint)
-    others = (*people.routes(), *desk.routes(), *view_routes(Path("nowhere")))
+    signalling = SignallingEndpoint.__new__(SignallingEndpoint)
+    others = (*people.routes(), *signalling.routes(), *view_routes(Path("nowhere")))
     for route in (*api.routes(), *others):
         assert isinstance(route, (Route, WebSocketRoute))
         methods = ["socket"] if isinstance(route, WebSocketRoute) else sorted(route.methods or ())

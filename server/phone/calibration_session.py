@@ -68,7 +68,7 @@ class CalibrationSession(FrameThread):
         """Pictures that were garbage or needed a lost one."""
         return self._decoder.undecodable
 
-    def feel(self, sample: PhoneImu) -> None:
+    def add_imu(self, sample: PhoneImu) -> None:
         """The phone's motion."""
         x, y, z = map(float, sample.omega_m_cf_in_c)
         self._motion.append((sample.t, x, y, z))

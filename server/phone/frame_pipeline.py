@@ -31,7 +31,7 @@ class FramePipeline(FrameDecoder):
         """`clock` only times the stages; `make` says where pictures are decoded."""
         super().__init__(camera.width, camera.height, make)
         self.camera, self._clock = camera, clock
-        self.looking = VisualFrontEnd(camera, robot.leds_in_b, gates, clock)
+        self.front_end = VisualFrontEnd(camera, robot.leds_in_b, gates, clock)
 
     def see(self, frames: Sequence[EncodedFrame]) -> Detection | None:
         """Decode all of `frames` in order, look at the newest; None if it can't be decoded."""
@@ -41,10 +41,10 @@ class FramePipeline(FrameDecoder):
             luma = self.decoded(frame)
         if luma is None:
             return None
-        t = frames[-1].t + self.camera.mounting.time_offset_s
+        t = frames[-1].t + self.camera.extrinsics.time_offset_s
         picture = Frame(t, luma, self.full_range)
         decoded = self._clock()
-        sighting = self.looking.process(picture)
-        if sighting.offset is None and frames[-1].picture.by_arrival:
-            sighting = replace(sighting, offset=StampOffset(0.0, ARRIVAL_S))
-        return replace(sighting, took_s={"decode": decoded - started, **sighting.took_s})
+        detection = self.front_end.process(picture)
+        if detection.offset is None and frames[-1].picture.by_arrival:
+            detection = replace(detection, offset=StampOffset(0.0, ARRIVAL_S))
+        return replace(detection, took_s={"decode": decoded - started, **detection.took_s})

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.camera.extrinsics import SQUARE
+from pipeline.camera.extrinsics import IDENTITY
 from pipeline.frames import R_cd
 from pipeline.signals import PhoneImu, TouchState
 from pipeline.timing.clock_synchronisation import ClockSynchronisation
@@ -49,7 +49,7 @@ class Ingest:
         self._last_touch = -1
         self._pings = 0
         self.clock = ClockSynchronisation()
-        self.mounting = SQUARE
+        self.extrinsics = IDENTITY
         """Of the camera that films, once it is known: motion comes out in its axes."""
         self.visible = True
         self.unsynchronised = 0
@@ -113,7 +113,7 @@ class Ingest:
         self._last_motion_t = t
         R = R_cd(motion.screen_angle_deg)
         rate, force = R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration)
-        return self.mounting.felt(PhoneImu(t, rate, force))
+        return self.extrinsics.felt(PhoneImu(t, rate, force))
 
     def _dated(self, record: Record, field: str, now: float) -> float | None:
         if not self.clock.ready:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hardware.camera_file import CameraFileError
 from hardware.codec import Decoder
-from pipeline.camera.extrinsics import SQUARE
+from pipeline.camera.extrinsics import IDENTITY
 from pipeline.camera.lens import Camera
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, PhoneImu, TouchState
@@ -75,7 +75,7 @@ class PhoneSession:
         self.path_choice: PathChoice | None = None
         self.camera_problem = self.camera_text = ""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
-        self.sighting: Detection | None = None
+        self.detection: Detection | None = None
         self.latency_ms: dict[str, float] = {}
         self._check = SensorCheck()
         self.link = LinkLog(clock())
@@ -102,12 +102,12 @@ class PhoneSession:
                 self.meters["phone_imu"].tick(now, sample.t)
                 self.link.came("motion", sample.t, now)
                 self._to_control(PhoneImuInput.of(sample))
-                self._check.feel(sample.t, record.body)
+                self._check.add_imu(sample.t, record.body)
                 if self.wizard is not None:
-                    self.wizard.feel(sample)
+                    self.wizard.add_imu(sample)
                 if self.vision is not None:
-                    self.vision.looking.add_imu(sample)
-                    self.vision.looking.doubts_gravity = self._check.doubts_gravity
+                    self.vision.front_end.add_imu(sample)
+                    self.vision.front_end.doubts_gravity = self._check.doubts_gravity
             case TouchState() as operator:
                 self.meters["operator"].tick(now, operator.t)
                 self._to_control(OperatorInput.of(operator))
@@ -126,9 +126,9 @@ class PhoneSession:
         """What control says of the robot, for eyes and tests."""
         self._check.know(status)
         if self.vision is not None:
-            looking, rows = self.vision.looking, np.array(status.body_samples).reshape(-1, 7)
-            looking.expect(expected_of(status))
-            looking.add_imu(*(BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows))
+            front_end, rows = self.vision.front_end, np.array(status.body_samples).reshape(-1, 7)
+            front_end.add_prediction(expected_of(status))
+            front_end.add_imu(*(BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows))
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)
@@ -158,28 +158,30 @@ class PhoneSession:
             self.camera_problem = str(error)
             return
         self.camera_text = path.read_text(encoding="utf-8")
-        self.ingest.mounting = camera.mounting
-        sight = FramePipeline(camera, self._robot, GatesConfig(), self._clock, self._make_decoder)
+        self.ingest.extrinsics = camera.extrinsics
+        frame_pipeline = FramePipeline(
+            camera, self._robot, GatesConfig(), self._clock, self._make_decoder
+        )
         self.vision = VisionThread(
-            sight, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
+            frame_pipeline, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
         )
 
-    def _sighted(self, camera: Camera, sighting: Detection, frame: EncodedFrame) -> None:
+    def _sighted(self, camera: Camera, detection: Detection, frame: EncodedFrame) -> None:
         """In the vision thread: hand on what was seen, remember where the time went."""
         now = self._clock()
-        seen = sighting.seen(camera)
+        seen = detection.seen(camera)
         if seen is not None:
             self._to_control(SeenInput.of(seen))
-        if sighting.pose is not None:
-            self.meters["pose"].tick(now, sighting.t)
-        took = {name: 1e3 * s for name, s in sighting.took_s.items()}
+        if detection.pose is not None:
+            self.meters["pose"].tick(now, detection.t)
+        took = {name: 1e3 * s for name, s in detection.took_s.items()}
         self.latency_ms = {
-            "capture to arrival": 1e3 * (frame.t_received - sighting.t),
+            "capture to arrival": 1e3 * (frame.t_received - detection.t),
             "waiting": 1e3 * (now - frame.t_received) - sum(took.values()),
             **took,
         }
-        self._check.saw(sighting)
-        self.sighting = sighting
+        self._check.saw(detection)
+        self.detection = detection
 
     def thumbnail(self, wanted: bool) -> npt.NDArray[np.uint8] | None:
         """The next small picture (h, w, 3) RGB of what the camera sees, if anyone `wanted` it."""
@@ -213,10 +215,10 @@ class PhoneSession:
         elif self.vision is not None and self.vision.failed:
             why.append(self.vision.failed)
         elif self.meters["pose"].age(now) > STALE_S and not faults:
-            found = self.sighting.reason if self.sighting is not None else ""
+            found = self.detection.reason if self.detection is not None else ""
             why.append(f"The robot is not seen. {found}".strip())
-        if not faults and self.vision is not None and self.vision.looking.watch.complaint:
-            why.append(self.vision.looking.watch.complaint)
+        if not faults and self.vision is not None and self.vision.front_end.monitor.complaint:
+            why.append(self.vision.front_end.monitor.complaint)
         return why
 
     def calibrate(self, wish: Calibrate) -> None:
@@ -253,7 +255,7 @@ class PhoneSession:
 
     def close(self) -> None:
         """Stop looking; who calibrates wants motion as it comes."""
-        self.ingest.mounting = SQUARE
+        self.ingest.extrinsics = IDENTITY
         if self.wizard is not None:
             self.wizard.stop()
             self.wizard = None

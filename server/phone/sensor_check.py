@@ -25,7 +25,7 @@ class SensorCheck:
         self._test = SensorValidation(GravityTestConfig())
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=MAX_WAITING)
 
-    def feel(self, t: float, motion: Motion) -> None:
+    def add_imu(self, t: float, motion: Motion) -> None:
         """A sample of the phone, taken at `t` [s] on our clock, as it came."""
         rate, force = np.array(motion.rotation_rate), np.array(motion.acceleration)
         self._test.add_motion(t, rate, force, motion.screen_angle_deg)
@@ -37,9 +37,9 @@ class SensorCheck:
         for t, x, y, z, *_ in status.body_samples:
             self._test.add_body(t, np.array((x, y, z)))
 
-    def saw(self, sighting: Detection) -> None:
+    def saw(self, detection: Detection) -> None:
         """A picture was looked at."""
-        pose, up_in_b = sighting.pose or sighting.unbelieved, sighting.prior.up_in_b
+        pose, up_in_b = detection.pose or detection.unbelieved, detection.prior.up_in_b
         if pose is not None and up_in_b is not None:
             self._poses.append((pose.t, pose.R_cb, up_in_b))
 

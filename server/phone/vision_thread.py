@@ -27,15 +27,15 @@ class VisionThread(FrameThread):
 
     def __init__(
         self,
-        sight: FramePipeline,
-        on_sighting: Callable[[Detection, EncodedFrame], None],
+        frame_pipeline: FramePipeline,
+        on_detection: Callable[[Detection, EncodedFrame], None],
         on_taken: Callable[[int], None],
         on_key_wanted: Callable[[], None],
     ) -> None:
         """Callbacks run in this thread."""
         super().__init__("vision", on_taken)
-        self._sight = sight
-        self._on_sighting, self._on_key_wanted = on_sighting, on_key_wanted
+        self._frame_pipeline = frame_pipeline
+        self._on_detection, self._on_key_wanted = on_detection, on_key_wanted
         self._t_thumbnail = 0.0
         self.watched = False
         """Whether anyone wants thumbnails."""
@@ -46,34 +46,38 @@ class VisionThread(FrameThread):
     @property
     def undecodable(self) -> int:
         """Pictures that were garbage or needed a lost one."""
-        return self._sight.undecodable
+        return self._frame_pipeline.undecodable
 
     @property
-    def looking(self) -> VisualFrontEnd:
+    def front_end(self) -> VisualFrontEnd:
         """Any thread may tell it of motion, and read what it learnt of the camera."""
-        return self._sight.looking
+        return self._frame_pipeline.front_end
 
     def _look(self, frames: list[EncodedFrame], has_gap: bool) -> None:
         if has_gap:
-            self._sight.needs_key = True
-        sighting = self._sight.see(frames)
-        if sighting is None:
+            self._frame_pipeline.needs_key = True
+        detection = self._frame_pipeline.see(frames)
+        if detection is None:
             self._tell(self._on_key_wanted)
             return
-        self._tell(lambda: self._on_sighting(sighting, frames[-1]))
+        self._tell(lambda: self._on_detection(detection, frames[-1]))
         now = clock.now()
-        if self.watched and now - self._t_thumbnail > THUMBNAIL_S and self._sight.luma is not None:
+        if (
+            self.watched
+            and now - self._t_thumbnail > THUMBNAIL_S
+            and self._frame_pipeline.luma is not None
+        ):
             self._t_thumbnail = now
-            self.thumbnail = draw(self._sight.luma, sighting)
+            self.thumbnail = draw(self._frame_pipeline.luma, detection)
 
 
-def draw(luma: Image, sighting: Detection) -> Picture:
+def draw(luma: Image, detection: Detection) -> Picture:
     """A small picture (h, w, 3) RGB: found LEDs circled in green, other lights in orange."""
     scale = THUMBNAIL_WIDTH / luma.shape[1]
     small = cv2.resize(luma, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     picture = cv2.cvtColor(small, cv2.COLOR_GRAY2RGB)
-    found = set(sighting.match.spot.tolist()) if sighting.match is not None else set()
-    for index, (u, v) in enumerate(scale * sighting.spots.pixels):
+    found = set(detection.match.spot.tolist()) if detection.match is not None else set()
+    for index, (u, v) in enumerate(scale * detection.spots.pixels):
         colour = (80, 255, 120) if index in found else (255, 160, 60)
         cv2.circle(picture, (round(u), round(v)), 9, colour, 1, cv2.LINE_AA)
     return np.asarray(picture, dtype=np.uint8)

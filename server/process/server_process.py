@@ -84,26 +84,26 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     doors = Doors(given.secret, settings.pairing.confirm, members, audit)
     warming = warm_up.begin()
     decoding = Decoding()
-    hub = _hub(settings, given, doors, decoding)
+    manager = _manager(settings, given, doors, decoding)
     view = given.runtime / VIEW_SOCKET
-    dashboard = _dashboard(settings, hub, view)
+    dashboard = _dashboard(settings, manager, view)
     base = base_url(settings.host, given.https.getsockname()[1])
-    api = Api(hub, tls.authority)
-    people = PeopleApi(hub, doors, base, http_url(given))
-    desk = SignallingEndpoint(hub, settings.rtc, settings.video.bitrate_bps)
-    routes = [*people.routes(), *view_routes(view), *desk.routes()]
-    app = make_app(api, PageServer(hub, settings.video), routes)
+    api = Api(manager, tls.authority)
+    people = PeopleApi(manager, doors, base, http_url(given))
+    signalling = SignallingEndpoint(manager, settings.rtc, settings.video.bitrate_bps)
+    routes = [*people.routes(), *view_routes(view), *signalling.routes()]
+    app = make_app(api, PageServer(manager, settings.video), routes)
     admission = Admission(limits_for(raise_handles()))
     guarded = Guard(app, doors, [*own_names(), *settings.names], admission)
     if settings.record:
-        hub.start_recording()
+        manager.start_recording()
     run = json.dumps(_run(settings, given, base, doors))
-    telling = asyncio.create_task(_tell_when_ready(hub, warming, given.runtime / RUN_FILE, run))
+    telling = asyncio.create_task(_tell_when_ready(manager, warming, given.runtime / RUN_FILE, run))
     try:
-        await _until_signalled(hub, doors_of(guarded, tls, given, admission))
+        await _until_signalled(manager, doors_of(guarded, tls, given, admission))
     finally:
         telling.cancel()
-        await desk.close()
+        await signalling.close()
         (given.runtime / RUN_FILE).unlink(missing_ok=True)
         api.phone.stop()
         dashboard.stop()
@@ -118,21 +118,21 @@ def http_url(given: LaunchContext) -> str:
 
 
 async def _tell_when_ready(
-    hub: SessionManager, warming: threading.Thread, run_file: Path, run: str
+    manager: SessionManager, warming: threading.Thread, run_file: Path, run: str
 ) -> None:
     """The run file says that a robot can be led: the control process compiles for a while first.
 
     So may this one. What is loaded by then is needed for ever, and frozen before anybody flies.
     """
-    hub.unready = WARMING
-    while hub.status is None or warming.is_alive():
+    manager.unready = WARMING
+    while manager.status is None or warming.is_alive():
         await asyncio.sleep(POLL_S)
-    hub.pauses.garbage.settle()
-    hub.unready = ""
+    manager.pauses.garbage.settle()
+    manager.unready = ""
     write_private(run_file, run)
 
 
-def _hub(
+def _manager(
     settings: Settings, given: LaunchContext, doors: Doors, decoding: Decoding
 ) -> SessionManager:
     folder = private_directory(private_directory(settings.state) / "recordings")
@@ -144,10 +144,10 @@ def _hub(
     return SessionManager(given.runtime, robot, cameras, recordings, profiles, doors, decoding)
 
 
-def _dashboard(settings: Settings, hub: SessionManager, view: Path) -> Dashboard:
+def _dashboard(settings: Settings, manager: SessionManager, view: Path) -> Dashboard:
     robot_file = load_robot(settings.robot)
     dashboard = Dashboard(robot_file.robot, robot_file.plant, robot_file.start, view)
-    dashboard.start(lambda: (hub.status, hub.last_thumbnail))
+    dashboard.start(lambda: (manager.status, manager.last_thumbnail))
     return dashboard
 
 
@@ -181,13 +181,13 @@ def doors_of(
 
 
 async def _until_signalled(
-    hub: SessionManager, listeners: list[tuple[Listener, socket.socket]]
+    manager: SessionManager, listeners: list[tuple[Listener, socket.socket]]
 ) -> None:
     loop, stop = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, stop.set)
     tasks = [asyncio.create_task(one.serve(sockets=[bound])) for one, bound in listeners]
-    hub_task = asyncio.create_task(hub.run())
+    hub_task = asyncio.create_task(manager.run())
     stopping = asyncio.create_task(stop.wait())
     try:
         done, _ = await asyncio.wait(

@@ -68,8 +68,8 @@ class Offline:
             RecordingError: nobody knows a camera that takes such pictures.
         """
         camera = recorded_camera(self._recording, self._shape)
-        self._sight = FramePipeline(camera, self.robot, self._config.gates)
-        self._ingest.mounting = camera.mounting
+        self._frame_pipeline = FramePipeline(camera, self.robot, self._config.gates)
+        self._ingest.extrinsics = camera.extrinsics
         self._is_blind = False
 
     def rows(self) -> Iterator[dict[str, str]]:
@@ -91,7 +91,7 @@ class Offline:
                 self._inbox.append(ReadyInput([]))
             output = self._tick(now)
             if k % EXPECT_EVERY == 0:
-                self._sight.looking.expect(self._controller.expected(output))
+                self._frame_pipeline.front_end.add_prediction(self._controller.expected(output))
             for frame, pose in self._seen:
                 yield row_of(frame, pose, output, recording.t_first)
             self._seen.clear()
@@ -100,7 +100,7 @@ class Offline:
         body: list[BodyImu] = []
         while self._body and self._body[0].t <= now:
             body.append(self._body.popleft())
-        self._sight.looking.add_imu(*body)
+        self._frame_pipeline.front_end.add_imu(*body)
         inbox, self._inbox = self._inbox, []
         self._tap(now, inbox, body)
         _, output = self._controller.tick(now, inbox, body, "")
@@ -129,7 +129,7 @@ class Offline:
         """A record of the phone."""
         match self._ingest.record(record, now):
             case PhoneImu() as sample:
-                self._sight.looking.add_imu(sample)
+                self._frame_pipeline.front_end.add_imu(sample)
                 self._inbox.append(PhoneImuInput.of(sample))
             case TouchState() as operator:
                 self._inbox.append(OperatorInput.of(operator))
@@ -137,7 +137,7 @@ class Offline:
                 self._see(frame)
             case None if isinstance(record.body, Picture):  # those that follow lean on it
                 self._fit(record.body)
-                self._sight.decoded(EncodedFrame(now, now, record.sequence, record.body))
+                self._frame_pipeline.decoded(EncodedFrame(now, now, record.sequence, record.body))
 
     def _fit(self, picture: Picture) -> None:
         """Open other eyes for another size or angle, as the server did; none if it had none."""
@@ -152,9 +152,9 @@ class Offline:
 
     def _see(self, frame: EncodedFrame) -> None:
         self._fit(frame.picture)
-        sighting = None if self._is_blind else self._sight.see([frame])
-        self._seen.append((frame, sighting.pose if sighting is not None else None))
-        seen = sighting.seen(self._sight.camera) if sighting is not None else None
+        detection = None if self._is_blind else self._frame_pipeline.see([frame])
+        self._seen.append((frame, detection.pose if detection is not None else None))
+        seen = detection.seen(self._frame_pipeline.camera) if detection is not None else None
         if seen is not None:
             self._inbox.append(SeenInput.of(seen))
 

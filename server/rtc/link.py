@@ -32,7 +32,7 @@ class RtcLink:
 
     def __init__(
         self,
-        hub: SessionManager,
+        manager: SessionManager,
         phone: PhoneSession,
         settings: RtcSettings,
         bitrate_bps: int,
@@ -41,7 +41,7 @@ class RtcLink:
         """For the phone that has the lease."""
         self.id = secrets.token_urlsafe(12)
         self.is_closing = False
-        self._hub, self._phone, self._on_gone = hub, phone, on_gone
+        self._manager, self._phone, self._on_gone = manager, phone, on_gone
         self._dating = FrameTimestamping()
         self._trip = RoundTrip()
         self._size: tuple[int, int] | None = None
@@ -97,7 +97,7 @@ class RtcLink:
         return self._trip.seconds
 
     def _leads(self) -> bool:
-        return self._hub.phone is self._phone
+        return self._manager.phone is self._phone
 
     def _record(self, data: str | bytes) -> None:
         """Something came over the data channel."""
@@ -122,7 +122,7 @@ class RtcLink:
             self._trip.add(1e-6 * body.server_time_us, t)
         if isinstance(body, Motion):
             self._screen_angle_deg = body.screen_angle_deg
-        self._hub.record(data, t)
+        self._manager.record(data, t)
         self._phone.take(record, t)
 
     def _frame(self, codec: Codec, frame: Assembled) -> None:
@@ -133,13 +133,13 @@ class RtcLink:
             return
         try:
             record = self._dated(codec, frame, t)
-            if record is None or not self._hub.paths.takes_from_fast(record.t_us, frame.key):
+            if record is None or not self._manager.paths.takes_from_fast(record.t_us, frame.key):
                 return
             data = encode(record)
             said = self.frames.receive(data, t)
             assert isinstance(said, Record)
             self._t_frame = t
-            self._hub.record(data, t)
+            self._manager.record(data, t)
             self._phone.take(said, t)
         except WireError as error:
             self._refuse(error, self.frames)
@@ -167,6 +167,6 @@ class RtcLink:
 
     def _refuse(self, error: WireError, session: Session) -> None:
         """Told on the websocket; too many faults end the fast path, not the phone."""
-        self._hub.paths.tell(encode_message(Refused(error.code, error.field, error.allowed)))
+        self._manager.paths.tell(encode_message(Refused(error.code, error.field, error.allowed)))
         if session.hopeless:
             self.close()

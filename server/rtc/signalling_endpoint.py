@@ -40,9 +40,9 @@ def address_of(request: Request) -> str:
 class SignallingEndpoint:
     """At most one connection: that of the phone that leads."""
 
-    def __init__(self, hub: SessionManager, settings: RtcSettings, bitrate_bps: int) -> None:
+    def __init__(self, manager: SessionManager, settings: RtcSettings, bitrate_bps: int) -> None:
         """Nobody has asked yet."""
-        self._hub, self._settings, self._bitrate_bps = hub, settings, bitrate_bps
+        self._manager, self._settings, self._bitrate_bps = manager, settings, bitrate_bps
         self._offers = TokenBucket(OFFERS_HZ, OFFERS_AT_ONCE)
         self._link: RtcLink | None = None
         self._closing: set[asyncio.Task[None]] = set()
@@ -65,20 +65,20 @@ class SignallingEndpoint:
             ask = _ask.decode(await body_of(request))
         except msgspec.DecodeError:
             return refusal(400, "session", 'JSON: {"session": "…"}')
-        phone = self._hub.phone
+        phone = self._manager.phone
         if not self._settings.enabled:
             return refusal(404, "rtc", OFF)
         if phone is None or phone.id != ask.session:
             return refusal(403, "session", "the session of the phone that leads")
         if not self._offers.take(now()):
             return refusal(429, "rtc", f"{60.0 * OFFERS_HZ:g} offers a minute")
-        link = RtcLink(self._hub, phone, self._settings, self._bitrate_bps, self._gone)
+        link = RtcLink(self._manager, phone, self._settings, self._bitrate_bps, self._gone)
         former, self._link = self._link, link
         if former is not None:
             self._gone(former)
         sdp = await link.peer.offer()
         if (
-            link.is_closing or self._hub.phone is not phone
+            link.is_closing or self._manager.phone is not phone
         ):  # meanwhile it was shut out, or asked anew
             self._gone(link)
             return refusal(403, "session", "the session of the phone that leads")
@@ -99,7 +99,7 @@ class SignallingEndpoint:
             log.warning("an answer is refused: %s", error)
             self._gone(link)
             return refusal(400, error.field, error.allowed)
-        if link.is_closing or self._hub.join_fast(link.session, link) is None:
+        if link.is_closing or self._manager.join_fast(link.session, link) is None:
             self._gone(link)
             return refusal(403, "session", "the session of the phone that leads")
         return JSONResponse({"connecting": True}, 202)
@@ -108,7 +108,7 @@ class SignallingEndpoint:
         """A connection has ended, or shall."""
         if self._link is link:
             self._link = None
-        self._hub.paths.leave(link)
+        self._manager.paths.leave(link)
         if not link.is_closing:
             link.is_closing = True
             task = asyncio.get_running_loop().create_task(link.hang_up())

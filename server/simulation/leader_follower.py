@@ -37,7 +37,7 @@ class LeaderFollowerSimulation:
         options: PlantOptions | None = None,
     ) -> None:
         """Everything at rest."""
-        self._rig = LeaderSensorModel(leader, hand, robot_file.robot, config.gates, seed)
+        self._sensors = LeaderSensorModel(leader, hand, robot_file.robot, config.gates, seed)
         self._follower = VirtualTimeFollower(robot_file, seed, options=options)
         self._link = RobotLink(self._follower)
         self._teleop = Teleop(robot_file.robot, config, PERIOD_S)
@@ -77,7 +77,7 @@ class LeaderFollowerSimulation:
         self._follower.advance(PERIOD_S)
         now = self.t
         self._poses.append((now, self.plant.wxyz_fb, self.plant.p_bf_in_f))
-        felt, seen = self._rig.arrivals(before, now, self._robot_at)
+        felt, seen = self._sensors.arrivals(before, now, self._robot_at)
         body = self._link.receive(now)
         held = self._mode in (Mode.ARMED, Mode.TRACK, Mode.COAST)
         inputs = Inputs(
@@ -98,7 +98,7 @@ class LeaderFollowerSimulation:
             self.ended = output.failsafe.reason
         self._follower.send(ThrustCommand(output.thrusts, output.armed))
         offset = self._teleop.estimator.health.time_offset
-        self._rig.learn(output.relative, offset, body)
+        self._sensors.learn(output.relative, offset, body)
         return output
 
     def _robot_at(self, t: float) -> tuple[Array, Array]:

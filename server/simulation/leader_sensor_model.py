@@ -30,11 +30,11 @@ class LeaderSensorModel:
         self._phone = VirtualPhone(
             leader.camera, hand, leds_in_b, RenderOptions(), rng, leader.options
         )
-        self._eye: VisionModel
+        self._vision_model: VisionModel
         if leader.pictures == "spots":
-            self._eye = RayVisionModel(self._phone, leds_in_b, leader.noise_px, spots_rng)
+            self._vision_model = RayVisionModel(self._phone, leds_in_b, leader.noise_px, spots_rng)
         else:
-            self._eye = RenderedVisionModel(self._phone, leader.pictures, robot, gates)
+            self._vision_model = RenderedVisionModel(self._phone, leader.pictures, robot, gates)
 
     def arrivals(
         self, t_from: float, t_to: float, body: BodyHistory
@@ -45,9 +45,9 @@ class LeaderSensorModel:
         """
         events = [e for e in self._phone.events(t_from, t_to) if e.t_capture > 0.0]
         motions = [self._felt(e.t_capture) for e in events if e.kind is EventKind.MOTION]
-        self._eye.feel(motions)
+        self._vision_model.add_imu(motions)
         pictures = [e for e in events if e.kind is EventKind.PICTURE]
-        seen = self._eye.see(pictures, body) if pictures else None
+        seen = self._vision_model.see(pictures, body) if pictures else None
         return motions, [seen] if seen is not None else []
 
     def learn(
@@ -57,8 +57,8 @@ class LeaderSensorModel:
 
         `time_offset` [s] of pictures, as the filter knows it; NaN if it doesn't.
         """
-        self._eye.expect(relative, time_offset)
-        self._eye.feel(body)
+        self._vision_model.add_prediction(relative, time_offset)
+        self._vision_model.add_imu(body)
 
     def _felt(self, t: float) -> PhoneImu:
         reading = self._phone.motion(t)

@@ -48,17 +48,17 @@ class TrackingEvaluator:
         """`axes` (6,): which of b are controlled; `period_s`: from one look to the next."""
         self.trace = TrackingTrace()
         self._config, self._axes, self._period_s = config, axes, period_s
-        self._intent: ReferenceTrajectory | None = None
+        self._reference: ReferenceTrajectory | None = None
 
     def look(self, t: float, body: Pose, hand: Pose, output: Output) -> None:
         """Take the true poses of body and camera at `t` [s], and what control made of them."""
         trace = self.trace
         if output.failsafe.mode not in (Mode.TRACK, Mode.COAST):
-            trace.left = output.failsafe.reason if self._intent is not None else ""
+            trace.left = output.failsafe.reason if self._reference is not None else ""
             return
-        if self._intent is None:
-            self._intent = ReferenceTrajectory(self._config, hand, body)
-        intended = self._intent.step(hand, self._period_s)
+        if self._reference is None:
+            self._reference = ReferenceTrajectory(self._config, hand, body)
+        intended = self._reference.step(hand, self._period_s)
         offset_in_f, turn = missed_by(body, intended, self._axes)
         trace.t.append(t)
         trace.coasts.append(output.failsafe.mode == Mode.COAST)

@@ -23,7 +23,7 @@ from hardware.sim.reference_trajectory import Pose
 from hardware.sim.render import RenderOptions
 from hardware.sim.truth import Truth
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
-from pipeline.camera.extrinsics import SQUARE, Extrinsics
+from pipeline.camera.extrinsics import IDENTITY, Extrinsics
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, TouchState, VisionMeasurement
@@ -70,9 +70,9 @@ class SimulationOptions:
     bitrate_bps: int = 3_000_000
     readout_s: float = 0.0
     """Of the rolling shutter."""
-    mounting: Extrinsics = SQUARE
+    extrinsics: Extrinsics = IDENTITY
     """How the camera sits beside the phone's motion sensors ..."""
-    knows_mounting: bool = True
+    knows_extrinsics: bool = True
     """... and whether the camera's file says it."""
     hidden: tuple[tuple[float, float, tuple[int, ...]], ...] = ()
     """From when to when [s] which LEDs can't be seen."""
@@ -100,8 +100,8 @@ class VirtualTimeSimulation:
         self.follower = VirtualTimeFollower(robot_file, scene.seed)
         late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
         self.controller = Controller(robot_file.robot, config, too_late=late)
-        self._judge = TrackingEvaluator(config.virtual_camera, robot_file.robot.axes, PERIOD_S)
-        self.trace = self._judge.trace
+        self._evaluator = TrackingEvaluator(config.virtual_camera, robot_file.robot.axes, PERIOD_S)
+        self.trace = self._evaluator.trace
         self.lost: set[str] = set()
         """What of the phone does not arrive now: motion, picture, touch."""
         self.transit = Transit()
@@ -114,10 +114,10 @@ class VirtualTimeSimulation:
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
         camera = self._script.phone.camera
-        camera = camera if scene.knows_mounting else replace(camera, mounting=SQUARE)
-        self._ingest.mounting = camera.mounting
-        self._sight = FramePipeline(camera, robot_file.robot, config.gates)
-        self._eye = make_eye(robot_file, scene, self._script)
+        camera = camera if scene.knows_extrinsics else replace(camera, extrinsics=IDENTITY)
+        self._ingest.extrinsics = camera.extrinsics
+        self._frame_pipeline = FramePipeline(camera, robot_file.robot, config.gates)
+        self._vision_model = make_vision_model(robot_file, scene, self._script)
         self._link = RobotLink(self.follower)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._on_their_way: deque[tuple[int, Record]] = deque()
@@ -163,7 +163,7 @@ class VirtualTimeSimulation:
         if due or self._output is None:
             self._output = self._control()
         hand, body = self.truth()
-        self._judge.look(self.t, body, hand, self._output)
+        self._evaluator.look(self.t, body, hand, self._output)
         return self._output
 
     def _control(self) -> Output:
@@ -174,7 +174,7 @@ class VirtualTimeSimulation:
             self.t, inbox, felt, self._link.reason, self._link.gap, self._link.left_s
         )
         if self._ticks % EVERY_TICKS["status"] == 0:
-            self._sight.looking.expect(self.controller.expected(output))
+            self._frame_pipeline.front_end.add_prediction(self.controller.expected(output))
         self.follower.send(command)
         self._feel(*felt)
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
@@ -194,10 +194,10 @@ class VirtualTimeSimulation:
             if event.kind == EventKind.MOTION:
                 motion = self._script.motion(event.t_capture)
                 self.transit.send(self.t, "motion", partial(self._take, motion))
-            elif self._eye is not None:
-                self._glimpse(self._eye, event.t_capture)
+            elif self._vision_model is not None:
+                self._glimpse(self._vision_model, event.t_capture)
             else:
-                key = self._sight.needs_key
+                key = self._frame_pipeline.needs_key
                 picture = self._script.picture(event.t_capture, self._robot_at, key)
                 self.transit.send(self.t, "picture", partial(self._take, picture))
         self.transit.deliver(self.t)
@@ -244,18 +244,18 @@ class VirtualTimeSimulation:
                 self._see(frame)
 
     def _see(self, frame: EncodedFrame) -> None:
-        sighting = self._sight.see([frame])
+        detection = self._frame_pipeline.see([frame])
         self.trace.pictures += 1
-        self.trace.leds.append(len(sighting.rays) if sighting is not None else 0)
-        self._tell(sighting.seen(self._sight.camera) if sighting is not None else None)
+        self.trace.leds.append(len(detection.rays) if detection is not None else 0)
+        self._tell(detection.seen(self._frame_pipeline.camera) if detection is not None else None)
 
     def _glimpse(self, eye: LedSensorModel, t: float) -> None:
         """A picture of which only the LEDs' rays exist; dated as others are."""
         clock, phone = self._ingest.clock, self._script.phone
         if not clock.ready:
             return
-        stamp = clock.local(phone.clock.at(t - phone.camera.mounting.time_offset_s))
-        stamp += self._sight.camera.mounting.time_offset_s
+        stamp = clock.local(phone.clock.at(t - phone.camera.extrinsics.time_offset_s))
+        stamp += self._frame_pipeline.camera.extrinsics.time_offset_s
         seen = eye.seen(t, stamp, self._robot_at)
         self.trace.pictures += 1
         self.trace.leds.append(len(seen.rays) if seen is not None else 0)
@@ -268,14 +268,14 @@ class VirtualTimeSimulation:
 
     def _feel(self, *samples: PhoneImu | BodyImu) -> None:
         """Motion samples, for whoever looks."""
-        if self._eye is None:
-            self._sight.looking.add_imu(*samples)
+        if self._vision_model is None:
+            self._frame_pipeline.front_end.add_imu(*samples)
             return
         for sample in samples:
-            self._eye.feel(sample)
+            self._vision_model.add_imu(sample)
 
 
-def make_eye(
+def make_vision_model(
     robot_file: RobotFile, scene: SimulationOptions, script: PhoneScript
 ) -> LedSensorModel | None:
     """What stands for pictures and vision in a scene without them."""
@@ -292,7 +292,7 @@ def make_script(
     options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
     camera = find_camera(DEVICE, scene.width, scene.height)
     phone = VirtualPhone(
-        replace(camera, readout_s=scene.readout_s, mounting=scene.mounting),
+        replace(camera, readout_s=scene.readout_s, extrinsics=scene.extrinsics),
         make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
         robot_file.robot.leds_in_b,
         RenderOptions(),

@@ -30,10 +30,10 @@ STATUS_PERIODS: Final = 4
 class VisionModel(Protocol):
     """Pictures that arrived, and what vision knows beside them."""
 
-    def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
+    def add_imu(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
         """Follow the motion of both sides."""
 
-    def expect(self, relative: RelativeState | None, time_offset: float) -> None:
+    def add_prediction(self, relative: RelativeState | None, time_offset: float) -> None:
         """Follow what control's filter says at the end of a period."""
 
     def see(self, pictures: Sequence[Event], body: BodyHistory) -> VisionMeasurement | None:
@@ -47,18 +47,18 @@ class RayVisionModel:
         self, phone: VirtualPhone, leds_in_b: Array, noise_px: float, rng: np.random.Generator
     ) -> None:
         """LEDs (n, 3) [m]; `noise_px` as in `LedSensorModel`."""
-        self._eye = LedSensorModel(phone, leds_in_b, noise_px, lambda _: (), rng)
+        self._vision_model = LedSensorModel(phone, leds_in_b, noise_px, lambda _: (), rng)
 
-    def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
+    def add_imu(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
         """It needs no help."""
 
-    def expect(self, relative: RelativeState | None, time_offset: float) -> None:
+    def add_prediction(self, relative: RelativeState | None, time_offset: float) -> None:
         """It needs no help."""
 
     def see(self, pictures: Sequence[Event], body: BodyHistory) -> VisionMeasurement | None:
         """What the newest says; the others are passed over."""
         t = pictures[-1].t_capture
-        return self._eye.seen(t, t, body)
+        return self._vision_model.seen(t, t, body)
 
 
 class RenderedVisionModel:
@@ -69,27 +69,27 @@ class RenderedVisionModel:
         camera, rate_hz = phone.camera, phone.options.frame_rate_hz
         encoder = Encoder(camera.width, camera.height, rate_hz, BITRATE_BPS, codec)
         self._script = PhoneScript(phone, encoder, VirtualOperator())
-        self._sight = FramePipeline(camera, robot, gates)
+        self._frame_pipeline = FramePipeline(camera, robot, gates)
         self._periods = 0
 
-    def feel(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
+    def add_imu(self, samples: Iterable[PhoneImu | BodyImu]) -> None:
         """Follow the motion of both sides."""
-        self._sight.looking.add_imu(*samples)
+        self._frame_pipeline.front_end.add_imu(*samples)
 
-    def expect(self, relative: RelativeState | None, time_offset: float) -> None:
+    def add_prediction(self, relative: RelativeState | None, time_offset: float) -> None:
         """Follow what control's filter says at the end of a period."""
         self._periods += 1
         if self._periods % STATUS_PERIODS == 0:
             said = Prediction.of(relative, time_offset) if relative is not None else None
-            self._sight.looking.expect(said)
+            self._frame_pipeline.front_end.add_prediction(said)
 
     def see(self, pictures: Sequence[Event], body: BodyHistory) -> VisionMeasurement | None:
         """What the newest says; all are decoded, as each needs the one before it."""
         frames = [self._frame(event, body) for event in pictures]
-        sighting = self._sight.see(frames)
-        return sighting.seen(self._sight.camera) if sighting is not None else None
+        detection = self._frame_pipeline.see(frames)
+        return detection.seen(self._frame_pipeline.camera) if detection is not None else None
 
     def _frame(self, event: Event, body: BodyHistory) -> EncodedFrame:
-        record = self._script.picture(event.t_capture, body, self._sight.needs_key)
+        record = self._script.picture(event.t_capture, body, self._frame_pipeline.needs_key)
         assert isinstance(record.body, Picture)
         return EncodedFrame(event.t_capture, event.t_deliver, record.sequence, record.body)

@@ -115,7 +115,7 @@ class PhoneScript:
         camera, angle = self.phone.camera, self.phone.options.screen_angle_deg
         codec = CODECS[self._encoder.codec]
         body = Picture(codec, key, camera.width, camera.height, angle, data)
-        return self._record(Kind.FRAME, t - camera.mounting.time_offset_s, body)
+        return self._record(Kind.FRAME, t - camera.extrinsics.time_offset_s, body)
 
     def touch(self, t: float) -> Record:
         """TOUCH at `t` [s]; call it every `TOUCH_S`."""
@@ -143,7 +143,7 @@ class TrackingMetrics:
         """`config` is the virtual camera's, whose lag is part of the intent; `axes` the robot's."""
         ReferenceTrajectory.warm_up()
         self._phone, self._config, self._axes = phone, config, axes
-        self._intent: ReferenceTrajectory | None = None
+        self._reference: ReferenceTrajectory | None = None
         self._t = -np.inf
         self._sum_m2 = self._sum_rad2 = 0.0
         self.max_m = 0.0
@@ -166,20 +166,20 @@ class TrackingMetrics:
 
     def tune(self, config: VirtualCameraConfig) -> None:
         """The virtual camera is another one from now on."""
-        if config != self._config and self._intent is not None:
-            self._intent.tune(config)
+        if config != self._config and self._reference is not None:
+            self._reference.tune(config)
         self._config = config
 
     def start(self, t: float, robot: BodyHistory) -> None:
         """The button was pressed at `t` [s]: from here the robot is to be led."""
-        self._intent = ReferenceTrajectory(self._config, self._phone.hand.pose(t), robot(t))
+        self._reference = ReferenceTrajectory(self._config, self._phone.hand.pose(t), robot(t))
         self._t = t
 
     def advance(self, t: float, robot: BodyHistory, *, counted: bool = True) -> None:
         """Follow the intent up to `t` [s]; `counted`: the robot is tracking it."""
-        while self._intent is not None and self._t + SCORE_STEP_S <= t:
+        while self._reference is not None and self._t + SCORE_STEP_S <= t:
             self._t += SCORE_STEP_S
-            intended = self._intent.step(self._phone.hand.pose(self._t), SCORE_STEP_S)
+            intended = self._reference.step(self._phone.hand.pose(self._t), SCORE_STEP_S)
             if not counted:
                 continue
             offset, turn = missed_by(robot(self._t), intended, self._axes)

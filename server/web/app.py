@@ -60,9 +60,9 @@ class VirtualPhoneProcess:
 class Api:
     """The HTTP side: few requests, each small."""
 
-    def __init__(self, hub: SessionManager, authority: Path | None) -> None:
+    def __init__(self, manager: SessionManager, authority: Path | None) -> None:
         """`authority` is the certificate to install on phones."""
-        self._hub, self._authority = hub, authority
+        self._manager, self._authority = manager, authority
         self.phone = VirtualPhoneProcess()
         self._reports = LinkReports(now)
         self._t_metrics, self._exposed = -float("inf"), b""
@@ -85,13 +85,13 @@ class Api:
             stop = await stop_of(request)
         except WireError as error:
             return refusal(409 if error.code == "age" else 400, error.field, error.allowed)
-        self._hub.wish(stop, request.scope["member"])
-        mode, _ = mode_of(self._hub, now())
+        self._manager.wish(stop, request.scope["member"])
+        mode, _ = mode_of(self._manager, now())
         return JSONResponse({"stopping": True, "mode": mode}, 202)
 
     def _note(self, what: str, request: Request) -> None:
         begins = request.method == "POST"
-        self._hub.people.note(what, request.scope["member"], "start" if begins else "stop")
+        self._manager.people.note(what, request.scope["member"], "start" if begins else "stop")
 
     async def _virtual_phone(self, request: Request) -> Response:
         self._note("virtual phone", request)
@@ -103,23 +103,23 @@ class Api:
 
     async def _recording(self, request: Request) -> Response:
         self._note("recording", request)
-        recordings = self._hub.recordings
+        recordings = self._manager.recordings
         if request.method == "DELETE":
             path = recordings.stop()
-            self._hub.say(f"Recorded: {path}" if path else "No recording was running.")
+            self._manager.say(f"Recorded: {path}" if path else "No recording was running.")
             return JSONResponse({"path": path})
         try:
-            name = self._hub.start_recording()
+            name = self._manager.start_recording()
         except RecordingError as error:
             return refusal(507, "recording", str(error))
-        self._hub.say(f"Recording {name}.")
+        self._manager.say(f"Recording {name}.")
         return JSONResponse({"name": name}, 202)
 
     async def _status(self, _request: Request) -> Response:
-        return Response(self._hub.snapshot(), media_type="application/json")
+        return Response(self._manager.snapshot(), media_type="application/json")
 
     async def _link(self, request: Request) -> Response:
-        phone = self._hub.phone
+        phone = self._manager.phone
         try:
             seconds = float(request.query_params.get("seconds", KEPT_S))
         except ValueError:
@@ -141,7 +141,7 @@ class Api:
 
     async def _metrics(self, _request: Request) -> Response:
         if now() - self._t_metrics >= METRICS_S:
-            self._t_metrics, self._exposed = now(), exposition(self._hub)
+            self._t_metrics, self._exposed = now(), exposition(self._manager)
         return Response(self._exposed, media_type="text/plain; version=0.0.4")
 
 

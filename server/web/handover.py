@@ -33,9 +33,9 @@ class LeadSubject(Protocol):
 class Handover:
     """Changes of who leads, beside those by phones that come and go."""
 
-    def __init__(self, hub: LeadSubject) -> None:
+    def __init__(self, manager: LeadSubject) -> None:
         """Of this hub's lead."""
-        self._hub = hub
+        self._manager = manager
 
     def give(self, to: str, by: Member, now: float) -> None:
         """Give the lead to the member with that id; a robot in flight comes down first.
@@ -43,8 +43,8 @@ class Handover:
         Raises:
             PairingError: `by` may not, nobody may lead under this id, or the robot flies.
         """
-        hub, people = self._hub, self._hub.people
-        heir, is_flying = people.named(to), hub.is_flying()
+        manager, people = self._manager, self._manager.people
+        heir, is_flying = people.named(to), manager.is_flying()
         if by.role != "supervisor" and by.id != people.lease.holder:
             raise PairingError("role", "supervisor, or who leads now")
         if heir is None or heir.role == "viewer":
@@ -54,9 +54,9 @@ class Handover:
         if by.role != "supervisor" and is_flying:
             raise PairingError("mode", "while the robot is disarmed: disarm it first")
         people.note("take-over" if is_flying else "hand-over", by, heir.name)
-        hub.say(f"{by.name} gives the lead to {heir.name}.")
+        manager.say(f"{by.name} gives the lead to {heir.name}.")
         people.lease.give(to, now)
-        hub.disarm()
+        manager.disarm()
         self.make_room(now)
 
     def keep(self, id: str, by: Member, now: float) -> None:
@@ -65,26 +65,26 @@ class Handover:
         Raises:
             PairingError: it is not kept for that one, or is none of the business of `by`.
         """
-        people, lease = self._hub.people, self._hub.people.lease
+        people, lease = self._manager.people, self._manager.people.lease
         if lease.next_of(now) != id:
             raise PairingError("id", "of whom the lead is kept for")
         if by.role != "supervisor" and by.id != id and lease.is_of_another(by.id):
             raise PairingError("role", "supervisor, who gave it, or whom it is kept for")
         heir = people.named(id)
         people.note("hand-over", by, f"ended before {heir.name if heir else id} took it")
-        self._hub.say(f"{by.name} ends the hand-over to {heir.name if heir else id}.")
+        self._manager.say(f"{by.name} ends the hand-over to {heir.name if heir else id}.")
         lease.forget(id)
 
     def make_room(self, now: float) -> None:
         """Who leads goes, when the robot is down, for whom the lead was given to."""
-        hub, lease = self._hub, self._hub.people.lease
+        manager, lease = self._manager, self._manager.people.lease
         heir = lease.next_of(now)
-        if not heir or hub.phone is None or lease.holder == heir:
+        if not heir or manager.phone is None or lease.holder == heir:
             return
-        if hub.is_flying():
+        if manager.is_flying():
             lease.give(heir, now)
         else:
-            hub.part(hub.phone)
+            manager.part(manager.phone)
 
     async def shut_out(self, id: str, why: str, by: Member) -> Member:
         """End a pairing: its sockets close now, and a robot that it leads comes down.
@@ -92,40 +92,40 @@ class Handover:
         Raises:
             PairingError: nobody is in under this id.
         """
-        people = self._hub.people
+        people = self._manager.people
         member = people.doors.pairings.revoke(id, why)
         people.note("revoke", by, f"{member.name}: {why}")
-        self._hub.say(f"{member.name} is shut out. {why}")
+        self._manager.say(f"{member.name} is shut out. {why}")
         await self._expel([member])
         return member
 
     async def expire(self) -> None:
         """Those whose time is over go; who has gone is written down, if that could not be done."""
-        if self._hub.people.doors.save_again():
-            self._hub.say("Who is paired is written down again.")
-        over = self._hub.people.expire()
+        if self._manager.people.doors.save_again():
+            self._manager.say("Who is paired is written down again.")
+        over = self._manager.people.expire()
         for member in over:
-            self._hub.say(f"{member.name} is not paired any more. {member.why}")
+            self._manager.say(f"{member.name} is not paired any more. {member.why}")
         if over:
             await self._expel(over)
 
     async def _expel(self, members: list[Member]) -> None:
         """The robot comes down before anybody waits for a disk or a page."""
-        doors = self._hub.people.doors
+        doors = self._manager.people.doors
         for member in members:
             self._take_the_lead_from(member)
         try:
             await asyncio.gather(*(doors.sockets.end(member.id) for member in members))
         finally:
             if not doors.save():
-                self._hub.say(UNSAVED)
+                self._manager.say(UNSAVED)
         for member in members:
             if all(other.address != member.address for other in doors.pairings.present()):
                 doors.on_gone(member.address)
 
     def _take_the_lead_from(self, member: Member) -> None:
-        hub, people = self._hub, self._hub.people
+        manager, people = self._manager, self._manager.people
         people.lease.forget(member.id)
-        if people.lease.holder == member.id and hub.phone is not None:
-            hub.disarm()
-            hub.part(hub.phone)
+        if people.lease.holder == member.id and manager.phone is not None:
+            manager.disarm()
+            manager.part(manager.phone)

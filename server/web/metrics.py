@@ -13,9 +13,9 @@ from server.web.session_manager import SessionManager
 from server.web.status import build
 
 
-def exposition(hub: SessionManager) -> bytes:
+def exposition(manager: SessionManager) -> bytes:
     """The present status in Prometheus' text format."""
-    registry, status = CollectorRegistry(), build(hub)
+    registry, status = CollectorRegistry(), build(manager)
     mode = Gauge("lightleash_mode", "1 for the present mode", ["mode"], registry=registry)
     for name in (*Mode.__members__, "LOST"):
         mode.labels(name).set(name == status.mode)

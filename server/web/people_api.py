@@ -50,9 +50,9 @@ class PersonRequest(msgspec.Struct, forbid_unknown_fields=True):
 class PeopleApi:
     """Pairing, confirming, shutting out, handing on."""
 
-    def __init__(self, hub: SessionManager, doors: Doors, phones: str, here: str = "") -> None:
+    def __init__(self, manager: SessionManager, doors: Doors, phones: str, here: str = "") -> None:
         """`phones` is where phones reach this server, `here` where this machine does."""
-        self._hub, self._doors, self._phones, self._here = hub, doors, phones, here
+        self._manager, self._doors, self._phones, self._here = manager, doors, phones, here
 
     def routes(self) -> Sequence[BaseRoute]:
         """All of them."""
@@ -88,11 +88,11 @@ class PeopleApi:
             doors.audit.note("refusal", address=address, why=f"pairing: {error.allowed}")
             return refusal(401, error.field, error.allowed)
         if former is not None:  # its old cookie is of no more use
-            await self._hub.handover.shut_out(former.id, "It has paired anew.", former)
+            await self._manager.handover.shut_out(former.id, "It has paired anew.", former)
         doors.save()
-        self._hub.people.note("pair", member, f"as {member.state}")
+        self._manager.people.note("pair", member, f"as {member.state}")
         unconfirmed = ", waits to be confirmed" if member.state == "waiting" else ""
-        self._hub.say(f"{member.name} has paired as {member.role}{unconfirmed}.")
+        self._manager.say(f"{member.name} has paired as {member.role}{unconfirmed}.")
         response = JSONResponse(_told(member))
         name = cookie_name(secure)
         response.set_cookie(name, cookie, httponly=True, secure=secure, samesite="strict")
@@ -128,7 +128,7 @@ class PeopleApi:
             return refusal(403, "role", "viewer, operator; lightleash invite makes the other one")
         key = self._doors.pairings.invite(asked.role, self._doors.clock(), by.id)
         self._doors.save()
-        self._hub.people.note("invite", by, asked.role)
+        self._manager.people.note("invite", by, asked.role)
         page = "/" if asked.role == "operator" else "/supervisor"
         url = f"{self._phones}{page}#k={key}"
         here = f"{self._here}{page}#k={key}" if self._here else url
@@ -137,30 +137,30 @@ class PeopleApi:
     async def _confirm(self, asked: PersonRequest, by: Member) -> Response:
         member = self._doors.pairings.confirm(asked.id, asked.code)
         self._doors.save()
-        self._hub.people.note("confirm", by, member.name)
-        self._hub.say(f"{by.name} let {member.name} in.")
+        self._manager.people.note("confirm", by, member.name)
+        self._manager.say(f"{by.name} let {member.name} in.")
         return JSONResponse({"name": member.name})
 
     async def _deny(self, asked: PersonRequest, by: Member) -> Response:
         member = self._doors.pairings.deny(asked.id, "A supervisor did not let it in.")
         self._doors.save()
-        self._hub.people.note("deny", by, member.name)
-        self._hub.say(f"{by.name} did not let {member.name} in.")
+        self._manager.people.note("deny", by, member.name)
+        self._manager.say(f"{by.name} did not let {member.name} in.")
         return JSONResponse({"name": member.name})
 
     async def _revoke(self, asked: PersonRequest, by: Member) -> Response:
         if asked.id.startswith(LOCAL):
             return refusal(409, "id", "a paired page; end the program on its computer instead")
         why = "A supervisor has ended this pairing."
-        member = await self._hub.handover.shut_out(asked.id, why, by)
+        member = await self._manager.handover.shut_out(asked.id, why, by)
         return JSONResponse({"name": member.name})
 
     async def _lead(self, asked: PersonRequest, by: Member) -> Response:
-        self._hub.handover.give(asked.id, by, self._doors.clock())
+        self._manager.handover.give(asked.id, by, self._doors.clock())
         return JSONResponse({"leads_next": asked.id}, 202)
 
     async def _keep(self, asked: PersonRequest, by: Member) -> Response:
-        self._hub.handover.keep(asked.id, by, self._doors.clock())
+        self._manager.handover.keep(asked.id, by, self._doors.clock())
         return JSONResponse({"leads_next": ""}, 202)
 
 

@@ -70,7 +70,7 @@ class SessionManager:
         self.robot, self.recordings = robot, recordings
         self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
         self.paths = Transports(lambda data: recordings.record("server", data, now()))
-        self._desk = CalibrationControl(self.paths.tell)
+        self._calibration = CalibrationControl(self.paths.tell)
         self._control = server_end(runtime)
         self.people = People(doors or Doors(), self._keep_deed)
         self.handover = Handover(self)
@@ -147,7 +147,7 @@ class SessionManager:
     def calibrate(self, wish: Calibrate) -> None:
         """Let the operator's phone begin its camera's calibration, or leave it."""
         if (phone := self.phone) is not None:
-            self._desk.wish(phone, wish, self.status)
+            self._calibration.wish(phone, wish, self.status)
             self.say(f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration")
 
     def _ask(self, request: RequestInput, insists: int) -> None:
@@ -159,7 +159,7 @@ class SessionManager:
         else:
             self.say(f"{request.what} did not reach the control process: try again.")
 
-    def greet(
+    def connect_phone(
         self, hello: Hello, page: ClientConnection, who: Member = PROGRAM
     ) -> PhoneSession | None:
         """Give the lease to a phone of `who`; None while another one has it, or shall have it.
@@ -296,7 +296,7 @@ class SessionManager:
         self.broadcast(status)
         self._show_picture()
         self._ask_key()
-        self._desk.tell(self.phone, self.status)
+        self._calibration.tell(self.phone, self.status)
 
     def broadcast(self, message: ToPage) -> None:
         """To every page."""

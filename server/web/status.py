@@ -46,29 +46,29 @@ class StatusSource(Protocol):
         """Pages that watch."""
 
 
-def build(hub: StatusSource) -> Status:
+def build(manager: StatusSource) -> Status:
     """From what the hub knows now."""
-    t, control, phone = now(), hub.status, hub.phone
-    mode, silence = mode_of(hub, t)
-    gaps = hub.blame.gaps(control, t) if control is not None else {}
+    t, control, phone = now(), manager.status, manager.phone
+    mode, silence = mode_of(manager, t)
+    gaps = manager.blame.gaps(control, t) if control is not None else {}
     refusals = [f"{silence}."] if control is None or silence else control.refusals
-    sighting = phone.sighting if phone is not None else None
-    found = sighting is not None and sighting.pose is not None
+    detection = phone.detection if phone is not None else None
+    found = detection is not None and detection.pose is not None
     return Status(
         mode=mode,
         reason=f"{silence}; the robot stops by its own watchdog."
         if control is None or silence
-        else hub.blame.reason(control, t),
+        else manager.blame.reason(control, t),
         ready=not refusals,
         refusals=list(refusals),
-        robot=hub.robot.name,
+        robot=manager.robot.name,
         operator=phone.device if phone is not None else "",
         video_path=phone.video_path if phone is not None else "",
-        streams=_streams(hub, t),
-        latency_ms=_latency(hub),
-        leds=len(sighting.match.led) if sighting is not None and sighting.match else 0,
-        reprojection_px=_rounded(sighting.pose.reprojection_px, 2)
-        if found and sighting and sighting.pose
+        streams=_streams(manager, t),
+        latency_ms=_latency(manager),
+        leds=len(detection.match.led) if detection is not None and detection.match else 0,
+        reprojection_px=_rounded(detection.pose.reprojection_px, 2)
+        if found and detection and detection.pose
         else None,
         position_mm=[round(1e3 * x, 1) for x in control.p_bc_in_c]
         if control is not None and control.p_bc_in_c is not None
@@ -77,15 +77,15 @@ def build(hub: StatusSource) -> Status:
         error_deg=_rounded(control.error_rad, 2, degrees(1.0)) if control else None,
         sigma_mm=_rounded(control.sigma_p, 1, 1e3) if control else None,
         saturated=control.saturated if control else False,
-        recording=hub.recordings.name,
+        recording=manager.recordings.name,
         phones=int(phone is not None),
-        supervisors=len(hub.supervisors),
+        supervisors=len(manager.supervisors),
         realtime=control.realtime if control else "",
         control=_control(control),
-        messages=list(hub.events),
+        messages=list(manager.events),
         virtual_camera=_virtual_camera(control),
         estimate=_estimate(control),
-        camera=health(phone.vision.looking)
+        camera=health(phone.vision.front_end)
         if phone is not None and phone.vision is not None
         else None,
         path_choice=phone.path_choice if phone is not None else None,
@@ -93,16 +93,16 @@ def build(hub: StatusSource) -> Status:
         until_ramp_ms=_rounded(control.until_ramp_s, 0, 1e3) if control and not silence else None,
         resumes=control is not None and control.resumes,
         gaps={side: GapCount(one.count, 1e3 * one.longest_s) for side, one in gaps.items()},
-        warnings=[*warnings(gaps), *([UNSAVED] if hub.people.doors.is_unsaved else [])],
-        server=hub.pauses.figures(),
-        people=hub.people.present(),
+        warnings=[*warnings(gaps), *([UNSAVED] if manager.people.doors.is_unsaved else [])],
+        server=manager.pauses.figures(),
+        people=manager.people.present(),
     )
 
 
-def mode_of(hub: StatusSource, t: float) -> tuple[ModeName, str]:
+def mode_of(manager: StatusSource, t: float) -> tuple[ModeName, str]:
     """The robot's mode at `t` [s], and why it is LOST, or ""."""
-    control = hub.status
-    silence = _silence(control, hub.control_meter.age(t))
+    control = manager.status
+    silence = _silence(control, manager.control_meter.age(t))
     if control is None or silence:
         return "LOST", silence
     return cast(ModeName, Mode(control.mode).name), ""
@@ -167,28 +167,28 @@ def _control(control: ControlStatus | None) -> dict[str, float]:
     return {**lateness, "missed": missed, "step_ms": round(control.step_ms, 3)}
 
 
-def _latency(hub: StatusSource) -> dict[str, float]:
-    stages = dict(hub.phone.latency_ms) if hub.phone is not None else {}
-    if stages and hub.status is not None:
-        stages["to control"] = max(0.0, hub.status.fuse_ms - sum(stages.values()))
-        stages["control"] = hub.status.step_ms
+def _latency(manager: StatusSource) -> dict[str, float]:
+    stages = dict(manager.phone.latency_ms) if manager.phone is not None else {}
+    if stages and manager.status is not None:
+        stages["to control"] = max(0.0, manager.status.fuse_ms - sum(stages.values()))
+        stages["control"] = manager.status.step_ms
     return {name: round(max(0.0, ms), 2) for name, ms in stages.items()}
 
 
-def _streams(hub: StatusSource, t: float) -> dict[str, Stream]:
+def _streams(manager: StatusSource, t: float) -> dict[str, Stream]:
     streams = {}
-    if hub.phone is not None:
-        streams = {name: meter.stream(t) for name, meter in hub.phone.meters.items()}
-        vision = hub.phone.vision
+    if manager.phone is not None:
+        streams = {name: meter.stream(t) for name, meter in manager.phone.meters.items()}
+        vision = manager.phone.vision
         if vision is not None:
             video = streams["video"]
             lost = vision.dropped + vision.undecodable
             streams["video"] = Stream(video.age_ms, video.rate_hz, lost)
-    control = hub.status
+    control = manager.status
     if control is not None:
-        age = control.body_imu_age + hub.control_meter.age(t)
+        age = control.body_imu_age + manager.control_meter.age(t)
         age_ms = round(1e3 * age, 1) if age < 1e6 else None
         streams["body_imu"] = Stream(age_ms, round(control.body_imu_rate_hz, 1), 0)
-        link = hub.control_meter.stream(t)
+        link = manager.control_meter.stream(t)
         streams["control"] = Stream(link.age_ms, link.rate_hz, control.inputs_dropped)
     return streams

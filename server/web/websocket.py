@@ -116,9 +116,9 @@ class Connection:
 class PageServer:
     """Serves the three kinds of socket."""
 
-    def __init__(self, hub: SessionManager, video: VideoSettings) -> None:
+    def __init__(self, manager: SessionManager, video: VideoSettings) -> None:
         """For the pages of one robot."""
-        self._hub, self._video = hub, video
+        self._manager, self._video = manager, video
 
     async def phone(self, socket: WebSocket) -> None:
         """`/ws/phone`: an operator."""
@@ -155,9 +155,9 @@ class PageServer:
             for task in (writer, pinger):
                 if task is not None:
                     task.cancel()
-            self._hub.supervisors.discard(page)
+            self._manager.supervisors.discard(page)
             if role == "operator" and phone is not None:
-                self._hub.part(phone)
+                self._manager.part(phone)
             await _quietly(page.close(1008 if session.hopeless or session.hello is None else 1000))
 
     async def _greet(
@@ -169,22 +169,22 @@ class PageServer:
             raise WireError("order", "message", "hello first")
         phone: PhoneSession | None = None
         if session.role == "operator":
-            phone = self._hub.greet(hello, page, member)
+            phone = self._manager.connect_phone(hello, page, member)
             if phone is None:
                 raise BUSY
         elif session.role == "video":
-            phone = self._hub.join_video(hello.session, page)
+            phone = self._manager.join_video(hello.session, page)
             if phone is None:
                 raise WireError("role", "hello.session", "the session of the phone that leads")
         else:
-            self._hub.supervisors.add(page)
+            self._manager.supervisors.add(page)
         video = self._video
         page.push(
             encode_message(
                 Welcome(
                     session=phone.id if phone is not None else "",
                     version=VERSION,
-                    robot=self._hub.robot.name,
+                    robot=self._manager.robot.name,
                     width=video.width,
                     height=video.height,
                     frame_rate_hz=video.frame_rate_hz,
@@ -205,30 +205,30 @@ class PageServer:
         """
         data = await page.read()
         t = now()
-        if phone is not None and self._hub.phone is not phone:
+        if phone is not None and self._manager.phone is not phone:
             raise BUSY
         try:
             said = session.receive(data, t)
             if phone is not None and self._is_straggler(said):
                 return
             if phone is not None:
-                self._hub.record(data, t)
+                self._manager.record(data, t)
             if isinstance(said, Record) and phone is not None:
                 phone.take(said, t)
             elif isinstance(said, Command):
-                self._hub.wish(said, member)
+                self._manager.wish(said, member)
             elif isinstance(said, Calibrate) and phone is not None:
-                self._hub.calibrate(said)
+                self._manager.calibrate(said)
             elif isinstance(said, Tune):
-                self._hub.people.note("tune", member)
-                self._hub.tune(said)
+                self._manager.people.note("tune", member)
+                self._manager.tune(said)
             elif isinstance(said, PathChoice):
                 self._choose(said, phone)
             elif isinstance(said, Log):
-                self._hub.say(f"page: {said.text}", of=f"page of {member.name}")
+                self._manager.say(f"page: {said.text}", of=f"page of {member.name}")
         except WireError as error:
             if error.code in ("role", "age"):
-                self._hub.people.note("refusal", member, str(error))
+                self._manager.people.note("refusal", member, str(error))
             page.refuse(error, fatal=session.hopeless)
 
     def _choose(self, choice: PathChoice, phone: PhoneSession | None) -> None:
@@ -238,30 +238,30 @@ class PageServer:
             WireError: no phone leads, or its page lets nobody choose.
         """
         if phone is None:
-            leading = self._hub.phone
+            leading = self._manager.phone
             if leading is None or leading.path_choice is None:
                 raise WireError("order", "path.wish", "while a phone leads that has several ways")
-            self._hub.paths.tell(encode_message(structs.replace(choice, by="supervisor")))
+            self._manager.paths.tell(encode_message(structs.replace(choice, by="supervisor")))
             return
         if choice.by and choice != phone.path_choice:
             way = "the best way" if choice.wish == "auto" else choice.wish
-            self._hub.say(f"pictures by {way}: chosen by the {choice.by}", of="pictures")
+            self._manager.say(f"pictures by {way}: chosen by the {choice.by}", of="pictures")
         phone.path_choice = choice
 
     def _is_straggler(self, said: FromPage | Record) -> bool:
         """A picture that was on its way when the phone went over to its fast path."""
         if not isinstance(said, Record) or not isinstance(said.body, Picture):
             return False
-        if not self._hub.paths.takes_from_socket(said.t_us, said.sequence, said.body.key):
+        if not self._manager.paths.takes_from_socket(said.t_us, said.sequence, said.body.key):
             return True
-        if self._hub.phone is not None:
-            self._hub.phone.video_path = f"websocket, {said.body.codec.name}"
+        if self._manager.phone is not None:
+            self._manager.phone.video_path = f"websocket, {said.body.codec.name}"
         return False
 
     async def _ping(self, phone: PhoneSession | None) -> None:
         t = now()
-        while phone is not None and self._hub.phone is phone:
-            self._hub.ping()
+        while phone is not None and self._manager.phone is phone:
+            self._manager.ping()
             t = max(t + PING_S, now())  # what was missed is not made up for
             await asyncio.sleep(t - now())
 

@@ -82,7 +82,7 @@ def law() -> None:
     ahead = FeedForward(robot, FeedForwardConfig())
 
     def feed(_k: int) -> None:
-        ahead.feel(up, np.eye(3), zero, H)
+        ahead.observe(up, np.eye(3), zero, H)
         ahead.wrench(relative, np.eye(3), view, p, H)
 
     soft = Compliance(ComplianceConfig(enabled=True))

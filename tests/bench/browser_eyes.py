@@ -45,18 +45,18 @@ class Eye:
 
     def __init__(self, film: RenderedVideo, seen: Seen) -> None:
         self._film, self._seen = film, seen
-        self._looking = VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig())
+        self._front_end = VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig())
 
-    def feel(self, shot: RenderedFrame) -> None:
-        self._looking.add_imu(*shot.phone, *shot.body)
+    def add_imu(self, shot: RenderedFrame) -> None:
+        self._front_end.add_imu(*shot.phone, *shot.body)
 
     def see(self, k: int, shot: RenderedFrame, frame: Frame) -> None:
         """Picture `k`."""
         seen, film = self._seen, self._film
         seen.frames += 1
         seen.solvable += shot.solvable
-        sighting = self._looking.process(frame)
-        pose, match = sighting.pose, sighting.match
+        detection = self._front_end.process(frame)
+        pose, match = detection.pose, detection.match
         if pose is None or match is None:
             return
         if is_wrong(pose, shot):
@@ -64,7 +64,7 @@ class Eye:
             return
         seen.found += shot.solvable
         seen.errors[film.seed, k] = measured(pose, shot, film.camera, film.leds_in_b)
-        for led, pixel in zip(match.led, sighting.spots.pixels[match.spot], strict=True):
+        for led, pixel in zip(match.led, detection.spots.pixels[match.spot], strict=True):
             off = float(np.linalg.norm(pixel - shot.pixels[led]))
             if off < NEAR_PX:
                 seen.places[film.seed, k, int(led)] = pixel
@@ -79,7 +79,7 @@ def look(
     wire, came = Wire(f"h264-{MBIT:g}", film.size), {picture.number: picture for picture in got}
     for k, shot in enumerate(shots):
         for eye in eyes.values():
-            eye.feel(shot)
+            eye.add_imu(shot)
         coded = wire.carry(shot.t, shot.luma)
         if k not in came or coded is None:
             continue

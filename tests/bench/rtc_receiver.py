@@ -94,9 +94,9 @@ class Receiver(RtcHouse):
         self._eyes: Eyes | None = None
         self._calls: list[RTCPeerConnection] = []
         self._reading: set[asyncio.Task[None]] = set()
-        routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.desk.routes()]
+        routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.signalling.routes()]
         routes.append(Route("/stock", self._stock, methods=["POST"]))
-        pages = PageServer(self.hub, VideoSettings())
+        pages = PageServer(self.manager, VideoSettings())
         self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
         PhoneSession._see = lambda phone, frame, t: self._see(phone, frame, t)
 
@@ -131,7 +131,7 @@ class Receiver(RtcHouse):
         """Ten times a second: clock, motion, path."""
         while True:
             await asyncio.sleep(WATCH_S)
-            phone = self.hub.phone
+            phone = self.manager.phone
             if phone is None or not phone.ingest.clock.ready:
                 continue
             self.seen.clock.append(phone.ingest.clock.offset)

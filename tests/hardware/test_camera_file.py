@@ -108,16 +108,16 @@ def test_a_number_that_yaml_takes_for_a_word_is_a_number(tmp_path):
 def test_how_the_camera_sits_beside_its_motion_sensors_is_read(tmp_path):
     R_ci = exp(np.array([0.02, -0.03, 0.01]))
     table = {"rotation": np.round(R_ci, 6).ravel().tolist(), "time_offset_s": -0.012}
-    mounting = load_camera(written(tmp_path, changed(INFO, ["camera_imu"], table)))[1].mounting
-    assert mounting.R_ci == pytest.approx(R_ci, abs=1e-5)
-    assert mounting.R_ci @ mounting.R_ci.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert mounting.time_offset_s == -0.012
-    square = load_camera(written(tmp_path, INFO))[1].mounting
+    extrinsics = load_camera(written(tmp_path, changed(INFO, ["camera_imu"], table)))[1].extrinsics
+    assert extrinsics.R_ci == pytest.approx(R_ci, abs=1e-5)
+    assert extrinsics.R_ci @ extrinsics.R_ci.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert extrinsics.time_offset_s == -0.012
+    square = load_camera(written(tmp_path, INFO))[1].extrinsics
     assert (square.R_ci == np.eye(3)).all()
     assert square.time_offset_s == 0.0
 
 
-SQUARE = {"rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1]}
+IDENTITY = {"rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1]}
 K = ["camera_matrix", "data"]
 FAULTS = [
     (["distortion_model"], "banana", "distortion_model", "plumb_bob, rational_polynomial"),
@@ -153,7 +153,7 @@ FAULTS = [
         "camera_imu.rotation",
         "a rotation",
     ),
-    (["camera_imu"], {**SQUARE, "time_offset_s": 3.0}, "camera_imu.time_offset_s", "-0.5 to 0.5"),
+    (["camera_imu"], {**IDENTITY, "time_offset_s": 3.0}, "camera_imu.time_offset_s", "-0.5 to 0.5"),
 ]
 
 

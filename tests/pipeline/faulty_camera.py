@@ -65,9 +65,9 @@ def looks(world, faults, seed=0):
 
 
 def watched(
-    world, faults, seed=0, coarse=True, hear=lambda watch: None, spoil=lambda sample: sample
+    world, faults, seed=0, coarse=True, observe=lambda watch: None, spoil=lambda sample: sample
 ):
-    """The watch after it has seen all; `hear` is asked after each picture."""
+    """The watch after it has seen all; `observe` is asked after each picture."""
     watch = CalibrationMonitor(CAMERA, LEDS_IN_B)
     phone = [
         (arrival, replace(sample, omega_m_cf_in_c=faults.gyro * sample.omega_m_cf_in_c))
@@ -79,9 +79,9 @@ def watched(
     for arrival, event in events:
         if isinstance(event, LedObservation):
             watch.saw(event, offset if arrival > 4.0 else None)
-            hear(watch)
+            observe(watch)
         elif (sample := spoil(event)) is not None:
-            watch.feel(sample)
+            watch.add_imu(sample)
     return watch
 
 

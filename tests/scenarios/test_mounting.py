@@ -23,7 +23,7 @@ def flown(**more: object) -> tuple[float, int, str]:
 
 
 def test_with_its_profile_it_flies_as_a_phone_whose_sensors_sit_square() -> None:
-    known_mm, ticks, left = flown(mounting=ASKEW)
+    known_mm, ticks, left = flown(extrinsics=ASKEW)
     square_mm, square_ticks, _ = flown()
     assert left == ""
     assert ticks == square_ticks
@@ -31,6 +31,6 @@ def test_with_its_profile_it_flies_as_a_phone_whose_sensors_sit_square() -> None
 
 
 def test_without_it_knows_less_of_where_the_robot_is() -> None:
-    known_mm, ticks, _ = flown(mounting=ASKEW)
-    unknown_mm, few, _ = flown(mounting=ASKEW, knows_mounting=False)
+    known_mm, ticks, _ = flown(extrinsics=ASKEW)
+    unknown_mm, few, _ = flown(extrinsics=ASKEW, knows_extrinsics=False)
     assert few < ticks or unknown_mm > 1.3 * known_mm

@@ -148,11 +148,11 @@ class House:
     def __init__(self, folder: Path) -> None:
         self.doors = Doors(audit=Audit(folder))
         recordings = Recordings(folder / "recordings", {})
-        self.hub = SessionManager(folder, ROBOT, [CAMERAS], recordings, doors=self.doors)
+        self.manager = SessionManager(folder, ROBOT, [CAMERAS], recordings, doors=self.doors)
         self.control = control_end(folder)
-        self.api = Api(self.hub, None)
-        self.people = PeopleApi(self.hub, self.doors, "https://robot.lan:8443", "http://here")
-        pages = PageServer(self.hub, VideoSettings())
+        self.api = Api(self.manager, None)
+        self.people = PeopleApi(self.manager, self.doors, "https://robot.lan:8443", "http://here")
+        pages = PageServer(self.manager, VideoSettings())
         view = view_routes(Path("nowhere"))
         self.inner = make_app(self.api, pages, [*self.people.routes(), *view])
         self.app = Guard(self.inner, self.doors, [HOST, "robot.lan", "::1"])
@@ -160,7 +160,7 @@ class House:
 
     def close(self) -> None:
         self.doors.audit.close()
-        for end in (self.control, self.hub._control):
+        for end in (self.control, self.manager._control):
             if end.fileno() >= 0:
                 end.close()
 
@@ -172,7 +172,7 @@ class House:
             server = listener(self.app, None)
             tasks = [
                 asyncio.create_task(server.serve(sockets=[bound])),
-                asyncio.create_task(self.hub.run()),
+                asyncio.create_task(self.manager.run()),
             ]
             try:
                 await eventually(lambda: server.started)

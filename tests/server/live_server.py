@@ -53,21 +53,21 @@ class LiveServer:
         self.control: Endpoint = control_end(folder)
         recordings = Recordings(folder / "recordings", {})
         self.doors = Doors()
-        self.hub = SessionManager(
+        self.manager = SessionManager(
             folder, load_robot("ames").robot, [CAMERAS], recordings, doors=self.doors
         )
-        self.api = Api(self.hub, None)
-        people = PeopleApi(self.hub, self.doors, "https://robot.lan:8443")
-        pages = PageServer(self.hub, VideoSettings())
-        desk = SignallingEndpoint(self.hub, RtcSettings(), 3_000_000)
+        self.api = Api(self.manager, None)
+        people = PeopleApi(self.manager, self.doors, "https://robot.lan:8443")
+        pages = PageServer(self.manager, VideoSettings())
+        signalling = SignallingEndpoint(self.manager, RtcSettings(), 3_000_000)
         view = view_routes(Path("nowhere"))
-        self.app = make_app(self.api, pages, [*people.routes(), *view, *desk.routes()])
+        self.app = make_app(self.api, pages, [*people.routes(), *view, *signalling.routes()])
         self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"], quotas=quotas)
 
     def close(self) -> None:
         """Give the sockets back."""
         self.control.close()
-        self.hub._control.close()
+        self.manager._control.close()
 
     def token(self, role: str) -> str:
         """Of this run."""
@@ -82,7 +82,7 @@ class LiveServer:
             server = listener(self.guard, None)
             tasks = [
                 asyncio.create_task(server.serve(sockets=[bound])),
-                asyncio.create_task(self.hub.run()),
+                asyncio.create_task(self.manager.run()),
             ]
             try:
                 yield self

@@ -109,7 +109,7 @@ class Plant:
             mujoco.mj_step(self._model, self._data)
             self._now_ms += STEP_MS
             if self._touch is not None:
-                self._touch.feel()
+                self._touch.sample()
         mujoco.mj_forward(self._model, self._data)
 
     def _apply_surroundings(self) -> None:

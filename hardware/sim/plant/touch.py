@@ -36,7 +36,7 @@ class ContactForceSensor:
         """A step of the plant begins."""
         self._forces.clear()
 
-    def feel(self) -> None:
+    def sample(self) -> None:
         """After each step of MuJoCo: what acted in it."""
         total = np.zeros(3)
         for k in range(self._data.ncon):  # the list's own iterator takes 0.5 ms to find its end

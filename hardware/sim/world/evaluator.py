@@ -72,7 +72,7 @@ class EstimatorRun:
 def run(estimator: Estimator, world: World) -> EstimatorRun:
     """Feed the world to the estimator, ask it every 5 ms, and compare."""
     notes = _Notes(estimator, world)
-    for now, state in feed(estimator, world, hear=notes.hear):
+    for now, state in feed(estimator, world, observe=notes.observe):
         notes.tick(now, state)
     return notes.track()
 
@@ -90,7 +90,7 @@ class _Notes:
         self._captured: list[tuple[float, Believed]] = []
         self._health: list[tuple[float, float, float, float]] = []
 
-    def hear(self, sample: Sample, fusion: Fusion | None) -> None:
+    def observe(self, sample: Sample, fusion: Fusion | None) -> None:
         """Note the phone's newest sample, and what is known at a fused picture."""
         if isinstance(sample, PhoneImu):
             self._newest = max(self._newest, sample.t)

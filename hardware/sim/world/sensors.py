@@ -106,11 +106,11 @@ def events(world: World) -> list[Event]:
 
 
 def feed(
-    estimator: Estimator, world: World, period: float = 0.005, hear: Listener = _nobody
+    estimator: Estimator, world: World, period: float = 0.005, observe: Listener = _nobody
 ) -> Iterator[tuple[float, RelativeState | None]]:
     """Run the estimator as the control loop does; gives (now, state) each period."""
     times = np.arange(0.1, world.t[-1], period).tolist()
-    return play(estimator, stamped(events(world)), times, hear)
+    return play(estimator, stamped(events(world)), times, observe)
 
 
 def stamped(arriving: Iterable[Event]) -> Iterator[Event]:
@@ -118,7 +118,7 @@ def stamped(arriving: Iterable[Event]) -> Iterator[Event]:
     search = CameraImuDelay()
     for arrival, sample in arriving:
         if not isinstance(sample, VisionMeasurement):
-            search.feel(sample)
+            search.add_imu(sample)
             yield arrival, sample
             continue
         if sample.pose is not None:
@@ -127,14 +127,14 @@ def stamped(arriving: Iterable[Event]) -> Iterator[Event]:
 
 
 def play(
-    estimator: Estimator, arriving: Iterable[Event], times: Iterable[float], hear: Listener
+    estimator: Estimator, arriving: Iterable[Event], times: Iterable[float], observe: Listener
 ) -> Iterator[tuple[float, RelativeState | None]]:
     """Give what arrives, in that order, and ask at each of `times` [s]."""
     queue = iter(arriving)
     event = next(queue, None)
     for now in times:
         while event is not None and event[0] <= now:
-            hear(event[1], give(estimator, event[1], now))
+            observe(event[1], give(estimator, event[1], now))
             event = next(queue, None)
         yield now, estimator.state(now)
 

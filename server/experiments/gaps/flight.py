@@ -68,7 +68,7 @@ class GapFlight:
         self.loop = VirtualTimeSimulation(robot_file, config, scene, self.person)
         self.log = FlightLog()
         self._config = config
-        self._intent: ReferenceTrajectory | None = None
+        self._reference: ReferenceTrajectory | None = None
         self._ideal_in_f = self._due_in_f = np.zeros(3)
         self._mode = Mode.DISARMED
 
@@ -99,8 +99,8 @@ class GapFlight:
             self.log.reasons.append(f"{mode.name}: {output.failsafe.reason}")
         if mode == Mode.TRACK:
             self._follow(self._mode)
-        elif mode == Mode.COAST and self._intent is not None:
-            self._ideal_in_f = self._intent.step(self.loop.truth()[0], PERIOD_S)[1]
+        elif mode == Mode.COAST and self._reference is not None:
+            self._ideal_in_f = self._reference.step(self.loop.truth()[0], PERIOD_S)[1]
         self._mode = mode
         self._write(output)
         return output
@@ -108,12 +108,12 @@ class GapFlight:
     def _follow(self, before: Mode) -> None:
         """Carry on where the robot should be, `before` being the mode before TRACK."""
         hand, body = self.loop.truth()
-        if self._intent is None or before not in (Mode.TRACK, Mode.COAST):
-            self._intent = ReferenceTrajectory(self._config.virtual_camera, hand, body)
+        if self._reference is None or before not in (Mode.TRACK, Mode.COAST):
+            self._reference = ReferenceTrajectory(self._config.virtual_camera, hand, body)
             self._ideal_in_f = self._due_in_f = body[1]
             return
         behind = (body[1] if before == Mode.COAST else self._due_in_f) - self._ideal_in_f
-        self._ideal_in_f = self._intent.step(hand, PERIOD_S)[1]
+        self._ideal_in_f = self._reference.step(hand, PERIOD_S)[1]
         self._due_in_f = self._ideal_in_f + released(behind, PERIOD_S)
 
     def _write(self, output: Output) -> None:

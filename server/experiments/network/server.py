@@ -99,28 +99,31 @@ async def serve(host: str, folder: Path) -> None:
     robot = load_robot("ames").robot
     doors = Doors()
     recordings = Recordings(folder / "recordings", {})
-    hub = NotingSessionManager(folder, robot, [CAMERAS], recordings, doors=doors)
+    manager = NotingSessionManager(folder, robot, [CAMERAS], recordings, doors=doors)
     control = control_end(folder)  # nobody's: what goes there is read and forgotten
     video = VideoSettings(width=640, height=480, bitrate_bps=1_500_000)
     with listen(host, 0) as bound:
         url = f"http://{host}:{bound.getsockname()[1]}"
-        desk = SignallingEndpoint(hub, RtcSettings(), video.bitrate_bps)
-        api = Api(hub, None)
+        signalling = SignallingEndpoint(manager, RtcSettings(), video.bitrate_bps)
+        api = Api(manager, None)
         admission = Admission()
-        inner = make_app(api, PageServer(hub, video), desk.routes())
+        inner = make_app(api, PageServer(manager, video), signalling.routes())
         app = Guard(inner, doors, [host], admission)
         stop, loop = asyncio.Event(), asyncio.get_running_loop()
         loop.add_reader(control.fileno(), control.inputs)
         loop.add_signal_handler(signal.SIGTERM, stop.set)
-        loop.add_signal_handler(signal.SIGUSR1, hub.tell_heard)
+        loop.add_signal_handler(signal.SIGUSR1, manager.tell_heard)
         server = listener(app, None, admission)
-        tasks = [asyncio.create_task(server.serve(sockets=[bound])), asyncio.create_task(hub.run())]
+        tasks = [
+            asyncio.create_task(server.serve(sockets=[bound])),
+            asyncio.create_task(manager.run()),
+        ]
         sys.stdout.buffer.write(
             msgspec.json.encode(ServerAddress(url, doors.operator_token)) + b"\n"
         )
         sys.stdout.buffer.flush()
         await stop.wait()
-        await desk.close()
+        await signalling.close()
         server.should_exit = server.force_exit = True
         tasks[1].cancel()
         await asyncio.gather(*tasks, return_exceptions=True)

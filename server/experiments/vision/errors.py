@@ -55,16 +55,16 @@ def is_wrong(pose: RelativePose, shot: RenderedFrame) -> bool:
 def measured(pose: RelativePose, shot: RenderedFrame, camera: Camera, leds_in_b: Array) -> Error:
     """All figures of a pose."""
     error = error_of(pose, shot)
-    sight = shot.p_bc_in_c / np.linalg.norm(shot.p_bc_in_c)
-    depth = float(sight @ error[:3])
+    frame_pipeline = shot.p_bc_in_c / np.linalg.norm(shot.p_bc_in_c)
+    depth = float(frame_pipeline @ error[:3])
     J = jacobian(shot, camera, leds_in_b)[shot.visible]
     H = np.einsum("nij,nik->jk", J, J)
     known = np.einsum("nij,nil,nlk->jk", J, shot.information[shot.visible], J)
     bound = _inverse(known)
     p, theta = bound[:3, :3], bound[3:, 3:]
-    depth_variance = float(sight @ p @ sight)
+    depth_variance = float(frame_pipeline @ p @ frame_pipeline)
     return Error(
-        lateral_m=float(np.linalg.norm(error[:3] - depth * sight)),
+        lateral_m=float(np.linalg.norm(error[:3] - depth * frame_pipeline)),
         depth_m=abs(depth),
         turn_rad=float(np.linalg.norm(error[3:])),
         nees=float(error @ np.linalg.solve(pose.covariance, error)),

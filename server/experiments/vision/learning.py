@@ -52,10 +52,10 @@ def learn(seed: int) -> LearningFigures:
     told_s = true_s * float(rng.choice(READOUT_ERROR))
     offset_s = float(rng.uniform(-OFFSET_S, OFFSET_S))
     camera = replace(film.camera, readout_s=told_s)
-    looking = VisualFrontEnd(camera, film.leds_in_b, GatesConfig())
+    front_end = VisualFrontEnd(camera, film.leds_in_b, GatesConfig())
     for shot in film:
-        looking.add_imu(*shot.phone, *shot.body)
-        looking.process(Frame(shot.t - offset_s, shot.luma))
+        front_end.add_imu(*shot.phone, *shot.body)
+        front_end.process(Frame(shot.t - offset_s, shot.luma))
     return LearningFigures(
-        seed, true_s, told_s, looking.readout.in_use_s, offset_s, looking.offset_s
+        seed, true_s, told_s, front_end.readout.in_use_s, offset_s, front_end.offset_s
     )

@@ -75,7 +75,7 @@ class ChannelRun:
     def __init__(self, film: RenderedVideo, channel: Channel) -> None:
         """Nothing seen yet."""
         self.channel, self._film = channel, film
-        self._looking = self._new()
+        self._front_end = self._new()
         self._wire = Wire(channel.codec, film.size)
         self.record = SceneRecord(film.scene.name, film.size, channel.name)
         self._phone: deque[PhoneImu] = deque()
@@ -100,40 +100,40 @@ class ChannelRun:
             record.undecoded += 1
             self._count_return(shot, False)
             return
-        sighting = self._look(self._looking, frame)
-        pose = sighting.pose
-        self._clocked(sighting, self._had_pose)
+        detection = self._look(self._front_end, frame)
+        pose = detection.pose
+        self._clocked(detection, self._had_pose)
         self._had_pose = pose is not None
         self._count_return(shot, pose is not None)
         record.found += shot.solvable and pose is not None
-        self._judge(k, shot, sighting)
+        self._judge(k, shot, detection)
         self._see_afresh(k, shot, frame)
 
     def _feel(self, shot: RenderedFrame) -> None:
-        for looking in (self._looking, self._fresh):
-            if looking is not None:
-                looking.add_imu(*shot.phone, *shot.body)
+        for front_end in (self._front_end, self._fresh):
+            if front_end is not None:
+                front_end.add_imu(*shot.phone, *shot.body)
         self._phone.extend(shot.phone)
         self._body.extend(shot.body)
         for samples in (self._phone, self._body):
             while samples and samples[0].t < shot.t - REMEMBERED_S:
                 samples.popleft()
 
-    def _look(self, looking: VisualFrontEnd, frame: Frame) -> Detection:
+    def _look(self, front_end: VisualFrontEnd, frame: Frame) -> Detection:
         begin = thread_cpu()
-        sighting = looking.process(frame)
+        detection = front_end.process(frame)
         self.record.whole_s.append(thread_cpu() - begin)
-        return sighting
+        return detection
 
-    def _clocked(self, sighting: Detection, was_tracking: bool) -> None:
-        took = sighting.took_s
+    def _clocked(self, detection: Detection, was_tracking: bool) -> None:
+        took = detection.took_s
         times = (took.get("detect", 0.0), took.get("identify", 0.0), took.get("pose", 0.0))
         (self.record.tracking_s if was_tracking else self.record.starting_s).append(times)
         if not was_tracking:
-            self.record.blobs.append(len(sighting.spots))
+            self.record.blobs.append(len(detection.spots))
 
-    def _judge(self, k: int, shot: RenderedFrame, sighting: Detection) -> None:
-        pose, film = sighting.pose, self._film
+    def _judge(self, k: int, shot: RenderedFrame, detection: Detection) -> None:
+        pose, film = detection.pose, self._film
         if pose is not None and not self._accuse(k, shot, pose) and shot.visible.sum() >= 3:
             self.record.errors.append(measured(pose, shot, film.camera, film.leds_in_b))
 
@@ -154,12 +154,12 @@ class ChannelRun:
             return
         self._fresh_left -= 1
         self._fresh_fair &= shot.solvable
-        sighting = self._look(self._fresh, frame)
-        self._clocked(sighting, False)
+        detection = self._look(self._fresh, frame)
+        self._clocked(detection, False)
         self.record.fresh_frames += 1
-        found = sighting.pose is not None
-        if sighting.pose is not None:
-            self._accuse(-1 - k, shot, sighting.pose)
+        found = detection.pose is not None
+        if detection.pose is not None:
+            self._accuse(-1 - k, shot, detection.pose)
         if found or self._fresh_left == 0:
             self.record.fresh += self._fresh_fair
             self.record.fresh_found += self._fresh_fair and found

@@ -56,7 +56,7 @@ def _run(given: argparse.Namespace) -> None:
     locator = Locator(camera, leds_in_b, motion)
     history = _work(locator, leds_in_b, frames, outputs)
     print(summary(history))
-    for line in camera_lines(camera, locator.looking):
+    for line in camera_lines(camera, locator.front_end):
         print(line)
     print(f"\nwritten: {', '.join(str(path) for path in outputs.values())}")
     _tell([*frames.notes[told:], *_doubts(history, files)])
@@ -106,8 +106,8 @@ def _work(locator: Locator, leds_in_b: Array, frames: Frames, outputs: dict[str,
 
 
 def _row(located: Located) -> dict[str, str]:
-    shot, sighting = located.shot, located.sighting
-    took = sighting.took_s if sighting is not None else {}
+    shot, detection = located.shot, located.detection
+    took = detection.took_s if detection is not None else {}
     return row(shot.name, shot.t, located.pose, located.leds, took)
 
 

@@ -35,7 +35,7 @@ class GravityDoubt:
         """Take a frame."""
         up_in_c, up_in_b = located.prior.up_in_c, located.prior.up_in_b
         self._confirmed += located.pose is not None
-        denied = located.sighting.unbelieved if located.sighting is not None else None
+        denied = located.detection.unbelieved if located.detection is not None else None
         if denied is not None and up_in_c is not None and up_in_b is not None:
             self._pairs.append((up_in_c, denied.R_cb @ up_in_b))
 

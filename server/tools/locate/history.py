@@ -45,8 +45,8 @@ class History:
             self.reprojections_px.append(pose.reprojection_px)
         else:
             self.reasons.append(located.reason)
-        self.unreadable += located.sighting is None
-        took = located.sighting.took_s if located.sighting is not None else {}
+        self.unreadable += located.detection is None
+        took = located.detection.took_s if located.detection is not None else {}
         for stage, s in {"read": located.read_s, **took}.items():
             self.took_s.setdefault(stage, []).append(s)
         for sensor, omega in enumerate((located.prior.omega_cf_in_c, located.prior.omega_bf_in_b)):

@@ -35,13 +35,13 @@ def draw(luma: Image, located: Located, camera: Camera, leds_in_b: Array) -> Pic
 
 
 def _draw_spots(picture: Picture, located: Located) -> None:
-    sighting = located.sighting
-    if sighting is None:
+    detection = located.detection
+    if detection is None:
         return
-    match = sighting.match
+    match = detection.match
     names = dict(zip(match.spot.tolist(), match.led.tolist(), strict=True)) if match else {}
-    for index, (u, v) in enumerate(sighting.spots.pixels.tolist()):
-        radius = round(6.0 + 0.6 * float(sighting.spots.area[index]) ** 0.5)
+    for index, (u, v) in enumerate(detection.spots.pixels.tolist()):
+        radius = round(6.0 + 0.6 * float(detection.spots.area[index]) ** 0.5)
         colour = FOUND if index in names else OTHER
         cv2.circle(picture, (round(u), round(v)), radius, colour, 1, cv2.LINE_AA)
         if index in names:

@@ -35,12 +35,12 @@ def summary(history: History) -> str:
     return "\n".join(lines)
 
 
-def camera_lines(camera: Camera, looking: VisualFrontEnd) -> list[str]:
+def camera_lines(camera: Camera, front_end: VisualFrontEnd) -> list[str]:
     """What pictures and gyroscopes together say of the camera; nothing without enough motion."""
-    facts = looking.watch.facts
+    facts = front_end.monitor.facts
     if facts is None:
         return []
-    used = "" if looking.camera.readout_s == camera.readout_s else ", corrected while it ran"
+    used = "" if front_end.camera.readout_s == camera.readout_s else ", corrected while it ran"
     lines = [
         "",
         "the camera, as pictures and gyroscopes have it",
@@ -51,7 +51,7 @@ def camera_lines(camera: Camera, looking: VisualFrontEnd) -> list[str]:
         _line("  focal", _measured(100.0 * facts.focal, 100.0 * facts.focal_sigma, "%"))
         + " longer than in the file",
     ]
-    complaint = looking.watch.complaint
+    complaint = front_end.monitor.complaint
     return [*lines, f"  {complaint}"] if complaint else lines
 
 

@@ -37,7 +37,7 @@ class Located:
     """What came of one frame."""
 
     shot: MediaFrame
-    sighting: Detection | None
+    detection: Detection | None
     """None: it could not be read."""
     read_s: float
     """CPU time of getting the picture [s]."""
@@ -47,19 +47,19 @@ class Located:
     @property
     def pose(self) -> RelativePose | None:
         """If it was found."""
-        return self.sighting.pose if self.sighting is not None else None
+        return self.detection.pose if self.detection is not None else None
 
     @property
     def leds(self) -> int | None:
         """How many were named; None: nobody looked."""
-        if self.sighting is None:
+        if self.detection is None:
             return None
-        return len(self.sighting.match.led) if self.sighting.match is not None else 0
+        return len(self.detection.match.led) if self.detection.match is not None else 0
 
     @property
     def reason(self) -> str:
         """Why there is no pose; empty if there is."""
-        return self.sighting.reason if self.sighting is not None else self.shot.problem
+        return self.detection.reason if self.detection is not None else self.shot.problem
 
 
 class Locator:
@@ -68,8 +68,8 @@ class Locator:
     def __init__(self, camera: Camera, leds_in_b: Array, motion: ImuRecordings) -> None:
         """`leds_in_b` (n, 3) [m]."""
         self.camera = camera
-        self.looking = VisualFrontEnd(camera, leds_in_b, GatesConfig(), thread_cpu)
-        self.looking.doubts_gravity = True  # told in the end, if it was wrong
+        self.front_end = VisualFrontEnd(camera, leds_in_b, GatesConfig(), thread_cpu)
+        self.front_end.doubts_gravity = True  # told in the end, if it was wrong
         self._camera_samples = _Samples(motion.camera)
         self._body_samples = _Samples(motion.body)
 
@@ -88,18 +88,18 @@ class Locator:
     def _located(self, shot: MediaFrame, read_s: float) -> Located:
         self._feel(shot.t)
         if shot.luma is None:
-            return Located(shot, None, read_s, self.looking.prior(shot.t))
+            return Located(shot, None, read_s, self.front_end.prior(shot.t))
         self._check_size(shot.name, shot.luma.shape)
         frame = Frame(shot.t, shot.luma, shot.full_range)
-        sighting = self.looking.process(frame)
-        return Located(shot, sighting, read_s, sighting.prior)
+        detection = self.front_end.process(frame)
+        return Located(shot, detection, read_s, detection.prior)
 
     def _feel(self, t: float) -> None:
         """All that was felt up to a little after `t` [s]: the frames' clock may differ by that."""
         for row in self._camera_samples.until(t + AHEAD_S):
-            self.looking.add_imu(PhoneImu(float(row[0]), row[1:4], row[4:]))
+            self.front_end.add_imu(PhoneImu(float(row[0]), row[1:4], row[4:]))
         for row in self._body_samples.until(t + AHEAD_S):
-            self.looking.add_imu(BodyImu(float(row[0]), row[1:4], row[4:]))
+            self.front_end.add_imu(BodyImu(float(row[0]), row[1:4], row[4:]))
 
     def _check_size(self, name: str, shape: tuple[int, ...]) -> None:
         camera = self.camera

@@ -39,11 +39,11 @@ def complaints(faults, hand=MOVING, **options):
     """[(t, words)] while there was a complaint, and the watch."""
     said = []
 
-    def hear(watch):
+    def observe(watch):
         if watch.complaint and (not said or said[-1][1] != watch.complaint):
             said.append((watch.facts.t, watch.complaint))
 
-    return said, watched(world(hand), faults, hear=hear, **options)
+    return said, watched(world(hand), faults, observe=observe, **options)
 
 
 @pytest.mark.parametrize("hand", [MOVING, pytest.param(STEADY, marks=pytest.mark.slow)])
@@ -110,13 +110,13 @@ def test_pictures_without_motion_samples_teach_nothing():
 def test_a_gap_in_the_motion_samples_spoils_no_more_than_its_block():
     said, lost = [], (6.0, 6.5)
 
-    def hear(watch):
+    def observe(watch):
         said.append(watch.complaint)
 
     watched(
         world(),
         USUAL,
-        hear=hear,
+        observe=observe,
         spoil=lambda s: (
             None if isinstance(s, PhoneImu | BodyImu) and lost[0] < s.t < lost[1] else s
         ),
@@ -132,7 +132,7 @@ def test_ten_minutes_of_usual_use_raise_no_false_alarm(seed, hand):
     """A quarter of them each; tremor, rolling shutter, late stamps, a file that is a bit wrong."""
     said = []
     watch = watched(
-        world(hand, 150.0, seed), USUAL, seed, hear=lambda watch: said.append(watch.complaint)
+        world(hand, 150.0, seed), USUAL, seed, observe=lambda watch: said.append(watch.complaint)
     )
     assert not any(said)
     assert abs(watch.facts.readout_s / USUAL.readout - 1.0) < 0.15
@@ -151,7 +151,7 @@ def test_the_coarse_offset_of_the_stamps_bears_a_rolling_shutter_nobody_models(r
         looks(world(), Faults(readout=readout)), world().pictures.arrival, strict=True
     ):
         while samples and samples[0][0] <= arrival:
-            search.feel(samples.pop(0)[1])
+            search.add_imu(samples.pop(0)[1])
         C = np.diag([*[1e-8] * 3, *[1e-6] * 3])
         search.saw(RelativePose(look.t, look.p_bc_in_c, look.R_cb, C, 0.1, 5))
     assert search.offset is not None

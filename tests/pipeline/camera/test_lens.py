@@ -73,7 +73,7 @@ def test_in_a_picture_made_smaller_each_point_keeps_its_share_of_width_and_heigh
 
 def test_a_camera_of_another_picture_size_keeps_all_else_it_knows():
     turned = Extrinsics(R_ci=np.diag([1.0, -1.0, -1.0]), time_offset_s=0.012)
-    whole = replace(camera(), readout_s=-0.02, mounting=turned)
+    whole = replace(camera(), readout_s=-0.02, extrinsics=turned)
     small = whole.resized(640, 360)
     kept = {one.name for one in fields(Camera)} - {"width", "height", "K", "lens"}
     assert {name for name in kept if getattr(small, name) is not getattr(whole, name)} == set()

@@ -90,11 +90,11 @@ def test_vision_sees_through_the_shutter_if_it_knows_the_motion(knows):
         eye, known = Vision(ROLLING, LEDS_IN_B), truth.prior()
         prior = replace(known, omega_cf_in_c=OMEGA if knows else None)
         luma = render(ROLLING, pose, LEDS_IN_B, RenderOptions(), rng)
-        sighting = eye.step(Frame(0.0, luma), prior)
-        if sighting.pose is None:
+        detection = eye.step(Frame(0.0, luma), prior)
+        if detection.pose is None:
             assert not knows
             continue
-        errors.append(np.abs(error_of(sighting.pose, truth)))
+        errors.append(np.abs(error_of(detection.pose, truth)))
     assert (np.median(errors, axis=0).max() < 0.01) == knows
 
 

@@ -91,11 +91,11 @@ def test_turns_of_v_move_the_reference_and_turn_the_body(ames: Robot) -> None:
 def test_a_growing_pull_is_balanced_and_one_that_was_there_is_not(ames: Robot) -> None:
     ahead, pull = FeedForward(ames, FeedForwardConfig()), np.array([2.0, -1.0, 0.5])
     for _ in range(400):  # at rest: thrust and spring share the weight as they always did
-        ahead.feel(UP, EYE, np.array([0.3, 0.0, 0.2]), H)
+        ahead.observe(UP, EYE, np.array([0.3, 0.0, 0.2]), H)
     ahead.start()
     quiet = ahead.wrench(relative(UP), EYE, view(), ZERO, H)
     for _ in range(400):
-        ahead.feel(UP + pull / ames.mass, EYE, np.array([0.3, 0.0, 0.2]), H)
+        ahead.observe(UP + pull / ames.mass, EYE, np.array([0.3, 0.0, 0.2]), H)
     np.testing.assert_allclose(quiet, np.zeros(6), atol=1e-9)
     wrench = ahead.wrench(relative(UP), EYE, view(), ZERO, H)
     np.testing.assert_allclose(wrench[:3], -pull, atol=1e-3)
@@ -105,7 +105,7 @@ def test_its_own_thrust_is_no_pull(ames: Robot) -> None:
     ahead, thrust = FeedForward(ames, FeedForwardConfig()), np.array([1.0, 2.0, 3.0])
     for k in range(400):
         given = thrust * (1.0 - np.exp(-(k + 1) * H / FeedForwardConfig().thrust_lag_s))
-        ahead.feel(UP + given / ames.mass, EYE, thrust, H)
+        ahead.observe(UP + given / ames.mass, EYE, thrust, H)
     np.testing.assert_allclose(
         ahead.wrench(relative(UP), EYE, view(), ZERO, H), np.zeros(6), atol=1e-2
     )
@@ -115,10 +115,10 @@ def test_a_robot_that_takes_off_does_not_carry_its_weight_twice() -> None:
     robot = load_robot("quadrotor").robot
     ahead, weight = FeedForward(robot, FeedForwardConfig()), np.array([0, 0, robot.weight_to_carry])
     for _ in range(400):
-        ahead.feel(UP, EYE, ZERO, H)  # the floor carries it
+        ahead.observe(UP, EYE, ZERO, H)  # the floor carries it
     ahead.start()
     for _ in range(400):
-        ahead.feel(UP, EYE, weight, H)  # thrusters do
+        ahead.observe(UP, EYE, weight, H)  # thrusters do
     wrench = ahead.wrench(relative(UP), EYE, view(), ZERO, H)
     np.testing.assert_allclose(wrench, np.zeros(6), atol=0.02 * robot.weight_to_carry)
 
@@ -141,7 +141,7 @@ def fly(robot: Robot, stiffness: float, config: FeedForwardConfig | None) -> tup
         felt = (force - stiffness * x - 1.5 * v) / robot.mass + 0.1 * rng.normal()
         if k == 10:
             ahead.start()
-        ahead.feel(UP + felt * along, EYE, given * along, H)
+        ahead.observe(UP + felt * along, EYE, given * along, H)
         if config is not None:
             rounded = 0.1 * round(10.0 * (a_hand + 0.05))
             wrench = wrench + ahead.wrench(relative(UP + rounded * along), EYE, seen, ZERO, H)

@@ -18,11 +18,11 @@ SIGMA = np.sqrt(1.25e-8)
 FORETOLD_AT, FORETOLD_R = np.array([2.5, 0.1, -0.2]), exp(np.array([0.2, -0.1, 0.3]))
 
 
-def judged(doubt: AdaptiveNoise, error: np.ndarray, foretold: np.ndarray = P) -> float:
+def judged(doubt: AdaptiveNoise, error: np.ndarray, predicted: np.ndarray = P) -> float:
     """The stretch for a picture that is (δp, θ) off."""
     R = FORETOLD_R @ exp(error[3:])
     pose = RelativePose(0.0, FORETOLD_AT + error[:3], R, C, 0.02, 5)
-    return doubt.judge(FORETOLD_AT, FORETOLD_R, foretold, pose)
+    return doubt.judge(FORETOLD_AT, FORETOLD_R, predicted, pose)
 
 
 def scattered(doubt: AdaptiveNoise, times: float, count: int, seed: int = 0) -> np.ndarray:
@@ -48,9 +48,9 @@ def test_samples_that_foretell_worse_are_doubted_and_believed_again():
 
 def test_a_picture_far_off_stretches_what_was_foretold_until_it_fits():
     error = 30.0 * SIGMA * np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-    stretch = judged(AdaptiveNoise(), error)
+    inflation = judged(AdaptiveNoise(), error)
     for times, fits in ((1.0, True), (0.5, False)):
-        S = times * stretch * P + C
+        S = times * inflation * P + C
         assert (error @ np.linalg.solve(S, error) / 6.0 <= 1.0) == fits
 
 
@@ -72,7 +72,7 @@ def test_pictures_that_scatter_of_themselves_are_no_reason_to_doubt_the_sensors(
     doubt = AdaptiveNoise()
     rng = np.random.default_rng(0)
     for _ in range(100):
-        judged(doubt, 2.0 * 0.5e-4 * rng.normal(size=6), foretold=1e-4 * P)
+        judged(doubt, 2.0 * 0.5e-4 * rng.normal(size=6), predicted=1e-4 * P)
     assert doubt.factor < 1.1
 
 

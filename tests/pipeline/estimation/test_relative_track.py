@@ -30,11 +30,11 @@ def begun(samples, config=OPEN):
     """A track that begins at the first picture after `START_S`; its time offset is known."""
     track = RelativeTrack(config, LEDS_IN_B)
     pose = next(s for s in samples if isinstance(s, VisionMeasurement) and s.t > START_S).pose
-    anchor = Checkpoint.empty()
-    anchor.t, anchor.x[:3], anchor.R[:] = pose.t, pose.p_bc_in_c, pose.R_cb
-    anchor.P[:6, :6], anchor.P[6:9, 6:9] = 4.0 * pose.covariance, 0.25 * np.eye(3)
-    anchor.P[BIASES:OFFSET, BIASES:OFFSET] = np.diag(np.repeat((0.03, 0.3, 0.005, 0.1), 3) ** 2)
-    track.begin(anchor)
+    checkpoint = Checkpoint.empty()
+    checkpoint.t, checkpoint.x[:3], checkpoint.R[:] = pose.t, pose.p_bc_in_c, pose.R_cb
+    checkpoint.P[:6, :6], checkpoint.P[6:9, 6:9] = 4.0 * pose.covariance, 0.25 * np.eye(3)
+    checkpoint.P[BIASES:OFFSET, BIASES:OFFSET] = np.diag(np.repeat((0.03, 0.3, 0.005, 0.1), 3) ** 2)
+    track.begin(checkpoint)
     return track
 
 
@@ -48,7 +48,7 @@ def take(track, s):
     """As the filter does: nothing from before the base."""
     if not isinstance(s, VisionMeasurement):
         return insert(track, s)
-    return track.fuse(track.foretold(s.t), s) if s.t > track.anchors[0].t else None
+    return track.fuse(track.predicted(s.t), s) if s.t > track.checkpoints[0].t else None
 
 
 def run(samples, until=END_S + 0.02, ask=(), settle=None):
@@ -67,7 +67,7 @@ def assert_same(a, b, tolerance=1e-9):
     for x, y in ((a.now, b.now), (a.newest, b.newest)):
         for name in ("t", "x", "R", "P", "R_ic"):
             assert np.abs(getattr(x, name) - getattr(y, name)).max() < tolerance, name
-    assert len(a.anchors) == len(b.anchors)
+    assert len(a.checkpoints) == len(b.checkpoints)
 
 
 def shuffled(samples, spread, seed):
@@ -135,11 +135,11 @@ def test_decisions_on_outliers_are_kept_when_pictures_are_made_anew(samples):
     track = begun(samples, RelativeConfig())
     for s in rest:
         take(track, deceived(s) if isinstance(s, VisionMeasurement) and s.t > 0.5 else s)
-    before = [a.use.tolist() for a in track.anchors[1:]]
+    before = [a.use.tolist() for a in track.checkpoints[1:]]
     assert any(0 in use for use in before)
     assert take(track, missing)
     track.to_now(END_S + 0.02)
-    assert [a.use.tolist() for a in track.anchors[1:]] == before
+    assert [a.use.tolist() for a in track.checkpoints[1:]] == before
 
 
 def test_the_base_follows_and_nothing_is_lost(samples):
@@ -151,9 +151,9 @@ def test_the_base_follows_and_nothing_is_lost(samples):
     assert track.to_now(END_S + 0.02)
     for name in ("x", "R", "P"):
         assert np.abs(getattr(track.now, name) - getattr(never.now, name)).max() < 1e-9
-    assert len(track.anchors) < 9 < len(never.anchors)
+    assert len(track.checkpoints) < 9 < len(never.checkpoints)
     assert len(track.body) < 0.27 / 0.005 + KEPT + 2
-    assert track.anchors[0].t <= END_S - 0.2
+    assert track.checkpoints[0].t <= END_S - 0.2
 
 
 def test_without_pictures_the_base_and_the_frontier_keep_up(samples):
@@ -162,15 +162,15 @@ def test_without_pictures_the_base_and_the_frontier_keep_up(samples):
     for now in np.arange(1.0, 4.0, 0.005):
         track.settle(now - 0.5)
         assert track.to_now(now)
-        assert track.anchors[0].t >= now - 0.5 - 1 / 30
-        assert track._frontier.t >= track.anchors[0].t
-    assert track.anchors[0].seen is None
+        assert track.checkpoints[0].t >= now - 0.5 - 1 / 30
+        assert track._frontier.t >= track.checkpoints[0].t
+    assert track.checkpoints[0].seen is None
     assert len(track.body) == KEPT
 
 
 def test_what_to_expect_of_a_picture_changes_nothing(samples):
     track, untouched = run(samples), run(samples)
-    expected = track.foretold(END_S)
+    expected = track.predicted(END_S)
     track.to_now(END_S)
     assert np.abs(expected.x - track.now.x).max() < 1e-9
     assert np.abs(expected.P - track.now.P).max() < 1e-9

@@ -28,8 +28,8 @@ def turning(truth, k, rate=0.03):
 def test_a_sure_explanation_is_told_at_once():
     rng = np.random.default_rng(80)
     truth = truth_at(rng)
-    naming = starting().step(0.0, seen(truth, rng, lamps=5), hints_of(truth), None)
-    assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+    association = starting().step(0.0, seen(truth, rng, lamps=5), hints_of(truth), None)
+    assert not is_wrong(pose_of(association.fit, 0.0), truth)
 
 
 def test_four_leds_without_gravity_wait_until_the_robot_has_turned():
@@ -39,9 +39,9 @@ def test_four_leds_without_gravity_wait_until_the_robot_has_turned():
         start, eye, found = truth_at(rng), starting(), None
         for k in range(12):
             truth, _ = turning(start, k)
-            naming = eye.step(k * DT, seen(truth, rng, range(4), lamps=0), SearchHints(), None)
-            if naming is not None:
-                assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+            association = eye.step(k * DT, seen(truth, rng, range(4), lamps=0), SearchHints(), None)
+            if association is not None:
+                assert not is_wrong(pose_of(association.fit, 0.0), truth)
                 found = k if found is None else found
         assert found is not None
         late += found >= CONFIRMED - 1
@@ -90,9 +90,9 @@ def test_of_two_branches_none_is_told_while_both_fit():
     for _ in range(10):
         truth, spots = flat_view(0.25, 9.0, rng)
         eye = starting(FLAT)
-        naming = eye.step(0.0, spots, upright(truth), None)
-        told += naming is not None
-        assert naming is not None or eye.ambiguous
+        association = eye.step(0.0, spots, upright(truth), None)
+        told += association is not None
+        assert association is not None or eye.ambiguous
     assert told == 0
 
 
@@ -104,9 +104,9 @@ def test_the_gyroscopes_refute_the_wrong_branch():
         for k in range(12):
             truth, spots = flat_view(0.2 + 0.04 * k, 9.0, rng)
             turn = np.stack((np.zeros(3), 0.04 * up))
-            naming = eye.step(k * DT, spots, upright(truth), turn)
-            if naming is not None:
-                assert np.linalg.norm(log(naming.fit.R_cb.T @ truth.R)) < np.deg2rad(10.0)
+            association = eye.step(k * DT, spots, upright(truth), turn)
+            if association is not None:
+                assert np.linalg.norm(log(association.fit.R_cb.T @ truth.R)) < np.deg2rad(10.0)
                 decided += 1
                 break
     assert decided >= 6
@@ -138,14 +138,14 @@ def test_of_thirty_two_leds_the_near_half_is_enough_without_gravity():
         leds_in_b, truth = ball_of(32, rng), truth_at(rng)
         leds_in_c = truth.p + leds_in_b @ truth.R.T
         near = np.flatnonzero(leds_in_c[:, 0] <= np.median(leds_in_c[:, 0]))
-        shown, eye, naming, k = CAMERA.pixels(leds_in_c), starting(leds_in_b), None, 0
-        while naming is None and k < 60:
+        shown, eye, association, k = CAMERA.pixels(leds_in_c), starting(leds_in_b), None, 0
+        while association is None and k < 60:
             pixels = np.vstack((shown[near], lamps_beside(shown, 3, rng)))
             pixels += rng.normal(0.0, NOISE_PX, pixels.shape)
             spots = spots_of(pixels, brightness=rng.uniform(1.0, 2.0, len(pixels)))
-            naming, k = eye.step(k * DT, spots, SearchHints(), None), k + 1
-        assert not is_wrong(pose_of(naming.fit, 0.0), truth)
-        assert set(naming.match.led) == set(near)
+            association, k = eye.step(k * DT, spots, SearchHints(), None), k + 1
+        assert not is_wrong(pose_of(association.fit, 0.0), truth)
+        assert set(association.match.led) == set(near)
 
 
 def test_all_of_thirty_two_leds_are_named():
@@ -154,6 +154,6 @@ def test_all_of_thirty_two_leds_are_named():
     pixels = CAMERA.pixels(truth.p + leds_in_b @ truth.R.T)
     apart = np.linalg.norm(pixels[:, None] - pixels, axis=2) + np.eye(32) * 99.0
     assert apart.min() > 1.0
-    naming = starting(leds_in_b).step(0.0, spots_of(pixels), hints_of(truth), None)
-    assert len(naming.match.led) == 32
-    assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+    association = starting(leds_in_b).step(0.0, spots_of(pixels), hints_of(truth), None)
+    assert len(association.match.led) == 32
+    assert not is_wrong(pose_of(association.fit, 0.0), truth)

@@ -153,10 +153,10 @@ def test_an_led_expected_outside_the_picture_is_not_looked_for():
 def looked(eye, frame, truth, expected, sensors=True):
     """As the server does it: what is found is believed."""
     known = truth.prior() if sensors else FramePrior()
-    sighting = eye.step(frame, replace(known, expected=expected))
-    if sighting.pose is not None:
-        eye.keep(sighting.pose)
-    return sighting
+    detection = eye.step(frame, replace(known, expected=expected))
+    if detection.pose is not None:
+        eye.keep(detection.pose)
+    return detection
 
 
 @pytest.mark.parametrize("covered", [(0, 1, 2, 3), (1, 2, 4), (0, 3, 4)])
@@ -168,15 +168,15 @@ def test_vision_hands_on_the_rays_of_a_few(covered):
     for k in range(1, 31):
         truth = moved(truth, rng)
         expected = expected_of(truth, 0.01, rng=rng, t=k * DT)
-        sighting = looked(eye, frame_at(k * DT, truth, rng, covered=covered), truth, expected)
-        assert sighting.pose is None
-        true = rays_at(k * DT, truth.p, truth.R, sighting.rays.led)
-        assert set(sighting.rays.led.tolist()) <= set(seen)
-        np.testing.assert_allclose(sighting.rays.tangents, true.tangents, atol=3e-4)
-        named_leds += len(sighting.rays)
+        detection = looked(eye, frame_at(k * DT, truth, rng, covered=covered), truth, expected)
+        assert detection.pose is None
+        true = rays_at(k * DT, truth.p, truth.R, detection.rays.led)
+        assert set(detection.rays.led.tolist()) <= set(seen)
+        np.testing.assert_allclose(detection.rays.tangents, true.tangents, atol=3e-4)
+        named_leds += len(detection.rays)
     assert named_leds >= 0.95 * 30 * len(seen)
-    assert sighting.reason == f"{len(seen)} of {len(LEDS_IN_B)} LEDs seen."
-    told = sighting.seen(CAMERA)
+    assert detection.reason == f"{len(seen)} of {len(LEDS_IN_B)} LEDs seen."
+    told = detection.seen(CAMERA)
     assert told is not None
     assert told.half_field == CAMERA.half_field
 
@@ -188,9 +188,9 @@ def test_three_are_a_pose_for_a_while_after_four_were():
     poses = []
     for k in range(1, 31):
         truth = moved(truth, rng)
-        sighting = looked(eye, frame_at(k * DT, truth, rng, covered=(0, 4)), truth, None)
-        assert sighting.pose is None or not is_wrong(sighting.pose, truth)
-        poses.append(sighting.pose is not None)
+        detection = looked(eye, frame_at(k * DT, truth, rng, covered=(0, 4)), truth, None)
+        assert detection.pose is None or not is_wrong(detection.pose, truth)
+        poses.append(detection.pose is not None)
     assert all(poses[:3])
     assert not any(poses[-3:])
 
@@ -199,17 +199,17 @@ def test_without_an_expectation_a_few_are_nothing():
     rng = np.random.default_rng(121)
     eye, truth = Vision(CAMERA, LEDS_IN_B), truth_at(rng)
     looked(eye, frame_at(0.0, truth, rng), truth, None)
-    sighting = looked(eye, frame_at(DT, truth, rng, covered=(0, 1, 3)), truth, None)
-    assert sighting.reason == "2 of 5 LEDs seen: 4 are needed."
-    assert sighting.seen(CAMERA) is None
+    detection = looked(eye, frame_at(DT, truth, rng, covered=(0, 1, 3)), truth, None)
+    assert detection.reason == "2 of 5 LEDs seen: 4 are needed."
+    assert detection.seen(CAMERA) is None
 
 
 def test_who_comes_back_where_he_is_expected_is_seen_at_once_even_without_gravity():
     rng = np.random.default_rng(122)
     eye, truth = Vision(CAMERA, LEDS_IN_B), truth_at(rng)
     expected = expected_of(truth, 0.02, rng=rng)
-    sighting = looked(eye, frame_at(5.0, truth, rng, covered=(2,)), truth, expected, sensors=False)
-    assert not is_wrong(sighting.pose, truth)
+    detection = looked(eye, frame_at(5.0, truth, rng, covered=(2,)), truth, expected, sensors=False)
+    assert not is_wrong(detection.pose, truth)
 
 
 def elsewhere(truth, expected_t=0.0):
@@ -221,8 +221,8 @@ def test_a_wrong_filter_is_contradicted_by_the_picture():
     rng = np.random.default_rng(123)
     eye, truth = Vision(CAMERA, LEDS_IN_B), truth_at(rng)
     for k in range(10):
-        sighting = looked(eye, frame_at(k * DT, truth, rng), truth, elsewhere(truth, k * DT))
-        assert not is_wrong(sighting.pose, truth)
+        detection = looked(eye, frame_at(k * DT, truth, rng), truth, elsewhere(truth, k * DT))
+        assert not is_wrong(detection.pose, truth)
 
 
 def with_lamp(frame, place):
@@ -244,10 +244,10 @@ def test_a_wrong_filter_does_not_confirm_itself_by_a_lamp_for_ever():
         frame = with_lamp(frame_at(k * DT, truth, rng, covered=covered), lamp)
         found.append(looked(eye, frame, truth, replace(lie, t=k * DT)))
     assert len(found[1].rays) == 1  # deceived
-    first = next(k for k, sighting in enumerate(found) if sighting.pose is not None)
+    first = next(k for k, detection in enumerate(found) if detection.pose is not None)
     assert first == 3
-    for sighting in found[first:]:
-        assert not is_wrong(sighting.pose, truth)
+    for detection in found[first:]:
+        assert not is_wrong(detection.pose, truth)
 
 
 def test_a_contradicted_filter_names_nothing_until_it_has_come_round():
@@ -271,7 +271,7 @@ def test_a_picture_full_of_lamps_costs_no_names():
         truth = moved(truth, rng)
         luma = picture(truth, rng, RenderOptions(distractors=10), covered=(0, 3, 4))
         expected = expected_of(truth, 0.005, rng=rng, t=k * DT)
-        sighting = looked(eye, Frame(k * DT, luma), truth, expected)
-        assert set(sighting.rays.led.tolist()) <= {1, 2}
-        right += len(sighting.rays)
+        detection = looked(eye, Frame(k * DT, luma), truth, expected)
+        assert set(detection.rays.led.tolist()) <= {1, 2}
+        right += len(detection.rays)
     assert right >= 6

@@ -33,10 +33,10 @@ def named(truth, spots, foreseen, follower=None):
     return follower.name(spots, (foreseen.p, foreseen.R), None)
 
 
-def names_truly(naming, truth, spots):
-    at = truth.pixels()[naming.match.led]
-    near = np.linalg.norm(spots.pixels[naming.match.spot] - at, axis=1).max() < 1.0
-    return near and not is_wrong(pose_of(naming.fit, 0.0), truth)
+def names_truly(association, truth, spots):
+    at = truth.pixels()[association.match.led]
+    near = np.linalg.norm(spots.pixels[association.match.spot] - at, axis=1).max() < 1.0
+    return near and not is_wrong(pose_of(association.fit, 0.0), truth)
 
 
 def test_what_moved_together_is_named():
@@ -45,9 +45,9 @@ def test_what_moved_together_is_named():
         before = truth_at(rng)
         now = moved(before, rng, dp=0.02)
         spots = seen(now, rng, lamps=4)
-        naming = named(now, spots, before)
-        assert names_truly(naming, now, spots)
-        assert len(naming.match.led) == 5
+        association = named(now, spots, before)
+        assert names_truly(association, now, spots)
+        assert len(association.match.led) == 5
 
 
 @pytest.mark.parametrize("covered", range(5))
@@ -57,9 +57,9 @@ def test_a_covered_led_is_preferred_to_a_lamp_beside_it(covered):
     now = moved(before, rng)
     pixels = now.pixels()
     pixels[covered] += (9.0, -7.0)
-    naming = named(now, spots_of(pixels), before)
-    assert covered not in naming.match.led
-    assert not is_wrong(pose_of(naming.fit, 0.0), now)
+    association = named(now, spots_of(pixels), before)
+    assert covered not in association.match.led
+    assert not is_wrong(pose_of(association.fit, 0.0), now)
 
 
 def test_three_leds_do_for_a_while_two_never():
@@ -69,8 +69,8 @@ def test_three_leds_do_for_a_while_two_never():
     three, two = seen(truth, rng, leds=(0, 1, 3)), seen(truth, rng, leds=(0, 3))
     assert named(truth, two, truth, follower) is None
     for _ in range(THREE_IN_A_ROW):
-        naming = named(truth, three, truth, follower)
-        assert not is_wrong(pose_of(naming.fit, 0.0), truth)
+        association = named(truth, three, truth, follower)
+        assert not is_wrong(pose_of(association.fit, 0.0), truth)
     assert named(truth, three, truth, follower) is None
 
 
@@ -86,7 +86,7 @@ def test_nothing_seen_is_nothing_named():
     truth = truth_at(np.random.default_rng(43))
     assert named(truth, spots_of(np.zeros((0, 2))), truth) is None
     dark = Frame(0.0, np.zeros((CAMERA.height, CAMERA.width), np.uint8))
-    assert LedTracker(CAMERA, LEDS_IN_B).look(dark, (truth.p, truth.R), None).naming is None
+    assert LedTracker(CAMERA, LEDS_IN_B).look(dark, (truth.p, truth.R), None).association is None
 
 
 def test_who_jumps_is_another():
@@ -105,7 +105,7 @@ def test_a_picture_gives_a_pose_to_a_tenth_of_a_millimetre():
         truth = moved(truth, rng)
         frame = frame_at(0.03 * k, truth, rng)
         followed = follower.look(frame, (foreseen.p, foreseen.R), STILL)
-        errors.append(np.abs(error_of(pose_of(followed.naming.fit, 0.0), truth)))
+        errors.append(np.abs(error_of(pose_of(followed.association.fit, 0.0), truth)))
     assert (np.median(errors, axis=0) < [5e-4, 1e-4, 1e-4, 5e-4, 5e-4, 5e-4]).all()
     assert len(measure.signatures) == 1
 
@@ -127,8 +127,8 @@ def test_a_turn_that_changes_is_taken_out_of_a_rolling_shutter():
         R, p = pose(0.0)
         motion = FrameMotion(omega + alpha * t, np.zeros(3), 2.5)
         luma = render(rolling, pose, LEDS_IN_B, RenderOptions(exposure_s=0.001), rng)
-        naming = follower.look(Frame(t, luma), (p, R), motion).naming
-        errors.append(np.linalg.norm(pose_of(naming.fit, 0.0).p_bc_in_c - p))
+        association = follower.look(Frame(t, luma), (p, R), motion).association
+        errors.append(np.linalg.norm(pose_of(association.fit, 0.0).p_bc_in_c - p))
     assert errors[-1] < 0.5 * errors[0]
 
 
@@ -147,17 +147,17 @@ def test_an_exposure_is_learnt_from_how_far_moving_spots_are_smeared():
         follower.look(
             Frame(0.03 * k, luma), (truth.p, truth.R), FrameMotion(omega, np.zeros(3), 2.5)
         )
-    assert follower.smear.exposure_s == pytest.approx(look.exposure_s, rel=0.15)
+    assert follower.motion_blur.exposure_s == pytest.approx(look.exposure_s, rel=0.15)
     assert MotionBlur().exposure_s == 0.0
 
 
 def test_doubt_follows_the_residuals_and_forgets_one_outlier():
     rng = np.random.default_rng(48)
-    doubt = NoiseScale()
-    assert doubt.factor == 1.0
+    noise_scale = NoiseScale()
+    assert noise_scale.factor == 1.0
     for chi2 in rng.chisquare(4, 300):
-        doubt.learn(6.0 * chi2, 4)
-    settled = doubt.factor
+        noise_scale.learn(6.0 * chi2, 4)
+    settled = noise_scale.factor
     assert settled == pytest.approx(6.0, rel=0.3)
-    doubt.learn(1e9, 4)
-    assert doubt.factor < 1.6 * settled
+    noise_scale.learn(1e9, 4)
+    assert noise_scale.factor < 1.6 * settled

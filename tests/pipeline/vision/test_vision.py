@@ -36,10 +36,10 @@ def follow(eye, truths, rng, start=0, covered=(), prior=None):
     sightings = []
     for k, truth in enumerate(truths):
         frame = frame_at((start + k) * DT, truth, rng, covered=covered)
-        sighting = eye.step(frame, truth.prior() if prior is None else prior)
-        if sighting.pose is not None:
-            eye.keep(sighting.pose)
-        sightings.append(sighting)
+        detection = eye.step(frame, truth.prior() if prior is None else prior)
+        if detection.pose is not None:
+            eye.keep(detection.pose)
+        sightings.append(detection)
     return sightings
 
 
@@ -53,18 +53,18 @@ def walk(rng, n, **motion):
 def test_the_first_picture_gives_the_pose():
     rng = np.random.default_rng(50)
     truth = truth_at(rng)
-    (sighting,) = follow(vision(), [truth], rng)
-    error = np.abs(error_of(sighting.pose, truth))
+    (detection,) = follow(vision(), [truth], rng)
+    error = np.abs(error_of(detection.pose, truth))
     assert (error < [0.002, 0.0005, 0.0005, 0.003, 0.003, 0.003]).all()
-    assert sighting.reason == ""
-    assert sighting.pose.leds == 5
+    assert detection.reason == ""
+    assert detection.pose.leds == 5
 
 
 def test_tracking_follows_motion():
     rng = np.random.default_rng(51)
     truths = walk(rng, 15, dp=0.015, turn=0.01)
-    for sighting, truth in zip(follow(vision(), truths, rng), truths, strict=True):
-        assert not is_wrong(sighting.pose, truth)
+    for detection, truth in zip(follow(vision(), truths, rng), truths, strict=True):
+        assert not is_wrong(detection.pose, truth)
 
 
 def test_tracking_survives_a_covered_led():
@@ -72,13 +72,13 @@ def test_tracking_survives_a_covered_led():
     truths = walk(rng, 6)
     eye = vision()
     follow(eye, truths[:2], rng)
-    for sighting, truth in zip(
+    for detection, truth in zip(
         follow(eye, truths[2:], rng, start=2, covered=(1,), prior=FramePrior()),
         truths[2:],
         strict=True,
     ):
-        assert not is_wrong(sighting.pose, truth)
-        assert sighting.pose.leds == 4
+        assert not is_wrong(detection.pose, truth)
+        assert detection.pose.leds == 4
 
 
 @pytest.mark.parametrize(("misses", "found"), [(FORGET_MISSES - 1, True), (15, False)])
@@ -90,8 +90,8 @@ def test_a_few_misses_and_it_is_forgotten(misses, found):
     follow(eye, [truth], rng)
     for k in range(misses):
         assert eye.step(Frame((1 + k) * DT, DARK), FramePrior()).pose is None
-    (sighting,) = follow(eye, [truth], rng, start=1 + misses, covered=(2,), prior=FramePrior())
-    assert (sighting.pose is not None) == found
+    (detection,) = follow(eye, [truth], rng, start=1 + misses, covered=(2,), prior=FramePrior())
+    assert (detection.pose is not None) == found
 
 
 def test_who_comes_back_is_known_by_the_attitude_that_the_gyroscopes_kept():
@@ -104,8 +104,8 @@ def test_who_comes_back_is_known_by_the_attitude_that_the_gyroscopes_kept():
     for k in range(30):
         assert eye.step(Frame((1 + k) * DT, DARK), sensors).pose is None
     back = replace(truth, p=truth.p + np.array([0.1, 0.3, -0.1]))
-    (sighting,) = follow(eye, [back], rng, start=31, covered=(2,), prior=sensors)
-    assert not is_wrong(sighting.pose, back)
+    (detection,) = follow(eye, [back], rng, start=31, covered=(2,), prior=sensors)
+    assert not is_wrong(detection.pose, back)
 
 
 def test_forgetting_is_immediate():
@@ -114,8 +114,8 @@ def test_forgetting_is_immediate():
     eye = vision()
     follow(eye, [truth], rng)
     eye.forget()
-    (sighting,) = follow(eye, [truth], rng, start=1, covered=(2,), prior=FramePrior())
-    assert sighting.pose is None
+    (detection,) = follow(eye, [truth], rng, start=1, covered=(2,), prior=FramePrior())
+    assert detection.pose is None
 
 
 @pytest.mark.parametrize("t", [-1.0, 0.0, 100.0])
@@ -124,16 +124,16 @@ def test_a_picture_from_another_time_is_searched_from_nothing(t):
     eye = vision()
     follow(eye, [truth_at(rng)], rng)
     elsewhere = truth_at(rng, 3.5)
-    sighting = eye.step(frame_at(t, elsewhere, rng), elsewhere.prior())
-    assert not is_wrong(sighting.pose, elsewhere)
+    detection = eye.step(frame_at(t, elsewhere, rng), elsewhere.prior())
+    assert not is_wrong(detection.pose, elsewhere)
 
 
 def test_who_jumps_is_found_again_in_the_same_picture():
     rng = np.random.default_rng(56)
     eye, here, there = vision(), truth_at(rng), truth_at(rng, 3.0)
     follow(eye, [here], rng)
-    (sighting,) = follow(eye, [there], rng, start=1)
-    assert not is_wrong(sighting.pose, there)
+    (detection,) = follow(eye, [there], rng, start=1)
+    assert not is_wrong(detection.pose, there)
 
 
 def test_an_led_outside_the_picture_does_no_harm():
@@ -141,9 +141,9 @@ def test_an_led_outside_the_picture_does_no_harm():
     truth = truth_at(rng)
     while CAMERA.sees(truth.pixels()).sum() > 4:
         truth = replace(truth, p=truth.p + np.array([0.0, 0.01, 0.0]))
-    for sighting in follow(vision(), [truth] * 4, rng):
-        assert not is_wrong(sighting.pose, truth)
-        assert sighting.pose.leds == 4
+    for detection in follow(vision(), [truth] * 4, rng):
+        assert not is_wrong(detection.pose, truth)
+        assert detection.pose.leds == 4
 
 
 REASONS = {
@@ -156,10 +156,10 @@ REASONS = {
 @pytest.mark.parametrize(("covered", "reason"), REASONS.items())
 def test_too_few_leds_are_counted_in_the_reason(covered, reason):
     rng = np.random.default_rng(58)
-    (sighting,) = follow(vision(), [truth_at(rng)], rng, covered=covered)
-    assert sighting.pose is None
-    assert sighting.match is None
-    assert sighting.reason == reason
+    (detection,) = follow(vision(), [truth_at(rng)], rng, covered=covered)
+    assert detection.pose is None
+    assert detection.match is None
+    assert detection.reason == reason
 
 
 def test_lights_that_are_no_robot_are_called_so():
@@ -167,9 +167,9 @@ def test_lights_that_are_no_robot_are_called_so():
     truth = truth_at(rng)
     frame = frame_at(0.0, truth, rng)
     mirrored = Frame(0.0, frame.luma[:, ::-1])
-    sighting = vision().step(mirrored, FramePrior())
-    assert sighting.pose is None
-    assert sighting.reason == "5 lights seen, but they do not look like the robot."
+    detection = vision().step(mirrored, FramePrior())
+    assert detection.pose is None
+    assert detection.reason == "5 lights seen, but they do not look like the robot."
 
 
 def turned(truth, quarter_turns):
@@ -219,9 +219,9 @@ def test_the_claimed_covariance_is_honest_on_video():
     eye, scores = vision(), []
     for k, truth in enumerate(walk(rng, 40)):
         data, _ = encoder.encode(frame_at(0.0, truth, rng).luma)
-        sighting = eye.step(Frame(k * DT, decoder.decode(data), False), truth.prior())
-        eye.keep(sighting.pose)
-        scores.append(nees(sighting.pose, truth))
+        detection = eye.step(Frame(k * DT, decoder.decode(data), False), truth.prior())
+        eye.keep(detection.pose)
+        scores.append(nees(detection.pose, truth))
     assert 0.2 < np.median(scores) < 2.0
 
 
@@ -229,8 +229,8 @@ def test_the_stages_are_timed_by_the_clock_that_is_given():
     rng = np.random.default_rng(64)
     ticks = iter(range(100))
     truth = truth_at(rng)
-    sighting = vision().step(frame_at(0.0, truth, rng), truth.prior(), lambda: next(ticks))
-    assert sighting.took_s == {"detect": 1, "identify": 1, "pose": 1}
+    detection = vision().step(frame_at(0.0, truth, rng), truth.prior(), lambda: next(ticks))
+    assert detection.took_s == {"detect": 1, "identify": 1, "pose": 1}
 
 
 def compiled():
@@ -255,17 +255,19 @@ def test_after_warming_up_nothing_is_left_to_compile():
             for k in range(3):
                 frame = frame_at(k * DT, truth, rng, RenderOptions(distractors=4), covered)
                 frame.luma.setflags(write=False)
-                sighting = eye.step(frame, truth.prior() if prior is None else prior)
-                if sighting.pose is not None:
-                    eye.keep(sighting.pose)
-    assert sighting.pose is not None
+                detection = eye.step(frame, truth.prior() if prior is None else prior)
+                if detection.pose is not None:
+                    eye.keep(detection.pose)
+    assert detection.pose is not None
     assert compiled() == before
 
 
 def test_lamps_by_the_dozen_are_said_to_be_more_than_could_be_tried():
     rng = np.random.default_rng(67)
     truth = truth_at(rng)
-    sighting = vision().step(frame_at(0.0, truth, rng, RenderOptions(distractors=60)), FramePrior())
-    assert sighting.pose is None or not is_wrong(sighting.pose, truth)
-    assert sighting.bounded
+    detection = vision().step(
+        frame_at(0.0, truth, rng, RenderOptions(distractors=60)), FramePrior()
+    )
+    assert detection.pose is None or not is_wrong(detection.pose, truth)
+    assert detection.bounded
     assert not vision().step(frame_at(0.0, truth, rng), FramePrior()).bounded

@@ -61,8 +61,8 @@ def test_the_file_is_a_camera_file(found, tmp_path):
     assert camera.K[0, 0] == pytest.approx(found.shared[0])
     assert camera.distortion == pytest.approx(found.shared[4:-1])
     assert camera.readout_s == pytest.approx(found.shared[-1], abs=1e-6)
-    assert camera.mounting.R_ci == pytest.approx(found.imu.R_ci, abs=1e-6)
-    assert camera.mounting.time_offset_s == pytest.approx(found.imu.time_offset_s, abs=1e-6)
+    assert camera.extrinsics.R_ci == pytest.approx(found.imu.R_ci, abs=1e-6)
+    assert camera.extrinsics.time_offset_s == pytest.approx(found.imu.time_offset_s, abs=1e-6)
     assert find_camera_file(name, 1280, 720, [tmp_path], 90)[0] == path
     assert [one.name for one in tmp_path.iterdir()] == [path.name]
 

@@ -18,19 +18,19 @@ FACTS = CameraFacts(
 )
 
 
-def looking():
+def front_end():
     return VisualFrontEnd(CAMERA, LEDS_IN_B, GatesConfig())
 
 
 def test_before_the_phone_moved_only_the_calibration_is_known():
-    told = health(looking())
+    told = health(front_end())
     assert told == CameraHealth("", "", "", None, 1e3 * CAMERA.readout_s, readout_learnt=False)
     assert msgspec.json.decode(msgspec.json.encode(told))["larger_percent"] is None
 
 
 def test_what_was_learnt_is_told_in_the_units_of_screens():
-    eye = looking()
-    eye.watch.facts, eye.watch.complaint = FACTS, "Another lens."
+    eye = front_end()
+    eye.monitor.facts, eye.monitor.complaint = FACTS, "Another lens."
     eye.exposure.hint = ExposureHint.TOO_BRIGHT
     assert eye.readout.learn(FACTS)
     told = health(eye)
@@ -43,9 +43,9 @@ def test_what_was_learnt_is_told_in_the_units_of_screens():
 
 
 def test_pictures_are_looked_at_as_of_when_they_were_taken():
-    eye = looking()
+    eye = front_end()
     assert eye.offset_s == 0.0
-    eye.watch.facts = replace(FACTS, offset_s=-0.02)
+    eye.monitor.facts = replace(FACTS, offset_s=-0.02)
     assert eye.offset_s == -0.02
 
 

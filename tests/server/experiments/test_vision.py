@@ -68,8 +68,8 @@ def test_wrong_is_beyond_two_centimetres_and_5_percent_or_10_degrees(shot):
 
 
 def test_errors_are_split_along_and_across_the_line_of_sight(film, shot):
-    sight = shot.p_bc_in_c / np.linalg.norm(shot.p_bc_in_c)
-    along = measured(pose_off(shot, 0.003 * sight), shot, film.camera, film.leds_in_b)
+    frame_pipeline = shot.p_bc_in_c / np.linalg.norm(shot.p_bc_in_c)
+    along = measured(pose_off(shot, 0.003 * frame_pipeline), shot, film.camera, film.leds_in_b)
     assert along.depth_m == pytest.approx(0.003)
     assert along.lateral_m == pytest.approx(0.0, abs=1e-9)
     assert along.nees == pytest.approx(9.0)

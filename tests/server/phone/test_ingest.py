@@ -85,7 +85,7 @@ def test_looking_along_the_back_of_the_phone_is_forward() -> None:
 
 def test_motion_comes_out_in_the_axes_of_a_camera_that_sits_askew() -> None:
     ingest, R_ci = synchronised(), exp(np.array([0.05, -0.04, 0.03]))
-    ingest.mounting = Extrinsics(R_ci)
+    ingest.extrinsics = Extrinsics(R_ci)
     motion = replace(FLAT, rotation_rate=(0.1, -0.2, 0.3))
     sample, plain = (
         one.record(Record(1, at(1.0), motion), 1.0) for one in (ingest, synchronised())

@@ -192,7 +192,7 @@ def test_the_profile_of_a_camera_turns_the_motion_as_long_as_it_films(tmp_path):
     assert isinstance(turned, PhoneImuInput)
     np.testing.assert_allclose(turned.a, R_ci @ plain.a)
     rig.phone.close()
-    assert (rig.phone.ingest.mounting.R_ci == np.eye(3)).all()
+    assert (rig.phone.ingest.extrinsics.R_ci == np.eye(3)).all()
 
 
 SHOT = EncodedFrame(49.9, 50.0, 1, JPEG)
@@ -230,7 +230,7 @@ def test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed():
         rig.say(JPEG)
         assert rig.phone.vision is not None
         assert not [why for why in rig.why() if "stabilisation" in why]
-        rig.phone.vision.looking.watch.complaint = camera_verdict.STABILISED
+        rig.phone.vision.front_end.monitor.complaint = camera_verdict.STABILISED
         assert rig.why()[-1] == camera_verdict.STABILISED
     finally:
         rig.phone.close()
@@ -244,9 +244,9 @@ def test_pictures_that_the_page_made_smaller_are_those_of_the_same_camera():
     try:
         rig.synchronise()
         rig.say(JPEG)
-        full = rig.phone.vision._sight.camera
+        full = rig.phone.vision._frame_pipeline.camera
         rig.say(SMALL, 2)
-        small = rig.phone.vision._sight.camera
+        small = rig.phone.vision._frame_pipeline.camera
         assert (small.width, small.height) == (960, 540)
         points = np.array([[1.0, 0.2, -0.1], [2.0, -0.5, 0.3]])
         np.testing.assert_allclose(

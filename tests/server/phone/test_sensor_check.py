@@ -95,10 +95,10 @@ class Rig:
         self.take(self.script.pong(ping.body.nonce, ping.t_us, self.t))
 
     def look(self, t):
-        before = self.phone.sighting
+        before = self.phone.detection
         self.take(self.script.picture(t, lambda _: (np.eye(3), np.zeros(3))))
         end = time.monotonic() + DEADLINE_S
-        while self.phone.vision is not None and self.phone.sighting is before:
+        while self.phone.vision is not None and self.phone.detection is before:
             assert time.monotonic() < end, "the picture was never looked at"
             time.sleep(0.001)
 

@@ -37,11 +37,11 @@ class Eyes:
         self.luma = np.zeros((48, 64), dtype=np.uint8)
         self.looks: list[tuple[list[int], bool]] = []
         self.may = threading.Semaphore(0)
-        self.looking = threading.Semaphore(0)
+        self.front_end = threading.Semaphore(0)
         self.fails = False
 
     def see(self, frames: list[EncodedFrame]) -> Detection | None:
-        self.looking.release()
+        self.front_end.release()
         assert self.may.acquire(timeout=5.0)
         if self.fails:
             raise ZeroDivisionError("no light")
@@ -69,7 +69,7 @@ class Rig:
         self.keys_wanted += 1
 
     def begin_look(self) -> None:
-        assert self.eyes.looking.acquire(timeout=5.0)
+        assert self.eyes.front_end.acquire(timeout=5.0)
 
 
 @pytest.fixture

@@ -35,9 +35,9 @@ class RtcHouse(House):
 
     def __init__(self, folder: Path, settings: RtcSettings | None = None) -> None:
         super().__init__(folder)
-        self.desk = SignallingEndpoint(self.hub, settings or RtcSettings(), 3_000_000)
-        pages = PageServer(self.hub, VideoSettings())
-        routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.desk.routes()]
+        self.signalling = SignallingEndpoint(self.manager, settings or RtcSettings(), 3_000_000)
+        pages = PageServer(self.manager, VideoSettings())
+        routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.signalling.routes()]
         self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
 
     @contextlib.asynccontextmanager
@@ -47,7 +47,7 @@ class RtcHouse(House):
             try:
                 yield
             finally:
-                await self.desk.close()
+                await self.signalling.close()
 
     @contextlib.asynccontextmanager
     async def phone(self, **options: Any) -> AsyncIterator[RtcPage]:

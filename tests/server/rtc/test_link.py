@@ -43,13 +43,13 @@ def in_house(folder, play, **options):
 
 def listen(house):
     """Note what reaches the phone at the server."""
-    take = house.hub.phone.take
+    take = house.manager.phone.take
 
     def noting(record, t):
         house.taken.append((record, t))
         take(record, t)
 
-    house.hub.phone.take = noting
+    house.manager.phone.take = noting
 
 
 def pictures(house):
@@ -83,8 +83,8 @@ def test_every_picture_comes_with_its_own_record(codec, tmp_path, monkeypatch):
         assert pictures(house) == sent(page)  # sequence, time, size, angle and every encoded byte
         expected = [ATTITUDES[k % len(ATTITUDES)] for k in range(1, PICTURES + 1)]
         np.testing.assert_allclose(attitudes, expected, atol=1e-4)
-        assert house.hub.phone.video_path == f"WebRTC, {codec.upper()}, dated by record"
-        assert house.desk._link.peer.lost == 0
+        assert house.manager.phone.video_path == f"WebRTC, {codec.upper()}, dated by record"
+        assert house.signalling._link.peer.lost == 0
         came = [t for record, t in house.taken if isinstance(record.body, Picture)]
         way = [t + 1000.0 - 1e-6 * record.t_us for t, record in zip(came, page.sent, strict=True)]
         assert np.median(way) < 0.5 * FRAME_S  # it has not waited for the next picture
@@ -104,8 +104,8 @@ def test_motion_and_touch_come_by_the_data_channel_and_reach_control(tmp_path):
         )
         heard = await house.control_hears(lambda one: isinstance(one, OperatorInput) and one.held)
         assert any(isinstance(one, PhoneImuInput) for one in heard)
-        assert house.hub.phone.ingest.clock.ready
-        assert house.hub.phone.ingest.clock.offset == pytest.approx(1000.0, abs=0.05)
+        assert house.manager.phone.ingest.clock.ready
+        assert house.manager.phone.ingest.clock.offset == pytest.approx(1000.0, abs=0.05)
 
     in_house(tmp_path, play)
 
@@ -123,10 +123,10 @@ def swallow(socket):
 def test_whichever_way_dies_without_a_word_the_finger_is_felt_by_the_other(dead, tmp_path):
     async def play(house, page):
         if dead == "channel":
-            page.client._channel.send = house.desk._link.peer._channel.send = lambda _: None
+            page.client._channel.send = house.signalling._link.peer._channel.send = lambda _: None
         else:
             swallow(page.client._sockets[0])
-            house.hub.paths._operator.push = lambda _: None
+            house.manager.paths._operator.push = lambda _: None
         pongs = page.pongs
         await eventually(lambda: page.pongs >= pongs + 3)
         for sequence, held in ((1, False), (2, True)):
@@ -136,7 +136,7 @@ def test_whichever_way_dies_without_a_word_the_finger_is_felt_by_the_other(dead,
         assert sorted(felt) == felt  # said again with a PING, but never in another order
         assert set(felt) == {False, True}
         age = now() - heard[-1].t
-        assert house.hub.phone.silent_for(now()) <= age + 0.01
+        assert house.manager.phone.silent_for(now()) <= age + 0.01
 
     in_house(tmp_path, play)
 
@@ -171,7 +171,7 @@ def test_without_records_pictures_are_dated_by_pairs_or_by_their_arrival(source,
             for came, taken in zip(pictures(house)[5:], page.sent[5:], strict=True)
         ]
         assert max(np.abs(late)) < limit_s
-        assert source in house.hub.phone.video_path
+        assert source in house.manager.phone.video_path
 
     in_house(tmp_path, play, dated_by=source)
 
@@ -224,10 +224,10 @@ def test_after_a_blackout_only_whole_pictures_come_and_they_begin_with_a_key(tmp
 
 def test_the_recording_has_the_encoded_pictures_as_they_came(tmp_path):
     async def play(house, page):
-        house.hub.start_recording()
+        house.manager.start_recording()
         await page.film(10)
         await eventually(lambda: len(pictures(house)) == 10)
-        path = house.hub.recordings.stop()
+        path = house.manager.recordings.stop()
         kept = [decode(data) for _, data in read(Path(path)).phone_records()]
         assert [plain(r) for r in kept if isinstance(r.body, Picture)] == sent(page)
 
@@ -236,14 +236,14 @@ def test_the_recording_has_the_encoded_pictures_as_they_came(tmp_path):
 
 def test_a_phone_that_leaves_and_one_that_calls_again_leave_no_connection_behind(tmp_path):
     async def play(house, page):
-        first = house.desk._link
-        answer = await house.post("/api/rtc", {"session": house.hub.phone.id})
+        first = house.signalling._link
+        answer = await house.post("/api/rtc", {"session": house.manager.phone.id})
         assert answer.status_code == 200
         assert first.is_closing
         await asyncio.wait_for(asyncio.gather(page.running, return_exceptions=True), 5.0)
-        second = house.desk._link
+        second = house.signalling._link
         assert second is not first
-        house.hub.part(house.hub.phone)
+        house.manager.part(house.manager.phone)
         refused = await house.post("/api/rtc/answer", {"id": second.id, "sdp": "v=0"})
         assert refused.status_code in (400, 404)
         await eventually(lambda: second.is_closing)
@@ -253,8 +253,8 @@ def test_a_phone_that_leaves_and_one_that_calls_again_leave_no_connection_behind
 
 def test_another_hand_takes_the_fast_path_away(tmp_path):
     async def play(house, page):
-        link = house.desk._link
-        house.hub.part(house.hub.phone)
+        link = house.signalling._link
+        house.manager.part(house.manager.phone)
         assert link.is_closing
         await page.touch(1, held=True)
         assert house.taken == [] or all(t < now() for _, t in house.taken)
@@ -264,7 +264,7 @@ def test_another_hand_takes_the_fast_path_away(tmp_path):
 
 def test_the_desk_has_the_rules_of_the_sockets(tmp_path):
     async def play(house, page):
-        session = house.hub.phone.id
+        session = house.manager.phone.id
         for body, status in (
             ({"session": "somebody else"}, 403),
             ({"session": session, "more": 1}, 400),
@@ -272,11 +272,11 @@ def test_the_desk_has_the_rules_of_the_sockets(tmp_path):
         ):
             assert (await house.post("/api/rtc", body)).status_code == status
         assert (await house.post("/api/rtc", {"session": session}, "nobody")).status_code == 401
-        long = {"id": house.desk._link.id, "sdp": "v=0\n" + "x" * 40_000}
+        long = {"id": house.signalling._link.id, "sdp": "v=0\n" + "x" * 40_000}
         assert (await house.post("/api/rtc/answer", long)).status_code == 400
         other = await house.post("/api/rtc/answer", {"id": "x", "sdp": "v=0"})
         assert (other.status_code, other.json()["field"]) == (404, "id")
-        again = {"id": house.desk._link.id, "sdp": "Once upon a time"}
+        again = {"id": house.signalling._link.id, "sdp": "Once upon a time"}
         refused = await house.post("/api/rtc/answer", again)
         assert (refused.status_code, refused.json()["field"]) == (400, "sdp")
 

@@ -53,8 +53,8 @@ def record(folder, play, **options):
             async with house.open(), house.phone(**options) as page:
                 await page.synchronised()
                 await play(house, page)
-                path = house.hub.recordings.stop()
-                await eventually(lambda: not house.hub.phone.vision._waiting)
+                path = house.manager.recordings.stop()
+                await eventually(lambda: not house.manager.phone.vision._waiting)
                 return path
 
         return read(Path(asyncio.run(run())))
@@ -79,7 +79,7 @@ def replayed(recording, decoded, folder):
 def test_a_recording_begun_in_the_middle_replays_to_the_same_pictures(codec, tmp_path, decoded):
     async def play(house, page):
         await page.film(10)
-        house.hub.start_recording()
+        house.manager.start_recording()
         for k in range(11, 41):
             await page.picture(k)
             await asyncio.sleep(FRAME_S)
@@ -104,15 +104,15 @@ async def change_to_websocket(house, page):
     page.running.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await page.running
-    house.desk._gone(house.desk._link)
-    await PhoneClient._open_video(client, DEVICE, SimpleNamespace(session=house.hub.phone.id))
+    house.signalling._gone(house.signalling._link)
+    await PhoneClient._open_video(client, DEVICE, SimpleNamespace(session=house.manager.phone.id))
     client.key_wanted = True
     client.send = PhoneClient.send.__get__(client)
 
 
 def test_a_change_of_path_within_a_recording_replays_to_the_same_pictures(tmp_path, decoded):
     async def play(house, page):
-        house.hub.start_recording()
+        house.manager.start_recording()
         await page.film(15)
         await eventually(lambda: any(number == 15 for number, _ in decoded))
         await change_to_websocket(house, page)

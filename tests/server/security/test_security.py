@@ -54,7 +54,7 @@ def pair(rig, role, client=None, name=""):
 
 def confirm(rig):
     """Let in whoever waits, as a supervisor's page does."""
-    waiting = [one for one in rig.hub.people.present() if one.state == "waiting"]
+    waiting = [one for one in rig.manager.people.present() if one.state == "waiting"]
     for one in waiting:
         body = {"id": one.id, "code": one.code}
         answer = rig.client.post(
@@ -165,7 +165,7 @@ def turned_away(client, method, path):
 def quiet(rig, monkeypatch):
     """Neither the virtual phone nor a recording is started."""
     monkeypatch.setattr(rig.api.phone, "start", lambda: None)
-    monkeypatch.setattr(rig.hub, "start_recording", lambda: "none")
+    monkeypatch.setattr(rig.manager, "start_recording", lambda: "none")
     return rig
 
 
@@ -198,7 +198,7 @@ def test_a_phone_that_waits_learns_its_code_and_reaches_nothing(quiet):
 
 def test_a_revoked_cookie_opens_no_route_and_no_socket(quiet):
     client = member(quiet, "supervisor")
-    (one,) = quiet.hub.people.present()
+    (one,) = quiet.manager.people.present()
     body = {"id": one.id}
     revoking = bearer(quiet, "supervisor")
     assert quiet.client.post("/api/people/revoke", json=body, headers=revoking).status_code == 200
@@ -213,9 +213,9 @@ def test_a_revoked_cookie_opens_no_route_and_no_socket(quiet):
 @pytest.mark.parametrize("deed", ["invite", "people/confirm", "people/revoke", "people/lead"])
 def test_who_is_revoked_while_a_body_is_on_the_way_does_nothing_by_it(rig, deed):
     client = member(rig, "supervisor")
-    (sue,) = rig.hub.people.present()
+    (sue,) = rig.manager.people.present()
     pair(rig, "operator")
-    before = rig.hub.people.present()[1:]
+    before = rig.manager.people.present()[1:]
 
     def body():
         yield b'{"role": "viewer"}' if deed == "invite" else b'{"id": '
@@ -225,14 +225,16 @@ def test_who_is_revoked_while_a_body_is_on_the_way_does_nothing_by_it(rig, deed)
         )
 
     assert client.post(f"/api/{deed}", content=body()).status_code == 401
-    assert [(one.id, one.state) for one in rig.hub.people.present()] == [(before[0].id, "waiting")]
+    assert [(one.id, one.state) for one in rig.manager.people.present()] == [
+        (before[0].id, "waiting")
+    ]
     assert all(link.used for link in rig.doors.pairings.book.links.values())
 
 
 def test_no_route_acts_for_who_is_shut_out_while_its_body_is_on_the_way(quiet):
     client, reading = member(quiet, "supervisor"), set()
     for method, path in [(m, p) for m, p in every_request(quiet) if m in ("POST", "DELETE")]:
-        (me,) = quiet.hub.people.present()
+        (me,) = quiet.manager.people.present()
         people = dict(quiet.doors.pairings.book.members)
 
         def body(path=path, me=me):
@@ -251,7 +253,7 @@ def test_no_route_acts_for_who_is_shut_out_while_its_body_is_on_the_way(quiet):
 
 def test_a_link_made_by_a_page_goes_when_that_page_is_revoked(rig):
     client = member(rig, "supervisor")
-    (sue,) = rig.hub.people.present()
+    (sue,) = rig.manager.people.present()
     url = client.post("/api/invite", json={"role": "viewer"}).json()["url"]
     answer = rig.client.post(
         "/api/people/revoke", json={"id": sue.id}, headers=bearer(rig, "supervisor")
@@ -285,7 +287,7 @@ def test_a_supervisors_page_can_not_make_supervisors(rig):
 
 def test_a_wrong_match_code_lets_nobody_in(rig):
     pair(rig, "operator")
-    (one,) = rig.hub.people.present()
+    (one,) = rig.manager.people.present()
     headers = bearer(rig, "supervisor")
     for code in ("", "BBBB" if one.code != "BBBB" else "CCCC", one.code.lower(), one.code[:3]):
         body = {"id": one.id, "code": code}
@@ -296,7 +298,7 @@ def test_a_wrong_match_code_lets_nobody_in(rig):
 
 def test_who_is_denied_is_told_and_stays_out(rig):
     pair(rig, "operator")
-    (one,) = rig.hub.people.present()
+    (one,) = rig.manager.people.present()
     headers, body = bearer(rig, "supervisor"), {"id": one.id}
     assert rig.client.post("/api/people/deny", json=body, headers=headers).status_code == 200
     told = rig.client.get("/api/whoami").json()
@@ -342,7 +344,7 @@ def test_a_browser_that_pairs_anew_leaves_who_it_was(rig):
     assert rig.client.get("/api/whoami").json()["role"] == "supervisor"
     former = TestClient(rig.guard, base_url=BASE, cookies={COOKIE: old})
     assert former.get("/api/whoami").json()["state"] == "revoked"
-    assert len(rig.hub.people.present()) == 1
+    assert len(rig.manager.people.present()) == 1
 
 
 @pytest.mark.parametrize(

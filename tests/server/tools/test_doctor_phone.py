@@ -34,11 +34,11 @@ def test_the_link_of_the_phone_that_leads_is_told_and_without_one_that_is_said(s
                 await asyncio.to_thread(ask, access(server), 1.0)
             async with server.operator() as page:
                 await page.synchronise()
-                await eventually(lambda: server.hub.phone.ingest.clock.ready)
+                await eventually(lambda: server.manager.phone.ingest.clock.ready)
                 for k in range(3):
                     await page.send(FLAT, sequence=k + 1)
                     await page.answer()
-                await eventually(lambda: len(server.hub.phone.link._kinds["answers"]) >= 9)
+                await eventually(lambda: len(server.manager.phone.link._kinds["answers"]) >= 9)
                 report = await asyncio.to_thread(ask, access(server), 60.0)
                 assert report.grade == "unknown"  # so short a look promises nothing
                 assert report.motion_hz > 0.0

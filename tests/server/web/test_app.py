@@ -75,14 +75,14 @@ def test_a_stop_reaches_control_from_either_role(house, client, role):
     answer = client.post("/api/stop", headers={"Authorization": f"Bearer {token[role]}"})
     assert answer.status_code == 202
     assert any(map(is_request("stop"), house.control.inputs()))
-    assert list(house.hub.events) == [f"local program ({role}): stop"]
+    assert list(house.manager.events) == [f"local program ({role}): stop"]
 
 
 def test_a_stop_by_request_is_told_what_the_robot_does(house, client):
     assert client.post("/api/stop").json()["mode"] == "LOST"
     for mode in (Mode.TRACK, Mode.STOPPED):
-        house.hub.status = control_status(mode=int(mode))
-        house.hub.control_meter.tick(now(), now())
+        house.manager.status = control_status(mode=int(mode))
+        house.manager.control_meter.tick(now(), now())
         assert client.post("/api/stop").json()["mode"] == mode.name
 
 
@@ -122,7 +122,7 @@ def test_health_is_told_to_everyone_and_tells_nothing(client):
 def test_the_certificate_of_our_authority_is_given_and_a_foreign_one_is_not(house, tmp_path):
     certificate = tmp_path / "ca.pem"
     certificate.write_text("PEM")
-    own = Api(house.hub, certificate).routes()
+    own = Api(house.manager, certificate).routes()
     house.inner.router.routes[:0] = [r for r in own if getattr(r, "path", "") == "/ca.crt"]
     answer = TestClient(house.app, base_url=BASE).get("/ca.crt")
     assert answer.headers["content-type"] == "application/x-x509-ca-cert"
@@ -133,8 +133,8 @@ def test_the_certificate_of_our_authority_is_given_and_a_foreign_one_is_not(hous
 
 def test_the_status_is_there_for_terminals_and_machines(house, client):
     house.control.send(control_status())
-    house.hub._hear_control()
-    house.hub._tick()
+    house.manager._hear_control()
+    house.manager._tick()
     assert client.get("/api/status").json()["mode"] == "DISARMED"
     assert 'lightleash_mode{mode="DISARMED"} 1.0' in client.get("/metrics").text
 
@@ -142,7 +142,7 @@ def test_the_status_is_there_for_terminals_and_machines(house, client):
 def test_a_recording_is_started_named_and_ended(house, client):
     name = client.post("/api/recording").json()["name"]
     assert client.post("/api/recording").json()["name"] == name
-    assert house.hub.recordings.name == name
+    assert house.manager.recordings.name == name
     path = Path(client.delete("/api/recording").json()["path"])
     assert path.stat().st_size > 0
     assert client.delete("/api/recording").json() == {"path": ""}
@@ -152,7 +152,7 @@ def test_a_recording_that_cannot_be_made_says_why(house, client, monkeypatch):
     def full() -> str:
         raise app.RecordingError(Path("disk"), "is full", "make room")
 
-    monkeypatch.setattr(house.hub, "start_recording", full)
+    monkeypatch.setattr(house.manager, "start_recording", full)
     answer = client.post("/api/recording")
     assert answer.status_code == 507
     assert answer.json()["allowed"] == "disk: is full; make room"

@@ -13,39 +13,39 @@ from tests.server.house import control_status, estimate_fields, house_in
 
 
 @pytest.fixture
-def hub(tmp_path):
+def manager(tmp_path):
     with house_in(tmp_path) as house:
-        yield house.hub
+        yield house.manager
 
 
-def samples(hub):
-    families = text_string_to_metric_families(exposition(hub).decode())
+def samples(manager):
+    families = text_string_to_metric_families(exposition(manager).decode())
     return {(s.name, *s.labels.values()): s.value for family in families for s in family.samples}
 
 
-def tell(hub, **changes):
-    hub.status = control_status(**changes)
-    hub.control_meter.tick(hub.status.t)
+def tell(manager, **changes):
+    manager.status = control_status(**changes)
+    manager.control_meter.tick(manager.status.t)
 
 
-def test_without_a_control_process_the_mode_is_lost(hub):
-    found = samples(hub)
+def test_without_a_control_process_the_mode_is_lost(manager):
+    found = samples(manager)
     assert found["lightleash_mode", "LOST"] == 1.0
     assert sum(value for (name, *_), value in found.items() if name == "lightleash_mode") == 1.0
 
 
 @pytest.mark.parametrize("mode", Mode)
-def test_exactly_one_mode_is_the_present_one(hub, mode):
-    tell(hub, mode=int(mode))
-    found = samples(hub)
+def test_exactly_one_mode_is_the_present_one(manager, mode):
+    tell(manager, mode=int(mode))
+    found = samples(manager)
     modes = {key[1]: value for key, value in found.items() if key[0] == "lightleash_mode"}
     assert set(modes) == {*Mode.__members__, "LOST"}
     assert [name for name, value in modes.items() if value] == [mode.name]
 
 
-def test_lateness_ages_and_the_error_are_told_in_si_units(hub):
-    tell(hub, error_m=0.0123, inputs_dropped=4)
-    found = samples(hub)
+def test_lateness_ages_and_the_error_are_told_in_si_units(manager):
+    tell(manager, error_m=0.0123, inputs_dropped=4)
+    found = samples(manager)
     assert found[("lightleash_error_metres",)] == pytest.approx(0.0123)
     assert found["lightleash_control", "p999_ms"] == 0.4
     assert found["lightleash_control", "missed"] == 3.0
@@ -54,33 +54,33 @@ def test_lateness_ages_and_the_error_are_told_in_si_units(hub):
     assert found["lightleash_stream_dropped", "control"] == 4.0
 
 
-def test_pauses_of_the_server_are_told(hub):
-    hub.pauses.tick(armed=True, idle=False)
-    hub.pauses.loop.saw(now() - 70.0, Stall(0.043, 0.012), armed=True)
-    hub.pauses.loop.saw(now(), Stall(0.025, 0.001), armed=True)
-    found = samples(hub)
+def test_pauses_of_the_server_are_told(manager):
+    manager.pauses.tick(armed=True, idle=False)
+    manager.pauses.loop.saw(now() - 70.0, Stall(0.043, 0.012), armed=True)
+    manager.pauses.loop.saw(now(), Stall(0.025, 0.001), armed=True)
+    found = samples(manager)
     assert found["lightleash_server", "stall_ms"] == 25.0
     assert found["lightleash_server", "armed_stall_ms"] == 43.0
     assert found["lightleash_server", "armed_stall_cpu_ms"] == 12.0
 
 
-def test_what_is_not_known_is_left_out(hub):
-    tell(hub, body_imu_age=float("inf"))
-    found = samples(hub)
+def test_what_is_not_known_is_left_out(manager):
+    tell(manager, body_imu_age=float("inf"))
+    found = samples(manager)
     assert ("lightleash_error_metres",) not in found
     assert ("lightleash_stream_age_seconds", "body_imu") not in found
 
 
-def test_the_estimators_telemetry_is_told_in_si_units(hub):
+def test_the_estimators_telemetry_is_told_in_si_units(manager):
     tell(
-        hub,
+        manager,
         estimate=estimate_fields(complaint="Restart the camera.", bias_omega_c=(0.0, -0.02, 0.0)),
         poses_fused=90,
         poses_dropped=4,
         time_offset=-0.012,
         sigma_p=0.003,
     )
-    found = samples(hub)
+    found = samples(manager)
     assert found["lightleash_estimator_complains", "relative"] == 1.0
     assert found[("lightleash_estimate_nis",)] == 1.25
     assert found[("lightleash_estimate_age_seconds",)] == pytest.approx(0.0871)
@@ -93,9 +93,9 @@ def test_the_estimators_telemetry_is_told_in_si_units(hub):
     assert told == pytest.approx(-0.02, abs=1e-4)
 
 
-def test_of_an_estimator_that_knows_little_the_rest_is_left_out(hub):
-    tell(hub, estimate=estimate_fields(name="none", nis=None, age=None, bias_a_b=None))
-    found = samples(hub)
+def test_of_an_estimator_that_knows_little_the_rest_is_left_out(manager):
+    tell(manager, estimate=estimate_fields(name="none", nis=None, age=None, bias_a_b=None))
+    found = samples(manager)
     assert found["lightleash_estimator_complains", "none"] == 0.0
     assert ("lightleash_estimate_nis",) not in found
     assert ("lightleash_estimate_age_seconds",) not in found

@@ -17,8 +17,8 @@ def chosen(wish: str, by: str) -> dict[str, str]:
     return {"type": "path", "wish": wish, "by": by}
 
 
-def told(hub: SessionManager) -> list[str]:
-    return [event for event in hub.events if event.startswith("pictures")]
+def told(manager: SessionManager) -> list[str]:
+    return [event for event in manager.events if event.startswith("pictures")]
 
 
 def test_a_supervisors_choice_goes_to_the_page_and_the_operators_next_one_wins(tmp_path):
@@ -35,7 +35,7 @@ def test_a_supervisors_choice_goes_to_the_page_and_the_operators_next_one_wins(t
             await watcher.until("status", path_choice=asked)
             await page.say(**chosen("WebRTC", "operator"))
             await watcher.until("status", path_choice=chosen("WebRTC", "operator"))
-            assert told(house.hub) == [
+            assert told(house.manager) == [
                 "pictures by WebRTC: chosen by the operator",
                 "pictures by WebSocket: chosen by the supervisor",
             ]

@@ -81,15 +81,15 @@ class Browser:
 
 
 def in_mode(house, mode):
-    house.hub.status = control_status(mode=int(mode))
+    house.manager.status = control_status(mode=int(mode))
 
 
 def give(house, to, by):
-    house.hub.handover.give(to, by, now())
+    house.manager.handover.give(to, by, now())
 
 
 def people(house):
-    return {one.name: one for one in house.hub.people.present()}
+    return {one.name: one for one in house.manager.people.present()}
 
 
 def test_everybody_is_listed_with_role_and_whether_he_leads(house):
@@ -131,9 +131,9 @@ def test_on_the_supervisors_page_others_may_stop_and_nothing_else(house, role):
 def test_whoever_is_shut_out_loses_every_socket_at_once_and_gets_no_other(house, role):
     async def scene():
         browser = Browser(house, role, "Vera")
-        sup = house.hub.people.named("local-supervisor")
+        sup = house.manager.people.named("local-supervisor")
         async with browser.watching() as one, browser.watching() as other:
-            await house.hub.handover.shut_out(browser.member.id, "lost", sup)
+            await house.manager.handover.shut_out(browser.member.id, "lost", sup)
             for page in (one, other):
                 await asyncio.wait_for(page.socket.wait_closed(), DEADLINE_S)
                 assert page.socket.close_code == REVOKED
@@ -148,8 +148,10 @@ def test_what_a_socket_still_says_after_its_end_is_heard_by_nobody(house):
     async def scene():
         browser = Browser(house, "viewer", "Vera")
         async with browser.watching() as page:
-            sup = house.hub.people.named("local-supervisor")
-            ended = asyncio.create_task(house.hub.handover.shut_out(browser.member.id, "lost", sup))
+            sup = house.manager.people.named("local-supervisor")
+            ended = asyncio.create_task(
+                house.manager.handover.shut_out(browser.member.id, "lost", sup)
+            )
             await page.say(type="command", what="stop")
             await ended
             await eventually(lambda: not house.doors.sockets.ids())
@@ -165,10 +167,10 @@ def test_a_leader_who_is_shut_out_is_disarmed_and_leads_no_more(house, mode):
         async with anna.leading():
             house.control.inputs()
             in_mode(house, mode)
-            sup = house.hub.people.named("local-supervisor")
-            await house.hub.handover.shut_out(anna.member.id, "stolen", sup)
-            assert house.hub.phone is None
-            assert house.hub.people.lease.holder == ""
+            sup = house.manager.people.named("local-supervisor")
+            await house.manager.handover.shut_out(anna.member.id, "stolen", sup)
+            assert house.manager.phone is None
+            assert house.manager.people.lease.holder == ""
             await house.control_hears(is_request("disarm"))
 
     play(house, scene)
@@ -182,14 +184,14 @@ def test_a_full_disk_keeps_nobody_in_who_was_shut_out_and_ends_no_server(house, 
         async with anna.leading() as page:
             house.control.inputs()
             in_mode(house, Mode.TRACK)
-            sup = house.hub.people.named("local-supervisor")
-            await house.hub.handover.shut_out(anna.member.id, "stolen", sup)
+            sup = house.manager.people.named("local-supervisor")
+            await house.manager.handover.shut_out(anna.member.id, "stolen", sup)
             assert await page.closed() == REVOKED
             await house.control_hears(is_request("disarm"))
-        assert any("The disk takes nothing" in event for event in house.hub.events)
-        assert any("The disk takes nothing" in text for text in build(house.hub).warnings)
+        assert any("The disk takes nothing" in event for event in house.manager.events)
+        assert any("The disk takes nothing" in text for text in build(house.manager).warnings)
         house.doors.clock = lambda: now() + WAIT_S
-        await house.hub.handover.expire()
+        await house.manager.handover.expire()
         assert not people(house)
 
     play(house, scene)
@@ -202,13 +204,13 @@ def test_a_revocation_that_could_not_be_written_down_is_written_once_the_disk_ta
     async def scene():
         anna = Browser(house, "operator", "Anna")
         store = house.doors._store = tmp_path / "nowhere" / "members"
-        sup = house.hub.people.named("local-supervisor")
-        await house.hub.handover.shut_out(anna.member.id, "stolen", sup)
+        sup = house.manager.people.named("local-supervisor")
+        await house.manager.handover.shut_out(anna.member.id, "stolen", sup)
         store.parent.mkdir()
         await eventually(store.exists)
         assert Doors(store=store).pairings.book.members[anna.member.id].state == "revoked"
-        await eventually(lambda: "written down again" in house.hub.events[0])
-        assert not build(house.hub).warnings
+        await eventually(lambda: "written down again" in house.manager.events[0])
+        assert not build(house.manager).warnings
 
     play(house, scene)
 
@@ -220,7 +222,7 @@ def test_on_the_ground_the_lead_is_handed_on_at_once_and_the_robot_disarmed(hous
             house.control.inputs()
             in_mode(house, Mode.ARMED)
             give(house, bert.member.id, anna.member)
-            assert house.hub.phone is None
+            assert house.manager.phone is None
             await house.control_hears(is_request("disarm"))
             async with bert.leading("other"):
                 assert people(house)["Bert"].leads
@@ -234,7 +236,7 @@ def test_on_the_ground_the_lead_is_handed_on_at_once_and_the_robot_disarmed(hous
 def test_a_lead_is_kept_no_longer_when_giver_or_heir_says_so_and_nobody_else(house):
     async def scene():
         anna, bert, cleo = (Browser(house, "operator", n) for n in ("Anna", "Bert", "Cleo"))
-        keep = house.hub.handover.keep
+        keep = house.manager.handover.keep
         for by in (anna, bert):
             async with anna.leading():
                 in_mode(house, Mode.DISARMED)
@@ -248,7 +250,7 @@ def test_a_lead_is_kept_no_longer_when_giver_or_heir_says_so_and_nobody_else(hou
             assert not any(one.offered for one in people(house).values())
             async with anna.leading():
                 assert people(house)["Anna"].leads
-            await eventually(lambda: house.hub.phone is None)
+            await eventually(lambda: house.manager.phone is None)
 
     play(house, scene)
 
@@ -279,14 +281,14 @@ def test_in_flight_the_leader_gives_nothing_away_and_a_supervisor_brings_the_rob
             with pytest.raises(PairingError, match="disarm it first"):
                 give(house, bert.member.id, anna.member)
             assert not any(map(is_request("disarm"), house.control.inputs()))
-            phone = house.hub.phone
-            give(house, bert.member.id, house.hub.people.named("local-supervisor"))
+            phone = house.manager.phone
+            give(house, bert.member.id, house.manager.people.named("local-supervisor"))
             assert any(map(is_request("disarm"), house.control.inputs()))
-            house.hub._tick()
-            assert house.hub.phone is phone, "it leads until the robot is down"
+            house.manager._tick()
+            assert house.manager.phone is phone, "it leads until the robot is down"
             in_mode(house, Mode.DISARMED)
-            house.hub._tick()
-            assert house.hub.phone is None
+            house.manager._tick()
+            assert house.manager.phone is None
             async with bert.leading():
                 pass
 
@@ -300,14 +302,14 @@ def test_a_robot_left_in_flight_comes_down_before_somebody_else_leads(house, mod
         in_mode(house, mode)
         async with anna.leading():
             pass
-        await eventually(lambda: house.hub.phone is None)
+        await eventually(lambda: house.manager.phone is None)
         house.control.inputs()
         async with bert.page("/ws/phone") as page:
             assert (await page.hello("operator", device="other"))["code"] == "role"
         await house.control_hears(is_request("disarm"))
         async with anna.leading():
             pass
-        await eventually(lambda: house.hub.phone is None)
+        await eventually(lambda: house.manager.phone is None)
         in_mode(house, Mode.DISARMED)
         async with bert.leading():
             assert people(house)["Bert"].leads
@@ -319,7 +321,7 @@ def test_a_new_lead_disarms_also_when_control_could_take_nothing_at_first(house,
     async def scene():
         anna, heard = Browser(house, "operator", "Anna"), []
         in_mode(house, Mode.DISARMED)
-        send = house.hub._control.send
+        send = house.manager._control.send
 
         def full_at_first(message):
             if is_request("disarm")(message):
@@ -327,7 +329,7 @@ def test_a_new_lead_disarms_also_when_control_could_take_nothing_at_first(house,
                 return len(heard) > 3 and send(message)
             return send(message)
 
-        monkeypatch.setattr(house.hub._control, "send", full_at_first)
+        monkeypatch.setattr(house.manager._control, "send", full_at_first)
         async with anna.leading():
             await house.control_hears(is_request("disarm"))
 
@@ -340,7 +342,7 @@ def test_nobody_gives_away_what_he_has_not_or_to_whom_he_may_not(house):
         vera = Browser(house, "viewer", "Vera")
         in_mode(house, Mode.DISARMED)
         async with anna.leading():
-            sup = house.hub.people.named("local-supervisor")
+            sup = house.manager.people.named("local-supervisor")
             for to, by in (
                 (bert.member.id, bert.member),
                 (bert.member.id, vera.member),
@@ -373,7 +375,7 @@ def test_what_somebody_tried_without_the_right_is_written_down_with_his_name(hou
 def test_arming_that_can_not_be_granted_is_written_down_with_what_lacks(house, tmp_path):
     async def scene():
         async with Browser(house, "operator", "Anna").leading() as page:
-            house.hub.status = control_status(refusals=["The robot is not seen."])
+            house.manager.status = control_status(refusals=["The robot is not seen."])
             await page.say(type="command", what="arm")
             await house.control_hears(is_request("arm"))
 
@@ -386,14 +388,14 @@ def test_arming_that_can_not_be_granted_is_written_down_with_what_lacks(house, t
 
 def test_deeds_are_in_the_audit_log_and_in_the_running_recording(house, tmp_path):
     async def scene():
-        house.hub.start_recording()
+        house.manager.start_recording()
         anna = Browser(house, "operator", "An\u202ena\n")
         async with anna.leading() as page:
             for what in ("arm", "stop"):
                 await page.say(type="command", what=what)
             await house.control_hears(is_request("stop"))
-            sup = house.hub.people.named("local-supervisor")
-            await house.hub.handover.shut_out(anna.member.id, "left", sup)
+            sup = house.manager.people.named("local-supervisor")
+            await house.manager.handover.shut_out(anna.member.id, "left", sup)
 
     play(house, scene)
     house.doors.audit.close()

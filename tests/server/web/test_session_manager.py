@@ -42,10 +42,10 @@ def house(tmp_path):
 def test_a_recording_begins_with_a_picture_that_can_be_decoded(house):
     async def scene():
         page = Paper()
-        house.hub.greet(hello("first"), page)
-        house.hub.start_recording()
+        house.manager.connect_phone(hello("first"), page)
+        house.manager.start_recording()
         await asyncio.sleep(0)
-        house.hub.recordings.stop()
+        house.manager.recordings.stop()
         return page.data
 
     assert encode_message(Command("key_frame")) in asyncio.run(scene())
@@ -64,34 +64,34 @@ def in_loop(scene):
 
 def test_one_phone_leads_until_it_has_been_silent(house, monkeypatch):
     def scene():
-        hub = house.hub
-        first = hub.greet(hello("first"), Paper())
-        assert hub.greet(hello("second"), Paper()) is None
-        assert hub.phone is first
+        manager = house.manager
+        first = manager.connect_phone(hello("first"), Paper())
+        assert manager.connect_phone(hello("second"), Paper()) is None
+        assert manager.phone is first
         monkeypatch.setattr("server.web.session_manager.now", lambda: now() + LEASE_S)
-        second = hub.greet(hello("second"), Paper())
-        assert hub.phone is second is not None
-        hub.part(first)
-        assert hub.phone is second
-        hub.part(second)
-        assert hub.phone is None
+        second = manager.connect_phone(hello("second"), Paper())
+        assert manager.phone is second is not None
+        manager.part(first)
+        assert manager.phone is second
+        manager.part(second)
+        assert manager.phone is None
 
     in_loop(scene)
 
 
 def test_whoever_comes_to_lead_finds_the_robot_disarmed(house):
-    in_loop(lambda: house.hub.greet(hello("first"), Paper()))
+    in_loop(lambda: house.manager.connect_phone(hello("first"), Paper()))
     assert any(map(is_request("disarm"), house.control.inputs()))
 
 
 def test_pings_go_to_the_phone_that_leads_alone(house, monkeypatch):
     def scene():
         old, new = Paper(), Paper()
-        house.hub.greet(hello("first"), old)
-        house.hub.ping()
+        house.manager.connect_phone(hello("first"), old)
+        house.manager.ping()
         monkeypatch.setattr("server.web.session_manager.now", lambda: now() + LEASE_S)
-        house.hub.greet(hello("second"), new)
-        house.hub.ping()
+        house.manager.connect_phone(hello("second"), new)
+        house.manager.ping()
         (ping,) = map(decode, new.data)
         assert isinstance(ping.body, Ping)
         assert len(old.data) == 1
@@ -101,12 +101,12 @@ def test_pings_go_to_the_phone_that_leads_alone(house, monkeypatch):
 
 def test_only_the_session_that_leads_may_send_pictures(house):
     def scene():
-        assert house.hub.join_video("", Paper()) is None
-        phone = house.hub.greet(hello("first"), Paper())
-        assert house.hub.join_video("guess", Paper()) is None
-        assert house.hub.join_video(phone.id, Paper()) is phone
-        house.hub.part(phone)
-        assert house.hub.join_video(phone.id, Paper()) is None
+        assert house.manager.join_video("", Paper()) is None
+        phone = house.manager.connect_phone(hello("first"), Paper())
+        assert house.manager.join_video("guess", Paper()) is None
+        assert house.manager.join_video(phone.id, Paper()) is phone
+        house.manager.part(phone)
+        assert house.manager.join_video(phone.id, Paper()) is None
 
     in_loop(scene)
 
@@ -130,15 +130,15 @@ class Fast:
 def test_pings_take_all_ways_that_are_open(house):
     def scene():
         page, fast = Paper(), Fast()
-        phone = house.hub.greet(hello("first"), page)
-        assert house.hub.join_fast("guess", fast) is None
-        house.hub.ping()
-        assert house.hub.join_fast(phone.id, fast) is phone
-        house.hub.ping()
+        phone = house.manager.connect_phone(hello("first"), page)
+        assert house.manager.join_fast("guess", fast) is None
+        house.manager.ping()
+        assert house.manager.join_fast(phone.id, fast) is phone
+        house.manager.ping()
         assert len(fast.data) == 1
         assert page.data[1:] == fast.data
-        house.hub.paths.leave(fast)
-        house.hub.ping()
+        house.manager.paths.leave(fast)
+        house.manager.ping()
         assert (len(fast.data), len(page.data)) == (1, 3)
 
     in_loop(scene)
@@ -146,15 +146,15 @@ def test_pings_take_all_ways_that_are_open(house):
 
 def test_a_phone_has_one_fast_path_which_goes_with_it(house):
     def scene():
-        phone = house.hub.greet(hello("first"), Paper())
+        phone = house.manager.connect_phone(hello("first"), Paper())
         former, fast = Fast(), Fast()
-        house.hub.join_fast(phone.id, former)
-        house.hub.join_fast(phone.id, fast)
+        house.manager.join_fast(phone.id, former)
+        house.manager.join_fast(phone.id, fast)
         assert (former.closed, fast.closed) == (True, False)
-        house.hub.paths.leave(former)  # late news
-        house.hub.ping()
+        house.manager.paths.leave(former)  # late news
+        house.manager.ping()
         assert len(fast.data) == 1
-        house.hub.part(phone)
+        house.manager.part(phone)
         assert fast.closed
 
     in_loop(scene)
@@ -163,16 +163,16 @@ def test_a_phone_has_one_fast_path_which_goes_with_it(house):
 def test_a_recording_begins_with_a_key_picture(house):
     def scene():
         fast = Fast()
-        phone = house.hub.greet(hello("first"), Paper())
-        house.hub.join_fast(phone.id, fast)
-        house.hub.start_recording()
+        phone = house.manager.connect_phone(hello("first"), Paper())
+        house.manager.join_fast(phone.id, fast)
+        house.manager.start_recording()
         assert fast.keys == 1
 
     in_loop(scene)
 
 
 def test_what_the_server_lacks_reaches_control_with_every_tick(house):
-    house.hub._tick()
+    house.manager._tick()
     (ready,) = house.control.inputs()
     assert isinstance(ready, ReadyInput)
     assert "No phone is connected" in ready.refusals[0]
@@ -181,37 +181,37 @@ def test_what_the_server_lacks_reaches_control_with_every_tick(house):
 def test_wishes_reach_control_except_those_for_phones(house):
     def scene():
         for what in ("arm", "disarm", "stop", "reset", "key_frame"):
-            house.hub.wish(Command(what), of_this_machine("operator"))
+            house.manager.wish(Command(what), of_this_machine("operator"))
 
     in_loop(scene)
     heard = [m.what for m in house.control.inputs() if isinstance(m, RequestInput)]
     assert heard == ["arm", "disarm", "stop", "reset"]
-    assert house.hub.events[0] == "local program (operator): reset"
+    assert house.manager.events[0] == "local program (operator): reset"
 
 
 def test_a_turned_knob_reaches_control_and_is_an_event(house):
-    in_loop(lambda: house.hub.tune(Tune(cutoff_hz=0.5, guard=False)))
+    in_loop(lambda: house.manager.tune(Tune(cutoff_hz=0.5, guard=False)))
     assert house.control.inputs() == [TuneInput(cutoff_hz=0.5, guard=False)]
-    assert house.hub.events[0] == "supervisor: virtual camera: cutoff_hz 0.5, guard False"
+    assert house.manager.events[0] == "supervisor: virtual camera: cutoff_hz 0.5, guard False"
 
 
 def test_a_wish_to_turn_nothing_is_none(house):
-    in_loop(lambda: house.hub.tune(Tune()))
+    in_loop(lambda: house.manager.tune(Tune()))
     assert house.control.inputs() == []
-    assert not house.hub.events
+    assert not house.manager.events
 
 
 def test_a_knob_that_does_not_reach_control_is_told(house):
     house.control.close()
-    in_loop(lambda: house.hub.tune(Tune(mode="off")))
-    assert "did not reach" in house.hub.events[0]
+    in_loop(lambda: house.manager.tune(Tune(mode="off")))
+    assert "did not reach" in house.manager.events[0]
 
 
 def test_a_stop_is_said_again_until_control_can_take_it(house):
     async def scene():
-        while house.hub._control.send(ReadyInput([])):
+        while house.manager._control.send(ReadyInput([])):
             pass
-        house.hub.wish(Command("stop"), of_this_machine("operator"))
+        house.manager.wish(Command("stop"), of_this_machine("operator"))
         assert not any(map(is_request("stop"), house.control.inputs()))
         heard = []
         for _ in range(1000):
@@ -226,20 +226,20 @@ def test_a_stop_is_said_again_until_control_can_take_it(house):
 
 def test_events_are_few_newest_first_and_hold_no_control_characters(house):
     for k in range(2 * EVENTS):
-        house.hub.say(f"{k}\x1b]0;owned\x07\n")
-    assert len(house.hub.events) == EVENTS
-    assert house.hub.events[0] == f"{2 * EVENTS - 1}·]0;owned··"
+        house.manager.say(f"{k}\x1b]0;owned\x07\n")
+    assert len(house.manager.events) == EVENTS
+    assert house.manager.events[0] == f"{2 * EVENTS - 1}·]0;owned··"
 
 
 def test_a_change_of_mode_is_an_event_and_every_page_is_told(house):
     watcher = Paper()
-    house.hub.supervisors.add(watcher)
+    house.manager.supervisors.add(watcher)
     house.control.send(control_status(mode=5, reason="STOP was pressed."))
-    house.hub._hear_control()
-    house.hub._tick()
-    assert house.hub.events[0] == "STOPPED: STOP was pressed."
-    house.hub._tick()
-    assert list(house.hub.events).count("STOPPED: STOP was pressed.") == 1
+    house.manager._hear_control()
+    house.manager._tick()
+    assert house.manager.events[0] == "STOPPED: STOP was pressed."
+    house.manager._tick()
+    assert list(house.manager.events).count("STOPPED: STOP was pressed.") == 1
     assert '"mode":"STOPPED"' in watcher.data[-1]
 
 
@@ -247,7 +247,7 @@ class Eyes:
     """A vision thread and its front-end, which keep what control expects."""
 
     def __init__(self) -> None:
-        self.looking = self
+        self.front_end = self
         self.expected: list[Prediction | None] = []
 
     def expect(self, expected: Prediction | None) -> None:
@@ -260,13 +260,13 @@ class Eyes:
 
 def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
     def scene():
-        phone = house.hub.greet(hello("first"), Paper())
+        phone = house.manager.connect_phone(hello("first"), Paper())
         phone.vision = eyes = Eyes()
         sure = {"u_bf_in_c": (0.0, 0.1, 0.0), "sigma_p": 0.01, "sigma_theta": 0.02}
         pose = {"p_bc_in_c": (2.5, 0.0, 0.0), "R_cb_wxyz": (1.0, 0.0, 0.0, 0.0)}
         for fields in ({}, {**pose, **sure}):
             house.control.send(control_status(**fields))
-        house.hub._hear_control()
+        house.manager._hear_control()
         before, after = eyes.expected
         assert before is None
         assert (after.sigma_p, after.sigma_theta, after.time_offset) == (0.01, 0.02, 0.0)
@@ -279,20 +279,20 @@ def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
 def test_a_recording_asks_for_a_key_again_until_one_has_come(house, monkeypatch):
     def scene():
         fast, t = Fast(), now()
-        phone = house.hub.greet(hello("first"), Paper())
-        house.hub.join_fast(phone.id, fast)
-        house.hub.start_recording()
+        phone = house.manager.connect_phone(hello("first"), Paper())
+        house.manager.join_fast(phone.id, fast)
+        house.manager.start_recording()
         picture = replace(JPEG, codec=Codec.H264, key=False)
         for _ in range(30):
             t += 0.1
             monkeypatch.setattr(hub_module, "now", lambda t=t: t)
-            house.hub.record(encode(Record(1, 1, picture)), t)
-            house.hub._ask_key()
+            house.manager.record(encode(Record(1, 1, picture)), t)
+            house.manager._ask_key()
         assert 6 <= fast.keys <= 8  # twice a second
-        house.hub.record(encode(Record(2, 1, replace(picture, key=True))), t)
+        house.manager.record(encode(Record(2, 1, replace(picture, key=True))), t)
         asked = fast.keys
         monkeypatch.setattr(hub_module, "now", lambda: t + 10.0)
-        house.hub._ask_key()
+        house.manager._ask_key()
         assert fast.keys == asked
 
     in_loop(scene)

@@ -16,34 +16,34 @@ from tests.server.house import control_status, estimate_fields, house_in
 
 
 @pytest.fixture
-def hub(tmp_path):
+def manager(tmp_path):
     with house_in(tmp_path) as house:
-        yield house.hub
+        yield house.manager
 
 
-def tell(hub, **changes):
-    hub.status = control_status(**changes)
-    hub.control_meter.tick(hub.status.t, hub.status.t)
+def tell(manager, **changes):
+    manager.status = control_status(**changes)
+    manager.control_meter.tick(manager.status.t, manager.status.t)
 
 
-def test_before_control_has_spoken_it_is_lost_and_nothing_is_ready(hub):
-    shown = status.build(hub)
+def test_before_control_has_spoken_it_is_lost_and_nothing_is_ready(manager):
+    shown = status.build(manager)
     assert (shown.mode, shown.ready) == ("LOST", False)
     assert "watchdog" in shown.reason
     assert shown.refusals == ["The control process is starting, about a minute the first time."]
     assert shown.position_mm is None
 
 
-def test_control_that_falls_silent_is_lost_whatever_it_said_last(hub):
-    tell(hub, t=now() - LOST_S - 0.05, mode=2, reason="Following the phone.", refusals=[])
-    shown = status.build(hub)
+def test_control_that_falls_silent_is_lost_whatever_it_said_last(manager):
+    tell(manager, t=now() - LOST_S - 0.05, mode=2, reason="Following the phone.", refusals=[])
+    shown = status.build(manager)
     assert (shown.mode, shown.ready) == ("LOST", False)
     assert "Following" not in shown.reason
 
 
-def test_what_control_says_is_shown_in_the_units_of_screens(hub):
+def test_what_control_says_is_shown_in_the_units_of_screens(manager):
     tell(
-        hub,
+        manager,
         mode=2,
         reason="Following the phone.",
         refusals=[],
@@ -53,7 +53,7 @@ def test_what_control_says_is_shown_in_the_units_of_screens(hub):
         sigma_p=0.002,
         saturated=True,
     )
-    shown = status.build(hub)
+    shown = status.build(manager)
     assert (shown.mode, shown.reason, shown.ready) == ("TRACK", "Following the phone.", True)
     assert shown.position_mm == [2500.0, -123.4, 0.0]
     assert (shown.error_mm, shown.error_deg, shown.sigma_mm) == (12.3, 2.0, 2.0)
@@ -64,48 +64,48 @@ def test_what_control_says_is_shown_in_the_units_of_screens(hub):
     assert shown.streams["body_imu"].rate_hz == 200.0
 
 
-def test_why_arming_is_refused_is_told(hub):
-    tell(hub, refusals=["Let go of the button before arming."])
-    shown = status.build(hub)
+def test_why_arming_is_refused_is_told(manager):
+    tell(manager, refusals=["Let go of the button before arming."])
+    shown = status.build(manager)
     assert not shown.ready
     assert shown.refusals == ["Let go of the button before arming."]
 
 
 @pytest.mark.parametrize("bad", [nan, inf])
-def test_it_is_json_even_if_a_number_is_none(hub, bad):
-    tell(hub, error_m=bad, body_imu_age=inf, sigma_p=bad)
-    decoded = msgspec.json.decode(encode_message(status.build(hub)))
+def test_it_is_json_even_if_a_number_is_none(manager, bad):
+    tell(manager, error_m=bad, body_imu_age=inf, sigma_p=bad)
+    decoded = msgspec.json.decode(encode_message(status.build(manager)))
     assert decoded["error_mm"] is None
     assert decoded["streams"]["body_imu"]["age_ms"] is None
 
 
-def test_the_knobs_are_shown_as_control_has_them_with_the_lag_they_cause(hub):
+def test_the_knobs_are_shown_as_control_has_them_with_the_lag_they_cause(manager):
     knobs = RuntimeParameters(0.28, "selective", 0.0, 1.0, guard=True)
     turn = (cos(radians(5.0)), 0.0, 0.0, -sin(radians(5.0)))
-    tell(hub, knobs=knobs, guarding=0.456, R_fc_wxyz=(-1.0, 0.0, 0.0, 0.0), R_fv_wxyz=turn)
-    shown = status.build(hub).virtual_camera
+    tell(manager, knobs=knobs, guarding=0.456, R_fc_wxyz=(-1.0, 0.0, 0.0, 0.0), R_fv_wxyz=turn)
+    shown = status.build(manager).virtual_camera
     assert (shown.knobs, shown.lag_deg, shown.guarding) == (knobs, 10.0, 0.46)
 
 
-def test_before_control_has_told_of_its_knobs_none_are_shown(hub):
-    assert status.build(hub).virtual_camera is None
-    tell(hub)
-    assert status.build(hub).virtual_camera is None
-    tell(hub, knobs=RuntimeParameters(0.28, "full", 0.0, 1.0, guard=True))
-    assert status.build(hub).virtual_camera.lag_deg is None
+def test_before_control_has_told_of_its_knobs_none_are_shown(manager):
+    assert status.build(manager).virtual_camera is None
+    tell(manager)
+    assert status.build(manager).virtual_camera is None
+    tell(manager, knobs=RuntimeParameters(0.28, "full", 0.0, 1.0, guard=True))
+    assert status.build(manager).virtual_camera.lag_deg is None
 
 
-def test_what_the_estimator_says_of_itself_is_shown_in_the_units_of_screens(hub):
+def test_what_the_estimator_says_of_itself_is_shown_in_the_units_of_screens(manager):
     turning = (radians(0.5), 0.0, radians(-1.0))
     tell(
-        hub,
+        manager,
         estimate=estimate_fields(complaint="Restart the camera.", bias_omega_b=turning),
         poses_fused=90,
         poses_dropped=4,
         time_offset=-0.0123,
         sigma_theta=radians(0.25),
     )
-    shown = status.build(hub).estimate
+    shown = status.build(manager).estimate
     assert (shown.name, shown.complaint, shown.nis) == ("relative", "Restart the camera.", 1.25)
     assert (shown.fused, shown.dropped, shown.late, shown.leds_rejected) == (90, 4, 3, 7)
     assert (shown.age_ms, shown.time_offset_ms, shown.time_offset_sigma_ms) == (87.1, -12.3, 0.4)
@@ -114,15 +114,17 @@ def test_what_the_estimator_says_of_itself_is_shown_in_the_units_of_screens(hub)
     assert shown.bias_phone_m_s2 == [0.1, 0.0, -0.2]
 
 
-def test_what_an_estimator_does_not_know_is_null(hub):
+def test_what_an_estimator_does_not_know_is_null(manager):
     unknown = dict.fromkeys(("nis", "age", "time_offset_sigma", "bias_a_b", "bias_omega_c"))
-    tell(hub, estimate=estimate_fields(name="none", **unknown), sigma_theta=inf, time_offset=None)
-    told = msgspec.json.decode(encode_message(status.build(hub)))["estimate"]
+    tell(
+        manager, estimate=estimate_fields(name="none", **unknown), sigma_theta=inf, time_offset=None
+    )
+    told = msgspec.json.decode(encode_message(status.build(manager)))["estimate"]
     names = ("nis", "age_ms", "time_offset_ms", "time_offset_sigma_ms", "sigma_deg")
     assert all(told[name] is None for name in (*names, "bias_body_m_s2", "bias_phone_deg_s"))
     assert told["bias_body_deg_s"] is not None
 
 
-def test_before_control_has_told_of_its_estimator_nothing_is_shown(hub):
-    tell(hub)
-    assert status.build(hub).estimate is None
+def test_before_control_has_told_of_its_estimator_nothing_is_shown(manager):
+    tell(manager)
+    assert status.build(manager).estimate is None

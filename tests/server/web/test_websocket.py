@@ -87,7 +87,7 @@ def test_a_page_that_makes_too_many_faults_is_closed_and_no_other(server):
                 await page.socket.send(b"")
             assert (await page.until("refused", fatal=True))["code"] == "size"
             assert await page.closed() == 1008
-            await eventually(lambda: server.hub.phone is None)
+            await eventually(lambda: server.manager.phone is None)
             await watcher.until("status", phones=0)
 
     play(server, scene)
@@ -102,7 +102,7 @@ def test_who_does_not_say_hello_first_is_refused_and_closed(server, first):
             await page.socket.send(first)
             assert (await page.until("refused"))["fatal"] is True
             assert await page.closed() == 1008
-        assert server.hub.phone is None
+        assert server.manager.phone is None
 
     play(server, scene)
 
@@ -124,10 +124,10 @@ def test_a_second_operator_is_refused_while_the_first_lives_and_led_by_when_it_h
             async with server.page("/ws/phone") as page:
                 refused = await page.hello("operator", device="second")
                 assert (refused["code"], refused["fatal"]) == ("role", True)
-            assert server.hub.phone.device == "first"
-        await eventually(lambda: server.hub.phone is None)
+            assert server.manager.phone.device == "first"
+        await eventually(lambda: server.manager.phone is None)
         async with server.operator("second"):
-            assert server.hub.phone.device == "second"
+            assert server.manager.phone.device == "second"
 
     play(server, scene)
 
@@ -147,7 +147,7 @@ def test_a_silent_operator_loses_its_place_and_what_it_says_later_reaches_nobody
                 refused = await first.until("refused")
                 assert (refused["code"], refused["fatal"]) == ("role", True)
                 await first.closed()
-                assert server.hub.phone.device == "second"
+                assert server.manager.phone.device == "second"
                 await second.touch(await second.synchronise(), held=True)
                 heard = await server.control_hears(lambda m: isinstance(m, OperatorInput))
                 assert not [m for m in heard if isinstance(m, PhoneImuInput)]
@@ -190,8 +190,8 @@ def test_a_picture_without_a_calibration_is_refused_given_back_and_told_in_every
     async def scene():
         async with server.operator("Nobody's phone") as page, server.page("/ws/video") as video:
             await page.synchronise()
-            await eventually(lambda: server.hub.phone.ingest.clock.ready)
-            await video.hello("video", session=server.hub.phone.id)
+            await eventually(lambda: server.manager.phone.ingest.clock.ready)
+            await video.hello("video", session=server.manager.phone.id)
             await video.send(JPEG, sequence=5)
             refused = await video.until("refused")
             assert (refused["code"], refused["fatal"]) == ("calibration", False)
@@ -199,7 +199,7 @@ def test_a_picture_without_a_calibration_is_refused_given_back_and_told_in_every
             assert credit.body == Credit(5)
             await page.send(FLAT)
             status = await page.until("status", leds=0)
-            while not any("calibrated" in why for why in server.hub.refusals()):
+            while not any("calibrated" in why for why in server.manager.refusals()):
                 status = await page.until("status")
             assert status["ready"] is False
 
@@ -209,7 +209,7 @@ def test_a_picture_without_a_calibration_is_refused_given_back_and_told_in_every
 def test_pictures_that_cannot_be_dated_yet_are_given_back(server):
     async def scene():
         async with server.operator(), server.page("/ws/video") as video:
-            await video.hello("video", session=server.hub.phone.id)
+            await video.hello("video", session=server.manager.phone.id)
             await video.send(JPEG, sequence=7)
             assert (await video.record(Credit)).body == Credit(7)
 
@@ -232,7 +232,7 @@ def test_a_message_beyond_all_bounds_closes_its_connection_only(server):
             await watcher.socket.send(bytes(MAX_RECORD_BYTES + 5000))
             assert await watcher.closed() == 1009
             await page.until("status", supervisors=0)
-            assert server.hub.phone is not None
+            assert server.manager.phone is not None
 
     play(server, scene)
 
@@ -261,7 +261,7 @@ def test_the_page_that_watches_is_told_who_leads_what_lacks_and_that_control_is_
 def test_a_page_that_does_not_read_loses_the_oldest_and_holds_up_nobody(server):
     async def scene():
         async with server.supervisor() as watcher, server.operator() as page:
-            lazy = next(iter(server.hub.supervisors))
+            lazy = next(iter(server.manager.supervisors))
             for k in range(2_000):
                 lazy.push(f'{{"type": "{k}"}}')
             assert len(lazy._unsent) <= 16
@@ -309,8 +309,8 @@ def test_a_hub_whose_control_is_gone_says_that_a_stop_did_not_arrive(server, mon
     async def scene():
         async with server.supervisor() as watcher:
             await watcher.say(type="command", what="stop")
-            hub: SessionManager = server.hub
-            await eventually(lambda: any("did not reach" in text for text in hub.events))
+            manager: SessionManager = server.manager
+            await eventually(lambda: any("did not reach" in text for text in manager.events))
 
     play(server, scene)
 
@@ -319,14 +319,14 @@ def test_a_camera_that_changes_its_picture_size_is_looked_up_anew(server):
     async def scene():
         async with server.operator() as page, server.page("/ws/video") as video:
             await page.synchronise()
-            await eventually(lambda: server.hub.phone.ingest.clock.ready)
-            await video.hello("video", session=server.hub.phone.id)
+            await eventually(lambda: server.manager.phone.ingest.clock.ready)
+            await video.hello("video", session=server.manager.phone.id)
             await video.send(JPEG, sequence=1)
             await video.record(Credit)
-            await eventually(lambda: server.hub.phone.vision is not None)
+            await eventually(lambda: server.manager.phone.vision is not None)
             odd = Picture(Codec.JPEG, True, 640, 200, 0, JPEG.data)
             await video.send(odd, sequence=2)
             assert (await video.until("refused"))["code"] == "calibration"
-            assert server.hub.phone.vision is None
+            assert server.manager.phone.vision is None
 
     play(server, scene)

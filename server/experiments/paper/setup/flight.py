@@ -79,7 +79,7 @@ class Flight:
         self._hand = make_hand(hand, seed=seed, start=robot_file.start, rest_s=HOVER_S)
         self._led = LeaderFollowerSimulation(robot_file, config, leader, self._hand, seed)
         self._push_in_b = np.zeros(6)
-        self._intent: ReferenceTrajectory | None = None
+        self._reference: ReferenceTrajectory | None = None
         self._rows, self._ended = _Rows(), ""
 
     def run(self, seconds: float) -> ExperimentTrace:
@@ -106,9 +106,9 @@ class Flight:
 
     def _measure(self, now: float, output: Output) -> None:
         body, hand = self._led.body, self._hand.pose(now)
-        if self._intent is None:
-            self._intent = ReferenceTrajectory(self._config.virtual_camera, hand, body)
-        offset_in_f, turn = missed_by(body, self._intent.step(hand, PERIOD_S), self._robot.axes)
+        if self._reference is None:
+            self._reference = ReferenceTrajectory(self._config.virtual_camera, hand, body)
+        offset_in_f, turn = missed_by(body, self._reference.step(hand, PERIOD_S), self._robot.axes)
         error, view, relative = output.error, output.view, output.relative
         if now < HOVER_S - REST_S or error is None or view is None or relative is None:
             return

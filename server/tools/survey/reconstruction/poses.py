@@ -79,9 +79,13 @@ def _mirrored(scene: PointsAndPoses) -> PointsAndPoses:
     R, p = [], []
     for R_os, p_s in zip(scene.R, scene.p, strict=True):
         centre = R_os @ middle + p_s
-        sight, lean = centre / np.linalg.norm(centre), R_os @ normal
-        lean = lean if lean @ sight > 0.0 else -lean
-        turn = exp(2.0 * np.arccos(min(1.0, float(lean @ sight))) * _unit(np.cross(lean, sight)))
+        frame_pipeline, lean = centre / np.linalg.norm(centre), R_os @ normal
+        lean = lean if lean @ frame_pipeline > 0.0 else -lean
+        turn = exp(
+            2.0
+            * np.arccos(min(1.0, float(lean @ frame_pipeline)))
+            * _unit(np.cross(lean, frame_pipeline))
+        )
         R.append(turn @ R_os)
         p.append(centre - turn @ R_os @ middle)
     return replace(scene, R=np.array(R), p=np.array(p))

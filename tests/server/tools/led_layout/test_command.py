@@ -9,7 +9,7 @@ import pytest
 from server.tools.led_layout.command import main
 
 QUICK = ["--views", "10", "--distances", "2.5"]
-SQUARE = [[0.0, 0.2, 0.2], [0.0, -0.2, 0.2], [0.0, -0.2, -0.2], [0.0, 0.2, -0.2], [0.0, 0.0, 0.0]]
+IDENTITY = [[0.0, 0.2, 0.2], [0.0, -0.2, 0.2], [0.0, -0.2, -0.2], [0.0, 0.2, -0.2], [0.0, 0.0, 0.0]]
 
 
 def robot(tmp_path, leds):
@@ -29,7 +29,7 @@ def test_the_shipped_robot_is_judged_in_words(capsys):
 
 @pytest.mark.slow
 def test_a_symmetric_flat_layout_is_told_and_fails(tmp_path, capsys):
-    assert main(["leds", robot(tmp_path, SQUARE), *QUICK]) == 1
+    assert main(["leds", robot(tmp_path, IDENTITY), *QUICK]) == 1
     said = capsys.readouterr().out
     assert "Verdict at 2.50 m: bad" in said
     assert "THE LEDS ARE ALL IN A PLANE" in said
@@ -50,7 +50,7 @@ def test_figures_are_json_and_a_picture_is_drawn(tmp_path, capsys):
 @pytest.mark.slow
 def test_an_improvement_is_toml_to_paste(tmp_path, capsys):
     moves = np.array([[0.02, 0, 0], [0, 0.01, 0], [0, 0, 0], [0, 0, 0.03], [0.0, 0, 0]])
-    given = np.array(SQUARE) + moves
+    given = np.array(IDENTITY) + moves
     file = robot(tmp_path, given.tolist())
     out = tmp_path / "out"
     words = ["--improve", "--turns", "20", "--starts", "2", "--reach", "0.08", "--out", str(out)]

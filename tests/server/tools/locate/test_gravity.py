@@ -21,7 +21,7 @@ def told(R_wrong, n=20, confirmed=0):
             SimpleNamespace(
                 prior=FramePrior(R_wrong @ R_fc.T @ UP, R_fb.T @ UP),
                 pose=None if is_denied else denied,
-                sighting=SimpleNamespace(unbelieved=denied if is_denied else None),
+                detection=SimpleNamespace(unbelieved=denied if is_denied else None),
             )
         )
     return doubt.words("imu.csv", "body.csv")
@@ -57,8 +57,8 @@ def test_a_few_denied_poses_among_many_good_ones_are_no_mistake():
 
 def test_without_both_verticals_nothing_is_said():
     doubt = GravityDoubt()
-    sighting = SimpleNamespace(unbelieved=SimpleNamespace(R_cb=np.eye(3)))
+    detection = SimpleNamespace(unbelieved=SimpleNamespace(R_cb=np.eye(3)))
     for ups in ((None, UP), (UP, None)) * 10:
-        doubt.add(SimpleNamespace(prior=FramePrior(*ups), pose=None, sighting=sighting))
-    doubt.add(SimpleNamespace(prior=FramePrior(UP, UP), pose=None, sighting=None))
+        doubt.add(SimpleNamespace(prior=FramePrior(*ups), pose=None, detection=detection))
+    doubt.add(SimpleNamespace(prior=FramePrior(UP, UP), pose=None, detection=None))
     assert doubt.words("imu.csv", "body.csv") == []

@@ -15,10 +15,10 @@ CAMERA = Camera(640, 480, np.diag([500.0, 500.0, 1.0]), "plumb_bob", np.zeros(4)
 
 
 def located(k, pose=None, reason=""):
-    sighting = SimpleNamespace(
+    detection = SimpleNamespace(
         pose=pose, reason=reason, match=None, unbelieved=None, took_s={"detect": 1e-4 * (k + 1)}
     )
-    return Located(MediaFrame(f"{k}.png", 0.1 * k, None), sighting, 0.002, FramePrior())
+    return Located(MediaFrame(f"{k}.png", 0.1 * k, None), detection, 0.002, FramePrior())
 
 
 def pose(leds):

@@ -117,7 +117,7 @@ def test_it_sees_what_the_live_pipeline_sees(films, tmp_path):
     source = films["typical"]
     film = RenderedVideo(SCENES["typical"], seed=SEED, size=VGA, frames=FRAMES)
     encoder = Encoder(*VGA, 30.0, 1_000_000, "jpeg")
-    sight = FramePipeline(film.camera, _robot(film.leds_in_b), GatesConfig())
+    frame_pipeline = FramePipeline(film.camera, _robot(film.leds_in_b), GatesConfig())
     phone, body = (load_imu(source / name) for name in ("imu.csv", "body.csv"))
     live, at = [], [0, 0]
     for k, row in enumerate(table(source / "times.csv")):
@@ -126,13 +126,13 @@ def test_it_sees_what_the_live_pipeline_sees(films, tmp_path):
         (folder / f"{k:03}.jpg").write_bytes(data)
         t = float(row["t_s"])
         for s in phone[at[0] : (stop := int(np.sum(phone[:, 0] <= t + AHEAD_S)))]:
-            sight.looking.add_imu(PhoneImu(s[0], s[1:4], s[4:]))
+            frame_pipeline.front_end.add_imu(PhoneImu(s[0], s[1:4], s[4:]))
         at[0] = stop
         for s in body[at[1] : (stop := int(np.sum(body[:, 0] <= t + AHEAD_S)))]:
-            sight.looking.add_imu(BodyImu(s[0], s[1:4], s[4:]))
+            frame_pipeline.front_end.add_imu(BodyImu(s[0], s[1:4], s[4:]))
         at[1] = stop
         sent = EncodedFrame(t, t, k, Picture(Codec.JPEG, True, *VGA, 0, data))
-        live.append(sight.see([sent]).pose)
+        live.append(frame_pipeline.see([sent]).pose)
     times = [f"{k:03}.jpg,{row['t_s']}" for k, row in enumerate(table(source / "times.csv"))]
     (folder / "times.csv").write_text("\n".join(["frame,t_s", *times]) + "\n")
     out = tmp_path / "poses.csv"
