@@ -1,4 +1,4 @@
-"""Where a filter says the robot was when a picture was taken that is only now looked at."""
+"""Predictions of a filter for the times of images that are only now looked at."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class PredictionHistory:
     """The last second of predictions. One thread may add while another one asks."""
 
     def __init__(self) -> None:
-        """Nothing known."""
+        """Begin without a prediction."""
         self._rows: tuple[Prediction, ...] = ()
 
     def add(self, expected: Prediction | None) -> None:
@@ -74,7 +74,7 @@ class PredictionHistory:
 
 
 def _between(before: Prediction, after: Prediction, t: float) -> Prediction:
-    """On the straight way from one to the other; as unsure as the worse of them."""
+    """Interpolate two predictions; as unsure as the worse of them."""
     share = (t - before.t) / (after.t - before.t)
     return Prediction(
         t=t,

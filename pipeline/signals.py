@@ -76,7 +76,7 @@ class Spots:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
-    """Spots named as LEDs."""
+    """Correspondences: which spot is which LED."""
 
     led: npt.NDArray[np.intp]
     """(m,) index of the LED in the robot file."""

@@ -119,7 +119,9 @@ class Teleop:
 
     def step(self, inputs: Inputs) -> Output:
         """One control period. Fig. 4."""
+        # time first: every filter below steps by the period that has really passed
         dt_ms = self._pass_time(inputs.t)
+        # news before the state: a late image is fused when it was taken, then predicted to now
         self._fuse(inputs)
         relative = self.estimator.state(inputs.t)  # Eq. (5)-(13)
         R_fc = self._R_fc_now(relative)
@@ -127,6 +129,7 @@ class Teleop:
         if known is not None:
             self._tracking.observe(known, self._given_in_b, self._h)
             self._propagate_station(known, inputs.t)
+        # the reference moves before its error is taken: else a period of the way back is missing
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
         error = self._error(known)  # Eq. (14)-(19)
@@ -136,11 +139,14 @@ class Teleop:
             inputs.t - self._t_phone,
             inputs.t - self._body.t,
         )
+        # the machine decides by this period's error, and its mode holds for these thrusts already:
+        # whoever lets go gets no thrust of tracking any more
         judged = self._judge(inputs, known, error, ages)
         before = self._failsafe.mode
         self._failsafe = failsafe.step(self._failsafe, judged, dt_ms, self._limits)
         if self._failsafe.mode != before:
             known, error = self._change_mode(before, known, error)
+        # last, what was given: feed-forward takes it off the next period's specific force
         thrusts, saturated = self._act(known, error)
         self._given_in_b = self._robot.A[:3] @ thrusts - self._actuation.push_in_b[:3]
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
@@ -199,14 +205,14 @@ class Teleop:
         return self._bridge.step(self.attitude, relative, self._h)
 
     def _is_deaf(self, t: float) -> bool:
-        """The robot's turns since the last step are not known.
+        """Whether the robot's turns since the last step are unknown.
 
         After a stall all samples come at once, but a step counts for no more than its longest.
         """
         return self._stood_still or t - self._body.t > LONGEST_STEP_S
 
     def _look(self, relative: RelativeState | None, R_fc: Array | None) -> Situation | None:
-        """The robot from the virtual camera, a period later."""
+        """Step the virtual camera by a period, and see the robot from it."""
         if relative is None or R_fc is None:
             return None
         p_ref_in_v = self._reference.p_rv_in_v if self._reference is not None else None
@@ -243,7 +249,7 @@ class Teleop:
         )
 
     def _sensor_fault(self) -> str:
-        """A body at rest may say the same for long, if its sensors are simulated without noise."""
+        """Words if the robot's IMU is frozen in flight; at rest a noiseless one repeats itself."""
         flies = self._failsafe.mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
         return (
             "The robot's motion sensors stand still."
@@ -264,6 +270,8 @@ class Teleop:
         """Bumpless: tracking starts where the robot is, holding starts from what tracking did."""
         mode = self._failsafe.mode
         if mode == Mode.TRACK and known is not None:
+            # v = c first, then a view from there, then the reference: the error begins at zero, and
+            # the lag that the virtual camera had before is no wish of the operator's
             self._reference = None
             self._virtual_camera.reset()
             known = self._look(known.relative, known.R_fc) or known
@@ -273,6 +281,7 @@ class Teleop:
             held_in_f = known.view.R_fv @ known.view.R_vb @ self._force_in_b
             self._tracking.start(held_in_f if before != Mode.ARMED else None)
             return known, self._error(known)
+        # hold and station take over from what tracking last gave, so before its integrals are reset
         if before == Mode.TRACK and known is not None:
             R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
             constant_in_f = self._tracking.constant_force_in_f
@@ -280,6 +289,7 @@ class Teleop:
             if error is not None:
                 offset_in_f = known.view.R_fv @ error.e_p_in_v
                 self._station.start(offset_in_f, constant_in_f)
+        # after a gap the velocity is the station's, which dead reckoning has kept
         if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._keeps_station:
             self._hold.start(
                 self._force_in_b,
@@ -294,7 +304,7 @@ class Teleop:
         return known, None
 
     def _propagate_station(self, known: Situation, t: float) -> None:
-        """Through a gap by the gyroscope alone: what comes after it puts the phone's axes right."""
+        """Carry the station on; in a gap by the gyroscope alone: f is put right only after it."""
         R_fb = known.view.R_fv @ known.view.R_vb
         if self._is_deaf(t):
             self._station.reset()
@@ -305,7 +315,7 @@ class Teleop:
         )
 
     def _follow_back(self) -> None:
-        """After a gap the reference goes to where it was led before, slowly: nothing jumps."""
+        """Bring the reference after a gap slowly back to where it was led: nothing jumps."""
         reference, led_to = self._reference, self._led_to
         if reference is None or led_to is None or reference is led_to:
             return

@@ -1,4 +1,4 @@
-"""What the hand meant: where the robot should be if everything were known; tracking's measure."""
+"""Reference trajectory: where the robot should be if all were known; what tracking is held to."""
 
 from __future__ import annotations
 

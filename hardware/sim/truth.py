@@ -1,4 +1,4 @@
-"""Where the simulated robot really is, for simulated phones on the same machine only.
+"""Ground truth of the simulated robot, for simulated phones on the same machine only.
 
 Request: any 8 bytes, to the truth port on the loopback interface. Answer, little-endian:
 

@@ -38,10 +38,10 @@ class LedObservation:
 
 
 class BlockPictures:
-    """Gathers."""
+    """Gathers observations until they make a block."""
 
     def __init__(self, leds: int) -> None:
-        """Of a robot with so many LEDs."""
+        """For a robot with so many `leds`."""
         self._m = leds
         self._looks: list[LedObservation] = []
         self._next: list[LedObservation] = []
@@ -71,7 +71,7 @@ class BlockPictures:
         self._looks, self._next = self._next, []
 
     def take(self) -> Pictures:
-        """The full block; its times are stamps."""
+        """Take the full block out; its times are stamps."""
         looks = self._looks
         self.drop()
         n = len(looks)

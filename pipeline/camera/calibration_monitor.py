@@ -1,4 +1,4 @@
-"""Watches whether a camera still is the one that was calibrated, while it is used.
+"""Online calibration monitor: does the camera in use still have the calibration of its file?
 
 Believed poses and both gyroscopes go in; every few seconds of motion a block is summed up. At rest
 nothing is judged.
@@ -104,7 +104,7 @@ class CalibrationMonitor:
                 _append(self._body, sample.t, sample.omega_m_bf_in_b)
 
     def _newest(self) -> float:
-        """Until when both sides have been felt."""
+        """Time until which both sides' samples have come [s]."""
         if not self._phone or not self._body:
             return -np.inf
         return min(self._phone[-1][0], self._body[-1][0])

@@ -1,4 +1,4 @@
-"""How well the camera is set for LEDs: too bright, too dim, smeared by motion, out of focus.
+"""How well the camera is set for LEDs: too bright, too dim, motion blur, out of focus.
 
 Judged by the LEDs that are known to be LEDs, over a second, and taken back as slowly.
 """
@@ -65,7 +65,7 @@ class ExposureMonitor:
     """Follows one camera."""
 
     def __init__(self, focal_px: float) -> None:
-        """Nothing seen."""
+        """Begin with nothing seen; `focal_px` is the mean focal length."""
         self._focal_px = focal_px
         self._t = -np.inf
         self._levels = np.full(4, np.nan)

@@ -40,7 +40,7 @@ def put_exposures(luma: Image, pixels: Array, white: float, out: Array) -> None:
 def put_moments(
     luma: Image, left: int, top: int, around: float, peak: float, white: float, out: Array
 ) -> None:
-    """The same for one window."""
+    """Fill one row of `put_exposures`."""
     least = around + 0.4 * (peak - around)
     total, su, sv, uu, uv, vv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     clipped = 0

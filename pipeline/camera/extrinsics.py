@@ -1,4 +1,4 @@
-"""How a camera sits beside its motion sensors, and how far its clock is off theirs."""
+"""Camera-IMU extrinsics: rotation from motion sensors to camera, and the camera-IMU time delay."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Extrinsics:
     """A picture was taken at its stamp plus this, on the sensors' clock."""
 
     def felt(self, sample: PhoneImu) -> PhoneImu:
-        """What the sensors said, in the camera's axes."""
+        """Turn a sample of the sensors into the camera's axes."""
         R = self.R_ci
         return PhoneImu(sample.t, R @ sample.omega_m_cf_in_c, R @ sample.a_m_cf_in_c)
 

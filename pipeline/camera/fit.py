@@ -1,4 +1,4 @@
-"""What is wrong with a camera, from blocks of seconds in which it moved: least squares that doubts.
+"""Errors of a camera's calibration by robust least squares over blocks of seconds of motion.
 
 Each block says the same eight unknowns (`calibration_monitor_kernels`) apart from its own
 nuisances. How far the blocks contradict each other is part of the variance: gyroscopes drift, robot
@@ -82,7 +82,7 @@ class CameraFit:
 
     @staticmethod
     def columns(leds: int) -> int:
-        """Of the sums over a robot with so many LEDs."""
+        """Columns of the sums over a robot with so many LEDs."""
         return LOCAL + 3 * leds + GLOBAL + 1
 
     def drift(self, N: Array) -> Array:
@@ -113,7 +113,7 @@ class CameraFit:
         return W
 
     def facts(self, t: float) -> CameraFacts | None:
-        """As of now; None before there are blocks enough."""
+        """Facts as of now; None before there are blocks enough."""
         n = len(self._blocks)
         if n < MIN_BLOCKS:
             return None

@@ -1,4 +1,4 @@
-"""The rolling shutter's readout time: the one from the file until pictures say it better."""
+"""Rolling-shutter line delay: the readout time of the file until images tell it better."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class LineDelay:
     """Which readout the rolling-shutter model should use."""
 
     def __init__(self, from_file_s: float) -> None:
-        """Nothing learnt: `from_file_s` [s]."""
+        """Begin with the file's readout time, `from_file_s` [s]."""
         self.in_use_s = from_file_s
         self.is_learnt = False
 

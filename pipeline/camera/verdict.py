@@ -1,4 +1,4 @@
-"""Is this the camera that was calibrated? Words when it is surely not."""
+"""Words for who holds the phone when the camera is surely not the calibrated one."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class Actuation:
     """A robot's thrusters, behind the attitude loop if it must tilt to move."""
 
     def __init__(self, robot: Robot, config: TeleopConfig) -> None:
-        """Of a robot's geometry and limits."""
+        """For a robot's geometry and limits."""
         self._A, self._axes = robot.A, robot.wrench_axes
         self._allocation = Allocation(robot, config.allocation)
         self._tilt = TiltToMove(robot, config.gains, config.tilt) if robot.needs_tilt else None

@@ -146,7 +146,7 @@ def _share(x: float) -> float:
 
 
 def _unit(vector: Array) -> Array:
-    """Its direction; 0 of 0."""
+    """Unit vector; 0 of 0."""
     length = _norm(vector)
     return vector / length if length > 0.0 else vector
 

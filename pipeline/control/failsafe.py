@@ -105,7 +105,7 @@ class FailsafeTimers:
     def of(
         cls, config: FailsafeConfig, ramp_s: float, hangs: bool = True, bridges: bool = True
     ) -> FailsafeTimers:
-        """Rounded to milliseconds.
+        """Round a configuration's timers to milliseconds.
 
         Args:
             config: Timers [s].

@@ -104,5 +104,5 @@ class FeedForward:
 
 
 def _share(x: float) -> float:
-    """Of the way that a first-order low pass goes in `x` time constants."""
+    """Share of the way that a first-order low pass goes in `x` time constants."""
     return 1.0 - exponential(-x)

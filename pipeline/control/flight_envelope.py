@@ -1,4 +1,4 @@
-"""Is what we know good enough to fly on, and is the flight within its envelope?"""
+"""Flight envelope and health: estimates and flights that nobody may go on with."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Ages:
     body_imu: float
 
     def in_ms(self) -> dict[str, int]:
-        """By the names of `failsafe.FailsafeInputs`, saturated."""
+        """Ages [ms] by the names of `failsafe.FailsafeInputs`, saturated."""
         return {
             "operator_ms": saturated_ms(self.operator),
             "pose_ms": saturated_ms(self.pose),

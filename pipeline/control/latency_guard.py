@@ -34,13 +34,13 @@ class Bearable:
     """For each of `BODY_AGES_S` [s]; `NEVER`: the body's samples themselves are too old."""
 
     def latency(self, body_age: float) -> float:
-        """With body samples so old [s]."""
+        """Largest age of images [s] with body samples so old [s]."""
         i = int(np.searchsorted(BODY_AGES_S, body_age - 1e-6))
         return self.latencies[i] if i < len(self.latencies) else NEVER
 
 
 class LatencyGuard:
-    """Of one robot with its gain sets."""
+    """Refuses to arm one robot when images or samples are too old for its gain set."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class LatencyGuard:
     def _remedies(
         self, chosen: str, estimator: EstimatorName, latency: float, body_age: float
     ) -> Iterator[str]:
-        """The least change first."""
+        """What would do, the least change first."""
         kind = _kind(estimator)
         fits = [key for key, b in self.bearable.items() if latency <= b.latency(body_age)]
         yield from (f"gains {name!r}" for name, other in fits if other == kind)
@@ -120,7 +120,7 @@ class LatencyGuard:
         return Bearable(tuple(latencies))
 
     def _largest_latency(self, loop: Loop, sensing: Sensing) -> float:
-        """By bisection; margins shrink as pictures get older."""
+        """Largest bearable age of images [s], by bisection: margins shrink as they get older."""
         low, high = 0.0, self._margins.max_latency_s
         if not self._is_sound(loop, replace(sensing, latency=low)):
             return NEVER

@@ -55,7 +55,7 @@ class Sensing:
 
 @dataclass(frozen=True, slots=True)
 class AxisMargins:
-    """Of one axis; what is infinite is `inf`."""
+    """Gain, phase and delay margins of one axis; what is infinite is `inf`."""
 
     stable: bool
     delay: float
@@ -122,7 +122,7 @@ class Loop:
         return np.asarray(w / (S + w))
 
     def _actuator(self, axis: int, sensing: Sensing) -> Complex:
-        """From the command of a force or torque to it."""
+        """Transfer function from the command of a force or torque to it."""
         d = self.dynamics
         thrusters: Complex = np.exp(-S * d.delay) / (1.0 + d.lag * S) * _hold(PERIOD_S)
         if not d.needs_tilt or axis not in TILT_AXIS:
@@ -191,5 +191,5 @@ def _critical_factors(L: Complex) -> Iterator[float]:
 
 
 def _hold(period: float) -> Complex:
-    """Of a value held for `period` [s]."""
+    """Transfer function of a value held for `period` [s]."""
     return np.asarray((1.0 - np.exp(-S * period)) / (S * period))

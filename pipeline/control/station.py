@@ -53,7 +53,7 @@ class StationKeeping:
         self._offset_in_f, self._constant_force_in_f = offset_in_f, constant_force_in_f
 
     def reset(self) -> None:
-        """Nothing was felt for a while: where it is now is as good as any place."""
+        """Begin again after a gap of samples: where it is now is as good as any place."""
         self.v_in_f, self._offset_in_f = np.zeros(3), np.zeros(3)
 
     def error(self, view: VirtualView) -> PoseError:
@@ -63,7 +63,7 @@ class StationKeeping:
         )
 
     def force_in_b(self, R_fb: Array) -> Array:
-        """(3,) [N]; none on axes let alone."""
+        """Force in b (3,) [N]; none on axes let alone."""
         return (
             self._Kp * (R_fb.T @ self._offset_in_f)
             - self._Kd * (R_fb.T @ self.v_in_f)

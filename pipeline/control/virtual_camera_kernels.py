@@ -34,7 +34,7 @@ KNOBS, MAX_SPEED, GUARD_START = 7, 5, 6
 
 @kernel
 def quaternion(R: Array) -> Quaternion:
-    """Of a rotation matrix, by its largest component; its sign is free."""
+    """Quaternion of a rotation matrix, by its largest component; its sign is free."""
     t = R[0, 0] + R[1, 1] + R[2, 2]
     if t > 0.0:
         s = 2.0 * sqrt(1.0 + t)
@@ -56,7 +56,7 @@ def quaternion(R: Array) -> Quaternion:
 
 @kernel
 def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Of two rotations."""
+    """Product of two quaternions."""
     return (
         p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
         p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
@@ -119,7 +119,7 @@ def norm(v: Array) -> float:
 
 @kernel
 def share(rate: float, guard: float, h: float) -> float:
-    """Of the way to its target that a stage goes in `h`; `rate` and the result's as logarithms."""
+    """Share of its way that a stage goes in `h`; `rate` and the result's as logarithms."""
     rate += guard * max(0.0, GUARD_RATE - rate)
     return 1.0 if rate >= AT_ONCE else 1.0 - exp(-h * exp(rate))
 

@@ -79,7 +79,7 @@ def _choices(thrusters: int, count: int) -> Iterator[list[tuple[int, ...]]]:
 
 @numba.njit(cache=True, error_model="numpy")
 def _shares(normals: Array, reach: Array, wrench: Array) -> tuple[float, float]:
-    """All s with s nᵀw ≤ reach for every face."""
+    """Interval of all s with s nᵀw ≤ reach for every face."""
     least, largest = -np.inf, np.inf
     for i in range(normals.shape[0]):
         along = 0.0

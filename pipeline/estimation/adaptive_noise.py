@@ -1,14 +1,15 @@
-"""How far the phone's motion samples can be trusted, learnt from the pictures that they foretell.
+"""Adaptive measurement noise of the phone's IMU, learnt from the poses that its samples predict.
 
 A browser hands samples on late, rounds their times or skips some, and dates pictures by its own
 clock: what both say of a hand's tremor can differ by ten times the sensors' noise. A filter that
 believes the noise alone takes pictures for outliers, and loses the robot. So each picture's own
-pose is compared with the one foretold for it: misfit eᵀ S⁻¹ e / 6, with S = P + C.
+pose is compared with the one predicted for it: misfit eᵀ S⁻¹ e / 6, with S = P + C.
 
 * Misfits above what is tolerated: the samples' variances grow until there are none, and fade again
   (covariance matching; Mehra, IEEE Trans. Automatic Control 17 (1972) 693).
-* One picture far off, by no more than bad samples explain: what was foretold of it is doubted at
-  once, as far as it missed (strong tracking; Zhou & Frank, Int. J. Control 65 (1996) 295).
+* One picture far off, by no more than bad samples explain: the covariance predicted for it is
+  inflated at once, as far as it missed (strong tracking; Zhou & Frank, Int. J. Control 65 (1996)
+  295).
 
 Gyroscope and accelerometer are doubted alike: seen from the camera, a turn moves the robot aside as
 a step does, and late samples are late for both.
@@ -41,16 +42,16 @@ class AdaptiveNoise:
     """By what factor the variances of the phone's samples are greater than their data sheet's."""
 
     def __init__(self) -> None:
-        """By none."""
+        """Begin with the data sheet's noise."""
         self._log = 0.0
 
     @property
     def factor(self) -> float:
-        """From 1 to `MOST`."""
+        """Factor of the variances, 1 to `MOST`."""
         return math.exp(self._log)
 
     def judge(self, p_bc_in_c: Array, R_cb: Array, P: Array, pose: RelativePose) -> float:
-        """Learn from a picture's own `pose` and the one foretold for it, P (6, 6) in (δp, θ).
+        """Learn from a picture's own `pose` and the one predicted for it, P (6, 6) in (δp, θ).
 
         Gives the factor, 1 as a rule, by which P must be stretched for this picture.
         """

@@ -62,7 +62,7 @@ class Attitude:
 
     @property
     def t(self) -> float:
-        """Of the last sample [s]; -inf before the first."""
+        """Time of the last sample [s]; -inf before the first."""
         return self._t
 
     @property
@@ -74,7 +74,7 @@ class Attitude:
         return sqrt(HAND_VARIANCE * max(GAIN, 1.0 / max(age, SAMPLE_S)))
 
     def correct(self, R_fc: Array, sigma: float) -> None:
-        """Somebody else knows the attitude at the last sample, (3, 3), by `sigma` [rad].
+        """Correct by an attitude (3, 3) at the last sample, otherwise known to `sigma` [rad].
 
         No turn of f (`take_turn`): it is the camera's motion in a gap that was not known.
         """

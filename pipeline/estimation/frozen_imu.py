@@ -17,7 +17,7 @@ class FrozenImu:
     """Since when the robot's samples are one and the same."""
 
     def __init__(self) -> None:
-        """Nothing heard."""
+        """Begin before the first sample."""
         self._last: BodyImu | None = None
         self._t_changed = 0.0
 
@@ -34,5 +34,5 @@ class FrozenImu:
 
     @property
     def is_frozen(self) -> bool:
-        """Whether they have been for too long."""
+        """Whether the samples have been the same for too long."""
         return self._last is not None and self._last.t - self._t_changed >= FROZEN_S

@@ -1,4 +1,4 @@
-"""Which way is up, for one motion sensor: the gyroscope now, the accelerometer in the long run."""
+"""Gravity direction in one IMU's axes: its gyroscope now, its accelerometer in the long run."""
 
 from __future__ import annotations
 

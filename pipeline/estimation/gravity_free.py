@@ -46,7 +46,7 @@ class PredictedImu:
 
 
 def derivative(x: RelativeMotion, felt: PredictedImu) -> RelativeMotion:
-    """(ṗ, Ṙ, u̇)."""
+    """Derivative (ṗ, Ṙ, u̇)."""
     return RelativeMotion(
         p=x.u - cross(felt.omega_c, x.p),
         R=x.R @ skew(felt.omega_b) - skew(felt.omega_c) @ x.R,
@@ -55,7 +55,7 @@ def derivative(x: RelativeMotion, felt: PredictedImu) -> RelativeMotion:
 
 
 def error_jacobian(x: RelativeMotion, felt: PredictedImu) -> tuple[Array, Array]:
-    """∂(δṗ, θ̇, δu̇) with respect to (δp, θ, δu): (9, 9), and to the four inputs: (9, 12).
+    """Jacobians of (δṗ, θ̇, δu̇) by (δp, θ, δu) (9, 9) and by the four inputs (9, 12).
 
     The inputs' order is that of `PredictedImu`.
     """
@@ -88,7 +88,7 @@ def seen_at(x: RelativeMotion, led_in_b: Array) -> Array:
 
 
 def seen_jacobian(x: RelativeMotion, felt: PredictedImu, led_in_b: Array) -> tuple[Array, Array]:
-    """∂z/∂(δp, θ) (2, 6), and ∂z/∂t (2,) for a picture taken later."""
+    """Jacobians ∂z/∂(δp, θ) (2, 6), and ∂z/∂t (2,) for a picture taken later."""
     q = x.p + x.R @ led_in_b
     D = np.array([[-q[1] / q[0], 1.0, 0.0], [-q[2] / q[0], 0.0, 1.0]]) / q[0]
     q_rate = x.u - cross(felt.omega_c, q) + x.R @ cross(felt.omega_b, led_in_b)

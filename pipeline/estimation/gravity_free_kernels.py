@@ -155,7 +155,7 @@ def _carry(
     K: Array,
     s: Array,
 ) -> None:
-    """p, u, R themselves."""
+    """Carry p, u, R over the step."""
     turn(EE, x[3:6], s)
     for i in range(3):
         Ea = E[i, 0] * a[0] + E[i, 1] * a[1] + E[i, 2] * a[2]

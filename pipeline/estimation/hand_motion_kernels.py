@@ -1,8 +1,8 @@
-"""What a hand will do in the next few dozen milliseconds: a slow motion and a tremor.
+"""Hand-motion predictor: the angular rate of a hand some dozen milliseconds ahead.
 
 Physiological tremor is noise in a narrow band around 8-12 Hz (Timmer et al. 1998): sixty samples a
 second say well how it goes on for half a period. Gaussian process regression of the angular rate
-over the newest samples, with the covariance
+over the newest samples (Rasmussen & Williams 2006), with the covariance
 
     k(τ) = slow² exp(−τ²/2 length²) + tremor² exp(−τ/coherence) cos(2π frequency τ)
 

@@ -124,7 +124,7 @@ class NoFilter:
 
     @property
     def complaint(self) -> str:
-        """It has none."""
+        """No complaint: it learns nothing that could be wrong."""
         return ""
 
     @property

@@ -1,4 +1,4 @@
-"""Old pictures and unordered IMU samples in one filter: what is late is fused when it was taken.
+"""Out-of-sequence measurements: late poses and unordered IMU samples, fused when they were taken.
 
 Three copies of the filter lie on the time axis:
 
@@ -6,7 +6,8 @@ Three copies of the filter lie on the time axis:
 
 Up to the *checkpoint* everything has arrived: later news from before it is too late. The *frontier*
 knows everything that arrived so far; when a sample arrives from before it, it is made anew from the
-checkpoint. Each `to_now` replays only what came after the frontier.
+checkpoint. Each `to_now` replays only what came after the frontier: the exact answer to what
+Bar-Shalom approximates (IEEE Trans. Aerospace and Electronic Systems 38 (2002) 769).
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ class EkfCheckpoint:
 
     @staticmethod
     def empty() -> EkfCheckpoint:
-        """Of no meaning yet."""
+        """Memory for a checkpoint; its content has no meaning yet."""
         return EkfCheckpoint(-inf, np.zeros(N), np.zeros((N, N)), np.eye(3))
 
     def copy(self, other: EkfCheckpoint) -> None:
@@ -135,7 +136,7 @@ class OutOfSequenceEkf:
         return self._advance(self.now, t)
 
     def _renew_frontier(self) -> bool:
-        """From the checkpoint through the waiting pictures."""
+        """Make the frontier anew, from the checkpoint through the waiting pictures."""
         self._frontier.copy(self.checkpoint)
         self._frontier_good = True
         for pose in self._waiting:
@@ -174,13 +175,13 @@ def walk_densities(c: EkfConfig) -> Array:
 
 
 def imu_variances(c: EkfConfig) -> Array:
-    """(2, 6) by kind."""
+    """Variances of IMU samples (2, 6) by kind [unit²]."""
     body, phone = (c.sigma_omega_b, c.sigma_a_b), (c.sigma_omega_c, c.sigma_a_c)
     return np.repeat(np.square((body, phone)), 3, axis=1)
 
 
 def initial_variances(c: EkfConfig) -> Array:
-    """(30,) at a start; those of the pose come with it."""
+    """Variances (30,) at a start; those of the pose come with it [unit²]."""
     rate, force = c.initial_omega, c.initial_a
     sigmas = (0.0, 0.0, c.initial_v, rate, rate, force, force, c.initial_delta)
     return np.repeat(np.square((*sigmas, c.initial_bias_omega, c.initial_bias_a)), 3)

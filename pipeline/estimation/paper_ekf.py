@@ -71,7 +71,7 @@ class PaperEkf:
 
     @property
     def complaint(self) -> str:
-        """It has none."""
+        """No complaint: it learns nothing that is checked."""
         return ""
 
     @property

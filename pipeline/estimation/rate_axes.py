@@ -1,4 +1,4 @@
-"""Are the gyroscope's axes those of the device? What else saw it turn must agree.
+"""Sensor validation: the gyroscope's axes against turns that gravity and images saw.
 
 In a device that turns with ω, the direction of gravity f̂ changes by ḟ̂ = f̂ × ω, and pictures show
 its turns directly. Of the 48 ways to permute and sign three axes the right one explains what was

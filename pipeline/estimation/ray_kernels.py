@@ -1,4 +1,4 @@
-"""LEDs as a picture saw them, compiled: gate each, fuse those that pass. `gravity_free.seen_at`."""
+"""Compiled measurement update by LED rays: gate each, fuse the inliers. `gravity_free.seen_at`."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _expect(
 
 @kernel
 def _unlikelihood(P: Array, H: Array, C: Array, miss: Array) -> float:
-    """missᵀ (H P Hᵀ + C)⁻¹ miss."""
+    """Squared Mahalanobis distance missᵀ (H P Hᵀ + C)⁻¹ miss."""
     s00, s01, s11 = C[0, 0], C[0, 1], C[1, 1]
     for i in range(7):
         h0, h1 = 0.0, 0.0

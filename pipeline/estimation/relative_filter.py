@@ -113,13 +113,15 @@ class RelativeFilter:
         t = seen.t + float(self._track.newest.x[X_OFFSET])
         if t <= self._track.checkpoints[0].t:
             return Fusion.LATE
+        # gating in this order: a prediction too unsure to gate by is replaced, not corrected; then
+        # what the sensors may be off by inflates it, before each LED is gated against it
         predicted = self._track.predicted(min(t, now))
         if is_better_start(seen, predicted.P, self._config) and self._start(seen, now):
             return Fusion.STARTED
         return self._fuse(seen, predicted, now)
 
     def _doubted(self, seen: VisionMeasurement, predicted: Checkpoint) -> float:
-        """How far what is foretold must be stretched for this picture; learns of the sensors."""
+        """Covariance inflation of the prediction for this picture; learns of the sensors."""
         dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
             return 1.0
@@ -134,6 +136,7 @@ class RelativeFilter:
         self._recent.append(seen.t)
         used = int((checkpoint.use == 1).sum()) if checkpoint.use is not None else 0
         self.leds_rejected += len(seen.rays) - used
+        # soundness before statistics: NaN must reach neither χ² nor the counts of misses
         if not np.isfinite(chi2):
             self._give_up()
             return self._start(seen, now)
@@ -239,7 +242,7 @@ class RelativeFilter:
 
     @property
     def complaint(self) -> str:
-        """The time offset that it learns can't be believed."""
+        """Why the learnt time offset can't be believed, in words for the operator."""
         return self._offset.complaint
 
     @property

@@ -79,7 +79,7 @@ def _times_step(f: Array, A: Array, n: int, w: Array) -> None:
 
 @kernel
 def apply(P: Array, F: Array, G: Array, Q: Array, walks: Array, span: float, w: Array) -> None:
-    """P (22, 22) after a transition; walks (13,) densities of biases and offset [unit²/s].
+    """Carry P (22, 22) over a transition; walks (13,) densities of biases and offset [unit²/s].
 
     Inputs are samples *less* biases, so biases act with −G; w (2, 9, 22) is scratch memory.
     """

@@ -51,7 +51,7 @@ class States:
 
 
 def derivative(x: Array) -> Array:
-    """ẋ (30,). Eq. (3), (7), (8), (11)."""
+    """Derivative ẋ (30,). Eq. (3), (7), (8), (11)."""
     p, eta, v = x[States.p_bc_in_c], x[States.eta_bc], x[States.v_bc_in_c]
     omega_b, omega_c = x[States.omega_bf_in_b], x[States.omega_cf_in_c]
     a_b, a_c, delta = x[States.a_bf_in_b], x[States.a_cf_in_c], x[States.delta_cf_in_c]
@@ -71,7 +71,7 @@ def derivative(x: Array) -> Array:
 
 
 def jacobian(x: Array) -> Array:
-    """∂ẋ/∂x (30, 30)."""
+    """Jacobian ∂ẋ/∂x (30, 30)."""
     p, eta, v = x[States.p_bc_in_c], x[States.eta_bc], x[States.v_bc_in_c]
     omega_c, delta = x[States.omega_cf_in_c], x[States.delta_cf_in_c]
     W = skew(omega_c)
@@ -123,7 +123,7 @@ def rk4_step(x: Array, h: float) -> Array:
 
 
 def transition(x: Array, h: float) -> Array:
-    """∂x(t+h)/∂x(t) (30, 30) to second order in h."""
+    """Transition matrix ∂x(t+h)/∂x(t) (30, 30), to second order in h."""
     F = h * jacobian(x)
     Phi: Array = np.eye(N) + F + 0.5 * F @ F
     return Phi
@@ -146,7 +146,7 @@ H_PHONE: Final = _rows(States.omega_cf_in_c, States.a_cf_in_c)
 
 
 def measurement(x: Array) -> Array:
-    """y (18,) = (p, η, ω_m,b, ω_c, a_m,b, a_c). Eq. (9), (13)."""
+    """Measurement y (18,) = (p, η, ω_m,b, ω_c, a_m,b, a_c). Eq. (9), (13)."""
     pose, body, phone = H_POSE @ x, H_BODY @ x, H_PHONE @ x
     return np.concatenate((pose, body[:3], phone[:3], body[3:], phone[3:]))
 

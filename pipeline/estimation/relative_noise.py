@@ -9,19 +9,19 @@ from pipeline.frames import Array
 
 
 def noise_of(c: RelativeConfig) -> Array:
-    """(2, 3, 2), see `relative_kernels.transit`."""
+    """Noise densities (2, 3, 2) of both IMUs' samples, as `relative_kernels.transit` takes them."""
     body = ((c.sigma_omega_b, c.sigma_f_b), (0.0, c.rough_f_b), (c.drift_omega_b, c.drift_f_b))
     phone = ((c.sigma_omega_c, c.sigma_f_c), (0.0, c.rough_f_c), (c.drift_omega_c, c.drift_f_c))
     return np.array((body, phone))
 
 
 def hand_of(c: HandConfig) -> Array:
-    """(6,), see `hand_motion_kernels.covariance`."""
+    """Parameters (6,) of the hand's motion, as `hand_motion_kernels.covariance` takes them."""
     return np.array((c.slow, c.length_s, c.tremor, c.tremor_hz, c.coherence_s, c.noise))
 
 
 def walks_of(c: RelativeConfig) -> Array:
-    """(13,) densities of the biases' and the offset's random walks [unit²/s]."""
+    """Process noise: densities (13,) of the biases' and the offset's random walks [unit²/s]."""
     walks = (c.walk_omega_b, c.walk_f_b, c.walk_omega_c, c.walk_f_c)
     densities: Array = np.square(np.append(np.repeat(walks, 3), c.walk_offset))
     return densities

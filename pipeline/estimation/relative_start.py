@@ -78,7 +78,7 @@ def first_anchor(
 
 
 def _initial_variances(c: RelativeConfig) -> Array:
-    """(13,) of biases and time offset."""
+    """Variances (13,) of biases and time offset [unit²]."""
     sigmas = (c.initial_omega_b, c.initial_f_b, c.initial_omega_c, c.initial_f_c)
     variances: Array = np.square(np.append(np.repeat(sigmas, 3), c.initial_offset))
     return variances

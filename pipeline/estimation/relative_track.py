@@ -59,11 +59,11 @@ class Checkpoint:
     use: Flags | None = None
     """(m,) which of its LEDs were."""
     inflation: float = 1.0
-    """Factor of the variances of place, velocity and attitude that were foretold for it."""
+    """Factor of the variances of place, velocity and attitude that were predicted for it."""
 
     @staticmethod
     def empty() -> Checkpoint:
-        """Of no meaning yet."""
+        """Memory for a checkpoint; its content has no meaning yet."""
         return Checkpoint(-inf, np.zeros(X), np.eye(3), np.zeros((N, N)), np.eye(3))
 
     def copy(self, other: Checkpoint) -> None:
@@ -104,7 +104,7 @@ class RelativeTrack:
 
     @property
     def newest(self) -> Checkpoint:
-        """Of the last picture, or the base."""
+        """Time of the last picture, or of the base [s]."""
         return self.checkpoints[-1]
 
     @property
@@ -135,7 +135,7 @@ class RelativeTrack:
         return checkpoint
 
     def in_picture(self, checkpoint: Checkpoint) -> Array:
-        """P (6, 6) of the pose in a picture stamped for the time of `checkpoint`: that is doubted too.
+        """P (6, 6) of the pose in a picture stamped for `checkpoint.t`; the stamp is doubted, too.
 
         The pose passes at ṗ = u − ω_c × p, Ṙ = R [ω_b − Rᵀ ω_c]×.
         """
@@ -167,7 +167,7 @@ class RelativeTrack:
         return chi2
 
     def _remake(self, k: int) -> None:
-        """Anchor k from the one before it."""
+        """Make checkpoint k anew from the one before it."""
         checkpoint = self.checkpoints[k]
         t = checkpoint.t
         checkpoint.copy(self.checkpoints[k - 1])
@@ -236,7 +236,7 @@ class RelativeTrack:
         return bool(is_sound(self.now.x, self.now.R, self.now.P))
 
     def inputs_now(self) -> Array:
-        """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
+        """Inputs (12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed [rad/s, m/s²]."""
         return self._inputs(self.now)
 
     def _inputs(self, checkpoint: Checkpoint) -> Array:

@@ -1,4 +1,4 @@
-"""Is it a measurement at all? Asked at the door of every estimator."""
+"""Checks that a measurement can be computed with, made before every estimator."""
 
 from __future__ import annotations
 

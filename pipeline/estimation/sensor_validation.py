@@ -1,4 +1,4 @@
-"""The phone's motion sensors put to the test of gravity, before anything may fly on them.
+"""Sensor validation: the phone's motion sensors against gravity, before anything may fly on them.
 
 Browsers differ in the sign of the acceleration, in its unit, in the order of the rates, and the
 page may be wrong about how the screen stands. Nothing is mended here: the page knows how to turn
@@ -58,7 +58,7 @@ class SensorValidation:
     """Feed it each motion sample in device axes and each pose; ask it what is wrong."""
 
     def __init__(self, config: GravityTestConfig) -> None:
-        """Nothing tested."""
+        """Begin with nothing tested."""
         self._config = config
         self._rates = RateAxes(config)
         self._body = AttitudeBuffer()

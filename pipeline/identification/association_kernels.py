@@ -1,4 +1,4 @@
-"""Compiled: which spot lies where an LED should be.
+"""Compiled data association: which spot lies where an LED is predicted.
 
 Spots are given as tangents (y/x, z/x) of their rays in c, at most `CANDIDATES` of them, so that a
 set of spots is the bits of one integer.
@@ -35,7 +35,7 @@ class BinnedSpots(NamedTuple):
 
 
 def lights_of(tangents: Array, areas: Array) -> BinnedSpots:
-    """Sorted into bins."""
+    """Sort spots into bins."""
     below, scale = np.zeros((2, BINS + 1), dtype=np.int64), np.zeros((2, 2))
     index_spots(tangents, below, scale)
     return BinnedSpots(tangents, areas, below, scale)

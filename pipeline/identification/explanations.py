@@ -1,4 +1,4 @@
-"""What spots may be, how likely chance would give as much, and which of several to believe."""
+"""Hypotheses of data association: their false-alarm number, their cost, and which to believe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Compiled: how many explanations as good as one chance would give in such a picture."""
+"""Compiled a-contrario test: the expected number of false alarms as good as an explanation.
+
+After Desolneux, Moisan and Morel, Int. J. Computer Vision 40 (2000) 7: an explanation of spots is
+believed if chance would hardly give one as good in such a picture, whatever the picture holds.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiled: every pair of spots as every pair of LEDs, where gravity is known.
+"""Compiled gravity-aided hypotheses: every two spots as every two LEDs, both verticals known.
 
 With a and b two LEDs seen along d and e, R (l_a − l_b) lies in the plane of d and e: a quadratic in
 the yaw with two solutions; then both distances follow linearly.

@@ -1,4 +1,4 @@
-"""From nothing to a name: at once if chance can't explain it, else when more pictures confirm it.
+"""Initialisation: from no pose to one, at once if chance can't explain it, else once confirmed.
 
 A rival explanation of equal strength, such as the other branch of a flat robot's pose, means that
 nothing is said; both are kept until the pictures or the gyroscopes refute one.
@@ -74,7 +74,7 @@ class Initialisation:
     """Finds a robot of which nothing, or only the attitude, is known."""
 
     def __init__(self, camera: Camera, leds_in_b: Array, config: IdentifyConfig) -> None:
-        """Nothing seen yet."""
+        """Begin with nothing seen; LEDs (n, 3) [m]."""
         self._camera, self._leds_in_b = camera, leds_in_b
         self._search = Relocalisation(camera, leds_in_b, config)
         self._config = config
@@ -88,7 +88,7 @@ class Initialisation:
         return self._search.bounded
 
     def forget(self) -> None:
-        """What was pending was something else."""
+        """Drop what is pending: it was something else."""
         self._pending = _Pending()
 
     def step(
@@ -128,7 +128,7 @@ class Initialisation:
         return Association(believed.match, fit)
 
     def _carry(self, turn: Array | None) -> None:
-        """What is pending turns as the gyroscopes say."""
+        """Turn what is pending as the gyroscopes say."""
         if turn is None:
             return
         before, after = exp(-turn[0]), exp(turn[1])

@@ -67,7 +67,7 @@ class Wanted(NamedTuple):
 
 
 class Work(NamedTuple):
-    """What a search writes."""
+    """Memory that a search writes into."""
 
     table: Integers
     """(TABLE,) namings that were tried."""

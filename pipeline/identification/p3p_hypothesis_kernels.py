@@ -1,4 +1,8 @@
-"""Compiled: every three spots as three LEDs, where nothing is known of the attitude."""
+"""Compiled P3P hypotheses: every three spots as three LEDs, where the attitude is unknown.
+
+All triples are tried, unlike in RANSAC (Fischler & Bolles, Comm. ACM 24 (1981) 381): there are few
+LEDs, and which hypothesis to believe is decided by `false_alarm_kernels`.
+"""
 
 from __future__ import annotations
 
@@ -112,7 +116,7 @@ def _try_triple(
 def p3p_hypotheses(
     which: Integers, start: int, budget: int, wanted: Wanted, lights: BinnedSpots, work: Work
 ) -> int:
-    """Explain spots of a robot in any attitude.
+    """Add explanations of the spots by a robot in any attitude.
 
     Args:
         which: (3,) LEDs that any three spots may be.

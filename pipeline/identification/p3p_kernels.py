@@ -1,4 +1,8 @@
-"""Compiled: the up to four poses from which three points are seen along three rays."""
+"""Compiled P3P: the up to four poses from which three points are seen along three rays.
+
+Grunert's solution (1841) as Haralick, Lee, Ottenberg and Nölle review it (Int. J. Computer Vision
+13 (1994) 331): a quartic in the ratio of two distances.
+"""
 
 from __future__ import annotations
 

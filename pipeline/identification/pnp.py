@@ -35,7 +35,7 @@ class PnpSolution:
 
     @property
     def rms_px(self) -> float:
-        """Of the distances between spots and projected LEDs."""
+        """RMS of the distances between spots and projected LEDs [px]."""
         flat = self.residuals_px.ravel()
         return sqrt(2.0 * float(flat @ flat) / len(flat))
 
@@ -51,7 +51,7 @@ class PnpSolution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Association:
-    """Spots with names, and the pose that gives them."""
+    """Correspondences of spots and LEDs, and the pose that gives them."""
 
     match: Match
     fit: PnpSolution

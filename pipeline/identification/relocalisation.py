@@ -1,4 +1,4 @@
-"""Which spot is which LED? All explanations of a picture, from nothing, the likeliest first."""
+"""Relocalisation: all explanations of an image's spots without a pose, the likeliest first."""
 
 from __future__ import annotations
 

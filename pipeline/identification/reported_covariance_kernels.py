@@ -1,4 +1,4 @@
-"""Compiled: what is claimed of a pose: its covariance by own errors of LEDs and by shared ones."""
+"""Compiled: the reported covariance of a pose, by LEDs' own errors and by those they share."""
 
 from __future__ import annotations
 

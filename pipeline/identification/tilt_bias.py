@@ -1,4 +1,4 @@
-"""How far the robot's own vertical is off, as the pictures tell: its accelerometer has a bias."""
+"""Tilt bias: how far the robot's own vertical is off the images', by its accelerometer's bias."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ class TiltBias:
     """Learnt from believed poses; true until the robot is another one."""
 
     def __init__(self) -> None:
-        """Nothing known."""
+        """Begin without a bias."""
         self._off = np.zeros(3)
         """Turn of the measured vertical onto the true one [rad], in b."""
         self._pictures = 0
 
     def learn(self, up_in_c: Array | None, up_in_b: Array | None, R_cb: Array) -> None:
-        """From a believed attitude."""
+        """Learn from a believed attitude."""
         if up_in_c is None or up_in_b is None:
             return
         self._pictures += 1

@@ -1,8 +1,9 @@
-"""Compiled: where a spot of light is to a hundredth of a pixel, and how sure that is.
+"""Compiled soft-window centroid: where a spot is to a hundredth of a pixel, with its covariance.
 
 A centroid in about linear light over a soft elliptical window that follows the spot (by Newton's
 method): no pixel counts wholly or not at all, and what is as bright on both sides cancels, whether
-it is clipped, bloomed or smeared. The scatter follows from that of each pixel.
+it is clipped, bloomed or blurred by motion. The covariance follows from each pixel's variance. An
+iteratively weighted centroid, as in Baker & Moallem, Optics Express 15 (2007) 5147.
 """
 
 from __future__ import annotations

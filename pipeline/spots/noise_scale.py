@@ -1,4 +1,4 @@
-"""How sure spots are, learnt from how well they fit."""
+"""Noise-scale estimation: the measurement noise of spots, learnt from residuals."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class NoiseScale:
 
     @property
     def factor(self) -> float:
-        """Of covariances."""
+        """Factor of the spots' covariances."""
         return min(max(self.chi2 / self.freedoms, LEAST_DOUBT), MOST_DOUBT)
 
     @property
@@ -37,7 +37,7 @@ class NoiseScale:
         return COMMON * max(0.0, 1.0 - 1.0 / self.factor)
 
     def learn(self, chi2: float, freedoms: int) -> None:
-        """From χ² by the covariances as they were measured."""
+        """Learn from χ² by the covariances as they were measured."""
         chi2 = min(chi2, OUTLYING * freedoms * self.factor)
         self.chi2 = FADE * self.chi2 + chi2
         self.freedoms = FADE * self.freedoms + freedoms

@@ -1,4 +1,4 @@
-"""A gyroscope's turns added up: attitudes at any time of the last seconds, as quaternions."""
+"""Attitude buffer: a gyroscope integrated, attitudes at any time of the last seconds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The coarse time offset of a phone's pictures, found beside the vision and sent along with them.
+"""Camera-IMU time delay, coarse: found beside vision, sent along with its measurements.
 
 It costs milliseconds now and then, which the control process hasn't got.
 """
@@ -21,7 +21,7 @@ class CameraImuDelay:
     """Samples come from the event loop, pictures from the vision thread."""
 
     def __init__(self) -> None:
-        """Nothing known."""
+        """Begin with nothing known."""
         self._search = TimeOffset(TimeOffsetConfig())
         self._waiting: deque[PhoneImu | BodyImu] = deque(maxlen=WAITING)
         self._pictures = 0

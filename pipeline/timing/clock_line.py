@@ -1,4 +1,4 @@
-"""The straight line that a clock's offset follows, between bounds that nobody can argue with."""
+"""Offset and drift of a clock: the line with most room between the bounds by round trips."""
 
 from __future__ import annotations
 

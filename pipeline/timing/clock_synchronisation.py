@@ -1,4 +1,4 @@
-"""Where another machine's clock stands and how fast it drifts, from questions and answers.
+"""Clock synchronisation: offset and drift of another machine's clock, from round trips.
 
 An answer proves that the other clock read `t_remote` somewhen between question and answer: it
 bounds the offset from both sides. The offset is a straight line over the last seconds; of all lines
@@ -92,7 +92,7 @@ class ClockSynchronisation:
 
     @property
     def round_trip(self) -> float:
-        """The shortest of the window [s]."""
+        """Shortest round trip of the window [s]."""
         self._known()
         return min(trip for _, trip in self._trips)
 
@@ -157,7 +157,7 @@ class ClockSynchronisation:
         return line.room < recent / 3.0 and line.room < recent - TOLERANCE_S
 
     def _remember(self, lower: OffsetBound, upper: OffsetBound, drift: float) -> bool:
-        """Into the newest bucket, if tighter than what is there; old buckets go."""
+        """Keep bounds tighter than those of the newest span; drop old spans."""
         t = lower.t
         while self._buckets and self._buckets[0].t < t - WINDOW_S:
             self._buckets.popleft()

@@ -1,4 +1,4 @@
-"""Is the time offset that the filter learns the true one? A wrong lock is worse than none.
+"""Health monitor of the learnt time offset: a lock on the wrong one is worse than none.
 
 A tremor looks alike a ninth of a second later, and a filter sees only the valley it is in. So a
 coarse offset, found apart from it (`time_offset`), must agree; before there is one, stamps are

@@ -1,9 +1,10 @@
-"""Coarse time offset between pictures and motion samples, by fitting one to the other.
+"""Coarse camera-IMU time delay by correlating images with motion samples over a range of shifts.
 
 Both gyroscopes say how the body turned relative to the camera, ω_b − R_cbᵀ ω_c, up to a constant
 attitude and slow biases; the pictures say the same at their own stamps. Of all shifts within reach
 the one that fits best is the offset, if no other fits nearly as well: tremor repeats itself after a
-ninth of a second, and a wrong lock is worse than none.
+ninth of a second, and a wrong lock is worse than none. The filter refines it online as a state
+(Li & Mourikis, Int. J. Robotics Research 33 (2014) 947).
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ class TimeOffset:
             self._begin_again()
 
     def _begin_again(self) -> None:
-        """After a gap nothing fits across it."""
+        """Forget what lies before a gap: nothing fits across it."""
         self._seen.clear()
         self._new = self._config.every
 

@@ -1,4 +1,4 @@
-"""What is known before a picture, and what came of it."""
+"""Prior knowledge of an image, and the detection that came of it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.signals import LedRays, Match, RelativePose, Spots, StampOffset, V
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramePrior:
-    """What is known without looking; each may be missing."""
+    """Prior knowledge of one image; each may be missing."""
 
     up_in_c: Array | None = None
     """Opposite of gravity (3,)."""
@@ -26,7 +26,7 @@ class FramePrior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection:
-    """What came of a picture."""
+    """Result of one image: spots, correspondences, pose and rays."""
 
     t: float
     pose: RelativePose | None
@@ -48,7 +48,7 @@ class Detection:
     """What was known before."""
 
     def seen(self, camera: Camera) -> VisionMeasurement | None:
-        """For a filter; None if it says nothing of the robot."""
+        """Vision measurement for a filter; None if it says nothing of the robot."""
         if self.pose is None and len(self.rays) == 0:
             return None
         return VisionMeasurement(self.t, self.rays, self.pose, camera.half_field, self.offset)

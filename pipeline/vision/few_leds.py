@@ -1,4 +1,4 @@
-"""One, two or three LEDs: too few for a pose, named by where a filter expects them, or not at all.
+"""Data association of one to three LEDs, too few for a pose, by a filter's prediction.
 
 A wrong name is worse than none: whoever could be another LED, or another lamp, stays nameless.
 """
@@ -28,7 +28,7 @@ FEW_PX = 4.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedLeds:
-    """Where LEDs are expected in the picture."""
+    """Predicted places of LEDs in the image."""
 
     pixels: Array
     """(n, 2)."""
@@ -41,7 +41,7 @@ class PredictedLeds:
 def places(
     camera: Camera, leds_in_b: Array, expected: Prediction, config: IdentifyConfig
 ) -> PredictedLeds | None:
-    """None if the expectation is too unsure, or no number."""
+    """Predict the LEDs' places; None if the prediction is too unsure, or no number."""
     q = expected.p_bc_in_c + leds_in_b @ expected.R_cb.T
     depth, f = float(expected.p_bc_in_c[0]), camera.focal_px
     if not (depth > NEAREST_M and q[:, 0].min() > NEAREST_M):
@@ -58,7 +58,7 @@ def places(
 
 
 def name_few(spots: Spots, expected: PredictedLeds, typical_area_px: float) -> Match | None:
-    """Names of spots that lie where LEDs are expected, all shifted alike.
+    """Associate spots that lie where LEDs are predicted, all shifted alike.
 
     Args:
         spots: All of the whole picture: a lamp nobody looked for is a rival as well.
@@ -85,7 +85,7 @@ def name_few(spots: Spots, expected: PredictedLeds, typical_area_px: float) -> M
 def _shifted(
     apart: Array, near: npt.NDArray[np.bool_], own_px: Array, led: int, spot: int
 ) -> Names:
-    """What has a name if `spot` is `led`: the others are then shifted alike."""
+    """Associations if `spot` is `led`: the others are then shifted alike."""
     off = np.sqrt(((apart - apart[led, spot]) ** 2).sum(axis=2))
     allowed = near & (off < np.hypot(own_px, own_px[led])[:, None])
     pairs = np.argwhere(allowed)
@@ -100,7 +100,7 @@ def _shifted(
 def _unrivalled(
     names: Names, apart: Array, near: npt.NDArray[np.bool_], own_px: Array
 ) -> set[tuple[int, int]]:
-    """Without LEDs that a nameless spot could be as well."""
+    """Drop LEDs that a spot without a name could be as well."""
     taken = [spot for _, spot in names]
     if len(names) >= MANY:  # the shift is known: nearer rivals only
         shift = np.mean([apart[pair] for pair in names], axis=0)
@@ -111,6 +111,6 @@ def _unrivalled(
 
 
 def _alike(area_px: float, typical_px: float) -> bool:
-    """Of about the same size; of a few pixels one more or less says nothing."""
+    """Whether areas are about the same; of a few pixels one more or less says nothing."""
     ratio = (area_px + FEW_PX) / (typical_px + FEW_PX)
     return not (ratio < 1.0 / SIZE_RATIO or ratio > SIZE_RATIO)

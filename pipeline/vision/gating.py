@@ -1,4 +1,4 @@
-"""Is this pose believable? Reprojection and gravity catch nearly all lies of a picture."""
+"""Gating of poses: reprojection error and gravity reject nearly all outliers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a motion sensor felt in the last half second: its vertical and its turning, at any time."""
+"""IMU buffer: gravity direction and angular rate at any time of the last half second."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STALE_S = 0.3
 
 
 class BufferedImu(NamedTuple):
-    """One moment."""
+    """Gravity direction and angular rate at one time."""
 
     t: float
     """[s]."""
@@ -30,7 +30,7 @@ class ImuBuffer:
     """Samples come in the order of time, from one thread; any thread may ask."""
 
     def __init__(self) -> None:
-        """Nothing felt."""
+        """Begin without a sample."""
         self._gravity_direction = GravityDirection()
         self._samples: tuple[BufferedImu, ...] = ()
 
@@ -45,7 +45,7 @@ class ImuBuffer:
         self._samples = (*kept[first:], BufferedImu(t, self._gravity_direction.up, omega))
 
     def at(self, t: float) -> BufferedImu | None:
-        """Between the samples around `t` [s], or that of the nearest; None if all are far."""
+        """Interpolate the samples around `t` [s], or take the nearest; None if all are far."""
         samples = self._samples
         if not samples or not samples[0].t - STALE_S <= t <= samples[-1].t + STALE_S:
             return None

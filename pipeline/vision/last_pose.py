@@ -52,7 +52,7 @@ class LastPose:
         """It was not where a filter expected it: until they agree, the filter is not asked."""
 
     def advance(self, t: float, omega_cf_in_c: Array | None, omega_bf_in_b: Array | None) -> None:
-        """A picture of time `t` is to be looked at."""
+        """Carry the prediction on to a picture of time `t` [s]."""
         dt, before = t - self._t, self._omega
         self._omega = (
             (omega_cf_in_c, omega_bf_in_b)
@@ -94,13 +94,13 @@ class LastPose:
         self._pose, self._R_cb, self._misses = None, None, 0
 
     def miss(self) -> None:
-        """A picture gave nothing."""
+        """Note a picture that gave no pose."""
         self._misses += 1
         if self._misses >= FORGET_MISSES:
             self._pose = None
 
     def predicted(self) -> Place | None:
-        """For the newest picture: moved on by both gyroscopes and the last velocity."""
+        """Predict the pose at the newest picture, by both gyroscopes and the last velocity."""
         last, R_cb = self._pose, self._R_cb
         if last is None or R_cb is None or not 0.0 < self._t - last.t < MAX_STEP_S:
             return None
@@ -128,5 +128,5 @@ def _contradict(pose: RelativePose, expected: Prediction) -> bool:
 
 
 def _largest(covariance: Array) -> float:
-    """Standard deviation along the axis that is known worst."""
+    """Largest standard deviation along any axis."""
     return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))

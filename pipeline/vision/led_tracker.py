@@ -1,4 +1,4 @@
-"""The next picture of a robot whose place is foreseen: windows → spots → names → pose."""
+"""LED tracker, for a predicted pose: windows → spots → data association → pose."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ BLIND_M_S = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedLeds:
-    """What the windows of a picture hold."""
+    """What was found in the predicted windows of an image."""
 
     spots: Spots
     """As they stand in the picture."""
@@ -57,7 +57,7 @@ class TrackedLeds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Attempt:
-    """One try."""
+    """One attempt with windows of one size."""
 
     spots: Spots
     table: Array
@@ -71,7 +71,7 @@ class _Attempt:
 
 
 class LedTracker:
-    """Names and measures by where LEDs are foreseen; learns how sure spots are."""
+    """Associates and measures spots in predicted windows; learns their measurement noise."""
 
     def __init__(
         self,
@@ -103,7 +103,7 @@ class LedTracker:
         motion: FrameMotion | None,
         clock: Clock = lambda: 0.0,
     ) -> TrackedLeds:
-        """Look only where the LEDs are foreseen.
+        """Search only the windows where LEDs are predicted.
 
         Args:
             frame: The picture.
@@ -149,7 +149,7 @@ class LedTracker:
         return self._named(table, spots.covariances, place, self.motion_blur.again(motion), motion)
 
     def forget(self) -> None:
-        """The robot was lost."""
+        """Forget what was learnt of windows: the robot was lost."""
         self._threes, self._known, self._reach = 0, 0, self._full
 
     @property
@@ -167,8 +167,8 @@ class LedTracker:
         table, covariances = np.empty((most, FIELDS)), np.empty((most, 2, 2))
         n = detect(
             frame.luma, *leds.light_of(full), leds.limits_of(full, config),
-            self.camera.lens, self._size, self._leds_in_b, *place, row, reach, self.noise_scale.factor,
-            self._expected, table, covariances,
+            self.camera.lens, self._size, self._leds_in_b, *place, row, reach,
+            self.noise_scale.factor, self._expected, table, covariances,
         )  # fmt: skip
         table = table[:n]
         brightness, area = table[:, BRIGHTNESS], table[:, AREA]
@@ -235,7 +235,7 @@ class LedTracker:
 
 
 def _near(fit: PnpSolution, place: Place, jump_m: float, jump_rad: float) -> bool:
-    """Tracking may not jump."""
+    """Whether a pose is near the predicted one: tracking may not jump."""
     shift, turn = fit.p_bc_in_c - place[0], place[1].T @ fit.R_cb
     cosine = 0.5 * (float(turn[0, 0] + turn[1, 1] + turn[2, 2]) - 1.0)
     return float(shift @ shift) < jump_m**2 and cosine > cos(jump_rad)

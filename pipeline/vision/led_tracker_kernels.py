@@ -1,4 +1,4 @@
-"""Compiled: which spots the foreseen LEDs are, and the pose that follows.
+"""Compiled LED tracker: data association of predicted LEDs, and the pose that follows.
 
 `motion` and `size` as in `predicted_windows_kernels`.
 """
@@ -161,7 +161,7 @@ def identify(
     residuals: Array,
     shared: Array,
 ) -> tuple[float, float]:
-    """Name the spots, solve: how many LEDs the pose rests on (0: none is believed) and its χ².
+    """Associate and solve: how many LEDs the pose rests on (0: none is believed) and its χ².
 
     Args:
         lens: As `lens_kernels` takes it.

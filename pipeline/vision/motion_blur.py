@@ -1,4 +1,4 @@
-"""What smears the spots of a moving camera: how long it exposes, and how its turning changes."""
+"""Motion blur of spots: exposure time, and how the camera's turning changes meanwhile."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class MotionBlur:
 
     @property
     def exposure_s(self) -> float:
-        """0 if unknown."""
+        """Exposure time [s]; 0 if unknown."""
         along, speed4 = float(self.sums[0]), float(self.sums[1])
         if speed4 < STEADY or along <= 0.0:
             return 0.0
@@ -49,7 +49,7 @@ class MotionBlur:
         table: Array,
         expected: Array,
     ) -> tuple[float, float]:
-        """From named LEDs of the newest picture, their rows (n, FIELDS) of measurements.
+        """Learn from named LEDs of the newest picture, their rows (n, FIELDS) of measurements.
 
         Gives the largest distance from where one was `expected` (n, 2) [px], and the largest area.
         """
@@ -62,14 +62,14 @@ class MotionBlur:
         return float(sums[2]), float(sums[3])
 
     def again(self, motion: FrameMotion | None) -> Array:
-        """The same for the picture that was asked for last, or for another guess of its motion."""
+        """Motion row of the same picture for another guess of its `motion`."""
         row, last = _plain(motion), self._row
         if (row[:SLOPES] == last[:SLOPES]).all():
             row[SLOPES:] = last[SLOPES:]
         return row
 
     def row(self, t: float, motion: FrameMotion | None) -> Array:
-        """A picture's motion as the kernels take it."""
+        """Motion row (16,) of a picture, as the kernels take it."""
         row, last, dt = _plain(motion), self._row, t - self._t
         if row[0] != 0.0 and last[0] != 0.0 and 0.0 < dt < MOST_STEP_S:
             put_slopes(last, dt, self._slopes, row)
@@ -80,7 +80,7 @@ class MotionBlur:
 
 
 def _plain(motion: FrameMotion | None) -> Array:
-    """Without derivatives."""
+    """Motion row (16,) without derivatives."""
     row = np.zeros(MOTION)
     if motion is not None:
         row[0], row[1:4], row[4:7] = 1.0, motion.omega_cf_in_c, motion.u_bf_in_c

@@ -1,4 +1,4 @@
-"""Compiled: how long pictures are exposed, by how far moving spots are smeared."""
+"""Compiled motion blur: the exposure time by how far moving spots are drawn out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiled: where LEDs are foreseen in a picture, and the spots that are there.
+"""Compiled predicted windows: where LEDs should be in an image, and the spots that are there.
 
 A `motion` is a row (16,): 1 if it is known, else 0; ω_c/f in c, the velocity u of the body seen
 from f in c, ω_b/f in b, and the two ω's derivatives. A row of the picture that is exposed τ later
@@ -139,7 +139,7 @@ def detect(
     table: Array,
     covariances: Array,
 ) -> int:
-    """Spots in windows about foreseen LEDs; gives how many.
+    """Find spots in windows about predicted LEDs; gives how many.
 
     Args:
         luma: The picture, and the following as `spot_kernels.measure` takes them.

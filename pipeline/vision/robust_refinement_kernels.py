@@ -1,4 +1,4 @@
-"""Compiled: the pose of named LEDs, the odd ones left out, and what is claimed of it."""
+"""Compiled robust refinement: the pose of associated LEDs, outliers left out one by one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiled: which spots are LEDs that are foreseen: those that shift together."""
+"""Compiled translation voting: predicted LEDs are the spots that one common shift explains."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _assign(
 
 @kernel
 def name_by_shift(expected: Array, seen: Array, reach: float, names: Names) -> int:
-    """The naming that most LEDs agree with after one common shift; gives how many.
+    """Associate by the common shift that most LEDs agree with; gives how many.
 
     LEDs shift together, lamps don't. Of namings of as many LEDs the one with the shortest distances
     is taken.

@@ -1,4 +1,4 @@
-"""Spots → names → pose and rays, from picture to picture: what all that looks runs."""
+"""Spots → data association → pose and rays, from image to image."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ UNTIMED = np.zeros(3)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """The spots of a picture and what they are called: all LEDs that a pose needs, or a few."""
+    """Spots of an image and their correspondences: all LEDs that a pose needs, or a few."""
 
     spots: Spots
     association: Association | None = None
@@ -52,7 +52,7 @@ class Vision:
         leds_config: LedsConfig | None = None,
         identify_config: IdentifyConfig | None = None,
     ) -> None:
-        """Nothing seen yet."""
+        """Begin with nothing seen; LEDs (n, 3) [m]."""
         self.camera, self._leds_in_b = camera, leds_in_b
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
@@ -115,7 +115,7 @@ class Vision:
         self.camera = self._tracker.camera = replace(self.camera, readout_s=readout_s)
 
     def forget(self) -> None:
-        """The next picture is searched from nothing."""
+        """Forget all: the next picture is searched from nothing."""
         self._last.forget()
         self._initialisation.forget()
         self._tracker.forget()
@@ -137,7 +137,7 @@ class Vision:
         return [*places, own] if own is not None else places
 
     def _motion(self, predicted: list[Place], prior: FramePrior) -> FrameMotion | None:
-        """During the readout of a picture; without gyroscopes as it was between the last poses."""
+        """Motion during the readout; without gyroscopes as it was between the last poses."""
         omega_c, omega_b, expected = prior.omega_cf_in_c, prior.omega_bf_in_b, prior.expected
         if not predicted:
             return None if omega_c is None else FrameMotion(omega_c, np.zeros(3), np.inf)
@@ -151,7 +151,7 @@ class Vision:
     def _search(
         self, frame: Frame, motion: FrameMotion | None, predicted: list[Place], clock: Clock
     ) -> tuple[_Found, Array]:
-        """In the whole picture; and how long that took, by stage [s]."""
+        """Search the whole picture; also how long that took, by stage [s]."""
         started = clock()
         spots = leds.find_spots(frame, self._leds)
         detected = clock()
@@ -174,7 +174,7 @@ class Vision:
         return _Found(spots, few=self._few(upright), bounded=bounded)
 
     def _exactly(self, association: Association, spots: Spots) -> Association:
-        """With each LED's own motion during the readout, now that it has a name."""
+        """Solve again with each LED's own motion during the readout, now that it is associated."""
         place = association.fit.p_bc_in_c, association.fit.R_cb
         again = self._tracker.name(spots, place, self._motion([place], self._prior))
         if again is None or len(again.match.led) < len(association.match.led):
@@ -182,7 +182,7 @@ class Vision:
         return again
 
     def _hints(self) -> SearchHints:
-        """For a search from nothing: the verticals, and what is remembered."""
+        """Hints for a search from nothing: the verticals, and what is remembered."""
         up_in_c, up_in_b = self._prior.up_in_c, self._tilt_bias.corrected(self._prior.up_in_b)
         memory = self._last.attitude()
         if memory is None:
@@ -190,7 +190,7 @@ class Vision:
         return SearchHints(up_in_c, up_in_b, *memory, self._area_px_m2)
 
     def _few(self, spots: Spots) -> Match | None:
-        """A few LEDs, where a filter expects them."""
+        """Associate a few LEDs where a filter predicts them."""
         if self._places is None or self._prior.expected is None:
             return None
         area_px = self._area_px_m2 / float(self._prior.expected.p_bc_in_c[0]) ** 2

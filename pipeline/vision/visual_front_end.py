@@ -1,4 +1,4 @@
-"""Frames and both motion sensors → judged poses: what a live phone and a folder of frames share.
+"""Visual front-end: images and both IMUs → gated poses, the same for a phone and a folder.
 
 Nothing here decodes, reads a file or knows a clock: `server.phone.frame_pipeline` puts a decoder
 before it, and `lightleash locate` files.
@@ -83,7 +83,7 @@ class VisualFrontEnd:
 
     @property
     def offset_s(self) -> float:
-        """A picture was taken at its stamp plus this [s], as far as known."""
+        """Camera-IMU time delay [s]: an image was taken at its stamp plus this, as far as known."""
         facts, coarse = self.monitor.facts, self._stamps.offset
         if facts is not None:
             return facts.offset_s

@@ -1,7 +1,7 @@
 """Bundle adjustment of a filmed board: lens and readout shared, pose and rates of each view.
 
 Views touch each other only through the shared parameters, so each view's own are eliminated by
-themselves (Schur complement).
+themselves (Schur complement; Triggs et al., "Bundle adjustment: a modern synthesis", 2000).
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 An oracle's covariance: a Kalman filter linearised at the truth, which knows the statistics of hand
 and robot, the frequencies of the tremor, every noise, and when each thing arrived. No estimator
-without that knowledge can be better in the mean over many worlds.
+without that knowledge can be better in the mean over many worlds (Tichavský, Muravchik & Nehorai,
+IEEE Trans. Signal Processing 46 (1998) 1386).
 """
 
 from __future__ import annotations

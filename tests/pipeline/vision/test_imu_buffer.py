@@ -46,7 +46,7 @@ def test_only_the_last_moments_are_remembered_at_any_rate():
     felt = ImuBuffer()
     for k in range(5000):
         felt.add(1e-4 * k, ZERO, GRAVITY * UP)
-    assert len(felt._feelings) <= 1025
+    assert len(felt._samples) <= 1025
 
 
 def test_free_fall_has_a_rate_but_no_vertical():

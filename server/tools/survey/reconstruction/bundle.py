@@ -1,5 +1,8 @@
 """Bundle adjustment: places of few points and poses of many frames, poses eliminated first.
 
+Elimination by Schur complement (Triggs, McLauchlan, Hartley & Fitzgibbon, "Bundle adjustment: a
+modern synthesis", 2000), here of the poses, for they are the many.
+
 Frames' poses turn points of the survey's frame s into optical axes o: q = R X + p.
 """
 
