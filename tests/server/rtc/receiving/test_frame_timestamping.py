@@ -57,6 +57,42 @@ def test_by_arrival_the_jitter_of_the_line_goes_and_its_least_delay_stays():
     assert min(late) < ARRIVAL_S
 
 
+DRIFT = 1e-4
+"""100 ppm: how much the stamps' clock goes too fast, or too slowly."""
+
+
+def late(dating, begin_s, drift, rng, stamps_from):
+    """How late the pictures of an hour are dated by arrival [s], ten a second."""
+    for k in range(36_000):
+        taken = begin_s + k / 10.0
+        arrival = taken + 0.03 + rng.expovariate(1 / 0.01)
+        stamp = ticks((taken - begin_s) * (1.0 + drift), stamps_from)
+        yield 1e-6 * dating.date(None, stamp, 1e6 * arrival).t_us - taken
+
+
+@pytest.mark.parametrize("drift", [-DRIFT, DRIFT])
+def test_by_arrival_an_hour_of_clocks_that_drift_and_a_restart_leave_no_error(drift):
+    """A least delay lives for 300 pictures at most: 30 s, in which 100 ppm are 3 ms."""
+    rng, dating, settled = random.Random(4), FrameTimestamping(), 300
+    for begin, stamps in ((100.0, 2**32 - 1000), (3700.0, 123_456)):
+        errors = list(late(dating, begin, drift, rng, stamps))[settled:]
+        assert min(errors) > 0.03 - 3.1e-3
+        assert max(errors) < 0.03 + 2e-3
+
+
+@pytest.mark.parametrize("drift", [-DRIFT, DRIFT])
+def test_by_pairs_clocks_that_drift_are_no_further_off_than_an_old_pair(drift):
+    dating = FrameTimestamping()
+    for k in range(36_000):
+        taken = 100.0 + k / 10.0
+        stamp = ticks(taken * (1.0 + drift))
+        if k % 40 == 0:
+            dating.pair(stamp, round(1e6 * taken))
+        date = dating.date(None, stamp, 1e6 * (taken + 0.08))
+        assert date.source == "pair"
+        assert abs(1e-6 * date.t_us - taken) <= DRIFT * OLDEST_PAIR_S + 2e-5
+
+
 def test_by_arrival_a_stream_that_begins_anew_is_dated_anew():
     dating = FrameTimestamping()
     for k in range(10):

@@ -1,6 +1,8 @@
 """Packets to pictures: at the last packet, in order, and never long behind a loss."""
 
+import random
 from dataclasses import dataclass
+from math import inf
 
 import pytest
 from hypothesis import given
@@ -75,6 +77,77 @@ def test_whatever_the_order_all_pictures_come_once_and_in_order(data):
     assert len(rig.frames) == len(sizes)
     assert "".join(rig.texts) == "".join(p._data.decode() for p in packets)
     assert [frame.number for frame in rig.frames] == list(range(1, len(sizes) + 1))
+
+
+def on_a_line(rng, packets, loss):
+    """When each packet comes [s]: in any order within twice our patience, or never."""
+    arrivals = [2e-3 * n + rng.choice([0.0, 0.0, 0.03, 0.09, 0.2]) * rng.random() for n in
+                range(len(packets))]  # fmt: skip
+    return [-1.0, *(inf if rng.random() < loss else t for t in arrivals[1:])]
+
+
+def in_order(arrivals):
+    """When an ideal reorderer hands on each packet [s]: its own wait, or that for one before it.
+
+    It waits for a missing one until the first of those behind has waited for PATIENCE_S.
+    """
+    released, t = [], -inf
+    for n, arrival in enumerate(arrivals):
+        until = max(t, min(arrivals[n + 1 :], default=inf) + PATIENCE_S)
+        t = max(t, min(arrival, until))
+        released.append(t if arrival <= until else inf)
+    return released
+
+
+def whole_pictures(released, sizes, keys):
+    """(when, which) of the pictures that are whole and lean on none that is not."""
+    pictures, first, is_good = [], 0, False
+    for k, size in enumerate(sizes):
+        parts, first = released[first : first + size], first + size
+        is_good = inf not in parts and (is_good or k in keys)
+        if is_good:
+            pictures.append((parts[-1], k))
+    return pictures
+
+
+def played(packets, arrivals, again):
+    """(when, which) of the pictures that come out; some packets come `again` [s] later."""
+    rig, came = Rig(), []
+    events = [(t, n) for n, t in enumerate(arrivals) if t < inf]
+    events += [(arrivals[n] + later, n) for n, later in again if arrivals[n] < inf]
+
+    def until(t):
+        while (due := rig.buffer.due()) is not None and due < t:
+            rig.t = due
+            rig.buffer.poll(due)
+            taken()
+            assert rig.buffer.due() != due
+        rig.t = t
+
+    def taken():
+        came.extend((rig.t, text) for text in rig.texts[len(came) :])
+
+    for t, n in sorted(events):
+        until(t)
+        rig.add(packets[n])
+        taken()
+    until(inf)
+    return [(t, int(text[1 : text.index(":")])) for t, text in came]
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.02, 0.2])
+@given(st.integers(0, 2**32 - 1))
+def test_each_picture_comes_when_an_ideal_reorderer_has_it_whole_and_no_other(loss, seed):
+    rng = random.Random(seed)
+    sizes = [rng.randint(1, 5) for _ in range(rng.randint(1, 40))]
+    keys = {0, *(k for k in range(len(sizes)) if rng.random() < 0.2)}
+    packets = stream(*sizes, first=rng.randrange(65_536), keys=keys)
+    arrivals = on_a_line(rng, packets, loss)
+    again = [(n, rng.random()) for n in range(1, len(packets)) if rng.random() < 0.1]
+    came = played(packets, arrivals, again)
+    wanted = whole_pictures(in_order(arrivals), sizes, keys)
+    assert [k for _, k in came] == [k for _, k in wanted]
+    assert [t for t, _ in came] == pytest.approx([t for t, _ in wanted], abs=1e-9)
 
 
 def test_packets_that_only_fill_the_line_are_no_pictures(rig):
