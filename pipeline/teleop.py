@@ -20,6 +20,7 @@ from pipeline.estimation.attitude import Attitude
 from pipeline.estimation.estimators import make_estimator
 from pipeline.estimation.frozen_imu import FrozenImu
 from pipeline.estimation.gyro_bridge import GyroBridge
+from pipeline.estimation.repeated_picture import RepeatedPicture
 from pipeline.frames import Array
 from pipeline.robot import Robot
 from pipeline.signals import (
@@ -105,6 +106,7 @@ class Teleop:
         self._half_field: tuple[float, float] | None = None
         self._t_seen = self._t_phone = -np.inf
         self._body, self._frozen_imu = BodyImu(-np.inf, np.zeros(3), np.zeros(3)), FrozenImu()
+        self._repeated = RepeatedPicture()
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
         self._force_in_b = self._given_in_b = np.zeros(3)
@@ -183,14 +185,18 @@ class Teleop:
         """Hand each measurement to the estimators; whatever its age, it has its own time."""
         for phone in inputs.phone_imu:
             self.attitude.add(phone)
+            self._repeated.add_imu(phone)
             self.estimator.add_phone_imu(phone)
             self._t_phone = max(self._t_phone, phone.t)
         for body in inputs.body_imu:
             self.estimator.add_body_imu(body)
+            self._repeated.add_imu(body)
             self._body = body
             self._frozen_imu.add(body)
         for seen in inputs.seen:
             self._half_field = seen.half_field
+            if self._repeated.comes_again(seen):
+                continue
             if self.estimator.add_seen(seen, inputs.t):
                 self._t_seen = max(self._t_seen, seen.t)
         if inputs.operator is not None:

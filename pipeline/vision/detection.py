@@ -46,6 +46,8 @@ class Detection:
     """There was more light in the picture than time to try it all: the next one goes on."""
     prior: FramePrior = field(default_factory=FramePrior)
     """What was known before."""
+    comes_again: bool = False
+    """The picture is the one before: it was not looked at."""
 
     def seen(self, camera: Camera) -> VisionMeasurement | None:
         """Vision measurement for a filter; None if it says nothing of the robot."""

@@ -18,18 +18,21 @@ from pipeline.camera.lens import Camera
 from pipeline.camera.line_delay import LineDelay
 from pipeline.frames import Array
 from pipeline.prediction import Prediction, PredictionHistory
-from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose
+from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose, Spots
 from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision import vision
 from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.gating import disbelief
 from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision.rays import NO_RAYS
+from pipeline.vision.repeated_frames import RepeatedFrames
 from pipeline.vision.vision import Vision
 from pipeline.vision_config import GatesConfig
 
 DOUBT_S = 0.15
 """Between looks without gravity."""
+AGAIN = "The picture is the one before."
+NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
 
 
 class VisualFrontEnd:
@@ -52,7 +55,7 @@ class VisualFrontEnd:
             CalibrationMonitor(camera, leds_in_b),
             LineDelay(camera.readout_s),
         )
-        self.exposure = ExposureMonitor(camera.focal_px)
+        self.exposure, self.repeats = ExposureMonitor(camera.focal_px), RepeatedFrames()
         self.doubts_gravity = False
         """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
         self._t_doubt = -np.inf
@@ -74,12 +77,21 @@ class VisualFrontEnd:
     def process(self, frame: Frame) -> Detection:
         """Find the robot in a frame, with what both motion sensors said of its time."""
         prior = self.prior(frame.t)
+        if self.repeats.comes_again(frame, (prior.omega_cf_in_c, prior.omega_bf_in_b)):
+            return Detection(
+                frame.t, None, NO_RAYS, NO_SPOTS, None, AGAIN, prior=prior, comes_again=True
+            )
         judged = self._judged(self._vision.step(frame, prior, self._clock), prior)
         if judged.pose is not None:
             self._watched(frame, judged, judged.pose, prior)
         if judged.pose is None and judged.unbelieved is None and self.doubts_gravity:
             return replace(judged, unbelieved=self._without_gravity(frame))
         return judged
+
+    @property
+    def complaint(self) -> str:
+        """Why nobody should fly with these pictures; empty if all is well, or not known yet."""
+        return self.repeats.complaint or self.monitor.complaint
 
     @property
     def offset_s(self) -> float:

@@ -15,7 +15,7 @@ def health(front_end: VisualFrontEnd) -> CameraHealth:
         front_end.exposure.hint,
     )
     told = CameraHealth(
-        complaint=front_end.monitor.complaint,
+        complaint=front_end.complaint or front_end.repeats.remark,
         hint=hint.value,
         advice=ADVICE[hint],
         exposure_ms=None if exposure is None else round(1e3 * exposure, 1),

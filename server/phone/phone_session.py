@@ -168,6 +168,8 @@ class PhoneSession:
 
     def _sighted(self, camera: Camera, detection: Detection, frame: EncodedFrame) -> None:
         """In the vision thread: hand on what was seen, remember where the time went."""
+        if detection.comes_again:
+            return
         now = self._clock()
         seen = detection.seen(camera)
         if seen is not None:
@@ -217,8 +219,8 @@ class PhoneSession:
         elif self.meters["pose"].age(now) > STALE_S and not faults:
             found = self.detection.reason if self.detection is not None else ""
             why.append(f"The robot is not seen. {found}".strip())
-        if not faults and self.vision is not None and self.vision.front_end.monitor.complaint:
-            why.append(self.vision.front_end.monitor.complaint)
+        if not faults and self.vision is not None and self.vision.front_end.complaint:
+            why.append(self.vision.front_end.complaint)
         return why
 
     def calibrate(self, wish: Calibrate) -> None:

@@ -61,6 +61,8 @@ class VisionThread(FrameThread):
             self._tell(self._on_key_wanted)
             return
         self._tell(lambda: self._on_detection(detection, frames[-1]))
+        if detection.comes_again:
+            return
         now = clock.now()
         if (
             self.watched

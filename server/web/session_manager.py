@@ -79,7 +79,7 @@ class SessionManager:
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
         self._events = Events()
-        self._last_mode = ""
+        self._last_mode = self._last_complaint = ""
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
         """What the phone saw, for the 3D view."""
@@ -288,6 +288,10 @@ class SessionManager:
             self.say(f"{status.mode}: {status.reason}")
             self.people.note("mode", why=f"{status.mode}: {status.reason}")
             self._last_mode = status.mode
+        complaint = status.camera.complaint if status.camera is not None else ""
+        if complaint not in ("", self._last_complaint):
+            self.say(complaint)
+        self._last_complaint = complaint
         self._shown = status
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
             self.say(paused)

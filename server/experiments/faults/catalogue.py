@@ -105,10 +105,16 @@ PICTURES: Final = (
     ends("pictures stop", "1", h.selective(("picture",), FOR_EVER), BLIND),
     borne("pictures stop for 1 s", "1", h.selective(("picture",), 1.0)),
     borne("pictures 0.2 s later", "2", h.slow_pictures(0.2)),
-    open_ended(
+    ends(
         "pictures frozen",
         "3",
         h.tampered_with_memory(lambda: tampering.pictures(tampering.frozen())),
+        BLIND,
+    ),
+    borne(
+        "pictures shown four times",
+        "3",
+        h.tampered_with_memory(lambda: tampering.pictures(tampering.repeated(4))),
     ),
     open_ended(
         "pictures' times 0.1 s wrong", "2", h.tampered(tampering.pictures(tampering.too_old))

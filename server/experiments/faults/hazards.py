@@ -57,7 +57,17 @@ HAZARDS: Final = (
         "fused at the moment they were taken; unbelievable: HOLD; too old: no arming",
         ("pipeline/control/test_latency_guard.py",),
     ),
-    Hazard("3", "The same picture again and again", "the filter's innovations", "HOLD"),
+    Hazard(
+        "3",
+        "The same picture again and again",
+        "it is the one before to the last bit, though phone or robot turn",
+        "looked at and fused once; for long: named on the pages, no arming, as 1",
+        (
+            "pipeline/vision/test_repeats_seen.py::"
+            "test_frames_that_come_again_change_nothing_to_the_last_bit",
+            "pipeline/vision/test_repeated_frames.py",
+        ),
+    ),
     Hazard(
         "4",
         "Picture mirrored, turned or cut",

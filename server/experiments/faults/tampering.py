@@ -140,6 +140,18 @@ def frozen() -> Callable[[SeenInput], SeenInput]:
     return freeze
 
 
+def repeated(times: int) -> Callable[[SeenInput], SeenInput]:
+    """Each picture is shown so often, with the time of the showing."""
+    shown: list[SeenInput] = []
+
+    def repeat(seen: SeenInput) -> SeenInput:
+        shown.append(seen)
+        first = shown[(len(shown) - 1) // times * times]
+        return stamped(first, seen.t - first.t)
+
+    return repeat
+
+
 def stamped(seen: SeenInput, later_s: float) -> SeenInput:
     """The same picture with another time."""
     change = msgspec.structs.replace

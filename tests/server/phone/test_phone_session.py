@@ -14,6 +14,7 @@ from pipeline.camera import verdict as camera_verdict
 from pipeline.estimation import sensor_validation
 from pipeline.frames import exp
 from pipeline.signals import LedRays, RelativePose, Spots
+from pipeline.vision import repeated_frames
 from pipeline.vision.detection import Detection
 from pipeline.vision.rays import NO_RAYS
 from server.control.ipc import OperatorInput, PhoneImuInput
@@ -223,6 +224,17 @@ def test_only_a_pose_counts_as_seeing_the_robot(rig):
     assert rig.to_control[-1].pose.leds == 5
 
 
+def test_a_picture_that_comes_again_is_no_news(rig):
+    pose = RelativePose(49.9, np.array([2.5, 0.0, 0.0]), np.eye(3), np.eye(6), 0.1, 5)
+    rig.phone._sighted(CAMERA, sighting_of(pose, FEW), SHOT)
+    told = list(rig.to_control)
+    rig.t += 2.0 * STALE_S
+    rig.phone._sighted(CAMERA, replace(sighting_of(None, NO_RAYS), comes_again=True), SHOT)
+    assert rig.to_control == told
+    assert rig.phone.detection.pose is pose
+    assert rig.phone.meters["pose"].age(rig.t) > STALE_S
+
+
 def test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed():
     rig = Rig(DEVICE)
     try:
@@ -232,6 +244,8 @@ def test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed():
         assert not [why for why in rig.why() if "stabilisation" in why]
         rig.phone.vision.front_end.monitor.complaint = camera_verdict.STABILISED
         assert rig.why()[-1] == camera_verdict.STABILISED
+        rig.phone.vision.front_end.repeats.complaint = repeated_frames.STANDS
+        assert rig.why()[-1] == repeated_frames.STANDS
     finally:
         rig.phone.close()
 

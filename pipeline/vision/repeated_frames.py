@@ -1,0 +1,74 @@
+"""Frames that come again with new times: noise makes no two alike, so nothing is learnt from them.
+
+A few are usual: a camera slower than its stream, a dark room. Many, or one for long, have a reason
+that people should know, unless phone and robot rest: then an encoder may have nothing to tell.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+import numpy as np
+
+from pipeline.frames import Array
+from pipeline.signals import Frame, Image
+
+STANDS_S: Final = 0.2
+"""A picture that lasts longer stands still."""
+RECENT: Final = 9
+"""Pictures that are looked at together: 0.3 s of them."""
+MOST: Final = 4
+"""Repeated ones of these that are usual: of 24 pictures in a stream of 30 there are two."""
+MOVED_RAD_S: Final = 0.05
+"""By how much a rate changes in a hand or in flight, and by no gyroscope's noise or bias."""
+FIRST_ROWS: Final = 8
+"""Compared before all others, for speed."""
+STANDS = (
+    "The picture stands still, though phone or robot move: reload the page; if that does not help, "
+    "restart the phone's browser."
+)
+SLOW = (
+    "Half of the pictures or more are the ones before: the camera films slowly. More light helps, "
+    "or closing what else uses the camera."
+)
+
+Rates = tuple[Array | None, Array | None]
+"""Of phone and robot (3,) [rad/s]; None if unknown."""
+
+
+class RepeatedFrames:
+    """Compares each frame with the one before, and remembers whether anything turned."""
+
+    def __init__(self) -> None:
+        """Nothing seen."""
+        self._luma: Image | None = None
+        self._t_new = -np.inf
+        self._recent: deque[tuple[bool, Rates]] = deque(maxlen=RECENT)
+        self.complaint = ""
+        """Why nobody should fly with these pictures; empty if all is well."""
+        self.remark = ""
+        """What people may mend, though each picture is looked at only once; or empty."""
+
+    def comes_again(self, frame: Frame, rates: Rates) -> bool:
+        """Whether `frame` is the one before to the last bit; `rates` are those of its time."""
+        again = self._luma is not None and _alike(self._luma, frame.luma)
+        if not again:
+            self._luma, self._t_new = frame.luma, frame.t
+        self._recent.append((again, rates))
+        stands = frame.t - self._t_new >= STANDS_S
+        often = sum(again for again, _ in self._recent) >= MOST
+        moves = (stands or often) and self._moves()
+        self.complaint = STANDS if stands and moves else ""
+        self.remark = SLOW if often and moves else ""
+        return again
+
+    def _moves(self) -> bool:
+        """Whether phone or robot turned unevenly of late, as whatever is held or flies does."""
+        sides = zip(*(rates for _, rates in self._recent), strict=True)
+        known = ([w for w in side if w is not None] for side in sides)
+        return any(w and float(np.ptp(w, axis=0).max()) > MOVED_RAD_S for w in known)
+
+
+def _alike(a: Image, b: Image) -> bool:
+    return np.array_equal(a[:FIRST_ROWS], b[:FIRST_ROWS]) and np.array_equal(a, b)
