@@ -23,7 +23,7 @@ class CalibrationControl:
         self._phone = ""
         self._told = Calibration("off")
 
-    def wish(self, phone: PhoneSession, wish: Calibrate, control: ControlStatus | None) -> None:
+    def request(self, phone: PhoneSession, wish: Calibrate, control: ControlStatus | None) -> None:
         """The phone begins to calibrate its camera, or leaves it.
 
         Raises:
@@ -33,7 +33,7 @@ class CalibrationControl:
             raise WireError("order", "calibrate.what", "while the robot is disarmed")
         phone.calibrate(wish)
 
-    def tell(self, phone: PhoneSession | None, control: ControlStatus | None) -> None:
+    def send(self, phone: PhoneSession | None, control: ControlStatus | None) -> None:
         """Send what is news; nobody calibrates while a robot is led."""
         if phone is None:
             return

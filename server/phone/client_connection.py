@@ -8,8 +8,8 @@ from typing import Protocol
 class ClientConnection(Protocol):
     """A connection that things can be sent to, from the event loop; never blocks."""
 
-    def push(self, data: str | bytes) -> None:
+    def send(self, data: str | bytes) -> None:
         """Send when possible; the newest wins."""
 
-    def push_newest(self, data: bytes) -> None:
+    def send_newest(self, data: bytes) -> None:
         """Send when possible, in place of what was pushed so and still waits."""

@@ -19,7 +19,7 @@ ASK_AGAIN_S = 0.3
 class FastTransport(Protocol):
     """Records by datagrams, and pictures."""
 
-    def push(self, data: bytes) -> None:
+    def send(self, data: bytes) -> None:
         """Send now or never."""
 
     def request_key(self) -> None:
@@ -83,18 +83,18 @@ class Transports:
         if self._fast is fast:
             self._fast = None
 
-    def tell(self, text: str) -> None:
+    def send(self, text: str) -> None:
         """A message."""
         if self._operator is not None:
-            self._operator.push(text)
+            self._operator.send(text)
 
     def ping(self, data: bytes) -> None:
         """A PING by all ways at once: the page answers the first, whatever becomes of the other."""
         if self._operator is None:
             return
         if self._fast is not None:
-            self._fast.push(data)
-        self._operator.push_newest(data)
+            self._fast.send(data)
+        self._operator.send_newest(data)
         self._keep(data)
 
     def taken(self, sequence: int) -> None:
@@ -105,7 +105,7 @@ class Transports:
     def _credit(self, sequence: int) -> None:
         if self._video is not None:
             data = encode(Record(sequence, int(1e6 * now()), Credit(sequence)))
-            self._video.push(data)
+            self._video.send(data)
             self._keep(data)
 
     def takes_from_fast(self, record_us: int, key: bool) -> bool:
@@ -130,7 +130,7 @@ class Transports:
         """Ask for a key frame wherever pictures may come from."""
         if self._fast is not None:
             self._fast.request_key()
-        self.tell(KEY_WANTED)
+        self.send(KEY_WANTED)
 
     def close(self) -> None:
         """The phone has gone."""

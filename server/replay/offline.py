@@ -85,7 +85,7 @@ class Offline:
         for k in range(ticks):
             now = recording.t_first + k * PERIOD_S
             while waiting is not None and waiting.t <= now:
-                self._hear(waiting)
+                self._receive(waiting)
                 waiting = next(entries, None)
             if k % READY_EVERY == 0:
                 self._inbox.append(ReadyInput([]))
@@ -106,7 +106,7 @@ class Offline:
         _, output = self._controller.tick(now, inbox, body, "")
         return output
 
-    def _hear(self, entry: Entry) -> None:
+    def _receive(self, entry: Entry) -> None:
         """What the server did with it then, without sockets."""
         try:
             if entry.topic == PHONE_MESSAGES:

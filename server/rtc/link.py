@@ -64,7 +64,7 @@ class RtcLink:
         """Of the phone."""
         return self._phone.id
 
-    def push(self, data: bytes) -> None:
+    def send(self, data: bytes) -> None:
         """Send a record to the page, now or never."""
         self.peer.send(data)
 
@@ -167,6 +167,6 @@ class RtcLink:
 
     def _refuse(self, error: WireError, session: Session) -> None:
         """Told on the websocket; too many faults end the fast path, not the phone."""
-        self._manager.paths.tell(encode_message(Refused(error.code, error.field, error.allowed)))
+        self._manager.paths.send(encode_message(Refused(error.code, error.field, error.allowed)))
         if session.hopeless:
             self.close()

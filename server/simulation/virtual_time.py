@@ -146,7 +146,7 @@ class VirtualTimeSimulation:
             self.advance()
         return self.trace
 
-    def wish(self, what: str) -> None:
+    def request(self, what: str) -> None:
         """A supervisor's wish."""
         self._inbox.append(RequestInput(what))
 

@@ -119,7 +119,7 @@ class LivePhone:
             await _first_failure([*tasks, leaving], seconds)
             self.script.operator.leaving = True
             await _first_failure(tasks, LEAVE_S)
-            await self.client.wish(Command("disarm"))
+            await self.client.request(Command("disarm"))
         finally:
             for task in (*tasks, leaving):
                 task.cancel()

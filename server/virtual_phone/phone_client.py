@@ -121,7 +121,7 @@ class PhoneClient:
         except WebSocketException as error:
             raise PhoneClientError(f"{self._access.url}: {error}") from error
 
-    async def wish(self, command: Command) -> None:
+    async def request(self, command: Command) -> None:
         """Send a wish."""
         await self._sockets[0].send(encode_message(command))
 
@@ -175,7 +175,7 @@ class PhoneClient:
         elif isinstance(message, Status):
             command = self._on_status(message)
             if command is not None:
-                await self.wish(command)
+                await self.request(command)
 
 
 def _message(data: str | bytes) -> ToPage:

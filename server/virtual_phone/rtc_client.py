@@ -203,10 +203,10 @@ class RtcPhoneClient(PhoneClient):
     def _channel_opened(self, channel: RTCDataChannel) -> None:
         if channel.label == CHANNEL:
             self._channel = channel
-            channel.on("message", self._hear)
+            channel.on("message", self._receive)
             self._opened.set()
 
-    def _hear(self, data: str | bytes) -> None:
+    def _receive(self, data: str | bytes) -> None:
         if isinstance(data, bytes) and not self._heard.full():
             self._heard.put_nowait(data)
 

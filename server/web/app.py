@@ -85,7 +85,7 @@ class Api:
             stop = await stop_of(request)
         except WireError as error:
             return refusal(409 if error.code == "age" else 400, error.field, error.allowed)
-        self._manager.wish(stop, request.scope["member"])
+        self._manager.request(stop, request.scope["member"])
         mode, _ = mode_of(self._manager, now())
         return JSONResponse({"stopping": True, "mode": mode}, 202)
 
@@ -106,13 +106,13 @@ class Api:
         recordings = self._manager.recordings
         if request.method == "DELETE":
             path = recordings.stop()
-            self._manager.say(f"Recorded: {path}" if path else "No recording was running.")
+            self._manager.log_event(f"Recorded: {path}" if path else "No recording was running.")
             return JSONResponse({"path": path})
         try:
             name = self._manager.start_recording()
         except RecordingError as error:
             return refusal(507, "recording", str(error))
-        self._manager.say(f"Recording {name}.")
+        self._manager.log_event(f"Recording {name}.")
         return JSONResponse({"name": name}, 202)
 
     async def _status(self, _request: Request) -> Response:

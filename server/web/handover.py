@@ -23,10 +23,10 @@ class LeadSubject(Protocol):
     def disarm(self) -> None:
         """Bring the robot down, whoever leads."""
 
-    def part(self, phone: PhoneSession) -> None:
+    def disconnect_phone(self, phone: PhoneSession) -> None:
         """A phone has gone."""
 
-    def say(self, text: str) -> None:
+    def log_event(self, text: str) -> None:
         """An event that people should see."""
 
 
@@ -54,7 +54,7 @@ class Handover:
         if by.role != "supervisor" and is_flying:
             raise PairingError("mode", "while the robot is disarmed: disarm it first")
         people.note("take-over" if is_flying else "hand-over", by, heir.name)
-        manager.say(f"{by.name} gives the lead to {heir.name}.")
+        manager.log_event(f"{by.name} gives the lead to {heir.name}.")
         people.lease.give(to, now)
         manager.disarm()
         self.make_room(now)
@@ -72,7 +72,7 @@ class Handover:
             raise PairingError("role", "supervisor, who gave it, or whom it is kept for")
         heir = people.named(id)
         people.note("hand-over", by, f"ended before {heir.name if heir else id} took it")
-        self._manager.say(f"{by.name} ends the hand-over to {heir.name if heir else id}.")
+        self._manager.log_event(f"{by.name} ends the hand-over to {heir.name if heir else id}.")
         lease.forget(id)
 
     def make_room(self, now: float) -> None:
@@ -84,7 +84,7 @@ class Handover:
         if manager.is_flying():
             lease.give(heir, now)
         else:
-            manager.part(manager.phone)
+            manager.disconnect_phone(manager.phone)
 
     async def shut_out(self, id: str, why: str, by: Member) -> Member:
         """End a pairing: its sockets close now, and a robot that it leads comes down.
@@ -95,17 +95,17 @@ class Handover:
         people = self._manager.people
         member = people.doors.pairings.revoke(id, why)
         people.note("revoke", by, f"{member.name}: {why}")
-        self._manager.say(f"{member.name} is shut out. {why}")
+        self._manager.log_event(f"{member.name} is shut out. {why}")
         await self._expel([member])
         return member
 
     async def expire(self) -> None:
         """Those whose time is over go; who has gone is written down, if that could not be done."""
         if self._manager.people.doors.save_again():
-            self._manager.say("Who is paired is written down again.")
+            self._manager.log_event("Who is paired is written down again.")
         over = self._manager.people.expire()
         for member in over:
-            self._manager.say(f"{member.name} is not paired any more. {member.why}")
+            self._manager.log_event(f"{member.name} is not paired any more. {member.why}")
         if over:
             await self._expel(over)
 
@@ -118,7 +118,7 @@ class Handover:
             await asyncio.gather(*(doors.sockets.end(member.id) for member in members))
         finally:
             if not doors.save():
-                self._manager.say(UNSAVED)
+                self._manager.log_event(UNSAVED)
         for member in members:
             if all(other.address != member.address for other in doors.pairings.present()):
                 doors.on_gone(member.address)
@@ -128,4 +128,4 @@ class Handover:
         people.lease.forget(member.id)
         if people.lease.holder == member.id and manager.phone is not None:
             manager.disarm()
-            manager.part(manager.phone)
+            manager.disconnect_phone(manager.phone)

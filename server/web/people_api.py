@@ -92,7 +92,7 @@ class PeopleApi:
         doors.save()
         self._manager.people.note("pair", member, f"as {member.state}")
         unconfirmed = ", waits to be confirmed" if member.state == "waiting" else ""
-        self._manager.say(f"{member.name} has paired as {member.role}{unconfirmed}.")
+        self._manager.log_event(f"{member.name} has paired as {member.role}{unconfirmed}.")
         response = JSONResponse(_told(member))
         name = cookie_name(secure)
         response.set_cookie(name, cookie, httponly=True, secure=secure, samesite="strict")
@@ -138,14 +138,14 @@ class PeopleApi:
         member = self._doors.pairings.confirm(asked.id, asked.code)
         self._doors.save()
         self._manager.people.note("confirm", by, member.name)
-        self._manager.say(f"{by.name} let {member.name} in.")
+        self._manager.log_event(f"{by.name} let {member.name} in.")
         return JSONResponse({"name": member.name})
 
     async def _deny(self, asked: PersonRequest, by: Member) -> Response:
         member = self._doors.pairings.deny(asked.id, "A supervisor did not let it in.")
         self._doors.save()
         self._manager.people.note("deny", by, member.name)
-        self._manager.say(f"{by.name} did not let {member.name} in.")
+        self._manager.log_event(f"{by.name} did not let {member.name} in.")
         return JSONResponse({"name": member.name})
 
     async def _revoke(self, asked: PersonRequest, by: Member) -> Response:

@@ -70,7 +70,7 @@ class SessionManager:
         self.robot, self.recordings = robot, recordings
         self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
         self.paths = Transports(lambda data: recordings.record("server", data, now()))
-        self._calibration = CalibrationControl(self.paths.tell)
+        self._calibration = CalibrationControl(self.paths.send)
         self._control = server_end(runtime)
         self.people = People(doors or Doors(), self._keep_deed)
         self.handover = Handover(self)
@@ -91,7 +91,7 @@ class SessionManager:
     async def run(self) -> None:
         """Serve until cancelled."""
         loop = asyncio.get_running_loop()
-        loop.add_reader(self._control.fileno(), self._hear_control)
+        loop.add_reader(self._control.fileno(), self._receive_status)
         watching = asyncio.create_task(self.pauses.watch())
         try:
             while True:
@@ -116,7 +116,7 @@ class SessionManager:
         """What people should see, newest first."""
         return self._events.shown
 
-    def say(self, text: str, of: str = "") -> None:
+    def log_event(self, text: str, of: str = "") -> None:
         """An event that people should see, and the log keep; see `Events.add`."""
         if said := self._events.add(text, of, now()):
             log.info("%s", said)
@@ -124,13 +124,13 @@ class SessionManager:
     def _keep_deed(self, deed: Deed) -> None:
         self.recordings.message("server", encode_message(deed), now())
 
-    def wish(self, command: Command, who: Member) -> None:
+    def request(self, command: Command, who: Member) -> None:
         """A person's wish, already checked for its role."""
         if command.what == "key_frame":
             return
         lacks = self.status.refusals if command.what == "arm" and self.status is not None else ()
         self.people.note(command.what, who, f"refused: {'; '.join(lacks)}"[:300] if lacks else "")
-        self.say(said := f"{who.name}: {command.what}", of=said)
+        self.log_event(said := f"{who.name}: {command.what}", of=said)
         self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
 
     def tune(self, wish: Tune) -> None:
@@ -140,15 +140,17 @@ class SessionManager:
             return
         told = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
         if self._control.send(TuneInput(**knobs)):
-            self.say(f"supervisor: {told}", of="virtual camera")
+            self.log_event(f"supervisor: {told}", of="virtual camera")
         else:
-            self.say(f"{told} did not reach the control process: try again.")
+            self.log_event(f"{told} did not reach the control process: try again.")
 
     def calibrate(self, wish: Calibrate) -> None:
         """Let the operator's phone begin its camera's calibration, or leave it."""
         if (phone := self.phone) is not None:
-            self._calibration.wish(phone, wish, self.status)
-            self.say(f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration")
+            self._calibration.request(phone, wish, self.status)
+            self.log_event(
+                f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration"
+            )
 
     def _ask(self, request: RequestInput, insists: int) -> None:
         """Nobody may be there, or the queue may be full: what stops the robot is said again."""
@@ -157,7 +159,7 @@ class SessionManager:
         if insists > 0:
             asyncio.get_running_loop().call_later(INSIST_S, self._ask, request, insists - 1)
         else:
-            self.say(f"{request.what} did not reach the control process: try again.")
+            self.log_event(f"{request.what} did not reach the control process: try again.")
 
     def connect_phone(
         self, hello: Hello, page: ClientConnection, who: Member = PROGRAM
@@ -172,12 +174,12 @@ class SessionManager:
             return None
         if self.is_flying() and self.people.lease.is_of_another(who.id):
             self.people.note("take-over", who, "the robot comes down first")
-            self.say(f"{who.name} leads once the robot is down.")
+            self.log_event(f"{who.name} leads once the robot is down.")
             self.disarm()
             return None
         if current is not None:
             self.people.note("take-over", who, "the phone that led was silent")
-            self.part(current)
+            self.disconnect_phone(current)
         soon: Callable[..., Any] = asyncio.get_running_loop().call_soon_threadsafe
         self.phone = PhoneSession(
             hello,
@@ -195,7 +197,7 @@ class SessionManager:
         self.disarm()  # never go on with another hand
         self.people.lease.take(who.id)
         self.people.note("lead", who, self.phone.device)
-        self.say(f"{who.name} leads: {self.phone.device}.")
+        self.log_event(f"{who.name} leads: {self.phone.device}.")
         return self.phone
 
     def is_flying(self) -> bool:
@@ -221,14 +223,14 @@ class SessionManager:
     def _leading(self, session: str) -> PhoneSession | None:
         return self.phone if self.phone is not None and self.phone.id == session else None
 
-    def part(self, phone: PhoneSession) -> None:
+    def disconnect_phone(self, phone: PhoneSession) -> None:
         """A phone has gone."""
         if self.phone is phone:
             self.phone = None
             self.paths.close()
             self.people.note("leave", self.people.named(self.people.lease.holder), phone.device)
             self.people.lease.free()
-            self.say(f"{phone.device} has left.")
+            self.log_event(f"{phone.device} has left.")
             phone.close()
 
     def start_recording(self) -> str:
@@ -262,7 +264,7 @@ class SessionManager:
         if self.phone is not None:
             self.paths.ping(encode(self.phone.ping(now())))
 
-    def _hear_control(self) -> None:
+    def _receive_status(self) -> None:
         for status in self._control.statuses():
             self.status = status
             self.control_meter.tick(now(), status.t)
@@ -285,30 +287,30 @@ class SessionManager:
             log.info("%s", said)
         status = build(self)
         if status.mode != self._last_mode:
-            self.say(f"{status.mode}: {status.reason}")
+            self.log_event(f"{status.mode}: {status.reason}")
             self.people.note("mode", why=f"{status.mode}: {status.reason}")
             self._last_mode = status.mode
         complaint = status.camera.complaint if status.camera is not None else ""
         if complaint not in ("", self._last_complaint):
-            self.say(complaint)
+            self.log_event(complaint)
         self._last_complaint = complaint
         self._shown = status
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
-            self.say(paused)
+            self.log_event(paused)
         if self._decoding is not None and (ended := self._decoding.news(now())):
-            self.say(ended)
+            self.log_event(ended)
         self.broadcast(status)
         self._show_picture()
         self._ask_key()
-        self._calibration.tell(self.phone, self.status)
+        self._calibration.send(self.phone, self.status)
 
     def broadcast(self, message: ToPage) -> None:
         """To every page."""
         text = encode_message(message)
         self.recordings.message("server", text, now())
         for page in self.supervisors:
-            page.push(text)
-        self.paths.tell(text)
+            page.send(text)
+        self.paths.send(text)
 
     def _show_picture(self) -> None:
         picture = self.phone.thumbnail(bool(self.supervisors)) if self.phone is not None else None
@@ -317,7 +319,7 @@ class SessionManager:
         self.last_thumbnail = picture
         data = encode(Record(0, int(1e6 * now()), Thumbnail(jpeg(picture))))
         for page in self.supervisors:
-            page.push(data)
+            page.send(data)
 
     def snapshot(self) -> bytes:
         """The last status as JSON, for people with a terminal."""

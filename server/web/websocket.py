@@ -55,12 +55,12 @@ class Connection:
         self._newest: bytes | None = None
         self._news = asyncio.Event()
 
-    def push(self, data: str | bytes) -> None:
+    def send(self, data: str | bytes) -> None:
         """Send when possible."""
         self._unsent.append(data)
         self._news.set()
 
-    def push_newest(self, data: bytes) -> None:
+    def send_newest(self, data: bytes) -> None:
         """Send when possible, in place of what was pushed so and still waits."""
         self._newest = data
         self._news.set()
@@ -68,7 +68,7 @@ class Connection:
     def refuse(self, error: WireError, fatal: bool = False) -> None:
         """Tell the page what was not taken."""
         refused = Refused(error.code, error.field, error.allowed, fatal)
-        self.push(encode_message(refused))
+        self.send(encode_message(refused))
 
     async def write(self) -> None:
         """Send what is pushed, until cancelled."""
@@ -157,7 +157,7 @@ class PageServer:
                     task.cancel()
             self._manager.supervisors.discard(page)
             if role == "operator" and phone is not None:
-                self._manager.part(phone)
+                self._manager.disconnect_phone(phone)
             await _quietly(page.close(1008 if session.hopeless or session.hello is None else 1000))
 
     async def _greet(
@@ -179,7 +179,7 @@ class PageServer:
         else:
             self._manager.supervisors.add(page)
         video = self._video
-        page.push(
+        page.send(
             encode_message(
                 Welcome(
                     session=phone.id if phone is not None else "",
@@ -216,7 +216,7 @@ class PageServer:
             if isinstance(said, Record) and phone is not None:
                 phone.take(said, t)
             elif isinstance(said, Command):
-                self._manager.wish(said, member)
+                self._manager.request(said, member)
             elif isinstance(said, Calibrate) and phone is not None:
                 self._manager.calibrate(said)
             elif isinstance(said, Tune):
@@ -225,7 +225,7 @@ class PageServer:
             elif isinstance(said, PathChoice):
                 self._choose(said, phone)
             elif isinstance(said, Log):
-                self._manager.say(f"page: {said.text}", of=f"page of {member.name}")
+                self._manager.log_event(f"page: {said.text}", of=f"page of {member.name}")
         except WireError as error:
             if error.code in ("role", "age"):
                 self._manager.people.note("refusal", member, str(error))
@@ -241,11 +241,11 @@ class PageServer:
             leading = self._manager.phone
             if leading is None or leading.path_choice is None:
                 raise WireError("order", "path.wish", "while a phone leads that has several ways")
-            self._manager.paths.tell(encode_message(structs.replace(choice, by="supervisor")))
+            self._manager.paths.send(encode_message(structs.replace(choice, by="supervisor")))
             return
         if choice.by and choice != phone.path_choice:
             way = "the best way" if choice.wish == "auto" else choice.wish
-            self._manager.say(f"pictures by {way}: chosen by the {choice.by}", of="pictures")
+            self._manager.log_event(f"pictures by {way}: chosen by the {choice.by}", of="pictures")
         phone.path_choice = choice
 
     def _is_straggler(self, said: FromPage | Record) -> bool:

@@ -46,8 +46,8 @@ LOSSES: list[tuple[str, Callable[[VirtualTimeSimulation], None], str, float]] = 
     ("picture", lambda loop: loop.lost.add("picture"), "HOLD", 2.6),
     ("motion", lambda loop: loop.lost.add("motion"), "COAST", 0.17),
     ("touch", lambda loop: loop.lost.add("touch"), "COAST", 0.17),
-    ("disarm", lambda loop: loop.wish("disarm"), "RAMP", 0.011),
-    ("stop", lambda loop: loop.wish("stop"), "STOPPED", 0.011),
+    ("disarm", lambda loop: loop.request("disarm"), "RAMP", 0.011),
+    ("stop", lambda loop: loop.request("stop"), "STOPPED", 0.011),
 ]
 
 

@@ -92,7 +92,7 @@ def lose_the_link(loop: VirtualTimeSimulation) -> None:
 LOSSES: list[Callable[[VirtualTimeSimulation], None]] = [
     lose_the_phone,
     lose_the_link,
-    lambda loop: loop.wish("disarm"),
+    lambda loop: loop.request("disarm"),
     lambda loop: None,  # the button is let go
 ]
 WHICH = ["phone", "link", "disarm", "button"]

@@ -58,7 +58,7 @@ class PageServer:
         """Run `talk(client)` against this server."""
 
         async def with_client(access):
-            client = PhoneClient(access, self.pong, self.wish)
+            client = PhoneClient(access, self.pong, self.request)
             try:
                 await talk(client)
             finally:
@@ -69,5 +69,5 @@ class PageServer:
     def pong(self, nonce, server_time_us):
         return Record(1, 77, Pong(nonce, server_time_us))
 
-    def wish(self, shown):
+    def request(self, shown):
         return Command("arm") if shown.mode == "DISARMED" else None

@@ -177,7 +177,7 @@ def requested(what: str, at: float = 0.0, before: Happening | None = None) -> Ha
     def happen(world: FaultyFlight) -> None:
         def request() -> None:
             world.begin = world.loop.t
-            world.loop.wish(what)
+            world.loop.request(what)
 
         if before is None:
             request()
@@ -196,7 +196,7 @@ def requested_every_tick(what: str) -> Happening:
 
     def happen(world: FaultyFlight) -> None:
         for k in range(200):
-            world.at(0.005 * k, partial(world.loop.wish, what))
+            world.at(0.005 * k, partial(world.loop.request, what))
 
     return happen
 

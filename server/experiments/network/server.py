@@ -74,11 +74,11 @@ class NotingSessionManager(SessionManager):
         if isinstance(message, OperatorInput):
             self.heard.echoes.append((message.t, now()))
 
-    def part(self, phone: PhoneSession) -> None:
+    def disconnect_phone(self, phone: PhoneSession) -> None:
         """Note how its pictures came."""
         self._look_back(phone)
         self.heard.partings += 1
-        super().part(phone)
+        super().disconnect_phone(phone)
 
     def tell_heard(self) -> None:
         """All of it, and begin anew."""

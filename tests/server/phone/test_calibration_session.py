@@ -154,13 +154,13 @@ def test_a_camera_without_a_calibration_is_told_once(front, board):
     with pytest.raises(WireError, match="no calibration"):
         front.see(1, board)
     for _ in range(3):
-        front.calibration_control.tell(front.phone, CALM)
+        front.calibration_control.send(front.phone, CALM)
     assert front.phases() == ["needed"]
 
 
 def test_a_phone_that_is_calibrated_is_told_nothing(front):
-    front.calibration_control.tell(front.phone, CALM)
-    front.calibration_control.tell(None, CALM)
+    front.calibration_control.send(front.phone, CALM)
+    front.calibration_control.send(None, CALM)
     assert front.told == []
 
 
@@ -169,16 +169,16 @@ def test_nobody_calibrates_while_the_robot_is_led(front, board):
         front.see(1, board)
     for control in (FLYING, None):
         with pytest.raises(WireError, match="disarmed"):
-            front.calibration_control.wish(front.phone, Calibrate("start"), control)
-    front.calibration_control.wish(front.phone, Calibrate("start"), CALM)
+            front.calibration_control.request(front.phone, Calibrate("start"), control)
+    front.calibration_control.request(front.phone, Calibrate("start"), CALM)
     assert front.phone.wizard is not None
-    front.calibration_control.tell(front.phone, FLYING)
+    front.calibration_control.send(front.phone, FLYING)
     assert front.phone.wizard is None
 
 
 def test_before_the_first_picture_there_is_nothing_to_calibrate(front):
     with pytest.raises(WireError, match="when pictures come"):
-        front.calibration_control.wish(front.phone, Calibrate("start"), CALM)
+        front.calibration_control.request(front.phone, Calibrate("start"), CALM)
 
 
 def test_turning_the_phone_begins_anew_and_leaving_looks_again(front, board):
@@ -194,6 +194,6 @@ def test_turning_the_phone_begins_anew_and_leaving_looks_again(front, board):
     assert front.phone.wizard is None
     with pytest.raises(WireError, match="no calibration"):
         front.see(4, board)
-    front.calibration_control.tell(front.phone, CALM)
+    front.calibration_control.send(front.phone, CALM)
     assert isinstance(front.told[-1], Calibration)
     assert front.phases() == ["needed"]

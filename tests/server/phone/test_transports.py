@@ -10,10 +10,10 @@ class Page:
     def __init__(self):
         self.data = []
 
-    def push(self, data):
+    def send(self, data):
         self.data.append(data)
 
-    push_newest = push
+    send_newest = send
 
     @property
     def credits(self):

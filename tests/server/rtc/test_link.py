@@ -126,7 +126,7 @@ def test_whichever_way_dies_without_a_word_the_finger_is_felt_by_the_other(dead,
             page.client._channel.send = house.signalling._link.peer._channel.send = lambda _: None
         else:
             swallow(page.client._sockets[0])
-            house.manager.paths._operator.push = lambda _: None
+            house.manager.paths._operator.send = lambda _: None
         pongs = page.pongs
         await eventually(lambda: page.pongs >= pongs + 3)
         for sequence, held in ((1, False), (2, True)):
@@ -243,7 +243,7 @@ def test_a_phone_that_leaves_and_one_that_calls_again_leave_no_connection_behind
         await asyncio.wait_for(asyncio.gather(page.running, return_exceptions=True), 5.0)
         second = house.signalling._link
         assert second is not first
-        house.manager.part(house.manager.phone)
+        house.manager.disconnect_phone(house.manager.phone)
         refused = await house.post("/api/rtc/answer", {"id": second.id, "sdp": "v=0"})
         assert refused.status_code in (400, 404)
         await eventually(lambda: second.is_closing)
@@ -254,7 +254,7 @@ def test_a_phone_that_leaves_and_one_that_calls_again_leave_no_connection_behind
 def test_another_hand_takes_the_fast_path_away(tmp_path):
     async def play(house, page):
         link = house.signalling._link
-        house.manager.part(house.manager.phone)
+        house.manager.disconnect_phone(house.manager.phone)
         assert link.is_closing
         await page.touch(1, held=True)
         assert house.taken == [] or all(t < now() for _, t in house.taken)

@@ -27,10 +27,10 @@ class Paper:
     def __init__(self) -> None:
         self.data: list[str | bytes] = []
 
-    def push(self, data: str | bytes) -> None:
+    def send(self, data: str | bytes) -> None:
         self.data.append(data)
 
-    push_newest = push
+    send_newest = send
 
 
 @pytest.fixture
@@ -71,9 +71,9 @@ def test_one_phone_leads_until_it_has_been_silent(house, monkeypatch):
         monkeypatch.setattr("server.web.session_manager.now", lambda: now() + LEASE_S)
         second = manager.connect_phone(hello("second"), Paper())
         assert manager.phone is second is not None
-        manager.part(first)
+        manager.disconnect_phone(first)
         assert manager.phone is second
-        manager.part(second)
+        manager.disconnect_phone(second)
         assert manager.phone is None
 
     in_loop(scene)
@@ -105,7 +105,7 @@ def test_only_the_session_that_leads_may_send_pictures(house):
         phone = house.manager.connect_phone(hello("first"), Paper())
         assert house.manager.join_video("guess", Paper()) is None
         assert house.manager.join_video(phone.id, Paper()) is phone
-        house.manager.part(phone)
+        house.manager.disconnect_phone(phone)
         assert house.manager.join_video(phone.id, Paper()) is None
 
     in_loop(scene)
@@ -117,7 +117,7 @@ class Fast:
     def __init__(self):
         self.data, self.keys, self.closed, self.has_video = [], 0, False, True
 
-    def push(self, data):
+    def send(self, data):
         self.data.append(data)
 
     def request_key(self):
@@ -154,7 +154,7 @@ def test_a_phone_has_one_fast_path_which_goes_with_it(house):
         house.manager.paths.leave(former)  # late news
         house.manager.ping()
         assert len(fast.data) == 1
-        house.manager.part(phone)
+        house.manager.disconnect_phone(phone)
         assert fast.closed
 
     in_loop(scene)
@@ -181,7 +181,7 @@ def test_what_the_server_lacks_reaches_control_with_every_tick(house):
 def test_wishes_reach_control_except_those_for_phones(house):
     def scene():
         for what in ("arm", "disarm", "stop", "reset", "key_frame"):
-            house.manager.wish(Command(what), of_this_machine("operator"))
+            house.manager.request(Command(what), of_this_machine("operator"))
 
     in_loop(scene)
     heard = [m.what for m in house.control.inputs() if isinstance(m, RequestInput)]
@@ -211,7 +211,7 @@ def test_a_stop_is_said_again_until_control_can_take_it(house):
     async def scene():
         while house.manager._control.send(ReadyInput([])):
             pass
-        house.manager.wish(Command("stop"), of_this_machine("operator"))
+        house.manager.request(Command("stop"), of_this_machine("operator"))
         assert not any(map(is_request("stop"), house.control.inputs()))
         heard = []
         for _ in range(1000):
@@ -226,7 +226,7 @@ def test_a_stop_is_said_again_until_control_can_take_it(house):
 
 def test_events_are_few_newest_first_and_hold_no_control_characters(house):
     for k in range(2 * EVENTS):
-        house.manager.say(f"{k}\x1b]0;owned\x07\n")
+        house.manager.log_event(f"{k}\x1b]0;owned\x07\n")
     assert len(house.manager.events) == EVENTS
     assert house.manager.events[0] == f"{2 * EVENTS - 1}·]0;owned··"
 

@@ -263,7 +263,7 @@ def test_a_page_that_does_not_read_loses_the_oldest_and_holds_up_nobody(server):
         async with server.supervisor() as watcher, server.operator() as page:
             lazy = next(iter(server.manager.supervisors))
             for k in range(2_000):
-                lazy.push(f'{{"type": "{k}"}}')
+                lazy.send(f'{{"type": "{k}"}}')
             assert len(lazy._unsent) <= 16
             await page.say(type="log", text="still here")
             await watcher.until("status", phones=1)
@@ -289,11 +289,11 @@ def test_signs_of_life_asked_for_in_a_gap_do_not_queue_and_the_rest_does_not_hol
         socket = Stalled()
         page = Connection(socket)
         writer = asyncio.create_task(page.write())
-        page.push("under way")
+        page.send("under way")
         await asyncio.sleep(0)
         for k in range(100):
-            page.push_newest(b"ping %d" % k)
-        page.push("status")
+            page.send_newest(b"ping %d" % k)
+        page.send("status")
         socket.open.set()
         await eventually(lambda: len(socket.taken) >= 3)
         assert socket.taken == ["under way", b"ping 99", "status"]
