@@ -42,7 +42,7 @@ class AttitudeGains:
 
     @classmethod
     def of(cls, robot: Robot, config: HoldConfig) -> AttitudeGains:
-        """For a robot that can be lifted and turned, as stiff as control's own hold."""
+        """Gains for a robot that can be lifted and turned, as stiff as control's own hold."""
         columns: Array = np.linalg.pinv(robot.A[2:]).astype(float)
         stiffness = columns[:, 1:] * (config.stiffness * robot.inertia)
         damping = columns[:, 1:] * (config.damping * robot.inertia)
@@ -79,7 +79,7 @@ class AttitudeKeeper:
         self._omega_in_b = omega
 
     def thrusts(self, falling: Array) -> Array:
-        """(m,) [N], within [0, f_max]: the lift of `falling`, torques against tilt and turning."""
+        """Thrusts (m,) [N] in [0, f_max]: the lift of `falling`, torques against tilt and turns."""
         gains = self._gains
         lift = max(0.0, float(gains.lift_row @ falling))
         level = np.clip(gains.lift_column * lift, 0.0, gains.f_max)

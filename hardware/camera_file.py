@@ -189,7 +189,7 @@ class _CameraFileReader:
         return Extrinsics(U @ Vt, offset_s)
 
     def _line_readout_s(self, name: str, height: int) -> float:
-        """Of a camchain: our own key beside the cameras, else Kalibr's time between two rows."""
+        """Readout time of a camchain: our own key, else Kalibr's time between two rows."""
         table = self._table[name]
         if "line_delay" not in table:
             return self._readout_s()

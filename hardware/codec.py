@@ -41,7 +41,7 @@ class Encoder:
     def __init__(
         self, width: int, height: int, frame_rate_hz: float, bitrate_bps: int, codec: str = "h264"
     ) -> None:
-        """For pictures of one size.
+        """Encode pictures of one size.
 
         Raises:
             ValueError: an unknown codec.
@@ -68,7 +68,7 @@ class Encoder:
         return context
 
     def encode(self, luma: Image, key: bool = False) -> tuple[bytes, bool]:
-        """Bytes of a picture (height, width), and whether they can be decoded alone."""
+        """Encode a picture (height, width): its bytes, and whether they can be decoded alone."""
         if self._context is None:
             _, data = cv2.imencode(".jpg", luma, (cv2.IMWRITE_JPEG_QUALITY, 80))
             return data.tobytes(), True
@@ -88,7 +88,7 @@ class Decoder:
     """A server's decoder of one stream of one size."""
 
     def __init__(self, codec: str, width: int, height: int) -> None:
-        """Nothing decoded yet.
+        """Begin with nothing decoded.
 
         Raises:
             ValueError: an unknown codec.

@@ -1,4 +1,4 @@
-"""What every robot, real or simulated, offers: take thrusts, give what its body sensors say."""
+"""The interface to every robot, real or simulated: thrusts in, samples of its body sensors out."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class FollowerError(RuntimeError):
 
 
 class FollowerState(IntEnum):
-    """What the robot itself does."""
+    """State of the robot, by itself."""
 
     IDLE = 0
     """Ready; no thrust."""
@@ -90,7 +90,7 @@ class ThrustCommand:
 
     @classmethod
     def zero(cls, thrusters: int) -> ThrustCommand:
-        """Nothing meant, nothing commanded."""
+        """Zero thrust, disarmed."""
         return cls(np.zeros(thrusters), armed=False)
 
 
@@ -116,13 +116,13 @@ class BodySample:
 
 
 class Follower(Protocol):
-    """One robot. Used from one thread; no method waits for the robot."""
+    """Interface to one robot. Used from one thread; no method waits for the robot."""
 
     thrusters: int
     """m."""
 
     def receive(self) -> list[BodySample]:
-        """All samples that have arrived since the last call, oldest first.
+        """Return all samples that have arrived since the last call, oldest first.
 
         Raises:
             FollowerError: closed. A lost link is no error: samples stay away.

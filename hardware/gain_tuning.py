@@ -94,7 +94,7 @@ def _alike(loop: Loop, axis: int, rows: Array) -> tuple[float, ...]:
 
 
 def _best(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> Array:
-    """(3,) Kp, Ki, Kd."""
+    """Best Kp, Ki, Kd (3,) of one axis."""
     inertia = float(loop.dynamics.inertia[axis])
     turns_to_move = loop.dynamics.needs_tilt and axis in TILT_AXIS.values()
 
@@ -132,7 +132,7 @@ def _cost(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> float:
 
 
 def variants(loop: Loop) -> Sequence[Loop]:
-    """As it is, and without feed-forward."""
+    """The loop as it is, and without feed-forward."""
     return (loop,) if loop.feedforward is None else (loop, replace(loop, feedforward=None))
 
 

@@ -59,7 +59,7 @@ def _all(sets: dict[str, Any]) -> str:
 
 
 def _places(text: str) -> dict[str, tuple[int, int]]:
-    """From where to where each set stands, from its header to its last line with content."""
+    """Span of each set in the text, from its header to its last line with content."""
     headers = [found.start() for found in HEADER.finditer(text)] + [len(text)]
     places: dict[str, tuple[int, int]] = {}
     for start, following in pairwise(headers):
@@ -81,7 +81,7 @@ def _row(row: Array) -> str:
 
 
 def _verify(before: dict[str, Any], changed: str, name: str, gains: Gains) -> None:
-    """Nothing else may have changed, however unusually the file is written.
+    """Verify that nothing else has changed, however unusually the file is written.
 
     Raises:
         GainsTextError: it has.

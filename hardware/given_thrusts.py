@@ -27,7 +27,7 @@ class GivenThrusts:
         return bool(self._base.any())
 
     def at(self, now_us: int) -> Array:
-        """What to give now."""
+        """Thrusts to give now (m,) [N]."""
         if self._fading_since_us is None:
             return self._base.copy()
         elapsed_us = max(0, now_us - self._fading_since_us)
@@ -56,7 +56,7 @@ class GivenThrusts:
         self.commanded = thrusts
 
     def zero(self) -> None:
-        """Nothing, at once."""
+        """Give zero thrust at once."""
         self.commanded = np.zeros_like(self.commanded)
         self._base = np.zeros_like(self._base)
         self._fading_since_us, self._catching_up = None, False

@@ -1,4 +1,4 @@
-"""Where a robot's LEDs are: of a whole robot file, or of one with nothing but `[[leds]]`."""
+"""Places of a robot's LEDs: of a whole robot file, or of one with nothing but `[[leds]]`."""
 
 from __future__ import annotations
 

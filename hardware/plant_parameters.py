@@ -45,7 +45,7 @@ class SuspensionParameters:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StandParameters:
-    """What a robot stands on the floor with."""
+    """Feet of a robot that stands on the floor."""
 
     feet_in_b: Array
     """(k, 3) [m], where they touch."""
@@ -67,7 +67,7 @@ class StartParameters:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlantParameters:
-    """What moves the robot, for simulation: it hangs from a suspension, or has a stand."""
+    """Rigid body of a simulated robot, and what carries it: a suspension or a stand."""
 
     mass: float
     """[kg]."""

@@ -81,7 +81,7 @@ def load_robot(name_or_path: str | Path) -> RobotFile:
 
 
 def robot_table(path: Path) -> dict[str, Any]:
-    """What stands in a robot file, unchecked.
+    """Table of a robot file, unchecked.
 
     Raises:
         RobotFileError: it can't be read, or is no TOML.

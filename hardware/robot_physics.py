@@ -1,4 +1,4 @@
-"""What a robot must be like to be flown at all."""
+"""Physical conditions that a robot must meet to be flown."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def allocation_matrix(positions_in_b: Array, directions_in_b: Array, torques: Ar
 
 
 def faults(robot: Robot, plant: PlantParameters) -> Iterator[tuple[str, str]]:
-    """What is wrong with a robot: (key of the robot file, what would be allowed)."""
+    """Faults of a robot: (key of the robot file, what would be allowed)."""
     Ixx, Iyy, Izz = plant.inertia
     if max(Ixx, Iyy, Izz) > 0.5 * (Ixx + Iyy + Izz):
         yield "body.inertia_kg_m2", "no moment larger than the sum of the two others"
@@ -110,7 +110,7 @@ def _wrench_faults(robot: Robot, plant: PlantParameters) -> Iterator[tuple[str, 
 
 
 def _hover_faults(robot: Robot, scaled: Array) -> Iterator[tuple[str, str]]:
-    """It must carry its weight, without turning, by thrusts with room below and above."""
+    """Faults of hovering: weight carried, without turning, by thrusts with room either way."""
     weight = np.array([0.0, 0.0, robot.weight_to_carry, 0.0, 0.0, 0.0])[robot.wrench_axes]
     bounds = (1.05 * robot.f_min, max(MOST_TO_HOVER * robot.f_max, 1.06 * robot.f_min + 1e-9))
     short = float(np.abs(lsq_linear(scaled, weight, bounds).fun).max())

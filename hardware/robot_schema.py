@@ -1,4 +1,4 @@
-"""What may stand in a robot file: every key, its unit in its name, its range."""
+"""Schema of robot files: every key, its unit in its name, its range."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ class RobotSchema(Section):
 
 
 def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
-    """What does not go together: (key, what would be allowed)."""
+    """Keys that contradict each other: (key, what would be allowed)."""
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     if robot.suspension is not None:

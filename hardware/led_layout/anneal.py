@@ -176,7 +176,7 @@ def improve(
 
 
 def _counted(ticks: list[None], done: Callable[[], bool]) -> Iterator[None]:
-    """As many turns as there were ticks, as they come."""
+    """Count turns by ticks, as they come."""
     counted = 0
     while counted < len(ticks) or not done():
         if counted < len(ticks):
@@ -219,7 +219,7 @@ def _anneal(
 
 
 def _moved(leds: Array, reaches: Sequence[Reach], stride: float, rng: np.random.Generator) -> Array:
-    """One or two LEDs moved within their reach, to whole millimetres where that is within."""
+    """Move one or two LEDs within their reach, to whole millimetres where that is within."""
     moved = leds.copy()
     for k in rng.choice(len(leds), rng.integers(1, 3), replace=False):
         place = reaches[k].nearest(moved[k] + stride * reaches[k].size * rng.normal(size=3))

@@ -1,4 +1,4 @@
-"""How well a pose can be known from LEDs at all: the Cramér-Rao bound, view by view."""
+"""CRLB of a pose by LEDs, view by view: how well it can be known at all."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Sigmas:
 
 
 def sigmas(leds_in_b: Array, looks: Viewpoints, noise_px: float) -> Sigmas:
-    """With all LEDs seen, each coordinate of each off by `noise_px`."""
+    """Standard deviations with all LEDs seen, each coordinate off by `noise_px`."""
     covariances = np.array(
         [
             [_covariance(leds_in_b, attitude(d), float(z), looks.focal_px) for z in looks.distances]
@@ -42,7 +42,7 @@ def sigmas(leds_in_b: Array, looks: Viewpoints, noise_px: float) -> Sigmas:
 
 
 def one_hidden(leds_in_b: Array, looks: Viewpoints, noise_px: float) -> Sigmas:
-    """The same with that one LED hidden that is missed most, for each figure of its own."""
+    """Standard deviations with the LED hidden that each figure misses most."""
     each = [sigmas(np.delete(leds_in_b, k, axis=0), looks, noise_px) for k in range(len(leds_in_b))]
     return Sigmas(
         np.max([s.lateral for s in each], axis=0),
@@ -52,7 +52,7 @@ def one_hidden(leds_in_b: Array, looks: Viewpoints, noise_px: float) -> Sigmas:
 
 
 def _covariance(leds_in_b: Array, R_cb: Array, distance: float, f: float) -> Array:
-    """(6, 6) of (δp in c, θ in b) for a noise of 1 px; huge where LEDs say nothing."""
+    """Covariance (6, 6) of (δp in c, θ in b) for a noise of 1 px; huge where LEDs say nothing."""
     px = seen(leds_in_b, R_cb, distance, f)
     q = leds_in_b @ R_cb.T + np.array([distance, 0.0, 0.0])
     along = np.zeros((len(q), 2, 3))

@@ -33,7 +33,7 @@ class Layout:
 
 
 def load_layout(name_or_path: str) -> Layout:
-    """Of a robot known by name, or of a file that ends in `.toml` with at least `[[leds]]`.
+    """Load the layout of a robot by name, or of a `.toml` file with at least `[[leds]]`.
 
     Raises:
         RobotFileError: names file, key and what is allowed.

@@ -75,7 +75,7 @@ def namings(count: int, named: int) -> tuple[Indices, Indices]:
 
 
 def check(leds_in_b: Array) -> None:
-    """Are they such that they can be judged?
+    """Refuse LEDs that have no margins.
 
     Raises:
         LedLayoutError: too few, too many, or two in one place.

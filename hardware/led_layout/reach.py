@@ -21,7 +21,7 @@ class Reach(Protocol):
 
     @property
     def size(self) -> float:
-        """From one end to the other [m]."""
+        """Distance from one end to the other [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +53,7 @@ class Ball:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
-    """Between two corners, edges along the body's axes."""
+    """Box between two corners, edges along the body's axes."""
 
     low: Array
     high: Array
@@ -74,7 +74,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
-    """On the straight line from `root` to `tip`."""
+    """Straight line from `root` to `tip`."""
 
     root: Array
     tip: Array

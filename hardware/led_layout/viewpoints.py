@@ -35,7 +35,7 @@ class Viewpoints:
 
     @property
     def limits(self) -> tuple[float, float, float]:
-        """For knowing nothing, gravity, attitude [rad]."""
+        """Limits of attitude for knowing nothing, gravity, attitude [rad]."""
         return (inf, self.gravity_rad, self.attitude_rad)
 
     @property
@@ -59,7 +59,7 @@ def looks_about(
     gravity_rad: float = np.radians(10.0),
     attitude_rad: float = np.radians(30.0),
 ) -> Viewpoints:
-    """So many views, evenly over the sphere within a spread of azimuth and elevation."""
+    """Spread so many views evenly over the sphere within a spread of azimuth and elevation."""
     azimuth, elevation = middle_rad
     half = (min(spread_rad[0], pi), min(spread_rad[1], pi))
     low, high = max(elevation - half[1], -0.5 * pi), min(elevation + half[1], 0.5 * pi)

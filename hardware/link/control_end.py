@@ -48,7 +48,7 @@ class ControlEnd:
         key: bytes,
         challenges: Callable[[], int] = random_u64,
     ) -> None:
-        """For a robot whose thrusters give up to `f_max` and rise by `max_rise` per command [N].
+        """Begin with a robot: thrusters give up to `f_max`, rise by `max_rise` per command [N].
 
         `epoch` must be later than that of every control process the robot has followed.
         """
@@ -73,7 +73,7 @@ class ControlEnd:
         epoch: int,
         challenges: Callable[[], int] = random_u64,
     ) -> ControlEnd:
-        """For the robot of a robot file."""
+        """Control end for the robot of a robot file."""
         robot = robot_file.robot
         max_rise = robot_file.link.max_rise
         return cls(robot.A.shape[1], robot.f_max, max_rise, epoch, key, challenges)

@@ -124,7 +124,7 @@ def _sample_layout(thrusters: int) -> struct.Struct:
 
 
 def encode_command(command: CommandDatagram, key: bytes) -> bytes:
-    """Bytes of a command."""
+    """Encode a command."""
     thrusters = len(command.thrusts)
     body = _command_layout(thrusters).pack(
         COMMAND_MAGIC,
@@ -141,7 +141,7 @@ def encode_command(command: CommandDatagram, key: bytes) -> bytes:
 
 
 def encode_sample(sample: SampleDatagram, key: bytes) -> bytes:
-    """Bytes of a sample."""
+    """Encode a sample."""
     thrusters = len(sample.thrusts)
     body = _sample_layout(thrusters).pack(
         SAMPLE_MAGIC,

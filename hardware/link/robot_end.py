@@ -84,7 +84,7 @@ ROUNDING = 1.0 + 1e-6
 
 @dataclass(frozen=True, slots=True)
 class LinkLimits:
-    """What a robot takes from its link."""
+    """Limits of what a robot takes from its link."""
 
     thrusters: int
     f_max: float
@@ -105,7 +105,7 @@ class LinkLimits:
 
     @classmethod
     def of(cls, robot_file: RobotFile) -> LinkLimits:
-        """Those of a robot file."""
+        """Limits of a robot file."""
         robot = robot_file.robot
         return cls(
             thrusters=robot.A.shape[1],
@@ -211,7 +211,7 @@ class RobotEnd:
         )
 
     def recipients(self, now_us: int) -> tuple[Peer, ...]:
-        """Whom to send the sample just made; nobody if nobody was heard lately."""
+        """Addresses to send the sample just made to; none if nobody was heard lately."""
         lately = now_us - self._heard_us <= FORGET_PEER_US
         both = self._peer if lately else None, self._answered
         return tuple(dict.fromkeys(peer for peer in both if peer is not None))
@@ -255,7 +255,7 @@ class RobotEnd:
         return early and not self._replaced
 
     def _refuse(self) -> None:
-        """At once; a handshake goes on."""
+        """Refuse at once; a handshake goes on."""
         self.state, self.refusal = FollowerState.REFUSING, Refusal.SILENT
         self._given.zero()
 

@@ -69,7 +69,7 @@ class UdpFollower:
         return self._end.dropped
 
     def receive(self) -> list[BodySample]:
-        """What has arrived. See `Follower`."""
+        """Return what has arrived. See `Follower`."""
         self._check_open()
         samples = (self._end.receive(data, self._clock()) for data in self._arrived())
         return [sample for sample in samples if sample is not None]

@@ -38,7 +38,7 @@ KEPT_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Participant:
-    """What differs between people."""
+    """Parameters that differ between people."""
 
     name: str
     delay_s: float
@@ -61,7 +61,7 @@ class Participant:
     """Exponent of the power law of practice (Newell, Rosenbloom 1981)."""
 
     def practised(self, attempt: int) -> Participant:
-        """At an attempt, counted from 1: quicker to react, and steadier."""
+        """The participant at an attempt, counted from 1: quicker to react, and steadier."""
         share = float(attempt) ** -self.practice
         return replace(
             self,
@@ -126,7 +126,7 @@ class GuidingHand:
     def __init__(
         self, person: Participant, laser: Laser, tube: Tube, rng: np.random.Generator, h: float
     ) -> None:
-        """At rest; `h` [s] from one look to the next."""
+        """Begin at rest; `h` [s] from one look to the next."""
         self._person, self._laser, self._tube, self._h = person, laser, tube, h
         self._seen: deque[Array] = deque(maxlen=round(person.delay_s / h) + 1)
         self._sight = _Drift(rng, FIXATION_S, rng.standard_normal(6))
@@ -143,7 +143,7 @@ class GuidingHand:
         self._move(self._rate(wanted, body[1] - hand[1]))
 
     def _sees(self, body: Pose, p_eye_in_f: Array) -> Array:
-        """(6,) what there is to do, as it seems."""
+        """Remedy (6,) as it seems to the person."""
         centre_in_f = self._tube.centre_in_f
         sigma = self._person.sight_noise(centre_in_f - p_eye_in_f, self._tube.length)
         seen = misalignment(self._laser, self._tube, body) + sigma * self._sight.step(self._h)
@@ -160,7 +160,7 @@ class GuidingHand:
         return noisy
 
     def _move(self, rate: Array) -> None:
-        """By the muscles' two poles; the jerk is constant for a period."""
+        """Move by the muscles' two poles; the jerk is constant for a period."""
         _, v, a = self._state
         T, h = self._person.muscle_s, self._h
         jerk = (rate - v) / T**2 - 2.0 * a / T

@@ -31,7 +31,7 @@ class PhoneClock:
     drift_ppm: float = 40.0
 
     def at(self, t: float) -> float:
-        """What it shows [s] at our time `t` [s]."""
+        """Reading of the clock [s] at our time `t` [s]."""
         return t * (1.0 + 1e-6 * self.drift_ppm) + self.offset_s
 
 
@@ -76,7 +76,7 @@ PERFECT = PhoneOptions(
 
 
 class EventKind(Enum):
-    """What arrives."""
+    """Kinds of what arrives."""
 
     MOTION = "motion"
     PICTURE = "picture"
@@ -124,7 +124,7 @@ class DelayedStream:
         return (k + self._phase) / self._rate
 
     def _deliver(self, k: int) -> float:
-        """Nothing overtakes: as late as the latest of those before it."""
+        """Delivery [s], in order: as late as the latest of those before it."""
         recent = range(k - self._lookback, k + 1)
         return max(self._capture(j) + float(self._delays[j % REMEMBERED_DELAYS]) for j in recent)
 

@@ -1,4 +1,4 @@
-"""What browsers get wrong about motion sensors, for the server's gravity test to find."""
+"""Faults of browsers' motion sensors, for the server's sensor validation to find."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pipeline.frames import GRAVITY, Array
 
 
 class SensorFault(Enum):
-    """One at a time."""
+    """One fault of the motion sensors."""
 
     NONE = "none"
     IOS_SIGN = "ios-sign"

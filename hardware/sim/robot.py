@@ -51,7 +51,7 @@ class RobotProcess:
 
     @property
     def ports(self) -> tuple[int, int]:
-        """(link, truth); 0 without truth."""
+        """Ports (link, ground truth); 0 without ground truth."""
         truth = self._truth.getsockname()[1] if self._truth else 0
         return self._link.getsockname()[1], truth
 

@@ -94,7 +94,7 @@ class TruthClient:
         self._newest: Truth | None = None
 
     def latest(self) -> Truth:
-        """What the robot knows now.
+        """The newest answer.
 
         Raises:
             FollowerError: no answer in time.

@@ -18,7 +18,7 @@ Tamper = Callable[[bytes], Sequence[bytes]]
 
 
 def whole(data: bytes) -> Sequence[bytes]:
-    """As it should."""
+    """Deliver a datagram as it is."""
     return (data,)
 
 
@@ -64,7 +64,7 @@ class VirtualTimeFollower:
 
     @property
     def state(self) -> FollowerState:
-        """What the robot itself does."""
+        """State of the robot, by itself."""
         return self._robot.end.state
 
     def restart(self) -> None:
@@ -80,7 +80,7 @@ class VirtualTimeFollower:
                 self._arrived += self.to_control(data)
 
     def receive(self) -> list[BodySample]:
-        """What has arrived. See `Follower`."""
+        """Return what has arrived. See `Follower`."""
         self._check_open()
         arrived, self._arrived = self._arrived, []
         samples = (self._end.receive(data, self.t) for data in arrived)

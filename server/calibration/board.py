@@ -64,7 +64,7 @@ class Board:
         return self.columns - 1, self.rows - 1
 
     def corners(self) -> Array:
-        """(n, 3) places of the inner corners on the board [m], in the order of their numbers."""
+        """Places (n, 3) of the inner corners on the board [m], in the order of their numbers."""
         across, down = self.shape
         index = np.arange(across * down)
         steps = (index % across + 1.0, index // across + 1.0, np.zeros(len(index)))
@@ -101,7 +101,7 @@ class Detector:
     """Finds a board's corners in pictures."""
 
     def __init__(self, board: Board) -> None:
-        """For one board; keeps OpenCV's tables."""
+        """Detect one board; keeps OpenCV's tables."""
         parameters = cv2.aruco.DetectorParameters()
         parameters.adaptiveThreshWinSizeMin = 7
         parameters.adaptiveThreshWinSizeMax = 43

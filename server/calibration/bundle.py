@@ -23,7 +23,7 @@ SMALL = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParameterPrior:
-    """What is known beforehand; standard deviation 0 holds a parameter."""
+    """Prior of the parameters; standard deviation 0 holds a parameter."""
 
     shared: Array
     shared_sigma: Array
@@ -99,7 +99,7 @@ def _descended(
 
 
 def _weights(residuals: Array, noise: float) -> Array:
-    """(m,) Huber's."""
+    """Huber's weights (m,)."""
     size = np.sqrt((residuals * residuals).sum(axis=1)) / (noise * np.sqrt(2.0))
     weights: Array = np.minimum(1.0, HUBER / np.maximum(size, 1e-12)) / noise**2
     return weights

@@ -1,4 +1,4 @@
-"""How a gyroscope sits at the camera, and its clock beside that of the pictures.
+"""Camera-IMU extrinsics and time delay, from a gyroscope and the turns that images show.
 
 A gyroscope i and the pictures of a board that stands still tell of the same turns:
 R_co φ = R_ci (∫ω dt − b Δt), the integral from one picture to the next, both moved by the offset.
@@ -41,7 +41,7 @@ class GyroSpline:
         self._angle = self._rate.antiderivative()
 
     def rate(self, t: Array) -> Array:
-        """(n, 3) [rad/s]."""
+        """Angular rate (n, 3) [rad/s]."""
         return np.asarray(self._rate(np.clip(t, self.t[0], self.t[-1])))
 
     def angle(self, t: Array) -> Array:
@@ -49,7 +49,7 @@ class GyroSpline:
         return np.asarray(self._angle(np.clip(t, self.t[0], self.t[-1])))
 
     def covers(self, t: Array) -> npt.NDArray[np.bool_]:
-        """(n,) where there are samples around."""
+        """Whether samples lie around (n,)."""
         after = np.clip(np.searchsorted(self.t, t), 1, len(self.t) - 1)
         inside = (t >= self.t[0]) & (t <= self.t[-1])
         dense = self.t[after] - self.t[after - 1] < MOST_GAP_S
@@ -94,7 +94,7 @@ class _Steps:
     begin: Array
     end: Array
     turned_in_c: Array
-    """(n, 3) [rad]."""
+    """Residuals (n, 3) [rad]."""
 
     @property
     def dt(self) -> Array:

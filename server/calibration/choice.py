@@ -1,4 +1,4 @@
-"""Which views to rest on: sharp, and as different from each other as they come."""
+"""Choice of the views to rest on: sharp, and as different from each other as they come."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def guessed_focal(size: tuple[int, int]) -> float:
 
 
 def coverage(views: Sequence[BoardView], size: tuple[int, int]) -> npt.NDArray[np.intp]:
-    """(rows, columns) how many corners fell into each cell of the picture."""
+    """Coverage (rows, columns): how many corners fell into each cell of the picture."""
     columns, rows = CELLS
     counts = np.zeros((rows, columns), dtype=np.intp)
     for view in views:
@@ -87,7 +87,7 @@ def choose(views: Sequence[BoardView], board: Board, size: tuple[int, int]) -> C
 
 
 def features(one: Aspect) -> Array:
-    """(5,) in which a distance of 1 means quite another view."""
+    """Features (5,) in which a distance of 1 means quite another view."""
     tilt = np.clip(one.tilt, -1.2, 1.2)
     return np.array([*one.centre, np.log(max(one.size, 1e-3)), *tilt])
 

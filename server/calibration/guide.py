@@ -54,7 +54,7 @@ class Coverage:
 
     @property
     def share(self) -> float:
-        """Of the whole."""
+        """Share of the whole that is done."""
         parts = (self.covered, self.tilted, self.near_and_far, self.turned, self.filmed)
         return sum(parts) / len(parts)
 
@@ -147,7 +147,7 @@ class Guide:
 
     @property
     def hint(self) -> str:
-        """What to do now."""
+        """Hint what to do now."""
         if self._t - self._t_seen > UNSEEN_S or not self.views:
             return "Point the camera at the board: all of it lit, about half the picture wide."
         if self.blurred:

@@ -23,7 +23,7 @@ MODEL = next(iter(COEFFICIENTS))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationJob:
-    """What was filmed."""
+    """Views and motion samples of a video, to be calibrated from."""
 
     board: Board
     size: tuple[int, int]
@@ -38,7 +38,7 @@ class CalibrationJob:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOutcome:
-    """What came of it."""
+    """Result of a calibration."""
 
     verdict: Verdict
     text: str
@@ -65,7 +65,7 @@ def run(job: CalibrationJob) -> CalibrationOutcome:
 
 
 def figures(found: CalibrationSolution) -> list[str]:
-    """What a person at the phone may like to know."""
+    """Figures for the person at the phone."""
     value, sigma = found.shared, found.sigma
     lines = [
         f"Focal length {value[0]:.1f} ± {sigma[0]:.1f} px",
@@ -96,7 +96,7 @@ class Solving:
         return self._answer.poll() or not self._process.is_alive()
 
     def outcome(self) -> CalibrationOutcome | None:
-        """What came of it; None: the process died."""
+        """Result; None: the process died."""
         try:
             outcome: CalibrationOutcome = self._answer.recv()
         except EOFError:

@@ -1,4 +1,4 @@
-"""How fast the board moved past the camera in each view, by the views before and after it."""
+"""Rates of the board past the camera in each view, by the views before and after it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ rate where there is no wide one."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rates:
-    """Of n views."""
+    """Rates of n views."""
 
     value: Array
     """(n, 6) ω [rad/s] and v [m/s] of the board relative to the camera, in o."""

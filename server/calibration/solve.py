@@ -59,7 +59,7 @@ class CalibrationSolution:
 
     @property
     def shared(self) -> Array:
-        """(5 + k,) lens and readout."""
+        """Lens and readout (5 + k,)."""
         return self.fit.guess.shared
 
     @property
@@ -108,7 +108,7 @@ def solve(
 
 
 def _believable(found: BoardFit, film: BoardCorners) -> npt.NDArray[np.bool_]:
-    """(n,) whether a view's error is an ordinary one."""
+    """Whether (n,) a view's error is an ordinary one."""
     errors = np.sqrt(np.add.reduceat((found.residuals**2).sum(axis=1), film.starts))
     errors = errors / np.sqrt(np.diff(np.append(film.starts, len(film.view))))
     return np.asarray(errors <= max(OUTLIER * float(np.median(errors)), 0.3))
@@ -119,7 +119,7 @@ def _rms(residuals: Array) -> float:
 
 
 class _Work:
-    """One calibration under way."""
+    """State of one calibration."""
 
     def __init__(
         self, board: Board, size: tuple[int, int], model: str, gyro: GyroSpline | None, timed: bool
@@ -134,7 +134,7 @@ class _Work:
         self.imu_complaint = untimed if gyro is not None and not timed else ""
 
     def without_motion(self, views: Sequence[BoardView]) -> BoardFit:
-        """As if the shutter opened all rows at once."""
+        """Solve as if the shutter opened all rows at once."""
         self.film = film_of(views, self._board, self._model, self._size[1])
         guess = first_guess(self._model, views, self._board, self._size)
         nothing = np.zeros((len(views), 6))
@@ -210,7 +210,7 @@ class _Work:
 
 
 def ray_sigma(solution: CalibrationSolution) -> Array:
-    """(rows, columns) how uncertain the pixel of a given direction is, over the picture [px].
+    """Uncertainty (rows, columns) of the pixel of a given direction, over the picture [px].
 
     A turn of the whole camera is free: what it could explain is no error of the lens.
     """

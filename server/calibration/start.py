@@ -1,4 +1,4 @@
-"""Where the bundle adjustment begins: a focal length by trial, poses by PnP."""
+"""Initialisation of the bundle adjustment: a focal length by trial, poses by PnP."""
 
 from __future__ import annotations
 

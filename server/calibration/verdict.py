@@ -59,7 +59,7 @@ AXES = "The motion sensors' axes should be the camera's: x along the view, y lef
 
 @dataclass(slots=True)
 class Verdict:
-    """What was found, from best to worst, and what would make it better."""
+    """Reasons found, from best to worst, and what would make it better."""
 
     level: Level = "good"
     reasons: list[str] = field(default_factory=list)

@@ -20,7 +20,7 @@ REACH = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardView:
-    """One picture of the board."""
+    """One image of the board."""
 
     t: float
     """When its middle row was exposed [s]."""
@@ -37,7 +37,7 @@ class BoardView:
 
 
 def look(luma: Image, t: float, board: Board, detector: Detector) -> BoardView | None:
-    """What a picture shows of the board; None where that is too little to be of use."""
+    """Detect the board in an image; None where that is too little to be of use."""
     ids, pixels = detector.find(luma)
     if len(ids) < FEWEST_CORNERS or not _spans(ids, board):
         return None

@@ -66,7 +66,7 @@ class Child:
         )
 
     def _start(self, now: float) -> None:
-        """It ends with us, however we end; Ctrl-C in the terminal is for us alone."""
+        """Start it; it ends with us, however we end, and Ctrl-C in the terminal is for us alone."""
         self._started, self._due = now, None
         parent = os.getpid()
         self.process = subprocess.Popen(

@@ -7,8 +7,8 @@ from typing import NoReturn
 
 
 class Parser(argparse.ArgumentParser):
-    """Without the usage, which `--help` tells."""
+    """Parser without the usage, which `--help` tells."""
 
     def error(self, message: str) -> NoReturn:
-        """One line is enough."""
+        """End with one line."""
         self.exit(2, f"{self.prog}: {message} (--help tells more)\n")

@@ -24,7 +24,7 @@ Result = TypeVar("Result")
 
 
 def cores() -> int:
-    """That this process may use."""
+    """Count of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""The virtual camera's knobs and their ranges: one place for settings, pages and control."""
+"""Runtime parameters of the virtual camera: one place for settings, pages and control."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class RuntimeParameters(msgspec.Struct, forbid_unknown_fields=True, frozen=True)
 
     @classmethod
     def of(cls, config: VirtualCameraConfig) -> RuntimeParameters:
-        """Of a configuration; the cut-off is that of the low pass, used or not."""
+        """Parameters of a configuration; the cut-off is that of the low pass, used or not."""
         hz = cutoff_hz(replace(config, mode="full"))
         return cls(
             cutoff_hz=round(min(max(hz, SLOWEST_HZ), FASTEST_HZ), 4),

@@ -78,7 +78,7 @@ class RtcSettings(BaseModel):
     )
 
     def ice_servers(self) -> list[dict[str, str]]:
-        """For both ends; none by default: phone and server meet on their own addresses."""
+        """ICE servers for both ends; none by default: both meet on their own addresses."""
         if not self.turn_url:
             return []
         return [
@@ -123,7 +123,7 @@ class VirtualCameraSettings(BaseModel):
 
     @property
     def knobs(self) -> RuntimeParameters:
-        """As control takes them."""
+        """Runtime parameters, as control takes them."""
         return RuntimeParameters(**self.model_dump())
 
 
@@ -226,7 +226,7 @@ def _fault(error: ErrorDetails) -> str:
 
 
 def _names() -> Iterator[str]:
-    """Of all settings; those of a table begin with its name."""
+    """Names of all settings; those of a table begin with its name."""
     yield from (name for name in Settings.model_fields if name not in TABLES)
     for table, model in TABLES.items():
         yield from (f"{table}.{name}" for name in model.model_fields)

@@ -11,7 +11,7 @@ Column = tuple[str, str, str]
 
 
 def table(columns: Sequence[Column], rows: Iterable[object]) -> str:
-    """One line a row under a line of titles, aligned to the right."""
+    """Lay out one line a row under a line of titles, aligned to the right."""
     cells = [tuple(title for _, title, _ in columns)]
     cells += [tuple(form.format(getattr(row, name)) for name, _, form in columns) for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
@@ -46,7 +46,7 @@ def statements(holds: Mapping[str, bool]) -> Iterator[str]:
 
 
 def plain(row: Mapping[str, object]) -> dict[str, object]:
-    """For JSON, which has no NaN."""
+    """Replace NaN, which JSON does not have."""
     return {
         key: None if isinstance(value, float) and not isfinite(value) else value
         for key, value in row.items()

@@ -41,7 +41,7 @@ TooLate = Callable[[float, float], str]
 
 
 def never_too_late(*_: float) -> str:
-    """Nobody knows the margins."""
+    """Refuse nothing: the margins are unknown."""
     return ""
 
 
@@ -50,7 +50,7 @@ LATELY = 50
 
 
 class Mean:
-    """Of some dozens of values lately; 0 before the first."""
+    """Mean of some dozens of values lately; 0 before the first."""
 
     def __init__(self) -> None:
         self.value = 0.0
@@ -184,7 +184,7 @@ class Controller:
         return _stood_still(stall_s, self._longest_gap_s) or slow
 
     def _note_gaps(self, output: Output, stall_s: float, robot_gap: str) -> None:
-        """Whose silence it was: while control stood still, nobody else could be heard."""
+        """Note whose silence it was: while control stood still, nobody else could be heard."""
         ages, stalled = output.ages, stall_s > STOOD_STILL_S
         if not robot_gap:
             self._t_robot_gap = output.t
@@ -206,7 +206,7 @@ class Controller:
         step_ms: float,
         dropped: int,
     ) -> ControlStatus:
-        """All that a supervisor may want to know, and the body's samples since the last one."""
+        """Status for supervisors, and the body's samples since the last one."""
         relative, view = output.relative, output.view
         reference, error = output.reference, output.error
         estimator = self.teleop.estimator

@@ -19,7 +19,7 @@ WORDS = {
 
 
 class GapStatistics(msgspec.Struct, array_like=True, frozen=True):
-    """Those of one side in the last minute."""
+    """Gaps of one side in the last minute."""
 
     count: int
     longest_s: float
@@ -32,7 +32,7 @@ class _Side:
         self._open_s = 0.0
 
     def add(self, now: float, silent_s: float) -> None:
-        """It has been silent for so long."""
+        """Take a silence of so long [s]."""
         if silent_s > LATELY_S:  # gone, or never there: that is no gap
             self._open_s = 0.0
         elif silent_s > self._least_s:
@@ -61,11 +61,11 @@ class GapLog:
             log.add(now, silent_s[side])
 
     def lately(self) -> dict[str, GapStatistics]:
-        """Of each side; one that is not over counts."""
+        """Statistics of each side; a gap that is not over counts."""
         return {side: log.lately() for side, log in self._sides.items()}
 
     def warnings(self) -> list[str]:
-        """What somebody who arms should know."""
+        """Warnings for somebody who arms."""
         lately = self.lately()
         return [
             WORDS[side].format(gaps.count, gaps.longest_s)

@@ -41,7 +41,7 @@ class RobotLink:
     """The robot's samples on our clock, and what it says against flying."""
 
     def __init__(self, follower: Follower) -> None:
-        """Nothing heard yet."""
+        """Begin with nothing received."""
         self._follower = follower
         self._clock = BodyClock()
         self._boot_id: int | None = None

@@ -26,7 +26,7 @@ class TickRate:
         self._sum_s = 0.0
 
     def complaint(self, step_s: float) -> str:
-        """What is wrong after another tick, `step_s` after the one before it; empty if nothing."""
+        """Complaint after another tick, `step_s` after the one before it; empty if nothing."""
         if not isfinite(step_s):
             return ""
         step_s = min(step_s, self._longest_s)

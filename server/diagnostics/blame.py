@@ -20,7 +20,7 @@ class Blame:
     """Remembers the stalls of the server's loop, and what control said first after one."""
 
     def __init__(self) -> None:
-        """Nothing was seen."""
+        """Begin with nothing seen."""
         self._stalls: deque[tuple[float, float]] = deque()
         self._said: tuple[int, int, str] | None = None
         self._is_ours = False
@@ -39,7 +39,7 @@ class Blame:
         return _ours(control.reason) if self._is_ours else control.reason
 
     def gaps(self, control: ControlStatus, now: float) -> dict[str, GapStatistics]:
-        """Of the last minute by side, with the server's own on its."""
+        """Gaps of the last minute by side, with the server's own on its."""
         while self._stalls and now - self._stalls[0][0] > LATELY_S:
             self._stalls.popleft()
         gaps = dict(control.gaps)
@@ -56,7 +56,7 @@ class Blame:
 
 
 def warnings(gaps: Mapping[str, GapStatistics]) -> list[str]:
-    """What somebody who arms should know of them."""
+    """Warnings of gaps for somebody who arms."""
     return [
         WORDS[side].format(one.count, one.longest_s)
         for side, one in gaps.items()

@@ -28,7 +28,7 @@ class Bounded(logging.Filter):
     """Lets so many records pass, and says with the next one how many it kept back."""
 
     def __init__(self) -> None:
-        """Nothing was said yet."""
+        """Begin an empty hour."""
         super().__init__()
         self._kinds: OrderedDict[str, TokenBucket] = OrderedDict()
         self._kept_back: dict[str, int] = {}
@@ -69,7 +69,7 @@ def escaped(text: str) -> str:
 
 
 def set_up() -> None:
-    """For this process: INFO and above, to the standard error."""
+    """Set up this process: INFO and above, to the standard error."""
     handler = logging.StreamHandler()
     handler.addFilter(Bounded())
     logging.basicConfig(level=logging.INFO, format=FORMAT, handlers=[handler])

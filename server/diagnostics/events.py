@@ -18,7 +18,7 @@ class Events:
     """The newest, and how many were left out."""
 
     def __init__(self) -> None:
-        """None."""
+        """Begin without events."""
         self.shown: deque[str] = deque(maxlen=EVENTS)
         self._of_pages: deque[bool] = deque(maxlen=EVENTS)
         self._kinds: OrderedDict[str, TokenBucket] = OrderedDict()

@@ -79,7 +79,7 @@ def _grade(report: LinkReport, series: Series) -> Grade:
 
 
 def _gaps(series: Series) -> list[Span]:
-    """Between signs of life, as they came."""
+    """Gaps between signs of life, as they came."""
     times = [series.begin, *(came for _, came in series.answers), series.end]
     return list(pairwise(times))
 
@@ -111,7 +111,7 @@ def _waits(series: Series, rules: FailsafeConfig) -> list[_Wait]:
 
 
 def _side(silence: Span, series: Series) -> Side:
-    """Whose it was: the server asked nobody, or pictures came on while the page was silent."""
+    """Side of a gap: the server asked nobody, or pictures came on while the page was silent."""
     begin, end = silence
     asked = [begin, *(t for t in series.asked if begin < t < end), end]
     if max(map(_length, pairwise(asked))) > 0.5 * (end - begin):

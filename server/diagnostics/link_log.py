@@ -15,7 +15,7 @@ Arrival = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """From `begin` to `end` [s]; each in the order of coming."""
+    """Arrivals from `begin` to `end` [s]; each in the order of coming."""
 
     begin: float
     end: float
@@ -31,7 +31,7 @@ class LinkLog:
     """Remembers a minute."""
 
     def __init__(self, now: float) -> None:
-        """Empty at `now` [s]."""
+        """Begin empty at `now` [s]."""
         self._begin = now
         self._asked: deque[float] = deque(maxlen=MOST)
         self._kinds = {
@@ -43,7 +43,7 @@ class LinkLog:
         self._asked.append(now)
 
     def came(self, kind: str, t: float, now: float) -> None:
-        """One of `answers`, `motion`, `pictures`, made at `t` [s], has come at `now` [s]."""
+        """Note one of `answers`, `motion`, `pictures`, made at `t` [s], received at `now` [s]."""
         self._kinds[kind].append((t, now))
 
     def series(self, now: float, seconds: float) -> Series:

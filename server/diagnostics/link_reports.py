@@ -23,7 +23,7 @@ class LinkReports:
     def __init__(
         self, clock: Callable[[], float], judge: Callable[[Series], LinkReport] | None = None
     ) -> None:
-        """None yet."""
+        """Begin without a report."""
         self._clock = clock
         self._judge = judge or (lambda series: check(series, RULES))
         self._one = asyncio.Lock()

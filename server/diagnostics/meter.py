@@ -13,7 +13,7 @@ class Meter:
     """Age, rate and losses of one stream."""
 
     def __init__(self) -> None:
-        """Nothing yet."""
+        """Begin without an item."""
         self._arrivals: deque[float] = deque(maxlen=1000)
         self._t = -float("inf")
         self.dropped = 0
@@ -24,11 +24,11 @@ class Meter:
         self._t = max(self._t, now if t is None else t)
 
     def age(self, now: float) -> float:
-        """Since the newest item was taken [s]; inf before the first."""
+        """Age of the newest item [s]; inf before the first."""
         return now - self._t
 
     def stream(self, now: float) -> Stream:
-        """For a status."""
+        """Health of the stream, for a status."""
         while self._arrivals and self._arrivals[0] < now - WINDOW_S:
             self._arrivals.popleft()
         age = self.age(now)

@@ -23,13 +23,13 @@ class RunQueue:
     """How long the thread that makes it has waited for a processor."""
 
     def __init__(self) -> None:
-        """Of the calling thread."""
+        """Watch the calling thread."""
         self._file = -1
         with contextlib.suppress(OSError):  # of Linux alone
             self._file = os.open("/proc/thread-self/schedstat", os.O_RDONLY | os.O_CLOEXEC)
 
     def __call__(self) -> float:
-        """In all [s]; 0 where nobody knows."""
+        """Time waited in all [s]; 0 where unknown."""
         return 1e-9 * int(os.pread(self._file, 100, 0).split()[1]) if self._file >= 0 else 0.0
 
     def close(self) -> None:
@@ -53,7 +53,7 @@ class LoopWatch:
     """Longest stalls of an event loop, by a ticker in it."""
 
     def __init__(self) -> None:
-        """Nothing seen."""
+        """Begin with nothing seen."""
         self._worst: deque[tuple[float, Stall]] = deque()
         """In the window, each shorter than the one before."""
         self.armed = Stall()
@@ -75,7 +75,7 @@ class LoopWatch:
 
 
 class Pauses:
-    """Of this process: kept short, measured, told."""
+    """Pauses of this process: kept short, measured, logged."""
 
     def __init__(
         self,
@@ -136,7 +136,7 @@ class Pauses:
         return f"The server stood still for {late:.0f} ms while armed: {shares}."
 
     def figures(self) -> dict[str, float]:
-        """For a status [ms]."""
+        """Figures for a status [ms]."""
         lately, armed = self.loop.lately(self._clock()), self.loop.armed
         return {
             "stall_ms": round(1e3 * lately.late_s, 1),

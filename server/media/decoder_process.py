@@ -69,7 +69,7 @@ def main() -> None:
 def _decode_for_ever(
     parent: int, channel: socket.socket, memory: mmap.mmap, cpu_s: float
 ) -> NoReturn:
-    """In the child: ends with 0 when the server has gone, or as a picture would have it."""
+    """Decode in the child: ends with 0 when the server has gone, or as a picture would have it."""
     code = 1
     try:
         die_with(parent)
@@ -91,7 +91,7 @@ def _decode_for_ever(
 
 
 def _limit() -> None:
-    """What no picture needs is not to be had."""
+    """Limit time and memory to what a picture needs."""
     limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_FSIZE: 0}
     with contextlib.suppress(OSError):
         pages = int(Path("/proc/self/statm").read_text().split()[0])

@@ -39,7 +39,7 @@ log = logging.getLogger("lightleash")
 
 
 class AnyDecoder(Protocol):
-    """What decodes one stream of one size; see `hardware.codec.Decoder`."""
+    """Decoder of one stream of one size; see `hardware.codec.Decoder`."""
 
     codec: str
 
@@ -55,7 +55,7 @@ MakeDecoder = Callable[[str, int, int], AnyDecoder]
 
 
 class _Running:
-    """One process, with its socket and memory."""
+    """One decoder process, with its socket and memory."""
 
     def __init__(self, cpu_s: float) -> None:
         """OSError: there are no handles, or there is no memory, for it."""
@@ -103,7 +103,7 @@ class _Running:
         return number, became
 
     def close(self) -> None:
-        """It ends when it sees that the socket is closed; what stands still is killed."""
+        """End it: it sees that the socket is closed; what stands still is killed."""
         self.channel.close()
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
@@ -138,7 +138,7 @@ class Decoding:
 
     @property
     def pid(self) -> int | None:
-        """Of the process that forks."""
+        """Id of the process that forks."""
         return self._running.process.pid if self._running is not None else None
 
     def open(self, codec: str, width: int, height: int) -> AnyDecoder:
@@ -154,7 +154,7 @@ class Decoding:
             return RemoteDecoder(self, self._streams, codec, width, height)
 
     def news(self, t: float) -> str:
-        """What people should read at `t` [s], or ""."""
+        """News for people at `t` [s], or ""."""
         new = self.deaths - self._told
         if not new or t < self._t_told + SAY_AGAIN_S:
             return ""
@@ -218,7 +218,7 @@ class RemoteDecoder:
     def __init__(
         self, decoding: Decoding, stream: int, codec: str, width: int, height: int
     ) -> None:
-        """Nothing decoded yet."""
+        """Begin with nothing decoded."""
         self.codec = codec
         self._decoding, self._stream = decoding, stream
         self._size = width, height

@@ -1,4 +1,4 @@
-"""One frame of a film or of a folder of pictures."""
+"""One frame of a video or of a folder of images."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pipeline.signals import Image
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MediaFrame:
-    """One frame."""
+    """One frame with its time."""
 
     name: str
     t: float

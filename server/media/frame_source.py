@@ -35,10 +35,10 @@ class Frames(Protocol):
 
     @property
     def notes(self) -> list[str]:
-        """What the user should know, complete after the last frame."""
+        """Notes for the user, complete after the last frame."""
 
     def __iter__(self) -> Iterator[MediaFrame]:
-        """In the order of time."""
+        """Iterate in the order of time."""
 
 
 def open_frames(path: Path, fps: float | None = None) -> Frames:
@@ -82,7 +82,7 @@ class Folder:
 
     @property
     def count(self) -> int | None:
-        """All of them."""
+        """Count of all frames."""
         return len(self._files)
 
     @property
@@ -91,7 +91,7 @@ class Folder:
         return self._times[0], self._times[-1]
 
     def __iter__(self) -> Iterator[MediaFrame]:
-        """In the order of their names, which is that of time."""
+        """Iterate in the order of names, which is that of time."""
         for file, t in zip(self._files, self._times, strict=True):
             luma = self._read(file)
             problem = "" if luma is not None else "The file can't be read as a picture."
@@ -135,7 +135,7 @@ class Folder:
                 )
 
     def _read(self, file: Path) -> Image | None:
-        """As the sensor saw it: a JPEG's orientation is not followed."""
+        """Read as the sensor saw it: a JPEG's orientation is not followed."""
         try:
             data = np.fromfile(file, np.uint8)
             if len(data) == 0:

@@ -1,4 +1,4 @@
-"""The CSV files that come with frames: their times, and what motion sensors felt."""
+"""CSV files that come with frames: their times, and IMU samples."""
 
 from __future__ import annotations
 

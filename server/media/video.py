@@ -54,7 +54,7 @@ class Video:
         return container.streams.video[0]
 
     def __iter__(self) -> Iterator[MediaFrame]:
-        """As decoded.
+        """Iterate over frames as decoded.
 
         Raises:
             InputError: it can't be decoded, or its times do not ascend.
@@ -88,7 +88,7 @@ class Video:
     def _decoded(
         self, container: InputContainer, stream: VideoStream
     ) -> Iterator[VideoFrame | Packet[VideoStream]]:
-        """What comes out, or the packet that can't be decoded."""
+        """Decoded frames, and in place of some the packet that can't be decoded."""
         try:
             for packet in container.demux(stream):
                 try:

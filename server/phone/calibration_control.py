@@ -15,7 +15,7 @@ CALM = (Mode.DISARMED, Mode.STOPPED)
 
 
 class CalibrationControl:
-    """Of one server; phones come and go."""
+    """Calibrations of one server; phones come and go."""
 
     def __init__(self, push: Callable[[str], object]) -> None:
         """`push` sends to the operator's page."""

@@ -102,7 +102,7 @@ class CalibrationSession(FrameThread):
             self._shown = self._filming("filming")
 
     def _solve(self, solving: Solving) -> None:
-        """In the thread: who was stopped meanwhile solves nothing."""
+        """Solve, in the thread; who was stopped meanwhile solves nothing."""
         self._tell(lambda: setattr(self, "_solving", solving))
         if self._solving is not solving:
             solving.stop()

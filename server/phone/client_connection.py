@@ -1,4 +1,4 @@
-"""What the hub needs of a connection."""
+"""Client connection, as the session manager needs it."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ class FrameDecoder:
     """Decodes what can be decoded, and knows when only a key frame helps."""
 
     def __init__(self, width: int, height: int, make: MakeDecoder = Decoder) -> None:
-        """For pictures of one size [px]; `make` says where they are decoded, by itself here."""
+        """Decode pictures of one size [px]; `make` says where they are decoded, by itself here."""
         self._size = width, height
         self._make = make
         self._decoder: AnyDecoder | None = None

@@ -1,4 +1,4 @@
-"""From encoded pictures to believed poses: decoding, then what `VisualFrontEnd` does."""
+"""Frame pipeline: encoded images to gated poses, decoding before `VisualFrontEnd`."""
 
 from __future__ import annotations
 

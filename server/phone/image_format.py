@@ -1,4 +1,4 @@
-"""What a picture must have in common with a calibration: its size, and how the phone was turned."""
+"""Image format that a calibration holds for: size, and how the phone was turned."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from server.protocol.wire_records import QUARTERS, Picture
 
 @dataclass(frozen=True, slots=True)
 class ImageFormat:
-    """Of the pictures of one stream: with another one it is another camera."""
+    """Format of one stream's images: with another one it is another camera."""
 
     width: int
     height: int
@@ -23,7 +23,7 @@ class ImageFormat:
 
     @classmethod
     def of(cls, picture: Picture) -> ImageFormat:
-        """That of one picture."""
+        """Format of one image."""
         return cls(picture.width, picture.height, picture.screen_angle_deg, picture.shrunk)
 
     @property

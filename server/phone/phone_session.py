@@ -1,4 +1,4 @@
-"""One operator's phone at the server: its clock, its stream, its eyes, and what it still lacks."""
+"""Phone session: one operator's phone, its clock, stream and vision, and what it still lacks."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ STALE_S = 1.0
 
 
 class PhoneSession:
-    """From hello to goodbye."""
+    """Session of one phone, from hello to goodbye."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class PhoneSession:
         """What came when, lately."""
 
     def silent_for(self, now: float) -> float:
-        """Since its last sign of life [s]; hello was the first."""
+        """Time since its last sign of life [s]; hello was the first."""
         return min(self.meters["operator"].age(now), now - self._greeted)
 
     def ping(self, now: float) -> Record:
@@ -194,7 +194,7 @@ class PhoneSession:
         return picture if wanted else None
 
     def refusals(self, now: float) -> list[str]:
-        """What this phone still lacks, in words for the person who can mend it."""
+        """Refusals: what this phone still lacks, in words for the person who can mend it."""
         clock = self.ingest.clock
         if not clock.ready:
             reason = clock.reason or "The phone's clock is not known yet."
@@ -250,7 +250,7 @@ class PhoneSession:
         )
 
     def calibration(self) -> Calibration:
-        """What the page should know of it."""
+        """State of the calibration for the page."""
         if self.wizard is not None:
             return self.wizard.state()
         return Calibration("needed" if self.camera_problem else "off")

@@ -1,4 +1,4 @@
-"""The gravity test of one phone's sensors, fed by the event loop and by the vision thread."""
+"""Sensor validation of one phone, fed by the event loop and by the vision thread."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class SensorCheck:
     """Collects what the test needs; `saw` may be called from another thread."""
 
     def __init__(self) -> None:
-        """Nothing tested."""
+        """Begin with nothing tested."""
         self._test = SensorValidation(GravityTestConfig())
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=MAX_WAITING)
 
@@ -49,5 +49,5 @@ class SensorCheck:
         return self._test.doubts_up
 
     def faults(self) -> list[str]:
-        """What is wrong, in words for who holds the phone."""
+        """Faults, in words for who holds the phone."""
         return self._test.faults()

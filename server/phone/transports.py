@@ -1,4 +1,4 @@
-"""The ways to the page of the phone that leads: its websockets, and a faster one if it has it."""
+"""Transports to the page of the phone that leads: its websockets, and a faster one if it has it."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ class FastTransport(Protocol):
 
 
 class ImageTransport:
-    """Of two ways that pictures come by, which one counts: whoever changes it begins with a key."""
+    """Which of two transports of images counts: a change begins with a key frame."""
 
     def __init__(self) -> None:
-        """None has come."""
+        """Begin before the first image."""
         self.is_fast = False
         """The fast one counts."""
         self._newest_us = -1
@@ -52,7 +52,7 @@ class ImageTransport:
 
 
 class Transports:
-    """What is open to the phone that leads; nothing if none does."""
+    """Transports open to the phone that leads; none if none does."""
 
     def __init__(self, keep: Callable[[bytes], None]) -> None:
         """`keep` records what is said."""
@@ -79,7 +79,7 @@ class Transports:
             former.close()
 
     def leave(self, fast: FastTransport) -> None:
-        """It has ended."""
+        """Take out a transport that has ended."""
         if self._fast is fast:
             self._fast = None
 

@@ -42,7 +42,7 @@ def key_of(state: Path, robot: str) -> bytes:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Those of the command."""
+    """Add the options of the command."""
     parser.add_argument("robot", metavar="ROBOT", nargs="?", default="ames", help="name or .toml")
     state = state_directory()
     parser.add_argument("--state", type=Path, default=state, help="default: %(default)s")

@@ -60,7 +60,7 @@ WebRTC; a vision thread that computes would keep it for Python's usual 5 ms each
 
 @dataclass(frozen=True, slots=True)
 class LaunchContext:
-    """What the launcher hands over: it outlives this process, so does what is in here."""
+    """Launch context: what the launcher hands over, and what outlives this process with it."""
 
     runtime: Path
     truth_port: int
@@ -152,7 +152,7 @@ def _dashboard(settings: Settings, manager: SessionManager, view: Path) -> Dashb
 
 
 def _run(settings: Settings, given: LaunchContext, base: str, doors: Doors) -> dict[str, object]:
-    """What other programs of this user are told."""
+    """Contents of the run file, for other programs of this user."""
     return {
         "http_url": http_url(given),
         "https_url": base,
@@ -217,7 +217,7 @@ def _certificate(settings: Settings) -> Certificate:
 
 
 def _metadata(settings: Settings) -> dict[str, str]:
-    """What a recording must know to be understood later."""
+    """Metadata that a recording needs to be understood later."""
     name = settings.robot
     path = Path(name) if name.endswith(".toml") else ROBOTS / f"{name}.toml"
     text = path.read_text(encoding="utf-8")

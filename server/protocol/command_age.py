@@ -15,7 +15,7 @@ OLDEST_S = 3.5
 
 
 def age_s(command: Command, now: float) -> float:
-    """Since the person asked [s], at `now` [s]; on the way, as far as that is known."""
+    """Age of a request [s], at `now` [s]; on the way, as far as that is known."""
     on_the_way = 0.0 if command.server_ms is None else now - 1e-3 * command.server_ms
     # a page that knows a later time than ours heard it before this computer was started anew
     return 1e-3 * command.age_ms + max(0.0, on_the_way)

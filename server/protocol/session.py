@@ -29,10 +29,10 @@ MESSAGES: dict[str, tuple[type, ...]] = {
 
 
 class TokenBucket:
-    """So many at once, so many a second."""
+    """Token bucket: so many at once, so many a second."""
 
     def __init__(self, rate: float, burst: float) -> None:
-        """Full."""
+        """Begin full."""
         self._rate, self._burst = rate, burst
         self._level, self._t = burst, 0.0
 
@@ -64,7 +64,7 @@ class Session:
         self._messages = TokenBucket(MESSAGES_HZ, burst=2.0 * MESSAGES_HZ)
 
     def receive(self, data: str | bytes, now: float) -> FromPage | Record:
-        """What the page said.
+        """Take bytes of the page: what it said.
 
         Raises:
             WireError: it may not say that, or not now; counted.

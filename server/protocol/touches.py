@@ -14,7 +14,7 @@ class Touches:
     """Remembers the newest one."""
 
     def __init__(self) -> None:
-        """None yet."""
+        """Begin before the first TOUCH."""
         self._count = 0
         self._newest: tuple[int, Touch] | None = None
 

@@ -79,7 +79,7 @@ CREDIT = struct.Struct("<I")
 
 
 def encode(record: Record) -> bytes:
-    """Bytes of a record."""
+    """Encode a record."""
     body, flags = record.body, 0
     match body:
         case Motion():

@@ -1,4 +1,4 @@
-"""Starting and stopping recordings of what the hub sees."""
+"""Start and stop recordings of what the session manager receives."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Recordings:
 
     @property
     def name(self) -> str:
-        """Of the running recording, or ""."""
+        """Name of the running recording, or ""."""
         return self._recorder.name if self._recorder is not None else ""
 
     def start(self, device: str = "", camera_text: str = "") -> str:

@@ -75,7 +75,7 @@ class Recording:
                 yield Entry(1e-9 * message.log_time, channel.topic, message.data)
 
     def phone_records(self) -> Iterator[tuple[float, bytes]]:
-        """(when received [s], bytes) of each binary record of the phone."""
+        """Each binary record of the phone: (when received [s], bytes)."""
         for entry in self.entries(PHONE_RECORDS):
             yield entry.t, entry.data
 

@@ -108,7 +108,7 @@ def _phone_us(t: float) -> int:
 
 @dataclass(slots=True)
 class Played:
-    """What became of a replay."""
+    """Outcome of a replay."""
 
     records: int = 0
     pictures_dropped: int = 0

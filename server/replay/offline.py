@@ -107,7 +107,7 @@ class Offline:
         return output
 
     def _receive(self, entry: Entry) -> None:
-        """What the server did with it then, without sockets."""
+        """Do what the server did with it then, without sockets."""
         try:
             if entry.topic == PHONE_MESSAGES:
                 message = decode_message(entry.data)

@@ -55,7 +55,7 @@ def recorded_camera(recording: Recording, shape: ImageFormat) -> Camera:
 
 
 def first_shape(recording: Recording) -> ImageFormat:
-    """Of its first picture.
+    """Format of its first image.
 
     Raises:
         RecordingError: it has none, or is damaged.

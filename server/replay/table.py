@@ -34,7 +34,7 @@ COLUMNS: Final = (
 def row_of(
     frame: EncodedFrame, pose: RelativePose | None, output: Output, t_first: float
 ) -> dict[str, str]:
-    """Of a picture and what control said next; times since `t_first` [s]."""
+    """Row of an image and what control said next; times since `t_first` [s]."""
     row = dict.fromkeys(COLUMNS, "")
     row["t_s"], row["capture_s"] = f"{frame.t_received - t_first:.6f}", f"{frame.t - t_first:.6f}"
     row["sequence"], row["found"] = str(frame.sequence), str(int(pose is not None))

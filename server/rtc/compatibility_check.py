@@ -1,4 +1,4 @@
-"""Does this aiortc still have what we put our own parts into? Said plainly, before it is needed."""
+"""Compatibility check: has this aiortc still what we put our own parts into?"""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class AiortcMismatchError(RuntimeError):
 
 
 def misfits(receiver: RTCRtpReceiver) -> list[str]:
-    """What of a fresh receiver of pictures is not as we know it; nothing if all is."""
+    """Differences of a fresh receiver from what we know; none if all is as it was."""
     wrong = [f"RTCRtpReceiver has no {name}" for name in REPLACED if not hasattr(receiver, name)]
     handler = RTCRtpReceiver._handle_rtp_packet.__code__
     names = (*handler.co_names, *handler.co_consts)

@@ -28,7 +28,7 @@ CONNECT_S = 15.0
 
 
 class RtcLink:
-    """From offer to goodbye."""
+    """WebRTC transport of one phone, from offer to goodbye."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class RtcLink:
         bitrate_bps: int,
         on_gone: Callable[[RtcLink], None],
     ) -> None:
-        """For the phone that has the lease."""
+        """Begin for the phone that has the lease."""
         self.id = secrets.token_urlsafe(12)
         self.is_closing = False
         self._manager, self._phone, self._on_gone = manager, phone, on_gone
@@ -61,7 +61,7 @@ class RtcLink:
 
     @property
     def session(self) -> str:
-        """Of the phone."""
+        """Session id of the phone."""
         return self._phone.id
 
     def send(self, data: bytes) -> None:

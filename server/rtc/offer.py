@@ -14,7 +14,7 @@ VIDEO_CODEC = re.compile(r"a=rtpmap:(\d+) (H264|VP8)/90000$")
 
 @dataclass(frozen=True, slots=True)
 class Bitrates:
-    """Of the page's encoder [bit/s]."""
+    """Bitrates of the page's encoder [bit/s]."""
 
     start: int
     lowest: int
@@ -22,7 +22,7 @@ class Bitrates:
 
     @property
     def words(self) -> str:
-        """As libwebrtc reads them [kbit/s]."""
+        """SDP words that libwebrtc reads them from [kbit/s]."""
         named = {"start": self.start, "min": self.lowest, "max": self.highest}
         return ";".join(f"x-google-{name}-bitrate={rate // 1000}" for name, rate in named.items())
 

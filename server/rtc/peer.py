@@ -47,7 +47,7 @@ candidates.build_wall()
 
 @dataclass(frozen=True, slots=True)
 class PeerCallbacks:
-    """Whom a connection tells; all called from the event loop."""
+    """Callbacks of a connection, called from the event loop."""
 
     on_frame: Callable[[Codec, Assembled], None]
     on_record: Callable[[str | bytes], None]

@@ -1,4 +1,4 @@
-"""A receiver of aiortc with our parts in it: pictures leave it encoded, as soon as they are whole.
+"""Receiver adapter: aiortc with our jitter buffer; frames leave it encoded, once complete.
 
 Its decoder never gets one: pictures are decoded by the vision thread, the same as a websocket's.
 """

@@ -38,10 +38,10 @@ def address_of(request: Request) -> str:
 
 
 class SignallingEndpoint:
-    """At most one connection: that of the phone that leads."""
+    """Signalling of at most one connection, that of the phone that leads."""
 
     def __init__(self, manager: SessionManager, settings: RtcSettings, bitrate_bps: int) -> None:
-        """Nobody has asked yet."""
+        """Begin without a connection."""
         self._manager, self._settings, self._bitrate_bps = manager, settings, bitrate_bps
         self._offers = TokenBucket(OFFERS_HZ, OFFERS_AT_ONCE)
         self._link: RtcLink | None = None

@@ -124,7 +124,7 @@ class Acceptor:
         task.add_done_callback(lambda done: self._settle(done, guest))
 
     async def _welcome(self, guest: Guest, place: ConnectionSlot) -> None:
-        """From the first byte to a protocol that takes over."""
+        """Bring a connection from its first byte to the protocol that takes over."""
         try:
             async with asyncio.timeout(HELLO_S):
                 await self._first_byte(guest)

@@ -35,14 +35,14 @@ class RemotePeer(NamedTuple):
 
 
 def peer_of(scope: Scope) -> RemotePeer:
-    """Who asks."""
+    """Remote peer of a request."""
     host, port = scope.get("client") or ("", 0)
     return RemotePeer(host, port, (scope.get("server") or ("", 0))[1])
 
 
 @dataclass(slots=True, eq=False)
 class ConnectionSlot:
-    """What a connection holds."""
+    """Slot that a connection holds."""
 
     peer: RemotePeer
     end: Callable[[], None]
@@ -63,7 +63,7 @@ class Admission:
     """All places of all doors. Not thread-safe: for one event loop."""
 
     def __init__(self, limits: AdmissionLimits | None = None) -> None:
-        """Empty."""
+        """Begin with all slots free."""
         self._limits = limits or AdmissionLimits()
         self._places: dict[RemotePeer, ConnectionSlot] = {}  # oldest first
         self._held: Counter[tuple[Kind, str]] = Counter()
@@ -93,7 +93,7 @@ class Admission:
         return place
 
     def leave(self, place: ConnectionSlot) -> None:
-        """It is free again."""
+        """Free a slot."""
         if self._places.get(place.peer) is place:
             del self._places[place.peer]
             self._count_out(place)
@@ -120,7 +120,7 @@ class Admission:
         return host in LOOPBACK or now - self._known.get(host, -KNOWN_S) < KNOWN_S
 
     def _kind_of(self, host: str, now: float) -> tuple[Kind, str]:
-        """With the name of its group."""
+        """Kind of a peer, with the name of its group."""
         if host in LOOPBACK:
             return "here", ""
         return ("known", host) if self.is_known(host, now) else ("stranger", network_of(host))
@@ -159,7 +159,7 @@ class Admission:
         return displaced is not None
 
     def _places_for(self, kind: Kind) -> tuple[int, int]:
-        """Of one group, and of all."""
+        """Slots of one group, and of all."""
         limits = self._limits
         if kind == "here":
             return limits.here, limits.here
@@ -177,7 +177,7 @@ class Admission:
         return self._oldest(kind, group) if most > own + 1 else None
 
     def _oldest(self, kind: Kind, group: str) -> ConnectionSlot | None:
-        """Of those that have not shown a role."""
+        """Oldest slot of those that have not shown a role."""
         places = (p for p in self._places.values() if (p.kind, p.group) == (kind, group))
         return next((place for place in places if not place.has_role), None)
 
@@ -235,7 +235,7 @@ class Admission:
 
 
 def network_of(host: str) -> str:
-    """What one stranger has: an IPv4 address, or 64 bits of IPv6."""
+    """Network of one stranger: an IPv4 address, or 64 bits of IPv6."""
     try:
         address = ip_address(host.partition("%")[0])
     except ValueError:

@@ -37,7 +37,7 @@ class PairingError(Exception):
     """A link or a wish that can't be taken; says which field and what is allowed."""
 
     def __init__(self, field: str, allowed: str) -> None:
-        """In words for the person who can mend it."""
+        """Refuse in words for the person who can mend it."""
         super().__init__(f"{field}: {allowed}")
         self.field, self.allowed = field, allowed
 
@@ -79,7 +79,7 @@ def of_this_machine(role: Role, address: str = "", since: float = 0.0) -> Member
 
 
 class Book(msgspec.Struct):
-    """What outlives the server process."""
+    """Contents of the file that outlives the server process."""
 
     links: dict[str, PairingLink] = {}
     members: dict[str, Member] = {}
@@ -169,7 +169,7 @@ class Pairings:
                 return code
 
     def of_cookie(self, value: str, now: float) -> Member | None:
-        """Whose cookie it is, in whatever state; that counts as using it."""
+        """Member whose cookie it is, in whatever state; that counts as using it."""
         digest = digest_of(value)
         found = next((m for m in self.book.members.values() if m.digest == digest), None)
         if found is not None:
@@ -244,10 +244,10 @@ class Pairings:
 
 
 def digest_of(key: str) -> str:
-    """What is kept of a link or a cookie."""
+    """Digest that is kept of a link or a cookie."""
     return hashlib.sha256(key.encode("utf-8", "replace")).hexdigest()
 
 
 def printable(text: str) -> str:
-    """Without anything that moves a cursor, turns the writing round or is not seen."""
+    """Strip anything that moves a cursor, turns the writing round or is not seen."""
     return "".join(c if c.isprintable() else "·" for c in text)

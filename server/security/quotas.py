@@ -29,7 +29,7 @@ class Asker(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """What one pool holds."""
+    """Contents of one pool."""
 
     hz: float
     at_once: float
@@ -52,7 +52,7 @@ class Quotas:
     """All pools. Not thread-safe: for one event loop."""
 
     def __init__(self, quotas: Mapping[Kind, Quota] = QUOTAS) -> None:
-        """Full."""
+        """Begin full."""
         self._quotas = quotas
         self._buckets: OrderedDict[Asker, TokenBucket] = OrderedDict()
         self._under_way: Counter[tuple[Asker, bool]] = Counter()

@@ -120,7 +120,7 @@ class Counts:
 
 
 class _Chance(NamedTuple):
-    """What is drawn for one packet, each in [0, 1)."""
+    """Random numbers for one packet, each in [0, 1)."""
 
     loss: float
     turn: float
@@ -151,12 +151,12 @@ class ChannelEmulator:
 
     @property
     def counts(self) -> Counts:
-        """What it has done so far."""
+        """Counts so far."""
         return replace(self._counts)
 
     @property
     def is_empty(self) -> bool:
-        """Nothing is on its way."""
+        """Whether nothing is on its way."""
         return not self._way
 
     def put(self, t: float, packet: bytes) -> None:
@@ -191,7 +191,7 @@ class ChannelEmulator:
         return self._way[0][0] if self._way else None
 
     def take(self, t: float) -> list[Taken]:
-        """What has come out by `t` [s], in order of time; each packet once."""
+        """Take out what is due by `t` [s], in order of time; each packet once."""
         taken: list[Taken] = []
         while self._way and self._way[0][0] <= t:
             t_out, _, packet = heappop(self._way)

@@ -39,7 +39,7 @@ class Lateness:
 
 
 class _Direction:
-    """From one wire to the other."""
+    """One direction, from one wire to the other."""
 
     def __init__(self, source: int, sink: int) -> None:
         self.source, self.sink = source, sink
@@ -122,7 +122,7 @@ class EmulatedLink:
                 self._to_near.line.conditions = to_near
 
     def counts(self) -> tuple[Counts, Counts]:
-        """What was done to packets (to `far`, to `near`) so far."""
+        """Counts of packets (to `far`, to `near`) so far."""
         with self._lock:
             return self._to_far.line.counts, self._to_near.line.counts
 
@@ -167,6 +167,6 @@ class EmulatedLink:
 
     @staticmethod
     def _pause(directions: Sequence[_Direction]) -> float:
-        """Until the next packet is due [s]."""
+        """Time until the next packet is due [s]."""
         dues = [due for direction in directions if (due := direction.line.due()) is not None]
         return max(0.0, min(dues) - time.monotonic()) if dues else WAKE_S

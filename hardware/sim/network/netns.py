@@ -57,7 +57,7 @@ class Namespace:
             ) from error
 
     def run(self, function: Callable[[], T]) -> T:
-        """What `function` gives in here, in a thread; sockets it makes stay in here."""
+        """Run `function` in here, in a thread; sockets it makes stay in here."""
 
         def inside() -> T:
             self.enter()
@@ -74,7 +74,7 @@ class Namespace:
         _checked(_libc.setns(self._file, CLONE_NEWNET))
 
     def enter_for_life(self) -> None:
-        """The same, and end with the thread that started us; for Popen(preexec_fn=…)."""
+        """Enter, and end with the thread that started us; for Popen(preexec_fn=…)."""
         self.enter()
         _libc.prctl(PR_SET_PDEATHSIG, SIGKILL)
 
@@ -84,7 +84,7 @@ class Namespace:
             os.close(self._opened.pop())
 
     def _make(self, netmask: str) -> tuple[int, int]:
-        """In a thread that moves into the new network; gives (its file, the wire's)."""
+        """Make it in a thread that moves into the new network; gives (its file, the wire's)."""
         _checked(_libc.unshare(CLONE_NEWNET))
         file = self._open(Path(f"/proc/self/task/{threading.get_native_id()}/ns/net"), os.O_RDONLY)
         with contextlib.suppress(OSError):  # a container may forbid; we speak IPv4 alone

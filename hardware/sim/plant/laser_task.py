@@ -29,7 +29,7 @@ class Laser:
     """(3,) unit vector."""
 
     def beam(self, R_fb: Array, p_bf_in_f: Array) -> Beam:
-        """Of a robot at this pose."""
+        """Beam of a robot at this pose."""
         return p_bf_in_f + R_fb @ self.p_lb_in_b, R_fb @ self.direction_in_b
 
 
@@ -71,7 +71,7 @@ class Tube:
         return self.radius - max(float(np.linalg.norm(end)) for end in ends)
 
     def mjcf(self) -> str:
-        """As a ring of boxes that touch nothing but rays."""
+        """MuJoCo geoms of a ring of boxes that touch nothing but rays."""
         R_ft = R_between(UP, self.axis_in_f)
         half = (0.5 * self.wall, (self.radius + self.wall) * tan(pi / SIDES), 0.5 * self.length)
         boxes = []

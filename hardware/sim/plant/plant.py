@@ -25,7 +25,7 @@ SETTLE_MS = 1000
 
 @dataclass(frozen=True, slots=True)
 class PlantOptions:
-    """What of reality is switched on."""
+    """Effects of reality that are switched on."""
 
     imu_noise: bool = True
     imu_bias: bool = True
@@ -140,7 +140,7 @@ class Plant:
 
     @property
     def t(self) -> float:
-        """Since the start or the last reset [s]."""
+        """Time since the start or the last reset [s]."""
         return 1e-3 * self._now_ms
 
     @property
@@ -180,7 +180,7 @@ class Plant:
 
     @property
     def thrusts(self) -> Array:
-        """What the thrusters give now (m,) [N]."""
+        """Thrusts now (m,) [N]."""
         return np.array(self._data.act)
 
     @property
@@ -198,7 +198,7 @@ class Plant:
 
     @property
     def touched(self) -> ContactForce:
-        """What the obstacle did in the last step; of robots that have one before them.
+        """Contact with the obstacle in the last step; only with an obstacle.
 
         Raises:
             ValueError: there is none.

@@ -1,4 +1,4 @@
-"""What a wall does to a tool, step by step of MuJoCo: the truth about contact."""
+"""Ground truth of contact: what a wall does to a tool, step by step of MuJoCo."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.frames import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactForce:
-    """Of the plant's last step."""
+    """Contact force in the plant's last step."""
 
     force_in_f: Array
     """(3,) that the wall puts on the robot, its mean [N]."""
@@ -26,7 +26,7 @@ class ContactForceSensor:
     """Adds up the forces of all contacts of the geom `tool`."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Of a model with an obstacle."""
+        """Watch a model with an obstacle."""
         self._model, self._data = model, data
         self._tool = model.geom("tool").id
         self._six = np.zeros(6)
@@ -49,7 +49,7 @@ class ContactForceSensor:
         self._forces.append(total)
 
     def touched(self) -> ContactForce:
-        """Since `start`; nothing before the first step."""
+        """Contact force since `start`; none before the first step."""
         if not self._forces:
             return ContactForce(np.zeros(3), 0.0, ())
         forces = np.array(self._forces)

@@ -62,7 +62,7 @@ class Optics:
         return slope
 
     def variance(self, light: Array) -> Array:
-        """Of a pixel's light, noise and rounding to grey levels together."""
+        """Variance of a pixel's light, noise and rounding to grey levels together."""
         rounding = 1.0 / (12.0 * self.slope(light) ** 2)
         noise: Array = light / self.electrons + self.read**2 + rounding
         return noise

@@ -194,7 +194,7 @@ LEARNING: Final = Scene(
 
 
 def at_reference(scene: Scene) -> Scene:
-    """The same at 2.5 m and 720p, for which the goals are stated."""
+    """The scene at 2.5 m and 720p, for which the goals are stated."""
     return replace(scene, distance_m=(2.5, 2.5), sizes=(HD,))
 
 

@@ -47,7 +47,7 @@ class ImageTrajectories:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """What a film shows."""
+    """Everything that a video shows."""
 
     leds_in_b: Array
     led_radius_m: float

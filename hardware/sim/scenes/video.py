@@ -1,4 +1,4 @@
-"""Films of a scene: pictures with their truth, and what the motion sensors felt meanwhile."""
+"""Videos of a scene: images with ground truth, and the IMU samples meanwhile."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TURNS = {ImageOrientation.TURNED_90: 0.5 * np.pi, ImageOrientation.TURNED_180: n
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderedFrame:
-    """One picture, what is true of it, and the readings that came since the one before."""
+    """One image, its ground truth, and the IMU samples since the one before."""
 
     t: float
     """When the middle row's exposure was half done [s]."""

@@ -1,4 +1,4 @@
-"""How far an estimator is from the truth of a `World`, at each tick and at each picture's time."""
+"""Evaluator: an estimator against the ground truth of a `World`, now and at images' times."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class KnowsCapture(Protocol):
     """An estimator that also tells what it knew at the time of the newest fused picture."""
 
     def last_fused(self) -> tuple[float, Array, Array, Array] | None:
-        """(t [s], p_bc_in_c, R_cb, covariance)."""
+        """Time [s], p_bc_in_c, R_cb and covariance at the newest fused image."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,13 +41,13 @@ class Errors:
     """(n, 6, 6): what the estimator believed of them."""
 
     def nees(self) -> Array:
-        """(n,) eᵀC⁻¹e, 6 in the mean when it is honest; NaN without an estimate."""
+        """NEES (n,) eᵀC⁻¹e, 6 in the mean when it is honest; NaN without an estimate."""
         C = np.where(np.isfinite(self.C), self.C, np.eye(6))
         nees: Array = np.einsum("ni,ni->n", self.e, np.linalg.solve(C, self.e[..., None])[..., 0])
         return nees
 
     def during(self, start: float, stop: float) -> Errors:
-        """Those at start ≤ t < stop [s]."""
+        """Errors at start ≤ t < stop [s]."""
         chosen = (self.t >= start) & (self.t < stop)
         return Errors(self.t[chosen], self.e[chosen], self.C[chosen])
 
@@ -78,7 +78,7 @@ def run(estimator: Estimator, world: World) -> EstimatorRun:
 
 
 class _Notes:
-    """What happens on the way."""
+    """Notes taken during one run."""
 
     def __init__(self, estimator: Estimator, world: World) -> None:
         self._estimator, self._world = estimator, world
@@ -122,7 +122,7 @@ class _Notes:
         self._held.append(R_ic @ self._world.p[k] - state.R_ic @ state.p_bc_in_c)
 
     def track(self) -> EstimatorRun:
-        """All of it against the truth."""
+        """The run against the ground truth."""
         t = np.array(self._t)
         return EstimatorRun(
             now=_compare(self._world, t, self._now),

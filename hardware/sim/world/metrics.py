@@ -1,4 +1,4 @@
-"""Figures of many tracks of one estimator through worlds that differ in their seed only."""
+"""Metrics of many runs of one estimator through worlds that differ in their seed only."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class EstimatorMetrics:
 def judge(
     tracks: Sequence[EstimatorRun], start: float = 5.0, stop: float = inf
 ) -> EstimatorMetrics:
-    """Of the times start ≤ t < stop [s]."""
+    """Metrics of the times start ≤ t < stop [s]."""
     now = [track.now.during(start, stop) for track in tracks]
     captured = [track.captured.during(start, stop) for track in tracks]
     ticks = [(track.now.t >= start) & (track.now.t < stop) for track in tracks]
@@ -129,7 +129,7 @@ def _chosen(rows: Sequence[Array], ticks: Sequence[Flags]) -> Array:
 
 
 def _rms(e: Array) -> float:
-    """Of the lengths of the rows that are known."""
+    """RMS length of the rows that are known."""
     known = e[np.isfinite(e).all(axis=1)]
     return float(np.sqrt(np.square(known).sum(axis=1).mean())) if len(known) else nan
 

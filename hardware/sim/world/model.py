@@ -26,7 +26,7 @@ PHONE_BIASES, BODY_BIASES = slice(54, 60), slice(60, 66)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """What one sensor says, whitened: rows H (m, 66) of unit variance."""
+    """One reading, whitened: rows H (m, 66) of unit variance."""
 
     i: int
     """When, on the grid."""
@@ -37,7 +37,7 @@ class Reading:
 
 
 def prior(world: World) -> Array:
-    """(66, 66) covariance before anything is measured."""
+    """Covariance (66, 66) before anything is measured."""
     biases = np.repeat((*sensors.PHONE_BIAS, *sensors.BODY_BIAS), 3)
     processes = [s**2 * process.stationary for s, process in _processes(world)]
     P: Array = block_diag(*processes, np.diag(np.square(biases)))
@@ -53,7 +53,7 @@ def step(world: World, h: float) -> tuple[Array, Array]:
 
 
 def readings(world: World) -> list[Reading]:
-    """Everything the sensors say, in the order of its times."""
+    """All readings, in the order of their times."""
     phone, body = phone_by_state(world, world.phone.i), body_by_state(world, world.body.i)
     rows = [
         Reading(int(i), float(a), H / _imu_sigmas(sensors.PHONE_NOISE, sensors.PHONE_STEP))
@@ -73,14 +73,14 @@ def readings(world: World) -> list[Reading]:
 
 
 def phone_by_state(world: World, i: Indices) -> Array:
-    """(n, 6, 66) of the phone's (ω, f)."""
+    """Jacobian (n, 6, 66) of the phone's (ω, f)."""
     H = _felt_by_motion(world.hand[:, i], world.f_c[i]) @ _hand_by_state(world)
     H[:, :, PHONE_BIASES] = np.eye(6)
     return H
 
 
 def body_by_state(world: World, i: Indices) -> Array:
-    """(n, 6, 66) of the robot's (ω, f)."""
+    """Jacobian (n, 6, 66) of the robot's (ω, f)."""
     own = _felt_by_motion(world.robot[:, i], world.f_b[i] @ world.R_mean.T)
     H = np.kron(np.eye(2), world.R_mean.T) @ own @ _robot_by_state()
     H[:, :, BODY_BIASES] = np.eye(6)
@@ -88,7 +88,7 @@ def body_by_state(world: World, i: Indices) -> Array:
 
 
 def pose_by_state(world: World, i: Indices) -> Array:
-    """(n, 6, 66) of (δp in c, θ in b) with R = R̂ Exp(θ)."""
+    """Jacobian (n, 6, 66) of (δp in c, θ in b) with R = R̂ Exp(θ)."""
     p, R = world.p[i], world.R[i]
     R_cf = world.R_fc[i].transpose(0, 2, 1)
     hand, robot = _hand_by_state(world), _robot_by_state()
@@ -99,7 +99,7 @@ def pose_by_state(world: World, i: Indices) -> Array:
 
 
 def tangents_by_state(world: World, i: Indices) -> Array:
-    """(n, LEDs, 2, 66)."""
+    """Jacobian (n, LEDs, 2, 66) of the LEDs' tangents."""
     p, R, pose = world.p[i], world.R[i], pose_by_state(world, i)
     rows = []
     for led in LEDS_IN_B:
@@ -125,7 +125,7 @@ def _felt_by_motion(motion: Array, force: Array) -> Array:
 
 
 def _hand_by_state(world: World) -> Array:
-    """(18, 66) value, rate and acceleration of the hand's axes."""
+    """Selection (18, 66) of value, rate and acceleration of the hand's axes."""
     H, fading = _slow(HAND), 2.0 / world.setup.tremor_relaxation
     for k, omega in enumerate(world.tremor_omega):
         fast = TREMOR.start + 3 * k
@@ -135,7 +135,7 @@ def _hand_by_state(world: World) -> Array:
 
 
 def _robot_by_state() -> Array:
-    """The same of the robot's."""
+    """Selection (18, 66) of value, rate and acceleration of the robot's axes."""
     return _slow(ROBOT)
 
 
@@ -157,6 +157,6 @@ def _processes(world: World) -> list[tuple[float, LinearProcess]]:
 
 
 def _imu_sigmas(noise: tuple[float, float], step: tuple[float, float]) -> Array:
-    """(6, 1): noise and rounding."""
+    """Standard deviations (6, 1) of noise and rounding."""
     sigmas: Array = np.sqrt(np.square(noise) + np.square(step) / 12.0)
     return np.repeat(sigmas, 3)[:, None]

@@ -36,7 +36,7 @@ class PosteriorBound:
 
 @dataclass(slots=True, eq=False)
 class Oracle:
-    """What can be known at one time."""
+    """Knowledge at one time: the bound's filter."""
 
     i: int
     """On the grid."""
@@ -90,13 +90,13 @@ def bound(world: World, every: float = 0.25, start: float = 5.0) -> PosteriorBou
 
 
 def rms(C: Array) -> tuple[float, float]:
-    """Of the distance [mm] and of the angle [°] of covariances (n, 6, 6)."""
+    """RMS of distance [mm] and angle [°] of covariances (n, 6, 6)."""
     p, theta = np.trace(C[:, :3, :3], axis1=1, axis2=2), np.trace(C[:, 3:, 3:], axis1=1, axis2=2)
     return 1e3 * float(np.sqrt(p.mean())), float(np.rad2deg(np.sqrt(theta.mean())))
 
 
 def _at(oracle: Oracle, arrived: list[Reading], i: int, step: Step) -> Array:
-    """(66, 66) at time `i` on the grid, with what has arrived out of order."""
+    """Covariance (66, 66) at time `i` on the grid, with what has arrived out of order."""
     copy = Oracle(oracle.i, oracle.P)
     for reading in arrived:
         copy.take(reading, step)

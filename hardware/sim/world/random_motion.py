@@ -63,7 +63,7 @@ def tremor(omega: float, relaxation: float) -> LinearProcess:
 
 
 def wander(rng: np.random.Generator, n: int, h: float, processes: Sequence[LinearProcess]) -> Array:
-    """(n, m, k) states of the k processes, a step of `h` [s]."""
+    """Draw states (n, m, k) of the k processes, a step of `h` [s]."""
     Phi, Q = (np.array(each) for each in zip(*(p.step(h) for p in processes), strict=True))
     start = np.array([p.stationary for p in processes])
     k, m = start.shape[:2]
@@ -85,7 +85,7 @@ def slow_motion(rng: np.random.Generator, n: int, h: float, sigma: tuple[float, 
 def tremor_motion(
     rng: np.random.Generator, t: Array, relaxation: float, hz: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """With frequencies within `hz` at equidistant times `t` (n,) [s]; and those (6,) [rad/s]."""
+    """Draw a tremor at equidistant times `t` (n,) [s]; also its frequencies (6,) [rad/s]."""
     omega, sigma = 2.0 * np.pi * rng.uniform(*hz, 6), np.repeat(TREMOR_SIGMA, 3)
     if np.isfinite(relaxation):
         x = wander(rng, len(t), t[1] - t[0], [tremor(float(w), relaxation) for w in omega])
@@ -98,7 +98,7 @@ def tremor_motion(
 
 
 def _root(C: Array) -> Array:
-    """Of covariances (k, m, m) of any rank."""
+    """Square roots of covariances (k, m, m) of any rank."""
     values, vectors = np.linalg.eigh(C)
     root: Array = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     return root

@@ -55,7 +55,7 @@ def _nobody(sample: Sample, fusion: Fusion | None) -> None:
 
 
 def phone_samples(world: World) -> list[Event]:
-    """Of the phone's IMU."""
+    """Samples of the phone's IMU."""
     rng, i, setup = world.rng(11), world.phone.i, world.setup
     stamps = world.phone_stamps(world.t[i]) + setup.stamp_jitter * rng.normal(size=len(i))
     sampled = zip((world.omega_c[i], world.f_c[i]), PHONE_BIAS, PHONE_NOISE, strict=True)
@@ -66,7 +66,7 @@ def phone_samples(world: World) -> list[Event]:
 
 
 def body_samples(world: World) -> list[Event]:
-    """Of the robot's IMU."""
+    """Samples of the robot's IMU."""
     rng, i = world.rng(12), world.body.i
     sampled = zip((world.omega_b[i], world.f_b[i]), BODY_BIAS, BODY_NOISE, strict=True)
     omega, f = (_disturbed(rng, *values) for values in sampled)
@@ -75,7 +75,7 @@ def body_samples(world: World) -> list[Event]:
 
 
 def pictures(world: World) -> list[Event]:
-    """Of the camera, through vision; also those without any LED."""
+    """Vision measurements; also those without any LED."""
     rng, i = world.rng(13), world.pictures.i
     stamps = world.phone_stamps(world.t[i]) - world.setup.time_offset
     noise_px = NOISE_PX * rng.normal(size=(len(i), len(LEDS_IN_B), 2))
@@ -92,7 +92,7 @@ def pictures(world: World) -> list[Event]:
 
 
 def events(world: World) -> list[Event]:
-    """Everything that arrives, in the order of arrival."""
+    """All measurements, in the order of arrival."""
     arriving: list[Event] = []
     rng, setup = world.rng(14), world.setup
     for arrival, sample in phone_samples(world) + body_samples(world) + pictures(world):
@@ -114,7 +114,7 @@ def feed(
 
 
 def stamped(arriving: Iterable[Event]) -> Iterator[Event]:
-    """The same; each picture with the coarse time offset found so far, as the server sends it."""
+    """The events, each picture with the coarse time offset found so far, as the server sends it."""
     search = CameraImuDelay()
     for arrival, sample in arriving:
         if not isinstance(sample, VisionMeasurement):
@@ -151,7 +151,7 @@ def give(estimator: Estimator, sample: Sample, now: float) -> Fusion | None:
 
 
 def tangents(world: World, i: Indices) -> Array:
-    """(n, LEDs, 2) where an ideal camera sees the LEDs."""
+    """Tangents (n, LEDs, 2) where an ideal camera sees the LEDs."""
     q = world.p[i, None] + LEDS_IN_B @ world.R[i].transpose(0, 2, 1)
     seen: Array = q[..., 1:] / q[..., :1]
     return seen

@@ -1,4 +1,4 @@
-"""A hand that holds a phone and a robot on a suspension, by their statistics: the truth.
+"""Ground truth of a hand that holds a phone and a robot on a suspension, by their statistics.
 
 Everything happens on a grid of 1 ms. Hand: three poles at 0.5 Hz (5 cm, 3° RMS) and a tremor of
 9 Hz (0.05 mm, 0.03°); robot: the same poles with 6 cm, 4°. What the sensors say of it, with the
@@ -50,7 +50,7 @@ class Occlusion:
 
 @dataclass(frozen=True, slots=True)
 class WorldOptions:
-    """What differs between worlds; SI and radians."""
+    """Parameters of a world; SI and radians."""
 
     seed: int = 0
     duration: float = 20.0
@@ -127,7 +127,7 @@ class World:
         self.R: Array = R_cf @ self.R_fb
 
     def index(self, t: npt.ArrayLike) -> Indices:
-        """On the grid, of times [s]."""
+        """Index on the grid of times [s]."""
         i = np.rint(np.asarray(t) / GRID_S).astype(np.intp)
         return np.clip(i, 0, len(self.t) - 1)
 
@@ -142,28 +142,28 @@ class World:
         return (stamp + s.time_offset - s.clock_offset) / (1.0 + s.clock_drift)
 
     def rng(self, what: int) -> np.random.Generator:
-        """One that depends on the seed and on what it is for, so that options don't mix."""
+        """Random numbers by the seed and what they are for, so that options don't mix."""
         return np.random.default_rng((self.setup.seed, what))
 
     @cached_property
     def phone(self) -> SampleTimes:
-        """Of the phone's IMU."""
+        """Sample times of the phone's IMU."""
         return self._schedule(1, PHONE_PERIOD_S, self.setup.phone_delay)
 
     @cached_property
     def body(self) -> SampleTimes:
-        """Of the robot's IMU."""
+        """Sample times of the robot's IMU."""
         return self._schedule(2, BODY_PERIOD_S, self.setup.body_delay)
 
     @cached_property
     def pictures(self) -> SampleTimes:
-        """Of the camera; a decoder keeps the order."""
+        """Sample times of the camera; a decoder keeps the order."""
         drawn = self._schedule(3, self.setup.picture_period, self.setup.picture_delay)
         return SampleTimes(drawn.i, np.maximum.accumulate(drawn.arrival))
 
     @cached_property
     def visible(self) -> Flags:
-        """(pictures, LEDs): seen, rightly or wrongly."""
+        """Whether LEDs are seen, rightly or wrongly (pictures, LEDs)."""
         t = self.t[self.pictures.i]
         seen = np.ones((len(t), len(LEDS_IN_B)), dtype=bool)
         for occlusion in self.setup.occlusions:
@@ -174,7 +174,7 @@ class World:
 
     @cached_property
     def false(self) -> Flags:
-        """(pictures, LEDs): would be seen elsewhere."""
+        """Whether LEDs would be seen elsewhere (pictures, LEDs)."""
         drawn = self.rng(5).uniform(size=self.visible.shape)
         outliers: Flags = drawn < self.setup.outliers
         return outliers

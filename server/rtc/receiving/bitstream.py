@@ -26,7 +26,7 @@ def begins_key(codec: Codec, data: bytes) -> bool:
 
 
 def size_of_key(codec: Codec, data: bytes) -> tuple[int, int] | None:
-    """(width, height) [px] of a key picture; None if it doesn't tell."""
+    """Size (width, height) [px] of a key picture; None if it doesn't tell."""
     if not begins_key(codec, data):
         return None
     if codec is Codec.VP8:
@@ -62,7 +62,7 @@ def _units(data: bytes) -> Iterator[bytes]:
 
 
 def _unescaped(data: bytes) -> bytes:
-    """Without the bytes that only keep start codes from appearing."""
+    """Strip the bytes that only keep start codes from appearing."""
     return data.replace(b"\0\0\3", b"\0\0")
 
 
@@ -94,7 +94,7 @@ class _Bits:
 
 
 def _size(bits: _Bits) -> tuple[int, int]:
-    """(width, height) in sequence parameters of 4:2:0 pictures (H.264, 7.3.2.1.1)."""
+    """Size (width, height) in sequence parameters of 4:2:0 pictures (H.264, 7.3.2.1.1)."""
     profile = bits.read(8)
     bits.read(16)  # constraints, level
     bits.number()  # identifier

@@ -1,4 +1,4 @@
-"""When was this picture taken? By its own record, a pair of times, or its arrival. Sans-I/O."""
+"""Frame timestamping: by an image's own record, a pair of times, or its arrival. Sans-I/O."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class FrameTimestamping:
     """The dates of one stream of pictures."""
 
     def __init__(self) -> None:
-        """Nothing known."""
+        """Begin with nothing known."""
         self._pairs: OrderedDict[int, int] = OrderedDict()
         """Capture time [µs] by RTP time stamp, newest last."""
         self._last: int | None = None
@@ -48,7 +48,7 @@ class FrameTimestamping:
     def date(
         self, record: FrameRecord | None, rtp_timestamp: int, arrival_us: float
     ) -> FrameTimestamp:
-        """Of a picture that arrived at `arrival_us`, on the phone's clock [µs]."""
+        """Timestamp of a picture that arrived at `arrival_us`, on the phone's clock [µs]."""
         by_arrival = self._by_arrival(rtp_timestamp, arrival_us)
         if record is not None:
             return FrameTimestamp(record.t_us, "record")

@@ -1,4 +1,4 @@
-"""Packets to pictures: a picture goes on with its last packet, and no loss is waited out for long.
+"""Jitter buffer: assembles RTP packets into frames, which leave it with their last packet.
 
 In the shape of aiortc's own `JitterBuffer`, which keeps every picture until the next one begins
 and, after a loss, all of them until 512 packets have come. Sans-I/O.

@@ -30,7 +30,7 @@ SHRUNK = 3
 
 @dataclass(frozen=True, slots=True)
 class FrameRecord:
-    """What the page says of one picture."""
+    """Record of one image, as the page wrote it."""
 
     sequence: int
     """Counts the pictures that left the encoder."""

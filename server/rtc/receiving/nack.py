@@ -24,7 +24,7 @@ class Numbered(Protocol):
 
 
 class _Lost:
-    """One packet."""
+    """One lost packet."""
 
     __slots__ = ("asked", "since")
 
@@ -63,7 +63,7 @@ class NackGenerator:
         return bool(self.missing)
 
     def take_due(self, now: float) -> set[int]:
-        """What is to be asked for now; it counts as asked."""
+        """Take the packets to ask for now; they count as asked for."""
         patience, pause = self._patience(), max(CLOSEST_S, self._round_trip())
         self._lost = {n: one for n, one in self._lost.items() if now < one.since + patience}
         due = {n for n, one in self._lost.items() if now >= one.asked + pause}

@@ -1,4 +1,4 @@
-"""How long a packet and its answer take now, for knowing when a lost one can be back. Sans-I/O."""
+"""Round-trip time now, for knowing when a lost packet can be back. Sans-I/O."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class RoundTrip:
     """The upper quartile of the last answers; the least of all would be of a line that was."""
 
     def __init__(self) -> None:
-        """Nothing known."""
+        """Begin with nothing known."""
         self._last: deque[float] = deque(maxlen=REMEMBERED)
 
     def add(self, t_asked: float, t_answered: float) -> None:
@@ -25,7 +25,7 @@ class RoundTrip:
 
     @property
     def seconds(self) -> float | None:
-        """Of the line, at present [s]; None before the first answer."""
+        """Round trip at present [s]; None before the first answer."""
         if not self._last:
             return None
         return sorted(self._last)[int(SHARE * len(self._last))]
