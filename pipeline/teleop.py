@@ -112,7 +112,7 @@ class Teleop:
         self._force_in_b = self._given_in_b = np.zeros(3)
 
     def tune(self, virtual_camera: VirtualCameraConfig) -> None:
-        """Turn the virtual camera's knobs in flight, without a jump."""
+        """Set the virtual camera's runtime parameters in flight, without a jump."""
         self._virtual_camera.tune(virtual_camera)
 
     def push(self, wrench_in_b: Array) -> None:

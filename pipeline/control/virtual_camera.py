@@ -44,7 +44,7 @@ class VirtualCamera:
         return float(self._state[kernels.GUARD])
 
     def tune(self, config: VirtualCameraConfig) -> None:
-        """Turn the knobs in flight; they take their time to get there, so that nothing jumps."""
+        """Set runtime parameters in flight; they get there slowly, so that nothing jumps."""
         self._config, self._knobs = config, _knobs(config)
 
     def reset(self) -> None:

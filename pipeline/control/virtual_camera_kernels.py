@@ -188,7 +188,7 @@ def follow(s: Array, c: Quaternion, n: Vector, longest: float, h: float) -> Vect
 
 @kernel
 def begin(s: Array, c: Quaternion, knobs: Array) -> None:
-    """v = c, with the knobs as they are set."""
+    """Begin with v = c and the runtime parameters as they are set."""
     for i in range(4):
         s[i] = s[4 + i] = c[i]
     for i in range(6):

@@ -28,14 +28,14 @@ Place = tuple[Array, Array]
 """p_bc_in_c (3,) [m] and R_cb (3, 3)."""
 
 JUMP_M, JUMP_RAD = 0.3, 0.5
-"""Farther from where it is foreseen is another robot."""
+"""Farther from where it is predicted is another robot."""
 THREE = 3
 THREE_JUMP, THREE_JUMP_RAD = 0.03, 0.06
 """Three LEDs have no residual to judge by: they must be this near, as a share of the distance."""
 THREE_IN_A_ROW = 15
 """Pictures in which three LEDs are believed, before four must confirm them."""
 CALM_PX, CALM_REACH_PX, CALM_RADII = 3.0, 8.0, 1.7
-"""LEDs that near to where they were foreseen are looked for in smaller windows next time."""
+"""LEDs that near to where they were predicted are looked for in smaller windows next time."""
 
 
 UNEVEN_PX_S2 = 2000.0
@@ -107,7 +107,7 @@ class LedTracker:
 
         Args:
             frame: The picture.
-            place: Where the robot is foreseen.
+            place: Where the robot is predicted.
             motion: During the readout; None if unknown.
             clock: Times the stages.
         """
@@ -182,7 +182,7 @@ class LedTracker:
         row: Array,
         motion: FrameMotion | None,
     ) -> Association | None:
-        """The pose of the LEDs, the odd ones left out, if it is near where it is foreseen."""
+        """Association and pose of the LEDs without outliers, if it is near the predicted one."""
         n, sigma_u = len(self._leds_in_b), BLIND_M_S if motion is None else motion.sigma_u
         led, spot = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
         pose, residuals = np.empty(12), np.empty((n, 2))
@@ -208,7 +208,7 @@ class LedTracker:
         return association
 
     def _three_do(self, association: Association, pixels: Array, place: Place) -> bool:
-        """Whether they are where they are foreseen, and no other spot could be one of them."""
+        """Whether three LEDs are where predicted, and no other spot could be one of them."""
         fit, match = association.fit, association.match
         if self._threes > THREE_IN_A_ROW:
             return False
@@ -221,7 +221,7 @@ class LedTracker:
         return not near.any()
 
     def _learn(self, association: Association, table: Array) -> None:
-        """From the residuals, from how spots are smeared, and from how well they were foreseen."""
+        """Learn from residuals, motion blur, and how well the LEDs were predicted."""
         fit = association.fit
         freedoms = fit.residuals_px.size - 6
         if freedoms > 0:

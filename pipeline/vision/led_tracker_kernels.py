@@ -173,10 +173,10 @@ def identify(
         limits: (6,) reach of `name_by_shift` and largest residual [px], LEDs of which none is left
             out, how well an LED's velocity is known [m/s], accelerations that are not [px/s²], and
             what share of their own error all LEDs have once more in common.
-        expected: (n, 2) written: where LEDs were foreseen.
+        expected: (n, 2) written: where LEDs were predicted.
         led: (n,) written: those that the pose rests on.
         spot: (n,) written: their spots.
-        pose: (12,) foreseen p_bc_in_c and R_cb by rows, then the answer.
+        pose: (12,) predicted p_bc_in_c and R_cb by rows, then the answer.
         information: (6, 6), written.
         residuals: (n, 2) of those LEDs, written [px].
         shared: (6, 6), written: `put_shared`.

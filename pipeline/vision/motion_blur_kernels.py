@@ -38,7 +38,7 @@ def add_smears(
     """Add to sums[:2] speed² times the second moment along the way less that across, and speed⁴.
 
     A spot of speed s [px/s] exposed for T is smeared by s T, which adds (s T)²/12 along its way.
-    sums[2:] are the largest distance from where an LED was foreseen [px] and the largest area.
+    sums[2:] are the largest distance from where an LED was predicted [px] and the largest area.
 
     Args:
         lens: As `lens_kernels` takes it.
@@ -47,7 +47,7 @@ def add_smears(
         led: (k,) LEDs with a name.
         spot: (k,) their rows in the table.
         table: (m, FIELDS).
-        expected: (n, 2) where LEDs were foreseen [px].
+        expected: (n, 2) where LEDs were predicted [px].
         motion: (16,).
         p: p_bc_in_c.
         R: R_cb.

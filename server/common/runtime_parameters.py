@@ -56,7 +56,7 @@ DEFAULT_KNOBS: Final = RuntimeParameters.of(VirtualCameraConfig())
 
 
 class TuneInput(msgspec.Struct, tag="tune", array_like=True, frozen=True):
-    """A supervisor's wish, server → control: the knobs to turn; None: leave it."""
+    """A supervisor's request, server → control: runtime parameters to set; None: leave it."""
 
     cutoff_hz: CutoffHz | None = None
     mode: VirtualCameraMode | None = None
@@ -66,7 +66,7 @@ class TuneInput(msgspec.Struct, tag="tune", array_like=True, frozen=True):
 
 
 def turned(config: VirtualCameraConfig, wish: TuneInput) -> VirtualCameraConfig:
-    """`config` with the knobs of `wish` turned, all else as it is."""
+    """`config` with the parameters of `wish` set, all else as it is."""
     wanted = msgspec.structs.asdict(wish)
     hz = wanted.pop("cutoff_hz")
     changes = {name: value for name, value in wanted.items() if value is not None}

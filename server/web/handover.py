@@ -12,7 +12,7 @@ from server.web.people import People
 
 
 class LeadSubject(Protocol):
-    """What is led: the hub."""
+    """What is led: the session manager."""
 
     phone: PhoneSession | None
     people: People
@@ -34,7 +34,7 @@ class Handover:
     """Changes of who leads, beside those by phones that come and go."""
 
     def __init__(self, manager: LeadSubject) -> None:
-        """Of this hub's lead."""
+        """Hand over the lead that `manager` keeps."""
         self._manager = manager
 
     def give(self, to: str, by: Member, now: float) -> None:

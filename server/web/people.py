@@ -15,7 +15,7 @@ LOCAL = "local-"
 
 
 class People:
-    """Whom the doors have let in, as seen by the hub."""
+    """Whom the doors have let in, as the session manager sees them."""
 
     def __init__(self, doors: Doors, keep: Callable[[Deed], object]) -> None:
         """`keep` puts a deed into the running recording."""

@@ -134,7 +134,7 @@ class SessionManager:
         self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
 
     def tune(self, wish: Tune) -> None:
-        """A supervisor turns knobs of the virtual camera."""
+        """Send a supervisor's runtime parameters of the virtual camera to control."""
         knobs = {name: value for name, value in asdict(wish).items() if value is not None}
         if not knobs:
             return

@@ -26,7 +26,7 @@ ModeName = Literal["DISARMED", "ARMED", "TRACK", "COAST", "HOLD", "RAMP", "STOPP
 
 
 class StatusSource(Protocol):
-    """What a status is built from: the hub has it."""
+    """Source of a status: the session manager."""
 
     robot: Robot
     phone: PhoneSession | None
@@ -47,7 +47,7 @@ class StatusSource(Protocol):
 
 
 def build(manager: StatusSource) -> Status:
-    """From what the hub knows now."""
+    """Build a status from what the session manager knows now."""
     t, control, phone = now(), manager.status, manager.phone
     mode, silence = mode_of(manager, t)
     gaps = manager.blame.gaps(control, t) if control is not None else {}

@@ -166,7 +166,7 @@ class House:
 
     @contextlib.asynccontextmanager
     async def open(self) -> AsyncIterator[None]:
-        """Listen, and run the hub."""
+        """Listen, and run the session manager."""
         with socket.create_server((HOST, 0)) as bound:
             self.port = bound.getsockname()[1]
             server = listener(self.app, None)

@@ -45,7 +45,7 @@ def control_status(**changes: object) -> ControlStatus:
 
 
 class LiveServer:
-    """Hub, doors and guarded app; listens while `running`."""
+    """Session manager, doors and guarded app; listens while `running`."""
 
     port = 0
 
@@ -76,7 +76,7 @@ class LiveServer:
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[LiveServer]:
-        """Listen, and run the hub."""
+        """Listen, and run the session manager."""
         with listen(HOST, 0) as bound:
             self.port = bound.getsockname()[1]
             server = listener(self.guard, None)

@@ -57,7 +57,7 @@ class ArrivalLog(msgspec.Struct):
 
 
 class NotingSessionManager(SessionManager):
-    """A hub that remembers arrivals."""
+    """Session manager that remembers arrivals."""
 
     heard = ArrivalLog()
 

@@ -42,7 +42,7 @@ class RtcHouse(House):
 
     @contextlib.asynccontextmanager
     async def open(self) -> AsyncIterator[None]:
-        """Listen, run the hub, hang up at the end."""
+        """Listen, run the session manager, hang up at the end."""
         async with super().open():
             try:
                 yield

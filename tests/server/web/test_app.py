@@ -133,7 +133,7 @@ def test_the_certificate_of_our_authority_is_given_and_a_foreign_one_is_not(hous
 
 def test_the_status_is_there_for_terminals_and_machines(house, client):
     house.control.send(control_status())
-    house.manager._hear_control()
+    house.manager._receive_status()
     house.manager._tick()
     assert client.get("/api/status").json()["mode"] == "DISARMED"
     assert 'lightleash_mode{mode="DISARMED"} 1.0' in client.get("/metrics").text

@@ -1,4 +1,4 @@
-"""Hub: one operator at a time, wishes that arrive, events that can be read."""
+"""Session manager: one operator at a time, wishes that arrive, events that can be read."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ def test_a_change_of_mode_is_an_event_and_every_page_is_told(house):
     watcher = Paper()
     house.manager.supervisors.add(watcher)
     house.control.send(control_status(mode=5, reason="STOP was pressed."))
-    house.manager._hear_control()
+    house.manager._receive_status()
     house.manager._tick()
     assert house.manager.events[0] == "STOPPED: STOP was pressed."
     house.manager._tick()
@@ -266,7 +266,7 @@ def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
         pose = {"p_bc_in_c": (2.5, 0.0, 0.0), "R_cb_wxyz": (1.0, 0.0, 0.0, 0.0)}
         for fields in ({}, {**pose, **sure}):
             house.control.send(control_status(**fields))
-        house.manager._hear_control()
+        house.manager._receive_status()
         before, after = eyes.expected
         assert before is None
         assert (after.sigma_p, after.sigma_theta, after.time_offset) == (0.01, 0.02, 0.0)
