@@ -51,6 +51,24 @@ def test_known_motion_puts_the_spots_where_a_global_shutter_would():
         assert after < 0.05 * before
 
 
+@pytest.mark.parametrize("approach", [-1.5, 0.8])
+def test_motion_along_the_line_of_sight_alone_is_taken_out_too(approach):
+    """It makes the picture larger row by row: the further from the middle, the more."""
+    truth = truth_at(np.random.default_rng(2))
+    along, still = np.array([approach, 0.0, 0.0]), np.zeros(3)
+    delays = np.zeros(len(LEDS_IN_B))
+    for _ in range(20):
+        pixels = CAMERA.pixels(truth.p + LEDS_IN_B @ truth.R.T + np.outer(delays, along))
+        delays = ROLLING.row_delays(pixels[:, 1])
+    rolled = spots_of(pixels)
+    righted = unrolled(ROLLING, rolled, FrameMotion(still, along, float(truth.p[0]))).pixels
+    before = np.abs(pixels - truth.pixels()).max()
+    assert before > 0.3
+    assert np.abs(righted - truth.pixels()).max() < 0.1 * before
+    turning_only = unrolled(ROLLING, rolled, FrameMotion(still, still, float(truth.p[0]))).pixels
+    np.testing.assert_array_equal(turning_only, pixels)
+
+
 def test_without_a_distance_the_cameras_turning_alone_is_taken_out():
     truth = truth_at(np.random.default_rng(3))
     rolled = spots_of(rolled_pixels(truth))

@@ -82,7 +82,7 @@ def test_a_learnt_force_stays_where_it_is_in_f_when_everything_turns() -> None:
     )
     force_in_f = [
         v.R_fv @ v.R_vb @ pid.wrench(pose_error(v, Reference.here(v)), v)[:3]
-        for v in (VirtualView(view.R_fv, *[np.zeros(3)] * 2, view.R_vb, *[np.zeros(3)] * 2), turned)
+        for v in (VirtualView(view.R_fv, *[np.zeros(3)] * 2, view.R_vb, *[np.zeros(3)] * 2), turned)  # type: ignore[call-arg]
     ]
     np.testing.assert_allclose(force_in_f[0], force_in_f[1], atol=1e-9)
     assert np.linalg.norm(force_in_f[0]) > 1.0
@@ -106,6 +106,21 @@ def test_what_the_thrusters_could_not_give_is_not_integrated_for_ever() -> None:
         pid.integrate(error, still, wrench - np.clip(wrench, -limit, limit), 0.005)
     more = GAINS.Ki[:3] * (still.R_vb.T @ error.e_p_in_v) * BACK_S
     assert (np.abs(wrench[:3]) <= limit + np.abs(more) + 1e-6).all()
+
+
+def test_torque_the_thrusters_could_not_give_is_not_integrated_either() -> None:
+    view = random_view(np.random.default_rng(6))
+    still = VirtualView(view.R_fv, np.zeros(3), view.p_bv_in_v, view.R_vb, np.zeros(3), np.zeros(3))
+    turned = still.R_vb @ exp(np.array([0.3, -0.2, 0.25]))
+    error = pose_error(still, Reference(still.p_bv_in_v, turned))
+    limit, pid = 0.2, Pid(GAINS)
+    for _ in range(5000):
+        wrench = pid.wrench(error, still)
+        pid.integrate(error, still, wrench - np.clip(wrench, -limit, limit), 0.005)
+    more = GAINS.Ki[3:] * error.e_eta_in_b * BACK_S
+    assert (np.abs(wrench[3:]) <= limit + np.abs(more) + 1e-6).all()
+    assert np.abs(wrench[3:]).min() >= limit
+    np.testing.assert_allclose(wrench[:3], 0.0, atol=1e-9)
 
 
 def place(x: float, v: float) -> VirtualView:

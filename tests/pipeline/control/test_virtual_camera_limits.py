@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.config import VirtualCameraConfig
+from pipeline.control import virtual_camera_kernels as kernels
 from pipeline.control.cutoff import time_constants
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import exp, rotation_about_z
@@ -111,6 +112,30 @@ def test_a_knob_turned_in_flight_never_jumps(before, after, angle) -> None:
     omega = np.linalg.norm(follower.omega, axis=1)[40:]
     # no more than before, or than the guard may hurry what is left to go
     assert omega.max() <= np.linalg.norm(follower.omega[39]) + 30.0 * lag + 1e-9
+
+
+def test_the_guard_and_a_higher_limit_come_by_and_by_and_a_lower_limit_at_once() -> None:
+    """Per second: all of the guard in a sixth of one, a limit by e⁴."""
+    camera = VirtualCamera(replace(FREE, guard=True, max_speed_m_s=0.1))
+    outside, inside = (relative(np.array([1.0, side, 0.0]), np.eye(3)) for side in (5.0, 0.0))
+    said = []
+    for robot in (outside, inside):
+        for _ in range(100):
+            camera.view(robot, np.eye(3), H, AHEAD, HALF_FIELD)
+            said.append((camera.guarding, camera._state[kernels.LIMIT]))
+    guard, limit = np.array(said).T
+    assert guard[99] == 1.0
+    assert guard[-1] == 0.0
+    assert np.abs(np.diff(guard, prepend=0.0)).max() == pytest.approx(6.0 * H)
+    assert np.ptp(limit) == 0.0
+    for wanted, steps in ((1.0, 116), (0.1, 1)):
+        camera.tune(replace(FREE, max_speed_m_s=wanted))
+        before = camera._state[kernels.LIMIT]
+        for k in range(1, steps + 1):
+            camera.view(inside, np.eye(3), H, AHEAD, HALF_FIELD)
+            risen = camera._state[kernels.LIMIT] - before
+            assert risen == pytest.approx(min(4.0 * H * k, np.log(wanted) - before))
+        assert camera._state[kernels.LIMIT] == pytest.approx(np.log(wanted))
 
 
 def test_switching_off_takes_a_second_or_two_and_ends_at_the_camera() -> None:

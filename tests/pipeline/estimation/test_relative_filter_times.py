@@ -46,6 +46,19 @@ def test_what_arrives_late_twice_or_too_early_is_counted(world, arriving):
     assert_same(estimator.state(flight.now), Flight(world, arriving).to(2.0), tolerance=1e-12)
 
 
+def test_pictures_that_come_twice_change_not_one_bit(world, arriving):
+    once, twice = (Flight(world, arriving) for _ in range(2))
+    once.to(1.5)
+    twice.to(1.5)
+    for until in (1.6, 1.9):
+        for seen in [seen for seen, fusion in twice.told[-6:] if fusion is Fusion.FUSED]:
+            assert twice.give(seen) is Fusion.DUPLICATE
+        a, b = once.to(until), twice.to(until)
+        for part in ("p_bc_in_c", "R_cb", "u_bf_in_c", "omega_bf_in_b", "R_ic", "sigma_p"):
+            np.testing.assert_array_equal(getattr(a, part), getattr(b, part))
+    assert once.filter.health.nis == twice.filter.health.nis
+
+
 def test_the_same_inputs_give_the_same_bits(world, arriving):
     a, b = (Flight(world, arriving).to(1.5) for _ in range(2))
     assert np.array_equal(a.p_bc_in_c, b.p_bc_in_c)
