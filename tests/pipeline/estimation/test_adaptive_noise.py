@@ -76,6 +76,7 @@ def test_pictures_that_scatter_of_themselves_are_no_reason_to_doubt_the_sensors(
     assert doubt.factor < 1.1
 
 
+@pytest.mark.slow
 def test_a_phone_that_dates_its_samples_badly_costs_no_leds():
     """8 ms of jitter; believed as their data sheet says, they cost a fifth of all LEDs."""
     rejected = 0

@@ -91,6 +91,7 @@ def test_a_turn_in_a_gap_is_inferred_from_both_ends() -> None:
     assert np.linalg.norm(log(attitude.R_fc.T @ rotation_about_z(1.12))) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap_s", [0.25, 0.5, 0.9])
 def test_its_sigma_is_that_of_its_tilt_after_a_gap(gap_s: float) -> None:
     """A hand as it is assumed to be: rates and accelerations, each with its correlation time."""
