@@ -14,7 +14,7 @@
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
-.PHONY: fuzz test-all mutants hooks lock clean
+.PHONY: fast-server fast-others fuzz test-all mutants hooks lock clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -87,15 +87,26 @@ kernels: dev
 	-@$(BIN)/pytest --collect-only -qq > /dev/null
 
 # Tests start some hundred processes, each with a thousand modules: compiled once, not each time.
-kernels pytest fast: export PYTHONDONTWRITEBYTECODE :=
+kernels pytest fast fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=
 
 # Real processes, and what is measured, have the machine to themselves.
 pytest: dev
 	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench" $(ARGS)
 	$(BIN)/pytest -m "e2e or bench" $(ARGS)
 
+# Beside each other, each collecting its own half alone; what needs a browser is not even imported.
+FAST := $(BIN)/pytest -q -m "not e2e and not bench and not slow"
+SERVER := tests/server/ tests/web/
+OTHERS := $(filter-out $(SERVER) tests/e2e/ tests/bench/ tests/data/,$(wildcard tests/[a-z]*/ tests/test_*.py))
+
 fast: dev
-	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench and not slow" $(ARGS)
+	$(MAKE) --jobs=2 fast-server fast-others
+
+fast-server: dev
+	$(FAST) $(SERVER) $(ARGS)
+
+fast-others: dev
+	$(FAST) $(OTHERS) $(ARGS)
 
 FUZZ_SECONDS ?= 60
 
