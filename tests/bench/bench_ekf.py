@@ -86,7 +86,7 @@ def step_cost(ekf):
             (H_PHONE, y_phone, np.diag(R_IMU[PHONE])),
             (H_POSE, y_pose, C),
         ):
-            state = dense_filter.fuse(*state[:2], H, y, R)
+            state = dense_filter.fuse(state[0], state[1], H, y, R)
 
     return median_us(fast, 5000), median_us(plain, 300)
 

@@ -65,7 +65,7 @@ def work(job):
         return f"seed {job.setup.seed}: {error!r}"
     if job.wants == "bound":
         limit = bound(world)
-        done.now, done.captured = limit.now, limit.captured
+        done.now, done.captured = limit.now, limit.captured  # type: ignore[assignment]
     if job.stop < inf:
         done.at_return = metrics.at_return(done.track, world, job.stop)
     return done
@@ -95,7 +95,7 @@ class Bench:
         """A line of the first table; gives (score, its ratios to the bound)."""
         _, done = self.run("bound" if limit else "", **options)
         score = metrics.judge([d.track for d in done])
-        ratios = (np.nan,) * 4
+        ratios: tuple[float, ...] = (np.nan,) * 4
         if limit:
             best = (
                 *rms(np.concatenate([d.now for d in done])),

@@ -128,7 +128,7 @@ def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
         for script in (clock_canvas(1280), KEEP_CONNECTIONS, *SCRIPTS[way]):
             page.add_init_script(script)
         sensors = Sensors(context, page)
-        operator, supervisor = told["tokens"]  # type: ignore[misc]
+        operator, supervisor = told["tokens"]
         page.goto(f"http://127.0.0.1:{told['port']}/#k={operator}")
         sensors.sway(1.0)
         epoch = float(page.evaluate("performance.timeOrigin")) * 1e-3

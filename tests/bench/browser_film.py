@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import av
 import numpy as np
@@ -165,7 +166,7 @@ def _delivered(recording: Path) -> Iterator[Delivered]:
             yield Delivered(number, luma.copy(), decoder.full_range, picture.key, size)
 
 
-def _chroma(colours: av.CodecContext, data: bytes) -> Image:
+def _chroma(colours: Any, data: bytes) -> Image:
     plane = colours.decode(av.Packet(data))[-1].planes[1]
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
     return rows[:, : plane.width]

@@ -30,7 +30,8 @@ from server.phone.phone_session import PhoneSession
 from server.process.server_process import SWITCH_S
 from server.security.request_guard import Guard
 from server.view.viser_proxy import routes as view_routes
-from server.web.app import body_of, make_app
+from server.web.app import make_app
+from server.web.replies import body_of
 from server.web.websocket import PageServer
 from tests.e2e.clock_canvas import painted_ms
 from tests.server.house import HOST
@@ -98,7 +99,7 @@ class Receiver(RtcHouse):
         routes.append(Route("/stock", self._stock, methods=["POST"]))
         pages = PageServer(self.manager, VideoSettings())
         self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
-        PhoneSession._see = lambda phone, frame, t: self._see(phone, frame, t)
+        PhoneSession._see = lambda phone, frame, t: self._see(phone, frame, t)  # type: ignore[assignment]
 
     def _see(self, phone: PhoneSession, frame: EncodedFrame, t: float) -> None:
         phone.meters["video"].tick(t, frame.t)

@@ -52,7 +52,7 @@ def browser(
         context = chromium.new_context(
             ignore_https_errors=True,
             permissions=["camera", "accelerometer", "gyroscope", "magnetometer"],
-            **options,  # type: ignore[arg-type]
+            **options,
         )
         try:
             yield context

@@ -100,6 +100,8 @@ def stranger(robot, tmp_path):
     sent, send = [], robot.follower._socket.send
 
     class Recorder:
+        socket = robot.follower._socket
+
         def send(self, data):
             sent.append(data.hex())
             return send(data)
@@ -107,8 +109,7 @@ def stranger(robot, tmp_path):
         def __getattr__(self, name):
             return getattr(self.socket, name)
 
-    recorder = Recorder()
-    recorder.socket, robot.follower._socket = robot.follower._socket, recorder
+    robot.follower._socket = Recorder()
     contract = FollowerContract()
     contract.ready(robot)
     contract.fly(robot, 1.0, 0.2)

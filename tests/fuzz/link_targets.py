@@ -127,7 +127,7 @@ class RobotRig:
             assert np.array_equal(self.thrusts(), before)
             assert STRANGER not in self.end.recipients(self.now_us)
             return
-        body = rest if kind == SEALED else bytearray(self.honest(rest))
+        body = bytearray(rest if kind == SEALED else self.honest(rest))
         if kind == PATCHED and len(rest) > 1:
             at = rest[1] % len(body)
             body[at : at + len(rest) - 2] = rest[2:][: len(body) - at]

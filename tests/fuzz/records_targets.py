@@ -7,6 +7,8 @@ import msgspec
 
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol import messages, wire
+from server.protocol.calibration_messages import Calibrate, Calibration
+from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import MAX_MESSAGE_BYTES, MAX_PIXELS, MAX_RECORD_BYTES, WireError
 from server.protocol.wire_records import (
     Codec,
@@ -133,8 +135,8 @@ def message_seeds():
         messages.Command("arm"),
         messages.Tune(cutoff_hz=0.5, guard=True),
         messages.Log("a fault"),
-        messages.PathChoice("auto", "operator"),
-        messages.Calibrate("start"),
+        PathChoice("auto", "operator"),
+        Calibrate("start"),
     )
     return [messages.encode_message(m).encode() for m in said] + recorded(PHONE_MESSAGES, most=6)
 
@@ -153,8 +155,8 @@ def from_server_seeds():
         messages.Welcome("session", 2, "ames", 1280, 720, 30, 3_000_000),
         messages.Refused("value", "motion", "finite"),
         messages.Command("key_frame"),
-        messages.PathChoice("WebRTC", "supervisor"),
-        messages.Calibration("filming", progress=0.5, tasks={"tilt": 0.2}, cells=[1, 2, 3]),
+        PathChoice("WebRTC", "supervisor"),
+        Calibration("filming", progress=0.5, tasks={"tilt": 0.2}, cells=[1, 2, 3]),
     )
     seeds = [messages.encode_message(m).encode() for m in said]
     return seeds + recorded(SERVER_MESSAGES, most=3, longest=6000)

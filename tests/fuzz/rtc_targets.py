@@ -5,7 +5,7 @@ from contextlib import suppress
 from types import SimpleNamespace
 
 from aioice import stun as ice_stun
-from aiortc.codecs import depayload, h264_depayload, vp8_depayload
+from aiortc.codecs import depayload, h264_depayload, vp8_depayload  # type: ignore[attr-defined]
 from aiortc.codecs.h264 import H264Encoder
 from aiortc.rtcrtpparameters import RTCRtpCodecParameters
 from aiortc.rtp import (
@@ -196,7 +196,7 @@ class Line:
             return
         self.nacks.add(packet)
         codec = H264 if packet.payload_type == 99 else VP8
-        packet._data = depayload(codec, packet.payload) if packet.payload else b""
+        packet._data = depayload(codec, packet.payload) if packet.payload else b""  # type: ignore[attr-defined]
         self.jitter.add(packet)
 
 

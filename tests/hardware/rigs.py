@@ -36,7 +36,7 @@ class LoopbackRig:
         self.now_us = 0
         self.connected = True
         self.f_max = robot_file.robot.f_max
-        self.follower = UdpFollower(
+        self.follower = UdpFollower(  # type: ignore[call-arg]
             *self.socket.getsockname(),
             ControlEnd.of(robot_file, KEY, 1),
             lambda: 1e-6 * self.now_us,

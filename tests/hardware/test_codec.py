@@ -131,7 +131,7 @@ HEADS = {codec: stream(codec, 1)[0][0][:60] for codec in CODECS}
 @pytest.mark.parametrize("codec", CODECS)
 @pytest.mark.parametrize("size", [(640, 480), (160, 120), (240, 320), (1024, 512)])
 def test_a_picture_of_another_size_is_refused(codec, size):
-    data, _ = Encoder(*size, 30.0, 2_000_000, codec).encode(np.zeros(size[::-1], np.uint8))
+    data, _ = Encoder(*size, 30.0, 2_000_000, codec).encode(np.zeros(size[::-1], np.uint8))  # type: ignore[call-arg]
     with pytest.raises(DecodeError):
         Decoder(codec, W, H).decode(data)
 

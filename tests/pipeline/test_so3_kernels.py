@@ -21,7 +21,7 @@ vectors = st.tuples(*[st.floats(-4.0, 4.0)] * 3).map(np.array)
 @given(vectors, st.sampled_from((1.0, 1e-3, 1e-5, 1e-9, 0.0)))
 def test_exp_is_that_of_frames(v, scale):
     R = np.empty((3, 3))
-    put_exp(*(scale * v), R)
+    put_exp(*(scale * v), R)  # type: ignore[call-arg]
     assert np.abs(R - exp(scale * v)).max() < 1e-13
     assert np.abs(R @ R.T - np.eye(3)).max() < 1e-13
 
@@ -41,7 +41,7 @@ def test_products():
 def test_the_right_jacobian_is_that_of_small_turns(angle):
     """Exp(v + δ) = Exp(v) Exp(J δ), to the third order in v."""
     v, J, e = angle * np.array([0.6, -0.48, 0.64]), np.empty((3, 3)), 1e-5
-    put_right_jacobian(*v, J)
+    put_right_jacobian(*v, J)  # type: ignore[call-arg]
     for k, axis in enumerate(np.eye(3)):
         turned = exp(v).T @ (exp(v + e * axis) - exp(v - e * axis)) / (2.0 * e)
         column = np.array([turned[2, 1], turned[0, 2], turned[1, 0]])

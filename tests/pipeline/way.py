@@ -43,7 +43,7 @@ class Way:
 
     def go(self, start, stop):
         """The count of steps."""
-        steps = transit(
+        steps = transit(  # type: ignore[call-arg]
             self.x,
             self.R,
             self.R_ic,

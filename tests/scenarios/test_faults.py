@@ -25,7 +25,7 @@ ROBOT = load_robot("ames")
 
 
 def tracking(**more: object) -> VirtualTimeSimulation:
-    scene = replace(SimulationOptions(hand="steady", seed=8, codec="jpeg"), **more)  # type: ignore[arg-type]
+    scene = replace(SimulationOptions(hand="steady", seed=8, codec="jpeg"), **more)
     loop = VirtualTimeSimulation(ROBOT, TeleopConfig(), scene)
     while len(loop.trace.t) < 200:
         loop.advance()

@@ -16,7 +16,7 @@ ASKEW = Extrinsics(exp(np.deg2rad([2.0, -3.0, 2.5])), time_offset_s=0.015)
 
 def flown(**more: object) -> tuple[float, int, str]:
     """Error of the estimate (RMS, mm), ticks of tracking, why it ended."""
-    scene = SimulationOptions(hand="moving", seed=8, codec="jpeg", **more)  # type: ignore[arg-type]
+    scene = SimulationOptions(hand="moving", seed=8, codec="jpeg", **more)
     trace = VirtualTimeSimulation(load_robot("ames"), TeleopConfig(), scene).run(8.0)
     errors = np.array(trace.estimate_error_in_c)
     return 1e3 * float(np.sqrt((errors**2).sum(axis=1).mean())), len(trace.t), trace.left

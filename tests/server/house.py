@@ -62,7 +62,7 @@ def control_status(**changes: object) -> ControlStatus:
         "gaps": {},
         "warnings": [],
     }
-    return ControlStatus(**{**values, **changes})  # type: ignore[arg-type]
+    return ControlStatus(**{**values, **changes})
 
 
 def estimate_fields(**changes: object) -> EstimateFields:
@@ -78,7 +78,7 @@ def estimate_fields(**changes: object) -> EstimateFields:
         **dict.fromkeys(("bias_omega_b", "bias_omega_c"), (0.01, 0.0, -0.02)),
         **dict.fromkeys(("bias_a_b", "bias_a_c"), (0.1, 0.0, -0.2)),
     }
-    return EstimateFields(**{**values, **changes})  # type: ignore[arg-type]
+    return EstimateFields(**{**values, **changes})
 
 
 class Talker:

@@ -21,8 +21,10 @@ def status(mode):
         ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""
     )
     flags = {"ready": True, "saturated": False, "resumes": False}
-    tables = {name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")}
-    tables |= {"refusals": [], "messages": [], "warnings": [], "people": []}
+    tables: dict[str, object] = {
+        **{name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")},
+        **{name: [] for name in ("refusals", "messages", "warnings", "people")},
+    }
     return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
 
 

@@ -77,7 +77,7 @@ def random_records(rng: random.Random, count: int) -> list[Record]:
         match rng.randrange(4):
             case 0:
                 quaternion = rng.choice([None, (0.5, -0.5, 0.5, -0.5), (0.0, 0.0, 0.0, 1.0)])
-                return wire_records.Motion(singles(70, 3), singles(320, 3), quaternion, angle)  # type: ignore[arg-type]
+                return wire_records.Motion(singles(70, 3), singles(320, 3), quaternion, angle)
             case 1:
                 codec = rng.choice(list(wire_records.Codec))
                 data = b"\xff\xd8" + rng.randbytes(rng.randrange(1, 300))

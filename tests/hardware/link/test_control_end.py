@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import count
@@ -12,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware.follower import FollowerState, Refusal, ThrustCommand
-from hardware.link import control_end
 from hardware.link.control_end import ControlEnd, random_u64
 from hardware.link.datagram import (
     U32,
@@ -218,5 +218,5 @@ def test_the_first_epoch_of_a_robot_that_never_flew_may_be_ours() -> None:
     ("drawn", "number"), [(lambda below: 0, 1), (lambda below: below - 1, U64 - 1)]
 )
 def test_a_random_number_has_64_bits_and_is_not_zero(monkeypatch, drawn, number) -> None:
-    monkeypatch.setattr(control_end.secrets, "randbelow", drawn)
+    monkeypatch.setattr(secrets, "randbelow", drawn)
     assert random_u64() == number

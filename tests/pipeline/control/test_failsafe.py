@@ -89,7 +89,7 @@ def test_arming_is_refused_with_every_reason_in_words() -> None:
     ],
 )
 def test_leaves_tracking(change: dict[str, object], ms: int, mode: Mode) -> None:
-    assert run(tracking(), replace(HELD, **change), ms).mode == mode  # type: ignore[arg-type]
+    assert run(tracking(), replace(HELD, **change), ms).mode == mode
 
 
 def test_comes_back_from_hold_only_by_a_new_press() -> None:
@@ -105,7 +105,7 @@ def test_after_a_gap_it_follows_again_by_itself_once_all_was_fresh_for_a_moment(
 ) -> None:
     state = tracking()
     for age in range(0, 1_000, 5):
-        state = failsafe.step(state, replace(HELD, **{silent: age}), 5, LIMITS)  # type: ignore[arg-type]
+        state = failsafe.step(state, replace(HELD, **{silent: age}), 5, LIMITS)
     assert state.mode == Mode.COAST
     assert failsafe.ceiling(state, LIMITS) == 1.0
     assert run(state, HELD, LIMITS.fresh - 5).mode == Mode.COAST
@@ -117,7 +117,7 @@ def test_a_finger_that_left_during_a_gap_holds_with_the_first_word(
     change: dict[str, object],
 ) -> None:
     state = run(tracking(), replace(HELD, operator_ms=400), 200)
-    let_go = replace(HELD, **change)  # type: ignore[arg-type]
+    let_go = replace(HELD, **change)
     state = failsafe.step(state, let_go, 5, LIMITS)
     assert state.mode == Mode.HOLD
     assert run(state, HELD, 2_500).mode == Mode.HOLD
@@ -280,7 +280,7 @@ def test_every_mode_but_disarmed_refuses_arming_in_its_own_words(mode: Mode) -> 
 def test_arming_is_refused_once_for_what_somebody_can_mend_first(
     change: dict[str, object], why: str
 ) -> None:
-    inputs = replace(GOOD, **change)  # type: ignore[arg-type]
+    inputs = replace(GOOD, **change)
     assert failsafe.refusals(STARTED, inputs, LIMITS) == (why,)
 
 

@@ -25,6 +25,8 @@ from pipeline.control.failsafe import (
 )
 from pipeline.signals import Mode, Requests
 
+Said = tuple[str, str, str, tuple[str, ...]]
+"""Gap, fault, doubt, refusals."""
 D = 10
 """Step [ms]."""
 LIMITS = FailsafeTimers(
@@ -71,9 +73,9 @@ def inputs() -> list[FailsafeInputs]:
     ages += [(0, p, 0, 0) for p in (D + 1, 2 * D, 2 * D + 1, 3 * D, 3 * D + 1)]
     ages += [(0, 0, i, 0) for i in (D + 1, 3 * D, 3 * D + 1)]
     ages += [(0, 0, 0, r) for r in (D + 1, 3 * D)]
-    fine = ("", "", "", ())
-    complaints = [("stood still", "", "", ()), ("", "spins", "", ()), ("", "", "unsure", ())]
-    complaints += [("", "", "", ("no",))]
+    fine: Said = ("", "", "", ())
+    complaints: list[Said] = [("stood still", "", "", ()), ("", "spins", "", ())]
+    complaints += [("", "", "unsure", ()), ("", "", "", ("no",))]
     arm, stop = Requests(arm=True), Requests(stop=True)
     wishes = [arm, Requests(disarm=True), Requests(reset=True), stop]
     wishes += [Requests(arm=True, disarm=True), Requests(stop=True, reset=True)]
@@ -147,8 +149,8 @@ def check(
     if before.mode == Mode.STOPPED and now.mode != Mode.STOPPED:
         assert wish.reset
         assert not told.held
-    bad = told.fault or max(told.robot_ms, told.operator_ms, told.phone_imu_ms) > D or told.gap
-    bad = bad or told.doubt or told.pose_ms > limits.pose_hold
+    silent = max(told.robot_ms, told.operator_ms, told.phone_imu_ms) > D or told.gap
+    bad = bool(told.fault or told.doubt) or silent or told.pose_ms > limits.pose_hold
     if now.mode == Mode.TRACK:
         assert told.held
         assert not bad

@@ -151,9 +151,7 @@ def test_a_row_exposed_later_is_compared_with_where_the_led_will_be():
     at = [gravity_free.step(RelativeMotion(x[:3], R, x[3:6]), inputs, h) for h in ahead]
     tangents = np.array([gravity_free.seen_at(m, led) for m, led in zip(at, LEDS, strict=True)])
     C = np.tile(1e-7 * np.eye(2), (4, 1, 1))
-    dated, ignorant = (
-        fuse(*(a.copy() for a in (x, R, P)), tangents, C, a)[0] for a in (ahead, HERE)
-    )
+    dated, ignorant = (fuse(x.copy(), R.copy(), P.copy(), tangents, C, a)[0] for a in (ahead, HERE))
     assert dated < 0.02 * ignorant
 
 
@@ -225,9 +223,9 @@ def test_of_slow_leds_nothing_is_believed_about_the_time_offset():
     x, R, P = state(0.3)
     told, C = picture(x, R), covariances(4)
     whole = [value.copy() for value in (x, R, P)]
-    fuse(*whole, told, C)
+    fuse(*whole, told, C)  # type: ignore[call-arg]
     held = [value.copy() for value in (x, R, P)]
-    fuse(*held, told, C, still=1e6)
+    fuse(*held, told, C, still=1e6)  # type: ignore[call-arg]
     rest = np.arange(len(P)) != OFFSET
     assert held[0][X_OFFSET] == pytest.approx(x[X_OFFSET], abs=1e-12)
     assert held[2][OFFSET, OFFSET] == pytest.approx(P[OFFSET, OFFSET])
@@ -240,8 +238,8 @@ def test_of_fast_leds_all_is_believed_about_the_time_offset():
     x, R, P = state(0.3)
     told, C = picture(x, R), covariances(4)
     whole = [value.copy() for value in (x, R, P)]
-    fuse(*whole, told, C)
+    fuse(*whole, told, C)  # type: ignore[call-arg]
     fast = [value.copy() for value in (x, R, P)]
-    fuse(*fast, told, C, still=1e-3)
+    fuse(*fast, told, C, still=1e-3)  # type: ignore[call-arg]
     for a, b in zip(whole, fast, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-6, atol=1e-9)

@@ -1,6 +1,7 @@
 """Whatever reaches the default estimator, and whenever: no exception, no NaN, and a way back."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -193,8 +194,8 @@ def test_lies_of_every_kind_leave_it_finite(world, arriving, seed):
 
 def test_warming_up_compiles_all_there_is(world, arriving):
     warm_up()
-    kernels = (ray_kernels.fuse_rays, ray_kernels.is_sound, relative_kernels.transit)
-    kernels += (relative_kernels.apply, relative_kernels.inputs_at)
+    kernels: list[Any] = [ray_kernels.fuse_rays, ray_kernels.is_sound, relative_kernels.transit]
+    kernels += [relative_kernels.apply, relative_kernels.inputs_at]
     compiled = [len(kernel.signatures) for kernel in kernels]
     Flight(world, arriving).to(1.0)
     assert [len(kernel.signatures) for kernel in kernels] == compiled

@@ -106,7 +106,7 @@ def test_a_transit_is_a_step_for_each_stretch_between_samples():
 
 def test_inputs_are_interpolated_and_freed_of_bias():
     for t in (0.31, float(BODY[0][40]), 0.9):
-        inputs = inputs_at(t, Way().x, *BODY, *PHONE, hand_of(HELD.hand))
+        inputs = inputs_at(t, Way().x, *BODY, *PHONE, hand_of(HELD.hand))  # type: ignore[call-arg]
         expected = np.concatenate((interpolated(BODY, t), interpolated(PHONE, t))) - BIAS
         assert np.abs(inputs - expected).max() < 1e-12
 

@@ -15,7 +15,7 @@ def roots_of(polynomial, split):
 
 def poses_of(rays, points, split):
     triad, ps, Rs = np.empty((3, 3)), np.empty((4, 3)), np.empty((4, 3, 3))
-    put_triad(*points, triad)
+    put_triad(*points, triad)  # type: ignore[call-arg]
     count = p3p(rays, points, triad, split, ps, Rs)
     return ps[:count], Rs[:count]
 

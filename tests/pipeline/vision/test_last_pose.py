@@ -1,5 +1,7 @@
 """A pose is carried on by gyroscopes and velocity; its attitude outlives its place."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -101,4 +103,5 @@ def test_turns_between_pictures_are_told():
     assert last.turned is None
     last.advance(DT, np.array([3.0, 0.0, 0.0]), STILL)
     np.testing.assert_allclose(last.turned, [[2.0 * DT, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    assert log(exp(last.turned[0]))[0] == pytest.approx(2.0 * DT)
+    turned: Any = last.turned
+    assert log(exp(turned[0]))[0] == pytest.approx(2.0 * DT)

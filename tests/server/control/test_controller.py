@@ -230,9 +230,9 @@ def turned_by(mode: VirtualCameraMode) -> float:
 
     def turning(t: float) -> list[Input]:
         phone = PhoneImuInput(t - 0.02, (0.0, 0.0, 0.5), UP)
-        return [one for one in said(t) if not isinstance(one, PhoneImuInput | SeenInput)] + [phone]
+        return [*(one for one in said(t) if not isinstance(one, PhoneImuInput | SeenInput)), phone]
 
-    rig.said = turning  # type: ignore[method-assign]
+    rig.said = turning
     rig.run(0.1, [TuneInput(mode=mode, cutoff_hz=0.1)])
     outputs = [output for _, output in rig.run(0.2)]
     knobs = rig.status(outputs[-1]).knobs
@@ -248,7 +248,7 @@ def test_a_knob_that_is_turned_in_flight_is_told_and_turns_the_view():
 def test_a_silent_server_ends_a_flight_in_a_ramp():
     rig = Rig()
     rig.track()
-    rig.said = lambda t: []  # type: ignore[method-assign]
+    rig.said = lambda t: []
     limits = TeleopConfig().failsafe
     seconds = limits.gap + ROBOT.ramp_s + 0.2
     modes = [output.failsafe.mode for _, output in rig.run(seconds)]
@@ -362,12 +362,12 @@ def test_a_status_tells_how_long_it_waits_and_whose_gaps_there_were():
     rig = Rig()
     rig.track()
     hears = rig.said
-    rig.said = lambda t: []  # type: ignore[method-assign]
+    rig.said = lambda t: []
     status = rig.status(rig.run(0.4)[-1][1])
     assert status.mode == Mode.COAST
     assert status.resumes
     assert status.until_ramp_s == pytest.approx(TeleopConfig().failsafe.gap - 0.4, abs=0.03)
-    rig.said = hears  # type: ignore[method-assign]
+    rig.said = hears
     rig.run(0.1, robot_gap="The robot coasts.")
     rig.k += 40
     status = rig.status(rig.run(0.5)[-1][1])
@@ -396,9 +396,9 @@ def test_a_phone_of_which_only_half_is_heard_has_a_gap(heard: type):
     rig = Rig()
     rig.track()
     everything = rig.said
-    rig.said = lambda t: [one for one in everything(t) if isinstance(one, heard)]  # type: ignore[method-assign]
+    rig.said = lambda t: [one for one in everything(t) if isinstance(one, heard)]
     rig.run(0.4)
-    rig.said = everything  # type: ignore[method-assign]
+    rig.said = everything
     gaps = rig.status(rig.run(0.1)[-1][1]).gaps
     assert gaps["phone"].longest_s == pytest.approx(0.42, abs=0.03)
 

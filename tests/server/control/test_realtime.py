@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -94,10 +97,10 @@ def test_after_the_slowest_tick_the_schedule_goes_on_where_it_would_be():
 
 def test_it_says_what_was_granted_or_how_to_get_it(monkeypatch):
     for name in ("collect", "freeze", "disable"):
-        monkeypatch.setattr(realtime.gc, name, lambda: None)
+        monkeypatch.setattr(gc, name, lambda: None)
 
     def denied(*_):
         raise PermissionError
 
-    monkeypatch.setattr(realtime.os, "sched_setscheduler", denied)
+    monkeypatch.setattr(os, "sched_setscheduler", denied)
     assert "CAP_SYS_NICE" in realtime.claim()

@@ -37,7 +37,7 @@ def outcome(**more: object) -> FaultOutcome:
         "thrust_n": 0.0,
         "words": "No word from the phone.",
     }
-    return FaultOutcome(**(usual | more))  # type: ignore[arg-type]
+    return FaultOutcome(**(usual | more))
 
 
 MADE_UP = Fault(

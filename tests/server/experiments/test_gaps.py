@@ -43,7 +43,7 @@ def test_by_websocket_nothing_is_lost_and_the_order_is_kept(
     line = WebSocketLine(gaps)
     came = [line.out(t, kind) for t in times]
     assert all(out is not None and out >= t for out, t in zip(came, times, strict=True))
-    assert came == sorted(came)  # type: ignore[type-var]
+    assert came == sorted(came)
     assert not any(gaps.dark(out) for out in came if out is not None)
 
 
@@ -153,7 +153,7 @@ def test_runs_are_found_at_both_ends_and_in_between() -> None:
 
 def flown(**figures: float) -> FlightFigures:
     usual = dict.fromkeys(FlightFigures.__slots__, 0.0) | {"follows_pct": 99.0, "reasons": ()}
-    return FlightFigures(**(usual | figures))  # type: ignore[arg-type]
+    return FlightFigures(**(usual | figures))
 
 
 def test_goals_are_met_or_missed_by_the_figures_and_silent_about_what_was_not_flown() -> None:

@@ -11,8 +11,8 @@ import pytest
 
 from pipeline.frames import exp
 from server.cli import main
-from server.experiments.tremor.command import PERIOD_S, cameras, judge, through
-from server.experiments.tremor.hand import attitudes_of_hand
+from server.experiments.tremor.command import cameras, judge, through
+from server.experiments.tremor.hand import PERIOD_S, attitudes_of_hand
 
 RECORDING = Path(__file__).parents[2] / "data/virtual_phone.mcap"
 P_REF = np.array([2.5, 0.0, 0.0])

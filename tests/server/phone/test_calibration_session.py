@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -25,7 +27,7 @@ SHAPE = (640, 360, 90)
 
 def frame(sequence, luma, shape=SHAPE):
     data = cv2.imencode(".jpg", luma)[1].tobytes()
-    picture = Picture(Codec.JPEG, True, *shape, data)
+    picture = Picture(Codec.JPEG, True, *shape, data)  # type: ignore[call-arg]
     return EncodedFrame(10.0 + sequence / 30.0, 10.0, sequence, picture)
 
 
@@ -37,7 +39,9 @@ def board():
 @pytest.fixture
 def wizard(tmp_path):
     wanted = []
-    made = CalibrationSession("a phone", SHAPE, tmp_path, lambda _n: None, lambda: wanted.append(1))
+    made: Any = CalibrationSession(
+        "a phone", SHAPE, tmp_path, lambda _n: None, lambda: wanted.append(1)
+    )
     made.wanted = wanted
     yield made
     made.stop()

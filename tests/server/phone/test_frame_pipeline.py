@@ -42,7 +42,7 @@ def shots(rng, n, codec="h264", with_=None, truth=None):
     """Encoded pictures of a robot, and what was true."""
     truth, camera_side = truth or truth_at(rng), with_ or encoder(codec)
     for k in range(n):
-        yield sent(k, *camera_side.encode(picture(truth, rng)), codec), truth
+        yield sent(k, *camera_side.encode(picture(truth, rng)), codec), truth  # type: ignore[call-arg]
         truth = moved(truth, rng)
 
 

@@ -54,7 +54,7 @@ class Rig:
         self.nonce = 0
 
     def say(self, body: object, sequence: int = 1) -> None:
-        self.phone.take(Record(sequence, int(1e6 * self.t), body), self.t)  # type: ignore[arg-type]
+        self.phone.take(Record(sequence, int(1e6 * self.t), body), self.t)
 
     def synchronise(self) -> None:
         for _ in range(6):

@@ -6,13 +6,15 @@ import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hardware.camera_file import CAMERAS, find_camera
 from hardware.codec import Encoder
-from hardware.sim.hand import MovingHand, Waves, make_hand
+from hardware.sim.hand import MovingHand, make_hand
+from hardware.sim.hand_parts import Waves
 from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
 from hardware.sim.phone_faults import SensorFault
 from hardware.sim.render import RenderOptions
@@ -170,7 +172,7 @@ def test_a_jump_of_the_magnetometer_moves_nothing():
         motions = [r.record for r in timed(read(FLIGHT)) if isinstance(r.record.body, Motion)]
         for k, record in enumerate(motions[:200]):
             rig.t = 1.0 + k / 60.0
-            body = record.body
+            body: Any = record.body
             if k >= 100:
                 turned = exp(np.array([0.0, 0.0, jump])) @ R_from_wxyz(body.orientation_wxyz)
                 body = replace(body, orientation_wxyz=wxyz_from_R(turned) if jump else None)

@@ -59,7 +59,7 @@ class Rig:
         self.taken: list[int] = []
         self.keys_wanted = 0
         self.thread = VisionThread(
-            self.eyes,  # type: ignore[arg-type]
+            self.eyes,
             lambda _, newest: self.seen.append(newest.sequence),
             self.taken.append,
             self._want_key,

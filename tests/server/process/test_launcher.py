@@ -153,7 +153,7 @@ def at_terminal(monkeypatch):
     def invite(run, role):
         page = "/" if role == "operator" else "/supervisor"
         urls = (f"{run[f'{way}_url']}{page}#k={keys[role]}" for way in ("https", "http"))
-        return Invitation(*urls, 600.0)
+        return Invitation(*urls, 600.0)  # type: ignore[call-arg]
 
     monkeypatch.setattr(launcher, "invite", invite)
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)

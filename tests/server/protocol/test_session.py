@@ -42,7 +42,7 @@ MAY = {"operator": {"Motion", "Touch", "Pong"}, "video": {"Picture"}, "superviso
 
 
 def hello(role: str, version: int = wire.VERSION) -> str:
-    return encode_message(Hello(version, role))  # type: ignore[arg-type]
+    return encode_message(Hello(version, role))
 
 
 def opened(role: str) -> Session:

@@ -14,7 +14,7 @@ from server.protocol.touches import NEWEST_TOUCH_US
 from server.protocol.wire import decode
 from server.protocol.wire_records import Motion, Picture, Touch
 from server.recording.reader import read
-from server.rtc import link as link_module
+from server.rtc.receiving import metadata_trailer
 from server.rtc.receiving.metadata_trailer import split
 from tests.server.house import eventually
 from tests.server.rtc.rtc_house import ATTITUDES, FRAME_S, rtc_house_in
@@ -34,7 +34,7 @@ def in_house(folder, play, **options):
         async def run():
             async with house.open(), house.phone(**options) as page:
                 await page.synchronised()
-                house.taken, house.said = [], []
+                house.taken, house.said = [], []  # type: ignore[attr-defined]
                 listen(house)
                 await play(house, page)
 
@@ -75,7 +75,7 @@ def test_every_picture_comes_with_its_own_record(codec, tmp_path, monkeypatch):
         attitudes.append(record.orientation_wxyz)
         return plain, record
 
-    monkeypatch.setattr(link_module.metadata_trailer, "split", noting)
+    monkeypatch.setattr(metadata_trailer, "split", noting)
 
     async def play(house, page):
         await page.film(PICTURES)

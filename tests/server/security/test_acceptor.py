@@ -16,7 +16,8 @@ import pytest
 
 from server.security import acceptor
 from server.security.acceptor import Acceptor
-from server.security.admission import Admission, AdmissionLimits
+from server.security.admission import Admission
+from server.security.places import AdmissionLimits
 from server.security.tls import certificate
 from tests.server.house import eventually
 

@@ -6,6 +6,7 @@ import asyncio
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import pytest
 from starlette.requests import Request
@@ -35,7 +36,7 @@ FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICT
 
 @pytest.fixture
 def rig(tmp_path):
-    server = LiveServer(tmp_path, Quotas(UNLIMITED))
+    server: Any = LiveServer(tmp_path, Quotas(UNLIMITED))
     server.client = TestClient(server.guard, base_url=BASE, client=("127.0.0.1", 50_000))
     yield server
     server.close()

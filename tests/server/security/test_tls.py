@@ -216,7 +216,7 @@ def test_an_authority_that_will_not_do_is_replaced_and_that_is_said_once(
     if old == "nearly over":
         monkeypatch.setattr(tls, "utc", later(AUTHORITY_DAYS - 40))
     if old == "of another machine":
-        monkeypatch.setattr(tls.socket, "gethostname", lambda: "other-machine")
+        monkeypatch.setattr(socket, "gethostname", lambda: "other-machine")
     for _ in range(3):
         certificate(tmp_path)
     assert made.authority.read_bytes() != before

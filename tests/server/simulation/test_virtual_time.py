@@ -66,7 +66,7 @@ def test_a_scene_says_which_leds_are_hidden_when() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("change", [{"latency_s": (0.2, 0.2)}, {"readout_s": 0.03}], ids=str)
 def test_late_pictures_and_a_rolling_shutter_are_flown_with(change: dict[str, object]) -> None:
-    scene = replace(SimulationOptions(hand="moving", seed=7, codec="jpeg"), **change)  # type: ignore[arg-type]
+    scene = replace(SimulationOptions(hand="moving", seed=7, codec="jpeg"), **change)
     trace = VirtualTimeSimulation(load_robot("ames"), TeleopConfig(), scene).run(4.5)
     assert trace.left == ""
     assert trace.poses > 0.95 * trace.pictures

@@ -256,7 +256,7 @@ def test_when_viser_dies_in_the_middle_the_browser_is_hung_up_on(rig):
     async def talk():
         away = rig.viewer_path.rename(rig.viewer_path.with_suffix(".away"))
         async with (
-            unix_serve(die, str(rig.viewer_path), subprotocols=[SUBPROTOCOL]),
+            unix_serve(die, str(rig.viewer_path), subprotocols=[SUBPROTOCOL]),  # type: ignore[attr-defined]
             rig.open() as browser,
             asyncio.timeout(5.0),
         ):

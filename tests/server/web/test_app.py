@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from starlette.testclient import TestClient
 
 from pipeline.signals import Mode
 from server.common.clock import now
-from server.web import app
+from server.recording.writer import RecordingError
 from server.web.app import CLIENT, Api
 from tests.server.house import control_status, house_in, is_request
 
@@ -150,7 +151,7 @@ def test_a_recording_is_started_named_and_ended(house, client):
 
 def test_a_recording_that_cannot_be_made_says_why(house, client, monkeypatch):
     def full() -> str:
-        raise app.RecordingError(Path("disk"), "is full", "make room")
+        raise RecordingError(Path("disk"), "is full", "make room")
 
     monkeypatch.setattr(house.manager, "start_recording", full)
     answer = client.post("/api/recording")
@@ -161,13 +162,13 @@ def test_a_recording_that_cannot_be_made_says_why(house, client, monkeypatch):
 def test_a_virtual_phone_is_one_process_that_can_be_ended(house, client, monkeypatch):
     command = ["sleep", "60"]
     started: list[list[str]] = []
-    popen = app.subprocess.Popen
+    popen = subprocess.Popen
 
     def stub(arguments, **options):
         started.append(arguments)
         return popen(command, **options)
 
-    monkeypatch.setattr(app.subprocess, "Popen", stub)
+    monkeypatch.setattr(subprocess, "Popen", stub)
     for _ in range(2):
         assert client.post("/api/virtual-phone").json() == {"running": True}
     assert len(started) == 1

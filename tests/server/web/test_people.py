@@ -14,7 +14,8 @@ from websockets.exceptions import InvalidStatus
 
 from pipeline.signals import Mode
 from server.common.clock import now
-from server.protocol.messages import Deed, decode_from_server
+from server.protocol.messages import decode_from_server
+from server.protocol.people_messages import Deed
 from server.recording.writer import SERVER_MESSAGES
 from server.security.audit import AUDIT_FILE
 from server.security.pairings import WAIT_S, PairingError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Any
 
 import pytest
 from starlette.responses import PlainTextResponse
@@ -79,7 +80,7 @@ async def reached(scope, receive, send):
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
-    server = LiveServer(tmp_path_factory.mktemp("routes"))
+    server: Any = LiveServer(tmp_path_factory.mktemp("routes"))
     guard = Guard(reached, server.doors, ["127.0.0.1"], quotas=Quotas(UNLIMITED))
     server.client = TestClient(guard, base_url=f"http://{HOST}", client=("127.0.0.1", 5000))
     yield server
@@ -98,7 +99,7 @@ def routes_of(app):
             sockets.add(route.path)
         else:
             assert isinstance(route, Route), f"{route}: of a kind that this test does not know"
-            http[route.path] = tuple(sorted(route.methods))
+            http[route.path] = tuple(sorted(route.methods))  # type: ignore[assignment]
     return http, sockets
 
 

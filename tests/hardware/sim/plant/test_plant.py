@@ -108,8 +108,8 @@ def test_it_swings_with_the_period_the_robot_file_gives():
     for _ in range(2000):
         plant.step(OFF)
         x.append(plant.p_bf_in_f[0])
-    x = np.array(x)
-    down = np.flatnonzero((x[:-1] > 0.0) & (x[1:] <= 0.0))
+    places = np.array(x)
+    down = np.flatnonzero((places[:-1] > 0.0) & (places[1:] <= 0.0))
     period = 0.005 * np.diff(down).mean()
     assert period == pytest.approx(AMES.robot.ramp_s, rel=0.02)
     assert period == pytest.approx(2.0 * pi * sqrt(1.33 / GRAVITY), rel=0.02)
@@ -124,8 +124,8 @@ def test_it_bounces_with_the_period_of_its_spring():
     for _ in range(1500):
         plant.step(OFF)
         z.append(plant.p_bf_in_f[2])
-    z = np.array(z)
-    down = np.flatnonzero((z[:-1] > 0.0) & (z[1:] <= 0.0))
+    places = np.array(z)
+    down = np.flatnonzero((places[:-1] > 0.0) & (places[1:] <= 0.0))
     q = AMES.plant
     assert 0.005 * np.diff(down).mean() == pytest.approx(
         2.0 * pi * sqrt(q.mass / q.suspension.stiffness), rel=0.01

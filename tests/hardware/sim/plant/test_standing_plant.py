@@ -62,7 +62,7 @@ def test_its_own_flight_controller_brings_a_flying_robot_down_upright_in_silence
     lift = []
     for k in range(400):
         falling = hover * (1.0 - 0.005 * k / robot.ramp_s)
-        keeper.add_imu(*plant.imu(), 0.005, at_rest=False)
+        keeper.add_imu(*plant.imu(), 0.005, at_rest=False)  # type: ignore[call-arg]
         thrusts = keeper.thrusts(falling)
         lift.append(thrusts.sum() - falling.sum())
         plant.step(thrusts)

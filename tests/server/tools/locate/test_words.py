@@ -78,7 +78,7 @@ def test_a_refusal_is_one_line_and_leaves_nothing_behind(
         frames = tmp_path / frames if frames else None
         code = run(folder, tmp_path / "poses.csv", *options, frames=frames, imu=False)
     except SystemExit as exit_:
-        code = exit_.code
+        code = exit_.code  # type: ignore[assignment]
     assert code == 2
     said = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("note:")]
     assert len(said) == 1
