@@ -127,7 +127,7 @@ def hidden(wishes: Sequence[Sequence[str]], leds: int) -> tuple[Hidden, ...]:
 
 
 def live(arguments: argparse.Namespace) -> int:
-    """The same flights in real time, through a server of its own on this machine."""
+    """Fly in real time, through a server of its own on this machine."""
     from server.virtual_phone import live_loop
 
     robot, gains, estimator = arguments.robot, arguments.gains, arguments.estimator

@@ -69,7 +69,7 @@ def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[Margi
 
 
 def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
-    """Of one axis."""
+    """Row of one axis."""
     margins = axis_margins(loop, axis, sensing)
     return MarginRow(
         gains=gains,
@@ -166,7 +166,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def told(one: MarginRow) -> dict[str, object]:
-    """For programs, without the response; null is what has no limit, or isn't there."""
+    """Values for programs, without the response; null is what has no limit, or isn't there."""
     return text.plain({f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"})
 
 

@@ -177,7 +177,7 @@ class Pairings:
         return found
 
     def present(self) -> list[Member]:
-        """Those who are in or wait, oldest first."""
+        """Members who are in or wait, oldest first."""
         return [m for m in self.book.members.values() if m.state in ("waiting", "in")]
 
     def confirm(self, id: str, code: str) -> Member:

@@ -110,7 +110,7 @@ class Guard:
             await _refuse(SHUT_OUT, scope, receive, extended)
 
     def _asker(self, member: Member | None, peer: RemotePeer) -> Asker | None:
-        """Whose pool it is; None: the strangers'."""
+        """Asker whose pool it is; None: the strangers'."""
         if member is not None:
             return Asker("member" if member.digest else "program", member.id)
         if peer.host in LOOPBACK:

@@ -51,7 +51,7 @@ class Doors:
         audit: Audit | None = None,
         clock: Callable[[], float] = now,
     ) -> None:
-        """By default with a secret of its own, and members that are forgotten with it."""
+        """Open with a secret of its own by default, and members that are forgotten with it."""
         self._secret = secret or secrets.token_bytes(32)
         self.operator_token = self._sign("token operator")
         self.supervisor_token = self._sign("token supervisor")
@@ -97,7 +97,7 @@ class Doors:
         return base64.urlsafe_b64encode(digest).rstrip(b"=").decode()
 
     def role_of_token(self, token: str) -> Role | None:
-        """Whose key of the run it is, in constant time."""
+        """Role whose key of the run it is, in constant time."""
         given = token.encode("utf-8", "replace")
         if secrets.compare_digest(given, self.supervisor_token.encode()):
             return "supervisor"
@@ -122,7 +122,7 @@ class Doors:
         return [t for t in self._tries.get(network_of(address), ()) if t > since]
 
     def who(self, headers: dict[str, str], secure: bool, address: str) -> Member | None:
-        """By the key of a program or the cookie of a page; in whatever state.
+        """Member by the key of a program or the cookie of a page; in whatever state.
 
         Over TLS only the cookie counts that a browser takes from nobody but us over TLS: another
         one may have been planted by whoever sits between.
@@ -140,7 +140,7 @@ class Doors:
 
 
 def cookie_name(secure: bool) -> str:
-    """Of the session's cookie, over TLS or on this machine."""
+    """Name of the session's cookie, over TLS or on this machine."""
     return f"__Host-{COOKIE}" if secure else COOKIE
 
 

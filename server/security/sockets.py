@@ -16,7 +16,7 @@ class OpenSocket:
     """A websocket between its server and the app; once ended, nothing of it reaches the app."""
 
     def __init__(self, receive: Receive, send: Send) -> None:
-        """Not accepted yet; inside a running loop."""
+        """Begin before it is accepted; inside a running loop."""
         self._receive, self._send = receive, send
         self._end: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
@@ -66,11 +66,11 @@ class Sockets:
     """All open websockets."""
 
     def __init__(self) -> None:
-        """None."""
+        """Begin without sockets."""
         self._open: dict[str, set[OpenSocket]] = {}
 
     def ids(self) -> list[str]:
-        """Who has one."""
+        """Ids of who has one."""
         return list(self._open)
 
     async def run(self, app: ASGIApp, who: str, scope: Scope, receive: Receive, send: Send) -> None:

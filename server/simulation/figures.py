@@ -63,7 +63,7 @@ def result_of(
 
 
 def rows_of(values: Sequence[Array]) -> Array:
-    """As one array, (0, 3) where there are none."""
+    """Rows as one array, (0, 3) where there are none."""
     return np.array(values) if values else np.zeros((0, 3))
 
 

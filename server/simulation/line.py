@@ -29,7 +29,7 @@ class Transit:
     """Keeps what a line holds back; may be given another line at any time."""
 
     def __init__(self) -> None:
-        """Nothing on its way."""
+        """Begin with nothing on its way."""
         self.line: PhoneLine = CleanLine()
         self.lost = 0
         """Of what was sent."""
@@ -37,7 +37,7 @@ class Transit:
         self._count = 0
 
     def send(self, t: float, kind: Kind, deliver: Callable[[], None]) -> None:
-        """At `t` [s] something has come; `deliver` is called when the line has let it through."""
+        """Send something at `t` [s]; `deliver` is called when the line has let it through."""
         t_out = self.line.out(t, kind)
         if t_out is None:
             self.lost += 1

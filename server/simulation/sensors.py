@@ -40,7 +40,7 @@ class Leader:
 
     @property
     def camera(self) -> Camera:
-        """Without distortion, all rows exposed at once."""
+        """Camera without distortion, all rows exposed at once."""
         u, v = 0.5 * (self.width - 1), 0.5 * (self.height - 1)
         K = np.array([[self.focal_px, 0.0, u], [0.0, self.focal_px, v], [0.0, 0.0, 1.0]])
         return Camera(self.width, self.height, K, "plumb_bob", np.zeros(5))

@@ -195,7 +195,7 @@ def _gains(robot_file: RobotFile, settings: Mapping[str, Value]) -> Gains:
 
 
 def _with(config: T, path: list[str], value: Value) -> T:
-    """The same dataclass with a number deep in it changed."""
+    """Copy of a dataclass with a number deep in it changed."""
     name, *deeper = path
     part = getattr(config, name)
     told = _with(part, deeper, value) if deeper else value

@@ -28,7 +28,7 @@ PLANT_SECTIONS: Final = tuple(name for name in ROBOT_SECTIONS if name != "start"
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """Between two bounds, which are allowed."""
+    """Number between two bounds, which are allowed."""
 
     low: float
     high: float
@@ -70,7 +70,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True)
 class RobotNumber:
-    """Of the robot file, which says by itself what is allowed."""
+    """Number of the robot file, which says by itself what is allowed."""
 
     def says_no(self, _: object) -> str:
         """Nothing yet: the whole robot is looked at."""

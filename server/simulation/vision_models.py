@@ -41,7 +41,7 @@ class VisionModel(Protocol):
 
 
 class RayVisionModel:
-    """Nothing is rendered, searched or named wrongly, and each picture's time is known."""
+    """LED rays with noise: nothing is rendered or associated wrongly, and times are known."""
 
     def __init__(
         self, phone: VirtualPhone, leds_in_b: Array, noise_px: float, rng: np.random.Generator

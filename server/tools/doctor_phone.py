@@ -62,7 +62,7 @@ def _why(body: bytes) -> str:
 
 
 def text_of(report: LinkReport) -> str:
-    """For a terminal."""
+    """Text for a terminal."""
     gaps = ", ".join(f"> {ms} ms: {count}" for ms, count in report.gaps.items())
     told = [
         report.title,

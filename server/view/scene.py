@@ -97,7 +97,7 @@ def _frustum(R_fc: Array) -> Pose:
 
 
 def _pose(R_fa: Array | None, p_in_a: npt.ArrayLike | None, R_ab_wxyz: Wxyz | None) -> Pose | None:
-    """Of b in f, from its pose in a camera a."""
+    """Pose of b in f, from its pose in a camera a."""
     R_ab = _rotation(R_ab_wxyz)
     if R_fa is None or R_ab is None or p_in_a is None or not np.all(np.isfinite(p_in_a)):
         return None
@@ -119,7 +119,7 @@ class Heading:
     """Finds when f must be turned anew: a phone appears, or control starts over."""
 
     def __init__(self) -> None:
-        """Nobody is there."""
+        """Begin without a phone."""
         self._epoch: int | None = None
 
     def new_yaw(self, epoch: int, view: ViewState) -> float | None:
@@ -214,7 +214,7 @@ class Craft:
 
     @classmethod
     def of(cls, robot: Robot, plant: PlantParameters) -> Craft:
-        """That of a robot file."""
+        """Craft of a robot file."""
         positions, directions = plant.thruster_positions_in_b, plant.thruster_directions_in_b
         suspension, stand = plant.suspension, plant.stand
         cable = None

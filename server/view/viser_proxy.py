@@ -130,7 +130,7 @@ async def _viser(path: Path, subprotocol: Subprotocol) -> AsyncIterator[ClientCo
 
 
 async def _both_ways(socket: WebSocket, viser: ClientConnection) -> None:
-    """Until either end closes; then the other one is closed too."""
+    """Pass both ways until either end closes; then the other one is closed too."""
     async with asyncio.TaskGroup() as tasks:
         up = tasks.create_task(_up(socket, viser))
         with contextlib.suppress(WebSocketDisconnect, ConnectionClosed):

@@ -47,7 +47,7 @@ class RobotTruth:
     """Where the simulated robot was, as one thread may ask; frozen while its process is silent."""
 
     def __init__(self, truth_port: int) -> None:
-        """With port 0 a robot that hangs still at the origin."""
+        """Ask at a port; with port 0 a robot that hangs still at the origin."""
         self._truth = TruthClient(truth_port) if truth_port else None
         self._last = (np.eye(3), np.zeros(3))
         self.silences = 0

@@ -44,7 +44,7 @@ class VirtualOperator:
     """The person: asks to arm when that would be granted, then holds the button to move."""
 
     def __init__(self, manners: Manners = Manners()) -> None:
-        """Nothing seen yet."""
+        """Begin with nothing seen."""
         self._manners = manners
         self.mode, self._since = "LOST", -np.inf
         self._asked = -np.inf
@@ -161,7 +161,7 @@ class TrackingMetrics:
 
     @property
     def rms_rad(self) -> float:
-        """The same of the attitude [rad]."""
+        """RMS error of the attitude [rad]."""
         return float(np.sqrt(self._sum_rad2 / self._steps)) if self._steps else float("nan")
 
     def tune(self, config: VirtualCameraConfig) -> None:

@@ -105,7 +105,7 @@ class RtcPhoneClient(PhoneClient):
         await self._say(record)
 
     async def _say(self, record: Record) -> None:
-        """By the data channel, dropped if it is full, or by the websocket until it is open."""
+        """Send by the data channel, dropped if it is full, or by the websocket until it is open."""
         if not self._send_fast(record):
             await super()._say(record)
 

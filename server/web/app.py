@@ -37,7 +37,7 @@ class VirtualPhoneProcess:
     """The virtual phone of the supervisor's button: a process like any other phone."""
 
     def __init__(self) -> None:
-        """Not started."""
+        """Begin without a process."""
         self._process: subprocess.Popen[bytes] | None = None
 
     @property

@@ -12,7 +12,7 @@ class Lease:
     """The right to lead, as sessions hold it."""
 
     def __init__(self) -> None:
-        """Nobody's."""
+        """Begin without a leader."""
         self.holder = ""
         """Id of the session that leads, or ""."""
         self._last = ""
@@ -42,7 +42,7 @@ class Lease:
             self._next = ""
 
     def free(self) -> None:
-        """Who led has gone."""
+        """Free the lease: who led has gone."""
         self.holder = ""
 
     def forget(self, who: str) -> None:

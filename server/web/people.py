@@ -15,7 +15,7 @@ LOCAL = "local-"
 
 
 class People:
-    """Whom the doors have let in, as the session manager sees them."""
+    """People whom the doors have let in, as the session manager sees them."""
 
     def __init__(self, doors: Doors, keep: Callable[[Deed], object]) -> None:
         """`keep` puts a deed into the running recording."""
@@ -31,7 +31,7 @@ class People:
             self._keep(deed)
 
     def present(self) -> list[Person]:
-        """For every screen: those who are paired, and programs that are connected."""
+        """People for every screen: those who are paired, and programs that are connected."""
         t, connected = self.doors.clock(), set(self.doors.sockets.ids())
         heir = self.lease.next_of(t)
         members = [*self.doors.pairings.present(), *self._programs(connected, t)]
@@ -58,13 +58,13 @@ class People:
         return [of_this_machine(role, since=since) for role, since in self._local.values()]
 
     def named(self, id: str) -> Member | None:
-        """Who is in under this id."""
+        """Member who is in under this id."""
         members = [m for m in self.doors.pairings.present() if m.state == "in"]
         members += [of_this_machine(role) for role in ("operator", "supervisor")]
         return next((one for one in members if one.id == id), None)
 
     def expire(self) -> list[Member]:
-        """Whose time is over; written down."""
+        """Put out those whose time is over, and write it down."""
         busy = self.doors.sockets.ids()
         over = self.doors.pairings.expire(self.doors.clock(), busy)
         for one in over:

@@ -41,7 +41,7 @@ class InviteRequest(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class PersonRequest(msgspec.Struct, forbid_unknown_fields=True):
-    """Whom a request is about."""
+    """Body of a request about a person."""
 
     id: Short
     code: Short = ""
@@ -55,7 +55,7 @@ class PeopleApi:
         self._manager, self._doors, self._phones, self._here = manager, doors, phones, here
 
     def routes(self) -> Sequence[BaseRoute]:
-        """All of them."""
+        """All routes of pairing."""
         roles = '{"role": "viewer", "operator" or "supervisor"}'
         id, code = '{"id": "…"}', '{"id": "…", "code": "…"}'
         return [
@@ -99,7 +99,7 @@ class PeopleApi:
         return response
 
     def _former(self, request: Request, secure: bool) -> Member | None:
-        """Who a browser that pairs anew has been until now."""
+        """Member that a browser that pairs anew has been until now."""
         value = request.cookies.get(cookie_name(secure), "")
         former = self._doors.pairings.of_cookie(value, self._doors.clock()) if value else None
         return former if former is not None and former.state in ("waiting", "in") else None

@@ -49,7 +49,7 @@ class Connection:
     """A page at the other end of a websocket."""
 
     def __init__(self, socket: WebSocket) -> None:
-        """Not accepted yet."""
+        """Begin before it is accepted."""
         self._socket = socket
         self._unsent: deque[str | bytes] = deque(maxlen=MAX_UNSENT)
         self._newest: bytes | None = None
@@ -117,7 +117,7 @@ class PageServer:
     """Serves the three kinds of socket."""
 
     def __init__(self, manager: SessionManager, video: VideoSettings) -> None:
-        """For the pages of one robot."""
+        """Serve the pages of one robot."""
         self._manager, self._video = manager, video
 
     async def phone(self, socket: WebSocket) -> None:

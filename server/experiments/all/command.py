@@ -142,7 +142,7 @@ class Report:
 
 
 def assumptions() -> list[dict[str, str]]:
-    """Of the paper's experiments with the AMES."""
+    """Assumptions of the paper's experiments with the AMES."""
     from server.experiments.paper.setup import assumptions as paper
     from server.experiments.paper.setup.measure import ExperimentSetup
     from server.simulation.sensors import PAPER

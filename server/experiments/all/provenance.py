@@ -28,7 +28,7 @@ GIT_S: Final = 10.0
 
 
 def versions() -> dict[str, str]:
-    """Of everything that a figure may depend on, by name; the commit if this is a clone."""
+    """Versions of all that a figure may depend on, by name; the commit if this is a clone."""
     found = {"lightleash": server.__version__}
     known = commit(ROOT)
     if known:
@@ -45,7 +45,7 @@ def _installed(name: str) -> str:
 
 
 def commit(root: Path) -> str:
-    """Of the clone at `root`, with a digest of what was changed since; "" if it is none."""
+    """Commit of the clone at `root`, with a digest of what was changed since; "" if it is none."""
     if not (root / ".git").exists():
         return ""
     head = _git(root, "rev-parse", "HEAD")

@@ -37,7 +37,7 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class PartResults:
-    """Of a part."""
+    """Results of a part."""
 
     blocks: tuple[Block, ...] = ()
     figures: tuple[Figure, ...] = ()
@@ -134,7 +134,7 @@ def _figures(files: list[Path], name: str) -> tuple[tuple[Figure, ...], list[str
 
 
 def _is_wide(data: bytes) -> bool:
-    """As a PNG says in its first chunk; others are scaled without loss."""
+    """Whether a PNG is wide, by its first chunk; others are scaled without loss."""
     if not data.startswith(PNG) or len(data) < 24:
         return False
     width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
@@ -151,7 +151,7 @@ def _said(path: Path) -> str:
 
 
 def _seeds(value: object) -> str:
-    """Those that a JSON file of a sweep names."""
+    """Seeds that a JSON file of a sweep names."""
     return spanned(sorted(set(_named(value)))) if isinstance(value, dict) else ""
 
 
@@ -171,7 +171,7 @@ def spanned(seeds: list[int]) -> str:
 
 
 def seeds_of(words: list[str]) -> str:
-    """Those that a command line names: `--seeds 3` of them from `--seed`, or from 1."""
+    """Seeds that a command line names: `--seeds 3` of them from `--seed`, or from 1."""
     said = {
         word: int(value)
         for word, value in pairwise(words)

@@ -74,7 +74,7 @@ class RunRecord:
 
 
 def record_of(folder: Path) -> RunRecord | None:
-    """Of a part's folder; None if there is none that can be read."""
+    """Record of a part's folder; None if there is none that can be read."""
     try:
         return msgspec.json.decode((folder / RECORD).read_bytes(), type=RunRecord)
     except (OSError, msgspec.DecodeError):

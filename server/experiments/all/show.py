@@ -71,7 +71,7 @@ def _cells(row: Sequence[Cell]) -> Iterator[Markup]:
 
 
 def pictured(figure: Figure, heading: str) -> Markup:
-    """With its caption; `heading` is that of its part."""
+    """Picture with its caption; `heading` is that of its part."""
     style = {"class_": "wide"} if figure.is_wide else {}
     image = element("img", src=figure.source, alt=f"{heading}. {figure.caption}", **style)
     frame = element(

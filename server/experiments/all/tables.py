@@ -94,7 +94,7 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """As it was written, with its own line breaks."""
+    """Text as it was written, with its own line breaks."""
 
     title: str
     text: str
@@ -104,7 +104,7 @@ Block = Table | Statements | Lines | Text
 
 
 def blocks(value: object, title: str = "") -> Iterator[Block]:
-    """Of one JSON value, in its order; tables before what is said about them."""
+    """Blocks of one JSON value, in its order; tables before what is said about them."""
     if isinstance(value, list):
         yield from _of_list(value, title)
     elif isinstance(value, dict):
@@ -216,7 +216,7 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 
 def _plain(value: object) -> str:
-    """As it is read in a cell; objects are only in the file."""
+    """Text of a cell; objects are only in the file."""
     match value:
         case None:
             return "–"

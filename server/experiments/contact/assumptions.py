@@ -28,7 +28,7 @@ from server.simulation.sensors import PAPER, Leader
 def of(
     plant: PlantParameters, leader: Leader, scenes: Sequence[ContactScene], seeds: int
 ) -> list[Assumption]:
-    """Of the experiment as it is set up."""
+    """Assumptions of the experiment as it is set up."""
     felt = sensors(leader) if leader == PAPER else phone_sensors(leader)
     return [*_touching(plant, scenes), *_judging(plant, seeds), *felt, *plant_parts(plant)]
 

@@ -43,7 +43,7 @@ def fly(
     seed: int,
     seconds: float = FLIGHT_S,
 ) -> ContactTrace:
-    """Until `seconds` after the hand's move, or until tracking ends."""
+    """Fly until `seconds` after the hand's move, or until tracking ends."""
     obstacle = scene.obstacle(seed)
     led = LeaderFollowerSimulation(
         robot_file,

@@ -52,7 +52,7 @@ class ContactScene:
         return self.gap_m + (self.socket.depth_m if self.socket else 0.0)
 
     def obstacle(self, seed: int) -> Obstacle:
-        """As a seed's aim has it."""
+        """Obstacle, displaced as a seed aims."""
         if self.socket is None:
             return Obstacle(self.gap_m)
         y, z = np.random.default_rng((seed, 17)).normal(0.0, AIM_M, 2)

@@ -86,7 +86,7 @@ RECORDED: Final = (
 
 
 def estimator_of(name: EstimatorName, leds_in_b: Array) -> Estimator:
-    """With its usual numbers."""
+    """Estimator with its usual numbers."""
     return make_estimator(replace(TeleopConfig(), estimator=name), leds_in_b)
 
 

@@ -95,7 +95,7 @@ def _compare(
     offset: float,
     t_first: float,
 ) -> Errors:
-    """At the time of each pose: its stamp and the `offset` [s] that the estimator learnt itself."""
+    """Compare at the time of each pose: its stamp and the `offset` [s] that was learnt."""
     t, e, C = [], [], []
     times = [prediction[0] for prediction in predicted]
     for arrival, pose in poses:

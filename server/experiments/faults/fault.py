@@ -73,7 +73,7 @@ class FaultyFlight:
 
     @property
     def t(self) -> float:
-        """Since the fault began [s]."""
+        """Time since the fault began [s]."""
         return self.loop.t - self.begin
 
     def at(self, t: float, act: Callable[[], None]) -> None:

@@ -22,7 +22,7 @@ class Selective:
     """Loses, or holds back until a moment, some kinds of what a phone sends."""
 
     def __init__(self, kinds: tuple[Kind, ...], until_s: float, *, holds: bool) -> None:
-        """Until `until_s`; `holds`: what was sent meanwhile comes then."""
+        """Lose until `until_s`; `holds`: what was sent meanwhile comes then."""
         self._kinds, self._until_s, self._holds = kinds, until_s, holds
 
     def out(self, t: float, kind: Kind) -> float | None:
@@ -104,7 +104,7 @@ def tampered(inputs: Inputs) -> Happening:
 
 
 def tampered_with_memory(make: Callable[[], Inputs]) -> Happening:
-    """The same, for what has a memory of its own: `make` gives it."""
+    """Tamper by what has a memory of its own: `make` gives it."""
 
     def happen(world: FaultyFlight) -> None:
         world.loop.tamper = make()
@@ -192,7 +192,7 @@ def requested(what: str, at: float = 0.0, before: Happening | None = None) -> Ha
 
 
 def requested_every_tick(what: str) -> Happening:
-    """The same request with each tick, for a second."""
+    """Request the same with each tick, for a second."""
 
     def happen(world: FaultyFlight) -> None:
         for k in range(200):
@@ -244,5 +244,5 @@ def pushed(force_n: float, seconds: float) -> Happening:
 
 
 def clean(world: FaultyFlight) -> None:
-    """Nothing."""
+    """Let nothing happen."""
     world.loop.transit.line = CleanLine()

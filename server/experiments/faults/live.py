@@ -92,7 +92,7 @@ class LiveServer:
         self.truth = TruthClient(int(self._run["truth_port"]))
 
     def mode(self) -> str:
-        """As the server says; "" while it says nothing."""
+        """Mode by the server's status; "" while it says nothing."""
         headers = {"Authorization": f"Bearer {self._run['supervisor_token']}"}
         request = urllib.request.Request(f"{self._run['http_url']}/api/status", headers=headers)
         try:

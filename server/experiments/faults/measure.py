@@ -74,7 +74,7 @@ class Times:
 
 
 def times_of(faults: Sequence[Fault], outcomes: Sequence[FaultOutcome]) -> list[Times]:
-    """Of each fault, the events that it is to lead to."""
+    """Times of the events that each fault is to lead to."""
     found = []
     for fault in faults:
         some = [one for one in outcomes if one.fault == fault.name]
@@ -83,7 +83,7 @@ def times_of(faults: Sequence[Fault], outcomes: Sequence[FaultOutcome]) -> list[
 
 
 def vanish_times(vanished: Sequence[Vanished]) -> list[Times]:
-    """Of phones that vanish at many moments."""
+    """Times of phones that vanish at many moments."""
     name = "phone vanishes, at any moment"
     outcomes = [
         FaultOutcome(

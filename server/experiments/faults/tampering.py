@@ -153,7 +153,7 @@ def repeated(times: int) -> Callable[[SeenInput], SeenInput]:
 
 
 def stamped(seen: SeenInput, later_s: float) -> SeenInput:
-    """The same picture with another time."""
+    """Give a picture another time."""
     change = msgspec.structs.replace
     leds = [change(led, t=led.t + later_s) for led in seen.leds]
     pose = change(seen.pose, t=seen.pose.t + later_s) if seen.pose is not None else None

@@ -151,7 +151,7 @@ class Case:
     minute: str = ""
 
     def line(self, begin: float, phase: float) -> PhoneLine:
-        """Of the phone, from `begin` [s] on; `phase`: share of the period before the first gap."""
+        """Line from `begin` [s] on; `phase`: share of the period before the first gap."""
         if self.minute:
             return next(m for m in minutes() if m.name == self.minute).line(begin)
         if self.side == "robot":

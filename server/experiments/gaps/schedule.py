@@ -36,7 +36,7 @@ class GapSchedule:
         return begin, begin + self.gap_s
 
     def dark(self, t: float) -> bool:
-        """Nothing crosses at `t` [s]."""
+        """Whether nothing crosses at `t` [s]."""
         gap = self.at(t)
         return gap is not None and t < gap[1]
 

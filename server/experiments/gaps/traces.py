@@ -44,7 +44,7 @@ class Minute:
 
 @cache
 def minutes() -> tuple[Minute, ...]:
-    """All of them, typical ones first."""
+    """All minutes, typical ones first."""
     found = []
     for name, told in json.loads(FILE.read_text(encoding="utf-8")).items():
         for which, minute in told["minutes"].items():
@@ -56,7 +56,7 @@ def minutes() -> tuple[Minute, ...]:
 
 
 def _segments(rows: list[list[int]]) -> tuple[Segment, ...]:
-    """Of [from, for, late after that] in ms."""
+    """Segments of [from, for, late after that] in ms."""
     return tuple(
         (1e-3 * begin, 1e-3 * (begin + length), 1e-3 * (begin + length + late))
         for begin, length, late in rows

@@ -142,7 +142,7 @@ def write(rows: list[NetworkRow], runs: list[Run], folder: Path) -> None:
 
 
 def _told(value: str | float) -> str | float | None:
-    """As JSON has it: no NaN, no infinity."""
+    """Value for JSON: no NaN, no infinity."""
     if isinstance(value, float):
         return round(value, 3) if isfinite(value) else None
     return value

@@ -18,7 +18,7 @@ STEP_S = 0.001
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arrivals:
-    """Of one kind: when each was taken, and when it came [s], one clock; in order of arrival."""
+    """Arrivals of one kind: when each was taken, when it came [s], one clock; in order."""
 
     taken: Times
     came: Times
@@ -29,7 +29,7 @@ class Arrivals:
         return self.came - self.taken
 
     def within(self, begin: float, end: float) -> Arrivals:
-        """Those taken within [begin, end) [s]."""
+        """Arrivals of those taken within [begin, end) [s]."""
         inside = (self.taken >= begin) & (self.taken < end)
         return Arrivals(self.taken[inside], self.came[inside])
 
@@ -45,7 +45,7 @@ class Arrivals:
 
 
 def percentile(values: Times, share: float) -> float:
-    """Of `values`, at `share` in percent; NaN of none, inf among infinite ones."""
+    """Percentile of `values`, at `share` in percent; NaN of none, inf among infinite ones."""
     if len(values) == 0:
         return float("nan")
     return float(np.sort(values)[min(len(values) - 1, int(share / 100.0 * len(values)))])

@@ -169,7 +169,7 @@ class NetworkTestbed:
 
 
 def _arrivals(heard: ArrivalLog, kinds: tuple[Kind, ...], after_s: float = 0.0) -> Arrivals:
-    """Of these kinds, by the true time they were taken, `after_s` later."""
+    """Arrivals of these kinds, by the true time they were taken, `after_s` later."""
     clock = PhoneClock()
     rate = 1.0 + 1e-6 * clock.drift_ppm
     rows = [(1e-6 * t_us, came) for kind, _, t_us, came in heard.records if kind in kinds]

@@ -81,7 +81,7 @@ class NotingSessionManager(SessionManager):
         super().disconnect_phone(phone)
 
     def tell_heard(self) -> None:
-        """All of it, and begin anew."""
+        """Send all that was noted, and begin anew."""
         if self.phone is not None:
             self._look_back(self.phone)
         sys.stdout.buffer.write(msgspec.json.encode(self.heard) + b"\n")

@@ -25,7 +25,7 @@ class Reported(Protocol):
 
     @property
     def name(self) -> str:
-        """Of its JSON file."""
+        """Name of its JSON file."""
 
     @property
     def holds(self) -> Mapping[str, bool]:

@@ -107,7 +107,7 @@ class Summary:
         return "\n".join((TITLE, rows, "Its phone:", of_phone))
 
     def json(self) -> dict[str, object]:
-        """The same for programs; null is what was not flown."""
+        """Values for programs; null is what was not flown."""
         rows = [plain(asdict(row)) for row in self.rows]
         of_phone = assumptions.json(assumptions.phone_sensors(self.phone))
         return {"title": TITLE, "rows": rows, "phone": of_phone}

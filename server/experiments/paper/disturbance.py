@@ -75,7 +75,7 @@ class Pushed:
         return "\n".join((TITLE, flights(COLUMNS, self.rows), *statements(self.holds)))
 
     def json(self) -> dict[str, object]:
-        """The same for programs; null is what could not be measured."""
+        """Values for programs; null is what could not be measured."""
         rows = [plain(asdict(row)) for row in self.rows]
         return {
             "title": TITLE,

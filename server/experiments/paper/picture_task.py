@@ -17,7 +17,7 @@ SHOWN_MM: Final = (-60.0, 20.0)
 
 
 def figure_times(times: Sequence[tuple[str, str, int, float]], path: Path) -> Path:
-    """Of each attempt (operator, variant, number, seconds); lines: ours; dashed: the paper's."""
+    """Draw the attempts (operator, variant, number, seconds); lines: ours; dashed: the paper's."""
     figure, axes = panels(len(PEOPLE), sharey=True)
     for axis, person in zip(axes, PEOPLE, strict=True):
         own = [one[1:] for one in times if one[0] == person.name]

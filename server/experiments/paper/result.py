@@ -12,7 +12,7 @@ from server.experiments.paper.setup.measure import ComparedFigure, table_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PaperResult:
-    """Of one of the paper's experiments."""
+    """Result of one of the paper's experiments."""
 
     name: str
     """Of its file."""
@@ -28,6 +28,6 @@ class PaperResult:
         return "\n".join((self.title, table_of(self.cells), *statements(self.holds)))
 
     def json(self) -> dict[str, object]:
-        """The same for programs; null is what could not be measured."""
+        """Values for programs; null is what could not be measured."""
         rows = [plain({**asdict(cell), "ratio": cell.ratio}) for cell in self.cells]
         return {"title": self.title, "cells": rows, "holds": dict(self.holds)}

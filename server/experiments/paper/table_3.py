@@ -124,7 +124,7 @@ class Study:
         return "\n".join((TITLE, dashed(COLUMNS, self.cells), *lost, *statements(self.holds)))
 
     def json(self) -> dict[str, object]:
-        """The same for programs; null is what the paper has not."""
+        """Values for programs; null is what the paper has not."""
         cells = [plain({**asdict(cell), "ratio": cell.ratio}) for cell in self.cells]
         attempts = [
             {

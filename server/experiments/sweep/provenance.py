@@ -19,7 +19,7 @@ ROOT: Final = Path(server.__file__).resolve().parents[1]
 
 
 def versions() -> Mapping[str, str]:
-    """Of everything that a figure may depend on."""
+    """Versions of everything that a figure may depend on."""
     found = {name: version(name) for name in LIBRARIES}
     python = f"{platform.python_implementation()} {platform.python_version()}"
     where = f"{sys.platform} {platform.machine()}"

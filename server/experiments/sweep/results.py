@@ -25,7 +25,7 @@ from server.simulation.session import FIGURES, Figures, SessionOutcome
 
 
 class SweepResults:
-    """Of one sweep in one directory."""
+    """Results of one sweep in one directory."""
 
     def __init__(self, folder: Path, sweep: Sweep, mix: bool = False) -> None:
         """Take up what is there already; what other code has flown, only if told to `mix`.
@@ -123,7 +123,7 @@ class SweepResults:
 
     @property
     def cpu_s(self) -> float:
-        """Of all sessions, those of earlier runs among them."""
+        """CPU time of all sessions [s], those of earlier runs among them."""
         return sum(outcome.cpu_s for outcome in self.done.values())
 
     def write(self, command: Sequence[str], hands: str) -> None:
@@ -185,7 +185,7 @@ def _line(outcome: SessionOutcome) -> dict[str, Any]:
 
 
 def _known(value: object) -> object:
-    """For JSON, which has no NaN."""
+    """Replace NaN, which JSON does not have."""
     return None if isinstance(value, float) and isnan(value) else value
 
 

@@ -65,7 +65,7 @@ def went_well(outcome: SessionOutcome) -> bool:
 
 
 def worded(value: Value) -> str:
-    """As on an axis."""
+    """Words as on an axis."""
     if isinstance(value, tuple):
         return " ".join(f"{one:g}" for one in value)
     if isinstance(value, bool):
@@ -80,7 +80,7 @@ def _row(key: str, value: str, outcomes: list[SessionOutcome]) -> SweepRow:
 
 
 def table(sweep: Sweep, done: Mapping[int, SessionOutcome]) -> str:
-    """As printed, with the best combination below."""
+    """Table as printed, with the best combination below."""
     told = text.table(COLUMNS, rows(sweep, done))
     points: dict[int, list[SessionOutcome]] = {}
     for index, outcome in done.items():

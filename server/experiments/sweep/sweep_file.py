@@ -53,7 +53,7 @@ class Sweep:
     """Every combination of theirs."""
 
     def sessions(self) -> list[SweepSession]:
-        """All of them; those of a combination side by side."""
+        """All sessions; those of a combination side by side."""
         pairs = [(point, seed) for point in self.points for seed in self.seeds]
         return [
             SweepSession(

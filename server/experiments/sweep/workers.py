@@ -36,7 +36,7 @@ def on_processes(
 
 
 def version() -> str:
-    """Of what a worker flies with."""
+    """Versions of what a worker flies with."""
     return f"{server.__version__}, code {provenance.code()}"
 
 

@@ -72,7 +72,7 @@ COLUMNS: tuple[Column, ...] = (
 
 
 def cameras(cutoff: float) -> dict[str, VirtualCameraConfig]:
-    """Those compared; without limit and guard, which tremor never meets."""
+    """Virtual cameras compared; without limit and guard, which tremor never meets."""
     full = VirtualCameraConfig(*time_constants(cutoff), max_speed_m_s=0.0, guard=False)
     return {
         "off": replace(full, mode="off"),

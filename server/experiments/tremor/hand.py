@@ -48,7 +48,7 @@ def simulated(hand: Hand, seconds: float, seed: int) -> Iterator[Arrival]:
 
 
 def recorded(recording: Recording) -> Iterator[Arrival]:
-    """The same of a recording.
+    """Turns of a recorded hand.
 
     Raises:
         RecordingError: the file is damaged.

@@ -25,7 +25,7 @@ class Channel:
 
     @property
     def name(self) -> str:
-        """As in tables."""
+        """Name as in tables."""
         return self.codec if self.imu else self.codec + WITHOUT_IMU
 
 
@@ -45,7 +45,7 @@ class Wire:
     """One stream through a channel."""
 
     def __init__(self, codec: str, size: Size) -> None:
-        """From its first picture on."""
+        """Begin a stream."""
         self._coder: tuple[Encoder, Decoder] | None = None
         if codec != "raw":
             named = NAMED.fullmatch(codec)

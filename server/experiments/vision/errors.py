@@ -20,7 +20,7 @@ STEP = 1e-5  # of a numeric derivative [m, rad]
 
 @dataclass(frozen=True, slots=True)
 class Error:
-    """Of one pose."""
+    """Error of one pose."""
 
     lateral_m: float
     """Across the line of sight."""

@@ -176,7 +176,7 @@ def text(rows: list[VisionRow]) -> str:
 
 
 def plain_values(rows: list[VisionRow]) -> list[dict[str, Any]]:
-    """For JSON, which has no NaN."""
+    """Replace NaN, which JSON does not have."""
     return [
         {k: None if isinstance(v, float) and v != v else v for k, v in asdict(one).items()}
         for one in rows

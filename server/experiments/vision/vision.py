@@ -180,7 +180,7 @@ def _watch(task: Task) -> list[SceneRecord]:
 
 
 def _sorted(records: dict[tuple[str, Size, str], SceneRecord]) -> list[SceneRecord]:
-    """By scene as in the family, then size; channels as given."""
+    """Sort by scene as in the family, then size; channels as given."""
     order = list(SCENES)
     return sorted(records.values(), key=lambda r: (order.index(r.scene), r.size))
 

@@ -73,7 +73,7 @@ class ChannelRun:
     """The live stages behind one channel."""
 
     def __init__(self, film: RenderedVideo, channel: Channel) -> None:
-        """Nothing seen yet."""
+        """Begin with nothing seen."""
         self.channel, self._film = channel, film
         self._front_end = self._new()
         self._wire = Wire(channel.codec, film.size)

@@ -66,7 +66,7 @@ def toml(leds_in_b: Array) -> Iterator[str]:
 
 
 def figures(it: LayoutReport) -> dict[str, object]:
-    """As JSON can hold it: finite numbers or null."""
+    """Figures as JSON can hold them: finite numbers or null."""
     by_distance = []
     for d, distance in enumerate(it.looks.distances):
         row: dict[str, object] = {"distance_m": float(distance)}

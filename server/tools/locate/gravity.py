@@ -27,7 +27,7 @@ class GravityDoubt:
     """Collects the poses that pictures show and gravity denies."""
 
     def __init__(self) -> None:
-        """None yet."""
+        """Begin without a doubt."""
         self._confirmed = 0
         self._pairs: list[tuple[Array, Array]] = []
 

@@ -44,7 +44,7 @@ class OpticalPose:
 
 
 def optical(pose: RelativePose) -> OpticalPose:
-    """The same pose; its rotation error, in b and to the right of R_cb, turned into o."""
+    """Pose in optical axes; its rotation error, in b and to the right of R_cb, turned into o."""
     R_oc = R_co.T
     R_ob = R_oc @ pose.R_cb
     turn = np.zeros((6, 6))

@@ -33,7 +33,7 @@ files:
 
 
 def parser() -> argparse.ArgumentParser:
-    """Of the words behind `lightleash locate`."""
+    """Parser of the words behind `lightleash locate`."""
     words = Parser(
         prog="lightleash locate",
         description=PURPOSE,

@@ -29,7 +29,7 @@ class KnownLed:
 
 
 def distance(text: str) -> Distance:
-    """Of `--distance`: LEDs count from 1 there."""
+    """Distance of `--distance`: LEDs count from 1 there."""
     pair, is_said, length = text.partition("=")
     names = pair.split(",")
     if not is_said or len(names) != 2:
@@ -46,7 +46,7 @@ def distance(text: str) -> Distance:
 
 
 def known(text: str) -> KnownLed:
-    """Of `--known`: LEDs count from 1 there."""
+    """Known LED of `--known`: LEDs count from 1 there."""
     name, is_said, place = text.partition("=")
     parts = place.split(",")
     if not is_said or len(parts) != 3:

@@ -177,7 +177,7 @@ def toml(it: Survey) -> Iterator[str]:
 
 
 def figures(it: Survey) -> dict[str, object]:
-    """As JSON has it."""
+    """Figures for JSON."""
     return {
         "grade": it.grade,
         "leds_in_b_m": it.leds_in_b.tolist(),

@@ -22,7 +22,7 @@ from server.simulation.vision_models import BITRATE_BPS
 
 
 def of(setup: ExperimentSetup) -> list[Assumption]:
-    """Of the experiments as they are set up."""
+    """Assumptions of the experiments as they are set up."""
     leader = sensors(setup.leader) if setup.leader == PAPER else phone_sensors(setup.leader)
     return [*method(), *leader, *plant(setup.robot_file.plant), *of_task()]
 
@@ -151,5 +151,5 @@ def lines(ones: Iterable[Assumption]) -> str:
 
 
 def json(ones: Iterable[Assumption]) -> list[dict[str, str]]:
-    """For programs."""
+    """Values for programs."""
     return [asdict(one) for one in ones]

@@ -40,19 +40,19 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """Of the person."""
+        """Name of the person."""
         return PEOPLE[self.person].name
 
     @property
     def number(self) -> int:
-        """Of the person's attempts, from 1. A variant not in the paper comes where its EKF did."""
+        """Number of the attempt, from 1. A variant not in the paper is where its EKF is."""
         order = ORDERS[self.name]
         place = order.index(self.variant if self.variant in order else WITH_EKF.name)
         return place * published.REPETITIONS + self.repetition
 
 
 def fly(trial: Trial) -> Attempt:
-    """The same noise of hands, eyes and sensors for each variant, so that only it differs."""
+    """Fly with the same noise of hands, eyes and sensors, so that only the variant differs."""
     seed = np.random.SeedSequence((trial.seed, trial.person, trial.repetition))
     return attempt(
         trial.robot_file,

@@ -83,7 +83,7 @@ class Rays:
     def __init__(
         self, camera: Camera, film: Sequence[FrameSpots], gyro: GyroAttitude | None = None
     ) -> None:
-        """For these frames; with a gyroscope the rolling shutter is undone better."""
+        """Rays of these frames; with a gyroscope the rolling shutter is undone better."""
         self._camera, self._film, self._gyro = camera, film, gyro
 
     def observations(
@@ -92,7 +92,7 @@ class Rays:
         rows: Mapping[int, int],
         extra_px: float = 0.0,
     ) -> Observations:
-        """Of the frames in `rows`, which says as what number each counts.
+        """Observations of the frames in `rows`, which says as what number each counts.
 
         Args:
             names: Frame → LED → spot.

@@ -57,7 +57,7 @@ class PointsAndPoses:
     """(f, 3)."""
 
     def scaled(self, scale: float) -> PointsAndPoses:
-        """The same picture of something larger."""
+        """Points and poses of something larger in the same images."""
         return PointsAndPoses(scale * self.points, self.R, scale * self.p)
 
 

@@ -36,7 +36,7 @@ def fitted(points: Array, onto: Array, scale: bool = False) -> tuple[Array, Arra
 
 
 def matched(points: Array, design: Array) -> tuple[int, ...]:
-    """For each LED of a design, which point it is, whatever the scale.
+    """Correspondence: which point each LED of a design is, whatever the scale.
 
     Raises:
         SurveyError: counts differ, none fits, or two namings fit about equally.

@@ -238,7 +238,7 @@ def _part(
 def _information(
     answer: BundleSolution, tapes: tuple[DistanceConstraint, ...], excess: float
 ) -> Array:
-    """Of the LEDs, with spots as unsure as the residuals say and tapes as they are."""
+    """Information of the LEDs, with spots as unsure as the residuals say and tapes as they are."""
     H, g = np.zeros_like(answer.information), np.zeros_like(answer.scene.points)
     add_tapes(answer.scene.points, tapes, H, g)
     information: Array = (answer.information - H) / excess + H
