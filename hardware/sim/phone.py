@@ -9,6 +9,7 @@ from math import ceil, floor, radians
 
 import numpy as np
 
+from hardware.sim.camera_faults import CameraFault, FaultyCamera
 from hardware.sim.hand import Hand
 from hardware.sim.phone_faults import SensorFault, spoilt_force, spoilt_rate
 from hardware.sim.render import RenderOptions, render
@@ -61,6 +62,9 @@ class PhoneOptions:
     step_angle: float = radians(0.1)
     """Of the orientation's rotation angle [rad]."""
     fault: SensorFault = SensorFault.NONE
+    camera_fault: CameraFault = CameraFault.NONE
+    camera_fault_s: float = 0.0
+    """From when on the camera lies [s]."""
 
 
 PERFECT = PhoneOptions(
@@ -165,6 +169,11 @@ class VirtualPhone:
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
         self._leds_in_b, self._look = leds_in_b, look
         schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
+        self._faulty = FaultyCamera(
+            options.camera_fault, camera, lambda t: self.hand.pose(t)[0], options.camera_fault_s
+        )
+        self._last: tuple[float, Image] | None = None
+        """The moment [s] that the last picture shows, and the picture."""
         self._bias_omega = schedule.normal(0.0, 1.0, 3) * options.bias_omega
         self._bias_a = schedule.normal(0.0, 1.0, 3) * options.bias_a
         # the sensors are taken to be the device, and the camera to sit beside its place
@@ -207,12 +216,17 @@ class VirtualPhone:
 
     def picture(self, t: float, body: BodyHistory) -> Image:
         """Luma (height, width) of a picture whose middle row is exposed around `t` [s]."""
+        moment, seen_by = self._faulty.moment(t), self._faulty.at(t)
+        if self._last is not None and moment == self._last[0]:
+            return self._last[1]
 
         def pose(dt: float) -> tuple[Array, Array]:
-            return self.relative_pose(t + dt, body)
+            return self.relative_pose(moment + dt, body)
 
-        shown = np.delete(self._leds_in_b, list(self._hidden(t)), axis=0)
-        return render(self.camera, pose, shown, self._look, self._picture_rng)
+        shown = np.delete(self._leds_in_b, list(self._hidden(moment)), axis=0)
+        image = render(seen_by, pose, shown, self._look, self._picture_rng)
+        self._last = moment, image
+        return image
 
 
 def _rounded(values: Array, step: float) -> Array:

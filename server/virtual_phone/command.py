@@ -16,6 +16,7 @@ from hardware.camera_file import find_camera
 from hardware.codec import Encoder
 from hardware.follower import FollowerError
 from hardware.robot_file import RobotFile, load_robot
+from hardware.sim.camera_faults import CameraFault
 from hardware.sim.hand import HANDS, REST_S, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
 from hardware.sim.phone_faults import SensorFault
@@ -31,6 +32,8 @@ from server.virtual_phone.phone_client import PhoneClient
 from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
 
 WIDTH, HEIGHT, BITRATE_BPS = 1280, 720, 3_000_000
+CAMERA_FAULT_S = 10.0
+"""Until the camera begins to lie, if it is to."""
 TAKE_OFF_S = 8.0
 """Rest before a robot is lifted from the floor: the button must have been pressed by then."""
 
@@ -46,6 +49,8 @@ def make_script(
         frame_rate_hz=arguments.fps,
         picture_delay_s=arguments.latency_ms,
         fault=SensorFault(arguments.fault),
+        camera_fault=CameraFault(arguments.camera_fault),
+        camera_fault_s=clock.now() + CAMERA_FAULT_S,
     )
     rest_s = REST_S if robot_file.start.lift == 0.0 else TAKE_OFF_S
     hand = make_hand(
@@ -144,6 +149,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--fps", type=_rate, default=30.0, help="pictures a second")
     faults = [fault.value for fault in SensorFault]
     parser.add_argument("--fault", choices=faults, default="none", help="of its motion sensors")
+    lies = [fault.value for fault in CameraFault]
+    parser.add_argument(
+        "--camera-fault", choices=lies, default="none", help=f"after {CAMERA_FAULT_S:g} s"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of hand, noise and delays")
     parser.add_argument("--robot", help="robot file with the LEDs; default: the server's")
     parser.add_argument("--truth-port", type=int, help="UDP port of the simulated robot's truth")

@@ -11,9 +11,12 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
+from hardware.sim.camera_faults import CameraFault
+
 Range = tuple[float, float]
 Size = tuple[int, int]
 
+HONEST_S: Final = 3.0
 FIRST_REPORTING_SEED: Final = 1000
 """Those below are for tuning."""
 VGA: Final[Size] = (640, 480)
@@ -84,6 +87,8 @@ class Scene:
     is_flat: bool = False
     """All LEDs in one plane."""
     picture: ImageOrientation = ImageOrientation.UPRIGHT
+    camera_fault: CameraFault = CameraFault.NONE
+    """Begins `HONEST_S` after the film."""
 
 
 CLEAN = Scene(

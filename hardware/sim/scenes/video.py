@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.robot_file import load_robot
+from hardware.sim.camera_faults import CameraFault, FaultyCamera
 from hardware.sim.scenes.motion import FLAT_LEDS, START_S, Sensors, movers, within
 from hardware.sim.scenes.optics import BANK, Optics, Sensor
 from hardware.sim.scenes.room import Room, bar_before, lights_around, mirror_near
-from hardware.sim.scenes.scene import HD, VGA, ImageOrientation, Scene, Size
+from hardware.sim.scenes.scene import HD, HONEST_S, VGA, ImageOrientation, Scene, Size
 from hardware.sim.scenes.stage import DrawnFrame, Stage
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rotation_about_x
@@ -49,7 +50,7 @@ class RenderedFrame:
     merged: npt.NDArray[np.bool_]
     """(n,) in one saturated area with another light."""
     solvable: bool
-    """At least four LEDs visible and not merged, in a picture delivered upright."""
+    """At least four LEDs visible and not merged, in an upright picture that is no lie."""
     information: Array
     """(n, 2, 2) Fisher information of each place [1/px²] by true point spread and noise; 0 unless
     the film was asked for it."""
@@ -138,14 +139,22 @@ class RenderedVideo:
         grain = np.random.default_rng(self._seeds[1])
         turn = rotation_about_x(TURNS.get(self.scene.picture, 0.0))
         felt = Sensors(self.moving, turn, *map(np.random.default_rng, self._seeds[2:]))
+        begin_s, drawn, shown = START_S + HONEST_S, None, -1.0
+        faulty = FaultyCamera(self.scene.camera_fault, camera, self._R_fc, begin_s)
         for k in range(self.frames):
             t = START_S + k / RATE_HZ
             du, dv = (int(x) for x in grain.integers(0, BANK, 2))
-            drawn = self._stage.draw(sensor, camera, self.moving, t, (du, dv), self._bound)
+            before, shown, seen_by = shown, faulty.moment(t), faulty.at(t)
+            if drawn is None or shown != before:
+                drawn = self._stage.draw(sensor, seen_by, self.moving, shown, (du, dv), self._bound)
             yield self._shot(t, drawn, felt)
+
+    def _R_fc(self, t: float) -> Array:
+        return self.moving.hand.pose(t)[0]
 
     def _shot(self, t: float, drawn: DrawnFrame, felt: Sensors) -> RenderedFrame:
         R_cb, p_bc_in_c = self.moving.relative(t)
+        lies = self.scene.camera_fault is not CameraFault.NONE and t >= START_S + HONEST_S
         enough = int((drawn.visible & ~drawn.merged).sum()) >= MIN_LEDS
         luma, pixels = drawn.luma, drawn.pixels
         if self.scene.picture is ImageOrientation.MIRRORED:
@@ -159,7 +168,7 @@ class RenderedVideo:
             pixels=pixels,
             visible=drawn.visible,
             merged=drawn.merged,
-            solvable=enough and self.scene.picture is ImageOrientation.UPRIGHT,
+            solvable=enough and not lies and self.scene.picture is ImageOrientation.UPRIGHT,
             information=drawn.information,
             phone=felt.phone(t + IMU_AHEAD_S),
             body=felt.body(t + IMU_AHEAD_S),

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import cv2
 
+from hardware.sim.camera_faults import CameraFault
 from hardware.sim.scenes.scene import (
     FIRST_REPORTING_SEED,
     HD,
@@ -32,6 +33,7 @@ from hardware.sim.scenes.scene import (
 )
 from hardware.sim.scenes.video import RenderedVideo
 from pipeline.vision.visual_front_end import warm_up
+from server.experiments.vision import lies
 from server.experiments.vision.channel import DEFAULT_CODECS, WITHOUT_IMU, Channel, channel
 from server.experiments.vision.learning import LearningFigures, learn
 from server.experiments.vision.rows import VisionRow, plain_values, row, text
@@ -79,6 +81,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--learn", type=int, default=0, metavar="FILMS", help="of 20 s, for the readout and dates"
     )
+    parser.add_argument(
+        "--lies", type=int, default=0, metavar="FILMS", help="instead: of cameras that begin to lie"
+    )
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--out", type=Path, metavar="DIR", help="figures as JSON and a picture")
     parser.add_argument(
@@ -88,6 +93,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, print, draw; the exit code is 1 if a goal is not met."""
+    if arguments.lies:
+        return _lies(arguments)
     try:
         tasks = list(_tasks(arguments))
     except ValueError as error:
@@ -107,6 +114,18 @@ def run(arguments: argparse.Namespace) -> int:
     learnt = [learn(tasks[0].seed + k) for k in range(arguments.learn)]
     pooled = [row(record) for record in pools.values()]
     return _report([row(record) for record in _sorted(records)], pooled, learnt, arguments.out)
+
+
+def _lies(arguments: argparse.Namespace) -> int:
+    """Watch films of cameras that lie; the exit code is 1 if an honest one is called a liar."""
+    first = arguments.seed + (0 if arguments.tuning else FIRST_REPORTING_SEED)
+    rows = []
+    for fault in CameraFault:
+        for codec in (name for name in arguments.codecs if not name.endswith(WITHOUT_IMU)):
+            films = [lies.lied(fault, first + k, codec) for k in range(arguments.lies)]
+            rows.append(lies.row(films))
+    print(lies.text(rows))
+    return int(any(one.before for one in rows))
 
 
 def _report(
