@@ -250,7 +250,7 @@ class Eyes:
         self.front_end = self
         self.expected: list[Prediction | None] = []
 
-    def expect(self, expected: Prediction | None) -> None:
+    def add_prediction(self, expected: Prediction | None) -> None:
         self.expected.append(expected)
 
     def add_imu(self, *samples: object) -> None: ...
