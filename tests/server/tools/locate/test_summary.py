@@ -68,9 +68,9 @@ def test_what_the_pictures_say_of_the_camera_is_told_with_its_uncertainty():
     )
     watch = SimpleNamespace(facts=facts, complaint="It zooms.")
     learnt = Camera(640, 480, CAMERA.K, "plumb_bob", np.zeros(4), 0.0195)
-    said = camera_lines(CAMERA, SimpleNamespace(watch=watch, camera=learnt))
+    said = camera_lines(CAMERA, SimpleNamespace(monitor=watch, camera=learnt))
     assert "  dates        +5.1 ± 0.3 ms later than t_s says" in said
     assert "  readout      +19.5 ± 0.4 ms (in the file: 18.0 ms, corrected while it ran)" in said
     assert said[-1] == "  It zooms."
-    unmoved = SimpleNamespace(watch=SimpleNamespace(facts=None), camera=CAMERA)
+    unmoved = SimpleNamespace(monitor=SimpleNamespace(facts=None), camera=CAMERA)
     assert camera_lines(CAMERA, unmoved) == []
