@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from math import inf
-from typing import Literal
+from typing import Final, Literal
 
 from pipeline.estimator_config import EkfConfig, NoFilterConfig, RelativeConfig
 from pipeline.gains import PHONE, Gains
@@ -17,6 +17,8 @@ from pipeline.vision_config import GatesConfig
 EstimatorName = Literal["relative", "paper", "none"]
 VirtualCameraMode = Literal["full", "selective", "off"]
 SaturationPolicy = Literal["torque_first", "scale", "lift", "clip"]
+PERIOD_S: Final = 0.005
+"""Of control [s]: 200 Hz."""
 
 
 @dataclass(frozen=True, slots=True)

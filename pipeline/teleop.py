@@ -7,7 +7,7 @@ from math import inf
 
 import numpy as np
 
-from pipeline.config import TeleopConfig, VirtualCameraConfig
+from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraConfig
 from pipeline.control import failsafe, flight_envelope, resumption
 from pipeline.control.actuation import Actuation
 from pipeline.control.flight_envelope import Ages
@@ -86,7 +86,7 @@ class Output:
 class Teleop:
     """Keeps the robot's pose relative to the virtual camera; time comes with the inputs."""
 
-    def __init__(self, robot: Robot, config: TeleopConfig, period: float = 0.005) -> None:
+    def __init__(self, robot: Robot, config: TeleopConfig, period: float = PERIOD_S) -> None:
         """For one robot; `period` [s] is what the first `step` counts for."""
         self.estimator = make_estimator(config, robot.leds_in_b)
         self.attitude, self._bridge = Attitude(), GyroBridge()

@@ -24,14 +24,13 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.config import EstimatorName, FeedForwardConfig, MarginsConfig
+from pipeline.config import PERIOD_S, EstimatorName, FeedForwardConfig, MarginsConfig
 from pipeline.control.dynamics import Dynamics
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.gains import Gains
 
 Complex = npt.NDArray[np.complex128]
 
-PERIOD_S: Final = 0.005
 OMEGA: Final = np.geomspace(0.03, 1500.0, 1200)
 """[rad/s]; up to five times the hold's first zero."""
 OMEGA.setflags(write=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hardware.follower import ThrustCommand
 from hardware.link.robot_end import SILENCE_US
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array, wxyz_from_R
 from pipeline.prediction import Prediction
 from pipeline.robot import Robot
@@ -29,8 +29,6 @@ from server.control.ipc_estimate import EstimateFields, finite
 from server.control.ipc_vision import SeenInput, triple
 from server.control.tick_rate import TickRate
 
-PERIOD_S = 0.005
-"""From tick to tick."""
 SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
 STOOD_STILL_S = 1e-6 * SILENCE_US

@@ -24,7 +24,7 @@ from hardware.link.control_end import ControlEnd
 from hardware.link.link_key import LinkKeyError, take_key
 from hardware.link.udp import UdpFollower
 from hardware.robot_file import RobotFile, load_robot
-from pipeline.config import EstimatorName, TeleopConfig, VirtualCameraConfig
+from pipeline.config import PERIOD_S, EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.estimation.estimators import warm_up
 from server.common import clock
@@ -32,7 +32,7 @@ from server.common.clock import unix_ms
 from server.common.options import Parser
 from server.common.runtime_parameters import DEFAULT_KNOBS, RuntimeParameters
 from server.control import realtime
-from server.control.controller import PERIOD_S, Controller, TooLate
+from server.control.controller import Controller, TooLate
 from server.control.ipc import Endpoint, control_end
 from server.control.robot_clock import RobotLink
 from server.control.robot_epoch import next_epoch

@@ -13,7 +13,7 @@ from server.common import clock
 from server.common.clock import now
 from server.diagnostics.garbage import Garbage
 
-PERIOD_S = 0.005
+LOOK_S = 0.005
 WINDOW_S = 60.0
 WORTH_SAYING_S = 0.02
 SAY_AGAIN_S = 10.0
@@ -102,16 +102,16 @@ class Pauses:
             await self._watch(self._waited or queue)
 
     async def _watch(self, waited: Callable[[], float]) -> None:
-        due, cpu, wait = self._clock() + PERIOD_S, self._cpu(), waited()
+        due, cpu, wait = self._clock() + LOOK_S, self._cpu(), waited()
         while True:
-            await asyncio.sleep(PERIOD_S)
+            await asyncio.sleep(LOOK_S)
             t, now_cpu, now_wait = self._clock(), self._cpu(), waited()
             late = max(0.0, t - due)
             stall = Stall(late, min(late, now_cpu - cpu), min(late, now_wait - wait))
             self.loop.saw(t, stall, self._is_armed)
             if self._on_stall is not None:
                 self._on_stall(t, late)
-            due, cpu, wait = t + PERIOD_S, now_cpu, now_wait
+            due, cpu, wait = t + LOOK_S, now_cpu, now_wait
 
     def tick(self, armed: bool, idle: bool) -> str:
         """Keep garbage small; gives what people should read, or "".

@@ -11,10 +11,10 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, TouchState
 from pipeline.teleop import Output
-from server.control.controller import PERIOD_S, Controller
+from server.control.controller import Controller
 from server.control.ipc import Input, OperatorInput, PhoneImuInput, ReadyInput, RequestInput
 from server.control.ipc_vision import SeenInput
 from server.phone.frame_pipeline import FramePipeline

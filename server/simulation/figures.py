@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.config import PERIOD_S
 from pipeline.frames import Array
 from server.simulation.trace import TrackingTrace
 from server.simulation.virtual_time import SimulationOptions
@@ -41,14 +42,14 @@ def result_of(
     trace: TrackingTrace, scene: SimulationOptions, cpu_s: float, settle_s: float = SETTLE_S
 ) -> TrackingFigures:
     """Figures of a trace, without the first seconds of tracking."""
-    skip = round(settle_s / 0.005)
+    skip = round(settle_s / PERIOD_S)
     errors = rows_of(trace.error_in_f)[skip:]
     distance = np.linalg.norm(errors, axis=1)
     steps = np.diff(rows_of(trace.thrusts)[skip:], axis=0)
     return TrackingFigures(
         hand=scene.hand,
         seed=scene.seed,
-        tracked_s=round(0.005 * len(errors), 2),
+        tracked_s=round(PERIOD_S * len(errors), 2),
         rms_mm=1e3 * _rms(distance),
         max_mm=1e3 * float(distance.max(initial=0.0)),
         rms_deg=float(np.rad2deg(_rms(np.linalg.norm(rows_of(trace.turn)[skip:], axis=1)))),

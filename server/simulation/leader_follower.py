@@ -13,15 +13,13 @@ from hardware.sim.plant.plant import Plant, PlantOptions
 from hardware.sim.reference_trajectory import Pose
 from hardware.sim.truth import Truth
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode, Requests, TouchState
 from pipeline.teleop import Inputs, Output, Teleop
 from server.control.robot_clock import RobotLink
 from server.simulation.leader_sensor_model import LeaderSensorModel
 from server.simulation.sensors import Leader
-
-PERIOD_S = 0.005
 
 
 class LeaderFollowerSimulation:

@@ -12,11 +12,10 @@ import numpy as np
 
 from hardware.robot_file import RobotFile, RobotFileError, robot_of
 from hardware.robot_schema import AXES
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.gains import Gains
 from server.common import clock
-from server.control.controller import PERIOD_S
 from server.simulation.figures import result_of
 from server.simulation.sweep_keys import ROWS, Value
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation

@@ -24,11 +24,11 @@ from hardware.sim.render import RenderOptions
 from hardware.sim.truth import Truth
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from pipeline.camera.extrinsics import IDENTITY, Extrinsics
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, TouchState, VisionMeasurement
 from pipeline.teleop import Output
-from server.control.controller import PERIOD_S, Controller, never_too_late
+from server.control.controller import Controller, never_too_late
 from server.control.ipc import (
     Input,
     OperatorInput,

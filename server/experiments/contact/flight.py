@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import PlantOptions
+from pipeline.config import PERIOD_S
 from pipeline.frames import Array
 from server.experiments.contact.setting import FLIGHT_S, HOVER_S, ContactScene, Way
-from server.simulation.leader_follower import PERIOD_S, LeaderFollowerSimulation
+from server.simulation.leader_follower import LeaderFollowerSimulation
 from server.simulation.sensors import Leader
 
 

@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.config import PERIOD_S
 from pipeline.frames import Array
 from server.common.text import Column, flights
 from server.experiments.contact.flight import PER_PERIOD, ContactTrace
 from server.experiments.contact.setting import BAND_N, FULL, GO_S, STAY_S, ContactScene, Way
 from server.experiments.paper.setup.measure import rms
-from server.simulation.leader_follower import PERIOD_S
 
 SETTLE_S: Final = 2.0
 """After the hand has arrived; from then on until it goes back the force is to be in the band."""

@@ -10,11 +10,10 @@ import numpy as np
 
 from hardware.robot_file import RobotFile
 from hardware.sim.reference_trajectory import ReferenceTrajectory
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
 from pipeline.teleop import Output
-from server.control.controller import PERIOD_S
 from server.experiments.gaps.person import Holder
 from server.experiments.gaps.schedule import GapSchedule, WebRtcLine, WebSocketLine
 from server.experiments.gaps.traces import minutes

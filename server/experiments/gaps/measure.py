@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.config import PERIOD_S
 from pipeline.frames import Array
 from pipeline.signals import Mode
-from server.control.controller import PERIOD_S
 from server.experiments.gaps.flight import Case, FlightLog
 
 WINDOW_TICKS: Final = 20

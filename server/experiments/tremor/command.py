@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import welch
 
-from pipeline.config import VirtualCameraConfig
+from pipeline.config import PERIOD_S, VirtualCameraConfig
 from pipeline.control.cutoff import time_constants
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import Array, log, rotation_about_z
@@ -23,7 +23,6 @@ from server.common.ranges import number
 from server.common.runtime_parameters import FASTEST_HZ, SLOWEST_HZ
 from server.common.text import Column, table
 from server.experiments.tremor.hand import (
-    PERIOD_S,
     REST_S,
     SHORTEST_S,
     attitudes_of_hand,

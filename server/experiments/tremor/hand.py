@@ -15,6 +15,7 @@ from hardware.sim.hand import Hand, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
 from hardware.sim.render import RenderOptions
 from pipeline.camera.lens import Camera
+from pipeline.config import PERIOD_S
 from pipeline.estimation.attitude import Attitude
 from pipeline.frames import Array, R_cd, exp
 from pipeline.signals import PhoneImu
@@ -24,7 +25,6 @@ from server.protocol.wire_records import Motion, Ping, Pong
 from server.recording.reader import Recording
 from server.recording.writer import PHONE_RECORDS, SERVER_RECORDS, RecordingError
 
-PERIOD_S = 0.005
 SHORTEST_S = 5.0
 """Of a recording: a second of tremor after the virtual camera has settled."""
 Arrival = tuple[float, PhoneImu]

@@ -11,13 +11,12 @@ import pytest
 
 from hardware.follower import ThrustCommand
 from hardware.robot_file import load_robot
-from pipeline.config import TeleopConfig, VirtualCameraMode
+from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraMode
 from pipeline.frames import GRAVITY
 from pipeline.signals import BodyImu, Mode
 from pipeline.teleop import Output
 from server.common.runtime_parameters import TuneInput
 from server.control.controller import (
-    PERIOD_S,
     STOOD_STILL_S,
     Controller,
     Mean,

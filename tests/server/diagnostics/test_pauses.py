@@ -7,7 +7,7 @@ from contextlib import closing
 
 import pytest
 
-from server.diagnostics.pauses import PERIOD_S, WINDOW_S, LoopWatch, Pauses, RunQueue, Stall
+from server.diagnostics.pauses import LOOK_S, WINDOW_S, LoopWatch, Pauses, RunQueue, Stall
 
 
 class Clock:
@@ -27,7 +27,7 @@ def watched(pauses: Pauses, work: list[float], clock: Clock, cpu: Clock) -> None
             await asyncio.sleep(0.0)
             clock.t += seconds
             cpu.t += 0.5 * seconds
-            await asyncio.sleep(2.0 * PERIOD_S)
+            await asyncio.sleep(2.0 * LOOK_S)
         watching.cancel()
 
     asyncio.run(scene())

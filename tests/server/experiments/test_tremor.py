@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.config import PERIOD_S
 from pipeline.frames import exp
 from server.cli import main
 from server.experiments.tremor.command import cameras, judge, through
-from server.experiments.tremor.hand import PERIOD_S, attitudes_of_hand
+from server.experiments.tremor.hand import attitudes_of_hand
 
 RECORDING = Path(__file__).parents[2] / "data/virtual_phone.mcap"
 P_REF = np.array([2.5, 0.0, 0.0])

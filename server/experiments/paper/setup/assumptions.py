@@ -11,12 +11,12 @@ from dataclasses import asdict
 
 from hardware.plant_parameters import PlantParameters
 from hardware.sim.render import RenderOptions
+from pipeline.config import PERIOD_S
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.assumption import Assumption
 from server.experiments.paper.setup.assumptions_task import of_task
 from server.experiments.paper.setup.flight import HOVER_S, REST_S
 from server.experiments.paper.setup.measure import WINDOW_S, ExperimentSetup
-from server.simulation.leader_follower import PERIOD_S
 from server.simulation.sensors import PAPER, Leader, Pictures
 from server.simulation.vision_models import BITRATE_BPS
 

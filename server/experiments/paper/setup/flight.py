@@ -9,10 +9,10 @@ import numpy as np
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import make_hand
 from hardware.sim.reference_trajectory import ReferenceTrajectory, missed_by
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.teleop import Output
-from server.simulation.leader_follower import PERIOD_S, LeaderFollowerSimulation
+from server.simulation.leader_follower import LeaderFollowerSimulation
 from server.simulation.sensors import Leader
 
 HOVER_S = 8.0

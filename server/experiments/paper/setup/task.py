@@ -14,10 +14,10 @@ from hardware.sim.hand import MovingHand, steady_wander, tremor
 from hardware.sim.person import GuidingHand, Participant
 from hardware.sim.plant.laser_task import Laser, Tube
 from hardware.sim.plant.plant import PlantOptions
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from server.experiments.paper.setup import published
-from server.simulation.leader_follower import PERIOD_S, LeaderFollowerSimulation
+from server.simulation.leader_follower import LeaderFollowerSimulation
 from server.simulation.sensors import Leader
 
 START_S: Final = 3.0
