@@ -8,11 +8,10 @@ from math import isfinite
 from operator import attrgetter
 
 from pipeline.frames import Array, exp, log
+from pipeline.imu_stream import MAX_GAP_S
 from pipeline.signals import RelativeState
 
 REMEMBERED_S = 1.0
-MAX_GAP_S = 0.1
-"""Between two predictions farther apart than this nothing is said."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,6 +6,7 @@ from math import acos, sqrt
 
 import numpy as np
 
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
 from pipeline.jit import numba
 from pipeline.linear_kernels import cholesky, solve_by
@@ -18,7 +19,6 @@ FREE, TILT, TURN = 0, 1, 2
 ITERATIONS = 12
 WALL_PX = 3000.0
 """Per radian beyond the limit: a twentieth of a degree costs some pixels."""
-NEAREST_M = 0.1
 SCRATCH = 191
 """Numbers that a fit of at most 16 LEDs needs."""
 HOPELESS = 2.0

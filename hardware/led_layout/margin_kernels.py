@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from hardware.led_layout.fit_kernels import (
     FREE,
-    NEAREST_M,
     SCRATCH,
     TILT,
     TURN,
@@ -17,6 +16,7 @@ from hardware.led_layout.fit_kernels import (
     kernel,
     refine,
 )
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
 from pipeline.identification.p3p_kernels import p3p, put_triad
 from pipeline.so3_kernels import multiply, put_exp

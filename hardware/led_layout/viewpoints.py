@@ -7,10 +7,10 @@ from math import inf, pi
 
 import numpy as np
 
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
 
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-NEAREST_M = 0.1
 
 
 class LedLayoutError(ValueError):

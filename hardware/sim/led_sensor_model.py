@@ -13,6 +13,7 @@ import numpy as np
 from hardware.sim.phone import BodyHistory, VirtualPhone
 from pipeline.frames import Array
 from pipeline.identification import pnp
+from pipeline.imu_stream import ImuStreams
 from pipeline.signals import BodyImu, Match, PhoneImu, Spots, VisionMeasurement
 from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision.rays import rays_of
@@ -37,11 +38,12 @@ class LedSensorModel:
         """`noise_px`: standard deviation of an LED's place, each way; `hidden` as the phone's."""
         self._phone, self._leds_in_b, self._hidden = phone, leds_in_b, hidden
         self._noise_px, self._rng = noise_px, rng
-        self._stamps = CameraImuDelay()
+        self._imus = ImuStreams()
+        self._stamps = CameraImuDelay(self._imus)
 
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
         """Follow a motion sample, for the pictures' time offset."""
-        self._stamps.add_imu(sample)
+        self._imus.add(sample)
 
     def seen(self, t: float, stamp: float, body: BodyHistory) -> VisionMeasurement | None:
         """What a picture taken at `t` [s], and dated `stamp` [s], says; None without any LED."""

@@ -18,7 +18,8 @@ from pipeline.camera.fit import WINDOW, CameraFacts, CameraFit
 from pipeline.camera.lens import Camera
 from pipeline.camera.verdict import verdict
 from pipeline.frames import Array
-from pipeline.signals import BodyImu, PhoneImu, StampOffset
+from pipeline.imu_stream import ImuStream, ImuStreams
+from pipeline.signals import StampOffset
 
 FADE: Final = 2.0 * np.pi * 0.5
 """Below 0.5 Hz a stabiliser follows [rad/s]."""
@@ -28,8 +29,6 @@ LEAD_S: Final = 1.3
 """Of the phone's samples before a block."""
 MOVED_RAD: Final = 0.0026
 """0.15°: with less turning of late, RMS over a block, nothing is learnt."""
-MAX_GAP_S: Final = 0.1
-"""Between motion samples."""
 PATIENCE_S: Final = 1.5
 """Motion samples that come later than this never come."""
 MARGIN_S: Final = 0.15
@@ -38,8 +37,6 @@ REDATE_S, MAX_REDATES = 0.004, 8
 """Dated so wrongly, tremor does not fit: the blocks are summed up anew with a better date."""
 DRIFT: Final = 2e-3
 """A bias of the body's gyroscope that was wrong by more is put right before summing up [rad/s]."""
-WAITING: Final = 4096
-"""Motion samples, kept until a picture asks for them: twenty seconds at 200 Hz."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,16 +49,14 @@ class _Block:
 
 
 class CalibrationMonitor:
-    """Samples come from the event loop, pictures from the vision thread."""
+    """Judges by believed poses and both IMUs' streams, which somebody else fills."""
 
-    def __init__(self, camera: Camera, leds_in_b: Array) -> None:
+    def __init__(self, camera: Camera, leds_in_b: Array, imus: ImuStreams) -> None:
         """Knows nothing of the camera but its calibration; LEDs (n, 3) [m]."""
+        self._imus = imus
         self._leds_in_b = np.ascontiguousarray(leds_in_b)
         self._floor = FLOOR_PX / camera.focal_px
         self._fit = CameraFit()
-        self._waiting: deque[PhoneImu | BodyImu] = deque(maxlen=WAITING)
-        self._phone: deque[tuple[float, ...]] = deque(maxlen=WAITING)
-        self._body: deque[tuple[float, ...]] = deque(maxlen=WAITING)
         self._pictures = BlockPictures(len(leds_in_b))
         self._blocks: deque[_Block] = deque(maxlen=WINDOW)
         self._bias_in_b = np.zeros(3)
@@ -73,47 +68,29 @@ class CalibrationMonitor:
         self.complaint = ""
         """Why nobody should fly with this camera; empty if all is well, or not known yet."""
 
-    def add_imu(self, sample: PhoneImu | BodyImu) -> None:
-        """Take a motion sample of either side, in order."""
-        self._waiting.append(sample)
-
     def saw(self, look: LedObservation, coarse: StampOffset | None) -> bool:
         """Take the named LEDs of a believed pose and, if known, how wrong the stamps are.
 
         Returns:
             Whether a block ended, and with it the facts may be new.
         """
-        self._take_in()
         if self.facts is None and coarse is not None:
             self._redate(coarse.value)
         if not self._pictures.add(look):
             return False
         until = self._pictures.last + MARGIN_S
-        if self._newest() < until:
+        if min(stream.newest for stream in self._imus.both) < until:
             if look.t - self._pictures.last > PATIENCE_S:
                 self._pictures.drop()
             return False
         return self._end_block(look.t)
 
-    def _take_in(self) -> None:
-        while self._waiting:
-            sample = self._waiting.popleft()
-            if isinstance(sample, PhoneImu):
-                _append(self._phone, sample.t, sample.omega_m_cf_in_c)
-            else:
-                _append(self._body, sample.t, sample.omega_m_bf_in_b)
-
-    def _newest(self) -> float:
-        """Time until which both sides' samples have come [s]."""
-        if not self._phone or not self._body:
-            return -np.inf
-        return min(self._phone[-1][0], self._body[-1][0])
-
     def _end_block(self, t: float) -> bool:
         """Judge by the waiting block; False: it says nothing."""
         pictures = self._pictures.take()
         start, stop = float(pictures.t[0]) - MARGIN_S, float(pictures.t[-1]) + MARGIN_S
-        phone, body = _between(self._phone, start - LEAD_S, stop), _between(self._body, start, stop)
+        phone = _gyro(self._imus.phone, start - LEAD_S, stop)
+        body = _gyro(self._imus.body, start, stop)
         if phone is None or body is None or not self._sum_up(_Block(pictures, phone, body)):
             return False
         self._blocks.append(_Block(pictures, phone, body))
@@ -159,20 +136,7 @@ class CalibrationMonitor:
         return True
 
 
-def _append(rows: deque[tuple[float, ...]], t: float, omega: Array) -> None:
-    if not rows or t > rows[-1][0]:
-        rows.append((t, *omega.tolist()))
-
-
-def _between(rows: deque[tuple[float, ...]], start: float, stop: float) -> GyroSamples | None:
-    """Samples from the last sample before `start` to the first after `stop`.
-
-    None if they don't reach or have a gap.
-    """
-    table = np.array(rows)
-    first = max(0, int(np.searchsorted(table[:, 0], start, side="right")) - 1)
-    last = int(np.searchsorted(table[:, 0], stop)) + 1
-    table = table[first:last]
-    if len(table) < 2 or table[-1, 0] < stop or np.diff(table[:, 0]).max() > MAX_GAP_S:
-        return None
-    return GyroSamples(table[:, 0].copy(), table[:, 1:].copy())
+def _gyro(stream: ImuStream, start: float, stop: float) -> GyroSamples | None:
+    """Rates from before `start` to behind `stop` [s]; None if they don't reach or have a gap."""
+    found = stream.between(start, stop)
+    return None if found is None else GyroSamples(found[0], np.ascontiguousarray(found[1][:, :3]))

@@ -19,6 +19,8 @@ LENS = 13
 EQUIDISTANT = 1.0
 ITERATIONS = 40
 CONVERGED = 1e-13
+NEAREST_M = 0.1
+"""What is nearer to the lens' plane has no place in the picture."""
 FARTHEST_RAD = 1.55
 """A ray of an equidistant lens is no farther from its axis."""
 

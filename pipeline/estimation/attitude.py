@@ -12,6 +12,7 @@ from math import inf, sqrt, tanh
 import numpy as np
 
 from pipeline.frames import GRAVITY, Array, R_fc_level_from_specific_force, cross, exp
+from pipeline.imu_stream import MAX_GAP_S
 from pipeline.signals import PhoneImu
 
 GAIN = 0.15
@@ -24,10 +25,9 @@ HAND_VARIANCE = 0.005
 gain g [1/s] is that of a Kalman filter whose tilt has the variance g `HAND_VARIANCE`."""
 SAMPLE_S = 0.02
 """What one sample of the accelerometer counts for after a gap."""
-GAP_S = 0.1
-"""Longer without samples: what the gyroscope would have felt is inferred from both ends."""
-MAX_GAP_S = 3.0
-"""Longer: what was integrated is worth nothing, start anew."""
+LOST_S = 3.0
+"""Longer without samples: what was integrated is worth nothing, start anew. Over a gap shorter than
+that, what the gyroscope would have felt is inferred from both ends."""
 HAND_RATE, HAND_RATE_S = 0.5, 0.2
 """A hand's angular rate, one axis [rad/s], and its correlation time."""
 
@@ -98,17 +98,17 @@ class Attitude:
         self._t = imu.t
         force = imu.a_m_cf_in_c
         norm = float(np.sqrt(force @ force))
-        self._is_lost = self._is_lost or dt > MAX_GAP_S
+        self._is_lost = self._is_lost or dt > LOST_S
         if self._R_fc is None or self._is_lost:
             if norm > 0.5 * GRAVITY:
                 self._begin(imu.t, force)
             return
         turn = (omega - self._bias) * dt
-        if dt > GAP_S:
+        if dt > MAX_GAP_S:
             turn = turn * self._bridge(dt)
         R_fc = self._R_fc @ exp(turn)
         if 0.7 * GRAVITY < norm < 1.3 * GRAVITY:
-            h = dt if dt <= GAP_S else SAMPLE_S
+            h = dt if dt <= MAX_GAP_S else SAMPLE_S
             tilt = cross(force / norm, R_fc[2])
             gain = max(GAIN, 1.0 / (imu.t - self._t_start + h))
             turn = exp(min(1.0, gain * h) * (R_fc @ tilt))

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from math import hypot, inf
 
-from pipeline.estimation.attitude import GAP_S, MAX_GAP_S, Attitude
+from pipeline.estimation.attitude import LOST_S, Attitude
 from pipeline.frames import Array, exp
+from pipeline.imu_stream import MAX_GAP_S
 from pipeline.signals import RelativeState
 
 DRIFT = 0.01
@@ -38,8 +39,8 @@ class GyroBridge:
         if attitude.R_fc is None:
             return None
         R_fc = attitude.R_fc @ relative.R_ic  # what carried p, R and u on: errors cancel
-        silent = relative.t - attitude.t > GAP_S
-        if self._bridges and relative.t - self._t_heard > MAX_GAP_S:
+        silent = relative.t - attitude.t > MAX_GAP_S
+        if self._bridges and relative.t - self._t_heard > LOST_S:
             self.reset()
         self._bridges = self._R_fb is not None and (self._bridges or silent)
         if not silent and not self._bridges and attitude.t > self._t_heard:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pipeline.frames import Array
+from pipeline.imu_stream import MAX_GAP_S
 from pipeline.so3_kernels import kernel
 
 NEAR_S = 0.012
 """So near to a sample, interpolation is as good as the sample."""
-MAX_GAP_S = 0.1
-"""Samples farther apart than this say nothing of each other."""
 
 
 @kernel

@@ -1,187 +1,201 @@
-"""Out-of-sequence measurements: late poses and unordered IMU samples, fused when they were taken.
+"""A filter on the time axis: what arrives late is fused at the moment it was taken.
 
-Three copies of the filter lie on the time axis:
+    base ── picture ── picture ── … ── frontier ── now
 
-    checkpoint ── pictures waiting for IMU samples ── frontier ── now
-
-Up to the *checkpoint* everything has arrived: later news from before it is too late. The *frontier*
-knows everything that arrived so far; when a sample arrives from before it, it is made anew from the
-checkpoint. Each `to_now` replays only what came after the frontier: the exact answer to what
-Bar-Shalom approximates (IEEE Trans. Aerospace and Electronic Systems 38 (2002) 769).
+A `Checkpoint` is the filter right after a picture. What arrives late (a picture between two others,
+an IMU sample that was held or interpolated over) spoils the checkpoints after it; they are made
+anew from the last good one, with the decisions on outliers they were made with. The *frontier* is
+as far as both IMUs' samples reach; from there to now the newest samples are held, with growing
+doubt.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import inf, nan
+from itertools import pairwise
+from math import inf, sqrt
+from typing import Generic, TypeVar
 
 import numpy as np
 
-from pipeline.estimation.imu_history import ImuHistory
-from pipeline.estimation.paper_ekf_kernels import workspace
-from pipeline.estimation.paper_ekf_replay import FAILED, fuse_pose, replay
-from pipeline.estimation.relative_model import N
-from pipeline.estimator_config import EkfConfig
 from pipeline.frames import Array
+from pipeline.imu_stream import ImuStream
+from pipeline.signals import Flags
+
+Measurement = TypeVar("Measurement")
 
 
 @dataclass(slots=True, eq=False)
-class EkfCheckpoint:
-    """The filter at one time."""
+class Checkpoint(Generic[Measurement]):
+    """The filter at one time, as a rule right after a picture."""
 
     t: float
     x: Array
-    """(30,)."""
+    """(n,) state."""
+    R: Array
+    """(3, 3) attitude R_cb, for a filter that has none in x."""
     P: Array
-    """(30, 30)."""
+    """(m, m) covariance of the error state."""
     R_ic: Array
     """(3, 3) rotation of the camera since the phone's last sample."""
+    seen: Measurement | None = None
+    """The picture that was fused here."""
+    use: Flags | None = None
+    """Which parts of it were: −1 is yet to be decided, 0 left out, 1 fused."""
+    inflation: float = 1.0
+    """Factor of the variances of place, velocity and attitude that were predicted for it."""
 
-    @staticmethod
-    def empty() -> EkfCheckpoint:
+    @classmethod
+    def empty(cls, states: int, errors: int) -> Checkpoint[Measurement]:
         """Memory for a checkpoint; its content has no meaning yet."""
-        return EkfCheckpoint(-inf, np.zeros(N), np.zeros((N, N)), np.eye(3))
+        return cls(-inf, np.zeros(states), np.eye(3), np.zeros((errors, errors)), np.eye(3))
 
-    def copy(self, other: EkfCheckpoint) -> None:
-        """Become like `other`."""
+    def copy(self, other: Checkpoint[Measurement]) -> None:
+        """Become like `other`, its picture aside."""
         self.t = other.t
-        self.x[:], self.P[:], self.R_ic[:] = other.x, other.P, other.R_ic
+        self.x[:], self.R[:], self.P[:] = other.x, other.R, other.P
+        self.R_ic[:] = other.R_ic
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseMeasurement:
-    """A measured (p, η)."""
+class OutOfSequence(ABC, Generic[Measurement]):
+    """State and covariance at any time between the base and now."""
 
-    t: float
-    y: Array
-    """(6,) [m, rad]."""
-    C: Array
-    """(6, 6) its covariance."""
+    def __init__(self, states: int, errors: int, moving: int, bent: int, kept: int) -> None:
+        """Begin without meaning: call `begin` before anything but `insert`.
 
-
-class OutOfSequenceEkf:
-    """The filter of `relative_model` on the time axis."""
-
-    def __init__(self, config: EkfConfig) -> None:
-        """Empty: `begin` before anything but `history.insert`."""
-        self.history = ImuHistory()
-        self.checkpoint, self.now = EkfCheckpoint.empty(), EkfCheckpoint.empty()
-        self._frontier = EkfCheckpoint.empty()
-        self._frontier_good = False
-        self._waiting: list[PoseMeasurement] = []
-        self._walk, self._r = walk_densities(config), imu_variances(config)
-        self._steps = np.array([config.max_step_s, config.tau_delta_c])
-        self._work = workspace()
-
-    def begin(self, t: float, x: Array, P: Array) -> None:
-        """Start at time `t` [s] from x (30,), P (30, 30)."""
-        self.checkpoint = EkfCheckpoint(t, x, P, np.eye(3))
-        self._waiting.clear()
-        self.history.forget_until(t)
-        self._frontier_good = False
-
-    def insert(self, t: float, kind: int, rate: Array, force: Array) -> bool:
-        """Remember an IMU sample from after the checkpoint; False: it was there already."""
-        if t <= self._frontier.t:
-            self._frontier_good = False
-        return self.history.insert(t, kind, rate, force)
-
-    def fuse(self, pose: PoseMeasurement, gate: float) -> float:
-        """Compare a pose from after the checkpoint with its prediction; fuse it up to `gate`.
-
-        Gives χ² (6 degrees of freedom); NaN: the filter can't be believed.
+        Args:
+            states: Length of x.
+            errors: Length of the error state.
+            moving: The first so many of it can be inflated.
+            bent: Samples before a new one from which on it changes what lies between samples.
+            kept: Samples up to the base that are still interpolated and extrapolated from.
         """
-        final = not self._waiting and pose.t <= min(self.history.newest)
-        if not final and not self._renew_frontier():
-            return nan
-        checkpoint = self.checkpoint if final else self._frontier
-        if not self._advance(checkpoint, pose.t):
-            return nan
-        chi2 = self._update(checkpoint, pose, gate)
-        if final:
-            self.history.forget_until(pose.t)
-            self._frontier_good = False
-        elif chi2 <= gate:
-            self._waiting.append(pose)
+        self._sizes, self._moving, self._bent, self._kept = (states, errors), moving, bent, kept
+        self.body, self.phone = ImuStream(), ImuStream()
+        self.checkpoints = [self._empty()]
+        self.now, self._frontier = self._empty(), self._empty()
+        self._spoilt_from = -inf
+        """Checkpoints and frontier after this time must be made anew; inf: none."""
+
+    def _empty(self) -> Checkpoint[Measurement]:
+        return Checkpoint.empty(*self._sizes)
+
+    @abstractmethod
+    def _advance(self, here: Checkpoint[Measurement], t: float) -> None:
+        """Carry `here` on to time `t` [s] by the samples in between."""
+
+    @abstractmethod
+    def _fuse(self, here: Checkpoint[Measurement], seen: Measurement, use: Flags) -> float:
+        """Fuse a picture at its time: what `use` says, deciding what is undecided; gives χ²."""
+
+    @abstractmethod
+    def _is_sound(self, here: Checkpoint[Measurement]) -> bool:
+        """Whether it can be believed."""
+
+    @property
+    def base(self) -> Checkpoint[Measurement]:
+        """Whatever was taken before it comes too late."""
+        return self.checkpoints[0]
+
+    @property
+    def newest(self) -> Checkpoint[Measurement]:
+        """Of the last picture, or the base."""
+        return self.checkpoints[-1]
+
+    @property
+    def complete(self) -> float:
+        """Both IMUs' samples have come up to this time [s]."""
+        return min(self.body.newest, self.phone.newest)
+
+    def begin(self, start: Checkpoint[Measurement]) -> None:
+        """Start from there."""
+        self.checkpoints = [start]
+        self._spoilt_from = -inf
+
+    def insert(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
+        """Remember a sample of `body` or `phone`; False: it was there already."""
+        i = int(np.searchsorted(stream.times, t)) - self._bent
+        before = float(stream.times[i]) if i >= 0 else -inf
+        if not stream.insert(t, rate, force):
+            return False
+        self._spoilt_from = min(self._spoilt_from, before)
+        return True
+
+    def predicted(self, t: float) -> Checkpoint[Measurement]:
+        """The filter at time `t` [s], not before the base, as if no picture had come then."""
+        self._repair()
+        here = self._empty()
+        here.copy(next(past for past in reversed(self.checkpoints) if past.t <= t))
+        self._advance(here, t)
+        return here
+
+    def fuse(
+        self,
+        here: Checkpoint[Measurement],
+        seen: Measurement,
+        parts: int,
+        inflation: float = 1.0,
+    ) -> float:
+        """Fuse a picture of so many parts into what was `predicted` for its time.
+
+        Gives χ² of the parts used; NaN: the filter can't be believed.
+        """
+        k = len(self.checkpoints)
+        while self.checkpoints[k - 1].t > here.t:
+            k -= 1
+        self.checkpoints.insert(k, here)
+        here.seen, here.use = seen, np.full(parts, -1, dtype=np.int8)
+        here.inflation = inflation
+        chi2 = self._look(here, seen, here.use)
+        self._spoilt_from = here.t
+        self._repair()
         return chi2
 
-    def settle(self, oldest: float) -> bool:
-        """Move the checkpoint to the last complete picture, at least to time `oldest` [s].
+    def _look(self, here: Checkpoint[Measurement], seen: Measurement, use: Flags) -> float:
+        if here.inflation != 1.0:
+            here.P[: self._moving] *= sqrt(here.inflation)
+            here.P[:, : self._moving] *= sqrt(here.inflation)
+        return self._fuse(here, seen, use)
 
-        Without pictures it follows at that distance: a replay stays short. False: the filter can't
-        be believed.
-        """
-        complete = max(min(self.history.newest), oldest)
-        before = self.checkpoint.t
-        while self._waiting and self._waiting[0].t <= complete:
-            pose = self._waiting.pop(0)
-            if not self._advance(self.checkpoint, pose.t):
-                return False
-            self._update(self.checkpoint, pose, inf)
-        if self.checkpoint.t < oldest and not self._advance(self.checkpoint, oldest):
-            return False
-        if self.checkpoint.t > before:
-            self.history.forget_until(self.checkpoint.t)
-            self._frontier_good &= self._frontier.t >= self.checkpoint.t
-        return True
+    def _repair(self) -> None:
+        """Make anew what was spoilt; the base can't be."""
+        if self._spoilt_from == inf:
+            return
+        for before, here in pairwise(self.checkpoints):
+            if here.t > self._spoilt_from:
+                t = here.t
+                here.copy(before)
+                self._advance(here, t)
+                if here.seen is not None and here.use is not None:
+                    self._look(here, here.seen, here.use)
+        if self._frontier.t > self._spoilt_from or self._frontier.t <= self.newest.t:
+            self._frontier.copy(self.newest)
+        self._spoilt_from = inf
+
+    def settle(self, oldest: float) -> None:
+        """Let the base follow at time `oldest` [s]: nothing from before it will be made anew."""
+        self._repair()
+        while len(self.checkpoints) > 1 and self.checkpoints[1].t <= oldest:
+            self.checkpoints.pop(0)
+        if len(self.checkpoints) == 1 and self.base.t < oldest:
+            self._advance(self.base, oldest)
+            self.base.seen = self.base.use = None
+        if self._frontier.t < self.newest.t:
+            self._frontier.copy(self.newest)
+        for stream in (self.body, self.phone):
+            kept = int(np.searchsorted(stream.times, self.base.t, side="right")) - self._kept
+            if kept > 0:
+                stream.forget_until(float(stream.times[kept - 1]))
 
     def to_now(self, t: float) -> bool:
         """Bring `now` to time `t` [s]; False: the filter can't be believed."""
-        if not self._frontier_good and not self._renew_frontier():
-            return False
-        complete = min(*self.history.newest, t)
-        if complete > self._frontier.t and not self._advance(self._frontier, complete):
-            return False
+        self._repair()
+        if self._frontier.t > t:
+            self._frontier.copy(self.newest)
+        complete = min(self.complete, t)
+        if complete > self._frontier.t:
+            self._advance(self._frontier, complete)
         self.now.copy(self._frontier)
-        return self._advance(self.now, t)
-
-    def _renew_frontier(self) -> bool:
-        """Make the frontier anew, from the checkpoint through the waiting pictures."""
-        self._frontier.copy(self.checkpoint)
-        self._frontier_good = True
-        for pose in self._waiting:
-            if not self._advance(self._frontier, pose.t):
-                return False
-            self._update(self._frontier, pose, inf)
-        return True
-
-    def _update(self, checkpoint: EkfCheckpoint, pose: PoseMeasurement, gate: float) -> float:
-        return float(fuse_pose(checkpoint.x, checkpoint.P, pose.y, pose.C, gate, self._work))
-
-    def _advance(self, checkpoint: EkfCheckpoint, t: float) -> bool:
-        """Replay the samples up to time `t` [s]; False: the filter can't be believed."""
-        history = self.history
-        used = replay(
-            checkpoint.x,
-            checkpoint.P,
-            checkpoint.R_ic,
-            (checkpoint.t, t),
-            history.times,
-            history.kinds,
-            history.values,
-            self._r,
-            self._walk,
-            self._steps,
-            self._work,
-        )
-        checkpoint.t = t
-        return bool(used != FAILED)
-
-
-def walk_densities(c: EkfConfig) -> Array:
-    """(30,) density of the process noise [unit²/s]."""
-    per_state = (0.0, 0.0, c.walk_v, c.walk_omega_b, 0.0, c.walk_a_b, c.walk_a_c, c.walk_delta_c)
-    return np.repeat(np.square((*per_state, c.walk_bias_omega, c.walk_bias_a)), 3)
-
-
-def imu_variances(c: EkfConfig) -> Array:
-    """Variances of IMU samples (2, 6) by kind [unit²]."""
-    body, phone = (c.sigma_omega_b, c.sigma_a_b), (c.sigma_omega_c, c.sigma_a_c)
-    return np.repeat(np.square((body, phone)), 3, axis=1)
-
-
-def initial_variances(c: EkfConfig) -> Array:
-    """Variances (30,) at a start; those of the pose come with it [unit²]."""
-    rate, force = c.initial_omega, c.initial_a
-    sigmas = (0.0, 0.0, c.initial_v, rate, rate, force, force, c.initial_delta)
-    return np.repeat(np.square((*sigmas, c.initial_bias_omega, c.initial_bias_a)), 3)
+        self._advance(self.now, t)
+        return self._is_sound(self.now)

@@ -1,7 +1,7 @@
 """The paper's 30-state filter, with each measurement fused at the time it was taken. Eq. (5)-(13).
 
 A phone's picture is 60-120 ms old when its pose is known and its IMU samples 15-40 ms:
-`OutOfSequenceEkf` fuses both in the past and predicts to now.
+`out_of_sequence` fuses both in the past and predicts to now.
 
 Deviations from the paper: gravity stays in the accelerations (see `relative_model`); δ_c of
 Eq. (11) fades with `tau_delta_c`, because the straight line through two 60 Hz gyroscope samples is
@@ -20,21 +20,20 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimation.estimator import Fusion, Health
-from pipeline.estimation.imu_history import BODY, PHONE
-from pipeline.estimation.out_of_sequence import OutOfSequenceEkf, PoseMeasurement, initial_variances
+from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.paper_ekf_kernels import MIN_COS_PITCH
 from pipeline.estimation.paper_ekf_replay import seen_pose
+from pipeline.estimation.paper_track import PaperTrack, PoseMeasurement, initial_variances
 from pipeline.estimation.relative_model import N, States, pose_covariance_in_rpy
 from pipeline.estimation.sanity import are_finite, is_pose
 from pipeline.estimator_config import EkfConfig
 from pipeline.frames import Array, cross, rpy_from_R
+from pipeline.imu_stream import ImuStream
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
 
 MAX_SLEEP_S: Final = 2.0
 """If nobody asked for so long, what was known is forgotten."""
-START_GAP_S: Final = 0.1
-"""A start needs a sample of each IMU so close to the picture."""
 
 
 class PaperEkf:
@@ -46,14 +45,14 @@ class PaperEkf:
         self.poses: Counter[Fusion] = Counter()
         """What became of the poses."""
         self.samples_late = self.samples_duplicate = self.samples_invalid = 0
-        """IMU samples not used: from before the checkpoint, there already, no numbers."""
+        """IMU samples not used: from before the base, there already, no numbers."""
         self.failures = 0
         """Times the estimate was thrown away: singular, not finite, or asleep for too long."""
         self.reset()
 
     def reset(self) -> None:
         """Forget the estimate and the samples; the counts stay."""
-        self._filter = OutOfSequenceEkf(self._config)
+        self._track = PaperTrack(self._config)
         self._started = False
         self._rejections, self._t_pose = 0, -np.inf
         self.nis = float("nan")
@@ -77,7 +76,7 @@ class PaperEkf:
     @property
     def health(self) -> Health:
         """Telemetry."""
-        x = self._filter.now.x
+        x = self._track.now.x
         return Health(
             fused=self.fused,
             dropped=self.dropped,
@@ -91,23 +90,25 @@ class PaperEkf:
     def covariance(self) -> Array:
         """(6, 6) of (δp in c [m], θ in b [rad]) with R = R̂ Exp(θ), at the last `state`."""
         C = np.empty((6, 6))
-        seen_pose(self._filter.now.x, self._filter.now.P, np.empty((3, 3)), C)
+        seen_pose(self._track.now.x, self._track.now.P, np.empty((3, 3)), C)
         return C
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
-        self._remember(sample.t, PHONE, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
+        rate, force = sample.omega_m_cf_in_c, sample.a_m_cf_in_c
+        self._remember(self._track.phone, sample.t, rate, force)
 
     def add_body_imu(self, sample: BodyImu) -> None:
         """Remember a sample of the robot, in any order; what can't be used is counted."""
-        self._remember(sample.t, BODY, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+        rate, force = sample.omega_m_bf_in_b, sample.a_m_bf_in_b
+        self._remember(self._track.body, sample.t, rate, force)
 
-    def _remember(self, t: float, kind: int, rate: Array, force: Array) -> None:
+    def _remember(self, stream: ImuStream, t: float, rate: Array, force: Array) -> None:
         if rate.shape != (3,) or force.shape != (3,) or not are_finite(t, rate, force):
             self.samples_invalid += 1
-        elif self._started and t <= self._filter.checkpoint.t:
+        elif self._started and t <= self._track.base.t:
             self.samples_late += 1
-        elif not self._filter.insert(t, kind, rate, force):
+        elif not self._track.insert(stream, t, rate, force):
             self.samples_duplicate += 1
 
     def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
@@ -142,10 +143,10 @@ class PaperEkf:
 
     def _compare(self, seen: PoseMeasurement) -> Fusion:
         """Fuse, gate, or begin again: after a failure, or when the gate was shut too often."""
-        if seen.t < self._filter.checkpoint.t:
+        if seen.t < self._track.base.t:
             return Fusion.LATE
         self._t_pose = seen.t
-        self.nis = self._filter.fuse(seen, self._config.gate_chi2)
+        self.nis = self._track.fuse(self._track.predicted(seen.t), seen, 1)
         if self.nis <= self._config.gate_chi2:
             self._rejections = 0
             return Fusion.FUSED
@@ -158,19 +159,16 @@ class PaperEkf:
 
     def _start(self, seen: PoseMeasurement) -> Fusion:
         """Begin at a pose: rates and forces from the nearest samples, the body at rest in f."""
-        history = self._filter.history
-        body, phone = history.nearest(seen.t, BODY), history.nearest(seen.t, PHONE)
+        body, phone = self._track.body.near(seen.t), self._track.phone.near(seen.t)
         self._started = False
-        if min(body, phone) < 0:
-            return Fusion.WAITING
-        if np.abs(history.times[[body, phone]] - seen.t).max() > START_GAP_S:
+        if body is None or phone is None:
             return Fusion.WAITING
         x, P = np.zeros(N), np.diag(initial_variances(self._config))
         x[States.pose], P[States.pose, States.pose] = seen.y, seen.C
-        x[States.omega_bf_in_b], x[States.a_bf_in_b] = np.split(history.values[body], 2)
-        x[States.omega_cf_in_c], x[States.a_cf_in_c] = np.split(history.values[phone], 2)
+        x[States.omega_bf_in_b], x[States.a_bf_in_b] = np.split(body, 2)
+        x[States.omega_cf_in_c], x[States.a_cf_in_c] = np.split(phone, 2)
         x[States.v_bc_in_c] = -cross(x[States.omega_cf_in_c], seen.y[:3])
-        self._filter.begin(seen.t, x, P)
+        self._track.begin(Checkpoint(seen.t, x, np.eye(3), P, np.eye(3)))
         self._started, self._rejections, self._t_pose = True, 0, seen.t
         return Fusion.STARTED
 
@@ -182,9 +180,10 @@ class PaperEkf:
     def _keep_up(self, now: float) -> None:
         if not self._started:
             return
-        asleep = now - self._filter.checkpoint.t > MAX_SLEEP_S
-        if asleep or not self._filter.settle(now - self._config.horizon_s):
+        if now - self._track.base.t > MAX_SLEEP_S:
             self._give_up()
+        else:
+            self._track.settle(now - self._config.horizon_s)
 
     def state(self, now: float) -> RelativeState | None:
         """The estimate at time `now` [s].
@@ -194,17 +193,17 @@ class PaperEkf:
         Raises:
             ValueError: `now` is not a number, or before what was fused for good.
         """
-        earliest = max(self._t_pose, self._filter.checkpoint.t)
+        earliest = max(self._t_pose, self._track.newest.t)
         if not now >= earliest:
             raise ValueError(f"state at {now} s: time can't go back before {earliest} s")
         self._keep_up(now)
-        if self._started and not self._filter.to_now(now):
+        if self._started and not self._track.to_now(now):
             self._give_up()
         return self._seen(now) if self._started else None
 
     def _seen(self, now: float) -> RelativeState:
-        x, R_cb, C = self._filter.now.x, np.empty((3, 3)), np.empty((6, 6))
-        seen_pose(x, self._filter.now.P, R_cb, C)
+        x, R_cb, C = self._track.now.x, np.empty((3, 3)), np.empty((6, 6))
+        seen_pose(x, self._track.now.P, R_cb, C)
         p, omega_c = x[States.p_bc_in_c].copy(), x[States.omega_cf_in_c].copy()
         return RelativeState(
             t=now,
@@ -213,7 +212,7 @@ class PaperEkf:
             u_bf_in_c=x[States.v_bc_in_c] + cross(omega_c, p),
             omega_bf_in_b=x[States.omega_bf_in_b].copy(),
             omega_cf_in_c=omega_c,
-            R_ic=self._filter.now.R_ic.copy(),
+            R_ic=self._track.now.R_ic.copy(),
             sigma_p=largest_sigma(C, 0),
             sigma_theta=largest_sigma(C, 3),
             age=now - self._t_pose,

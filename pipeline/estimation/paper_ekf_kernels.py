@@ -12,7 +12,7 @@ from math import cos, sin
 import numpy as np
 
 from pipeline.frames import Array
-from pipeline.jit import numba
+from pipeline.so3_kernels import kernel
 
 N, MOVING, TOUCHED = 30, 12, 24
 """States; those with a derivative; those a derivative depends on."""
@@ -21,6 +21,8 @@ DELTA = 21
 MOVING_STATE = np.array([0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 13, 14])
 MIN_COS_PITCH = 0.02
 """Nearer than 1.1° to the singularity of roll, pitch, yaw the kernels give up."""
+BODY, PHONE = 0, 1
+"""Kinds of IMU."""
 MEASURED = np.array(
     [
         [[9, 24], [10, 25], [11, 26], [15, 27], [16, 28], [17, 29]],
@@ -28,9 +30,6 @@ MEASURED = np.array(
     ]
 )
 """(kind, component, 2): a gyroscope and accelerometer read the sum of these states. Eq. (9)."""
-
-kernel = numba.njit(cache=True, error_model="numpy")
-"""Compiled at the first call, then cached; a division by zero gives inf, not an exception."""
 
 
 def workspace() -> Array:

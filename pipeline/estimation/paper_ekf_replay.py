@@ -1,8 +1,4 @@
-"""The compiled filter of `paper_ekf`: prediction, updates and the replay of buffered IMU samples.
-
-Numba does not see that a function of another file changed: after editing `paper_ekf_kernels` delete
-`pipeline/estimation/__pycache__` (the tests compare what is compiled with `relative_model`).
-"""
+"""The compiled filter of `paper_ekf`: prediction, updates, and from IMU sample to IMU sample."""
 
 from __future__ import annotations
 
@@ -10,20 +6,21 @@ from math import ceil, cos, exp, pi, sin, sqrt
 
 import numpy as np
 
-from pipeline.estimation.imu_history import PHONE, Kinds
 from pipeline.estimation.paper_ekf_kernels import (
+    BODY,
     DELTA,
     MEASURED,
     MIN_COS_PITCH,
     MOVING,
+    PHONE,
     N,
-    kernel,
     rk4,
     rotation,
     spread,
     transition,
 )
 from pipeline.frames import Array
+from pipeline.so3_kernels import kernel, multiply, put_exp
 
 FAILED = -1
 """Of `replay`: near the singularity, or no longer numbers. x and P are then worthless."""
@@ -56,28 +53,6 @@ def predict(x: Array, P: Array, h: float, walk: Array, tau_delta: float, work: A
 
 
 @kernel
-def _turn(R: Array, wx: float, wy: float, wz: float, work: Array) -> None:
-    """R ← R Exp(w), w [rad] small but exact at any size."""
-    angle2 = wx * wx + wy * wy + wz * wz
-    angle = sqrt(angle2)
-    a = sin(angle) / angle if angle > 1e-6 else 1.0 - angle2 / 6.0
-    b = 2.0 * (sin(0.5 * angle) / angle) ** 2 if angle > 1e-6 else 0.5
-    E = work[0:3]
-    E[0, 0], E[1, 1], E[2, 2] = (
-        1 - b * (wy**2 + wz**2),
-        1 - b * (wx**2 + wz**2),
-        1 - b * (wx**2 + wy**2),
-    )
-    E[0, 1], E[1, 0] = b * wx * wy - a * wz, b * wx * wy + a * wz
-    E[0, 2], E[2, 0] = b * wx * wz + a * wy, b * wx * wz - a * wy
-    E[1, 2], E[2, 1] = b * wy * wz - a * wx, b * wy * wz + a * wx
-    for i in range(3):
-        r0, r1, r2 = R[i, 0], R[i, 1], R[i, 2]
-        for j in range(3):
-            R[i, j] = r0 * E[0, j] + r1 * E[1, j] + r2 * E[2, j]
-
-
-@kernel
 def _carry(
     x: Array, P: Array, R_ic: Array, h: float, walk: Array, steps: Array, work: Array
 ) -> bool:
@@ -85,12 +60,14 @@ def _carry(
     if h <= 0.0:
         return True
     n = max(1, ceil(h / steps[0] - 1e-6))
-    dt = h / n
+    dt, step, turned = h / n, np.empty((3, 3)), np.empty((3, 3))
     for _ in range(n):
         k = 0.5 * dt
         turn0, turn1, turn2 = x[12] + k * x[21], x[13] + k * x[22], x[14] + k * x[23]
         predict(x, P, dt, walk, steps[1], work)
-        _turn(R_ic, dt * turn0, dt * turn1, dt * turn2, work)
+        put_exp(dt * turn0, dt * turn1, dt * turn2, step)
+        multiply(R_ic, step, turned)
+        R_ic[:] = turned
         if not cos(x[4]) > MIN_COS_PITCH:
             return False
     return True
@@ -137,9 +114,10 @@ def replay(
     P: Array,
     R_ic: Array,
     span: tuple[float, float],
-    times: Array,
-    kinds: Kinds,
-    values: Array,
+    t_b: Array,
+    v_b: Array,
+    t_c: Array,
+    v_c: Array,
     r: Array,
     walk: Array,
     steps: Array,
@@ -147,22 +125,29 @@ def replay(
 ) -> int:
     """Carry x, P from span[0] to span[1], fusing the samples in between.
 
-    The samples are sorted by time; `r` (2, 6) are the variances by kind; `steps` = (longest step,
-    fading time of δ_c) [s]. R_ic gathers the camera's rotation since the phone's last sample.
-    Gives FAILED or how many samples were used.
+    Samples of the body (n,), (n, 6) and of the phone (m,), (m, 6) are sorted by time; `r` (2, 6)
+    are their variances; `steps` = (longest step, fading time of δ_c) [s]. R_ic gathers the camera's
+    rotation since the phone's last sample. Gives FAILED or how many samples were used.
     """
     t, t_end = span
-    first = np.searchsorted(times, t, side="right")
+    b, c = np.searchsorted(t_b, t, side="right"), np.searchsorted(t_c, t, side="right")
     used = 0
-    for n in range(first, times.shape[0]):
-        if times[n] > t_end:
+    while True:
+        next_b = t_b[b] if b < t_b.shape[0] else np.inf
+        next_c = t_c[c] if c < t_c.shape[0] else np.inf
+        if min(next_b, next_c) > t_end:
             break
-        if not _carry(x, P, R_ic, times[n] - t, walk, steps, work):
+        kind = BODY if next_b <= next_c else PHONE
+        until = min(next_b, next_c)
+        if not _carry(x, P, R_ic, until - t, walk, steps, work):
             return FAILED
-        t = times[n]
-        if not fuse_imu(x, P, kinds[n], values[n], r[kinds[n]], work):
+        t = until
+        if not fuse_imu(x, P, kind, v_b[b] if kind == BODY else v_c[c], r[kind], work):
             return FAILED
-        if kinds[n] == PHONE:
+        if kind == BODY:
+            b += 1
+        else:
+            c += 1
             R_ic[:] = np.eye(3)
         used += 1
     if not _carry(x, P, R_ic, t_end - t, walk, steps, work):

@@ -14,12 +14,12 @@ import numpy as np
 
 from pipeline.estimator_config import GravityTestConfig
 from pipeline.frames import GRAVITY, Array, skew
+from pipeline.imu_stream import MAX_GAP_S
 
 SPAN: Final = 20
 """Samples between two looks at gravity: a third of a second."""
 ENDS: Final = 4
 """Samples that are averaged at each end."""
-MAX_GAP_S: Final = 0.1
 MAX_SHAKE: Final = 1.0
 """[m/s²] beside gravity: says nothing of its direction."""
 

@@ -6,13 +6,12 @@ from math import sqrt
 
 import numpy as np
 
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_OFFSET, N
 from pipeline.frames import Array
 from pipeline.signals import Flags
 from pipeline.so3_kernels import kernel, put_exp
 
-NEAREST_M = 0.1
-"""Nearer than this to the picture's plane an LED has no place in the picture."""
 TOUCHED = np.array([0, 1, 2, 3, 4, 5, OFFSET])
 """Error states that a picture depends on: δp, θ, and its time."""
 

@@ -1,6 +1,6 @@
 """The default estimator: LED rays and two IMUs in an error-state filter on SO(3), 22 states.
 
-`gravity_free` says what moves, `relative_track` when each picture is fused, this file what to
+`gravity_free` says what moves, `out_of_sequence` when each picture is fused, this file what to
 believe: where to start, which pictures to refuse, when to begin again, and how much is known.
 """
 
@@ -14,19 +14,19 @@ import numpy as np
 
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
 from pipeline.estimation.estimator import Fusion, Health
-from pipeline.estimation.imu_history import ImuHistory
+from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
 from pipeline.estimation.relative_start import (
     Learnt,
     can_start,
-    first_anchor,
-    has_samples_near,
+    first_checkpoint,
     is_better_start,
 )
-from pipeline.estimation.relative_track import Checkpoint, RelativeTrack
+from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_felt
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
+from pipeline.imu_stream import ImuStream
 from pipeline.signals import BodyImu, PhoneImu, RelativeState, VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
 from pipeline.timing.offset_watch import OffsetMonitor
@@ -80,12 +80,12 @@ class RelativeFilter:
         rate, force = sample.omega_m_bf_in_b, sample.a_m_bf_in_b
         self._remember(self._track.body, sample.t, rate, force)
 
-    def _remember(self, history: ImuHistory, t: float, rate: Array, force: Array) -> None:
+    def _remember(self, stream: ImuStream, t: float, rate: Array, force: Array) -> None:
         if not is_felt(t, rate, force) or t > self._now + MAX_SLEEP_S:
             self.samples_invalid += 1
-        elif self._started and t <= self._track.checkpoints[0].t:
+        elif self._started and t <= self._track.base.t:
             self.samples_late += 1
-        elif not self._track.insert(history, t, rate, force):
+        elif not self._track.insert(stream, t, rate, force):
             self.samples_duplicate += 1
 
     def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
@@ -111,7 +111,7 @@ class RelativeFilter:
         if not self._started:
             return self._start(seen, now)
         t = seen.t + float(self._track.newest.x[X_OFFSET])
-        if t <= self._track.checkpoints[0].t:
+        if t <= self._track.base.t:
             return Fusion.LATE
         # gating in this order: a prediction too unsure to gate by is replaced, not corrected; then
         # what the sensors may be off by inflates it, before each LED is gated against it
@@ -120,8 +120,10 @@ class RelativeFilter:
             return Fusion.STARTED
         return self._fuse(seen, predicted, now)
 
-    def _doubted(self, seen: VisionMeasurement, predicted: Checkpoint) -> float:
-        """Covariance inflation of the prediction for this picture; learns of the sensors."""
+    def _inflation(
+        self, seen: VisionMeasurement, predicted: Checkpoint[VisionMeasurement]
+    ) -> float:
+        """How far what is predicted must be doubted for this picture; learns of the sensors."""
         dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
             return 1.0
@@ -130,11 +132,13 @@ class RelativeFilter:
         self._track.doubt_phone(self._adaptive_noise.factor)
         return inflation
 
-    def _fuse(self, seen: VisionMeasurement, checkpoint: Checkpoint, now: float) -> Fusion:
+    def _fuse(
+        self, seen: VisionMeasurement, here: Checkpoint[VisionMeasurement], now: float
+    ) -> Fusion:
         """Fuse, or begin again when too many pictures in a row didn't fit."""
-        chi2 = self._track.fuse(checkpoint, seen, self._doubted(seen, checkpoint))
+        chi2 = self._track.fuse(here, seen, len(seen.rays), self._inflation(seen, here))
         self._recent.append(seen.t)
-        used = int((checkpoint.use == 1).sum()) if checkpoint.use is not None else 0
+        used = int((here.use == 1).sum()) if here.use is not None else 0
         self.leds_rejected += len(seen.rays) - used
         # soundness before statistics: NaN must reach neither χ² nor the counts of misses
         if not np.isfinite(chi2):
@@ -162,11 +166,11 @@ class RelativeFilter:
         """Begin at a pose, the body at rest in f; what was learnt of the sensors stays."""
         if not can_start(seen, self._config):
             return Fusion.BLIND
-        if not has_samples_near(self._track, seen.t):
+        if self._track.body.near(seen.t) is None or self._track.phone.near(seen.t) is None:
             return Fusion.WAITING
         if self._started:
             self._keep_learnt(seen.t)
-        self._track.begin(first_anchor(seen, self._learnt, now, self._config))
+        self._track.begin(first_checkpoint(seen, self._learnt, now, self._config))
         self._started, self._misses = True, 0
         self._t_seen = self._t_start = seen.t
         self._recent.append(seen.t)
@@ -188,7 +192,7 @@ class RelativeFilter:
         self._now = now
         if not self._started:
             return
-        if now - self._track.checkpoints[0].t > MAX_SLEEP_S:
+        if now - self._track.base.t > MAX_SLEEP_S:
             self._give_up()
         else:
             self._track.settle(now - self._config.horizon_s)

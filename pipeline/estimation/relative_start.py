@@ -6,16 +6,14 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.ray_kernels import NEAREST_M
-from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
-from pipeline.estimation.relative_track import Checkpoint, RelativeTrack
+from pipeline.camera.lens_kernels import NEAREST_M
+from pipeline.estimation.out_of_sequence import Checkpoint
+from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET, N, X
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 from pipeline.signals import VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
 
-START_GAP_S: Final = 0.1
-"""A start needs samples of both IMUs so close to the picture."""
 LOST: Final = 0.1
 """Doubt of the place, by its distance, or of the attitude [rad], beyond which a picture's own pose
 is the better start: what the LEDs say of an error so large isn't linear in it."""
@@ -43,18 +41,9 @@ def is_better_start(seen: VisionMeasurement, P: Array, config: RelativeConfig) -
     )
 
 
-def has_samples_near(track: RelativeTrack, t: float) -> bool:
-    """Whether both IMUs were heard about `t` [s]."""
-    for history in (track.body, track.phone):
-        near = history.nearest(t, 0)
-        if near < 0 or abs(history.times[near] - t) > START_GAP_S:
-            return False
-    return True
-
-
-def first_anchor(
+def first_checkpoint(
     seen: VisionMeasurement, learnt: Learnt | None, now: float, config: RelativeConfig
-) -> Checkpoint:
+) -> Checkpoint[VisionMeasurement]:
     """The body at rest in f at the pose of `seen`; what was `learnt` of the sensors stays.
 
     Raises:
@@ -62,19 +51,19 @@ def first_anchor(
     """
     if seen.pose is None:
         raise ValueError("a start needs a pose")
-    checkpoint = Checkpoint.empty()
+    start: Checkpoint[VisionMeasurement] = Checkpoint.empty(X, N)
     if learnt is not None:
-        checkpoint.x[X_BIASES:], checkpoint.P[BIASES:, BIASES:] = learnt
+        start.x[X_BIASES:], start.P[BIASES:, BIASES:] = learnt
     else:
-        checkpoint.P[BIASES:, BIASES:] = np.diag(_initial_variances(config))
+        start.P[BIASES:, BIASES:] = np.diag(_initial_variances(config))
         if seen.offset is not None:
-            checkpoint.x[X_OFFSET] = seen.offset.value
-            checkpoint.P[OFFSET, OFFSET] = seen.offset.sigma**2
-    checkpoint.t = min(seen.t + float(checkpoint.x[X_OFFSET]), now)
-    checkpoint.x[0:3], checkpoint.R[:] = seen.pose.p_bc_in_c, seen.pose.R_cb
-    checkpoint.P[:6, :6] = config.start_doubt**2 * seen.pose.covariance
-    checkpoint.P[6:9, 6:9] = config.initial_u**2 * np.eye(3)
-    return checkpoint
+            start.x[X_OFFSET] = seen.offset.value
+            start.P[OFFSET, OFFSET] = seen.offset.sigma**2
+    start.t = min(seen.t + float(start.x[X_OFFSET]), now)
+    start.x[0:3], start.R[:] = seen.pose.p_bc_in_c, seen.pose.R_cb
+    start.P[:6, :6] = config.start_doubt**2 * seen.pose.covariance
+    start.P[6:9, 6:9] = config.initial_u**2 * np.eye(3)
+    return start
 
 
 def _initial_variances(c: RelativeConfig) -> Array:

@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.rate_axes import MAX_GAP_S, WAYS, RateAxes, words
+from pipeline.estimation.rate_axes import WAYS, RateAxes, words
 from pipeline.estimator_config import GravityTestConfig
-from pipeline.frames import GRAVITY, Array, R_cd, R_from_wxyz, log, rotation_about_x
-from pipeline.timing.attitude_buffer import AttitudeBuffer
+from pipeline.frames import GRAVITY, Array, R_cd, log, rotation_about_x
+from pipeline.imu_stream import MAX_GAP_S, ImuStream
 
 WAIT = "The phone's motion sensors are being checked: a second."
 G_UNITS = "The phone's acceleration comes in g instead of m/s²: use another browser."
@@ -61,7 +61,7 @@ class SensorValidation:
         """Begin with nothing tested."""
         self._config = config
         self._rates = RateAxes(config)
-        self._body = AttitudeBuffer()
+        self._body = ImuStream()
         self._felt: deque[tuple[float, Array]] = deque(maxlen=SUMS)
         self._omega = np.zeros(3)
         self._screen_angle_deg = 0
@@ -98,8 +98,7 @@ class SensorValidation:
 
     def add_body(self, t: float, omega_bf_in_b: Array) -> None:
         """Take a rate (3,) of the robot [rad/s]: so its own turns are no turns of the phone."""
-        if not self._body.add(t, omega_bf_in_b):
-            self._last_pose = None
+        self._body.insert(t, omega_bf_in_b, np.zeros(3))
 
     def add_pose(self, t: float, R_cb: Array, up_in_b: Array) -> None:
         """Take a pose (3, 3) that a picture gave at `t` [s], and the body's own vertical (3,)."""
@@ -123,8 +122,7 @@ class SensorValidation:
         self._last_pose = (t, R_cb)
         if last is None or not 0.0 < t - last[0] < 2.0 * span or not self._covers(last[0], t):
             return
-        before, after = (R_from_wxyz(q) for q in self._body.at(np.array([last[0], t])))
-        turn_in_c = log(last[1] @ before.T @ after @ R_cb.T)
+        turn_in_c = log(last[1] @ self._body.turn(last[0], t) @ R_cb.T)
         times = np.array([time for time, _ in self._felt])
         sums = np.array([turned for _, turned in self._felt])
         felt = [float(np.diff(np.interp((last[0], t), times, column))[0]) for column in sums.T]

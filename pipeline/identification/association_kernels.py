@@ -11,14 +11,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel
 
 Integers = npt.NDArray[np.int64]
-CANDIDATES = 60
-BINS = 128
-NEAR_M = 0.1
-"""No LED is nearer to the camera."""
+CANDIDATES = 60  # spots, at most
+BINS = 128  # by axis
 
 
 class BinnedSpots(NamedTuple):
@@ -100,7 +99,7 @@ def is_complete(
     missed = 0
     for k in range(leds.shape[0]):
         x, y, z = place(p, R, leds, k)
-        if x < NEAR_M:
+        if x < NEAREST_M:
             return False
         spot, _ = nearest(y, z, reach, lights)
         if spot < 0:
@@ -121,7 +120,7 @@ def name_near(
         names[k] = -1
     for k in range(leds.shape[0]):
         x, y, z = place(p, R, leds, k)
-        if x < NEAR_M:
+        if x < NEAREST_M:
             return 0
         spot, d2 = nearest(y, z, reach, lights)
         for other in range(k):  # a spot is one LED: the nearer one

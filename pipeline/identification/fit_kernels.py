@@ -6,8 +6,9 @@ from math import acos, cos, sqrt
 
 import numpy as np
 
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
-from pipeline.identification.association_kernels import NEAR_M, BinnedSpots, Integers, place
+from pipeline.identification.association_kernels import BinnedSpots, Integers, place
 from pipeline.linear_kernels import cholesky, solve_by
 from pipeline.so3_kernels import kernel, multiply, put_exp
 
@@ -57,7 +58,7 @@ def _linearised(
         if names[k] < 0 or k == without:
             continue
         at = place(p, R, leds, k)
-        if at[0] < NEAR_M:
+        if at[0] < NEAREST_M:
             return -1.0
         _add(R, leds, k, at, row, A)
         for r in range(2):

@@ -15,9 +15,9 @@ from pipeline.frames import Array
 from pipeline.identification.association_kernels import BinnedSpots, is_complete, name_near
 from pipeline.identification.initialisation_kernels import (
     BOUNDED,
-    FARTHEST_M,
     LOOKED,
-    NEAREST_M,
+    MAX_RANGE_M,
+    MIN_RANGE_M,
     Wanted,
     Work,
     consider,
@@ -100,7 +100,7 @@ def _placed(
         return False
     for i in range(3):
         p[i] = s * d[i] - arms[0, i]
-    near_enough: bool = NEAREST_M < p[0] < FARTHEST_M
+    near_enough: bool = MIN_RANGE_M < p[0] < MAX_RANGE_M
     return near_enough
 
 

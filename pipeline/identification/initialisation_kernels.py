@@ -26,7 +26,7 @@ the logarithm of how many as good ones chance would give, place, attitude by row
 ROW = NAMES + MOST_LEDS
 FIT_COST = 25
 """Of a fit, in looks."""
-NEAREST_M, FARTHEST_M = 0.3, 12.0
+MIN_RANGE_M, MAX_RANGE_M = 0.3, 12.0
 FIRST_PX = 12.0
 """A hypothesis that misses by more after its first fit is none."""
 SUSPICIOUS_PX, EXPOSED = 0.5, 0.25
@@ -128,7 +128,7 @@ def consider(
             return
     if wanted.turn_rad < pi and not is_turned_less(R, wanted.R_cb, wanted.turn_rad):
         return
-    if NEAREST_M < p[0] < FARTHEST_M and _are_alike(p, R, names, wanted, lights):
+    if MIN_RANGE_M < p[0] < MAX_RANGE_M and _are_alike(p, R, names, wanted, lights):
         _keep(p, R, names, squared_px, tilt, wanted, lights, work)
 
 

@@ -20,10 +20,10 @@ from pipeline.identification.association_kernels import (
 )
 from pipeline.identification.initialisation_kernels import (
     BOUNDED,
-    FARTHEST_M,
     FEW_PX,
     LOOKED,
-    NEAREST_M,
+    MAX_RANGE_M,
+    MIN_RANGE_M,
     Wanted,
     Work,
     consider,
@@ -101,7 +101,7 @@ def _try_triple(
     names = np.empty(leds.shape[0], dtype=np.int64)
     for root in range(p3p(c.rays, c.points, c.triad, SPLIT, c.ps, c.Rs)):
         p, R = c.ps[root], c.Rs[root]
-        if not NEAREST_M < p[0] < FARTHEST_M:
+        if not MIN_RANGE_M < p[0] < MAX_RANGE_M:
             continue
         if not is_complete(p, R, leds, leds.shape[0] - wanted.least, reach, lights):
             continue

@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE
+from pipeline.camera.lens_kernels import CUBE, NEAREST_M, OUT_1, OUT_2, TABLE
 from pipeline.frames import Array
 from pipeline.jit import numba
 from pipeline.linear_kernels import cholesky, solve_by
@@ -14,7 +14,6 @@ from pipeline.so3_kernels import kernel, multiply, put_exp
 
 ITERATIONS = 10
 CONVERGED = 1e-10
-NEAREST_M = 0.05
 LONGEST_STEP = 1.0
 """Metres or radians; longer, and half as long is tried."""
 

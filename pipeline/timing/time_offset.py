@@ -18,14 +18,8 @@ import numpy.typing as npt
 
 from pipeline.estimator_config import TimeOffsetConfig
 from pipeline.frames import Array, R_from_wxyz, wxyz_from_R
-from pipeline.signals import BodyImu, PhoneImu
-from pipeline.timing.attitude_buffer import (
-    AttitudeBuffer,
-    conjugate,
-    matrices,
-    product,
-    small_vectors,
-)
+from pipeline.imu_stream import ImuStreams
+from pipeline.timing.quaternions import conjugate, matrices, product, small_vectors
 
 PARAMETERS: Final = 7
 """Constant attitude, bias of the body's gyroscope, offset."""
@@ -63,39 +57,21 @@ class _AttitudeByShift:
 
 
 class TimeOffset:
-    """Streaming: feed it all, ask it now and then."""
+    """Streaming: give it all pictures, ask it now and then."""
 
-    def __init__(self, config: TimeOffsetConfig) -> None:
-        """Knows nothing."""
-        self._config = config
+    def __init__(self, config: TimeOffsetConfig, imus: ImuStreams) -> None:
+        """Begin without a picture; somebody else fills `imus`."""
+        self._config, self._imus = config, imus
         steps = round(config.reach_s / config.step_s)
         self._shifts: Array = config.step_s * np.arange(-steps, steps + 1, dtype=np.float64)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all samples and pictures."""
-        self._phone, self._body = AttitudeBuffer(), AttitudeBuffer()
+        self._gap_end = np.inf
+        """Of the last gap of either gyroscope [s]."""
         self._waiting: deque[tuple[float, Array, Array]] = deque(maxlen=32)
         self._seen: deque[_AttitudeByShift] = deque()
         self._new = 0
         self._offset: Offset | None = None
         self.reason = WAITING
         """Why there is no estimate; empty if there is."""
-
-    def add_phone_imu(self, sample: PhoneImu) -> None:
-        """Take a sample; those not newer than the last are ignored."""
-        if not self._phone.add(sample.t, sample.omega_m_cf_in_c):
-            self._begin_again()
-
-    def add_body_imu(self, sample: BodyImu) -> None:
-        """Take a sample; those not newer than the last are ignored."""
-        if not self._body.add(sample.t, sample.omega_m_bf_in_b):
-            self._begin_again()
-
-    def _begin_again(self) -> None:
-        """Forget what lies before a gap: nothing fits across it."""
-        self._seen.clear()
-        self._new = self._config.every
 
     def add_pose(self, t: float, R_cb: Array, covariance: Array | None = None) -> None:
         """Take a picture's attitude with its stamp `t` [s].
@@ -121,19 +97,23 @@ class TimeOffset:
 
     def _take_in(self) -> None:
         """Pictures whose neighbourhood both gyroscopes have covered by now."""
-        reach, config = self._config.reach_s, self._config
-        until = min(self._phone.newest, self._body.newest)
-        since = max(self._phone.oldest, self._body.oldest)
+        reach, config, phone, body = self._config.reach_s, self._config, *self._imus.both
+        until, since = min(phone.newest, body.newest), max(phone.oldest, body.oldest)
+        gap_end = max(phone.gap_end, body.gap_end)
+        if gap_end != self._gap_end and self._seen:  # nothing fits across a gap
+            self._seen.clear()
+            self._new = config.every
+        self._gap_end = gap_end
         while self._waiting and self._waiting[0][0] + reach <= until:
             t, wxyz_cb, C_in_c = self._waiting.popleft()
             if t - reach < since or (self._seen and t <= self._seen[-1].t):
                 continue
             times = t + self._shifts
-            camera, body = self._phone.at(times), self._body.at(times)
-            wxyz = product(product(camera, wxyz_cb), conjugate(body))
+            from_camera, from_body = phone.attitudes(times), body.attitudes(times)
+            wxyz = product(product(from_camera, wxyz_cb), conjugate(from_body))
             middle = len(times) // 2
-            R_ic = R_from_wxyz(camera[middle])
-            self._seen.append(_AttitudeByShift(t, wxyz, body[middle], R_ic @ C_in_c @ R_ic.T))
+            R_ic = R_from_wxyz(from_camera[middle])
+            self._seen.append(_AttitudeByShift(t, wxyz, from_body[middle], R_ic @ C_in_c @ R_ic.T))
             self._new += 1
         while self._seen and self._seen[0].t < self._seen[-1].t - config.window_s:
             self._seen.popleft()

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens import Camera
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
 from pipeline.prediction import Prediction
 from pipeline.signals import Match, Spots
@@ -18,7 +19,6 @@ from pipeline.vision_config import IdentifyConfig
 
 Names = frozenset[tuple[int, int]]
 """Pairs of an LED and a spot."""
-NEAREST_M = 0.1
 MANY = 3
 """So many LEDs that shift together leave no doubt which shift it was."""
 SIZE_RATIO = 3.0

@@ -7,14 +7,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE, VECTOR, bend, put_slope, unbend
+from pipeline.camera.lens_kernels import (
+    CUBE,
+    NEAREST_M,
+    OUT_1,
+    OUT_2,
+    TABLE,
+    VECTOR,
+    bend,
+    put_slope,
+    unbend,
+)
 from pipeline.frames import Array
 from pipeline.identification.reported_covariance_kernels import put_shared
 from pipeline.jit import numba
 from pipeline.so3_kernels import kernel, turn
 from pipeline.spots.centroid_kernels import S_UU, S_UV, S_VV
 from pipeline.vision.predicted_windows_kernels import (
-    NEAREST_M,
     OMEGA_B,
     OMEGA_C,
     led_at,

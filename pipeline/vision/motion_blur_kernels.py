@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.camera.lens_kernels import OUT_1, TABLE, VECTOR, bend
+from pipeline.camera.lens_kernels import NEAREST_M, OUT_1, TABLE, VECTOR, bend
 from pipeline.frames import Array
 from pipeline.jit import numba
 from pipeline.spots.centroid_kernels import AREA, UU, UV, VV, U, V
-from pipeline.vision.predicted_windows_kernels import NEAREST_M, led_at
+from pipeline.vision.predicted_windows_kernels import led_at
 
 STEP_S = 1e-3
 SLOPES = 10

@@ -13,7 +13,7 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.camera.lens_kernels import OUT_2, OUT_3, TABLE, VECTOR, bend
+from pipeline.camera.lens_kernels import NEAREST_M, OUT_2, OUT_3, TABLE, VECTOR, bend
 from pipeline.frames import Array
 from pipeline.jit import numba
 from pipeline.signals import Image
@@ -26,7 +26,6 @@ MOTION = 16  # numbers of a motion
 OMEGA_C, OMEGA_B = 1, 7  # where its rates begin
 ROW_ITERATIONS = 3
 """A point's row says when it was read, and the time says its row."""
-NEAREST_M = 0.1
 EDGE_PX, LEAST_HALF_PX = 2.0, 5.0
 
 

@@ -6,6 +6,7 @@ before it, and `lightleash locate` files.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,6 +18,7 @@ from pipeline.camera.exposure import ExposureMonitor
 from pipeline.camera.lens import Camera
 from pipeline.camera.line_delay import LineDelay
 from pipeline.frames import Array
+from pipeline.imu_stream import CAPACITY, ImuStreams
 from pipeline.prediction import Prediction, PredictionHistory
 from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose, Spots
 from pipeline.timing.camera_imu_delay import CameraImuDelay
@@ -49,10 +51,12 @@ class VisualFrontEnd:
         self.camera = camera
         self._gates, self._clock, self._leds_in_b = gates, clock, leds_in_b
         self._vision = Vision(camera, leds_in_b)
-        self._phone, self._body = ImuBuffer(), ImuBuffer()
-        self._predictions, self._stamps = PredictionHistory(), CameraImuDelay()
+        self._waiting: deque[PhoneImu | BodyImu] = deque(maxlen=CAPACITY)
+        imus = ImuStreams()
+        self._phone, self._body = ImuBuffer(imus.phone), ImuBuffer(imus.body)
+        self._predictions, self._stamps = PredictionHistory(), CameraImuDelay(imus)
         self.monitor, self.readout = (
-            CalibrationMonitor(camera, leds_in_b),
+            CalibrationMonitor(camera, leds_in_b, imus),
             LineDelay(camera.readout_s),
         )
         self.exposure, self.repeats = ExposureMonitor(camera.focal_px), RepeatedFrames()
@@ -61,14 +65,8 @@ class VisualFrontEnd:
         self._t_doubt = -np.inf
 
     def add_imu(self, *samples: PhoneImu | BodyImu) -> None:
-        """Follow the motion of phone and robot: of each, samples in the order of time."""
-        for sample in samples:
-            if isinstance(sample, PhoneImu):
-                self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
-            else:
-                self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
-            self._stamps.add_imu(sample)
-            self.monitor.add_imu(sample)
+        """Follow the motion of phone and robot; any thread may say it, the next frame heeds it."""
+        self._waiting.extend(samples)
 
     def add_prediction(self, expected: Prediction | None) -> None:
         """Follow what a filter says; None: it says nothing."""
@@ -103,6 +101,7 @@ class VisualFrontEnd:
 
     def prior(self, t: float) -> FramePrior:
         """What is known before a picture with stamp `t` [s] is looked at."""
+        self._take_in()
         phone = self._phone.at(t + self.offset_s)
         body = self._body.at(t + self.offset_s)
         return FramePrior(
@@ -112,6 +111,14 @@ class VisualFrontEnd:
             body.omega if body is not None else None,
             self._predictions.at(t),
         )
+
+    def _take_in(self) -> None:
+        while self._waiting:
+            sample = self._waiting.popleft()
+            if isinstance(sample, PhoneImu):
+                self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
+            else:
+                self._body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
 
     def _judged(self, detection: Detection, prior: FramePrior) -> Detection:
         if detection.pose is None:
@@ -172,10 +179,11 @@ def warm_up() -> None:
     K = np.array([[400.0, 0.0, 160.0], [0.0, 400.0, 120.0], [0.0, 0.0, 1.0]])
     leds = np.array([[0.1, 0.3, 0.2], [0.0, -0.3, 0.1], [-0.1, 0.2, -0.3], [0.2, -0.1, -0.2]])
     camera, place = Camera(320, 240, K, "plumb_bob", np.zeros(5)), np.array([2.5, 0.0, 0.0])
-    monitor, still = CalibrationMonitor(camera, leds), np.zeros(3)
+    imus, still = ImuStreams(), np.zeros(3)
+    monitor = CalibrationMonitor(camera, leds, imus)
     for k in range(160):
-        monitor.add_imu(PhoneImu(0.02 * k, still, still))
-        monitor.add_imu(BodyImu(0.02 * k, still, still))
+        imus.add(PhoneImu(0.02 * k, still, still))
+        imus.add(BodyImu(0.02 * k, still, still))
     tangents = (leds[:, 1:]) / (place[0] + leds[:, :1])
     C, names = np.tile(1e-6 * np.eye(2), (len(leds), 1, 1)), np.arange(len(leds))
     for k in range(30):

@@ -26,10 +26,9 @@ from hardware.sim.world.sensors import feed
 from hardware.sim.world.world import Occlusion, World, WorldOptions
 from pipeline.estimation import paper_ekf_replay as compiled
 from pipeline.estimation.estimators import warm_up
-from pipeline.estimation.imu_history import BODY, PHONE
-from pipeline.estimation.out_of_sequence import imu_variances, walk_densities
 from pipeline.estimation.paper_ekf import PaperEkf
-from pipeline.estimation.paper_ekf_kernels import workspace
+from pipeline.estimation.paper_ekf_kernels import BODY, PHONE, workspace
+from pipeline.estimation.paper_track import imu_variances, walk_densities
 from pipeline.estimation.relative_model import H_BODY, H_PHONE, H_POSE
 from pipeline.estimator_config import EkfConfig
 from tests.pipeline import dense_filter
@@ -70,7 +69,7 @@ def filter_in_flight():
 
 def step_cost(ekf):
     """µs of predict + update of all 18 measurements: compiled, plain numpy."""
-    x, P, work = ekf._filter.now.x.copy(), ekf._filter.now.P.copy(), workspace()
+    x, P, work = ekf._track.now.x.copy(), ekf._track.now.P.copy(), workspace()
     y_pose, y_body, y_phone = x[:6].copy(), H_BODY @ x, H_PHONE @ x
 
     def fast():
@@ -95,16 +94,16 @@ def costs():
     warm_up()
     ekf, now = filter_in_flight()
     fast, plain = step_cost(ekf)
-    late = ekf._filter
+    track = ekf._track
 
     def whole():
-        late._frontier_good = False
+        track._frontier.copy(track.newest)
         ekf.state(now)
 
     print(f"predict + update(18): {fast:.1f} µs; plain numpy {plain:.0f} µs = {plain / fast:.0f} ×")
-    replayed = 1e3 * (now - late.checkpoint.t)
+    replayed = 1e3 * (now - track.newest.t)
     print(f"state(now), {replayed:.0f} ms of both IMUs replayed: {median_us(whole, 1000):.0f} µs")
-    tail = 1e3 * (now - late._frontier.t)
+    tail = 1e3 * (now - track._frontier.t)
     usual = median_us(lambda: ekf.state(now), 2000)
     print(f"state(now), nothing out of order ({tail:.0f} ms replayed): {usual:.0f} µs")
 

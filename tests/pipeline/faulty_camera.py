@@ -12,6 +12,7 @@ from hardware.sim.world.world import GRID_S, LEDS_IN_B
 from pipeline.camera.block import LedObservation
 from pipeline.camera.calibration_monitor import CalibrationMonitor
 from pipeline.camera.lens import Camera
+from pipeline.imu_stream import ImuStreams
 from pipeline.signals import StampOffset
 
 FOCAL = 900.0
@@ -68,7 +69,8 @@ def watched(
     world, faults, seed=0, coarse=True, observe=lambda watch: None, spoil=lambda sample: sample
 ):
     """The watch after it has seen all; `observe` is asked after each picture."""
-    watch = CalibrationMonitor(CAMERA, LEDS_IN_B)
+    imus = ImuStreams()
+    watch = CalibrationMonitor(CAMERA, LEDS_IN_B, imus)
     phone = [
         (arrival, replace(sample, omega_m_cf_in_c=faults.gyro * sample.omega_m_cf_in_c))
         for arrival, sample in phone_samples(world)
@@ -81,7 +83,7 @@ def watched(
             watch.saw(event, offset if arrival > 4.0 else None)
             observe(watch)
         elif (sample := spoil(event)) is not None:
-            watch.add_imu(sample)
+            imus.add(sample)
     return watch
 
 

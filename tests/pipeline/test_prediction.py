@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.frames import exp
-from pipeline.prediction import MAX_GAP_S, REMEMBERED_S, Prediction, PredictionHistory
+from pipeline.imu_stream import MAX_GAP_S
+from pipeline.prediction import REMEMBERED_S, Prediction, PredictionHistory
 from pipeline.signals import RelativeState
 
 OMEGA, U, P = np.array([0.2, -0.5, 0.3]), np.array([0.4, 0.1, -0.2]), np.array([2.5, 0.1, 0.0])

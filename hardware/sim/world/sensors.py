@@ -15,8 +15,10 @@ import numpy as np
 
 from hardware.sim.world.rotations import exp_each, skew_each
 from hardware.sim.world.world import LEDS_IN_B, Flags, Indices, World
+from pipeline.config import PERIOD_S
 from pipeline.estimation.estimator import Estimator, Fusion
 from pipeline.frames import Array
+from pipeline.imu_stream import ImuStreams
 from pipeline.signals import (
     BodyImu,
     LedRays,
@@ -106,7 +108,7 @@ def events(world: World) -> list[Event]:
 
 
 def feed(
-    estimator: Estimator, world: World, period: float = 0.005, observe: Listener = _nobody
+    estimator: Estimator, world: World, period: float = PERIOD_S, observe: Listener = _nobody
 ) -> Iterator[tuple[float, RelativeState | None]]:
     """Run the estimator as the control loop does; gives (now, state) each period."""
     times = np.arange(0.1, world.t[-1], period).tolist()
@@ -115,10 +117,11 @@ def feed(
 
 def stamped(arriving: Iterable[Event]) -> Iterator[Event]:
     """The events, each picture with the coarse time offset found so far, as the server sends it."""
-    search = CameraImuDelay()
+    imus = ImuStreams()
+    search = CameraImuDelay(imus)
     for arrival, sample in arriving:
         if not isinstance(sample, VisionMeasurement):
-            search.add_imu(sample)
+            imus.add(sample)
             yield arrival, sample
             continue
         if sample.pose is not None:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.camera.lens import Camera
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
 from pipeline.signals import Image, RelativePose
 from server.tools.locate.work import Located
@@ -17,7 +18,6 @@ FOUND, OTHER, PLACED, WORDS = (120, 255, 80), (60, 160, 255), (255, 255, 0), (25
 AXES = ((60, 60, 255), (60, 255, 60), (255, 120, 60))
 """x red, y green, z blue; all colours are in OpenCV's order."""
 AXIS_M = 0.15
-NEAR_M = 0.05
 
 
 def draw(luma: Image, located: Located, camera: Camera, leds_in_b: Array) -> Picture:
@@ -63,7 +63,7 @@ def _projected(pose: RelativePose, points_in_b: Array, camera: Camera) -> Array:
     """Pixels (n, 2); NaN behind the camera or far outside the picture."""
     points = pose.p_bc_in_c + points_in_b @ pose.R_cb.T
     pixels = np.full((len(points), 2), np.nan)
-    ahead = points[:, 0] > NEAR_M
+    ahead = points[:, 0] > NEAREST_M
     pixels[ahead] = camera.pixels(points[ahead])
     far = np.abs(pixels) > 4 * max(camera.width, camera.height)
     return np.where(far, np.nan, pixels)

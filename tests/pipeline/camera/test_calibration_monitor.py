@@ -9,6 +9,7 @@ from hardware.sim.world.sensors import body_samples, phone_samples
 from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
 from pipeline.camera import verdict as camera_verdict
 from pipeline.camera.calibration_monitor import CalibrationMonitor
+from pipeline.imu_stream import ImuStreams
 from pipeline.signals import BodyImu, PhoneImu, RelativePose
 from pipeline.timing.camera_imu_delay import CameraImuDelay
 from tests.pipeline.faulty_camera import CAMERA, Faults, looks, watched
@@ -102,7 +103,7 @@ def test_a_hand_that_only_trembles_is_not_judged():
 
 
 def test_pictures_without_motion_samples_teach_nothing():
-    watch = CalibrationMonitor(CAMERA, LEDS_IN_B)
+    watch = CalibrationMonitor(CAMERA, LEDS_IN_B, ImuStreams())
     assert not any(watch.saw(look, None) for look in looks(world(), Faults()))
     assert watch.facts is None
 
@@ -143,15 +144,14 @@ def test_ten_minutes_of_usual_use_raise_no_false_alarm(seed, hand):
 @pytest.mark.parametrize("readout", [0.0, 0.03])
 def test_the_coarse_offset_of_the_stamps_bears_a_rolling_shutter_nobody_models(readout):
     """To 5 ms within 20 s of motion, poses untreated."""
-    search, samples = (
-        CameraImuDelay(),
-        sorted([*phone_samples(world()), *body_samples(world())], key=lambda event: event[0]),
-    )
+    imus = ImuStreams()
+    search = CameraImuDelay(imus)
+    samples = sorted([*phone_samples(world()), *body_samples(world())], key=lambda event: event[0])
     for look, arrival in zip(
         looks(world(), Faults(readout=readout)), world().pictures.arrival, strict=True
     ):
         while samples and samples[0][0] <= arrival:
-            search.add_imu(samples.pop(0)[1])
+            imus.add(samples.pop(0)[1])
         C = np.diag([*[1e-8] * 3, *[1e-6] * 3])
         search.saw(RelativePose(look.t, look.p_bc_in_c, look.R_cb, C, 0.1, 5))
     assert search.offset is not None

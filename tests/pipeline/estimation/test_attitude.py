@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.estimation.attitude import HAND_RATE, HAND_RATE_S, MAX_GAP_S, Attitude
+from pipeline.estimation.attitude import HAND_RATE, HAND_RATE_S, LOST_S, Attitude
 from pipeline.frames import GRAVITY, exp, log, rotation_about_z
 from pipeline.signals import PhoneImu
 
@@ -60,9 +60,9 @@ def test_old_samples_are_ignored_and_a_long_gap_starts_anew() -> None:
     attitude.add(sample(0.5, rotation_about_z(1.0), np.array([9.0, 9.0, 9.0])))
     np.testing.assert_allclose(attitude.R_fc, np.eye(3), atol=1e-12)
     turned = exp(np.array([0.5, 0.0, 0.0]))
-    attitude.add(PhoneImu(1.1 + MAX_GAP_S, np.zeros(3), np.zeros(3)))  # falls: says no tilt
+    attitude.add(PhoneImu(1.1 + LOST_S, np.zeros(3), np.zeros(3)))  # falls: says no tilt
     np.testing.assert_allclose(attitude.R_fc, np.eye(3), atol=1e-12)
-    attitude.add(sample(1.2 + MAX_GAP_S, turned, np.zeros(3)))
+    attitude.add(sample(1.2 + LOST_S, turned, np.zeros(3)))
     assert attitude.resets == 1
     np.testing.assert_allclose(attitude.up_in_c, turned.T @ UP, atol=1e-12)
 
@@ -159,7 +159,7 @@ def test_after_a_long_gap_the_heading_stays() -> None:
         R_fc = rotation_about_z(k * DT)
         attitude.add(sample(k * DT, R_fc, rate))
     later = R_fc @ exp(np.array([0.1, 0.0, 0.0]))
-    attitude.add(sample(1.1 + MAX_GAP_S, later, np.zeros(3)))
+    attitude.add(sample(1.1 + LOST_S, later, np.zeros(3)))
     assert attitude.R_fc is not None
     assert np.linalg.norm(log(attitude.R_fc.T @ later)) < 0.01
 

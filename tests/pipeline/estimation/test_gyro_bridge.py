@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.estimation.attitude import MAX_GAP_S, Attitude
+from pipeline.estimation.attitude import LOST_S, Attitude
 from pipeline.estimation.gyro_bridge import DRIFT, GyroBridge
 from pipeline.frames import GRAVITY, Array, exp, log
 from pipeline.signals import PhoneImu, RelativeState
@@ -84,7 +84,7 @@ def test_without_the_robots_gyroscope_the_phones_own_sensors_are_all_there_is() 
 def test_a_robot_not_seen_again_is_not_believed_for_ever() -> None:
     gap = Gap()
     gap.run(0.5, heard=False, sigma_theta=0.3)
-    gap.run(MAX_GAP_S - 0.6, sigma_theta=0.3)
+    gap.run(LOST_S - 0.6, sigma_theta=0.3)
     assert gap.attitude.sigma == pytest.approx(np.hypot(0.05, 0.3), rel=0.1)
     gap.run(1.1, sigma_theta=0.3)
     assert gap.attitude.sigma < 0.1

@@ -85,8 +85,8 @@ def test_old_news_is_dropped_and_counted():
     before = ekf.state(1.0)
     assert ekf.add_pose(pose(0.97, P0 + 0.01), 1.0) is Fusion.LATE
     assert ekf.add_pose(pose(1.2), 1.0) is Fusion.EARLY
-    ekf.add_phone_imu(PhoneImu(0.5, UP, UP))
-    ekf.add_body_imu(BodyImu(0.5, UP, UP))
+    ekf.add_phone_imu(PhoneImu(0.4, UP, UP))
+    ekf.add_body_imu(BodyImu(0.4, UP, UP))
     assert ekf.samples_late == 2
     assert_same(ekf.state(1.0), before, 1e-12)
     far = at_rest(1.0, pictures=False, ekf=at_rest(0.2), start=0.205)

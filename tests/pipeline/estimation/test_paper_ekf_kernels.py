@@ -5,8 +5,8 @@ import pytest
 
 from pipeline.estimation import paper_ekf_kernels as kernels
 from pipeline.estimation import paper_ekf_replay as compiled
-from pipeline.estimation.imu_history import BODY, PHONE
-from pipeline.estimation.out_of_sequence import imu_variances, walk_densities
+from pipeline.estimation.paper_ekf_kernels import BODY, PHONE
+from pipeline.estimation.paper_track import imu_variances, walk_densities
 from pipeline.estimation.relative_model import (
     H_BODY,
     H_PHONE,
@@ -107,7 +107,7 @@ def test_a_pose_beyond_the_gate_changes_nothing(filter_):
 
 
 def test_a_replay_is_the_dense_filter_from_sample_to_sample():
-    """This one also tells when Numba's cache is older than the kernels."""
+    """Of two samples at one time the body's comes first."""
     rng = np.random.default_rng(3)
     x, P = 0.3 * rng.normal(size=N), np.diag(rng.uniform(0.01, 0.1, N))
     times = np.array([0.002, 0.004, 0.004, 0.017, 0.018])
@@ -128,8 +128,9 @@ def test_a_replay_is_the_dense_filter_from_sample_to_sample():
             turned = np.eye(3) if kinds[k] == PHONE else turned
         t = stop
     work = kernels.workspace()
-    samples = (times, kinds, values, R_IMU, WALK, STEPS, work)
-    assert compiled.replay(x, P, R_ic, (0.003, t_end), *samples) == 4
+    body, phone = ((times[kinds == kind], values[kinds == kind]) for kind in (BODY, PHONE))
+    noise = (R_IMU, WALK, STEPS, work)
+    assert compiled.replay(x, P, R_ic, (0.003, t_end), *body, *phone, *noise) == 4
     assert close(x, xd)
     assert np.abs(P - Pd).max() < 1e-12
     assert close(R_ic, turned)
@@ -153,7 +154,7 @@ def test_the_seen_pose_and_its_largest_sigmas(filter_):
 def test_a_replay_with_absurd_numbers_fails_instead_of_giving_them_on(filter_, spoil):
     x, P, _ = filter_
     x[15] = spoil
-    none = np.zeros(0), np.zeros(0, dtype=np.int8), np.zeros((0, 6))
+    none = (np.zeros(0), np.zeros((0, 6))) * 2
     span, work = (0.0, 0.02), kernels.workspace()
     used = compiled.replay(x, P, np.eye(3), span, *none, R_IMU, WALK, STEPS, work)
     assert used == compiled.FAILED

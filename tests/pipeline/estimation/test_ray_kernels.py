@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.estimation import gravity_free, ray_kernels
 from pipeline.estimation.gravity_free import PredictedImu, RelativeMotion
 from pipeline.estimation.ray_kernels import TOUCHED, correct, fuse_rays, is_sound
@@ -169,7 +170,7 @@ def test_an_led_behind_the_picture_is_no_measurement():
     x[0] = 0.15
     before = P.copy()
     chi2, use = fuse(x, R, P, np.zeros((4, 2)), covariances(4))
-    behind = (x[0] + LEDS @ R.T[:, 0]) <= ray_kernels.NEAREST_M
+    behind = (x[0] + LEDS @ R.T[:, 0]) <= NEAREST_M
     assert behind.any()
     assert not use[behind].any()
     x[0] = -2.0

@@ -7,9 +7,10 @@ import pytest
 
 from hardware.sim.world.sensors import body_samples, phone_samples, pictures
 from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
+from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.ray_kernels import fuse_rays
-from pipeline.estimation.relative_kernels import BIASES, OFFSET
-from pipeline.estimation.relative_track import KEPT, Checkpoint, RelativeTrack
+from pipeline.estimation.relative_kernels import BIASES, OFFSET, N, X
+from pipeline.estimation.relative_track import KEPT, RelativeTrack
 from pipeline.estimator_config import RelativeConfig
 from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 
@@ -30,11 +31,11 @@ def begun(samples, config=OPEN):
     """A track that begins at the first picture after `START_S`; its time offset is known."""
     track = RelativeTrack(config, LEDS_IN_B)
     pose = next(s for s in samples if isinstance(s, VisionMeasurement) and s.t > START_S).pose
-    checkpoint = Checkpoint.empty()
-    checkpoint.t, checkpoint.x[:3], checkpoint.R[:] = pose.t, pose.p_bc_in_c, pose.R_cb
-    checkpoint.P[:6, :6], checkpoint.P[6:9, 6:9] = 4.0 * pose.covariance, 0.25 * np.eye(3)
-    checkpoint.P[BIASES:OFFSET, BIASES:OFFSET] = np.diag(np.repeat((0.03, 0.3, 0.005, 0.1), 3) ** 2)
-    track.begin(checkpoint)
+    start = Checkpoint.empty(X, N)
+    start.t, start.x[:3], start.R[:] = pose.t, pose.p_bc_in_c, pose.R_cb
+    start.P[:6, :6], start.P[6:9, 6:9] = 4.0 * pose.covariance, 0.25 * np.eye(3)
+    start.P[BIASES:OFFSET, BIASES:OFFSET] = np.diag(np.repeat((0.03, 0.3, 0.005, 0.1), 3) ** 2)
+    track.begin(start)
     return track
 
 
@@ -48,7 +49,7 @@ def take(track, s):
     """As the filter does: nothing from before the base."""
     if not isinstance(s, VisionMeasurement):
         return insert(track, s)
-    return track.fuse(track.predicted(s.t), s) if s.t > track.checkpoints[0].t else None
+    return track.fuse(track.predicted(s.t), s, len(s.rays)) if s.t > track.base.t else None
 
 
 def run(samples, until=END_S + 0.02, ask=(), settle=None):
@@ -153,7 +154,7 @@ def test_the_base_follows_and_nothing_is_lost(samples):
         assert np.abs(getattr(track.now, name) - getattr(never.now, name)).max() < 1e-9
     assert len(track.checkpoints) < 9 < len(never.checkpoints)
     assert len(track.body) < 0.27 / 0.005 + KEPT + 2
-    assert track.checkpoints[0].t <= END_S - 0.2
+    assert track.base.t <= END_S - 0.2
 
 
 def test_without_pictures_the_base_and_the_frontier_keep_up(samples):
@@ -162,9 +163,9 @@ def test_without_pictures_the_base_and_the_frontier_keep_up(samples):
     for now in np.arange(1.0, 4.0, 0.005):
         track.settle(now - 0.5)
         assert track.to_now(now)
-        assert track.checkpoints[0].t >= now - 0.5 - 1 / 30
-        assert track._frontier.t >= track.checkpoints[0].t
-    assert track.checkpoints[0].seen is None
+        assert track.base.t >= now - 0.5 - 1 / 30
+        assert track._frontier.t >= track.base.t
+    assert track.base.seen is None
     assert len(track.body) == KEPT
 
 

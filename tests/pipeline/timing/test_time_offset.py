@@ -14,6 +14,7 @@ from hardware.sim.world.sensors import events
 from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimator_config import TimeOffsetConfig
 from pipeline.frames import exp
+from pipeline.imu_stream import ImuStreams
 from pipeline.signals import BodyImu, PhoneImu
 from pipeline.timing import time_offset
 from pipeline.timing.time_offset import TimeOffset
@@ -25,13 +26,12 @@ STILL = (1e-6, 1e-6)
 
 def listen(setup, spoil=lambda sample: sample):
     """What is answered after each picture: [(t, offset or None, reason)]."""
-    finder, answers = TimeOffset(TimeOffsetConfig()), []
+    imus, answers = ImuStreams(), []
+    finder = TimeOffset(TimeOffsetConfig(), imus)
     for arrival, arrived in events(World(setup)):
         sample = spoil(arrived)
-        if isinstance(sample, PhoneImu):
-            finder.add_phone_imu(sample)
-        elif isinstance(sample, BodyImu):
-            finder.add_body_imu(sample)
+        if isinstance(sample, PhoneImu | BodyImu):
+            imus.add(sample)
         elif sample is not None:
             if sample.pose is not None:
                 pose = sample.pose
