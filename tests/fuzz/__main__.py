@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from tests.fuzz.planted import PLANTED
+from tests.fuzz.target import CALLS
 from tests.fuzz.targets import TARGETS
 
 MISSING = (
@@ -29,6 +30,8 @@ class Outcome:
 
     name: str
     executions: int
+    calls: int
+    """Of the parser: of an input that is a sequence one for each piece."""
     per_second: int
     edges: int
     finding: str
@@ -47,18 +50,23 @@ def fuzz(name: str, seconds: int, runs: int, out: Path) -> Outcome:
         "-print_final_stats=1",
         "-verbosity=1",
     ]
-    with tempfile.TemporaryDirectory() as corpus:
-        command = [sys.executable, "-m", "tests.fuzz.child", name, *options, corpus]
+    with tempfile.TemporaryDirectory() as folder:
+        corpus = Path(folder, name)
+        corpus.mkdir()
+        command = [sys.executable, "-m", "tests.fuzz.child", name, *options, str(corpus)]
         done = subprocess.run(
             command,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             timeout=seconds + ROOM_S if seconds else None,
         )
+        calls = corpus.with_suffix(CALLS)
+        counted = int.from_bytes(calls.read_bytes(), sys.byteorder) if calls.exists() else 0
     said = done.stdout.decode(errors="replace")
     return Outcome(
         name,
         _last(r"stat::number_of_executed_units:\s*(\d+)", said),
+        counted,
         _last(r"stat::average_exec_per_sec:\s*(\d+)", said),
         _last(r"\bcov: (\d+)", said),
         _finding(said) if done.returncode else "",
@@ -94,12 +102,13 @@ def main() -> int:
         print(MISSING, file=sys.stderr)
         return 2
     seconds = asked.seconds or (0 if asked.runs else 60)
-    print("| target | executions | a second | edges | finding |\n|---|--:|--:|--:|---|", flush=True)
+    print("| target | executions | calls of the parser | a second | edges | finding |")
+    print("|---|--:|--:|--:|--:|---|", flush=True)
     outcomes = []
     for name in asked.targets or TARGETS:
         one = fuzz(name, seconds, asked.runs, asked.out)
         outcomes.append(one)
-        row = (name, f"{one.executions:,}", f"{one.per_second:,}", one.edges)
+        row = (name, f"{one.executions:,}", f"{one.calls:,}", f"{one.per_second:,}", one.edges)
         print(f"| {' | '.join(map(str, row))} | {'FOUND' if one.finding else ''} |", flush=True)
     for one in outcomes:
         if one.finding:

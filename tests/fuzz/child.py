@@ -1,6 +1,7 @@
 """One target under atheris (libFuzzer), in this process: `python -m tests.fuzz.child NAME …`."""
 
 import logging
+import mmap
 import sys
 import warnings
 from pathlib import Path
@@ -44,6 +45,7 @@ INSTRUMENTED = [
 def main() -> None:
     with atheris.instrument_imports(include=INSTRUMENTED):
         from tests.fuzz.planted import PLANTED
+        from tests.fuzz.target import CALLS
         from tests.fuzz.targets import TARGETS
     name, *options = sys.argv[1:]
     target = (TARGETS | PLANTED)[name]
@@ -52,7 +54,14 @@ def main() -> None:
         (corpus / f"seed-{k}").write_bytes(data[: target.max_bytes])
     logging.disable()  # a line for each refusal would be slower than what is fuzzed
     warnings.simplefilter("error", RuntimeWarning)  # as in the tests: NumPy's overflows
-    atheris.Setup([sys.argv[0], f"-max_len={target.max_bytes}", *options], target.check)
+    with corpus.with_suffix(CALLS).open("w+b") as file:
+        file.truncate(8)
+        calls = memoryview(mmap.mmap(file.fileno(), 8)).cast("Q")  # libFuzzer ends without a word
+
+    def check(data: bytes) -> None:
+        calls[0] += target.check(data)
+
+    atheris.Setup([sys.argv[0], f"-max_len={target.max_bytes}", *options], check)
     atheris.Fuzz()
 
 

@@ -44,19 +44,21 @@ def stream_of(codec: Codec):
         yield together([bytes([key]) + data for data, key in small[1:] + small])
         yield together([bytes([key]) + data for data, key in small[:2] + other + small[:1]])
 
-    def run(data: bytes) -> None:
-        decoder = FrameDecoder(WIDTH, HEIGHT)
+    def run(data: bytes) -> int:
+        decoder, calls = FrameDecoder(WIDTH, HEIGHT), 0
         for k, piece in enumerate(pieces(data)):
             key, lost = bool(piece[:1] == b"\1"), k * (piece[:1] == b"\7")
             picture = Picture(codec, key, WIDTH, HEIGHT, 0, piece[1:])
             needed_key, undecodable = decoder.needs_key or bool(lost), decoder.undecodable
             luma = decoder.decoded(EncodedFrame(0.0, 0.0, k + lost, picture))
+            calls += luma is not None or decoder.undecodable > undecodable
             if luma is None:
                 assert decoder.needs_key
                 assert decoder.undecodable <= undecodable + 1
             else:
                 assert luma.shape == SHAPE
                 assert key or not needed_key, "decoded without its key"
+        return calls
 
     target(codec.name.lower(), seeds, max_bytes=8192, mutants=400)(run)
 

@@ -201,10 +201,10 @@ class Line:
 
 
 @target("rtp", rtp_seeds, max_bytes=8192)
-def rtp(data: bytes) -> None:
+def rtp(data: bytes) -> int:
     """Packets in any order: whole pictures come out, in order, and little is waited for."""
-    line = Line()
-    for piece in pieces(data):
+    line, packets = Line(), pieces(data)
+    for piece in packets:
         line.t += (piece[0] if piece else 0) / 2560
         try:
             line.take(piece)
@@ -214,6 +214,7 @@ def rtp(data: bytes) -> None:
         assert line.jitter._size <= MAX_RECORD_BYTES
         assert len(line.nacks._lost) <= nack.MAX_MISSING
         assert all(0 <= number < 1 << 16 for number in line.nacks.missing)
+    return len(packets)
 
 
 def payload_seeds():

@@ -1,7 +1,7 @@
 """Several pieces in one input: a length of two bytes before each, as little as must be right."""
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 LENGTH = struct.Struct("<H")
 
@@ -11,11 +11,12 @@ def together(parts: Sequence[bytes]) -> bytes:
     return b"".join(LENGTH.pack(len(part)) + part for part in parts)
 
 
-def pieces(data: bytes) -> Iterator[bytes]:
+def pieces(data: bytes) -> list[bytes]:
     """The pieces of an input; the last one may be short."""
-    at = 0
+    found, at = [], 0
     while at + LENGTH.size <= len(data):
         (length,) = LENGTH.unpack_from(data, at)
         at += LENGTH.size
-        yield data[at : at + length]
+        found.append(data[at : at + length])
         at += length
+    return found

@@ -9,6 +9,8 @@ from pathlib import Path
 
 FOUND = Path(__file__).parent / "found"
 """Inputs that once were findings: one folder a target."""
+CALLS = ".calls"
+"""Beside the folder of a corpus: how often the parser was called, 8 bytes of this machine."""
 
 
 class TooSlowError(Exception):
@@ -20,7 +22,8 @@ class Target:
     """One parser. `run` raises what is neither allowed nor a law that holds: a finding."""
 
     name: str
-    run: Callable[[bytes], None]
+    run: Callable[[bytes], int | None]
+    """How often its parser was called, if an input is a sequence of pieces; None: once."""
     make_seeds: Callable[[], Iterable[bytes]]
     allowed: tuple[type[Exception], ...]
     """What the parser says that it raises of bytes which it does not take."""
@@ -40,13 +43,14 @@ class Target:
         """Stored inputs, each a finding that was mended."""
         return sorted(path for path in (FOUND / self.name).glob("*") if path.is_file())
 
-    def check(self, data: bytes) -> None:
-        """Run on `data`; raises only findings."""
-        started = time.process_time()
+    def check(self, data: bytes) -> int:
+        """Run on `data`, tell how often its parser was called; raises only findings."""
+        started, calls = time.process_time(), None
         with contextlib.suppress(self.allowed):
-            self.run(data)
+            calls = self.run(data)
         if (took := time.process_time() - started) > self.longest_s:
             raise TooSlowError(f"{took:.2f} s of processor time for {len(data)} bytes")
+        return 1 if calls is None else calls
 
 
 TARGETS: dict[str, Target] = {}
@@ -62,7 +66,7 @@ def target(
 ):
     """Enter a function among the targets."""
 
-    def enter(run: Callable[[bytes], None]) -> Callable[[bytes], None]:
+    def enter(run: Callable[[bytes], int | None]) -> Callable[[bytes], int | None]:
         TARGETS[name] = Target(name, run, seeds, allowed, max_bytes, longest_s, mutants)
         return run
 

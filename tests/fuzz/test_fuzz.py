@@ -124,10 +124,12 @@ def test_the_command_finds_a_planted_bug_and_keeps_its_input(tmp_path):
 def test_the_command_tells_executions_and_edges_of_a_sound_target(tmp_path):
     out = fuzz("trailer", "--runs", "3000", "--out", str(tmp_path), cwd=ROOT)
     assert out.returncode == 0, out.stdout + out.stderr
-    row = re.search(r"\| trailer \| ([\d,]+) \| [\d,]+ \| (\d+) \|  \|", out.stdout)
+    row = re.search(r"\| trailer \| ([\d,]+) \| ([\d,]+) \| [\d,]+ \| (\d+) \|  \|", out.stdout)
     assert row is not None, out.stdout
-    assert int(row[1].replace(",", "")) >= 3000
-    assert int(row[2]) > 5
+    executions, calls = (int(cell.replace(",", "")) for cell in row.groups()[:2])
+    assert executions >= 3000
+    assert calls == executions
+    assert int(row[3]) > 5
     assert not list(tmp_path.iterdir())
 
 
