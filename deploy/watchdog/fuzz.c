@@ -14,7 +14,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define N 3
+#ifndef N
+#define N 3 /* thrusters */
+#endif
 #define F_MAX 3.0
 #define COMMAND_BYTES (36u + 4u * N)
 
@@ -41,7 +43,7 @@ static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *n
 {
     static const int64_t PASSES[8] = {5000, 5000, 5000, 0, 41000, 61000, 300000, 3000000};
     uint8_t data[LL_MAX_BYTES + 1] = {0}, digest[LL_DIGEST_BYTES], out[LL_MAX_BYTES];
-    float thrusts[LL_MAX_THRUSTERS], gyro[3], acc[3];
+    float thrusts[N], gyro[3], acc[3];
     *now_us += in[6] == 254 ? -20000 : PASSES[in[0] & 7];
     for (int i = 0; i < 3; i++) {
         gyro[i] = (float)(int8_t)in[5 + i % 3] / 8.0f;

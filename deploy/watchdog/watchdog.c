@@ -68,7 +68,7 @@ static bool is_later(uint32_t a, uint32_t b)
 
 static bool decode(const ll_watchdog *w, const uint8_t *data, size_t size, command *c)
 {
-    if (size <= COMMAND_BYTES || size > LL_MAX_BYTES || memcmp(data, "LLcm\2", 5) != 0)
+    if (size <= COMMAND_BYTES || memcmp(data, "LLcm\2", 5) != 0)
         return false;
     c->thrusters = data[5];
     if (c->thrusters > LL_MAX_THRUSTERS || size != COMMAND_BYTES + 4u * c->thrusters)
@@ -99,14 +99,11 @@ static bool gives(const ll_watchdog *w)
 /* What to give now: faded, and upright if the robot flies. */
 static void given(const ll_watchdog *w, int64_t now_us, double *thrusts)
 {
-    memcpy(thrusts, w->base, sizeof w->base);
-    if (!w->fading)
-        return;
-    double elapsed_us = now_us > w->fading_us ? (double)(now_us - w->fading_us) : 0.0;
-    double share = fmin(1.0, fmax(0.0, 1.0 - elapsed_us / (double)w->limits.ramp_us));
+    double elapsed = (double)(now_us - w->fading_us) / (double)w->limits.ramp_us;
+    double share = w->fading ? fmin(1.0, fmax(0.0, 1.0 - elapsed)) : 1.0;
     for (int i = 0; i < w->limits.thrusters; i++)
-        thrusts[i] *= share;
-    if (w->limits.attitude)
+        thrusts[i] = share * w->base[i];
+    if (w->fading && w->limits.attitude)
         ll_attitude_thrusts(&w->attitude, w->limits.attitude, w->limits.thrusters,
                             w->limits.f_max, thrusts);
 }
@@ -145,19 +142,19 @@ static void to_zero(ll_watchdog *w)
     w->fading = w->catching_up = false;
 }
 
-static void refuse(ll_watchdog *w, uint64_t candidate)
+/* At once; a handshake goes on. */
+static void refuse(ll_watchdog *w)
 {
     w->state = LL_REFUSING;
     w->refusal = LL_SILENT;
-    w->candidate = candidate;
     to_zero(w);
 }
 
-/* Ramp down; at once if there is no thrust. */
+/* Ramp down, or go on to; at once if there is no thrust. */
 static void leave(ll_watchdog *w, int64_t now_us)
 {
     if (!gives(w)) {
-        refuse(w, 0);
+        refuse(w);
         return;
     }
     w->state = LL_RAMP;
@@ -181,7 +178,7 @@ static void advance(ll_watchdog *w, int64_t now_us)
     if (w->state == LL_COAST && silence_us > (gives(w) ? LL_RAMP_AFTER_US : LL_BACK_UNTIL_US))
         leave(w, now_us);
     if (w->state == LL_RAMP && now_us - w->fading_us >= w->limits.ramp_us)
-        refuse(w, w->candidate);
+        refuse(w);
 }
 
 /* Whether nothing newer was heard before; if so, remember it, and echo its challenge. */
@@ -247,10 +244,9 @@ static ll_refusal judge(const ll_watchdog *w, const command *c, int64_t now_us)
 static void shake_hands(ll_watchdog *w, const command *c, int64_t now_us)
 {
     w->replaced = true;
-    if (w->state != LL_RAMP && w->state != LL_REFUSING)
-        leave(w, now_us);
+    leave(w, now_us);
     if (c->stop)
-        refuse(w, w->candidate);
+        refuse(w);
     if (c->epoch != w->candidate) {
         w->candidate = c->epoch;
         w->handshake_us = now_us;
@@ -278,7 +274,7 @@ static void take(ll_watchdog *w, const command *c, int64_t now_us)
     w->taken_us = now_us;
     w->counter = c->counter;
     if (w->state == LL_RAMP && c->zero) {
-        refuse(w, w->candidate);
+        refuse(w);
         return;
     }
     follow(w, c, now_us);
@@ -291,21 +287,17 @@ static void obey_zero(ll_watchdog *w, const command *c, bool newest)
 {
     if (!c->zero || w->state == LL_REFUSING)
         return;
-    if (c->epoch != w->epoch) {
-        if (c->stop && newest && c->epoch > w->epoch)
-            refuse(w, w->candidate);
-        return;
+    if (c->epoch > w->epoch) {
+        if (c->stop && newest)
+            refuse(w);
+    } else if (c->epoch == w->epoch && is_later(c->counter, w->counter)) {
+        w->counter = c->counter;
+        if (w->state == LL_RAMP)
+            refuse(w);
+        to_zero(w);
+        if (w->state == LL_RUNNING)
+            w->state = LL_IDLE;
     }
-    if (!is_later(c->counter, w->counter))
-        return;
-    w->counter = c->counter;
-    if (w->state == LL_RAMP) {
-        refuse(w, w->candidate);
-        return;
-    }
-    to_zero(w);
-    if (w->state == LL_RUNNING)
-        w->state = LL_IDLE;
 }
 
 static bool is_above_zero(double value)
@@ -398,5 +390,6 @@ size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyr
 
 void ll_halt(ll_watchdog *w)
 {
-    refuse(w, 0);
+    refuse(w);
+    w->candidate = 0;
 }

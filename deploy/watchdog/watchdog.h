@@ -73,10 +73,11 @@ bool ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
 ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us,
                       bool *answer);
 
-/* What the thrusters are to give now [N]. Ask at least every 5 ms, whatever else happens. */
+/* What the thrusters are to give now [N], one number for each. Ask at least every 5 ms, whatever else happens. */
 void ll_setpoint(ll_watchdog *w, int64_t now_us, float *thrusts);
 
-/* Write the next sample, to be sent to control; gives its size. `nonce`: random, not 0. */
+/* Write the next sample, to be sent to control; gives its size. `nonce`: random, not 0;
+ * `thrusts`: one number for each thruster. */
 size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyro[3],
                  const float accelerometer[3], const float *thrusts, uint8_t out[LL_MAX_BYTES]);
 

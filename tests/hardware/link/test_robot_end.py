@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hardware.follower import FollowerState, Refusal
 from hardware.link.datagram import CommandDatagram, decode_sample, encode_command
-from hardware.link.robot_end import LinkLimits, RobotEnd
+from hardware.link.robot_end import ROUNDING, LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
 
 LIMITS = LinkLimits(thrusters=2, f_max=3.0, max_rise=1.0, ramp_us=2_000_000)
@@ -265,6 +265,19 @@ def test_refuses_and_keeps_flying_on_the_last_good_one(flying, what):
     assert flying.send(flying.command(2.0, 2.0)) == Refusal.NONE
     assert flying.send(flying.command(3.0, 3.0)) == Refusal.NONE
     assert flying.end.refusal == Refusal.NONE
+
+
+LARGEST = next(v for v in np.arange(0.5, 3.0, 0.015625) if v / ROUNDING * ROUNDING == v)
+"""[N]: a float32, and with rounding just what a limit of LARGEST / ROUNDING allows."""
+ABOVE = float(np.nextafter(np.float32(LARGEST), 4))
+
+
+@pytest.mark.parametrize(("limit", "why"), [("f_max", Refusal.LIMITS), ("max_rise", Refusal.RISE)])
+def test_a_limit_allows_what_is_rounded_to_it_and_no_more(limit, why):
+    bench = Bench(replace(LIMITS, **{"max_rise": 3.0, limit: LARGEST / ROUNDING}))
+    bench.shake_hands()
+    assert bench.send(bench.command(1.0 / 64, ABOVE)) == why
+    assert bench.send(bench.command(1.0 / 64, LARGEST)) == Refusal.NONE
 
 
 @pytest.mark.parametrize(("back", "why"), [(32, Refusal.STALE), (33, Refusal.NONCE)])

@@ -15,8 +15,9 @@ import pytest
 from hardware.follower import FollowerState, Refusal
 from hardware.link.datagram import CommandDatagram, encode_command
 from hardware.link.link_key import LinkKeyError, mac, read_key
-from hardware.link.robot_end import LinkLimits, RobotEnd
+from hardware.link.robot_end import ROUNDING, LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
+from tests.hardware.link.test_robot_end import ABOVE, LARGEST
 from tests.hardware.test_attitude_keeper import asymmetric, turned
 
 SOURCE = Path(__file__).parents[3] / "deploy" / "watchdog"
@@ -59,7 +60,7 @@ class CRobotEnd:
 
     def __init__(self, library, limits, boot_id, key=KEY):
         self.library = library
-        self.memory = ctypes.create_string_buffer(4096)
+        self.memory = ctypes.create_string_buffer(4096 * b"\xa5")  # whatever was there before
         self.thrusters = limits.thrusters
         c_limits = CLimits(limits.thrusters, limits.f_max, limits.max_rise, limits.ramp_us)
         if limits.attitude is not None:
@@ -72,7 +73,7 @@ class CRobotEnd:
 
     def receive(self, data, _peer, now_us):
         size, now = ctypes.c_size_t(len(data)), ctypes.c_int64(now_us)
-        answer = ctypes.c_bool()
+        answer = ctypes.c_bool(True)
         why = self.library.ll_receive(self.memory, data, size, now, ctypes.byref(answer))
         self.answers = answer.value
         return Refusal(why)
@@ -94,6 +95,9 @@ class CRobotEnd:
             out,
         )
         return out.raw[:size]
+
+    def halt(self):
+        self.library.ll_halt(self.memory)
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +131,15 @@ class Traffic:
             return 5000
         return self.random.choice(HOLES_US)
 
+    def thrusts(self):
+        """Of all thrusters the same, of each its own, or of one alone."""
+        rnd, n = self.random, self.thrusters
+        if self.often(0.7):
+            return [rnd.uniform(0.0, 1.9)] * n
+        drawn = [rnd.uniform(0.0, 1.0) for _ in range(n)]
+        alone = rnd.randrange(n) if self.often(0.3) else None
+        return [thrust * (alone in (None, i)) for i, thrust in enumerate(drawn)]
+
     def datagram(self, state, nonce):
         rnd = self.random
         if self.often(0.02):
@@ -137,27 +150,49 @@ class Traffic:
             self.counter + (1 if self.often(0.98) else rnd.choice((0, 2, 200, 201, -3)))
         ) % 2**32
         thrusting = state != FollowerState.REFUSING and self.often(0.98)
-        thrusts = [rnd.uniform(0.0, 1.9) if thrusting else 0.0] * self.thrusters
+        thrusts = self.thrusts() if thrusting else [0.0] * self.thrusters
         if self.often(0.01):
-            thrusts[1] = rnd.choice((float("nan"), float("inf"), -1.0, 3.5, 3.0, -0.0))
+            bad = rnd.choice((float("nan"), float("inf"), -1.0, 3.5, 3.0, -0.0))
+            thrusts[rnd.randrange(self.thrusters)] = bad
         command = CommandDatagram(
             epoch=self.epoch,
             counter=self.counter,
             nonce=nonce if self.often(0.99) else rnd.choice((0, max(1, nonce - 12))),
             challenge=rnd.getrandbits(64),
             armed=any(thrusts) if self.often(0.99) else False,
-            thrusts=tuple(thrusts if self.often(0.995) else thrusts[:2]),
+            thrusts=tuple(
+                thrusts if self.often(0.995) else rnd.choice((thrusts[1:], [0.0, *thrusts]))
+            ),
             stop=self.often(0.01),
         )
+        if self.often(0.02):
+            command = self.other(command)
         key = KEY if self.often(0.995) else rnd.randbytes(16)
         self.sent.append(encode_command(command, key))
         return self.sent[-1]
+
+    def other(self, command):
+        """Of another process, or of one that hears nothing; or half round the counter's corner."""
+        rnd, zero = self.random, (0.0,) * self.thrusters
+        stop, nonce = self.often(0.5), rnd.choice((0, command.nonce, max(1, command.nonce - 8)))
+        if self.often(0.5):
+            epoch, counter = command.epoch + rnd.choice((-1, 1)), rnd.choice((1, command.counter))
+            return replace(command, epoch=max(1, epoch), counter=counter, thrusts=zero, stop=stop)
+        if self.often(0.5):
+            return replace(command, nonce=nonce, thrusts=zero)
+        return replace(command, counter=(command.counter - 1 + 2**31) % 2**32, thrusts=zero)
 
 
 HOLES_US = (*range(0, 450_000, 50_000), -20_000, 1, 39_999, 41_000, 60_001, 1_500_000)
 PERIODS = np.array([40.0, 50.0, 60.0])
 QUADROTOR = load_robot("quadrotor")
-HANGS, FLIES = LIMITS, LinkLimits.of(QUADROTOR)
+FLIES = LinkLimits.of(QUADROTOR)
+ROBOTS = {
+    "hangs": LIMITS,
+    "flies": FLIES,
+    "one thruster": replace(LIMITS, thrusters=1),
+    "sixteen thrusters": replace(LIMITS, thrusters=16),
+}
 
 
 def hold_against_each_other(library, seed, limits, seen):
@@ -180,13 +215,18 @@ def hold_against_each_other(library, seed, limits, seen):
         assert why == c.receive(data, peer, now_us), nonce
         assert (python._asking == peer) == c.answers
         assert (python._peer == peer) == (why == Refusal.NONE)
+        if traffic.often(0.01):
+            now_us += traffic.step_us() + traffic.random.choice(HOLES_US)
+        if traffic.often(0.001):
+            python.halt()
+            c.halt()
         np.testing.assert_allclose(python.setpoint(now_us), c.setpoint(now_us), atol=1e-6)
         seen |= {python.state, ("answer", why), (before, python.state)}
         seen.add((why == Refusal.NONE, c.answers))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("limits", [HANGS, FLIES], ids=["hangs", "flies"])
+@pytest.mark.parametrize("limits", ROBOTS.values(), ids=ROBOTS)
 def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, limits):
     seen = set()
     for seed in range(6):
@@ -215,6 +255,92 @@ def test_limits_that_limit_nothing_are_refused_and_then_no_command_is_taken(libr
         robot.sample(now_us, nonce, (0.0,) * 3, (0.0,) * 3, np.zeros(3))
         command = CommandDatagram(5, nonce, nonce, nonce, False, (0.0,) * 3)
         assert robot.receive(encode_command(command, KEY), None, now_us) == Refusal.THRUSTERS
+
+
+GOOD_LIMITS = (*({"thrusters": n} for n in (1, 16)), {"ramp_us": 1}, {"f_max": 5e-324})
+
+
+@pytest.mark.parametrize("good", GOOD_LIMITS, ids=str)
+def test_limits_that_limit_something_are_taken(library, good):
+    assert CRobotEnd(library, replace(LIMITS, **good), 77).started
+
+
+class Both:
+    """The two ends, asked and told the same; what they answer and give is the same, too."""
+
+    def __init__(self, library, limits=LIMITS):
+        self.ends = RobotEnd(limits, 77, KEY), CRobotEnd(library, limits, 77)
+        self.thrusters, self.now_us, self.nonce, self.counter = limits.thrusters, 1_000_000, 0, 0
+
+    def send(self, thrust=0.0, after_us=5000):
+        """A good command on the sample of that time; what the robot says to it."""
+        self.now_us += after_us
+        self.nonce += 1
+        values = (0.0,) * 3, (0.0,) * 3, np.zeros(self.thrusters)
+        python, c = (end.sample(self.now_us, self.nonce, *values) for end in self.ends)
+        assert python == c
+        thrusts = (thrust,) * self.thrusters
+        command = CommandDatagram(5, self.counter + 1, self.nonce, 1, thrust > 0.0, thrusts)
+        data = encode_command(command, KEY)
+        why, c_why = (end.receive(data, None, self.now_us) for end in self.ends)
+        assert why == c_why
+        python, c = (end.setpoint(self.now_us) for end in self.ends)
+        np.testing.assert_allclose(python, c, atol=1e-6)
+        self.counter += why == Refusal.NONE
+        return why
+
+    def shake_hands(self):
+        while self.ends[0].state != FollowerState.IDLE:
+            assert self.send() == Refusal.NONE
+
+
+@pytest.mark.parametrize(("limit", "why"), [("f_max", Refusal.LIMITS), ("max_rise", Refusal.RISE)])
+def test_a_limit_allows_what_is_rounded_to_it_and_no_more(library, limit, why):
+    both = Both(
+        library, replace(LIMITS, **{"f_max": 3.0, "max_rise": 3.0, limit: LARGEST / ROUNDING})
+    )
+    both.shake_hands()
+    assert both.send(ABOVE) == why
+    assert both.send(LARGEST) == Refusal.NONE
+
+
+LIMITS_OF_SILENCE = (60_000, 280_000, 400_000, 60_000 + LIMITS.ramp_us)
+
+
+@pytest.mark.parametrize("silence_us", sorted(us + k for us in LIMITS_OF_SILENCE for k in (0, 1)))
+@pytest.mark.parametrize("thrust", [0.0, 2.0])
+def test_c_and_python_follow_again_alike_after_a_silence_as_long_as_a_limit(
+    library, silence_us, thrust
+):
+    both = Both(library, replace(LIMITS, max_rise=0.05))
+    both.shake_hands()
+    for k in range(50):
+        assert both.send(min(thrust, 0.05 * k)) == Refusal.NONE
+    both.send(thrust, silence_us)
+    for _ in range(20):
+        both.send(thrust)
+
+
+ZERO = encode_command(CommandDatagram(5, 110, 109, 1, False, (0.0,) * 3), KEY)[:-16]
+
+
+@pytest.mark.parametrize("at", range(8))
+def test_c_and_python_read_the_same_of_the_first_bytes(library, at):
+    ends = RobotEnd(LIMITS, 77, KEY), CRobotEnd(library, LIMITS, 77)
+    for value in range(256):
+        body = ZERO[:at] + bytes([value]) + ZERO[at + 1 :]
+        python, c = (end.receive(body + mac(KEY, body), None, 1_000_000) for end in ends)
+        assert python == c
+
+
+@pytest.mark.parametrize("sent", range(20))
+def test_a_datagram_has_as_many_thrusts_as_it_says(library, sent):
+    body = ZERO[:36] + bytes(4 * sent)
+    for said in range(20):
+        end = CRobotEnd(library, replace(LIMITS, thrusters=max(1, min(said, 16))), 77)
+        data = body[:5] + bytes([said]) + body[6:]
+        why = end.receive(data + mac(KEY, data), None, 1_000_000)
+        assert (why == Refusal.MALFORMED) == (said != sent or not 1 <= said <= 16)
 
 
 def run_robot(path, key_text, *numbers):

@@ -14,6 +14,7 @@ import pytest
 pytestmark = pytest.mark.slow
 SOURCE = Path(__file__).parents[3] / "deploy" / "watchdog"
 NAMES = ("fuzz.c", "watchdog.c", "attitude.c", "hmac.c")
+GCC = ("gcc", "-std=c99", "-g", "-O1", "-Wall", "-Wextra", "-Werror")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 EXECUTIONS = 50_000
 SECONDS = float(os.environ.get("LIGHTLEASH_FUZZ_S", "0"))
@@ -25,11 +26,11 @@ def compiler():
         pytest.skip("NO COMPILER, not tested: gcc is not installed")
 
 
-@pytest.fixture(scope="module")
-def fuzz(tmp_path_factory):
+@pytest.fixture(scope="module", params=[3, 16], ids="{} thrusters".format)
+def fuzz(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("fuzz") / "fuzz"
     sources = [str(SOURCE / name) for name in NAMES]
-    words = ("gcc", "-std=c99", "-g", "-O1", "-Wall", "-Wextra", "-Werror", *SANITIZED)
+    words = (*GCC, *SANITIZED, f"-DN={request.param}")
     done = subprocess.run(
         (*words, "-o", str(path), *sources, "-lm"), check=False, capture_output=True, text=True
     )
