@@ -8,13 +8,13 @@ from typing import Any
 
 from starlette.routing import Route, WebSocketRoute
 
-from server.common.roles import least_of
 from server.phone import ingest
 from server.protocol import session, wire, wire_records
 from server.protocol.wire import Kind
 from server.rtc import answer, link
 from server.rtc.receiving import metadata_trailer
 from server.rtc.signalling_endpoint import OFFERS_HZ, SignallingEndpoint
+from server.security.least_role import roles_of
 from server.security.pairings import CODE_LETTERS, IDLE_S, KEY_BYTES, LINK_S, WAIT_S
 from server.security.security import COOKIE, PAIR_TRIES, PAIR_WINDOW_S
 from server.view.viser_proxy import routes as view_routes
@@ -22,8 +22,8 @@ from server.virtual_phone.phone_client import MAX_IN_FLIGHT
 from server.web.app import Api
 from server.web.lease import GIVEN_S, LEASE_S
 from server.web.people_api import PeopleApi
-from server.web.replies import MAX_BODY
 from server.web.session_manager import TICK_S
+from server.web.typed_routes import MAX_BODY
 from server.web.websocket import HELLO_S, PING_S
 
 Layout = tuple[type[Any], struct.Struct | None, tuple[tuple[str, int], ...]]
@@ -94,6 +94,7 @@ REQUESTS = {
     "GET /ca.crt": "the authority to install on phones",
     "GET /healthz": "whether the server lives",
     "GET /metrics": "Prometheus",
+    "GET /api/openapi.json": "these requests and their answers field by field, for programs",
     "POST /api/rtc": 'WebRTC, body `{"session": "…"}`; answers `{"id", "sdp", "ice_servers"}`',
     "POST /api/rtc/answer": 'body `{"id": "…", "sdp": "…"}`: the page\'s answer to that offer',
     "GET /view": "the 3D view's page",
@@ -114,13 +115,14 @@ def requests() -> str:
     api, people = Api.__new__(Api), PeopleApi.__new__(PeopleApi)  # only asked for their routes
     signalling = SignallingEndpoint.__new__(SignallingEndpoint)
     others = (*people.routes(), *signalling.routes(), *view_routes(Path("nowhere")))
+    roles = roles_of((*api.routes(), *others))
     for route in (*api.routes(), *others):
         assert isinstance(route, (Route, WebSocketRoute))
         methods = ["socket"] if isinstance(route, WebSocketRoute) else sorted(route.methods or ())
         for method in methods:
             if method != "HEAD":
                 request = f"{method} {route.path}"
-                least = least_of(route.path, is_read=method == "GET")
+                least = roles.of(route.path, is_read=method == "GET")
                 lines.append(f"| `{request}` | {least} | {REQUESTS[request]} |")
     return "\n".join(lines)
 

@@ -36,6 +36,7 @@ from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
 from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.admission import Admission
 from server.security.audit import Audit
+from server.security.least_role import roles_of
 from server.security.listener import Listener, listener
 from server.security.places import limits_for
 from server.security.request_guard import Guard
@@ -94,7 +95,8 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     routes = [*people.routes(), *view_routes(view), *signalling.routes()]
     app = make_app(api, PageServer(manager, settings.video), routes)
     admission = Admission(limits_for(raise_handles()))
-    guarded = Guard(app, doors, [*own_names(), *settings.names], admission)
+    hosts = [*own_names(), *settings.names]
+    guarded = Guard(app, doors, hosts, admission, roles=roles_of(app.routes))
     if settings.record:
         manager.start_recording()
     run = json.dumps(_run(settings, given, base, doors))

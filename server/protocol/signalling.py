@@ -26,3 +26,9 @@ class Answer(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     id: str
     """Of the offer."""
     sdp: str
+
+
+class Connecting(msgspec.Struct, frozen=True):
+    """Its answer: packets may come."""
+
+    connecting: bool = True

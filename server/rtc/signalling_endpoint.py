@@ -6,20 +6,20 @@ import asyncio
 import logging
 from collections.abc import Sequence
 
-import msgspec
+from fastapi import Depends
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
-from starlette.routing import BaseRoute, Route
+from starlette.routing import BaseRoute
 
 from server.common.clock import now
 from server.common.settings import RtcSettings
 from server.protocol.session import TokenBucket
-from server.protocol.signalling import Answer, Ask, Offer
+from server.protocol.signalling import Answer, Ask, Connecting, Offer
 from server.protocol.wire import WireError
 from server.rtc.answer import MAX_BYTES
 from server.rtc.link import RtcLink
-from server.web.replies import body_of, refusal
+from server.security.least_role import RefusedRequest, operator
 from server.web.session_manager import SessionManager
+from server.web.typed_routes import ApiRoute, Asked, Told
 
 log = logging.getLogger("lightleash")
 
@@ -27,9 +27,13 @@ OFFERS_HZ, OFFERS_AT_ONCE = 0.5, 10
 MAX_ANSWER_BODY = MAX_BYTES + 2_048
 """JSON adds a little to the session description."""
 OFF = "WebRTC is switched off (rtc.enabled): use the websockets"
+NOT_LEADING = "the session of the phone that leads"
 
 
-_ask, _answer = msgspec.json.Decoder(Ask), msgspec.json.Decoder(Answer)
+class AnswerRoute(ApiRoute):
+    """Takes a session description."""
+
+    longest = MAX_ANSWER_BODY
 
 
 def address_of(request: Request) -> str:
@@ -49,9 +53,12 @@ class SignallingEndpoint:
 
     def routes(self) -> Sequence[BaseRoute]:
         """Both requests."""
+        post, leads = ["POST"], [Depends(operator)]
         return [
-            Route("/api/rtc", self._ask, methods=["POST"]),
-            Route("/api/rtc/answer", self._answer, methods=["POST"]),
+            ApiRoute("/api/rtc", self._ask, methods=post, dependencies=leads),
+            AnswerRoute(
+                "/api/rtc/answer", self._answer, methods=post, status_code=202, dependencies=leads
+            ),
         ]
 
     async def close(self) -> None:
@@ -60,18 +67,15 @@ class SignallingEndpoint:
             self._gone(self._link)
         await asyncio.gather(*self._closing, return_exceptions=True)
 
-    async def _ask(self, request: Request) -> Response:
-        try:
-            ask = _ask.decode(await body_of(request))
-        except msgspec.DecodeError:
-            return refusal(400, "session", 'JSON: {"session": "…"}')
+    async def _ask(self, ask: Asked[Ask]) -> Told[Offer]:
+        """Offer a connection to the phone that leads."""
         phone = self._manager.phone
         if not self._settings.enabled:
-            return refusal(404, "rtc", OFF)
+            raise RefusedRequest(404, "rtc", OFF)
         if phone is None or phone.id != ask.session:
-            return refusal(403, "session", "the session of the phone that leads")
+            raise RefusedRequest(403, "session", NOT_LEADING)
         if not self._offers.take(now()):
-            return refusal(429, "rtc", f"{60.0 * OFFERS_HZ:g} offers a minute")
+            raise RefusedRequest(429, "rtc", f"{60.0 * OFFERS_HZ:g} offers a minute")
         link = RtcLink(self._manager, phone, self._settings, self._bitrate_bps, self._gone)
         former, self._link = self._link, link
         if former is not None:
@@ -81,28 +85,24 @@ class SignallingEndpoint:
             link.is_closing or self._manager.phone is not phone
         ):  # meanwhile it was shut out, or asked anew
             self._gone(link)
-            return refusal(403, "session", "the session of the phone that leads")
-        offer = Offer(link.id, sdp, self._settings.ice_servers())
-        return Response(msgspec.json.encode(offer), media_type="application/json")
+            raise RefusedRequest(403, "session", NOT_LEADING)
+        return Offer(link.id, sdp, self._settings.ice_servers())
 
-    async def _answer(self, request: Request) -> Response:
-        try:
-            answer = _answer.decode(await body_of(request, MAX_ANSWER_BODY))
-        except msgspec.DecodeError:
-            return refusal(400, "sdp", f'JSON up to {MAX_BYTES} bytes: {{"id": "…", "sdp": "…"}}')
+    async def _answer(self, request: Request, answer: Asked[Answer]) -> Told[Connecting]:
+        """Take the page's answer to the newest offer."""
         link = self._link
         if link is None or link.id != answer.id:
-            return refusal(404, "id", "of the newest offer")
+            raise RefusedRequest(404, "id", "of the newest offer")
         try:
             await link.peer.answer(answer.sdp, address_of(request))
         except WireError as error:
             log.warning("an answer is refused: %s", error)
             self._gone(link)
-            return refusal(400, error.field, error.allowed)
+            raise
         if link.is_closing or self._manager.join_fast(link.session, link) is None:
             self._gone(link)
-            return refusal(403, "session", "the session of the phone that leads")
-        return JSONResponse({"connecting": True}, 202)
+            raise RefusedRequest(403, "session", NOT_LEADING)
+        return Connecting()
 
     def _gone(self, link: RtcLink) -> None:
         """A connection has ended, or shall."""

@@ -10,11 +10,10 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.common.clock import now
-from server.common.roles import Least, is_enough, least_of
 from server.security.admission import LOOPBACK, Admission, RemotePeer, peer_of
+from server.security.least_role import RefusedRequest, RoleTable, refusal_of
 from server.security.pairings import Member
 from server.security.quotas import Asker, Quotas
-from server.security.rechecked import Rechecked
 from server.security.security import Doors
 
 PORT = re.compile(r":\d{1,5}$")
@@ -34,10 +33,7 @@ HEADERS = {
     "cache-control": "no-store",
 }
 STOP = "/api/stop"
-"""Never limited, and taken also of who is shut out while it comes."""
-SHUT_OUT = 401, "role", "pair anew: this pairing has ended"
-Refusal = tuple[int, str, str]
-"""Status, field, what is allowed."""
+"""Never limited."""
 
 
 class Guard:
@@ -50,15 +46,17 @@ class Guard:
         hosts: Iterable[str],
         admission: Admission | None = None,
         quotas: Quotas | None = None,
+        roles: RoleTable | None = None,
     ) -> None:
         """`hosts` are the names and addresses this server answers to.
 
         `admission` is told whose address has shown a role, and limits what strangers ask, `quotas`
-        what everybody else does.
+        what everybody else does; without `roles` of its routes all is the supervisor's.
         """
         self._app, self._doors = app, doors
         self._admission = Admission() if admission is None else admission
         self._quotas = Quotas() if quotas is None else quotas
+        self._roles = RoleTable({}) if roles is None else roles
         doors.on_gone = self._admission.forget
         self._hosts = {f"[{host}]" if ":" in host else host.lower() for host in hosts}
 
@@ -73,18 +71,18 @@ class Guard:
         is_in = member is not None and member.state == "in"
         refusal = self._refusal(scope, headers, member)
         if not self._admission.may_ask(peer, is_in, now()):
-            await _refuse((429, "requests", "fewer"), scope, receive, send)
+            await _refuse(RefusedRequest(429, "requests", "fewer"), scope, receive, send)
             return
         is_stop = refusal is None and scope["path"] == STOP
         asker = None if is_stop else self._asker(member if is_in else None, peer)
         allowed = self._quotas.may_ask(asker, scope["path"], now())
-        refusal = (429, "requests", allowed) if allowed else refusal
+        refusal = RefusedRequest(429, "requests", allowed) if allowed else refusal
         if refusal is None:
             with self._quotas.place(asker, scope["type"] == "websocket") as allowed:
                 if not allowed:
                     await self._serve(scope, receive, send, member, headers.get("host", ""))
                     return
-                refusal = 429, "requests", allowed
+                refusal = RefusedRequest(429, "requests", allowed)
         self._note(refusal, member, peer.host, scope["path"])
         await _refuse(refusal, scope, receive, send)
 
@@ -94,20 +92,11 @@ class Guard:
         """Hand it to the app, with who asks."""
         address = peer_of(scope).host
         scope["member"] = replace(member, address=address) if member is not None else None
-        if member is None:
-            await self._app(scope, receive, _with_headers(scope, host, send))
-            return
-        if scope["type"] == "websocket":
+        scope["doors"] = self._doors
+        if scope["type"] == "websocket" and member is not None:
             await self._doors.sockets.run(self._app, member.id, scope, receive, send)
-            return
-        extended = _with_headers(scope, host, send)
-        if scope["path"] == STOP or _least(scope) in ("anyone", "known"):
-            await self._app(scope, receive, extended)
-            return
-        one = Rechecked(receive, extended, lambda: self._doors.has_still(member))
-        await self._app(scope, one.receive, one.send)
-        if one.ended:
-            await _refuse(SHUT_OUT, scope, receive, extended)
+        else:
+            await self._app(scope, receive, _with_headers(scope, host, send))
 
     def _asker(self, member: Member | None, peer: RemotePeer) -> Asker | None:
         """Asker whose pool it is; None: the strangers'."""
@@ -117,35 +106,25 @@ class Guard:
             return Asker("loopback", "")
         return Asker("address", peer.host) if self._admission.is_known(peer.host, now()) else None
 
-    def _note(self, refusal: Refusal, member: Member | None, address: str, path: str) -> None:
+    def _note(
+        self, refusal: RefusedRequest, member: Member | None, address: str, path: str
+    ) -> None:
         name, role = (member.name, member.role) if member is not None else ("", "")
-        status, field, allowed = refusal
-        why = f"{path}: {status} {field}: {allowed}"
+        why = f"{path}: {refusal.status_code} {refusal.field}: {refusal.allowed}"
         self._doors.audit.note("refusal", name, role, address, why[:200])
 
     def _refusal(
         self, scope: Scope, headers: dict[str, str], member: Member | None
-    ) -> Refusal | None:
+    ) -> RefusedRequest | None:
         """Why not, or None for welcome."""
         host = headers.get("host", "")
         if PORT.sub("", host).lower() not in self._hosts:
-            return 421, "Host", "an address of this server"
+            return RefusedRequest(421, "Host", "an address of this server")
         bearer = headers.get("authorization", "").lower().startswith("bearer ")
         changes = _changes(scope)
         if changes and not bearer and not self._is_own(scope, headers, host):
-            return 403, "Origin", "this server's own pages"
-        least = _least(scope)
-        if least == "anyone":
-            return None
-        if member is None:
-            return 401, "role", "pair first: open the link or scan the QR code"
-        if least == "known":
-            return None
-        if member.state == "waiting":
-            return 403, "pairing", "once a supervisor has confirmed it"
-        if member.state != "in":
-            return 401, "role", f"pair anew: this pairing has ended. {member.why}".strip()
-        return None if is_enough(member.role, least) else (403, "role", least)
+            return RefusedRequest(403, "Origin", "this server's own pages")
+        return refusal_of(member, self._roles.of(scope["path"], is_read=not changes))
 
     def _is_own(self, scope: Scope, headers: dict[str, str], host: str) -> bool:
         """A page of another site can neither know our origin nor set our header."""
@@ -160,14 +139,8 @@ def _changes(scope: Scope) -> bool:
     return scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
 
 
-def _least(scope: Scope) -> Least:
-    return least_of(scope["path"], is_read=not _changes(scope))
-
-
-async def _refuse(refusal: Refusal, scope: Scope, receive: Receive, send: Send) -> None:
-    status, field, allowed = refusal
-    body = {"code": "role" if status == 401 else "refused", "field": field, "allowed": allowed}
-    response = JSONResponse(body, status)
+async def _refuse(refusal: RefusedRequest, scope: Scope, receive: Receive, send: Send) -> None:
+    response = JSONResponse(refusal.detail, refusal.status_code)
     if scope["type"] == "http" or "websocket.http.response" in scope.get("extensions", {}):
         await response(scope, receive, send)
     else:

@@ -17,13 +17,16 @@ from math import isfinite
 from pathlib import Path
 
 import msgspec
-from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
-from starlette.routing import BaseRoute, Route, WebSocketRoute
+from fastapi import Depends
+from fastapi.routing import APIRoute, APIWebSocketRoute
+from starlette.responses import HTMLResponse, PlainTextResponse
+from starlette.routing import BaseRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, unix_connect
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.typing import Subprotocol
+
+from server.security.least_role import viewer
 
 VIEW_POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' blob:; "
@@ -67,17 +70,20 @@ def routes(viser: Path) -> list[BaseRoute]:
     async def pipe(socket: WebSocket) -> None:
         await _pipe(socket, viser)
 
+    watches = [Depends(viewer)]
     # viser's page drops the slash when it makes its socket's address.
     return [
         route
         for path in ("/view", "/view/")
-        for route in (Route(path, _page), WebSocketRoute(path, pipe))
+        for route in (
+            APIRoute(path, _page, dependencies=watches, include_in_schema=False),
+            APIWebSocketRoute(path, pipe, dependencies=watches),
+        )
     ]
 
 
-async def _page(_: Request) -> Response:
-    headers = {"content-security-policy": VIEW_POLICY}
-    return Response(_html(), media_type="text/html; charset=utf-8", headers=headers)
+async def _page() -> HTMLResponse:
+    return HTMLResponse(_html(), headers={"content-security-policy": VIEW_POLICY})
 
 
 @cache

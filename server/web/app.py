@@ -6,31 +6,74 @@ import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
-from starlette.applications import Starlette
+from fastapi import Depends, FastAPI, Query
+from fastapi.routing import APIWebSocketRoute
+from fastapi.telemetry import TelemetryConfig
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from server import __version__
 from server.common.clock import now
 from server.diagnostics.link_log import KEPT_S
 from server.diagnostics.link_reports import LinkReports
 from server.protocol.command_age import refuse_old
-from server.protocol.messages import Command, decode_message
+from server.protocol.link_messages import LinkReport
+from server.protocol.messages import Command, Status
 from server.protocol.wire import WireError
 from server.recording.writer import RecordingError
+from server.security.least_role import (
+    RefusedRequest,
+    Stopper,
+    Supervisor,
+    operator,
+    supervisor,
+    viewer,
+)
 from server.web.metrics import exposition
-from server.web.replies import body_of, refusal
+from server.web.replies import HANDLERS
 from server.web.session_manager import SessionManager
-from server.web.status import mode_of
+from server.web.status import ModeName, mode_of
+from server.web.typed_routes import ApiRoute, Asked, Told
 from server.web.websocket import PageServer
 
 CLIENT = Path(__file__).resolve().parents[2] / "web_client"
 LOOKS = sorted((*CLIENT.glob("*.css"), *CLIENT.glob("*.svg")))
 METRICS_S = 1.0
 """So old they may be: they cost some milliseconds."""
+NO_TELEMETRY = TelemetryConfig(tracing=False, metrics=False, logs=False, auto_configure=False)
+"""FastAPI sends nothing to anybody, whatever the environment says."""
+
+
+class StopAnswer(msgspec.Struct):
+    """Answer to a STOP."""
+
+    mode: ModeName
+    """Of the robot, as far as is known."""
+    stopping: bool = True
+
+
+class PhoneAnswer(msgspec.Struct):
+    """Whether the virtual phone runs."""
+
+    running: bool
+
+
+class RecordingAnswer(msgspec.Struct):
+    """A recording that runs."""
+
+    name: str
+
+
+class RecordedAnswer(msgspec.Struct):
+    """A recording that has ended."""
+
+    path: str
+    """"" without one."""
 
 
 class VirtualPhoneProcess:
@@ -69,98 +112,116 @@ class Api:
 
     def routes(self) -> Sequence[BaseRoute]:
         """All of `/api/` that is no person's pairing, and the small ones beside it."""
+        phone, recording, post = "/api/virtual-phone", "/api/recording", ["POST"]
+        watches = [Depends(viewer)]
         return [
-            Route("/api/stop", self._stop, methods=["POST"]),
-            Route("/api/virtual-phone", self._virtual_phone, methods=["POST", "DELETE"]),
-            Route("/api/recording", self._recording, methods=["POST", "DELETE"]),
-            Route("/api/status", self._status),
-            Route("/api/link", self._link),
+            ApiRoute("/api/stop", self._stop, methods=post, status_code=202),
+            ApiRoute(phone, self._start_virtual_phone, methods=post, status_code=202),
+            ApiRoute(phone, self._stop_virtual_phone, methods=["DELETE"], status_code=202),
+            ApiRoute(recording, self._start_recording, methods=post, status_code=202),
+            ApiRoute(recording, self._stop_recording, methods=["DELETE"]),
+            ApiRoute(
+                "/api/status", self._status, dependencies=watches, response_model=Told[Status]
+            ),
+            ApiRoute("/api/link", self._link, dependencies=watches),
+            ApiRoute("/metrics", self._metrics, dependencies=watches),
+            ApiRoute("/api/openapi.json", _openapi, dependencies=[Depends(supervisor)]),
             Route("/ca.crt", self._certificate),
             Route("/healthz", self._health),
-            Route("/metrics", self._metrics),
         ]
 
-    async def _stop(self, request: Request) -> Response:
-        try:
-            stop = await stop_of(request)
-        except WireError as error:
-            return refusal(409 if error.code == "age" else 400, error.field, error.allowed)
-        self._manager.request(stop, request.scope["member"])
-        mode, _ = mode_of(self._manager, now())
-        return JSONResponse({"stopping": True, "mode": mode}, 202)
+    async def _stop(self, by: Stopper, asked: Asked[Command | None] = None) -> Told[StopAnswer]:
+        """STOP, which says how old it is if it has a body."""
+        stop = asked or Command("stop")
+        if stop.what != "stop":
+            raise WireError("value", "command.what", "stop")
+        self._manager.request(refuse_old(stop, now()), by)
+        return StopAnswer(mode_of(self._manager, now())[0])
 
-    def _note(self, what: str, request: Request) -> None:
-        begins = request.method == "POST"
-        self._manager.people.note(what, request.scope["member"], "start" if begins else "stop")
+    async def _start_virtual_phone(self, by: Supervisor) -> Told[PhoneAnswer]:
+        """Start it, unless it runs."""
+        self._manager.people.note("virtual phone", by, "start")
+        self.phone.start()
+        return PhoneAnswer(self.phone.running)
 
-    async def _virtual_phone(self, request: Request) -> Response:
-        self._note("virtual phone", request)
-        if request.method == "POST":
-            self.phone.start()
-        else:
-            self.phone.stop()
-        return JSONResponse({"running": self.phone.running}, 202)
+    async def _stop_virtual_phone(self, by: Supervisor) -> Told[PhoneAnswer]:
+        """Ask it to leave."""
+        self._manager.people.note("virtual phone", by, "stop")
+        self.phone.stop()
+        return PhoneAnswer(self.phone.running)
 
-    async def _recording(self, request: Request) -> Response:
-        self._note("recording", request)
-        recordings = self._manager.recordings
-        if request.method == "DELETE":
-            path = recordings.stop()
-            self._manager.log_event(f"Recorded: {path}" if path else "No recording was running.")
-            return JSONResponse({"path": path})
+    async def _start_recording(self, by: Supervisor) -> Told[RecordingAnswer]:
+        """Record, unless a recording runs."""
+        self._manager.people.note("recording", by, "start")
         try:
             name = self._manager.start_recording()
         except RecordingError as error:
-            return refusal(507, "recording", str(error))
+            raise RefusedRequest(507, "recording", str(error)) from error
         self._manager.log_event(f"Recording {name}.")
-        return JSONResponse({"name": name}, 202)
+        return RecordingAnswer(name)
 
-    async def _status(self, _request: Request) -> Response:
+    async def _stop_recording(self, by: Supervisor) -> Told[RecordedAnswer]:
+        """End the recording that runs."""
+        self._manager.people.note("recording", by, "stop")
+        path = self._manager.recordings.stop()
+        self._manager.log_event(f"Recorded: {path}" if path else "No recording was running.")
+        return RecordedAnswer(path)
+
+    async def _status(self) -> Response:
+        """What every screen shows."""
         return Response(self._manager.snapshot(), media_type="application/json")
 
-    async def _link(self, request: Request) -> Response:
+    async def _link(
+        self, seconds: Annotated[float, Query(gt=0.0, le=KEPT_S, allow_inf_nan=False)] = KEPT_S
+    ) -> Told[LinkReport]:
+        """How it will be to fly with the operator's link, by its last `seconds`."""
         phone = self._manager.phone
-        try:
-            seconds = float(request.query_params.get("seconds", KEPT_S))
-        except ValueError:
-            seconds = 0.0
-        if not 0.0 < seconds <= KEPT_S:
-            return refusal(400, "seconds", f"up to {KEPT_S:g}")
         if phone is None:
-            return refusal(409, "phone", "while a phone leads: scan the code first")
-        report = await self._reports.of(phone.link, seconds)
-        return Response(msgspec.json.encode(report), media_type="application/json")
+            raise RefusedRequest(409, "phone", "while a phone leads: scan the code first")
+        return await self._reports.of(phone.link, seconds)
+
+    async def _metrics(self) -> Response:
+        """For Prometheus."""
+        if now() - self._t_metrics >= METRICS_S:
+            self._t_metrics, self._exposed = now(), exposition(self._manager)
+        return Response(self._exposed, media_type="text/plain; version=0.0.4")
 
     async def _certificate(self, _request: Request) -> Response:
         if self._authority is None:
-            return refusal(404, "ca.crt", "this server has a certificate of its owner's")
+            raise RefusedRequest(404, "ca.crt", "this server has a certificate of its owner's")
         return FileResponse(self._authority, media_type="application/x-x509-ca-cert")
 
     async def _health(self, _request: Request) -> Response:
         return JSONResponse({"ok": True})
 
-    async def _metrics(self, _request: Request) -> Response:
-        if now() - self._t_metrics >= METRICS_S:
-            self._t_metrics, self._exposed = now(), exposition(self._manager)
-        return Response(self._exposed, media_type="text/plain; version=0.0.4")
 
-
-def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> Starlette:
+def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAPI:
     """The application, without its guard; `others` are routes of people, WebRTC and 3D view."""
-    return Starlette(
+    leads, watches = [Depends(operator)], [Depends(viewer)]
+    return FastAPI(
+        title="Lightleash",
+        version=__version__,
+        openapi_url=None,  # ours is the supervisor's; the pages of docs would ask another host
+        telemetry=NO_TELEMETRY,
+        exception_handlers=HANDLERS,
         routes=[
             Route("/", _file("index.html")),
             Route("/supervisor", _file("supervisor.html")),
             Route("/board", _file("board.html")),
             *api.routes(),
-            WebSocketRoute("/ws/phone", pages.phone),
-            WebSocketRoute("/ws/video", pages.video),
-            WebSocketRoute("/ws/supervisor", pages.supervisor),
+            APIWebSocketRoute("/ws/phone", pages.phone, dependencies=leads),
+            APIWebSocketRoute("/ws/video", pages.video, dependencies=leads),
+            APIWebSocketRoute("/ws/supervisor", pages.supervisor, dependencies=watches),
             *others,
             *(Route(f"/{path.name}", _file(path.name)) for path in LOOKS),
             Mount("/src", StaticFiles(directory=CLIENT / "src")),
-        ]
+        ],
     )
+
+
+async def _openapi(request: Request) -> JSONResponse:
+    """This description."""
+    return JSONResponse(request.app.openapi())
 
 
 def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
@@ -168,18 +229,3 @@ def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
         return FileResponse(CLIENT / name)
 
     return file
-
-
-async def stop_of(request: Request) -> Command:
-    """The STOP of a request, which says how old it is if it has a body.
-
-    Raises:
-        WireError: its body is something else, or it is too old.
-    """
-    body = await body_of(request)
-    if not body and request.headers.get("content-length", "0") == "0":
-        return Command("stop")
-    command = decode_message(body)
-    if not isinstance(command, Command) or command.what != "stop":
-        raise WireError("value", "command.what", "stop")
-    return refuse_old(command, now())

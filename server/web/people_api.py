@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Awaitable, Callable, Sequence
-from typing import Annotated, TypeVar
+from collections.abc import Sequence
+from typing import Annotated
 
 import msgspec
 import segno
 from msgspec import Meta
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
-from starlette.routing import BaseRoute, Route
+from starlette.routing import BaseRoute
 
 from server.common.roles import Role, is_enough
-from server.security.pairings import LINK_S, Member, PairingError
+from server.security.least_role import Known, Operator, RefusedRequest, Supervisor
+from server.security.pairings import LINK_S, Member, PairingError, State
 from server.security.security import PAIR_TRIES, Doors, cookie_name
 from server.web.people import LOCAL
-from server.web.replies import body_of, refusal
 from server.web.session_manager import SessionManager
+from server.web.typed_routes import ApiRoute, Asked, Told
 
-Wanted = TypeVar("Wanted", bound=msgspec.Struct)
-Answer = Callable[[Wanted, Member], Awaitable[Response]]
 Short = Annotated[str, Meta(max_length=64)]
 
 
@@ -47,6 +46,46 @@ class PersonRequest(msgspec.Struct, forbid_unknown_fields=True):
     code: Short = ""
 
 
+class PairAnswer(msgspec.Struct):
+    """What a page may know of its own pairing."""
+
+    role: Role
+    state: State
+    name: str
+    code: str
+    """Four letters that a supervisor has to find equal."""
+    why: str
+    """It has ended, in words."""
+
+    @classmethod
+    def of(cls, member: Member) -> PairAnswer:
+        """That of `member`."""
+        return cls(member.role, member.state, member.name, member.code, member.why)
+
+
+class InviteAnswer(msgspec.Struct):
+    """A link that opens once."""
+
+    url: str
+    here: str
+    """The same for a browser on the server's own machine."""
+    qr_svg: str
+    lives_s: float = LINK_S
+
+
+class PersonAnswer(msgspec.Struct):
+    """Whom it was done to."""
+
+    name: str
+
+
+class LeadAnswer(msgspec.Struct):
+    """Whose the lead is next."""
+
+    leads_next: str
+    """Id; "" of nobody in particular."""
+
+
 class PeopleApi:
     """Pairing, confirming, shutting out, handing on."""
 
@@ -56,27 +95,24 @@ class PeopleApi:
 
     def routes(self) -> Sequence[BaseRoute]:
         """All routes of pairing."""
-        roles = '{"role": "viewer", "operator" or "supervisor"}'
-        id, code = '{"id": "…"}', '{"id": "…", "code": "…"}'
+        post = ["POST"]
         return [
-            Route("/api/pair", self._pair, methods=["POST"]),
-            Route("/api/whoami", self._who_am_i),
-            self._of_a_member("/api/invite", InviteRequest, roles, self._invite),
-            self._of_a_member("/api/people/confirm", PersonRequest, code, self._confirm),
-            self._of_a_member("/api/people/deny", PersonRequest, id, self._deny),
-            self._of_a_member("/api/people/revoke", PersonRequest, id, self._revoke),
-            self._of_a_member("/api/people/lead", PersonRequest, id, self._lead),
-            self._of_a_member("/api/people/keep", PersonRequest, id, self._keep),
+            ApiRoute("/api/pair", self._pair, methods=post, response_model=Told[PairAnswer]),
+            ApiRoute("/api/whoami", self._who_am_i),
+            ApiRoute("/api/invite", self._invite, methods=post),
+            ApiRoute("/api/people/confirm", self._confirm, methods=post),
+            ApiRoute("/api/people/deny", self._deny, methods=post),
+            ApiRoute("/api/people/revoke", self._revoke, methods=post),
+            ApiRoute("/api/people/lead", self._lead, methods=post, status_code=202),
+            ApiRoute("/api/people/keep", self._keep, methods=post, status_code=202),
         ]
 
-    async def _pair(self, request: Request) -> Response:
+    async def _pair(self, request: Request, asked: Asked[PairingRequest]) -> Response:
+        """Exchange a link for a cookie."""
         address = request.client.host if request.client is not None else ""
-        if not self._doors.may_try(address):
-            return refusal(429, "token", f"{PAIR_TRIES} wrong links a minute")
-        asked = await _asked(request, PairingRequest)
-        if asked is None:
-            return refusal(400, "token", 'JSON: {"token": "…", "name": "…"}')
         doors, secure = self._doors, request.url.scheme == "https"
+        if not doors.may_try(address):
+            raise RefusedRequest(429, "token", f"{PAIR_TRIES} wrong links a minute")
         former = self._former(request, secure)
         try:
             role, must_wait = doors.pairings.opens(asked.token, doors.clock())
@@ -86,14 +122,14 @@ class PeopleApi:
         except PairingError as error:
             doors.tried(address)
             doors.audit.note("refusal", address=address, why=f"pairing: {error.allowed}")
-            return refusal(401, error.field, error.allowed)
+            raise RefusedRequest(401, error.field, error.allowed) from error
         if former is not None:  # its old cookie is of no more use
             await self._manager.handover.shut_out(former.id, "It has paired anew.", former)
         doors.save()
         self._manager.people.note("pair", member, f"as {member.state}")
         unconfirmed = ", waits to be confirmed" if member.state == "waiting" else ""
         self._manager.log_event(f"{member.name} has paired as {member.role}{unconfirmed}.")
-        response = JSONResponse(_told(member))
+        response = JSONResponse(msgspec.to_builtins(PairAnswer.of(member)))
         name = cookie_name(secure)
         response.set_cookie(name, cookie, httponly=True, secure=secure, samesite="strict")
         return response
@@ -104,64 +140,56 @@ class PeopleApi:
         former = self._doors.pairings.of_cookie(value, self._doors.clock()) if value else None
         return former if former is not None and former.state in ("waiting", "in") else None
 
-    async def _who_am_i(self, request: Request) -> Response:
-        return JSONResponse(_told(_member(request)))
+    async def _who_am_i(self, by: Known) -> Told[PairAnswer]:
+        """As what a page is paired."""
+        return PairAnswer.of(by)
 
-    def _of_a_member(
-        self, path: str, kind: type[Wanted], needs: str, answer: Answer[Wanted]
-    ) -> Route:
-        """A request with a body; `needs` says which, as JSON."""
-
-        async def endpoint(request: Request) -> Response:
-            asked, by = await _asked(request, kind), _member(request)
-            if asked is None:
-                return refusal(400, kind.__struct_fields__[0], f"JSON: {needs}")
-            try:
-                return await answer(asked, by)
-            except PairingError as error:
-                return refusal(409, error.field, error.allowed)
-
-        return Route(path, endpoint, methods=["POST"])
-
-    async def _invite(self, asked: InviteRequest, by: Member) -> Response:
+    async def _invite(self, asked: Asked[InviteRequest], by: Supervisor) -> Told[InviteAnswer]:
+        """Make a link, and its QR code."""
         if asked.role == "supervisor" and not by.id.startswith(LOCAL):
-            return refusal(403, "role", "viewer, operator; lightleash invite makes the other one")
+            allowed = "viewer, operator; lightleash invite makes the other one"
+            raise RefusedRequest(403, "role", allowed)
         key = self._doors.pairings.invite(asked.role, self._doors.clock(), by.id)
         self._doors.save()
         self._manager.people.note("invite", by, asked.role)
         page = "/" if asked.role == "operator" else "/supervisor"
         url = f"{self._phones}{page}#k={key}"
         here = f"{self._here}{page}#k={key}" if self._here else url
-        return JSONResponse({"url": url, "here": here, "qr_svg": _code(url), "lives_s": LINK_S})
+        return InviteAnswer(url, here, _code(url))
 
-    async def _confirm(self, asked: PersonRequest, by: Member) -> Response:
+    async def _confirm(self, asked: Asked[PersonRequest], by: Supervisor) -> Told[PersonAnswer]:
+        """Let in who waits, by the letters on both screens."""
         member = self._doors.pairings.confirm(asked.id, asked.code)
         self._doors.save()
         self._manager.people.note("confirm", by, member.name)
         self._manager.log_event(f"{by.name} let {member.name} in.")
-        return JSONResponse({"name": member.name})
+        return PersonAnswer(member.name)
 
-    async def _deny(self, asked: PersonRequest, by: Member) -> Response:
+    async def _deny(self, asked: Asked[PersonRequest], by: Supervisor) -> Told[PersonAnswer]:
+        """Turn away who waits."""
         member = self._doors.pairings.deny(asked.id, "A supervisor did not let it in.")
         self._doors.save()
         self._manager.people.note("deny", by, member.name)
         self._manager.log_event(f"{by.name} did not let {member.name} in.")
-        return JSONResponse({"name": member.name})
+        return PersonAnswer(member.name)
 
-    async def _revoke(self, asked: PersonRequest, by: Member) -> Response:
+    async def _revoke(self, asked: Asked[PersonRequest], by: Supervisor) -> Told[PersonAnswer]:
+        """Shut out who is in."""
         if asked.id.startswith(LOCAL):
-            return refusal(409, "id", "a paired page; end the program on its computer instead")
+            allowed = "a paired page; end the program on its computer instead"
+            raise PairingError("id", allowed)
         why = "A supervisor has ended this pairing."
-        member = await self._manager.handover.shut_out(asked.id, why, by)
-        return JSONResponse({"name": member.name})
+        return PersonAnswer((await self._manager.handover.shut_out(asked.id, why, by)).name)
 
-    async def _lead(self, asked: PersonRequest, by: Member) -> Response:
+    async def _lead(self, asked: Asked[PersonRequest], by: Operator) -> Told[LeadAnswer]:
+        """Hand the lead on."""
         self._manager.handover.give(asked.id, by, self._doors.clock())
-        return JSONResponse({"leads_next": asked.id}, 202)
+        return LeadAnswer(asked.id)
 
-    async def _keep(self, asked: PersonRequest, by: Member) -> Response:
+    async def _keep(self, asked: Asked[PersonRequest], by: Operator) -> Told[LeadAnswer]:
+        """Keep the lead, or leave it to whom it was not given."""
         self._manager.handover.keep(asked.id, by, self._doors.clock())
-        return JSONResponse({"leads_next": ""}, 202)
+        return LeadAnswer("")
 
 
 def _loses(former: Member, role: Role, waits: bool) -> bool:
@@ -181,23 +209,6 @@ def _told_of_less(former: Member, role: Role, waits: bool) -> Response:
         "waits": waits,
     }
     return JSONResponse(body, 409)
-
-
-def _member(request: Request) -> Member:
-    member: Member = request.scope["member"]
-    return member
-
-
-def _told(member: Member) -> dict[str, str]:
-    """What a page may know of its own pairing."""
-    return {field: getattr(member, field) for field in ("role", "state", "name", "code", "why")}
-
-
-async def _asked(request: Request, kind: type[Wanted]) -> Wanted | None:
-    try:
-        return msgspec.json.decode(await body_of(request), type=kind)
-    except msgspec.MsgspecError:
-        return None
 
 
 def _code(url: str) -> str:

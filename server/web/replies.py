@@ -1,31 +1,44 @@
-"""What every request has in common: a bounded body, and a refusal in words."""
+"""Whatever can't be taken is answered alike: which field, and what is allowed."""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
+from collections.abc import Callable
+from typing import Any
 
-from starlette.requests import ClientDisconnect, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.requests import HTTPConnection
 from starlette.responses import JSONResponse, Response
+from starlette.websockets import WebSocket
 
-MAX_BODY, BODY_S = 4_096, 5.0
-"""Bytes, and seconds until all of them have come."""
-
-
-async def body_of(request: Request, longest: int = MAX_BODY) -> bytes:
-    """The body; empty if it is no text, longer than what we take, or too long in coming."""
-    body = b""
-    with contextlib.suppress(TimeoutError, ClientDisconnect, UnicodeDecodeError):
-        async with asyncio.timeout(BODY_S):
-            async for part in request.stream():
-                body += part
-                if len(body) > longest:
-                    return b""
-            body.decode()  # msgspec would raise another error of it than of other faults
-            return body
-    return b""
+from server.protocol.wire import WireError
+from server.security.least_role import RefusedRequest
+from server.security.pairings import PairingError
 
 
-def refusal(status: int, field: str, allowed: str) -> Response:
-    """The answer to a request that can't be taken."""
-    return JSONResponse({"code": "refused", "field": field, "allowed": allowed}, status)
+async def told(connection: HTTPConnection, error: Exception) -> Response:
+    """The answer to a request or websocket that ended in `error`."""
+    refused = _refused(error)
+    answer = JSONResponse(refused.detail, refused.status_code)
+    if isinstance(connection, WebSocket):
+        await connection.send_denial_response(answer)
+    return answer
+
+
+def _refused(error: Exception) -> RefusedRequest:
+    match error:
+        case RefusedRequest():
+            return error
+        case PairingError():
+            return RefusedRequest(409, error.field, error.allowed)
+        case WireError():  # what comes too late was right once
+            return RefusedRequest(409 if error.code == "age" else 400, error.field, error.allowed)
+        case RequestValidationError():  # of what stands behind an address's question mark
+            first = error.errors()[0]
+            allowed = str(first["msg"]).removeprefix("Input should be ")
+            return RefusedRequest(400, str(first["loc"][-1]), allowed)
+    raise error
+
+
+HANDLERS: dict[Any, Callable[..., Any]] = dict.fromkeys(
+    (RefusedRequest, PairingError, WireError, RequestValidationError), told
+)

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
+from fastapi import Depends
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
-from starlette.routing import Route
 
 from pipeline.signals import Image
 from server.common.clock import now
@@ -28,10 +28,11 @@ from server.phone.frame_worker import FrameThread
 from server.phone.ingest import EncodedFrame
 from server.phone.phone_session import PhoneSession
 from server.process.server_process import SWITCH_S
+from server.security.least_role import roles_of, supervisor
 from server.security.request_guard import Guard
 from server.view.viser_proxy import routes as view_routes
 from server.web.app import make_app
-from server.web.replies import body_of
+from server.web.typed_routes import ApiRoute, body_of
 from server.web.websocket import PageServer
 from tests.e2e.clock_canvas import painted_ms
 from tests.server.house import HOST
@@ -96,9 +97,11 @@ class Receiver(RtcHouse):
         self._calls: list[RTCPeerConnection] = []
         self._reading: set[asyncio.Task[None]] = set()
         routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.signalling.routes()]
-        routes.append(Route("/stock", self._stock, methods=["POST"]))
+        kept = [Depends(supervisor)]
+        routes.append(ApiRoute("/stock", self._stock, methods=["POST"], dependencies=kept))
         pages = PageServer(self.manager, VideoSettings())
-        self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
+        inner = make_app(self.api, pages, routes)
+        self.app = Guard(inner, self.doors, [HOST], roles=roles_of(inner.routes))
         PhoneSession._see = lambda phone, frame, t: self._see(phone, frame, t)  # type: ignore[assignment]
 
     def _see(self, phone: PhoneSession, frame: EncodedFrame, t: float) -> None:

@@ -22,6 +22,7 @@ from server.protocol.wire import VERSION, decode, encode
 from server.protocol.wire_records import Body, Codec, Picture, Ping, Pong, Record, Touch
 from server.recording.control import Recordings
 from server.security.audit import Audit
+from server.security.least_role import roles_of
 from server.security.listener import listener
 from server.security.request_guard import Guard
 from server.security.security import Doors
@@ -155,7 +156,8 @@ class House:
         pages = PageServer(self.manager, VideoSettings())
         view = view_routes(Path("nowhere"))
         self.inner = make_app(self.api, pages, [*self.people.routes(), *view])
-        self.app = Guard(self.inner, self.doors, [HOST, "robot.lan", "::1"])
+        hosts = [HOST, "robot.lan", "::1"]
+        self.app = Guard(self.inner, self.doors, hosts, roles=roles_of(self.inner.routes))
         self.port = 0
 
     def close(self) -> None:

@@ -18,6 +18,7 @@ from server.control.ipc import ControlStatus, Endpoint, control_end
 from server.process.launcher import listen
 from server.recording.control import Recordings
 from server.rtc.signalling_endpoint import SignallingEndpoint
+from server.security.least_role import roles_of
 from server.security.listener import listener
 from server.security.quotas import QUOTAS, Quota, Quotas
 from server.security.request_guard import Guard
@@ -62,7 +63,9 @@ class LiveServer:
         signalling = SignallingEndpoint(self.manager, RtcSettings(), 3_000_000)
         view = view_routes(Path("nowhere"))
         self.app = make_app(self.api, pages, [*people.routes(), *view, *signalling.routes()])
-        self.guard = Guard(self.app, self.doors, ["robot.lan", HOST, "::1"], quotas=quotas)
+        self.roles = roles_of(self.app.routes)
+        hosts = ["robot.lan", HOST, "::1"]
+        self.guard = Guard(self.app, self.doors, hosts, quotas=quotas, roles=self.roles)
 
     def close(self) -> None:
         """Give the sockets back."""

@@ -26,6 +26,7 @@ from server.protocol.wire import HEADER, MAGIC
 from server.recording.control import Recordings
 from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.admission import Admission
+from server.security.least_role import roles_of
 from server.security.listener import listener
 from server.security.request_guard import Guard
 from server.security.security import Doors
@@ -108,7 +109,7 @@ async def serve(host: str, folder: Path) -> None:
         api = Api(manager, None)
         admission = Admission()
         inner = make_app(api, PageServer(manager, video), signalling.routes())
-        app = Guard(inner, doors, [host], admission)
+        app = Guard(inner, doors, [host], admission, roles=roles_of(inner.routes))
         stop, loop = asyncio.Event(), asyncio.get_running_loop()
         loop.add_reader(control.fileno(), control.inputs)
         loop.add_signal_handler(signal.SIGTERM, stop.set)

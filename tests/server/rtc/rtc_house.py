@@ -18,6 +18,7 @@ from server.common.settings import RtcSettings, VideoSettings
 from server.protocol.messages import Status
 from server.protocol.wire_records import Motion, Picture, Pong, Record, Touch
 from server.rtc.signalling_endpoint import SignallingEndpoint
+from server.security.least_role import roles_of
 from server.security.request_guard import Guard
 from server.view.viser_proxy import routes as view_routes
 from server.virtual_phone.phone_script import CODECS, DEVICE
@@ -38,7 +39,8 @@ class RtcHouse(House):
         self.signalling = SignallingEndpoint(self.manager, settings or RtcSettings(), 3_000_000)
         pages = PageServer(self.manager, VideoSettings())
         routes = [*self.people.routes(), *view_routes(Path("nowhere")), *self.signalling.routes()]
-        self.app = Guard(make_app(self.api, pages, routes), self.doors, [HOST])
+        inner = make_app(self.api, pages, routes)
+        self.app = Guard(inner, self.doors, [HOST], roles=roles_of(inner.routes))
 
     @contextlib.asynccontextmanager
     async def open(self) -> AsyncIterator[None]:

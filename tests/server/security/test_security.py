@@ -14,12 +14,13 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.testclient import TestClient, WebSocketDenialResponse
 
 from server.common.clock import now
-from server.common.roles import ADDRESSES, RANKS, is_enough
+from server.common.roles import RANKS, is_enough
 from server.security.audit import STRANGERS_FILE, Audit
+from server.security.least_role import RefusedRequest
 from server.security.quotas import Quotas
 from server.security.request_guard import Guard
 from server.security.security import COOKIE, PAIR_TRIES, Doors
-from server.web import replies
+from server.web import typed_routes
 from tests.server.live_server import UNLIMITED, LiveServer
 
 BASE = "http://127.0.0.1:8080"
@@ -107,8 +108,7 @@ def test_every_route_is_known_to_this_test(rig):
     mounts = [route.path for route in rig.app.routes if isinstance(route, Mount)]
     assert mounts == ["/src"]
     assert set(socket_paths(rig)) >= {"/ws/phone", "/ws/video", "/ws/supervisor", "/view", "/view/"}
-    known = {*http_paths(rig), *socket_paths(rig)}
-    assert known == set(ADDRESSES) | FILES
+    assert {*http_paths(rig), *socket_paths(rig)} == set(rig.roles.least) | FILES
 
 
 def test_every_websocket_asks_for_a_role(rig):
@@ -142,10 +142,15 @@ def test_nothing_else_of_the_disk_is_served(rig, path):
 def every_request(rig):
     """(method, path) of each route that asks for a role."""
     for route in rig.app.routes:
-        if isinstance(route, (Route, WebSocketRoute)) and ADDRESSES.get(route.path) in RANKS:
+        if isinstance(route, (Route, WebSocketRoute)) and route.path in rig.roles.least:
             is_socket = isinstance(route, WebSocketRoute)
             for method in ["socket"] if is_socket else sorted(set(route.methods) - {"HEAD"}):
                 yield method, route.path
+
+
+def open_to_all(rig):
+    """Paths that take no role."""
+    return {path for path, least in rig.roles.least.items() if RANKS[least] < RANKS["viewer"]}
 
 
 def turned_away(client, method, path):
@@ -175,7 +180,7 @@ def test_each_role_reaches_what_it_may_and_nothing_else_on_every_route_and_socke
     client = member(quiet, role)
     wrong = []
     for method, path in every_request(quiet):
-        least = ADDRESSES[path]
+        least = quiet.roles.least[path]
         may = least in ("anyone", "known") or is_enough(role, least)
         told = turned_away(client, method, path)
         if (told is None) != may:
@@ -194,7 +199,7 @@ def test_a_phone_that_waits_learns_its_code_and_reaches_nothing(quiet):
         for method, path in every_request(quiet)
         if turned_away(quiet.client, method, path) is None
     }
-    assert {path for _, path in reached} == {p for p, r in ADDRESSES.items() if RANKS[r] < 2}
+    assert {path for _, path in reached} == open_to_all(quiet)
 
 
 def test_a_revoked_cookie_opens_no_route_and_no_socket(quiet):
@@ -206,7 +211,7 @@ def test_a_revoked_cookie_opens_no_route_and_no_socket(quiet):
     reached = {
         path for method, path in every_request(quiet) if turned_away(client, method, path) is None
     }
-    assert reached == {p for p, r in ADDRESSES.items() if RANKS[r] < 2}
+    assert reached == open_to_all(quiet)
     told = client.get("/api/whoami").json()
     assert (told["state"], told["why"]) == ("revoked", "A supervisor has ended this pairing.")
 
@@ -447,13 +452,14 @@ def test_a_key_of_the_run_is_no_link(rig, role):
 
 
 def test_a_body_that_never_comes_does_not_hold_its_connection(monkeypatch):
-    monkeypatch.setattr(replies, "BODY_S", 0.01)
+    monkeypatch.setattr(typed_routes, "BODY_S", 0.01)
 
     async def never():
         await asyncio.Event().wait()
 
     request = Request({"type": "http", "method": "POST", "headers": []}, receive=never)
-    assert asyncio.run(replies.body_of(request)) == b""
+    with pytest.raises(RefusedRequest, match="within"):
+        asyncio.run(typed_routes.body_of(request))
 
 
 def test_a_token_of_half_a_character_is_simply_wrong(rig):

@@ -13,13 +13,15 @@ import msgspec
 import pytest
 import uvicorn
 import viser
-from starlette.applications import Starlette
+from fastapi import FastAPI
 from starlette.testclient import TestClient
 from viser._messages import GuiUpdateMessage, ShareUrlRequest
 from websockets.asyncio.client import connect, unix_connect
 from websockets.asyncio.server import unix_serve
 from websockets.exceptions import InvalidStatus
 
+from server.security.pairings import of_this_machine
+from server.security.security import Doors
 from server.view import viser_view
 from server.view.viser_proxy import MAX_UP_BYTES, camera_only, routes
 from server.view.viser_view import start_viser
@@ -41,6 +43,16 @@ CAMERA = {
 }
 SHARE = {"type": "ShareUrlRequest"}
 encode = msgspec.msgpack.encode
+
+
+def let_in(path):
+    """The routes as the guard hands people on."""
+    inner, doors = FastAPI(routes=routes(path), openapi_url=None), Doors()
+
+    async def app(scope, receive, send):
+        await inner({**scope, "member": of_this_machine("viewer"), "doors": doors}, receive, send)
+
+    return app
 
 
 class Rig(SimpleNamespace):
@@ -76,8 +88,7 @@ def rig(tmp_path_factory):
 
     listening = socket.create_server(("127.0.0.1", 0))
     rig.port = listening.getsockname()[1]
-    app = Starlette(routes=routes(path))
-    server = uvicorn.Server(uvicorn.Config(app, log_level="critical"))
+    server = uvicorn.Server(uvicorn.Config(let_in(path), log_level="critical"))
     thread = threading.Thread(target=server.run, args=([listening],))
     thread.start()
     yield rig
@@ -89,7 +100,7 @@ def rig(tmp_path_factory):
 
 
 def client():
-    return TestClient(Starlette(routes=routes(Path("nowhere"))))
+    return TestClient(let_in(Path("nowhere")))
 
 
 @pytest.mark.parametrize("path", ["/view", "/view/"])

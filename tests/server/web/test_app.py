@@ -179,13 +179,51 @@ def test_a_virtual_phone_is_one_process_that_can_be_ended(house, client, monkeyp
 
 
 @pytest.mark.parametrize(
-    "body", [b"", b"[]", b"{}", b'{"token": 1}', b"\xff", b'{"token": "' + bytes(5000)]
+    "body", [b"", b"[]", b"{}", b'{"token": 1}', b"\xff", b'{"token": "\xff"}', b"[" * 4000]
 )
 def test_a_pairing_that_is_none_is_refused_by_name(client, body):
     headers = {"Origin": BASE, "X-Lightleash": "1", "Authorization": ""}
     answer = client.post("/api/pair", content=body, headers=headers)
     assert answer.status_code == 400
     assert answer.json()["field"] == "token"
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "field", "allowed"),
+    [
+        ("invite", b'{"role": "boss"}', "role", '"operator" or "supervisor" or "viewer"'),
+        ("invite", b'{"roles": "viewer"}', "roles", '{"role": '),
+        ("people/confirm", b'{"code": "BCDF"}', "id", '{"id": "…", "code": "…"}'),
+        ("people/lead", b'{"id": 7}', "id", '"id": '),
+        ("pair", b'{"token": "x", "replace": 1}', "replace", '"replace": true or false'),
+        ("people/deny", b'{"id": "' + bytes(5000), "body", "up to 4096 bytes"),
+        ("stop", b'{"type": "command", "what": "arm"}', "command.what", "stop"),
+        (
+            "stop",
+            b'{"type": "command", "what": "stop", "age_ms": -1}',
+            "age_ms",
+            '"age_ms": a number',
+        ),
+    ],
+)
+def test_a_body_that_cannot_be_taken_is_refused_by_its_field_and_what_it_may_be(
+    house, client, path, body, field, allowed
+):
+    answer = client.post(f"/api/{path}", content=body)
+    assert (answer.status_code, answer.json()["field"]) == (400, field)
+    assert allowed in answer.json()["allowed"]
+    assert not house.control.inputs()
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "61", "nan", "inf", "a minute", ""])
+def test_a_link_is_judged_over_no_time_that_is_not_kept(client, seconds):
+    answer = client.get(f"/api/link?seconds={seconds}")
+    assert (answer.status_code, answer.json()["field"]) == (400, "seconds")
+
+
+def test_a_link_is_judged_while_a_phone_leads(client):
+    answer = client.get("/api/link?seconds=60")
+    assert (answer.status_code, answer.json()["field"]) == (409, "phone")
 
 
 def test_every_refusal_is_json_that_names_what_is_allowed(client):
