@@ -6,7 +6,7 @@ from server.protocol.calibration_messages import Calibrate
 from server.protocol.command_age import refuse_old
 from server.protocol.messages import Command, FromPage, Hello, Log, Tune, decode_message
 from server.protocol.video_path_messages import PathChoice
-from server.protocol.wire import VERSION, WireError, decode
+from server.protocol.wire import VERSION, WireError, check_frame, decode, size_of
 from server.protocol.wire_records import Motion, Picture, Pong, Record, Stamp, Touch
 
 MAX_FAULTS, FAULTS_HZ = 50, 0.5
@@ -71,7 +71,8 @@ class Session:
         """
         try:
             if isinstance(data, bytes):
-                return self._record(data, now)
+                self._take_record(len(data), now)
+                return self._of_role(decode(data))
             said = self._message(data, now)
         except WireError:
             self.fault(now)
@@ -79,18 +80,33 @@ class Session:
         # no fault of the page: its link was away
         return refuse_old(said, now) if isinstance(said, Command) else said
 
+    def admit(self, record: Record, now: float) -> None:
+        """Take a record that was put together here: a picture that came as packets.
+
+        Raises:
+            WireError: it may not come, or not now; counted.
+        """
+        try:
+            body = self._of_role(record).body
+            self._take_record(size_of(body) if isinstance(body, Picture) else 0, now)
+            check_frame(record)
+        except WireError:
+            self.fault(now)
+            raise
+
     def fault(self, now: float) -> None:
         """Count one."""
         self.hopeless = self.hopeless or not self._faults.take(now)
 
-    def _record(self, data: bytes, now: float) -> Record:
+    def _take_record(self, size: int, now: float) -> None:
         if self.hello is None:
             raise WireError("order", "record", "after hello")
-        if not self._records.take(now) or not self._bytes.take(now, len(data)):
+        if not self._records.take(now) or not self._bytes.take(now, size):
             raise WireError(
                 "rate", "record", f"{RECORDS_HZ:g} records, {1e-6 * BYTES_HZ:g} MB a second"
             )
-        record = decode(data)
+
+    def _of_role(self, record: Record) -> Record:
         if not isinstance(record.body, ALLOWED[self.role]):
             names = ", ".join(kind.__name__.lower() for kind in ALLOWED[self.role]) or "none"
             raise WireError("role", "record.kind", f"as {self.role}: {names}")

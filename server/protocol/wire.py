@@ -122,12 +122,37 @@ def decode(data: bytes) -> Record:
         raise WireError("type", "record.magic", f"{MAGIC:#x}")
     if version != VERSION:
         raise WireError("version", "record.version", f"{VERSION}: reload the page")
-    if not 0 <= t_us < 1 << 60:
-        raise WireError("value", "record.time", "0 to 2^60 µs")
+    _time(t_us)
     decoder = _DECODERS.get(kind)
     if decoder is None:
         raise WireError("type", "record.kind", ", ".join(str(int(k)) for k in _DECODERS))
     return Record(sequence, t_us, decoder(data[HEADER.size :], flags))
+
+
+def check_frame(record: Record) -> None:
+    """Hold a picture that came in another form to the laws of one that came as bytes.
+
+    Raises:
+        WireError: as by `decode`.
+    """
+    if not isinstance(record.body, Picture):
+        raise WireError("type", "record.kind", str(int(Kind.FRAME)))
+    if size_of(record.body) > MAX_RECORD_BYTES:
+        raise WireError("size", "record", f"{HEADER.size} to {MAX_RECORD_BYTES} bytes")
+    if not 0 <= record.sequence < 1 << 32:
+        raise WireError("value", "record.sequence", "0 to 2^32 - 1")
+    _time(record.t_us)
+    _picture(record.body)
+
+
+def size_of(picture: Picture) -> int:
+    """How long its record would be [bytes]."""
+    return HEADER.size + FRAME.size + len(picture.data)
+
+
+def _time(t_us: int) -> None:
+    if not 0 <= t_us < 1 << 60:
+        raise WireError("value", "record.time", "0 to 2^60 µs")
 
 
 def _unpack(layout: struct.Struct, payload: bytes, name: str) -> tuple[float, ...]:
@@ -162,21 +187,32 @@ def _motion(payload: bytes, flags: int) -> Motion:
 
 
 def _frame(payload: bytes, flags: int) -> Picture:
-    if len(payload) <= FRAME.size:
+    if len(payload) < FRAME.size:
         raise WireError("size", "frame", f"more than {FRAME.size} bytes of payload")
     codec, shrunk, width, height, angle = FRAME.unpack_from(payload)
     if codec not in Codec.__members__.values():
         raise WireError("value", "frame.codec", ", ".join(f"{int(c)} {c.name}" for c in Codec))
-    if width < 16 or height < 16 or width * height > MAX_PIXELS:
+    key, by_arrival, data = bool(flags & KEY_FLAG), bool(flags & 8), payload[FRAME.size :]
+    return _picture(Picture(Codec(codec), key, width, height, angle, data, shrunk, by_arrival))
+
+
+def _picture(picture: Picture) -> Picture:
+    """The picture, if it keeps the laws.
+
+    Raises:
+        WireError: which one it breaks.
+    """
+    if not picture.data:
+        raise WireError("size", "frame", f"more than {FRAME.size} bytes of payload")
+    size = picture.width, picture.height
+    if min(size) < 16 or picture.width * picture.height > MAX_PIXELS:
         raise WireError("value", "frame.size", f"16×16 up to {MAX_PIXELS} pixels")
-    if shrunk > MOST_SHRUNK:
+    if not 0 <= picture.shrunk <= MOST_SHRUNK:
         raise WireError("value", "frame.shrunk", f"0 to {MOST_SHRUNK}")
-    data = payload[FRAME.size :]
-    if codec == Codec.JPEG and data[:2] != b"\xff\xd8":
+    if picture.codec == Codec.JPEG and picture.data[:2] != b"\xff\xd8":
         raise WireError("value", "frame.data", "a JPEG, beginning with FF D8")
-    angle = _angle(angle, "frame.screen_angle_deg")
-    key, by_arrival = bool(flags & KEY_FLAG), bool(flags & 8)
-    return Picture(Codec(codec), key, width, height, angle, data, shrunk, by_arrival)
+    _angle(picture.screen_angle_deg, "frame.screen_angle_deg")
+    return picture
 
 
 def _touch(payload: bytes, _flags: int) -> Touch:

@@ -11,7 +11,7 @@ from server.common.settings import RtcSettings
 from server.phone.phone_session import PhoneSession
 from server.protocol.messages import Refused, encode_message
 from server.protocol.session import Session
-from server.protocol.wire import WireError, encode
+from server.protocol.wire import WireError
 from server.protocol.wire_records import Codec, Motion, Picture, Pong, Record, Stamp
 from server.rtc.peer import PeerCallbacks, PeerConnection
 from server.rtc.receiving import metadata_trailer
@@ -135,12 +135,10 @@ class RtcLink:
             record = self._dated(codec, frame, t)
             if record is None or not self._manager.paths.takes_from_fast(record.t_us, frame.key):
                 return
-            data = encode(record)
-            said = self.frames.receive(data, t)
-            assert isinstance(said, Record)
+            self.frames.admit(record, t)
             self._t_frame = t
-            self._manager.record(data, t)
-            self._phone.take(said, t)
+            self._manager.record(record, t)
+            self._phone.take(record, t)
         except WireError as error:
             self._refuse(error, self.frames)
 

@@ -247,9 +247,12 @@ class SessionManager:
         self._ask_key()
         return name
 
-    def record(self, data: str | bytes, t: float) -> None:
+    def record(self, data: str | bytes | Record, t: float) -> None:
         """Keep what the leading phone said, if a recording runs."""
-        if isinstance(data, bytes):
+        if isinstance(data, Record):
+            if self.recordings.name:
+                self.recordings.record("phone", encode(data), t)
+        elif isinstance(data, bytes):
             self.recordings.record("phone", data, t)
         else:
             self.recordings.message("phone", data, t)

@@ -22,7 +22,8 @@ from server.common.settings import RtcSettings, VideoSettings
 from server.control.ipc import Input, OperatorInput, control_end
 from server.phone.phone_session import PhoneSession
 from server.process.launcher import listen
-from server.protocol.wire import HEADER, MAGIC
+from server.protocol.wire import HEADER, MAGIC, Kind
+from server.protocol.wire_records import Record
 from server.recording.control import Recordings
 from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.admission import Admission
@@ -62,10 +63,12 @@ class NotingSessionManager(SessionManager):
 
     heard = ArrivalLog()
 
-    def record(self, data: str | bytes, t: float) -> None:
+    def record(self, data: str | bytes | Record, t: float) -> None:
         """Note it."""
         super().record(data, t)
-        if isinstance(data, bytes) and data[0] == MAGIC:
+        if isinstance(data, Record):
+            self.heard.records.append((Kind.FRAME, data.sequence, data.t_us, t))
+        elif isinstance(data, bytes) and data[0] == MAGIC:
             _, _, kind, _, sequence, t_us = HEADER.unpack_from(data)
             self.heard.records.append((kind, sequence, t_us, t))
 

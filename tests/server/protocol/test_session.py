@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf, nan
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from server.protocol import wire, wire_records
@@ -251,3 +252,58 @@ def test_only_a_supervisor_turns_knobs() -> None:
     for role in ("operator", "video"):
         error = refusal(opened(role), encode_message(wish))
         assert (error.code, error.field) == ("role", "message.type")
+
+
+def outcome(take: Callable[[], object]) -> tuple[str, str] | None:
+    """Code and field of the refusal, if it is refused."""
+    try:
+        take()
+    except WireError as error:
+        return error.code, error.field
+    return None
+
+
+@given(
+    picture=st.builds(
+        wire_records.Picture,
+        st.sampled_from(wire_records.Codec),
+        st.booleans(),
+        st.integers(0, 65_535),
+        st.integers(0, 65_535),
+        st.sampled_from((0, 45, 90, 180, 270, -90)),
+        st.sampled_from((b"", b"\xff\xd8", b"\x00\x00\x01", bytes(wire.MAX_RECORD_BYTES))),
+        st.integers(0, 7),
+        st.booleans(),
+    ),
+    t_us=st.sampled_from((-1, 0, 5, (1 << 60) - 1, 1 << 60)),
+    role=st.sampled_from(ROLES),
+)
+@example(JPEG, 2, "video")
+@example(replace(JPEG, data=bytes(wire.MAX_RECORD_BYTES)), 2, "video")
+def test_a_picture_by_packets_is_taken_or_refused_as_its_bytes_would_be(
+    picture: wire_records.Picture, t_us: int, role: str
+) -> None:
+    one, packed = Record(7, t_us, picture), opened(role)
+    as_bytes = outcome(lambda: packed.receive(wire.encode(one), 0.0))
+    admitted = outcome(lambda: opened(role).admit(one, 0.0))
+    assert (as_bytes is None) == (admitted is None)
+    if role == "video":
+        assert as_bytes == admitted
+
+
+def test_pictures_by_packets_are_limited_by_number_and_bytes() -> None:
+    session, one = opened("video"), Record(1, 2, replace(JPEG, data=b"\xff\xd8" + bytes(100_000)))
+    taken = 0
+    while outcome(lambda: session.admit(one, 0.0)) is None:
+        taken += 1
+    assert taken == int(BYTES_HZ // wire.size_of(one.body))
+    small, session = Record(1, 2, JPEG), opened("video")
+    codes = [outcome(lambda: session.admit(small, 0.0)) for _ in range(int(2 * RECORDS_HZ) + 1)]
+    assert [k for k, code in enumerate(codes) if code is not None] == [2 * RECORDS_HZ]
+    assert codes[-1] == ("rate", "record")
+    for sequence in (-1, 1 << 32):
+        assert outcome(lambda n=sequence: opened("video").admit(Record(n, 2, JPEG), 0.0))
+
+
+def test_who_said_no_hello_gets_no_picture_in_by_packets() -> None:
+    assert outcome(lambda: Session("video").admit(Record(1, 2, JPEG), 0.0)) == ("order", "record")
