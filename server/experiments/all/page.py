@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from server.experiments.all.markup import Markup, document, element
+from markupsafe import Markup
+
+from server.experiments.all.markup import document, element
 from server.experiments.all.parts import ReportPart
 from server.experiments.all.results import PartResults
 from server.experiments.all.running import RunRecord

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from server.experiments.all.markup import Markup, element, joined
+from markupsafe import Markup
+
+from server.experiments.all.markup import element, joined
 from server.experiments.all.results import Figure
 from server.experiments.all.tables import Block, Cell, Lines, Statements, Table, Text
 
