@@ -6,7 +6,6 @@ one beginning without the EKF, the other with it; what they have learnt they kee
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
@@ -16,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from server.common.progress import Progress
+from server.common.progress import progress_bar
 from server.common.text import Column, dashed, plain, statements
 from server.experiments.paper.picture_task import figure_beam, figure_times
 from server.experiments.paper.setup import published
@@ -160,10 +159,11 @@ def measure(setup: ExperimentSetup, extra: Sequence[Variant] = ()) -> Study:
     """Fly all attempts with each variant; the paper's two columns and `extra` ones."""
     trials = list(trials_of(setup, (WITHOUT_EKF, WITH_EKF, *extra)))
     results: dict[int, Attempt] = {}
-    progress = Progress(len(trials), sys.stderr)
-    with closing(flown(trials, setup.workers)) as coming:
+    with (
+        progress_bar(len(trials), "attempts") as bar,
+        closing(flown(trials, setup.workers)) as coming,
+    ):
         for k, one in coming:
             results[k] = one
-            progress.advance(f"{len(results)}/{len(trials)} attempts")
-    progress.close()
+            bar.update()
     return Study(tuple((trial, results[k]) for k, trial in enumerate(trials)))

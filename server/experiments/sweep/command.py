@@ -11,7 +11,7 @@ from pathlib import Path
 
 from server.common.clock import now
 from server.common.processes import cores
-from server.common.progress import Progress
+from server.common.progress import progress_bar
 from server.common.ranges import whole
 from server.experiments.sweep import picture, summary
 from server.experiments.sweep.errors import SweepError
@@ -85,18 +85,18 @@ def _fill(
     results: SweepResults, missing: list[SweepSession], arguments: argparse.Namespace, total: int
 ) -> int:
     """Fly what is missing; whatever stops it, what is done stays."""
-    progress = Progress(len(missing), sys.stderr)
+    bar = progress_bar(total, "sessions", total - len(missing))
     try:
         with closing(_outcomes(missing, arguments)) as outcomes:
             for outcome in outcomes:
                 results.add(outcome)
-                progress.advance(f"{len(results.done)}/{total} sessions")
+                bar.update()
     except KeyboardInterrupt:
         return _stopped("interrupted", INTERRUPTED)
     except BrokenProcessPool:
         return _stopped("a worker process was killed (out of memory?)", KILLED)
     finally:
-        progress.close()
+        bar.close()
     return 0
 
 

@@ -24,7 +24,7 @@ from hardware.link.link_key import LinkKeyError
 from hardware.robot_file import RobotFileError
 from pipeline.frames import Array
 from server.common.options import Parser
-from server.common.progress import Progress as Progressing
+from server.common.progress import progress_bar
 from server.process import robot_key
 from server.tools.led_layout.files import OutError, changes, figures, make_folder, toml, write
 from server.tools.led_layout.report import LayoutReport, judged, lines
@@ -178,10 +178,9 @@ def _bar(label: str, total: int) -> Progress:
     """Tells how far it is."""
 
     def show(turns: Iterator[None]) -> None:
-        progress = Progressing(total, sys.stderr)
-        for _ in turns:
-            progress.advance(label)
-        progress.close()
+        with progress_bar(total, label) as bar:
+            for _ in turns:
+                bar.update()
 
     return show
 

@@ -19,7 +19,7 @@ from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.vision.visual_front_end import warm_up
 from server.common.errors import InputError
-from server.common.progress import Progress
+from server.common.progress import progress_bar
 from server.media.frame_source import Frames, open_frames
 from server.media.tables import load_imu
 from server.tools.locate import overlay, plot
@@ -86,8 +86,7 @@ def _work(locator: Locator, leds_in_b: Array, frames: Frames, outputs: dict[str,
         file = stack.enter_context(parts["--out"].open("w", encoding="utf-8", newline=""))
         writer = DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
-        progress = Progress(frames.count, sys.stderr)
-        stack.callback(progress.close)
+        bar = stack.enter_context(progress_bar(frames.count, "frames"))
         found = 0
         for located in locator.locate(frames):
             writer.writerow(_row(located))
@@ -95,7 +94,8 @@ def _work(locator: Locator, leds_in_b: Array, frames: Frames, outputs: dict[str,
             if "--overlay" in parts:
                 _paint(located, locator.camera, leds_in_b, parts["--overlay"])
             found += located.pose is not None
-            progress.advance(f"found {100.0 * found / len(history):.1f} %")
+            bar.set_postfix_str(f"found {100.0 * found / len(history):.1f} %", refresh=False)
+            bar.update()
         if "--covariance" in parts:
             history.save_covariances(parts["--covariance"])
         if "--plot" in parts:

@@ -12,7 +12,7 @@ from pipeline.camera.lens import Camera
 from pipeline.signals import Frame, Image, Spots
 from pipeline.spots.leds import find_spots
 from pipeline.vision_config import LedsConfig
-from server.common.progress import Progress
+from server.common.progress import progress_bar
 from server.media.frame_source import open_frames
 from server.tools.survey.reconstruction.detections import FrameSpots
 from server.tools.survey.reconstruction.errors import SurveyError
@@ -30,23 +30,24 @@ def read(path: Path, camera: Camera, fps: float | None, every: int) -> list[Fram
         SurveyError: its pictures are not the camera's, or it is too long.
     """
     frames = open_frames(path, fps)
-    progress = Progress(frames.count, sys.stderr)
     film: list[FrameSpots] = []
-    for k, shot in enumerate(frames):
-        progress.advance("spots")
-        if k % every or shot.luma is None:
-            continue
-        if shot.luma.shape != (camera.height, camera.width):
-            tall, wide = shot.luma.shape
-            raise SurveyError(
-                f"{path}: {shot.name} is {wide} x {tall}, the camera was calibrated at"
-                f" {camera.width} x {camera.height}"
-            )
-        if len(film) == MOST_FRAMES:
-            raise SurveyError(f"{path}: more than {MOST_FRAMES} frames; take --every {every + 1}")
-        spots = find_spots(Frame(shot.t, shot.luma, shot.full_range), LedsConfig())
-        film.append(FrameSpots(shot.name, shot.t, _brightest(spots)))
-    progress.close()
+    with progress_bar(frames.count, "frames") as bar:
+        for k, shot in enumerate(frames):
+            bar.update()
+            if k % every or shot.luma is None:
+                continue
+            if shot.luma.shape != (camera.height, camera.width):
+                tall, wide = shot.luma.shape
+                raise SurveyError(
+                    f"{path}: {shot.name} is {wide} x {tall}, the camera was calibrated at"
+                    f" {camera.width} x {camera.height}"
+                )
+            if len(film) == MOST_FRAMES:
+                raise SurveyError(
+                    f"{path}: more than {MOST_FRAMES} frames; take --every {every + 1}"
+                )
+            spots = find_spots(Frame(shot.t, shot.luma, shot.full_range), LedsConfig())
+            film.append(FrameSpots(shot.name, shot.t, _brightest(spots)))
     if not film:
         raise SurveyError(f"{path}: none of its frames can be read")
     for note in frames.notes:
