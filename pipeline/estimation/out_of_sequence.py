@@ -115,8 +115,9 @@ class OutOfSequence(ABC, Generic[Measurement]):
 
     def insert(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
         """Remember a sample of `body` or `phone`; False: it was there already."""
-        i = int(np.searchsorted(stream.times, t)) - self._bent
-        before = float(stream.times[i]) if i >= 0 else -inf
+        times = stream.times
+        i = (len(times) if t > stream.newest else int(np.searchsorted(times, t))) - self._bent
+        before = float(times[i]) if i >= 0 else -inf
         if not stream.insert(t, rate, force):
             return False
         self._spoilt_from = min(self._spoilt_from, before)
@@ -162,13 +163,15 @@ class OutOfSequence(ABC, Generic[Measurement]):
         """Make anew what was spoilt; the base can't be."""
         if self._spoilt_from == inf:
             return
-        for before, here in pairwise(self.checkpoints):
-            if here.t > self._spoilt_from:
-                t = here.t
-                here.copy(before)
-                self._advance(here, t)
-                if here.seen is not None and here.use is not None:
-                    self._look(here, here.seen, here.use)
+        k = len(self.checkpoints)
+        while k > 1 and self.checkpoints[k - 1].t > self._spoilt_from:
+            k -= 1
+        for before, here in pairwise(self.checkpoints[k - 1 :]):
+            t = here.t
+            here.copy(before)
+            self._advance(here, t)
+            if here.seen is not None and here.use is not None:
+                self._look(here, here.seen, here.use)
         if self._frontier.t > self._spoilt_from or self._frontier.t <= self.newest.t:
             self._frontier.copy(self.newest)
         self._spoilt_from = inf
@@ -176,6 +179,7 @@ class OutOfSequence(ABC, Generic[Measurement]):
     def settle(self, oldest: float) -> None:
         """Let the base follow at time `oldest` [s]: nothing from before it will be made anew."""
         self._repair()
+        before = self.base.t
         while len(self.checkpoints) > 1 and self.checkpoints[1].t <= oldest:
             self.checkpoints.pop(0)
         if len(self.checkpoints) == 1 and self.base.t < oldest:
@@ -183,6 +187,8 @@ class OutOfSequence(ABC, Generic[Measurement]):
             self.base.seen = self.base.use = None
         if self._frontier.t < self.newest.t:
             self._frontier.copy(self.newest)
+        if self.base.t == before:
+            return
         for stream in (self.body, self.phone):
             kept = int(np.searchsorted(stream.times, self.base.t, side="right")) - self._kept
             if kept > 0:

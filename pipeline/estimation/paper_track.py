@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import Final
 
 import numpy as np
@@ -54,7 +54,7 @@ class PaperTrack(OutOfSequence[PoseMeasurement]):
         return chi2
 
     def _is_sound(self, here: Checkpoint[PoseMeasurement]) -> bool:
-        return bool(np.isfinite(here.x[0]))
+        return isfinite(here.x[0])
 
     def _advance(self, here: Checkpoint[PoseMeasurement], t: float) -> None:
         body, phone = self.body, self.phone
