@@ -9,37 +9,36 @@ import numpy as np
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, LedRays, PhoneImu, VisionMeasurement
 
-TURNED_RAD: Final = 1e-4
-"""A tenth of a pixel, and less than the noise of a gyroscope adds up to between two pictures. Less
-turning: both bodies are simulated, at rest and without noise, and so may be the pictures."""
+MOVED_RAD_S: Final = 0.03
+"""By how much a rate changes in a hand or in flight, and by no gyroscope's noise or bias. Where no
+rate does, a picture that says the same is news: an encoder has nothing to draw anew."""
 
 
 class RepeatedPicture:
-    """Remembers the last picture, and how far either side has turned since."""
+    """Remembers the last picture, and how the rates of either side have changed since."""
 
     def __init__(self) -> None:
         """Nothing seen."""
         self._rays: LedRays | None = None
-        self._turned = [0.0, 0.0]
-        self._t = [np.inf, np.inf]
+        self._rates: dict[type, tuple[Array, Array]] = {}
 
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
-        """Add up how far phone or robot turn, in whatever direction."""
-        if isinstance(sample, PhoneImu):
-            self._turn(0, sample.t, sample.omega_m_cf_in_c)
-        else:
-            self._turn(1, sample.t, sample.omega_m_bf_in_b)
+        """Widen the bounds of the rates of phone or robot."""
+        is_phone = isinstance(sample, PhoneImu)
+        omega = sample.omega_m_cf_in_c if is_phone else sample.omega_m_bf_in_b
+        low, high = self._rates.get(type(sample), (omega, omega))
+        self._rates[type(sample)] = np.minimum(low, omega), np.maximum(high, omega)
 
-    def _turn(self, side: int, t: float, omega: Array) -> None:
-        dt, self._t[side] = t - self._t[side], t
-        if dt > 0.0:
-            self._turned[side] += dt * float(np.sqrt(omega @ omega))
+    @property
+    def _moved(self) -> bool:
+        return any(float((high - low).max()) > MOVED_RAD_S for low, high in self._rates.values())
 
     def comes_again(self, seen: VisionMeasurement) -> bool:
-        """Whether `seen` says, to the last bit, what the picture before said; remembers it."""
+        """Whether `seen` says to the last bit what was said before anything moved; remembers it."""
         if self._rays is not None and _alike(self._rays, seen.rays):
-            return max(self._turned) > TURNED_RAD
-        self._rays, self._turned = seen.rays, [0.0, 0.0]
+            return self._moved
+        self._rays = seen.rays
+        self._rates.clear()
         return False
 
 

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.estimation.repeated_picture import MOVED_RAD_S
 from pipeline.frames import Array
 from pipeline.signals import Frame, Image
 
@@ -20,8 +21,6 @@ RECENT: Final = 9
 """Pictures that are looked at together: 0.3 s of them."""
 MOST: Final = 4
 """Repeated ones of these that are usual: of 24 pictures in a stream of 30 there are two."""
-MOVED_RAD_S: Final = 0.05
-"""By how much a rate changes in a hand or in flight, and by no gyroscope's noise or bias."""
 FIRST_ROWS: Final = 8
 """Compared before all others, for speed."""
 STANDS = (
@@ -51,17 +50,20 @@ class RepeatedFrames:
         """What people may mend, though each picture is looked at only once; or empty."""
 
     def comes_again(self, frame: Frame, rates: Rates) -> bool:
-        """Whether `frame` is the one before to the last bit; `rates` are those of its time."""
+        """Whether `frame` is the one before to the last bit, though something moved since.
+
+        `rates` are those of its time. Before what rests, the same picture is news as any other.
+        """
         again = self._luma is not None and _alike(self._luma, frame.luma)
         if not again:
             self._luma, self._t_new = frame.luma, frame.t
         self._recent.append((again, rates))
         stands = frame.t - self._t_new >= STANDS_S
         often = sum(again for again, _ in self._recent) >= MOST
-        moves = (stands or often) and self._moves()
+        moves = again and self._moves()
         self.complaint = STANDS if stands and moves else ""
         self.remark = SLOW if often and moves else ""
-        return again
+        return moves
 
     def _moves(self) -> bool:
         """Whether phone or robot turned unevenly of late, as whatever is held or flies does."""

@@ -12,7 +12,7 @@ from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from tests.pipeline.seeing import rays_at
 
 P, LEVEL = np.array([2.5, 0.0, 0.0]), np.eye(3)
-TURNING = np.array([0.0, 0.0, 0.02])
+TURNING = np.array([0.0, 0.0, 0.02])  # more with each sample
 
 
 def seen(t: float, leds: list[int] | None = None) -> VisionMeasurement:
@@ -20,8 +20,8 @@ def seen(t: float, leds: list[int] | None = None) -> VisionMeasurement:
 
 
 def felt(repeated: RepeatedPicture, side: type[PhoneImu] | type[BodyImu], omega: np.ndarray):
-    for t in (0.0, 0.02, 0.04):
-        repeated.add_imu(side(t, omega, np.zeros(3)))
+    for k, t in enumerate((0.0, 0.02, 0.04)):
+        repeated.add_imu(side(t, k * omega, np.zeros(3)))
 
 
 @pytest.mark.parametrize("side", [PhoneImu, BodyImu])

@@ -16,14 +16,16 @@ DT = 1.0 / 30.0
 def test_frames_that_come_again_change_nothing_to_the_last_bit() -> None:
     rng = np.random.default_rng(1000)
     once, again = (VisualFrontEnd(CAMERA, LEDS_IN_B, GatesConfig()) for _ in range(2))
-    truth, still = truth_at(rng), np.zeros(3)
+    truth = truth_at(rng)
     for k in range(6):
         t, up_in_b = k * DT, truth.prior().up_in_b
         for front_end in (once, again):
-            front_end.add_imu(
-                PhoneImu(t, still, GRAVITY * truth.prior().up_in_c),
-                BodyImu(t, still, GRAVITY * up_in_b),
-            )
+            for sampled in (t, t + 0.5 * DT):  # the phone trembles
+                shaken = np.array([0.0, 0.12 * np.cos(300.0 * sampled), 0.0])
+                front_end.add_imu(
+                    PhoneImu(sampled, shaken, GRAVITY * truth.prior().up_in_c),
+                    BodyImu(sampled, np.zeros(3), GRAVITY * up_in_b),
+                )
         luma = picture(truth, rng)
         first, second = (x.process(Frame(t, luma)) for x in (once, again))
         for later in (0.3 * DT, 0.6 * DT):
