@@ -24,9 +24,7 @@ class RepeatedPicture:
 
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
         """Widen the bounds of the rates of phone or robot."""
-        omega = (
-            sample.omega_m_cf_in_c if isinstance(sample, PhoneImu) else sample.omega_m_bf_in_b
-        )
+        omega = sample.omega_m_cf_in_c if isinstance(sample, PhoneImu) else sample.omega_m_bf_in_b
         low, high = self._rates.get(type(sample), (omega, omega))
         self._rates[type(sample)] = np.minimum(low, omega), np.maximum(high, omega)
 
