@@ -6,7 +6,6 @@ from collections import deque
 
 import numpy as np
 
-from hardware.follower import ThrustCommand
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import Hand
 from hardware.sim.plant.plant import Plant, PlantOptions
@@ -15,8 +14,11 @@ from hardware.sim.truth import Truth
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
-from pipeline.signals import Mode, Requests, TouchState
-from pipeline.teleop import Inputs, Output, Teleop
+from pipeline.signals import Mode, TouchState
+from pipeline.teleop import Output
+from server.control.controller import Controller
+from server.control.ipc import Input, OperatorInput, PhoneImuInput, ReadyInput, RequestInput
+from server.control.ipc_vision import SeenInput
 from server.control.robot_clock import RobotLink
 from server.simulation.leader_sensor_model import LeaderSensorModel
 from server.simulation.sensors import Leader
@@ -38,7 +40,7 @@ class LeaderFollowerSimulation:
         self._sensors = LeaderSensorModel(leader, hand, robot_file.robot, config.gates, seed)
         self._follower = VirtualTimeFollower(robot_file, seed, options=options)
         self._link = RobotLink(self._follower)
-        self._teleop = Teleop(robot_file.robot, config, PERIOD_S)
+        self._controller = Controller(robot_file.robot, config)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._mode = Mode.DISARMED
         self._ready = False
@@ -67,7 +69,7 @@ class LeaderFollowerSimulation:
 
     def push(self, wrench_in_b: Array) -> None:
         """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
-        self._teleop.push(wrench_in_b)
+        self._controller.teleop.push(wrench_in_b)
 
     def advance(self) -> Output:
         """One control period of everything."""
@@ -78,24 +80,19 @@ class LeaderFollowerSimulation:
         felt, seen = self._sensors.arrivals(before, now, self._robot_at)
         body = self._link.receive(now)
         held = self._mode in (Mode.ARMED, Mode.TRACK, Mode.COAST)
-        inputs = Inputs(
-            t=now,
-            phone_imu=tuple(felt),
-            body_imu=tuple(body),
-            seen=tuple(seen),
-            operator=TouchState(now, held, press=int(held)),
-            requests=Requests(arm=self._ready),
-            gap=self._link.gap,
-            refusals=(self._link.reason,) if self._link.reason else (),
-            fault=self._link.reason if self._mode is not Mode.DISARMED else "",
+        messages: list[Input] = [PhoneImuInput.of(sample) for sample in felt]
+        messages += [SeenInput.of(one) for one in seen]
+        messages += [OperatorInput.of(TouchState(now, held, press=int(held))), ReadyInput([])]
+        messages += [RequestInput("arm")] if self._ready else []
+        command, output = self._controller.tick(
+            now, messages, body, self._link.reason, self._link.gap, self._link.left_s
         )
-        output = self._teleop.step(inputs)
         self._mode = output.failsafe.mode
         self._ready = self._mode is Mode.DISARMED and not output.refusals
         if self._mode in (Mode.HOLD, Mode.RAMP) and not self.ended:
             self.ended = output.failsafe.reason
-        self._follower.send(ThrustCommand(output.thrusts, output.armed))
-        offset = self._teleop.estimator.health.time_offset
+        self._follower.send(command)
+        offset = self._controller.teleop.estimator.health.time_offset
         self._sensors.learn(output.relative, offset, body)
         return output
 
