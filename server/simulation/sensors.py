@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import radians, sqrt
+from math import inf, radians, sqrt
 from typing import Final, Literal
 
 import numpy as np
@@ -13,6 +13,8 @@ from hardware.sim.phone import PhoneOptions
 from pipeline.camera.lens import Camera
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.frames import GRAVITY
+from server.simulation.virtual_time import SimulationOptions
+from server.virtual_phone.phone_script import Manners, VirtualOperator
 
 MTI_RATE_HZ: Final = 400.0
 Pictures = Literal["spots", "h264", "vp8", "jpeg"]
@@ -44,6 +46,19 @@ class Leader:
         u, v = 0.5 * (self.width - 1), 0.5 * (self.height - 1)
         K = np.array([[self.focal_px, 0.0, u], [0.0, self.focal_px, v], [0.0, 0.0, 1.0]])
         return Camera(self.width, self.height, K, "plumb_bob", np.zeros(5))
+
+    def scene(self, seed: int) -> SimulationOptions:
+        """A flight behind it; its clock is known."""
+        scene = SimulationOptions(
+            seed=seed,
+            camera=self.camera,
+            sensors=self.options,
+            knows_clock=True,
+            newest_only=True,
+        )
+        if self.pictures == "spots":
+            return replace(scene, led_noise_px=self.noise_px)
+        return replace(scene, codec=self.pictures)
 
 
 PAPER: Final = Leader(
@@ -108,3 +123,8 @@ def phone(
         gains="paper_with_ekf",
         pictures=pictures,
     )
+
+
+def prompt() -> VirtualOperator:
+    """Somebody who arms as soon as that is granted, and holds the button from then on."""
+    return VirtualOperator(Manners(press_after_s=0.0, hold_s=inf, again=False))

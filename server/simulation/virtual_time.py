@@ -1,7 +1,8 @@
 """The whole loop in virtual time: simulated robot, virtual phone, records, vision, control.
 
 The same bytes and the same code as live, without sockets, clocks and threads; as fast as the CPU
-allows, and the same for a seed every time.
+allows, and the same for a seed every time. What differs between experiments stands in
+`SimulationOptions`: sensors, whether pictures are rendered, whether the phone's clock is known.
 """
 
 from __future__ import annotations
@@ -16,18 +17,21 @@ import numpy as np
 from hardware.camera_file import find_camera
 from hardware.codec import Encoder
 from hardware.robot_file import RobotFile
-from hardware.sim.hand import make_hand
+from hardware.sim.hand import Hand, make_hand
 from hardware.sim.led_sensor_model import LedSensorModel
-from hardware.sim.phone import EventKind, PhoneOptions, VirtualPhone
+from hardware.sim.phone import EventKind, PhoneClock, PhoneOptions, VirtualPhone
+from hardware.sim.plant.plant import PlantOptions
 from hardware.sim.reference_trajectory import Pose
 from hardware.sim.render import RenderOptions
 from hardware.sim.truth import Truth
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from pipeline.camera.extrinsics import IDENTITY, Extrinsics
+from pipeline.camera.lens import Camera
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, TouchState, VisionMeasurement
 from pipeline.teleop import Output
+from pipeline.timing.clock_synchronisation import ClockSynchronisation
 from server.control.controller import Controller, never_too_late
 from server.control.ipc import (
     Input,
@@ -78,11 +82,34 @@ class SimulationOptions:
     """From when to when [s] which LEDs can't be seen."""
     led_noise_px: float | None = None
     """None: pictures are rendered and looked at; else LEDs' rays come with this noise instead."""
+    camera: Camera | None = None
+    """None: the virtual phone's, as large as said above."""
+    sensors: PhoneOptions | None = None
+    """None: those of a phone with Chromium, with pictures as often and as late as said above."""
+    knows_clock: bool = False
+    """The phone's clock and each picture's time are known; else PING asks for them."""
+    newest_only: bool = False
+    """Of pictures that arrive in one period only the newest is looked at."""
 
     def hidden_at(self, t: float) -> tuple[int, ...]:
         """LEDs that can't be seen at `t` [s]."""
         covered = (leds for since, until, leds in self.hidden if since <= t < until)
         return tuple(sorted({led for leds in covered for led in leds}))
+
+
+class KnownClock(ClockSynchronisation):
+    """Of a phone that need not be asked."""
+
+    ready = True
+
+    def __init__(self, clock: PhoneClock) -> None:
+        """As it truly goes."""
+        super().__init__()
+        self._clock = clock
+
+    def local(self, t_remote: float) -> float:
+        """When the phone's clock shows `t_remote` [s], on ours [s]."""
+        return (t_remote - self._clock.offset_s) / (1.0 + 1e-6 * self._clock.drift_ppm)
 
 
 class VirtualTimeSimulation:
@@ -94,10 +121,15 @@ class VirtualTimeSimulation:
         config: TeleopConfig,
         scene: SimulationOptions,
         operator: VirtualOperator | None = None,
+        hand: Hand | None = None,
+        plant: PlantOptions | None = None,
     ) -> None:
-        """Everything at rest at time 0; the phone is held by the usual `operator` or another."""
+        """Everything at rest at time 0.
+
+        The usual `operator` holds the phone, or another, and the scene's `hand` moves it.
+        """
         self.scene = scene
-        self.follower = VirtualTimeFollower(robot_file, scene.seed)
+        self.follower = VirtualTimeFollower(robot_file, scene.seed, options=plant)
         late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
         self.controller = Controller(robot_file.robot, config, too_late=late)
         self._evaluator = TrackingEvaluator(config.virtual_camera, robot_file.robot.axes, PERIOD_S)
@@ -110,10 +142,12 @@ class VirtualTimeSimulation:
         """Ticks from one of control's to the next; 0: it stands still."""
         self.tamper: Callable[[list[Input]], list[Input]] = list
         """What becomes of what the server tells control."""
-        self._script = make_script(robot_file, scene, operator)
+        self._script = make_script(robot_file, scene, operator, hand)
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
-        camera = self._script.phone.camera
+        if scene.knows_clock:
+            self._ingest.clock = KnownClock(self.phone.clock)
+        camera = self.phone.camera
         camera = camera if scene.knows_extrinsics else replace(camera, extrinsics=IDENTITY)
         self._ingest.extrinsics = camera.extrinsics
         self._frame_pipeline = FramePipeline(camera, robot_file.robot, config.gates)
@@ -121,6 +155,7 @@ class VirtualTimeSimulation:
         self._link = RobotLink(self.follower)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._on_their_way: deque[tuple[int, Record]] = deque()
+        self._frames: list[EncodedFrame] = []
         self._inbox: list[Input] = []
         self._output: Output | None = None
         self._ticks = 0
@@ -188,19 +223,24 @@ class VirtualTimeSimulation:
 
     def _hear_phone(self, t_before: float) -> None:
         """Sensors and pictures that arrive within this period."""
-        for event in self._script.phone.events(t_before, self.t):
-            if event.t_capture < PERIOD_S or event.kind.value in self.lost:
-                continue
+        events = [
+            event
+            for event in self.phone.events(t_before, self.t)
+            if event.t_capture >= PERIOD_S and event.kind.value not in self.lost
+        ]
+        pictures = [event for event in events if event.kind == EventKind.PICTURE]
+        for event in events:
             if event.kind == EventKind.MOTION:
                 motion = self._script.motion(event.t_capture)
                 self.transit.send(self.t, "motion", partial(self._take, motion))
-            elif self._vision_model is not None:
-                self._glimpse(self._vision_model, event.t_capture)
-            else:
+            elif self._vision_model is None:
                 key = self._frame_pipeline.needs_key
                 picture = self._script.picture(event.t_capture, self._robot_at, key)
                 self.transit.send(self.t, "picture", partial(self._take, picture))
+            elif event is pictures[-1] or not self.scene.newest_only:
+                self._glimpse(self._vision_model, event.t_capture)
         self.transit.deliver(self.t)
+        self._see()
 
     def _hear_small_talk(self) -> None:
         """PING there and PONG back, TOUCH, and the server's readiness, each at its rate."""
@@ -241,10 +281,16 @@ class VirtualTimeSimulation:
             case TouchState() as operator:
                 self._inbox.append(OperatorInput.of(operator))
             case EncodedFrame() as frame:
-                self._see(frame)
+                self._frames.append(frame)
+                if not self.scene.newest_only:
+                    self._see()
 
-    def _see(self, frame: EncodedFrame) -> None:
-        detection = self._frame_pipeline.see([frame])
+    def _see(self) -> None:
+        """Decode all frames that have come, and look at the newest."""
+        frames, self._frames = self._frames, []
+        if not frames:
+            return
+        detection = self._frame_pipeline.see(frames)
         self.trace.pictures += 1
         self.trace.leds.append(len(detection.rays) if detection is not None else 0)
         self._tell(detection.seen(self._frame_pipeline.camera) if detection is not None else None)
@@ -270,9 +316,9 @@ class VirtualTimeSimulation:
         """Motion samples, for whoever looks."""
         if self._vision_model is None:
             self._frame_pipeline.front_end.add_imu(*samples)
-            return
-        for sample in samples:
-            self._vision_model.add_imu(sample)
+        elif not self.scene.knows_clock:
+            for sample in samples:
+                self._vision_model.add_imu(sample)
 
 
 def make_vision_model(
@@ -286,20 +332,26 @@ def make_vision_model(
 
 
 def make_script(
-    robot_file: RobotFile, scene: SimulationOptions, operator: VirtualOperator | None = None
+    robot_file: RobotFile,
+    scene: SimulationOptions,
+    operator: VirtualOperator | None = None,
+    hand: Hand | None = None,
 ) -> PhoneScript:
     """The virtual phone of a scene, with its page and its holder."""
-    options = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
-    camera = find_camera(DEVICE, scene.width, scene.height)
+    usual = PhoneOptions(frame_rate_hz=scene.frame_rate_hz, picture_delay_s=scene.latency_s)
+    sensors, camera = scene.sensors or usual, scene.camera
+    if camera is None:
+        camera = find_camera(DEVICE, scene.width, scene.height)
+        camera = replace(camera, readout_s=scene.readout_s, extrinsics=scene.extrinsics)
     phone = VirtualPhone(
-        replace(camera, readout_s=scene.readout_s, extrinsics=scene.extrinsics),
-        make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
+        camera,
+        hand or make_hand(scene.hand, seed=scene.seed, start=robot_file.start),
         robot_file.robot.leds_in_b,
         RenderOptions(),
         np.random.default_rng((scene.seed, 3)),
-        options,
+        sensors,
         hidden=scene.hidden_at,
     )
-    size = scene.width, scene.height
-    encoder = Encoder(*size, scene.frame_rate_hz, scene.bitrate_bps, scene.codec)
+    size = camera.width, camera.height
+    encoder = Encoder(*size, sensors.frame_rate_hz, scene.bitrate_bps, scene.codec)
     return PhoneScript(phone, encoder, operator or VirtualOperator())

@@ -12,8 +12,8 @@ from hardware.sim.plant.plant import PlantOptions
 from pipeline.config import PERIOD_S
 from pipeline.frames import Array
 from server.experiments.contact.setting import FLIGHT_S, HOVER_S, ContactScene, Way
-from server.simulation.leader_follower import LeaderFollowerSimulation
-from server.simulation.sensors import Leader
+from server.simulation.sensors import Leader, prompt
+from server.simulation.virtual_time import VirtualTimeSimulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,29 +46,28 @@ def fly(
 ) -> ContactTrace:
     """Fly until `seconds` after the hand's move, or until tracking ends."""
     obstacle = scene.obstacle(seed)
-    led = LeaderFollowerSimulation(
+    loop = VirtualTimeSimulation(
         robot_file,
         way.config(robot_file, leader),
-        leader,
+        leader.scene(seed),
+        prompt(),
         scene.hand(seed, robot_file),
-        seed,
         PlantOptions(obstacle=obstacle),
     )
+    plant = loop.follower.plant
     rows: list[tuple[float, ...]] = []
     pushes: list[bool] = []
-    while led.t < HOVER_S + seconds and not led.ended:
-        led.advance()
-        if led.t <= HOVER_S:
+    while loop.t < HOVER_S + seconds and not loop.trace.left:
+        loop.advance()
+        if loop.t <= HOVER_S:
             continue
-        plant, touched = led.plant, led.plant.touched
-        p = plant.p_bf_in_f
+        p, touched = plant.p_bf_in_f, plant.touched
         depth, side = obstacle.depth_of_tip(p, plant.R_fb), float(np.hypot(p[1], p[2]))
-        t = led.t - HOVER_S
-        rows.append((t, -touched.force_in_f[0], touched.peak_n, depth, side))
+        rows.append((loop.t - HOVER_S, -touched.force_in_f[0], touched.peak_n, depth, side))
         pushes += touched.pushes
     columns = np.array(rows).reshape(-1, 5).T
-    why = led.ended or ("" if led.tracks else "tracking never began")
-    ended = f"{led.t - HOVER_S:+.2f} s: {why}" if why else ""
+    why = loop.trace.left or ("" if loop.trace.t else "tracking never began")
+    ended = f"{loop.t - HOVER_S:+.2f} s: {why}" if why else ""
     t_s, force_n, peak_n, depth_m, side_m = columns
     touches = np.array(pushes, dtype=np.bool_)
     return ContactTrace(t_s, force_n, peak_n, touches, depth_m, side_m, ended)

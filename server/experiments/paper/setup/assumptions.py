@@ -18,7 +18,7 @@ from server.experiments.paper.setup.assumptions_task import of_task
 from server.experiments.paper.setup.flight import HOVER_S, REST_S
 from server.experiments.paper.setup.measure import WINDOW_S, ExperimentSetup
 from server.simulation.sensors import PAPER, Leader, Pictures
-from server.simulation.vision_models import BITRATE_BPS
+from server.simulation.virtual_time import SimulationOptions
 
 
 def of(setup: ExperimentSetup) -> list[Assumption]:
@@ -86,7 +86,7 @@ def _filmed(codec: Pictures) -> Iterator[Assumption]:
     """Pictures that are rendered."""
     look = RenderOptions()
     # a JPEG's size follows from its quality
-    rate = "" if codec == "jpeg" else f" at {1e-6 * BITRATE_BPS:g} Mbit/s"
+    rate = "" if codec == "jpeg" else f" at {1e-6 * SimulationOptions().bitrate_bps:g} Mbit/s"
     yield Assumption(
         "their way", f"rendered, {codec}{rate}, decoded, the server's vision looks", "chosen"
     )

@@ -8,12 +8,12 @@ import numpy as np
 
 from hardware.robot_file import RobotFile
 from hardware.sim.hand import make_hand
-from hardware.sim.reference_trajectory import ReferenceTrajectory, missed_by
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
+from pipeline.signals import Mode
 from pipeline.teleop import Output
-from server.simulation.leader_follower import LeaderFollowerSimulation
-from server.simulation.sensors import Leader
+from server.simulation.sensors import Leader, prompt
+from server.simulation.virtual_time import VirtualTimeSimulation
 
 HOVER_S = 8.0
 """From switching on to the arm's move; tracking begins within the first second."""
@@ -74,12 +74,10 @@ class Flight:
         push: Push | None = None,
     ) -> None:
         """Everything at rest; `hand` is one of `hardware.sim.hand.HANDS`."""
-        robot = robot_file.robot
-        self._robot, self._config, self._push = robot, config, push
-        self._hand = make_hand(hand, seed=seed, start=robot_file.start, rest_s=HOVER_S)
-        self._led = LeaderFollowerSimulation(robot_file, config, leader, self._hand, seed)
+        self._robot, self._push = robot_file.robot, push
+        moves = make_hand(hand, seed=seed, start=robot_file.start, rest_s=HOVER_S)
+        self._loop = VirtualTimeSimulation(robot_file, config, leader.scene(seed), prompt(), moves)
         self._push_in_b = np.zeros(6)
-        self._reference: ReferenceTrajectory | None = None
         self._rows, self._ended = _Rows(), ""
 
     def run(self, seconds: float) -> ExperimentTrace:
@@ -94,21 +92,19 @@ class Flight:
 
     def _advance(self) -> None:
         """One control period of everything."""
-        led = self._led
-        if self._push is not None and led.t + PERIOD_S >= HOVER_S + self._push.after_s:
+        loop, after_s = self._loop, self._loop.t + PERIOD_S - HOVER_S
+        if self._push is not None and after_s >= self._push.after_s:
             self._push_in_b[1] = self._push.y_n
-            led.push(self._push_in_b)
-        output = led.advance()
-        if led.ended:
-            self._ended = f"{led.t - HOVER_S:+.2f} s: {led.ended}"
-        if led.tracks:
-            self._measure(led.t, output)
+            loop.controller.teleop.push(self._push_in_b)
+        output = loop.advance()
+        if loop.trace.left:
+            self._ended = f"{loop.t - HOVER_S:+.2f} s: {loop.trace.left}"
+        if output.failsafe.mode is Mode.TRACK:
+            self._measure(loop.t, output)
 
     def _measure(self, now: float, output: Output) -> None:
-        body, hand = self._led.body, self._hand.pose(now)
-        if self._reference is None:
-            self._reference = ReferenceTrajectory(self._config.virtual_camera, hand, body)
-        offset_in_f, turn = missed_by(body, self._reference.step(hand, PERIOD_S), self._robot.axes)
+        hand, body = self._loop.truth()
+        offset_in_f, turn = self._loop.trace.error_in_f[-1], self._loop.trace.turn[-1]
         error, view, relative = output.error, output.view, output.relative
         if now < HOVER_S - REST_S or error is None or view is None or relative is None:
             return

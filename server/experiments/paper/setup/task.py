@@ -17,8 +17,8 @@ from hardware.sim.plant.plant import PlantOptions
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from server.experiments.paper.setup import published
-from server.simulation.leader_follower import LeaderFollowerSimulation
-from server.simulation.sensors import Leader
+from server.simulation.sensors import Leader, prompt
+from server.simulation.virtual_time import VirtualTimeSimulation
 
 START_S: Final = 3.0
 """From switching on until the person begins; tracking begins within the first second."""
@@ -95,16 +95,18 @@ def attempt(
     start = np.array([-robot_file.start.distance, 0.0, 0.0])
     shake = tremor(rng, person.tremor_m, degrees(person.tremor_rad))
     hand = MovingHand((guiding, drift, shake), start, np.zeros(3), START_S)
-    led = LeaderFollowerSimulation(robot_file, config, leader, hand, seed, PlantOptions(tube=TUBE))
-    while led.t < START_S:
-        led.advance()
+    plant = PlantOptions(tube=TUBE)
+    loop = VirtualTimeSimulation(robot_file, config, leader.scene(seed), prompt(), hand, plant)
+    while loop.t < START_S:
+        loop.advance()
 
     def move() -> str:
-        guiding.look(led.body, hand.pose(led.t))
-        led.advance()
-        return led.ended
+        seen_from, body = loop.truth()
+        guiding.look(body, seen_from)
+        loop.advance()
+        return loop.trace.left
 
-    return _judged(move, lambda: TUBE.clearance(LASER.beam(*led.body)))
+    return _judged(move, lambda: TUBE.clearance(LASER.beam(*loop.truth()[1])))
 
 
 def _judged(move: Callable[[], str], clearance: Callable[[], float]) -> Attempt:
