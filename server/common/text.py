@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, is_dataclass
 from math import isfinite
 from typing import Protocol
 
@@ -45,9 +46,16 @@ def statements(holds: Mapping[str, bool]) -> Iterator[str]:
     return (f"{'holds' if good else 'MISSED'}: {what}" for what, good in holds.items())
 
 
-def plain(row: Mapping[str, object]) -> dict[str, object]:
-    """Replace NaN, which JSON does not have."""
-    return {
-        key: None if isinstance(value, float) and not isfinite(value) else value
-        for key, value in row.items()
-    }
+def plain(value: object) -> object:
+    """Replace dataclasses and NaN, which JSON does not have."""
+    match value:
+        case float() if not isfinite(value):
+            return None
+        case Mapping():
+            return {key: plain(one) for key, one in value.items()}
+        case list() | tuple():
+            return [plain(one) for one in value]
+        case _ if is_dataclass(value) and not isinstance(value, type):
+            return plain(asdict(value))
+        case _:
+            return value

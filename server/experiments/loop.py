@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -16,7 +15,9 @@ from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
 from server.common import clock, text
+from server.common.drawing import panels, save
 from server.control.process import teleop_config
+from server.experiments.runner import ExperimentReport, experiment
 from server.simulation.figures import TrackingFigures, result_of, rows_of
 from server.simulation.trace import TrackingTrace
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
@@ -45,14 +46,9 @@ def table(results: Sequence[TrackingFigures]) -> str:
     return "\n".join(line + end for line, end in zip(lines, ends, strict=True))
 
 
-def draw(traces: Sequence[tuple[TrackingFigures, TrackingTrace]], path: Path) -> None:
+def draw(traces: Sequence[tuple[TrackingFigures, TrackingTrace]], path: Path) -> Path:
     """Where the robot was meant to be and was, and how far apart that is, over time."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, rows = pyplot.subplots(
+    figure, rows = panels(
         2, len(traces), figsize=(6.0 * len(traces), 6.0), squeeze=False, sharex="col"
     )
     for column, (result, trace) in enumerate(traces):
@@ -71,14 +67,12 @@ def draw(traces: Sequence[tuple[TrackingFigures, TrackingTrace]], path: Path) ->
         bottom.axhline(result.rms_mm, color="k", lw=0.8, ls=":")
         bottom.set_ylabel("tracking error [mm]")
         bottom.set_xlabel("time [s]")
-    figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    return save(figure, path)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Fly each hand in virtual time through rendered, encoded pictures; print, draw, judge."""
+@experiment("loop")
+def run(arguments: argparse.Namespace) -> ExperimentReport | int:
+    """Fly each hand in virtual time through rendered, encoded pictures."""
     robot_file = load_robot(arguments.robot)
     virtual_camera, estimator = TeleopConfig().virtual_camera, arguments.estimator
     config = teleop_config(robot_file, arguments.gains, virtual_camera, estimator)
@@ -102,13 +96,13 @@ def run(arguments: argparse.Namespace) -> int:
         cpu = clock.process_cpu()
         trace = _fly(VirtualTimeSimulation(robot_file, config, flight), arguments.seconds, hand)
         flights.append((result_of(trace, flight, clock.process_cpu() - cpu), trace))
-    print(table([result for result, _ in flights]))
-    if arguments.out is not None:
-        draw(flights, arguments.out / "loop.png")
-        rows = [asdict(result) for result, _ in flights]
-        (arguments.out / "loop.json").write_text(json.dumps(rows, indent=1))
-        print(f"written: {arguments.out / 'loop.png'}, {arguments.out / 'loop.json'}")
-    return 0 if all(not result.ended and result.tracked_s > 0 for result, _ in flights) else 1
+    results = [result for result, _ in flights]
+    return ExperimentReport(
+        results,
+        table(results),
+        is_good=all(not result.ended and result.tracked_s > 0 for result in results),
+        draw=lambda folder: (draw(flights, folder / "loop.png"),),
+    )
 
 
 def hidden(wishes: Sequence[Sequence[str]], leds: int) -> tuple[Hidden, ...]:

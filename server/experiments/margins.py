@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from math import degrees
@@ -18,6 +17,8 @@ from pipeline.config import TeleopConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.control.margins import OMEGA, Complex, Loop, Sensing, axis_margins
 from server.common import text
+from server.common.drawing import panels, save
+from server.experiments.runner import ExperimentReport, experiment
 
 ESTIMATORS = ("relative", "paper", "none")
 
@@ -102,20 +103,15 @@ def verdicts(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[s
             yield f"arming with {gains}, {estimator}: {why or 'yes'}"
 
 
-def draw(found: list[MarginRow], path: Path) -> None:
+def draw(found: list[MarginRow], path: Path) -> Path:
     """Nyquist and Bode pictures: a column for each axis, a colour for each loop."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     axes = list(dict.fromkeys(one.axis for one in found))
-    figure, panels = pyplot.subplots(3, len(axes), figsize=(3.4 * len(axes), 9.0), squeeze=False)
+    figure, grid = panels(3, len(axes), figsize=(3.4 * len(axes), 9.0), squeeze=False)
     colours = {(r.gains, r.estimator): "" for r in found}
     colours = {key: f"C{k}" for k, key in enumerate(colours)}
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
     for one in found:
-        nyquist, size, phase = panels[:, axes.index(one.axis)]
+        nyquist, size, phase = grid[:, axes.index(one.axis)]
         L = one.response
         style = {"color": colours[one.gains, one.estimator], "lw": 1.0}
         style["ls"] = ":" if one.state else "-"
@@ -123,7 +119,7 @@ def draw(found: list[MarginRow], path: Path) -> None:
         size.loglog(OMEGA, np.abs(L), **style)
         angle = np.degrees(np.unwrap(np.angle(L)))
         phase.semilogx(OMEGA, angle - 360.0 * (angle[0] > 0.0), **style)
-    for axis, (nyquist, size, phase) in zip(axes, panels.T, strict=True):
+    for axis, (nyquist, size, phase) in zip(axes, grid.T, strict=True):
         nyquist.plot(circle.real, circle.imag, "k", lw=0.5)
         nyquist.plot(-1.0, 0.0, "k+")
         nyquist.set(title=axis, xlim=(-2.5, 1.0), ylim=(-1.75, 1.75), aspect="equal")
@@ -131,16 +127,14 @@ def draw(found: list[MarginRow], path: Path) -> None:
         size.set(xlim=(0.3, 300.0), ylim=(1e-2, 1e2), ylabel="|L|")
         phase.axhline(-180.0, color="k", lw=0.5)
         phase.set(xlim=(0.3, 300.0), ylim=(-540.0, 0.0), ylabel="phase °", xlabel="ω rad/s")
-    panels[0][0].legend(fontsize=6, loc="lower left")
+    grid[0][0].legend(fontsize=6, loc="lower left")
     figure.suptitle("Open loops; dotted: unstable when closed")
-    figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    return save(figure, path)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Work out, print, draw; 1 if a wanted gain set is unknown."""
+@experiment("margins")
+def run(arguments: argparse.Namespace) -> ExperimentReport | int:
+    """Every axis' margins and what arming says; 1 if a wanted gain set is unknown."""
     robot_file = load_robot(arguments.robot)
     for gains in arguments.gains:
         if gains not in robot_file.gains:
@@ -156,18 +150,15 @@ def run(arguments: argparse.Namespace) -> int:
     print(text.table(COLUMNS, found))
     arming = list(verdicts(robot_file, arguments))
     print("\n".join(arming))
-    if arguments.out is not None:
-        draw(found, arguments.out / "margins.png")
-        figures = {"margins": [told(one) for one in found], "arming": arming}
-        path = arguments.out / "margins.json"
-        path.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
-        print(f"written: {arguments.out / 'margins.png'}, {path}")
-    return 0
+    return ExperimentReport(
+        {"margins": [told(one) for one in found], "arming": arming},
+        draw=lambda folder: (draw(found, folder / "margins.png"),),
+    )
 
 
 def told(one: MarginRow) -> dict[str, object]:
-    """Values for programs, without the response; null is what has no limit, or isn't there."""
-    return text.plain({f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"})
+    """Values for programs, without the response."""
+    return {f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
-from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from hardware.robot_file import RobotFile, load_robot
 from hardware.sim.plant.obstacle import Socket
 from server.common.ranges import number, whole
-from server.common.text import plain, statements
 from server.experiments.contact import assumptions, picture
 from server.experiments.contact.flight import ContactTrace, fly
 from server.experiments.contact.free import NEAR, Free, free_flights, free_table
 from server.experiments.contact.measure import ContactRow, row_of, table_of
 from server.experiments.contact.setting import LEAST_N, ContactScene, Way, foretold_n
 from server.experiments.paper.setup.variants import check_gains
+from server.experiments.runner import ExperimentReport, RefusedError, experiment
 from server.simulation.sensors import PAPER, Leader, phone
 
 STIFF: Final = Way("stiff", None)
@@ -27,16 +25,13 @@ IN_BAND_PCT: Final = 95.0
 """Of the time of pressing: held."""
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Fly, print, write, draw; 1 if the goal is missed, 2 if it can't be flown."""
+@experiment("contact")
+def run(arguments: argparse.Namespace) -> ExperimentReport:
+    """Fly each scene stiff and compliant, and each way in the free."""
     leader = PAPER if arguments.leader == PAPER.name else phone(arguments.fps)
-    try:
-        robot_file = load_robot(arguments.robot)
-        check_gains(robot_file, arguments.robot)
-        flown = flown_of(arguments, robot_file)
-    except (RobotFileError, ValueError) as error:
-        print(f"lightleash experiments contact: {error}", file=sys.stderr)
-        return 2
+    robot_file = load_robot(arguments.robot)
+    check_gains(robot_file, arguments.robot)
+    flown = flown_of(arguments, robot_file)
     seeds = range(1, arguments.seeds + 1)
     said = assumptions.of(robot_file.plant, leader, [scene for scene, _ in flown], arguments.seeds)
     print(assumptions.lines(said), flush=True)
@@ -48,22 +43,12 @@ def run(arguments: argparse.Namespace) -> int:
         rows.append(row_of(scene, way, foretold, traces))
         shown.append((rows[-1], traces[0]))
     free = free_flights(robot_file, leader, [STIFF, *_soft(arguments)], list(seeds))
-    holds = goals(rows, free)
-    print(f"\n{table_of(rows)}\n\n{free_table(free)}\n")
-    print("\n".join(statements(holds)))
-    if arguments.out is not None:
-        head = {"assumptions": assumptions.json(said), "seeds": list(seeds)}
-        told = {
-            "rows": [plain(asdict(row)) for row in rows],
-            "free": [plain(asdict(one)) for one in free],
-        }
-        figures = {**head, **told, "holds": holds}
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        file = arguments.out / "contact.json"
-        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
-        drawn = picture.draw(shown, arguments.out / "contact.png")
-        print(f"\nwritten: {file}, {drawn}")
-    return 0 if all(holds.values()) else 1
+    return ExperimentReport(
+        {"assumptions": assumptions.json(said), "seeds": list(seeds), "rows": rows, "free": free},
+        f"\n{table_of(rows)}\n\n{free_table(free)}",
+        goals(rows, free),
+        draw=lambda folder: (picture.draw(shown, folder / "contact.png"),),
+    )
 
 
 def flown_of(
@@ -72,7 +57,7 @@ def flown_of(
     """Each scene with each controller; a socket only with limits that reach its bottom.
 
     Raises:
-        ValueError: no limit reaches an obstacle; says which would.
+        RefusedError: no limit reaches an obstacle; says which would.
     """
     gap, beyond = 1e-3 * arguments.gap_mm, 1e-3 * arguments.depth_mm
     socket = Socket(1e-3 * arguments.clearance_mm, 1e-3 * arguments.chamfer_mm)
@@ -85,7 +70,7 @@ def flown_of(
         ]
         if not soft:
             least = LEAST_N - foretold_n(0.0, scene, robot_file.plant)
-            raise ValueError(
+            raise RefusedError(
                 f"--limit-n: none reaches the {scene.name}, the suspension pulls back; "
                 f"allowed: one of {least:.1f} or more, or a smaller --gap-mm"
             )

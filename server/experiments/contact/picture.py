@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from server.common.drawing import save
 from server.experiments.contact.flight import ContactTrace
 from server.experiments.contact.measure import ContactRow, smooth
 from server.experiments.contact.setting import BAND_N, GO_S, STAY_S
-from server.experiments.paper.picture import TIME, panels, save
+from server.experiments.paper.picture import TIME, lettered
 
 
 def draw(shown: Sequence[tuple[ContactRow, ContactTrace]], path: Path) -> Path:
     """A figure; gives its file."""
     scenes = list(dict.fromkeys(row.scene for row, _ in shown))
-    figure, axes = panels(len(scenes))
+    figure, axes = lettered(len(scenes))
     for axis, scene in zip(axes, scenes, strict=True):
         ones = [(row, trace) for row, trace in shown if row.scene == scene]
         for k, (row, trace) in enumerate(ones):

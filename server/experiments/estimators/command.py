@@ -8,7 +8,6 @@ that time gave when it arrived.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from dataclasses import asdict, dataclass, replace
 from math import inf, nan
@@ -29,6 +28,7 @@ from pipeline.frames import Array
 from server.common import text
 from server.experiments.estimators.picture import draw
 from server.experiments.estimators.recording import play_recording
+from server.experiments.runner import ExperimentReport, experiment
 from server.recording.reader import read
 from server.recording.writer import RecordingError
 
@@ -103,8 +103,9 @@ def row_of(name: str, score: EstimatorMetrics, limit: EstimatorRow | None) -> Es
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Measure, print, draw."""
+@experiment("estimators")
+def run(arguments: argparse.Namespace) -> ExperimentReport | int:
+    """Each estimator's figures, beside the bound where data are simulated."""
     try:
         tracks, limit, start = (
             _simulated(arguments) if arguments.recording is None else _recorded(arguments.recording)
@@ -115,15 +116,12 @@ def run(arguments: argparse.Namespace) -> int:
     rows = [row_of(name, metrics.judge(runs, start), limit) for name, runs in tracks.items()]
     rows += [limit] if limit is not None else []
     told = [column for column in COLUMNS if any(_tells(row, column[0]) for row in rows)]
-    print(text.table(told, rows))
-    print(LEGEND if limit is not None else RECORDED)
-    if arguments.out is not None:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        draw({name: runs[0] for name, runs in tracks.items()}, arguments.out / "estimators.png")
-        figures = json.dumps([asdict(row) for row in rows], indent=1)
-        (arguments.out / "estimators.json").write_text(figures)
-        print(f"written: {arguments.out / 'estimators.png'}, {arguments.out / 'estimators.json'}")
-    return 0
+    shown: dict[str, EstimatorRun] = {name: runs[0] for name, runs in tracks.items()}
+    return ExperimentReport(
+        rows,
+        f"{text.table(told, rows)}\n{LEGEND if limit is not None else RECORDED}",
+        draw=lambda folder: (draw(shown, folder / "estimators.png"),),
+    )
 
 
 def _tells(row: EstimatorRow, name: str) -> bool:

@@ -9,16 +9,12 @@ import numpy as np
 
 from hardware.sim.world.evaluator import EstimatorRun
 from pipeline.frames import Array
+from server.common.drawing import panels, save
 
 
-def draw(tracks: Mapping[str, EstimatorRun], path: Path) -> None:
+def draw(tracks: Mapping[str, EstimatorRun], path: Path) -> Path:
     """A row per estimator, a column per component of the position, ±3 σ as a band."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(
+    figure, axes = panels(
         len(tracks), 3, figsize=(15.0, 2.8 * len(tracks)), sharex=True, squeeze=False
     )
     for row, (name, track) in zip(axes, tracks.items(), strict=True):
@@ -34,9 +30,7 @@ def draw(tracks: Mapping[str, EstimatorRun], path: Path) -> None:
         row[0].set_ylabel("error [mm]")
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    return save(figure, path)
 
 
 def _nearly_all(values: Array) -> float:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
 from server.common import processes
 from server.common.ranges import whole
-from server.common.text import dashed, plain, statements
+from server.common.text import Column, dashed
 from server.control.process import teleop_config
 from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
@@ -26,12 +25,13 @@ from server.experiments.forked import forked
 from server.experiments.gaps import vanish
 from server.experiments.gaps.flight import GapFlight
 from server.experiments.gaps.vanish import Vanished
+from server.experiments.runner import ExperimentReport, experiment
 
 APART_TICKS: Final = 7
 """Between two faults in a flight: each meets another moment of it."""
 SHARED: Final = 16
 """Faults that are tried in one flight."""
-COLUMNS: Final = (
+COLUMNS: Final[tuple[Column, ...]] = (
     ("fault", "fault", "{}"),
     ("COAST", "COAST s", "{:.3f}"),
     ("HOLD", "HOLD s", "{:.3f}"),
@@ -45,8 +45,7 @@ COLUMNS: Final = (
     ("missed", "missed", "{}"),
 )
 
-
-TIMES: Final = (
+TIMES: Final[tuple[Column, ...]] = (
     ("fault", "fault", "{}"),
     ("event", "event", "{}"),
     ("n", "n", "{}"),
@@ -82,15 +81,12 @@ def flown(job: FaultJob) -> list[FaultOutcome]:
     return outcomes
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Fly, print, write, draw; 1 if a goal is missed, 2 if it can't be flown."""
+@experiment("faults")
+def run(arguments: argparse.Namespace) -> ExperimentReport | int:
+    """Let every fault happen to flights of many seeds."""
     if arguments.live:
-        return _live(arguments)
-    try:
-        robot_file = load_robot(arguments.robot)
-    except RobotFileError as error:
-        print(f"lightleash experiments faults: {error}", file=sys.stderr)
-        return 2
+        return run_live(arguments)
+    robot_file = load_robot(arguments.robot)
     config = teleop_config(robot_file, arguments.gains, VirtualCameraConfig(), "relative")
     faults = [fault for fault in FAULTS if arguments.only in fault.name]
     outcomes = _outcomes(robot_file, config, faults, arguments)
@@ -99,25 +95,17 @@ def run(arguments: argparse.Namespace) -> int:
     vanished = vanish.fly(robot_file, config, arguments.vanish, arguments.workers)
     if vanished:
         times += vanish_times(vanished)
-    holds = goals(rows, arguments.seeds, vanished)
     print(f"{arguments.robot}, gains {arguments.gains}, hand moving; the worst of each")
-    print(dashed(COLUMNS, rows), end="\n\n")
-    print(dashed(TIMES, times), end="\n\n")
-    print("\n".join(statements(holds)))
-    if arguments.out is not None:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        figures = {
-            "rows": [plain(asdict(row)) for row in rows],
-            "times": [plain(asdict(one)) for one in times],
-            "holds": holds,
-        }
-        file = arguments.out / "faults.json"
-        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
-        print(f"\nwritten: {file}, {picture.draw(rows, arguments.out / 'faults.png')}")
-    return 0 if all(holds.values()) else 1
+    return ExperimentReport(
+        {"rows": rows, "times": times},
+        f"{dashed(COLUMNS, rows)}\n\n{dashed(TIMES, times)}",
+        goals(rows, arguments.seeds, vanished),
+        draw=lambda folder: (picture.draw(rows, folder / "faults.png"),),
+    )
 
 
-def _live(arguments: argparse.Namespace) -> int:
+@experiment("faults_live")
+def run_live(arguments: argparse.Namespace) -> ExperimentReport:
     """The ones that need real processes."""
     outcomes = []
     for one in live.fly(arguments.robot, arguments.gains, arguments.live):
@@ -128,14 +116,7 @@ def _live(arguments: argparse.Namespace) -> int:
         f"live: {thrust} samples with thrust after zero, in {len(outcomes)} faults": thrust == 0,
         "live: each in time": not any(one.missed for one in outcomes),
     }
-    print("\n".join(statements(holds)))
-    if arguments.out is not None:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        figures = {"rows": [plain(asdict(one)) for one in outcomes], "holds": holds}
-        file = arguments.out / "faults_live.json"
-        file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
-        print(f"\nwritten: {file}")
-    return 0 if all(holds.values()) else 1
+    return ExperimentReport({"rows": outcomes}, holds=holds)
 
 
 def text_of(one: LiveOutcome) -> str:

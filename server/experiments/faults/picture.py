@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from server.common.drawing import panels, save
 from server.experiments.faults.measure import EVENTS, FaultRow
 
 MARKS = {"COAST": ("o", "C7"), "HOLD": ("s", "C1"), "RAMP": ("v", "C3"), "robot": ("d", "C4")}
@@ -13,13 +14,8 @@ MARKS |= {"zero": ("|", "k")}
 
 def draw(rows: Sequence[FaultRow], path: Path) -> Path:
     """A figure; gives its file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     height = 1.5 + 0.2 * len(rows)
-    figure, (times, strays) = pyplot.subplots(
+    figure, (times, strays) = panels(
         1, 2, figsize=(12.0, height), sharey=True, width_ratios=(3.0, 1.0)
     )
     y = list(range(len(rows)))
@@ -37,7 +33,4 @@ def draw(rows: Sequence[FaultRow], path: Path) -> Path:
     times.legend(fontsize=7)
     strays.barh(y, [row.excursion_mm for row in rows], color="C0")
     strays.set_xlabel("excursion [mm]")
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
-    return path
+    return save(figure, path)

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
 from server.common import processes
 from server.common.ranges import number, whole
-from server.common.text import dashed, plain, statements
+from server.common.text import Column, dashed
 from server.control.process import teleop_config
 from server.experiments.gaps import picture, vanish
 from server.experiments.gaps.flight import Case, FlightLog, fly
 from server.experiments.gaps.goals import goals
 from server.experiments.gaps.measure import FlightFigures, GapRow, flight_of, row_of
 from server.experiments.gaps.traces import MINUTE_S, minutes
-from server.experiments.gaps.vanish import Vanished
+from server.experiments.runner import ExperimentReport, experiment
 
 GAPS_MS: Final = (40.0, 90.0, 160.0, 250.0, 400.0, 700.0, 1000.0)
 USUAL_S: Final = 5.0
@@ -32,7 +31,7 @@ ROBOT_MS: Final = 250.0
 """The longest gap in the robot's link."""
 SHOWN: Final = Case("phone", "webrtc", 0.25, 5.0)
 """Of which a flight is drawn."""
-COLUMNS: Final = (
+COLUMNS: Final[tuple[Column, ...]] = (
     ("link", "link", "{}"),
     ("gap_ms", "gap ms", "{:.0f}"),
     ("every_s", "every s", "{:.0f}"),
@@ -84,18 +83,15 @@ def cases(arguments: argparse.Namespace) -> Iterator[Case]:
         yield from (Case("phone", "radio", minute=minute.name) for minute in minutes())
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Fly, print, write, draw; 1 if a goal is missed, 2 if it can't be flown."""
+@experiment("gaps")
+def run(arguments: argparse.Namespace) -> ExperimentReport:
+    """Fly each gap and each recorded minute by each way."""
     if arguments.quick:
         arguments.seeds, arguments.seconds = 1, min(arguments.seconds, 20.0)
         arguments.gap_ms, arguments.every_s = [160.0, 250.0, 400.0], [5.0]
         arguments.vanish = min(arguments.vanish, 40)
-    try:
-        robot_file = load_robot(arguments.robot)
-        config = teleop_config(robot_file, arguments.gains, VirtualCameraConfig(), "relative")
-    except RobotFileError as error:
-        print(f"lightleash experiments gaps: {error}", file=sys.stderr)
-        return 2
+    robot_file = load_robot(arguments.robot)
+    config = teleop_config(robot_file, arguments.gains, VirtualCameraConfig(), "relative")
     jobs = [
         GapJob(robot_file, config, case, seed, MINUTE_S if case.minute else arguments.seconds)
         for case in cases(arguments)
@@ -103,13 +99,15 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     rows, log = _rows(jobs, arguments.workers)
     gone = vanish.fly(robot_file, config, arguments.vanish, arguments.workers)
-    holds = goals(rows, gone)
     print(f"{arguments.robot}, gains {arguments.gains}, hand moving, the button held; {_about()}")
-    print(dashed(COLUMNS, rows), end="\n\n")
-    print("\n".join(statements(holds)))
-    if arguments.out is not None:
-        _write(arguments.out, rows, gone, holds, log)
-    return 0 if all(holds.values()) else 1
+    title = f"{1e3 * SHOWN.gap_s:.0f} ms every {SHOWN.every_s:.0f} s, {SHOWN.way}"
+    shown = (title, log) if log else None
+    return ExperimentReport(
+        {"rows": rows, "vanished": gone},
+        dashed(COLUMNS, rows),
+        goals(rows, gone),
+        draw=lambda folder: (picture.draw(rows, shown, folder / "gaps.png"),),
+    )
 
 
 def _about() -> str:
@@ -132,26 +130,6 @@ def _rows(jobs: list[GapJob], workers: int) -> tuple[list[GapRow], FlightLog | N
     by_seed = sorted(found, key=lambda one: one[1])  # the same whatever the workers
     rows = [row_of(case, [found[one] for one in by_seed if one[0] == case]) for case in ordered]
     return rows, shown
-
-
-def _write(
-    folder: Path,
-    rows: list[GapRow],
-    gone: list[Vanished],
-    holds: dict[str, bool],
-    log: FlightLog | None,
-) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    figures = {
-        "rows": [plain(asdict(row)) for row in rows],
-        "vanished": [plain(asdict(one)) for one in gone],
-        "holds": holds,
-    }
-    file = folder / "gaps.json"
-    file.write_text(json.dumps(figures, indent=1, ensure_ascii=False), encoding="utf-8")
-    title = f"{1e3 * SHOWN.gap_s:.0f} ms every {SHOWN.every_s:.0f} s, {SHOWN.way}"
-    drawn = picture.draw(rows, (title, log) if log else None, folder / "gaps.png")
-    print(f"\nwritten: {file}, {drawn}")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

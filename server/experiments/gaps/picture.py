@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.signals import Mode
+from server.common.drawing import panels, save
 from server.experiments.gaps.flight import FlightLog
 from server.experiments.gaps.goals import EXCURSION_MM, FOLLOWS_PCT
 from server.experiments.gaps.measure import GapRow, spans
@@ -23,12 +24,7 @@ SHOWN_S = 12.0
 
 def draw(rows: Sequence[GapRow], shown: tuple[str, FlightLog] | None, path: Path) -> Path:
     """A figure; gives its file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, ((follows, strays), (traces, flight)) = pyplot.subplots(2, 2, figsize=(12.0, 8.0))
+    figure, ((follows, strays), (traces, flight)) = panels(2, 2, figsize=(12.0, 8.0))
     kinds = list(dict.fromkeys((r.link, r.way, r.every_s) for r in rows if r.way != "radio"))
     for link, way, every_s in kinds:
         ones = sorted(
@@ -53,10 +49,7 @@ def draw(rows: Sequence[GapRow], shown: tuple[str, FlightLog] | None, path: Path
     traces.axvline(97.0, color="k", lw=0.8, ls=":")
     if shown is not None:
         _flight(flight, *shown)
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
-    return path
+    return save(figure, path)
 
 
 def _flight(axis: Axes, title: str, log: FlightLog) -> None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +15,10 @@ from hardware.sim.network.netns import NamespaceError
 from server.common.text import table
 from server.experiments.network.figures import drops, percentile, recovery
 from server.experiments.network.phone import CLIENTS, FRAME_RATE_HZ
+from server.experiments.network.picture import draw
 from server.experiments.network.run import NetworkTestbed, Run, RunError
 from server.experiments.network.scenarios import SCENARIOS, Scenario
+from server.experiments.runner import ExperimentReport, experiment
 
 COLUMNS = (
     ("scenario", "line", "{}"),
@@ -125,49 +125,34 @@ def measure(arguments: argparse.Namespace) -> Iterator[tuple[Scenario, str, Run]
             rig.close()
 
 
-def write(rows: list[NetworkRow], runs: list[Run], folder: Path) -> None:
-    """JSON and the picture."""
-    from server.experiments.network.picture import draw
-
-    folder.mkdir(parents=True, exist_ok=True)
-    told = [
-        {name: _told(value) for name, value in asdict(row).items()}
-        | {"to_phone": asdict(run.counts[0]), "to_server": asdict(run.counts[1])}
-        for row, run in zip(rows, runs, strict=True)
-    ]
-    text, picture = folder / "network.json", folder / "network.png"
-    text.write_text(json.dumps(told, indent=1))
-    draw([(row.scenario, row.path, run) for row, run in zip(rows, runs, strict=True)], picture)
-    print(f"written: {picture}, {text}")
-
-
-def _told(value: str | float) -> str | float | None:
-    """Value for JSON: no NaN, no infinity."""
-    if isinstance(value, float):
-        return round(value, 3) if isfinite(value) else None
-    return value
-
-
-def run(arguments: argparse.Namespace) -> int:
-    """Measure, print, draw; 1 if a goal was missed, 2 if it can't be measured here."""
-    rows: list[NetworkRow] = []
-    runs: list[Run] = []
-    try:
-        for scenario, path, one in measure(arguments):
-            rows.append(row_of(scenario, path, one))
-            runs.append(one)
-            print(f"{scenario.name}, {path}: {scenario.told}", file=sys.stderr, flush=True)
-    except (NamespaceError, RunError) as error:
-        print(f"lightleash experiments network: {error}", file=sys.stderr)
-        return 2
+@experiment("network", NamespaceError, RunError)
+def run(arguments: argparse.Namespace) -> ExperimentReport:
+    """Each scenario by each path."""
+    flown: list[tuple[NetworkRow, Run]] = []
+    for scenario, path, one in measure(arguments):
+        flown.append((row_of(scenario, path, one), one))
+        print(f"{scenario.name}, {path}: {scenario.told}", file=sys.stderr, flush=True)
     print(
         f"640x480, {FRAME_RATE_HZ:g} pictures a second, {arguments.seconds:g} s each, seed "
         f"{arguments.seed}; both directions alike; goals are those of webrtc"
     )
-    print(table(COLUMNS, rows))
-    if arguments.out is not None:
-        write(rows, runs, arguments.out)
-    return int(any(row.verdict not in ("", "met") for row in rows))
+
+    def drawn(folder: Path) -> list[Path]:
+        runs = [(row.scenario, row.path, run) for row, run in flown]
+        return [draw(runs, folder / "network.png")]
+
+    return ExperimentReport(
+        [_told(row, run) for row, run in flown],
+        table(COLUMNS, [row for row, _ in flown]),
+        is_good=all(row.verdict in ("", "met") for row, _ in flown),
+        draw=drawn,
+    )
+
+
+def _told(row: NetworkRow, run: Run) -> dict[str, object]:
+    """For programs, to a thousandth."""
+    rounded = {k: round(v, 3) if isinstance(v, float) else v for k, v in asdict(row).items()}
+    return rounded | {"to_phone": run.counts[0], "to_server": run.counts[1]}
 
 
 def _seconds(text: str) -> float:

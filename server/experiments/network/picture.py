@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from server.common.drawing import panels, save
 from server.experiments.network.figures import Times
 from server.experiments.network.run import Run
 
@@ -15,23 +16,18 @@ COLUMNS = 5  # of panels
 AGES_MS = (1.0, 3e3)
 
 
-def draw(runs: Sequence[tuple[str, str, Run]], path: Path) -> None:
+def draw(runs: Sequence[tuple[str, str, Run]], path: Path) -> Path:
     """A panel for each scenario: the share of pictures, and of time, older than an age."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     names = list(dict.fromkeys(scenario for scenario, _, _ in runs))
     columns = min(COLUMNS, len(names))
     rows = -(-len(names) // columns)
-    figure, panels = pyplot.subplots(
+    figure, axes = panels(
         rows, columns, figsize=(3.2 * columns, 2.9 * rows), squeeze=False, sharex=True, sharey=True
     )
-    for panel in panels.flat[len(names) :]:
+    for panel in axes.flat[len(names) :]:
         panel.axis("off")
     for scenario, way, run in runs:
-        panel = panels.flat[names.index(scenario)]
+        panel = axes.flat[names.index(scenario)]
         frames = run.frames.within(run.begin, run.end).ages
         records = run.records.ages_of_newest(run.begin, run.end)
         panel.loglog(*_older(frames), color=COLOURS[way], lw=1.2, label=f"{way}, pictures")
@@ -40,14 +36,12 @@ def draw(runs: Sequence[tuple[str, str, Run]], path: Path) -> None:
         )
         panel.set(title=scenario, xlim=AGES_MS, ylim=(1e-3, 1.1))
         panel.grid(visible=True, alpha=0.3)
-    for panel in panels[-1]:
+    for panel in axes[-1]:
         panel.set_xlabel("age, ms")
-    for panel in panels[:, 0]:
+    for panel in axes[:, 0]:
         panel.set_ylabel("share that is older")
-    panels[0][0].legend(fontsize=6, loc="lower left")
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    axes[0][0].legend(fontsize=6, loc="lower left")
+    return save(figure, path)
 
 
 def _older(ages: Times) -> tuple[Times, Times]:

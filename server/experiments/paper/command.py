@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Protocol, get_args
 
-from hardware.robot_file import RobotFileError, load_robot
+from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, VirtualCameraMode
 from server.common import processes
 from server.common.ranges import number, whole
@@ -17,6 +15,7 @@ from server.experiments.paper import comparison, disturbance, table_1, table_3, 
 from server.experiments.paper.setup import assumptions, published
 from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.variants import Variant, VariantRequest, check_gains, ours
+from server.experiments.runner import ExperimentReport, RefusedError, experiment
 from server.simulation.sensors import PAPER, Leader, Pictures, phone
 
 
@@ -52,16 +51,12 @@ EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
 """Each with the virtual camera that ours has in it unless another is wished."""
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Fly, print, write, draw; 1 if a statement of the paper does not hold, 2 if it can't fly."""
-    wishes = wishes_of(arguments)
-    try:
-        leader = leader_of(arguments)
-        robot_file = load_robot(arguments.robot)
-        check_gains(robot_file, arguments.robot, arguments.gains)
-    except (RobotFileError, ValueError) as error:
-        print(f"lightleash experiments paper: {error}", file=sys.stderr)
-        return 2
+@experiment("paper")
+def run(arguments: argparse.Namespace) -> ExperimentReport:
+    """Fly each table; what the paper says must hold with its own sensors."""
+    wishes, leader = wishes_of(arguments), leader_of(arguments)
+    robot_file = load_robot(arguments.robot)
+    check_gains(robot_file, arguments.robot, arguments.gains)
     setup = ExperimentSetup(
         robot_file, leader, tuple(range(1, arguments.seeds + 1)), arguments.workers
     )
@@ -74,32 +69,24 @@ def run(arguments: argparse.Namespace) -> int:
         outcome = measure(setup, [ours(leader, wishes, vci)] if adds else [])
         outcomes.append(outcome)
         print(f"\n{outcome.text()}", flush=True)
-    if arguments.out is not None:
-        print(f"\nwritten: {', '.join(map(str, write(outcomes, setup, arguments.out)))}")
-    good = all(all(outcome.holds.values()) for outcome in outcomes)
-    return 0 if good or leader.name != PAPER.name else 1
-
-
-def write(outcomes: Sequence[Reported], setup: ExperimentSetup, folder: Path) -> list[Path]:
-    """JSON and pictures; gives the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    head = {"source": published.SOURCE, "assumptions": assumptions.json(assumptions.of(setup))}
-    results = {outcome.name: outcome.json() for outcome in outcomes}
-    figures = folder / "paper.json"
-    told = json.dumps({**head, **results}, indent=1, ensure_ascii=False)
-    figures.write_text(told, encoding="utf-8")
-    return [figures, *(path for outcome in outcomes for path in outcome.draw(folder))]
+    told = assumptions.json(assumptions.of(setup))
+    return ExperimentReport(
+        {"source": published.SOURCE, "assumptions": told}
+        | {outcome.name: outcome.json() for outcome in outcomes},
+        is_good=leader.name != PAPER.name or all(all(one.holds.values()) for one in outcomes),
+        draw=lambda folder: [path for outcome in outcomes for path in outcome.draw(folder)],
+    )
 
 
 def leader_of(arguments: argparse.Namespace) -> Leader:
     """The paper's sensors, or a phone with its rate and delay.
 
     Raises:
-        ValueError: pictures that the paper's sensors have not; says what is allowed.
+        RefusedError: pictures that the paper's sensors have not; says what is allowed.
     """
     if arguments.leader == PAPER.name:
         if arguments.pictures != PAPER.pictures:
-            raise ValueError(
+            raise RefusedError(
                 f"--pictures {arguments.pictures}: allowed with --leader {PAPER.name}: "
                 f"{PAPER.pictures}; its camera's 500 pictures/s went through no codec"
             )

@@ -7,14 +7,14 @@ with one thing of the world made better at a time: what helps is what bounds it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 from typing import Final
 
 from hardware.robot_file import RobotFile
 from pipeline.config import VirtualCameraMode
-from server.common.text import Column, flights, plain
+from server.common.text import Column, flights
 from server.experiments.paper.setup import assumptions, published
 from server.experiments.paper.setup.measure import ComparedFigure, ExperimentSetup, cell_of
 from server.experiments.paper.setup.variants import Variant, VariantRequest, ours
@@ -108,7 +108,7 @@ class Summary:
 
     def json(self) -> dict[str, object]:
         """Values for programs; null is what was not flown."""
-        rows = [plain(asdict(row)) for row in self.rows]
+        rows = list(self.rows)
         of_phone = assumptions.json(assumptions.phone_sensors(self.phone))
         return {"title": TITLE, "rows": rows, "phone": of_phone}
 

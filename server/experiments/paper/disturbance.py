@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 from typing import Final
@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.frames import Array
-from server.common.text import Column, flights, plain, statements
+from server.common.text import Column, flights, statements
 from server.experiments.paper.picture import figure_9
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.flight import ExperimentTrace, Push
@@ -76,7 +76,7 @@ class Pushed:
 
     def json(self) -> dict[str, object]:
         """Values for programs; null is what could not be measured."""
-        rows = [plain(asdict(row)) for row in self.rows]
+        rows = list(self.rows)
         return {
             "title": TITLE,
             "paper": {"back_s": published.BACK_S},

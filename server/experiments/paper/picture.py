@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from hardware.sim.hand import STEP_M
+from server.common.drawing import panels, save
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.flight import ExperimentTrace
 
@@ -24,35 +25,19 @@ COLOURS: Final = {
 TIME: Final = "time [s]"
 
 
-def panels(count: int, sharey: bool = False) -> tuple[Figure, list[Axes]]:
+def lettered(count: int, sharey: bool = False) -> tuple[Figure, list[Axes]]:
     """A figure of panels under each other, (a), (b), ... as in the paper."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(
-        count, 1, figsize=(7.0, 2.9 * count), sharex=True, sharey=sharey, squeeze=False
-    )
+    size = (7.0, 2.9 * count)
+    figure, axes = panels(count, 1, figsize=size, sharex=True, sharey=sharey, squeeze=False)
     for letter, (axis,) in zip("abcdef", axes, strict=False):
         axis.set_title(f"({letter})", loc="left", fontsize="medium")
         axis.grid(True, alpha=0.3)
     return figure, list(axes[:, 0])
 
 
-def save(figure: Figure, path: Path) -> Path:
-    """Write and close."""
-    from matplotlib import pyplot
-
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
-    return path
-
-
 def figure_6(traces: Mapping[str, ExperimentTrace], path: Path) -> Path:
     """Fig. 6: error along x_b while the camera moves along x_c; thrust along x_b."""
-    figure, (top, bottom) = panels(2)
+    figure, (top, bottom) = lettered(2)
     for name, trace in traces.items():
         t = trace.t + published.MOVE_AT_S
         top.plot(t, 1e3 * trace.error_in_b[:, 0], color=COLOURS[name], lw=1.0, label=name)
@@ -72,7 +57,7 @@ def figure_6(traces: Mapping[str, ExperimentTrace], path: Path) -> Path:
 
 def figure_7(traces: Mapping[str, ExperimentTrace], path: Path) -> Path:
     """Fig. 7: error and controller output along y_b, with and without the VCI."""
-    figure, (top, bottom) = panels(2)
+    figure, (top, bottom) = lettered(2)
     for name, trace in traces.items():
         t = trace.t + published.MOVE_AT_S
         top.plot(t, 1e3 * trace.error_in_b[:, 1], color=COLOURS[name], lw=1.0, label=name)
@@ -87,7 +72,7 @@ def figure_7(traces: Mapping[str, ExperimentTrace], path: Path) -> Path:
 def figure_8(traces: Mapping[str, ExperimentTrace], f_max: float, path: Path) -> Path:
     """Fig. 8: what each thruster is asked for, with the VCI and without; its limit `f_max` [N]."""
     shown = ("with VCI", "without VCI")
-    figure, axes = panels(len(shown), sharey=True)
+    figure, axes = lettered(len(shown), sharey=True)
     for axis, name in zip(axes, shown, strict=True):
         trace = traces[name]
         for k, thrusts in enumerate(trace.thrusts.T):
@@ -103,7 +88,7 @@ def figure_8(traces: Mapping[str, ExperimentTrace], f_max: float, path: Path) ->
 
 def figure_9(pushed: ExperimentTrace, path: Path) -> Path:
     """Fig. 9: relative position along y_c and controller output along y_b, turned and pushed."""
-    figure, (top, bottom) = panels(2)
+    figure, (top, bottom) = lettered(2)
     t = pushed.t + published.MOVE_AT_S
     top.plot(t, 1e3 * pushed.p_bc_in_c[:, 1], color=COLOURS["with VCI"], lw=1.0)
     bottom.plot(t, pushed.wrench_in_b[:, 1], color=COLOURS["with VCI"], lw=0.8)

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from server.experiments.paper.picture import COLOURS, TIME, panels, save
+from server.common.drawing import save
+from server.experiments.paper.picture import COLOURS, TIME, lettered
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.task import PEOPLE, Attempt
 
@@ -18,7 +19,7 @@ SHOWN_MM: Final = (-60.0, 20.0)
 
 def figure_times(times: Sequence[tuple[str, str, int, float]], path: Path) -> Path:
     """Draw the attempts (operator, variant, number, seconds); lines: ours; dashed: the paper's."""
-    figure, axes = panels(len(PEOPLE), sharey=True)
+    figure, axes = lettered(len(PEOPLE), sharey=True)
     for axis, person in zip(axes, PEOPLE, strict=True):
         own = [one[1:] for one in times if one[0] == person.name]
         for variant in dict.fromkeys(one[0] for one in own):
@@ -43,7 +44,7 @@ def figure_times(times: Sequence[tuple[str, str, int, float]], path: Path) -> Pa
 
 def figure_beam(shown: Mapping[tuple[str, str], Attempt], path: Path) -> Path:
     """What is left between beam and bore at the worse end, an attempt of each operator, variant."""
-    figure, axes = panels(len(PEOPLE), sharey=True)
+    figure, axes = lettered(len(PEOPLE), sharey=True)
     for axis, person in zip(axes, PEOPLE, strict=True):
         for (operator, variant), one in shown.items():
             if operator == person.name:

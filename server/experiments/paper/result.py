@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from server.common.text import plain, statements
+from server.common.text import statements
 from server.experiments.paper.setup.measure import ComparedFigure, table_of
 
 
@@ -29,5 +29,5 @@ class PaperResult:
 
     def json(self) -> dict[str, object]:
         """Values for programs; null is what could not be measured."""
-        rows = [plain({**asdict(cell), "ratio": cell.ratio}) for cell in self.cells]
+        rows = [{**asdict(cell), "ratio": cell.ratio} for cell in self.cells]
         return {"title": self.title, "cells": rows, "holds": dict(self.holds)}

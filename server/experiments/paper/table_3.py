@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from server.common.progress import progress_bar
-from server.common.text import Column, dashed, plain, statements
+from server.common.text import Column, dashed, statements
 from server.experiments.paper.picture_task import figure_beam, figure_times
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.measure import ExperimentSetup
@@ -124,7 +124,7 @@ class Study:
 
     def json(self) -> dict[str, object]:
         """Values for programs; null is what the paper has not."""
-        cells = [plain({**asdict(cell), "ratio": cell.ratio}) for cell in self.cells]
+        cells = [{**asdict(cell), "ratio": cell.ratio} for cell in self.cells]
         attempts = [
             {
                 "operator": trial.name,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from server.common.drawing import panels, save
 from server.experiments.sweep.summary import by_value, went_well, worded
 from server.experiments.sweep.sweep_file import Sweep
 from server.simulation.session import SessionOutcome
@@ -28,16 +29,11 @@ SPREAD: Final = 0.32
 
 def draw(sweep: Sweep, done: Mapping[int, SessionOutcome], path: Path) -> None:
     """A panel a key; colours are the values of the key after it; what ended early stands on top."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     keys = sweep.varied or ("",)
     columns = min(COLUMNS, len(keys))
     shape = ceil(len(keys) / columns), columns
     size = (max(7.0, 5.2 * shape[1]), 4.2 * shape[0])
-    figure, axes = pyplot.subplots(*shape, figsize=size, squeeze=False, sharey=True)
+    figure, axes = panels(*shape, figsize=size, squeeze=False, sharey=True)
     for k, key in enumerate(keys):
         other = keys[(k + 1) % len(keys)] if len(keys) > 1 else ""
         _panel(axes.flat[k], sweep, done, key, other)
@@ -52,9 +48,7 @@ def draw(sweep: Sweep, done: Mapping[int, SessionOutcome], path: Path) -> None:
     early = f", {bad} ended early (crosses on top)" if bad else ""
     lines = "lines: medians" if sweep.varied else "line: median"
     figure.suptitle(f"{len(done)} sessions of {sweep.seconds:g} s{early}; points: seeds, {lines}")
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    save(figure, path)
 
 
 def _panel(

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from math import radians
@@ -22,6 +20,7 @@ from pipeline.frames import Array, log, rotation_about_z
 from server.common.ranges import number
 from server.common.runtime_parameters import FASTEST_HZ, SLOWEST_HZ
 from server.common.text import Column, table
+from server.experiments.runner import ExperimentReport, experiment
 from server.experiments.tremor.hand import (
     REST_S,
     SHORTEST_S,
@@ -175,27 +174,22 @@ def place(arguments: argparse.Namespace) -> Array:
     return ahead
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Print the table, draw the picture."""
-    try:
-        figures, spectra = measure(arguments)
-    except (RecordingError, ValueError) as error:
-        print(f"lightleash experiments tremor: {error}", file=sys.stderr)
-        return 2
+@experiment("tremor", RecordingError, ValueError)
+def run(arguments: argparse.Namespace) -> ExperimentReport:
+    """Each virtual camera's figures, with spectra and a turn as a picture."""
+    figures, spectra = measure(arguments)
     source = arguments.recording or f"hand {arguments.hand}, seed {arguments.seed}"
     print(
         f"{source}; {arguments.cutoff_hz:g} Hz, robot {arguments.distance_m:g} m away, "
         f"{arguments.side_deg:g}° beside the axis; RMS at {BAND_HZ[0]:g}-{BAND_HZ[1]:g} Hz, of "
         "turns across and about the line of sight and of the reference"
     )
-    print(table(COLUMNS, figures))
-    if arguments.out is not None:
-        arguments.out.mkdir(parents=True, exist_ok=True)
-        picture, text = arguments.out / "tremor.png", arguments.out / "tremor.json"
-        draw(spectra, list(turns(arguments.cutoff_hz, place(arguments))), BAND_HZ, picture)
-        text.write_text(json.dumps([asdict(row) for row in figures], indent=1))
-        print(f"written: {picture}, {text}")
-    return 0
+
+    def drawn(folder: Path) -> list[Path]:
+        seen = list(turns(arguments.cutoff_hz, place(arguments)))
+        return [draw(spectra, seen, BAND_HZ, folder / "tremor.png")]
+
+    return ExperimentReport(figures, table(COLUMNS, figures), draw=drawn)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

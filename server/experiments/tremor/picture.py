@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.frames import Array
+from server.common.drawing import panels, save
 
 SHOWN_HZ = (0.1, 50.0)
 SHOWN_DECADES = 11.0  # of power
@@ -37,14 +38,9 @@ def draw(
     turns: Sequence[Turn],
     band_hz: tuple[float, float],
     path: Path,
-) -> None:
+) -> Path:
     """Densities on logarithmic axes, the band of tremor shaded; the turn over time beside them."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, (left, middle, right) = pyplot.subplots(1, 3, figsize=(16.0, 4.8))
+    figure, (left, middle, right) = panels(1, 3, figsize=(16.0, 4.8))
     top = 3.0 * max(float(spectrum.across.max()) for spectrum in spectra.values())
     for name, spectrum in spectra.items():
         line = LINES.get(name, "-")
@@ -65,6 +61,4 @@ def draw(
     for axis, place in ((left, "lower left"), (middle, "lower left"), (right, "lower right")):
         axis.grid(True, which="major", alpha=0.4)
         axis.legend(loc=place, fontsize="small")
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    return save(figure, path)

@@ -17,6 +17,7 @@ from pipeline.config import (
 )
 from pipeline.control.cutoff import time_constants
 from pipeline.estimator_config import NoFilterConfig
+from server.experiments.runner import RefusedError
 from server.simulation.sensors import Leader
 
 PAPER_TAUS: Final = (3.18, 0.16)
@@ -107,9 +108,9 @@ def check_gains(robot_file: RobotFile, name: str, wished: str | None = None) -> 
     """Whether the robot has what is to be flown.
 
     Raises:
-        ValueError: it lacks a set; says which there are.
+        RefusedError: it lacks a set; says which there are.
     """
     needed = {WITHOUT_EKF.gains, WITH_EKF.gains, *([wished] if wished else [])}
     for gains in sorted(needed - set(robot_file.gains)):
         has = ", ".join(robot_file.gains)
-        raise ValueError(f"{name}: gains: {gains!r} is not one of its sets: {has}")
+        raise RefusedError(f"{name}: gains: {gains!r} is not one of its sets: {has}")

@@ -1,0 +1,90 @@
+"""What experiments do alike: refuse in a line, print, write figures, draw, tell by exit code."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from hardware.robot_file import RobotFileError
+from server.common.text import plain, statements
+
+MISSED: Final = 1
+REFUSED: Final = 2
+"""Exit codes."""
+Draw = Callable[[Path], Sequence[Path]]
+"""Draws into a folder; gives the files."""
+
+
+class RefusedError(ValueError):
+    """It can't be measured so; says what is allowed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExperimentReport:
+    """What an experiment has found."""
+
+    figures: object
+    """Its JSON: dataclasses, mappings and lists of them; NaN becomes null."""
+    text: str = ""
+    """To print, if that was not done meanwhile."""
+    holds: Mapping[str, bool] = field(default_factory=dict)
+    """Goals, and whether they were met; in the JSON, too, where that is an object."""
+    is_good: bool = True
+    """Whether all else went well."""
+    draw: Draw | None = None
+
+    @property
+    def code(self) -> int:
+        """Exit code."""
+        return 0 if self.is_good and all(self.holds.values()) else MISSED
+
+    def write(self, folder: Path, name: str) -> list[Path]:
+        """JSON called `name`, and pictures; gives the files."""
+        folder.mkdir(parents=True, exist_ok=True)
+        figures = plain(self.figures)
+        if self.holds and isinstance(figures, dict):
+            figures["holds"] = dict(self.holds)
+        file = folder / f"{name}.json"
+        told = json.dumps(figures, indent=1, ensure_ascii=False, allow_nan=False)
+        file.write_text(told, encoding="utf-8")
+        return [file, *(self.draw(folder) if self.draw is not None else ())]
+
+
+def experiment(
+    name: str, *refusals: type[Exception]
+) -> Callable[[Callable[[Namespace], ExperimentReport | int]], Callable[[Namespace], int]]:
+    """Make a command of a function that measures; one that gives a number has told all itself.
+
+    `refusals` are errors that say why it can't be measured, beside those of robot files and of
+    what was asked for.
+    """
+    refused: tuple[type[Exception], ...] = (RobotFileError, RefusedError, *refusals)
+
+    def command(
+        measure: Callable[[Namespace], ExperimentReport | int],
+    ) -> Callable[[Namespace], int]:
+        def run(arguments: Namespace) -> int:
+            """Measure, print, write, draw; 1 if a goal is missed, 2 if it can't be measured."""
+            try:
+                found = measure(arguments)
+            except refused as error:
+                print(f"lightleash experiments {name}: {error}", file=sys.stderr)
+                return REFUSED
+            if isinstance(found, int):
+                return found
+            if found.text:
+                print(found.text)
+            if found.holds:
+                print("\n".join(("", *statements(found.holds))))
+            if arguments.out is not None:
+                print(f"\nwritten: {', '.join(map(str, found.write(arguments.out, name)))}")
+            return found.code
+
+        return run
+
+    return command
