@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from operator import attrgetter
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ ENDED: Final = (Mode.RAMP, Mode.DISARMED, Mode.STOPPED)
 WAITING: Final = (Mode.COAST, Mode.HOLD)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FlightFigures:
     """Figures of one flight; NaN where nothing of the kind happened."""
 
@@ -128,57 +129,39 @@ def _largest(values: Sequence[float]) -> float:
     return max(values, default=float("nan"))
 
 
-@dataclass(frozen=True, slots=True)
-class GapRow:
-    """All seeds of a case: the mean of what it follows, sums of counts, else the worst."""
+@dataclass(frozen=True)
+class GapHeading:
+    """What was flown."""
 
     link: str
     gap_ms: float
     every_s: float
     way: str
-    follows_pct: float
-    ended: int
-    resumed: int
-    pressed: int
-    coasts: int
-    holds: int
-    ramps: int
-    excursion_mm: float
-    behind_mm: float
-    drift_mm: float
-    release_m_s: float
-    quiet_m_s: float
-    step_mm: float
+
+
+@dataclass(frozen=True)
+class GapRow(FlightFigures, GapHeading):
+    """All seeds of a case: the mean of what it follows, sums of counts, else the worst."""
+
     seeds: int
-    reasons: tuple[str, ...]
+
+
+COUNTS: Final = ("ended", "resumed", "pressed", "coasts", "holds", "ramps")
+SIZES: Final = ("excursion_mm", "behind_mm", "drift_mm", "release_m_s", "quiet_m_s", "step_mm")
 
 
 def row_of(case: Case, flights: Sequence[FlightFigures]) -> GapRow:
     """Figures of a case."""
-
-    def total(name: str) -> int:
-        return sum(getattr(one, name) for one in flights)
-
-    def worst(name: str) -> float:
-        values = [getattr(one, name) for one in flights]
-        return max((value for value in values if value == value), default=float("nan"))
-
+    counts = {name: sum(getattr(one, name) for one in flights) for name in COUNTS}
+    known = {name: [one for one in map(attrgetter(name), flights) if one == one] for name in SIZES}
+    shared: dict[str, Any] = counts | {name: _largest(ones) for name, ones in known.items()}
     return GapRow(
         link=case.minute or f"{case.side}'s link",
         gap_ms=1e3 * case.gap_s if not case.minute else float("nan"),
         every_s=case.every_s if not case.minute else float("nan"),
         way=case.way,
         follows_pct=float(np.mean([one.follows_pct for one in flights])),
-        excursion_mm=worst("excursion_mm"),
-        behind_mm=worst("behind_mm"),
-        drift_mm=worst("drift_mm"),
-        release_m_s=worst("release_m_s"),
-        quiet_m_s=worst("quiet_m_s"),
-        step_mm=worst("step_mm"),
         seeds=len(flights),
         reasons=tuple(sorted({reason for one in flights for reason in one.reasons})),
-        **{
-            name: total(name)
-            for name in ("ended", "resumed", "pressed", "coasts", "holds", "ramps")
-        },
+        **shared,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 from math import isnan
 from pathlib import Path
 
@@ -152,7 +153,10 @@ def test_runs_are_found_at_both_ends_and_in_between() -> None:
 
 
 def flown(**figures: float) -> FlightFigures:
-    usual = dict.fromkeys(FlightFigures.__slots__, 0.0) | {"follows_pct": 99.0, "reasons": ()}
+    usual = dict.fromkeys((one.name for one in fields(FlightFigures)), 0.0) | {
+        "follows_pct": 99.0,
+        "reasons": (),
+    }
     return FlightFigures(**(usual | figures))
 
 
