@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
 from hardware.plant_parameters import StartParameters
-from hardware.sim.hand_parts import Keyed, MotionComponent, Waves, lift
+from hardware.sim.hand_parts import TREMOR_DEG, TREMOR_M, Keyed, MotionComponent, Waves, lift
 from pipeline.frames import GRAVITY, Array, R_from_rpy, S_in_b, rotation_about_z
 
 REST_S = 2.0
@@ -100,9 +100,9 @@ def _strata(rng: np.random.Generator, n: int) -> Array:
 
 
 def tremor(
-    rng: np.random.Generator, sigma_m: float = 5e-5, sigma_deg: float = 0.03
+    rng: np.random.Generator, sigma_m: float = TREMOR_M, sigma_deg: float = TREMOR_DEG
 ) -> MotionComponent:
-    """Physiological tremor: 8-12 Hz, 0.05 mm and 0.03° RMS."""
+    """Physiological tremor: 8-12 Hz."""
     return _noise(rng, 8.0 + 4.0 * _strata(rng, 12), sigma_m, sigma_deg)
 
 

@@ -12,6 +12,8 @@ from pipeline.frames import Array
 
 FADE_S = 1.5
 """From rest to full motion."""
+TREMOR_M, TREMOR_DEG = 5e-5, 0.03
+"""RMS of a hand's tremor, each axis."""
 LIFT_S = 3.0
 """To rise to where one flies."""
 

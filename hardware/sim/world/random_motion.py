@@ -1,5 +1,7 @@
 """Motions known by their statistics: a hand that trembles, a robot that sways.
 
+Linear processes driven by white noise, so that the posterior Cramér-Rao bound knows all of them; a
+hand of sines with exact derivatives at any time is `hardware/sim/hand.py`.
 A motion is an array (3, n, 6): value, rate and acceleration, at n times, of x, y, z [m], roll,
 pitch, yaw [rad].
 """
@@ -13,12 +15,13 @@ from typing import Final
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
+from hardware.sim.hand_parts import TREMOR_DEG, TREMOR_M
 from hardware.sim.world.rotations import rates_each, rpy_each, turn_each
 from pipeline.frames import GRAVITY, Array
 
 POLES: Final = np.pi
 """Three of them at 0.5 Hz [rad/s]."""
-TREMOR_SIGMA: Final = (5e-5, float(np.deg2rad(0.03)))
+TREMOR_SIGMA: Final = (TREMOR_M, float(np.deg2rad(TREMOR_DEG)))
 """Of a hand [m, rad]."""
 MUSCLE_S: Final = 0.008
 """Low pass between the noise and the force that drives a tremor."""
