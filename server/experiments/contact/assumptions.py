@@ -17,10 +17,9 @@ from server.experiments.contact.setting import (
     ContactScene,
     spring_n_m,
 )
-from server.experiments.paper.setup.assumption import Assumption
+from server.experiments.paper.setup.assumptions import Assumption, phone_sensors, sensors
 from server.experiments.paper.setup.assumptions import json as json
 from server.experiments.paper.setup.assumptions import lines as lines
-from server.experiments.paper.setup.assumptions import phone_sensors, sensors
 from server.experiments.paper.setup.assumptions import plant as plant_parts
 from server.simulation.sensors import PAPER, Leader
 

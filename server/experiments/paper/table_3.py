@@ -17,7 +17,7 @@ import numpy as np
 
 from server.common.progress import progress_bar
 from server.common.text import Column, dashed, statements
-from server.experiments.paper.picture_task import figure_beam, figure_times
+from server.experiments.paper.picture import figure_beam, figure_times
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.task import PEOPLE, Attempt
