@@ -144,8 +144,8 @@ def test_a_process_starts_inside_and_sees_that_network_alone(link: EmulatedLink)
 
 HOLDER = """
 import subprocess, sys
-from hardware.sim.network.emulated_link import Link
-with Link() as link:
+from hardware.sim.network.emulated_link import EmulatedLink
+with EmulatedLink() as link:
     inside = subprocess.Popen(["sleep", "600"], preexec_fn=link.far.enter_for_life)
     print(inside.pid, flush=True)
     sys.stdin.read()
@@ -196,7 +196,8 @@ def named_namespaces() -> list[str]:
 
 def test_without_rights_it_says_what_it_takes() -> None:
     script = (
-        "from hardware.sim.network.emulated_link import Link; import os; os.setuid(65534); Link()"
+        "from hardware.sim.network.emulated_link import EmulatedLink; "
+        "import os; os.setuid(65534); EmulatedLink()"
     )
     if os.geteuid() != 0:
         pytest.skip("not root: the rest of these tests is skipped, with the reason")
