@@ -220,13 +220,16 @@ def test_a_correction_is_added_where_it_belongs():
     assert np.abs(R - R_before @ exp(dx[3:6])).max() < 1e-15
 
 
-def test_of_slow_leds_nothing_is_believed_about_the_time_offset():
+def fused(still):
+    """(x, R, P) of one picture, LEDs slower than `still` [rad/s] not believed about the offset."""
     x, R, P = state(0.3)
-    told, C = picture(x, R), covariances(4)
-    whole = [value.copy() for value in (x, R, P)]
-    fuse(*whole, told, C)  # type: ignore[call-arg]
-    held = [value.copy() for value in (x, R, P)]
-    fuse(*held, told, C, still=1e6)  # type: ignore[call-arg]
+    fuse(x, R, P, picture(x, R), covariances(4), still=still)
+    return x, R, P
+
+
+def test_of_slow_leds_nothing_is_believed_about_the_time_offset():
+    x, _, P = state(0.3)
+    whole, held = fused(0.0), fused(1e6)
     rest = np.arange(len(P)) != OFFSET
     assert held[0][X_OFFSET] == pytest.approx(x[X_OFFSET], abs=1e-12)
     assert held[2][OFFSET, OFFSET] == pytest.approx(P[OFFSET, OFFSET])
@@ -236,11 +239,5 @@ def test_of_slow_leds_nothing_is_believed_about_the_time_offset():
 
 
 def test_of_fast_leds_all_is_believed_about_the_time_offset():
-    x, R, P = state(0.3)
-    told, C = picture(x, R), covariances(4)
-    whole = [value.copy() for value in (x, R, P)]
-    fuse(*whole, told, C)  # type: ignore[call-arg]
-    fast = [value.copy() for value in (x, R, P)]
-    fuse(*fast, told, C, still=1e-3)  # type: ignore[call-arg]
-    for a, b in zip(whole, fast, strict=True):
+    for a, b in zip(fused(0.0), fused(1e-3), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-6, atol=1e-9)
