@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.e2e.flight_log import Flight, Said
-from tests.e2e.witness import Hole, Witness, longest
+from tests.e2e.witness import Hole, Witness, holes_of, longest
 
 pytestmark = pytest.mark.e2e
 AWAY_S = 0.3
@@ -40,6 +40,19 @@ def test_what_stops_a_ticker_is_noted_with_its_length(witness: Witness) -> None:
         assert time.monotonic() < end
         time.sleep(0.01)
     assert longest(witness.holes(time.monotonic()), "others") == 0.0
+
+
+def test_many_short_holes_of_the_machine_are_a_slow_machine() -> None:
+    def ticks(away_s: float) -> Iterator[tuple[float, float]]:
+        """A second on time, then away once in ten ticks."""
+        for n in range(400):
+            yield 0.005 * n, 0.005 + (away_s if n > 200 and n % 10 == 0 else 0.0)
+
+    assert list(holes_of("machine", ticks(0.015))) == []
+    assert {hole.where for hole in holes_of("machine", ticks(0.03))} == {"machine", "slow"}
+    assert {hole.where for hole in holes_of("others", ticks(0.03))} == {"others"}
+    assert flight("RAMP", Hole("slow", 4.8, 0.5)).excuse
+    assert not flight("RAMP", *[Hole("machine", 4.8, 0.03)] * 9).excuse
 
 
 def test_a_flight_is_excused_by_a_hole_longer_than_is_borne_where_it_ended() -> None:

@@ -1,9 +1,10 @@
 """What the machine did beside a flight: two tickers in processes of their own, and their holes.
 
 One before everything else (SCHED_FIFO, where that is permitted): what it misses, nobody was given.
+It also judges its own rate as control judges its own: many holes, each short, are a slow machine.
 One like everybody else: what it misses though it asks for next to nothing, others took.
 
-    python -m tests.e2e.witness machine|others    # prints "end [s] length [s]" of each hole
+    python -m tests.e2e.witness machine|others    # prints "where end [s] length [s]" of each hole
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import IO
+
+from server.control.tick_rate import OVER_S, TickRate
 
 PERIOD_S = 0.005
 NOTED_S = 0.02
@@ -31,7 +34,7 @@ class Hole:
     """A while in which something did not run."""
 
     where: str
-    """`machine`, `others`, `page`."""
+    """`machine`, `others`, `page`; `slow` for a while in which `machine` had many."""
     t: float
     """Its end [s, monotonic]."""
     s: float
@@ -48,16 +51,16 @@ class Witness:
         self._holes: list[Hole] = []
         self._processes = [_start(where) for where in WAYS]
         self._threads = [
-            threading.Thread(target=self._read, args=(where, process.stdout), daemon=True)
-            for where, process in zip(WAYS, self._processes, strict=True)
+            threading.Thread(target=self._read, args=(process.stdout,), daemon=True)
+            for process in self._processes
         ]
         for thread in self._threads:
             thread.start()
 
-    def _read(self, where: str, lines: IO[str]) -> None:
+    def _read(self, lines: IO[str]) -> None:
         for line in lines:
-            t, s = map(float, line.split())
-            self._holes.append(Hole(where, t, s))
+            where, t, s = line.split()
+            self._holes.append(Hole(where, float(t), float(s)))
 
     def holes(self, since: float = 0.0, longer_s: float = NOTED_S) -> list[Hole]:
         """Those that ended after `since` [s, monotonic]."""
@@ -91,21 +94,37 @@ def _start(where: str) -> subprocess.Popen[str]:
     return process
 
 
-def main() -> None:
-    """Tick until the standard input is closed."""
-    gc.disable()
-    if sys.argv[1] == "machine":
-        with contextlib.suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
-    print("ticking", flush=True)
+def holes_of(where: str, steps: Iterable[tuple[float, float]]) -> Iterator[Hole]:
+    """Holes of a ticker, by the time of each tick and the time since the one before it [s]."""
+    rate = TickRate(PERIOD_S, longest_s=OVER_S)
+    for now, step in steps:
+        if step - PERIOD_S > NOTED_S:
+            yield Hole(where, now, step - PERIOD_S)
+        if rate.complaint(step) and where == "machine":
+            yield Hole("slow", now, OVER_S)
+            rate = TickRate(PERIOD_S, longest_s=OVER_S)
+
+
+def _ticks() -> Iterator[tuple[float, float]]:
     before = time.monotonic()
     while True:
         time.sleep(PERIOD_S)
         now = time.monotonic()
-        if now - before - PERIOD_S > NOTED_S:
-            print(f"{now:.4f} {now - before - PERIOD_S:.4f}", flush=True)
+        yield now, now - before
         before = now
+
+
+def main() -> None:
+    """Tick until the standard input is closed."""
+    gc.disable()
+    where = sys.argv[1]
+    if where == "machine":
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+    print("ticking", flush=True)
+    for hole in holes_of(where, _ticks()):
+        print(f"{hole.where} {hole.t:.4f} {hole.s:.4f}", flush=True)
 
 
 if __name__ == "__main__":
