@@ -16,6 +16,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from hardware.plant_parameters import StartParameters
 from hardware.sim.hand_parts import TREMOR_DEG, TREMOR_M, Keyed, MotionComponent, Waves, lift
+from hardware.sim.measured_hands import MEASURED
 from pipeline.frames import GRAVITY, Array, R_from_rpy, S_in_b, rotation_about_z
 
 REST_S = 2.0
@@ -211,4 +212,5 @@ HANDS: dict[str, Callable[[np.random.Generator], tuple[MotionComponent, ...]]] =
     "step_y": lambda _: (step(1, STEP_M),),
     "step_z": lambda _: (step(2, STEP_M),),
     "turn_z": lambda _: (step(5, float(np.deg2rad(STEP_DEG))),),
+    **{name: hand.parts for name, hand in MEASURED.items()},
 }

@@ -39,13 +39,58 @@ class Waves:
 
     def at(self, t: float) -> Array:
         """(3, 6): value, rate and acceleration."""
-        w, w1, w2 = _fade(t / self.fade_s) / self.fade_s ** np.arange(3)
         angle = self.omega * t + self.phase
         sines, cosines = self.amplitude * np.sin(angle), self.amplitude * np.cos(angle)
-        x = sines.sum(axis=0)
-        x1 = (self.omega * cosines).sum(axis=0)
-        x2 = -(self.omega**2 * sines).sum(axis=0)
-        return np.array([w * x, w1 * x + w * x1, w2 * x + 2.0 * w1 * x1 + w * x2])
+        rows = (
+            sines.sum(axis=0),
+            (self.omega * cosines).sum(axis=0),
+            -(self.omega**2 * sines).sum(axis=0),
+        )
+        return weighed(_fade(t / self.fade_s) / self.fade_s ** np.arange(3), np.array(rows))
+
+
+def weighed(weight: Array, rows: Array) -> Array:
+    """A motion (3, ..., 6) times a weight (3, ...) that changes: value, rate, acceleration."""
+    (w, w1, w2), (x, x1, x2) = weight[..., None], rows
+    return np.array([w * x, w1 * x + w * x1, w2 * x + 2.0 * w1 * x1 + w * x2])
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """From `start` to `stop` [s] after the motion's start, with soft edges that begin there."""
+
+    start: float
+    stop: float
+    edge: float = 0.3
+
+    def at(self, t: float) -> Array:
+        """(3,): weight 0 to 1, its rate and acceleration."""
+        edges = _fade((t - self.start) / self.edge) - _fade((t - self.stop) / self.edge)
+        return edges / self.edge ** np.arange(3)
+
+
+@dataclass(frozen=True, slots=True)
+class During:
+    """A motion within a window only."""
+
+    part: MotionComponent
+    window: Window
+
+    def at(self, t: float) -> Array:
+        """(3, 6): value, rate and acceleration."""
+        return weighed(self.window.at(t), self.part.at(t))
+
+
+@dataclass(frozen=True, slots=True)
+class Except:
+    """A motion that stops within a window."""
+
+    part: MotionComponent
+    window: Window
+
+    def at(self, t: float) -> Array:
+        """(3, 6): value, rate and acceleration."""
+        return weighed(np.array([1.0, 0.0, 0.0]) - self.window.at(t), self.part.at(t))
 
 
 def _fade(s: float) -> Array:

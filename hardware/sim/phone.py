@@ -55,6 +55,10 @@ class PhoneOptions:
     """Standard deviation of the constant bias, one axis [rad/s]."""
     bias_a: float = 0.05
     """[m/s²]."""
+    range_omega: float = radians(2000.0)
+    """Beyond it an axis of the gyroscope says no more [rad/s]."""
+    range_a: float = 2.0 * GRAVITY
+    """Of the accelerometer [m/s²]: the least that phones have."""
     step_omega: float = radians(0.1)
     """The browser rounds to multiples of this [rad/s]; 0: not at all."""
     step_a: float = 0.1
@@ -201,6 +205,8 @@ class VirtualPhone:
         R_ed = self.hand.pose(t)[0] @ self._R_cd
         omega_in_d = _rounded(omega_in_d + o.sigma_omega * rng.normal(0.0, 1.0, 3), o.step_omega)
         a_in_d = _rounded(a_in_d + o.sigma_a * rng.normal(0.0, 1.0, 3), o.step_a)
+        omega_in_d = np.clip(omega_in_d, -o.range_omega, o.range_omega)
+        a_in_d = np.clip(a_in_d, -o.range_a, o.range_a)
         return MotionReading(
             spoilt_rate(omega_in_d, o.fault),
             spoilt_force(a_in_d, o.fault, GRAVITY * R_ed[2]),

@@ -21,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from hardware.sim.measured_hands import MEASURED
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.pcrb import bound, rms
 from hardware.sim.world.world import LEDS_IN_B, Occlusion, World, WorldOptions
@@ -192,6 +193,19 @@ def base(bench, goals):
     return sines
 
 
+def hands(bench, goals):
+    """As recorded ones move, and as people hold a phone besides."""
+    for name, hand in MEASURED.items():
+        random = hand.absent is None and not hand.deeds
+        score, ratio = bench.whole(name, limit=random, hand=name)
+        if random:
+            goals.add(f"{name}: position ÷ bound at capture", ratio[2], -inf, 1.10)
+            goals.add(f"{name}: position ÷ bound now", ratio[0], -inf, 1.25)
+        if name != "shaken":
+            goals.add(f"{name}: ANEES(6)", score.nees, 4.7, 7.4)
+            goals.add(f"{name}: ticks inside the band [%]", score.in_band_pct, 90.0, 100.0)
+
+
 def occlusions(bench, goals, usual):
     print(f"\n{'last tick before the return':<34}       mm       ° worst mm     NEES")
     bench.hidden("all hidden for 0.2 s", 0.2)
@@ -230,6 +244,7 @@ def main():
     with Pool(arguments.processes) as pool:
         bench = Bench(arguments.name, arguments.seeds, pool)
         usual = base(bench, goals)
+        hands(bench, goals)
         occlusions(bench, goals, usual)
         offsets(bench, goals, usual)
     goals.add("runs that raised", bench.raised, -inf, 0)

@@ -1,7 +1,7 @@
 """A `World` as a linear model about its truth: what each sensor sees of each hidden process.
 
-State (66,): value, rate, acceleration of the hand's six slow axes (18); value, rate, force of its
-six tremors (18); value, rate, acceleration of the robot's six axes (18); biases of the phone's
+State (N,), of `size`: three numbers, value and rate first, for each process that an axis of the
+hand is the sum of; value, rate, acceleration of the robot's six axes (18); biases of the phone's
 gyroscope and accelerometer, and of the body's (12).
 """
 
@@ -14,19 +14,18 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from hardware.sim.world import sensors
-from hardware.sim.world.random_motion import TREMOR_SIGMA, LinearProcess, three_pole, tremor
+from hardware.sim.world.random_motion import LinearProcess, three_pole
 from hardware.sim.world.rotations import rates_each, rpy_each, skew_each
 from hardware.sim.world.world import LEDS_IN_B, Indices, World
 from pipeline.frames import Array
 
-N: Final = 66  # states, in these slices
-HAND, TREMOR, ROBOT = slice(0, 18), slice(18, 36), slice(36, 54)
-PHONE_BIASES, BODY_BIASES = slice(54, 60), slice(60, 66)
+AFTER_HAND: Final = 30  # states, in these slices
+ROBOT, PHONE_BIASES, BODY_BIASES = slice(-30, -12), slice(-12, -6), slice(-6, None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """One reading, whitened: rows H (m, 66) of unit variance."""
+    """One reading, whitened: rows H (m, N) of unit variance."""
 
     i: int
     """When, on the grid."""
@@ -36,8 +35,13 @@ class Reading:
     is_picture: bool = False
 
 
+def size(world: World) -> int:
+    """N."""
+    return 3 * sum(len(axis) for axis in world.hand_axes) + AFTER_HAND
+
+
 def prior(world: World) -> Array:
-    """Covariance (66, 66) before anything is measured."""
+    """Covariance (N, N) before anything is measured."""
     biases = np.repeat((*sensors.PHONE_BIAS, *sensors.BODY_BIAS), 3)
     processes = [s**2 * process.stationary for s, process in _processes(world)]
     P: Array = block_diag(*processes, np.diag(np.square(biases)))
@@ -45,7 +49,7 @@ def prior(world: World) -> Array:
 
 
 def step(world: World, h: float) -> tuple[Array, Array]:
-    """Transition (66, 66) over `h` [s] and the covariance of what is new; exact."""
+    """Transition (N, N) over `h` [s] and the covariance of what is new; exact."""
     steps = [(s, *process.step(h)) for s, process in _processes(world)]
     whole: Array = block_diag(*(Phi for _, Phi, _ in steps), np.eye(12))
     new: Array = block_diag(*(s**2 * Q for s, _, Q in steps), np.zeros((12, 12)))
@@ -66,32 +70,32 @@ def readings(world: World) -> list[Reading]:
     seen = tangents_by_state(world, world.pictures.i) * (sensors.FOCAL_PX / sensors.NOISE_PX)
     good = world.visible & ~world.false
     rows += [
-        Reading(int(i), float(a), H[g].reshape(-1, N), is_picture=True)
+        Reading(int(i), float(a), H[g].reshape(-1, size(world)), is_picture=True)
         for i, a, H, g in zip(world.pictures.i, world.pictures.arrival, seen, good, strict=True)
     ]
     return sorted(rows, key=lambda reading: reading.i)
 
 
 def phone_by_state(world: World, i: Indices) -> Array:
-    """Jacobian (n, 6, 66) of the phone's (ω, f)."""
+    """Jacobian (n, 6, N) of the phone's (ω, f)."""
     H = _felt_by_motion(world.hand[:, i], world.f_c[i]) @ _hand_by_state(world)
     H[:, :, PHONE_BIASES] = np.eye(6)
     return H
 
 
 def body_by_state(world: World, i: Indices) -> Array:
-    """Jacobian (n, 6, 66) of the robot's (ω, f)."""
+    """Jacobian (n, 6, N) of the robot's (ω, f)."""
     own = _felt_by_motion(world.robot[:, i], world.f_b[i] @ world.R_mean.T)
-    H = np.kron(np.eye(2), world.R_mean.T) @ own @ _robot_by_state()
+    H = np.kron(np.eye(2), world.R_mean.T) @ own @ _robot_by_state(world)
     H[:, :, BODY_BIASES] = np.eye(6)
     return H
 
 
 def pose_by_state(world: World, i: Indices) -> Array:
-    """Jacobian (n, 6, 66) of (δp in c, θ in b) with R = R̂ Exp(θ)."""
+    """Jacobian (n, 6, N) of (δp in c, θ in b) with R = R̂ Exp(θ)."""
     p, R = world.p[i], world.R[i]
     R_cf = world.R_fc[i].transpose(0, 2, 1)
-    hand, robot = _hand_by_state(world), _robot_by_state()
+    hand, robot = _hand_by_state(world), _robot_by_state(world)
     turn_c = rates_each(world.hand[0, i, 3:]) @ hand[3:6]
     turn_b = world.R_mean.T @ rates_each(world.robot[0, i, 3:]) @ robot[3:6]
     position = skew_each(p) @ turn_c + R_cf @ (robot[:3] - hand[:3])
@@ -99,7 +103,7 @@ def pose_by_state(world: World, i: Indices) -> Array:
 
 
 def tangents_by_state(world: World, i: Indices) -> Array:
-    """Jacobian (n, LEDs, 2, 66) of the LEDs' tangents."""
+    """Jacobian (n, LEDs, 2, N) of the LEDs' tangents."""
     p, R, pose = world.p[i], world.R[i], pose_by_state(world, i)
     rows = []
     for led in LEDS_IN_B:
@@ -125,35 +129,29 @@ def _felt_by_motion(motion: Array, force: Array) -> Array:
 
 
 def _hand_by_state(world: World) -> Array:
-    """Selection (18, 66) of value, rate and acceleration of the hand's axes."""
-    H, fading = _slow(HAND), 2.0 / world.setup.tremor_relaxation
-    for k, omega in enumerate(world.tremor_omega):
-        fast = TREMOR.start + 3 * k
-        H[k, fast] = H[6 + k, fast + 1] = 1.0
-        H[12 + k, fast : fast + 3] = -(omega**2), -fading, 1.0
+    """Selection (18, N) of value, rate and acceleration of the hand's axes."""
+    H, k = np.zeros((18, size(world))), 0
+    for axis, processes in enumerate(world.hand_axes):
+        for _, process in processes:
+            H[axis, k] = H[6 + axis, k + 1] = 1.0
+            H[12 + axis, k : k + 3] = process.A[1]
+            k += 3
     return H
 
 
-def _robot_by_state() -> Array:
-    """Selection (18, 66) of value, rate and acceleration of the robot's axes."""
-    return _slow(ROBOT)
-
-
-def _slow(where: slice) -> Array:
-    H = np.zeros((18, N))
-    for k in range(6):
-        slow = where.start + 3 * k
-        H[k, slow] = H[6 + k, slow + 1] = H[12 + k, slow + 2] = 1.0
+def _robot_by_state(world: World) -> Array:
+    """Selection (18, N) of value, rate and acceleration of the robot's axes."""
+    H = np.zeros((18, size(world)))
+    H[:, ROBOT] = np.eye(18).reshape(6, 3, 18).transpose(1, 0, 2).reshape(18, 18)
     return H
 
 
 def _processes(world: World) -> list[tuple[float, LinearProcess]]:
-    """(σ [m or rad], process): 18 of three states."""
-    relaxation, setup = world.setup.tremor_relaxation, world.setup
-    tremors = [tremor(omega, relaxation) for omega in world.tremor_omega.tolist()]
-    sigmas = np.repeat((*setup.hand_sigma, *TREMOR_SIGMA, *setup.robot_sigma), 3)
-    whole = [three_pole()] * 6 + tremors + [three_pole()] * 6
-    return list(zip(sigmas.tolist(), whole, strict=True))
+    """(σ [m or rad], process), each of three states."""
+    hand = [each for axis in world.hand_axes for each in axis]
+    return hand + [
+        (sigma, three_pole()) for sigma in np.repeat(world.setup.robot_sigma, 3).tolist()
+    ]
 
 
 def _imu_sigmas(noise: tuple[float, float], step: tuple[float, float]) -> Array:

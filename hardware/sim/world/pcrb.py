@@ -41,7 +41,7 @@ class Oracle:
     i: int
     """On the grid."""
     P: Array
-    """(66, 66)."""
+    """(N, N), of `model`."""
 
     def take(self, reading: Reading, step: Step) -> None:
         """Go on to a reading and learn from it."""
@@ -78,13 +78,13 @@ def bound(world: World, every: float = 0.25, start: float = 5.0) -> PosteriorBou
         )
     pose = model.pose_by_state(world, world.index(t))
     i = np.array([k for k, _ in captured], dtype=np.intp)
-    captured_pose = model.pose_by_state(world, i)
+    captured_pose, states = model.pose_by_state(world, i), model.size(world)
     return PosteriorBound(
         t=t,
         now=pose @ np.array(now) @ pose.transpose(0, 2, 1),
         t_captured=world.t[i],
         captured=captured_pose
-        @ np.array([P for _, P in captured]).reshape(-1, model.N, model.N)
+        @ np.array([P for _, P in captured]).reshape(-1, states, states)
         @ captured_pose.transpose(0, 2, 1),
     )
 
@@ -96,7 +96,7 @@ def rms(C: Array) -> tuple[float, float]:
 
 
 def _at(oracle: Oracle, arrived: list[Reading], i: int, step: Step) -> Array:
-    """Covariance (66, 66) at time `i` on the grid, with what has arrived out of order."""
+    """Covariance (N, N) at time `i` on the grid, with what has arrived out of order."""
     copy = Oracle(oracle.i, oracle.P)
     for reading in arrived:
         copy.take(reading, step)

@@ -43,9 +43,8 @@ class LinearProcess:
         return Phi, 0.5 * (Q + Q.T)
 
 
-def three_pole() -> LinearProcess:
-    """Value, rate, acceleration of white jerk through three poles."""
-    w = POLES
+def three_pole(w: float = POLES) -> LinearProcess:
+    """Value, rate, acceleration of white jerk through three poles at `w` [rad/s]."""
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-(w**3), -3.0 * w**2, -3.0 * w]])
     v, a = w**2 / 3.0, w**4
     return LinearProcess(A, np.array([[1.0, 0.0, -v], [0.0, v, 0.0], [-v, 0.0, a]]))

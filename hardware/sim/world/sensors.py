@@ -1,8 +1,8 @@
 """What the sensors say of a `World`, when it arrives, and to whom it is given.
 
-Phone: 60 Hz, rounded as Chromium does, biases 0.002 rad/s and 0.05 m/s². Robot: 200 Hz, biases
-0.02 rad/s and 0.15 m/s². Pictures: LEDs with 0.4 px of noise at a focal length of 900 px, and the
-pose that those very pixels say, outliers left out as vision leaves them out.
+Phone: 60 Hz, rounded as Chromium does, up to 2 g, biases 0.002 rad/s and 0.05 m/s². Robot: 200 Hz,
+biases 0.02 rad/s and 0.15 m/s². Pictures: LEDs with 0.4 px of noise at a focal length of 900 px,
+and the pose that those very pixels say, outliers left out as vision leaves them out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hardware.sim.world.rotations import exp_each, skew_each
 from hardware.sim.world.world import LEDS_IN_B, Flags, Indices, World
 from pipeline.config import PERIOD_S
 from pipeline.estimation.estimator import Estimator, Fusion
-from pipeline.frames import Array
+from pipeline.frames import GRAVITY, Array
 from pipeline.imu_stream import ImuStreams
 from pipeline.signals import (
     BodyImu,
@@ -43,6 +43,8 @@ MIN_LEDS: Final = 4
 PHONE_BIAS: Final = (0.002, 0.05)
 """σ of gyroscope [rad/s] and accelerometer [m/s²]."""
 PHONE_NOISE: Final = (0.001, 0.02)  # σ, in the same units
+PHONE_RANGE: Final = (float(np.deg2rad(2000.0)), 2.0 * GRAVITY)
+"""Beyond it each axis says no more [rad/s, m/s²]."""
 PHONE_STEP: Final = (float(np.deg2rad(0.1)), 0.1)
 """Rounding."""
 BODY_BIAS: Final = (0.02, 0.15)
@@ -62,7 +64,10 @@ def phone_samples(world: World) -> list[Event]:
     stamps = world.phone_stamps(world.t[i]) + setup.stamp_jitter * rng.normal(size=len(i))
     sampled = zip((world.omega_c[i], world.f_c[i]), PHONE_BIAS, PHONE_NOISE, strict=True)
     omega, f = (_disturbed(rng, *values) for values in sampled)
-    omega, f = (np.rint(v / step) * step for v, step in zip((omega, f), PHONE_STEP, strict=True))
+    omega, f = (
+        np.clip(np.rint(v / step) * step, -most, most)
+        for v, step, most in zip((omega, f), PHONE_STEP, PHONE_RANGE, strict=True)
+    )
     rows = zip(world.phone.arrival.tolist(), stamps.tolist(), omega, f, strict=True)
     return [(arrival, PhoneImu(t, w, g)) for arrival, t, w, g in rows]
 

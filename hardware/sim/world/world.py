@@ -15,7 +15,16 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from hardware.sim.world.random_motion import felt, slow_motion, tremor_motion
+from hardware.sim.measured_hands import MEASURED
+from hardware.sim.world.hand_processes import Axis, motion_of, processes_of
+from hardware.sim.world.random_motion import (
+    TREMOR_SIGMA,
+    felt,
+    slow_motion,
+    three_pole,
+    tremor,
+    tremor_motion,
+)
 from hardware.sim.world.rotations import turn_each
 from pipeline.frames import Array, R_from_rpy
 
@@ -61,6 +70,8 @@ class WorldOptions:
     distance: float = 2.5
     eta_bc: tuple[float, float, float] = (0.1, -0.2, 0.4)
     """Mean roll, pitch, yaw of b with respect to c."""
+    hand: str = ""
+    """One of `MEASURED`; "": as the next four say."""
     hand_sigma: tuple[float, float] = (0.05, float(np.deg2rad(3.0)))
     tremor_hz: tuple[float, float] = (8.5, 9.5)
     tremor_relaxation: float = inf
@@ -109,9 +120,11 @@ class World:
         rng = np.random.default_rng(setup.seed)
         n = round(setup.duration / GRID_S)
         self.t: Array = GRID_S * np.arange(n, dtype=np.float64)
-        shaking, self.tremor_omega = _hand(rng, self.t, setup)
-        self.hand: Array = shaking
+        self.hand: Array
         """(3, n, 6) of `random_motion`; mean attitude level."""
+        self.hand_axes: tuple[Axis, ...]
+        """What is random in its six axes."""
+        self.hand, self.hand_axes = _hand(rng, self.t, setup)
         self.robot: Array = slow_motion(rng, n, GRID_S, setup.robot_sigma)
         """The same; its attitude is that of b turned back by `R_mean`."""
         self.robot[0, :, 0] += setup.distance
@@ -185,7 +198,17 @@ class World:
         return SampleTimes(i, self.t[i] + rng.uniform(*delay, len(i)))
 
 
-def _hand(rng: np.random.Generator, t: Array, setup: WorldOptions) -> tuple[Array, Array]:
+def _hand(
+    rng: np.random.Generator, t: Array, setup: WorldOptions
+) -> tuple[Array, tuple[Axis, ...]]:
+    if setup.hand:
+        hand = MEASURED[setup.hand]
+        return motion_of(rng, t, hand), processes_of(hand)
     slow = slow_motion(rng, len(t), GRID_S, setup.hand_sigma)
     fast, omega = tremor_motion(rng, t, setup.tremor_relaxation, setup.tremor_hz)
-    return slow + setup.tremor * fast, omega
+    sigmas = zip(np.repeat(setup.hand_sigma, 3), np.repeat(TREMOR_SIGMA, 3), omega, strict=True)
+    axes = tuple(
+        ((float(s), three_pole()), (float(shake), tremor(float(w), setup.tremor_relaxation)))
+        for s, shake, w in sigmas
+    )
+    return slow + setup.tremor * fast, axes

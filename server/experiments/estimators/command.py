@@ -16,6 +16,7 @@ from typing import Final, get_args
 
 import numpy as np
 
+from hardware.sim.measured_hands import MEASURED
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.evaluator import EstimatorRun
 from hardware.sim.world.metrics import EstimatorMetrics
@@ -136,6 +137,7 @@ def _simulated(arguments: argparse.Namespace) -> tuple[Tracks, EstimatorRow, flo
         duration=arguments.seconds,
         picture_period=1.0 / arguments.fps,
         picture_delay=(low, high),
+        hand=arguments.hand,
         tremor_relaxation=arguments.tremor_relaxation_s,
     )
     print(
@@ -191,6 +193,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seconds", type=_positive, default=20.0)
     parser.add_argument("--latency-ms", nargs=2, type=float, default=(60.0, 120.0))
     parser.add_argument("--fps", type=_positive, default=30.0)
+    parser.add_argument(
+        "--hand", choices=tuple(MEASURED), default="", help="as recorded; else one with a tremor"
+    )
     parser.add_argument(
         "--tremor-relaxation-s",
         type=_positive,

@@ -38,7 +38,7 @@ def test_nothing_jumps(kind):
     hand = make_hand(kind, seed=5)
     times = np.arange(REST_S - 0.05, REST_S + FADE_S + 0.1, 1e-3)
     force = np.array([hand.specific_force_in_c(t) for t in times])
-    assert np.abs(np.diff(force, axis=0)).max() < 0.2  # an arm without rounded corners: 1.3
+    assert np.abs(np.diff(force, axis=0)).max() < 0.3  # an arm without rounded corners: 1.3
 
 
 @pytest.mark.parametrize("kind", sorted(HANDS))

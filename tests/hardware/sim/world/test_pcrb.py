@@ -17,7 +17,7 @@ SHORT = WorldOptions(
 
 
 def conditioned(world, query, i, readings):
-    """Covariance of `query` (6, 66) at time i given the readings: one large Gaussian."""
+    """Covariance of `query` (6, N) at time i given the readings: one large Gaussian."""
     C = model.prior(world)
 
     @cache
@@ -82,11 +82,11 @@ def test_the_jacobians_are_those_of_finite_differences(world):
         )
     ]
     _, _, _, _, R0 = observed(world.hand[:, i], world.robot[:, i], world.R_mean)
-    hand_of, robot_of = model._hand_by_state(world), model._robot_by_state()
-    for k in range(54):
+    hand_of, robot_of = model._hand_by_state(world), model._robot_by_state(world)
+    for k in range(model.size(world) - 12):
         seen = []
         for sign in (-step, step):
-            x = np.zeros(model.N)
+            x = np.zeros(model.size(world))
             x[k] = sign
             hand = world.hand[:, i] + (hand_of @ x).reshape(3, 1, 6)
             robot = world.robot[:, i] + (robot_of @ x).reshape(3, 1, 6)
