@@ -45,6 +45,7 @@ $(BIN)/python:
 .venv/core.stamp: requirements/core.txt pyproject.toml | $(BIN)/python
 	$(LOCKED) requirements/core.txt
 	$(PROJECT)
+	$(BIN)/lightleash warm
 	@touch $@
 
 .venv/dev.stamp: requirements/dev.txt pyproject.toml | $(BIN)/python
@@ -84,7 +85,7 @@ web: dev
 
 # A fresh clone's kernels take a minute to compile: once, and not by each of the workers at once.
 kernels: dev
-	-@$(BIN)/pytest --collect-only -qq > /dev/null
+	@$(BIN)/lightleash warm
 
 # Tests start some hundred processes, each with a thousand modules: compiled once, not each time.
 kernels pytest fast fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=

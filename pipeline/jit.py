@@ -4,20 +4,31 @@ Numba stamps a cached kernel with the file it stands in alone: after an edit of 
 call, or an upgrade, they would go on with the old machine code inside them. Here every kernel is
 stamped with the sources of all kernels and of what these import, so a change of one makes all anew;
 numba's own index tells versions of numba and kinds of processor apart. Whoever compiles imports
-`numba` from here. Reading those sources is the one file access of this package: it belongs to
-compiling.
+`numba` from here. Reading those sources and keeping what was compiled is the one file access of
+this package: it belongs to compiling.
+
+Compiled kernels lie in NUMBA_CACHE_DIR if that is set; else beside their sources; else, where those
+can't be written and nobody has compiled them there, in the user's cache directory. A folder that
+can't be written serves as well, once all is in it; without any folder kernels are compiled and not
+kept. Numba's own way ends in an error there. With NUMBA_CPU_NAME set, in an image for many
+machines, all machines of that level take them.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
+import tempfile
+from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
+from itertools import chain
 from typing import Any
 
 import numba as numba
 from numba.core import caching
+from numba.core.registry import cpu_target
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PACKAGES = ("pipeline", "hardware")
@@ -66,24 +77,77 @@ def kernel_stamp() -> str:
     return digest.hexdigest()
 
 
-class UserProvided(caching.UserProvidedCacheLocator):
-    """In NUMBA_CACHE_DIR, where that is set."""
-
-    def get_source_stamp(self) -> tuple[Any, str]:
-        """Numba's own stamp and ours."""
-        return super().get_source_stamp(), kernel_stamp()
-
-
-class InTree(caching.InTreeCacheLocator):
-    """In the cache folder beside the source, where that can be written."""
-
-    def get_source_stamp(self) -> tuple[Any, str]:
-        """Numba's own stamp and ours."""
-        return super().get_source_stamp(), kernel_stamp()
+def _cache_folders() -> tuple[str, ...]:
+    """Where compiled kernels may lie, the best first; "" is beside each source."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    if named:
+        return (named,)
+    users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return "", os.path.join(users, "lightleash", "kernels")
 
 
-class UserWide(caching.UserWideCacheLocator):
-    """In the user's cache directory."""
+def _mark_of(folder: str) -> str:
+    """File that says that all is in `folder`: of these sources, this numba, this processor."""
+    target = cpu_target.target_context.codegen().magic_tuple()
+    made_of = f"{kernel_stamp()}\0{numba.__version__}\0{target}"
+    name = f"warm-{sha256(made_of.encode()).hexdigest()[:16]}"
+    return os.path.join(folder or os.path.join(ROOT, PACKAGES[0], "__pycache__"), name)
+
+
+def _is_writable(folder: str) -> bool:
+    folder = folder or os.path.join(ROOT, PACKAGES[0], "__pycache__")
+    try:
+        os.makedirs(folder, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+@cache
+def cache_folder() -> str | None:
+    """Where this process finds and keeps compiled kernels; "": beside each source; None: nowhere.
+
+    One that has them all goes before one that can be written.
+    """
+    folders = _cache_folders()
+    complete = (folder for folder in folders if os.path.exists(_mark_of(folder)))
+    return next(chain(complete, filter(_is_writable, folders)), None)
+
+
+def are_kernels_kept() -> bool:
+    """Whether somebody has compiled them all, here, for this processor."""
+    folder = cache_folder()
+    return folder is not None and os.path.exists(_mark_of(folder))
+
+
+def note_kernels_kept() -> None:
+    """Say so, for the next process."""
+    folder = cache_folder()
+    if folder is not None:
+        with contextlib.suppress(OSError), open(_mark_of(folder), "wb"):
+            pass
+
+
+class KernelLocator(caching.InTreeCacheLocator):
+    """Of one kernel's file in `cache_folder`."""
+
+    def __init__(self, function: Callable[..., Any], source: str) -> None:
+        """For a kernel in that source."""
+        super().__init__(function, source)
+        folder = cache_folder()
+        if folder:
+            self._cache_path = os.path.join(folder, self.get_suitable_cache_subpath(source))
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], source: str) -> KernelLocator | None:
+        """One for every function of a file: no folder is no reason not to compile."""
+        return cls(function, source) if os.path.exists(source) else None
+
+    def ensure_cache_path(self) -> None:
+        """Make it if that can be: what can't be kept is not (see `Index`)."""
+        with contextlib.suppress(OSError):
+            os.makedirs(self._cache_path, exist_ok=True)
 
     def get_source_stamp(self) -> tuple[Any, str]:
         """Numba's own stamp and ours."""
@@ -91,19 +155,20 @@ class UserWide(caching.UserWideCacheLocator):
 
 
 class Index(caching.IndexDataCacheFile):
-    """A kernel's index; one that names modules that are gone, after an upgrade, counts as none."""
+    """A kernel's index; one that can't be read, or names modules that are gone, counts as none."""
 
     def _load_index(self) -> dict[Any, str]:
         try:
             found: dict[Any, str] = super()._load_index()
-        except (ImportError, AttributeError):
+        except (OSError, ImportError, AttributeError):
             return {}
         return found
 
+    def save(self, key: object, data: object) -> None:
+        """Keep a kernel, unless the disk is full or not ours to write."""
+        with contextlib.suppress(OSError):
+            super().save(key, data)
+
 
 vars(caching).update(IndexDataCacheFile=Index)
-vars(numba.config).update(
-    CACHE_LOCATOR_CLASSES=",".join(
-        f"{__name__}.{locator.__name__}" for locator in (UserProvided, InTree, UserWide)
-    )
-)
+vars(numba.config).update(CACHE_LOCATOR_CLASSES=f"{__name__}.{KernelLocator.__name__}")

@@ -25,6 +25,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   robot        robot leds: can its LEDs be told apart, and would others be; robot key: make its key
   tune         find a robot's gains for a measured latency, under stated margins
   survey       where the LEDs are, from a film of the robot at rest
+  warm         compile what must be fast, once; `serve` does so by itself
   doctor       what this machine can do: real time, certificates, ports, codecs; --phone: a link
 """
 
@@ -133,6 +134,12 @@ def _survey(argv: Sequence[str]) -> int:
     return main(list(argv))
 
 
+def _warm(argv: Sequence[str]) -> int:
+    from server.tools.warm import main
+
+    return main(list(argv))
+
+
 def _doctor(argv: Sequence[str]) -> int:
     from server.tools.doctor import main
 
@@ -151,6 +158,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "robot": _robot,
     "tune": _tune,
     "survey": _survey,
+    "warm": _warm,
     "doctor": _doctor,
     "_server": _server,
 }

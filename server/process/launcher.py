@@ -7,6 +7,7 @@ import os
 import secrets
 import signal
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from hardware.link.link_key import KEY_VARIABLE, LinkKeyError, new_key
 from hardware.robot_file import RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
-from server.common.child import PROMPT_NICENESS, Child
+from server.common.child import PROMPT_NICENESS, Child, die_with, watched
 from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.common.settings import Settings
 from server.process.invite import invite, print_code
@@ -79,7 +80,7 @@ class Launcher:
         """Start, announce, watch, stop; gives the exit code."""
         announced, said = False, clock.now()
         names = ", ".join(child.name for child in self.children)
-        print(f"Starting {names}: some seconds, about a minute the first time.", flush=True)
+        print(f"Starting {names}: some seconds.", flush=True)
         try:
             while not self._stopping:
                 self.revive(clock.now())
@@ -90,7 +91,7 @@ class Launcher:
                     return 1
                 if not announced and clock.now() - said > REMIND_S:
                     said = clock.now()
-                    print("Still starting: what computes fast is compiled first, once.", flush=True)
+                    print("Still starting: this computer is slow, or busy elsewhere.", flush=True)
                 time.sleep(POLL_S)
         finally:
             print("\nStopping: robot first.", flush=True)
@@ -188,6 +189,21 @@ def announce(run: Mapping[str, object]) -> None:
     print("Ctrl-C stops, robot first.", flush=True)
 
 
+def _compile() -> None:
+    """What they all need is compiled once, by one process, which tells how long that takes.
+
+    What fails there fails in theirs, too, and is told there.
+    """
+    parent = os.getpid()
+    subprocess.run(
+        [sys.executable, "-m", *watched(["server", "warm"], parent)],
+        preexec_fn=lambda: die_with(parent),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        check=False,
+    )
+
+
 def main(settings: Settings, arguments: Sequence[str]) -> int:
     """Entry of `lightleash serve`; `arguments` are handed on to the server process."""
     os.umask(0o077)  # whatever is written, by the children too, is for this user alone
@@ -199,6 +215,7 @@ def main(settings: Settings, arguments: Sequence[str]) -> int:
             listen("127.0.0.1", settings.http_port) as http,
         ):
             children = children_of(settings, arguments, runtime, (https, http))
+            _compile()
             launcher = Launcher(children, runtime / RUN_FILE)
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, launcher.stop)

@@ -17,6 +17,7 @@ from starlette.types import ASGIApp
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
+from pipeline.vision.visual_front_end import warm_up
 from server.calibration.camera_yaml import PROFILES
 from server.common.runtime import (
     MEMBERS_FILE,
@@ -29,7 +30,6 @@ from server.common.settings import Settings
 from server.diagnostics import bounded_log
 from server.media.decoding import Decoding
 from server.phone.frame_worker import join_all
-from server.process import warm_up
 from server.recording.control import Recordings
 from server.recording.reader import recover_all
 from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
@@ -83,7 +83,8 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     audit = Audit(settings.state)
     members = given.runtime / MEMBERS_FILE
     doors = Doors(given.secret, settings.pairing.confirm, members, audit)
-    warming = warm_up.begin()
+    warming = threading.Thread(target=warm_up, name="warm-up", daemon=True)
+    warming.start()  # loads what is compiled, beside the start
     decoding = Decoding()
     manager = _manager(settings, given, doors, decoding)
     view = given.runtime / VIEW_SOCKET

@@ -59,7 +59,7 @@ def realtime(seconds: float) -> Iterator[Finding]:
     finally:
         process.join(1.0)
     fifo = granted.startswith("SCHED_FIFO")
-    advice = "give CAP_SYS_NICE (deploy/lightleash.service does), else only fly in simulation"
+    advice = "permit real-time priority (deploy/lightleash.service does), or only simulate"
     yield Finding(GOOD if fifo else POOR, "real time", granted, "" if fifo else advice)
     text = ", ".join(f"{name} {value:g}" for name, value in late.items())
     held = late["p999"] <= LATE_MS

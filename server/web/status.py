@@ -110,7 +110,7 @@ def mode_of(manager: StatusSource, t: float) -> tuple[ModeName, str]:
 
 def _silence(control: ControlStatus | None, age: float) -> str:
     if control is None:
-        return "The control process is starting, about a minute the first time"
+        return "The control process is starting: some seconds"
     return "The control process does not answer" if age > LOST_S else ""
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline import jit
 from pipeline.jit import ROOT, kernel_sources
 
 CALLER = """
@@ -21,10 +22,10 @@ print(corner(0.5, np.eye(3)), sum(corner.stats.cache_hits.values()))
 """
 
 
-def run(tree: Path) -> tuple[float, int]:
+def run(tree: Path, **settings: str) -> tuple[float, int]:
     """The caller's result, and how many of its kernels came from the cache."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
-    environment = kept | {"PYTHONPATH": str(tree)}
+    environment = kept | {"PYTHONPATH": str(tree)} | settings
     command = [sys.executable, "-c", "import pipeline.caller"]
     said = subprocess.run(
         command, cwd=tree, env=environment, capture_output=True, text=True, check=True
@@ -99,3 +100,33 @@ def test_a_cached_kernel_that_names_a_module_that_is_gone_is_compiled_anew(tmp_p
     (package / "before.py").rename(package / "after.py")
     (package / "caller.py").write_text(SUMMER.format(module="after"))
     assert run(tmp_path) == (1.0, 0)
+
+
+@pytest.mark.slow
+def test_where_the_tree_cannot_be_written_the_users_cache_is_taken_and_without_one_none(tmp_path):
+    package = package_in(tmp_path)
+    (package / "caller.py").write_text(CALLER)
+    (package / "__pycache__").touch()  # no folder can be made here, not even by root
+    users = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    first, hits = run(tmp_path, **users)
+    assert hits == 0
+    assert run(tmp_path, **users) == (first, 1)
+    assert list((tmp_path / "cache" / "lightleash" / "kernels").rglob("*.nbc"))
+    for _ in range(2):
+        assert run(tmp_path, XDG_CACHE_HOME="/proc/nowhere") == (first, 0)
+    assert run(tmp_path, NUMBA_CACHE_DIR="/proc/nowhere", **users) == (first, 0)
+
+
+def test_a_folder_with_all_kernels_goes_before_one_that_can_be_written(tmp_path, monkeypatch):
+    shipped, own = str(tmp_path / "shipped"), str(tmp_path / "own")
+    monkeypatch.setattr(jit, "_cache_folders", lambda: (own, shipped))
+    folder = jit.cache_folder.__wrapped__
+    assert folder() == own
+    Path(shipped).mkdir()
+    monkeypatch.setattr(jit, "_is_writable", lambda folder: folder == own)
+    Path(jit._mark_of(shipped)).touch()
+    assert folder() == shipped
+    monkeypatch.setattr(jit, "kernel_stamp", lambda: "after an edit")
+    assert folder() == own
+    monkeypatch.setattr(jit, "_is_writable", lambda folder: False)
+    assert folder() is None

@@ -30,7 +30,7 @@ def test_before_control_has_spoken_it_is_lost_and_nothing_is_ready(manager):
     shown = status.build(manager)
     assert (shown.mode, shown.ready) == ("LOST", False)
     assert "watchdog" in shown.reason
-    assert shown.refusals == ["The control process is starting, about a minute the first time."]
+    assert shown.refusals == ["The control process is starting: some seconds."]
     assert shown.position_mm is None
 
 

@@ -1,0 +1,62 @@
+"""What flies is compiled by one process, once, and the next ones know it."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from server.tools import warm
+
+
+def warmed(**settings: str) -> tuple[int, str]:
+    """Exit code of `lightleash warm`, and all it said."""
+    done = subprocess.run(
+        [sys.executable, "-m", "server", "warm"],
+        env={**os.environ, **settings},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout
+
+
+def test_where_nothing_can_be_kept_it_says_what_to_do_and_compiles_nothing():
+    code, said = warmed(NUMBA_CACHE_DIR="/proc/nowhere")
+    assert code == 1
+    assert said == warm.NOWHERE + "\n"
+
+
+def test_a_second_time_nothing_is_compiled(monkeypatch, capsys):
+    compiled = []
+    kept = [False, True]
+    monkeypatch.setattr(warm, "compile_kernels", lambda: compiled.append(1))
+    monkeypatch.setattr(warm, "raise_niceness", lambda least: None)
+    monkeypatch.setattr(warm, "are_kernels_kept", lambda: kept.pop(0))
+    assert warm.main([]) == warm.main([]) == 0
+    assert compiled == [1]
+    assert "about a minute" in capsys.readouterr().err
+
+
+CONTROL = """
+import sys
+from pipeline.jit import numba
+compiled = []
+numba.core.event.register("numba:compile", type("", (numba.core.event.Listener,), {
+    "on_start": lambda self, event: compiled.append(str(event.data["dispatcher"])),
+    "on_end": lambda self, event: None,
+})())
+from server.tools import warm
+warm._in_flight()
+print(len(compiled), *compiled)
+"""
+
+
+@pytest.mark.slow
+def test_a_warm_process_compiles_nothing(tmp_path):
+    assert warmed()[0] == 0
+    said = subprocess.run(
+        [sys.executable, "-c", CONTROL], capture_output=True, text=True, check=True
+    ).stdout
+    assert said.split()[0] == "0", said
