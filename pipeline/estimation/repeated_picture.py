@@ -2,42 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
-from pipeline.frames import Array
+from pipeline.estimation.uneven_turning import UnevenTurning
 from pipeline.signals import BodyImu, LedRays, PhoneImu, VisionMeasurement
-
-MOVED_RAD_S: Final = 0.03
-"""By how much a rate changes in a hand or in flight, and by no gyroscope's noise or bias. Where no
-rate does, a picture that says the same is news: an encoder has nothing to draw anew."""
 
 
 class RepeatedPicture:
-    """Remembers the last picture, and how the rates of either side have changed since."""
+    """Remembers the last picture, and whether anything turned meanwhile."""
 
     def __init__(self) -> None:
         """Nothing seen."""
         self._rays: LedRays | None = None
-        self._rates: dict[type, tuple[Array, Array]] = {}
+        self._turning = UnevenTurning()
 
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
-        """Widen the bounds of the rates of phone or robot."""
-        omega = sample.omega_m_cf_in_c if isinstance(sample, PhoneImu) else sample.omega_m_bf_in_b
-        low, high = self._rates.get(type(sample), (omega, omega))
-        self._rates[type(sample)] = np.minimum(low, omega), np.maximum(high, omega)
-
-    @property
-    def _moved(self) -> bool:
-        return any(float((high - low).max()) > MOVED_RAD_S for low, high in self._rates.values())
+        """Feel phone or robot turn."""
+        self._turning.add_imu(sample)
 
     def comes_again(self, seen: VisionMeasurement) -> bool:
-        """Whether `seen` says to the last bit what was said before anything moved; remembers it."""
+        """Whether `seen` says to the last bit what was said before, though something turns.
+
+        Where nothing does it is news: an encoder has nothing to draw anew.
+        """
         if self._rays is not None and _alike(self._rays, seen.rays):
-            return self._moved
+            return self._turning.is_felt
         self._rays = seen.rays
-        self._rates.clear()
+        self._turning.begin()
         return False
 
 

@@ -11,9 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.repeated_picture import MOVED_RAD_S
-from pipeline.frames import Array
-from pipeline.signals import Frame, Image
+from pipeline.estimation.uneven_turning import UnevenTurning
+from pipeline.signals import BodyImu, Frame, Image, PhoneImu
 
 STANDS_S: Final = 0.2
 """A picture that lasts longer stands still."""
@@ -32,44 +31,40 @@ SLOW = (
     "or closing what else uses the camera."
 )
 
-Rates = tuple[Array | None, Array | None]
-"""Of phone and robot (3,) [rad/s]; None if unknown."""
-
 
 class RepeatedFrames:
-    """Compares each frame with the one before, and remembers whether anything turned."""
+    """Compares each frame with the one before, and remembers whether anything turned meanwhile."""
 
     def __init__(self) -> None:
         """Nothing seen."""
         self._luma: Image | None = None
         self._t_new = -np.inf
-        self._recent: deque[tuple[bool, Rates]] = deque(maxlen=RECENT)
+        self._recent: deque[bool] = deque(maxlen=RECENT)
+        self._turning = UnevenTurning()
         self.complaint = ""
         """Why nobody should fly with these pictures; empty if all is well."""
         self.remark = ""
         """What people may mend, though each picture is looked at only once; or empty."""
 
-    def comes_again(self, frame: Frame, rates: Rates) -> bool:
-        """Whether `frame` is the one before to the last bit, though something moved since.
+    def add_imu(self, sample: PhoneImu | BodyImu) -> None:
+        """Feel phone or robot turn."""
+        self._turning.add_imu(sample)
 
-        `rates` are those of its time. Before what rests, the same picture is news as any other.
+    def comes_again(self, frame: Frame) -> bool:
+        """Whether `frame` is the one before to the last bit, though something turns.
+
+        Before what rests, the same picture is news as any other.
         """
         again = self._luma is not None and _alike(self._luma, frame.luma)
         if not again:
             self._luma, self._t_new = frame.luma, frame.t
-        self._recent.append((again, rates))
+            self._turning.begin()
+        self._recent.append(again)
         stands = frame.t - self._t_new >= STANDS_S
-        often = sum(again for again, _ in self._recent) >= MOST
-        moves = again and self._moves()
-        self.complaint = STANDS if stands and moves else ""
-        self.remark = SLOW if often and moves else ""
-        return moves
-
-    def _moves(self) -> bool:
-        """Whether phone or robot turned unevenly of late, as whatever is held or flies does."""
-        sides = zip(*(rates for _, rates in self._recent), strict=True)
-        known = ([w for w in side if w is not None] for side in sides)
-        return any(w and float(np.ptp(w, axis=0).max()) > MOVED_RAD_S for w in known)
+        turns = again and self._turning.is_felt
+        self.complaint = STANDS if stands and turns else ""
+        self.remark = SLOW if turns and sum(self._recent) >= MOST else ""
+        return turns
 
 
 def _alike(a: Image, b: Image) -> bool:

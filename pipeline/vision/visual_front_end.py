@@ -75,7 +75,7 @@ class VisualFrontEnd:
     def process(self, frame: Frame) -> Detection:
         """Find the robot in a frame, with what both motion sensors said of its time."""
         prior = self.prior(frame.t)
-        if self.repeats.comes_again(frame, (prior.omega_cf_in_c, prior.omega_bf_in_b)):
+        if self.repeats.comes_again(frame):
             return Detection(
                 frame.t, None, NO_RAYS, NO_SPOTS, None, AGAIN, prior=prior, comes_again=True
             )
@@ -115,6 +115,7 @@ class VisualFrontEnd:
     def _take_in(self) -> None:
         while self._waiting:
             sample = self._waiting.popleft()
+            self.repeats.add_imu(sample)
             if isinstance(sample, PhoneImu):
                 self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
             else:

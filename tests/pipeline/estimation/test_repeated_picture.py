@@ -12,7 +12,8 @@ from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from tests.pipeline.seeing import rays_at
 
 P, LEVEL = np.array([2.5, 0.0, 0.0]), np.eye(3)
-TURNING = np.array([0.0, 0.0, 0.02])  # more with each sample
+TURNING = np.array([0.0, 0.0, 0.4])  # of a tremor's rate
+NOISE_RAD_S = 0.005
 
 
 def seen(t: float, leds: list[int] | None = None) -> VisionMeasurement:
@@ -20,8 +21,8 @@ def seen(t: float, leds: list[int] | None = None) -> VisionMeasurement:
 
 
 def felt(repeated: RepeatedPicture, side: type[PhoneImu] | type[BodyImu], omega: np.ndarray):
-    for k, t in enumerate((0.0, 0.02, 0.04)):
-        repeated.add_imu(side(t, k * omega, np.zeros(3)))
+    for t in np.arange(-0.3, 0.03, 0.01):
+        repeated.add_imu(side(t, np.sin(30.0 * t) * omega, np.zeros(3)))
 
 
 @pytest.mark.parametrize("side", [PhoneImu, BodyImu])
@@ -58,3 +59,31 @@ def test_where_nothing_turns_nothing_need_change() -> None:
     repeated.comes_again(seen(0.0))
     felt(repeated, PhoneImu, np.zeros(3))
     assert not repeated.comes_again(seen(0.03))
+
+
+@pytest.mark.parametrize(("side", "rate_hz"), [(PhoneImu, 60.0), (BodyImu, 200.0)])
+def test_noise_and_bias_of_a_minute_at_rest_turn_nothing(side, rate_hz) -> None:
+    rng, repeated, taken = np.random.default_rng(1000), RepeatedPicture(), 0
+    for k in range(int(60.0 * rate_hz)):
+        omega = np.array([0.02, 0.0, -0.01]) + rng.normal(0.0, NOISE_RAD_S, 3)
+        repeated.add_imu(side(k / rate_hz, omega, np.zeros(3)))
+        taken += not repeated.comes_again(seen(k / rate_hz))
+    assert taken == int(60.0 * rate_hz)
+
+
+def test_what_turned_since_a_picture_came_stays_turned() -> None:
+    repeated = RepeatedPicture()
+    repeated.comes_again(seen(0.0))
+    felt(repeated, BodyImu, TURNING)
+    for t in np.arange(0.03, 2.0, 0.01):
+        repeated.add_imu(BodyImu(t, np.zeros(3), np.zeros(3)))
+    assert repeated.comes_again(seen(2.0))
+
+
+def test_what_rested_when_a_picture_came_may_have_turned_before() -> None:
+    repeated = RepeatedPicture()
+    felt(repeated, PhoneImu, TURNING)
+    repeated.comes_again(seen(0.0))
+    for t in np.arange(0.03, 0.5, 0.01):
+        repeated.add_imu(PhoneImu(t, np.zeros(3), np.zeros(3)))
+    assert not repeated.comes_again(seen(0.5))

@@ -5,24 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.signals import Frame
+from pipeline.signals import Frame, PhoneImu
 from pipeline.vision.repeated_frames import SLOW, STANDS, RepeatedFrames
 
 RATE_HZ = 30.0
 NOTICED_S = 0.3
+FELT_BEFORE = 6  # pictures
 
 
-def shown(shows, seconds, *, turning=0.1, seed=1000):
+def shown(shows, seconds, *, turning=0.1, noise=0.0, seed=1000):
     """(again, complaint, remark) of each picture; `shows(k)` numbers what picture k shows.
 
     The phone trembles at 5 Hz with an amplitude of `turning` [rad/s], its gyroscope has a bias.
     """
     rng, frames, told = np.random.default_rng(seed), RepeatedFrames(), []
     pictures: dict[int, np.ndarray] = {}
-    for k in range(round(seconds * RATE_HZ)):
+    for k in range(-FELT_BEFORE, round(seconds * RATE_HZ)):
+        for t in ((k - 1) / RATE_HZ, (k - 0.5) / RATE_HZ):
+            rate = np.array([0.0, turning * np.sin(2.0 * np.pi * 5.0 * t), 0.02])
+            frames.add_imu(PhoneImu(t, rate + rng.normal(0.0, noise, 3), np.zeros(3)))
+        if k < 0:
+            continue
         luma = pictures.setdefault(shows(k), rng.integers(0, 255, (24, 32), dtype=np.uint8))
-        rate = np.array([0.0, turning * np.sin(2.0 * np.pi * 5.0 * k / RATE_HZ), 0.02])
-        again = frames.comes_again(Frame(k / RATE_HZ, luma.copy()), (rate, np.zeros(3)))
+        again = frames.comes_again(Frame(k / RATE_HZ, luma.copy()))
         told.append((again, frames.complaint, frames.remark))
     return told
 
@@ -51,5 +56,5 @@ def test_a_camera_a_little_slower_than_its_stream_is_usual(hz: int) -> None:
 
 
 def test_at_rest_an_encoder_has_nothing_to_draw_anew_and_its_picture_is_news() -> None:
-    told = shown(lambda k: 0, 5.0, turning=0.01)
+    told = shown(lambda k: 0, 60.0, turning=0.005, noise=0.005)
     assert not any(again or complaint or remark for again, complaint, remark in told)
