@@ -92,7 +92,7 @@ REQUESTS = {
     "GET /api/status": "the last `Status`",
     "GET /api/link": "how it will be to fly with the operator's link: `?seconds=` of the last 60",
     "GET /ca.crt": "the authority to install on phones",
-    "GET /healthz": "whether the server lives",
+    "GET /healthz": "200, or 503 with `reasons`: control is silent, nothing can be recorded",
     "GET /metrics": "Prometheus",
     "GET /api/openapi.json": "these requests and their answers field by field, for programs",
     "POST /api/rtc": 'WebRTC, body `{"session": "…"}`; answers `{"id", "sdp", "ice_servers"}`',

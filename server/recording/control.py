@@ -8,7 +8,7 @@ from pathlib import Path
 from server.common import clock
 from server.control.ipc import ControlStatus
 from server.protocol.wire import HEADER, KEY_FLAG, Kind
-from server.recording.writer import CAMERA_KEY, DEVICE_KEY, Direction, Recorder
+from server.recording.writer import CAMERA_KEY, DEVICE_KEY, Direction, Recorder, full_disk
 
 KEY_S = 0.5
 """Between two requests for a key: one may be lost on the way."""
@@ -22,6 +22,8 @@ class Recordings:
         self._directory, self._metadata = directory, metadata
         self._recorder: Recorder | None = None
         self._has_key, self._t_asked = True, -inf
+        self.failure = ""
+        """Why the last recording ended by itself, or ""."""
 
     @property
     def name(self) -> str:
@@ -38,6 +40,7 @@ class Recordings:
             name = clock.file_stamp()
             own = {DEVICE_KEY: device, CAMERA_KEY: camera_text}
             self._recorder = Recorder(self._directory, name, {**self._metadata, **own})
+            self.failure = ""
             self._has_key, self._t_asked = False, -inf
         return self.name
 
@@ -49,6 +52,19 @@ class Recordings:
             return ""
         recorder.close()
         return str(recorder.path)
+
+    def end_if_failed(self) -> bool:
+        """Whether a recording had ended by itself, see `failure`; it is put away."""
+        if self._recorder is None or not self._recorder.error:
+            return False
+        self.failure = self._recorder.error
+        self.stop()
+        return True
+
+    def why_not(self) -> str:
+        """Why nothing could be recorded now, or ""."""
+        there = next(path for path in (self._directory, *self._directory.parents) if path.exists())
+        return self.failure or full_disk(there)
 
     def key_is_due(self, now: float) -> bool:
         """Whether to ask the page for a key: without one no recorded picture can be decoded."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 import fcntl
 import os
 import queue
+import shutil
 import threading
 from contextlib import suppress
 from dataclasses import dataclass
@@ -51,6 +52,8 @@ FLUSH_S = 0.25
 CAPACITY = 4_096
 """Items waiting for the disk; at 300 a second more than ten seconds."""
 MAX_BYTES = 8 << 30
+RESERVE_BYTES = 256 << 20
+"""Left on the disk for whatever else this machine does: a full one stops more than a recording."""
 MAX_NS = (1 << 64) - 1
 
 
@@ -94,8 +97,11 @@ class Recorder:
         self._max_bytes = max_bytes
         self._closing = threading.Event()
         self._queue: queue.Queue[_Item | None] = queue.Queue(CAPACITY)
+        self._directory = directory
         try:
             directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if why := full_disk(directory):
+                raise OSError(why)
             if self.path.exists():
                 raise FileExistsError("there is a recording of this name")
             self._file = new_private_file(part_of(self.path))
@@ -157,9 +163,17 @@ class Recorder:
             if clock.now() - flushed >= FLUSH_S:
                 writer.flush()  # type: ignore[no-untyped-call]
                 flushed = clock.now()
+                self.error = full_disk(self._directory)
                 if self._file.tell() > self._max_bytes:
                     self.error = f"larger than {self._max_bytes} bytes"
+                if self.error:
                     return
+
+
+def full_disk(directory: Path) -> str:
+    """Why nothing should be recorded in a directory that exists, or ""."""
+    left = shutil.disk_usage(directory).free
+    return f"only {left >> 20} MB are left on the disk" if left < RESERVE_BYTES else ""
 
 
 def part_of(path: Path) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Sequence
+from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +35,7 @@ from server.security.least_role import (
     supervisor,
     viewer,
 )
+from server.web.health import problems
 from server.web.metrics import exposition
 from server.web.replies import HANDLERS
 from server.web.session_manager import SessionManager
@@ -192,7 +194,9 @@ class Api:
         return FileResponse(self._authority, media_type="application/x-x509-ca-cert")
 
     async def _health(self, _request: Request) -> Response:
-        return JSONResponse({"ok": True})
+        reasons = problems(self._manager, now())
+        code = HTTPStatus.SERVICE_UNAVAILABLE if reasons else HTTPStatus.OK
+        return JSONResponse({"ok": not reasons, "reasons": reasons}, code)
 
 
 def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAPI:

@@ -302,6 +302,8 @@ class SessionManager:
             self.log_event(paused)
         if self._decoding is not None and (ended := self._decoding.news(now())):
             self.log_event(ended)
+        if self.recordings.end_if_failed():
+            self.log_event(f"The recording has ended: {self.recordings.failure}.")
         self.broadcast(status)
         self._show_picture()
         self._ask_key()

@@ -116,8 +116,15 @@ def test_the_invitation_holds_a_fresh_link_and_its_code(client, role, page):
     assert one["qr_svg"].startswith("<svg")
 
 
-def test_health_is_told_to_everyone_and_tells_nothing(client):
-    assert client.get("/healthz", headers={"Authorization": ""}).json() == {"ok": True}
+def test_health_is_told_to_everyone_with_a_code_that_machines_read(client, house):
+    before = client.get("/healthz", headers={"Authorization": ""})
+    assert before.status_code == 503
+    reasons = ["The control process is starting: some seconds."]
+    assert before.json() == {"ok": False, "reasons": reasons}
+    house.manager.status = control_status()
+    house.manager.control_meter.tick(now(), now())
+    after = client.get("/healthz", headers={"Authorization": ""})
+    assert (after.status_code, after.json()) == (200, {"ok": True, "reasons": []})
 
 
 def test_the_certificate_of_our_authority_is_given_and_a_foreign_one_is_not(house, tmp_path):

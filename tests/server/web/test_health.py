@@ -1,0 +1,57 @@
+"""Health: silent control, a recording that ended by itself, a full disk; and who is told."""
+
+import shutil
+from types import SimpleNamespace
+
+import pytest
+
+from server.common.clock import now
+from server.recording import writer
+from server.recording.writer import RecordingError
+from server.web.health import problems
+from tests.server.house import control_status, house_in
+
+SILENT_S = 1.0
+
+
+@pytest.fixture
+def manager(tmp_path):
+    with house_in(tmp_path) as house:
+        house.manager.status = control_status()
+        house.manager.control_meter.tick(now(), now())
+        yield house.manager
+
+
+def test_a_second_of_silence_of_control_is_a_problem(manager):
+    assert problems(manager, now()) == []
+    assert problems(manager, now() + SILENT_S) == ["The control process does not answer."]
+
+
+def fill_the_disk(monkeypatch):
+    usage = SimpleNamespace(free=writer.RESERVE_BYTES - 1)
+    monkeypatch.setattr(writer, "shutil", SimpleNamespace(disk_usage=lambda path: usage))
+
+
+def test_on_a_full_disk_nothing_is_begun_and_it_is_said_why(manager, monkeypatch):
+    fill_the_disk(monkeypatch)
+    with pytest.raises(RecordingError, match="only 255 MB are left on the disk"):
+        manager.start_recording()
+    assert "only 255 MB" in problems(manager, now())[0]
+
+
+def test_a_disk_that_fills_up_ends_the_recording_which_is_readable_and_people_are_told(
+    manager, monkeypatch, tmp_path
+):
+    name = manager.start_recording()
+    recorder = manager.recordings._recorder
+    fill_the_disk(monkeypatch)
+    recorder._thread.join(5.0)
+    manager._tick()
+    assert manager.recordings.name == ""
+    assert any("only 255 MB are left" in said for said in manager.events)
+    assert next(tmp_path.rglob(f"{name}.mcap")).stat().st_size > 0
+    monkeypatch.setattr(writer, "shutil", shutil)
+    assert "only 255 MB" in problems(manager, now())[0]  # until somebody has looked after it
+    manager.start_recording()
+    assert problems(manager, now()) == []
+    manager.recordings.stop()
