@@ -21,6 +21,11 @@ def thread_cpu() -> float:
     return time.thread_time()
 
 
+def unix_zero_ns() -> int:
+    """Calendar's time when `now` was 0 [ns since 1970]; may jump, and be wrong."""
+    return time.time_ns() - time.monotonic_ns()
+
+
 def unix_ms() -> int:
     """Milliseconds of the calendar's time since 1970; may jump, and be wrong."""
     return time.time_ns() // 1_000_000

@@ -25,6 +25,7 @@ from server.recording.writer import (
     DEVICE_KEY,
     PHONE_RECORDS,
     SERVER_MESSAGES,
+    UNIX_ZERO_KEY,
     RecordingError,
     finish_file,
     start_file,
@@ -63,6 +64,20 @@ class Recording:
     t_first: float
     """Of its first item [s]."""
     t_last: float
+
+    @property
+    def unix_zero_ns(self) -> int | None:
+        """Calendar's time at 0 of the server's clock [ns since 1970]; None: of an older Lightleash.
+
+        Raises:
+            RecordingError: it is no number.
+        """
+        text = self.metadata.get(UNIX_ZERO_KEY)
+        try:
+            return None if text is None else int(text)
+        except ValueError as error:
+            what = f"has no number as {UNIX_ZERO_KEY}: {text!r}"
+            raise RecordingError(self.path, what, "record anew") from error
 
     def entries(self, *topics: str) -> Iterator[Entry]:
         """Items of these channels (of all, if none is named), in the order of their times.

@@ -8,7 +8,8 @@ The bytes recorded are the bytes of the wire. Channels, with log times on the se
 | phone/messages, server/messages | json (`server.protocol.messages`) | text, both ways |
 | control/status | json | `ControlStatus`, with the samples of the robot's motion sensors |
 
-Publish time is the sender's own clock for records, else the log time. A file is called
+Publish time is the sender's own clock for records, else the log time. Metadata has the calendar's
+time at 0 of the server's clock, for both clocks together say what day it was. A file is called
 `*.mcap.part` until closed; what a crash leaves behind ends at the last flush, and
 `reader.recover` makes it readable.
 """
@@ -47,6 +48,8 @@ ENCODINGS = {
 }
 DEVICE_KEY, ROBOT_KEY, CAMERA_KEY, SETTINGS_KEY = "device", "robot_file", "camera_file", "settings"
 """Metadata: phone, text of the robot's and the camera's file, settings of the server."""
+UNIX_ZERO_KEY = "unix_zero_ns"
+"""Metadata: the calendar's time at 0 of the server's clock [ns since 1970]."""
 CHUNK_BYTES = 131_072
 FLUSH_S = 0.25
 CAPACITY = 4_096
@@ -109,7 +112,7 @@ class Recorder:
         except OSError as error:
             raise RecordingError(self.path, str(error), "another name or directory") from error
         own = {"protocol_version": str(VERSION), "lightleash_version": server.__version__}
-        self._metadata = metadata | own
+        self._metadata = {UNIX_ZERO_KEY: str(clock.unix_zero_ns())} | metadata | own
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 

@@ -5,10 +5,12 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
+from pathlib import Path
 
 import msgspec
 import pytest
 
+from server.common import clock
 from server.control.ipc import ControlStatus
 from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Ping, Pong, Record, Touch
@@ -19,6 +21,7 @@ from server.recording.writer import (
     PHONE_RECORDS,
     SERVER_RECORDS,
     STATUS,
+    UNIX_ZERO_KEY,
     Recorder,
     RecordingError,
     part_of,
@@ -77,6 +80,24 @@ def test_what_was_recorded_is_read_back_in_order_of_time(tmp_path):
     assert kept["body_samples"][0] == [pytest.approx(101.995), 0.1, 0.2, 0.3, 0.0, 0.0, 9.8]
     assert kept["pose_age"] is None
     assert (recorder.written, recorder.dropped, recorder.error) == (5, 0, "")
+
+
+def test_a_recording_knows_the_day_also_when_recovered(tmp_path):
+    recorder = make(tmp_path)
+    recorder.close()
+    zero = read(recorder.path).unix_zero_ns
+    assert zero == pytest.approx(clock.unix_zero_ns(), abs=60e9)  # two clocks are read, not at once
+    assert read(recover(recorder.path)).unix_zero_ns == zero
+
+
+def test_older_recordings_know_no_day_and_a_wrong_one_is_named(tmp_path):
+    old = read(Path(__file__).parents[2] / "data" / "chromium.mcap")
+    assert old.unix_zero_ns is None
+    recorder = Recorder(tmp_path, "odd", {UNIX_ZERO_KEY: "yesterday"})
+    recorder.record("phone", TOUCH, 1.0)
+    recorder.close()
+    with pytest.raises(RecordingError, match="'yesterday'"):
+        _ = read(recorder.path).unix_zero_ns
 
 
 def test_capture_time_on_the_phones_clock_is_the_publish_time(tmp_path):
