@@ -6,19 +6,17 @@ import argparse
 import asyncio
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pipeline.timing.clock_synchronisation import ClockSynchronisation
 from server.common.access import Access, PhoneClientError, access_of, add_access_arguments
 from server.common.clock import now
 from server.common.options import Parser
 from server.protocol.messages import Command, Status
-from server.protocol.wire import WireError, decode
 from server.protocol.wire_records import Picture, Pong, Record, Touch
 from server.recording.reader import Recording, device_of, read, recover
 from server.recording.writer import RecordingError
+from server.replay.dates import Timed, timed
 from server.replay.offline import run_offline
 from server.virtual_phone.phone_client import PhoneClient
 from server.virtual_phone.phone_script import SYNCHRONISED_PONGS
@@ -26,46 +24,6 @@ from server.virtual_phone.phone_script import SYNCHRONISED_PONGS
 PHONE_CLOCK_OFFSET_S = 1000.0
 """Of the replayed phone's clock: any will do, the server must find it."""
 DEVICE = "lightleash-replay"
-
-
-@dataclass(frozen=True, slots=True)
-class Timed:
-    """A recorded record and when it was what."""
-
-    t: float
-    """Received [s], the recorded server's clock."""
-    latency_s: float
-    """Between its capture and that."""
-    record: Record
-
-
-def timed(recording: Recording) -> list[Timed]:
-    """The phone's records with their latencies; its clock is found as the server finds it.
-
-    Raises:
-        RecordingError: the file is damaged.
-    """
-    records: list[tuple[float, Record]] = []
-    for t, data in recording.phone_records():
-        with suppress(WireError):  # recorded as it came: the server refused it then, and so do we
-            records.append((t, decode(data)))
-    offsets = _clock_offsets(records)
-    return [
-        Timed(t, max(0.0, t + offset - 1e-6 * record.t_us), record)
-        for (t, record), offset in zip(records, offsets, strict=True)
-    ]
-
-
-def _clock_offsets(records: list[tuple[float, Record]]) -> list[float]:
-    """Phone's clock minus the server's at each record [s]; before it is known, the first known."""
-    clock, offsets = ClockSynchronisation(), list[float | None]()
-    for t, record in records:
-        if isinstance(record.body, Pong):
-            clock.add(1e-6 * record.body.server_time_us, 1e-6 * record.t_us, t)
-        offsets.append(clock.offset if clock.ready else None)
-    quickest = max((1e-6 * r.t_us - t for t, r in records), default=0.0)  # no pings: took no time
-    first = next((offset for offset in offsets if offset is not None), quickest)
-    return [first if offset is None else offset for offset in offsets]
 
 
 class Replay:

@@ -27,7 +27,7 @@ from server.protocol.messages import Hello
 from server.protocol.wire import VERSION, decode, encode
 from server.protocol.wire_records import Motion, Ping
 from server.recording.reader import read
-from server.replay.command import timed
+from server.replay.dates import timed
 from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
 from tests.server.house import ROBOT, control_status
 

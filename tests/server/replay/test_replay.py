@@ -18,7 +18,8 @@ from server.protocol.wire_records import Motion, Ping, Pong, Record, Touch
 from server.recording.reader import Recording, device_of, read
 from server.recording.writer import PHONE_RECORDS, STATUS, Recorder, RecordingError
 from server.replay import command
-from server.replay.command import Replay, play, timed
+from server.replay.command import Replay, play
+from server.replay.dates import timed
 from server.replay.offline import Offline, run_offline
 from server.replay.table import COLUMNS
 from tests.server.page_server import WELCOME, PageServer, status
