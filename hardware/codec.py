@@ -122,20 +122,37 @@ class Decoder:
         """
         if not data:
             raise DecodeError("an empty picture")
-        luma = self._jpeg(data) if self._context is None else self._video(self._context, data)
-        if luma.shape != (self.height, self.width):
-            raise DecodeError(
-                f"a picture of {luma.shape[1]}x{luma.shape[0]}, not {self.width}x{self.height}"
-            )
-        return luma
+        if self._context is None:
+            return self._sized(self._jpeg(data, cv2.IMREAD_GRAYSCALE))
+        return self._sized(self._luma(self._video(self._context, data)))
 
-    def _jpeg(self, data: bytes) -> Image:
+    def decode_colour(self, data: bytes) -> Image:
+        """BGR (height, width, 3) of a picture.
+
+        Raises:
+            DecodeError: as by `decode`.
+        """
+        if not data:
+            raise DecodeError("an empty picture")
+        if self._context is None:
+            return self._sized(self._jpeg(data, cv2.IMREAD_COLOR))
+        frame = self._video(self._context, data)
+        return self._sized(np.asarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8))
+
+    def _sized(self, image: Image) -> Image:
+        if image.shape[:2] != (self.height, self.width):
+            raise DecodeError(
+                f"a picture of {image.shape[1]}x{image.shape[0]}, not {self.width}x{self.height}"
+            )
+        return image
+
+    def _jpeg(self, data: bytes, colours: int) -> Image:
         size = jpeg_size(data)
         if size != (self.width, self.height):
             raise DecodeError(f"a JPEG of size {size}, not {self.width}x{self.height}")
         if data.count(SCAN) > MAX_SCANS:
             raise DecodeError(f"a JPEG of {data.count(SCAN)} scans; at most {MAX_SCANS} are taken")
-        upright = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION  # as the sensor saw it
+        upright = colours | cv2.IMREAD_IGNORE_ORIENTATION  # as the sensor saw it
         try:
             image = cv2.imdecode(np.frombuffer(data, np.uint8), upright)
         except cv2.error as error:
@@ -144,7 +161,7 @@ class Decoder:
             raise DecodeError("not a whole JPEG")
         return np.asarray(image, dtype=np.uint8)
 
-    def _video(self, context: VideoCodecContext, data: bytes) -> Image:
+    def _video(self, context: VideoCodecContext, data: bytes) -> av.VideoFrame:
         whole, self._whole = self._whole, False  # until all went well
         try:
             frames = context.decode(av.Packet(data))
@@ -158,9 +175,13 @@ class Decoder:
             raise DecodeError(f"damaged {self.codec}: wait for a key frame")
         if frame.format.name not in ("yuv420p", "yuvj420p", "nv12", "gray"):
             raise DecodeError(f"pictures of format {frame.format.name}, not yuv420p")
+        self._whole = (frame.width, frame.height) == (self.width, self.height)
+        return frame
+
+    @staticmethod
+    def _luma(frame: av.VideoFrame) -> Image:
         plane = frame.planes[0]
         rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
-        self._whole = (plane.width, plane.height) == (self.width, self.height)
         luma: Image = rows[:, : plane.width]
         return luma
 

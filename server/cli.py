@@ -18,6 +18,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   invite       a link into the running server: --role viewer, operator or supervisor
   phone        a virtual phone that films the simulated robot and leads it
   replay       push a recorded phone through a server, or through the pipeline alone
+  export       a recording in a format that others read: Foxglove, CSV
   locate       where the robot was in each picture of a folder or film, with its uncertainty
   experiments  measure the loop, as tables and pictures
   bench        how well it sees: right, exact, honest, fast; against stated goals
@@ -92,6 +93,12 @@ def _replay(argv: Sequence[str]) -> int:
     return main(list(argv))
 
 
+def _export(argv: Sequence[str]) -> int:
+    from server.export.command import main
+
+    return main(list(argv))
+
+
 def _locate(argv: Sequence[str]) -> int:
     from server.tools.locate import main
 
@@ -151,6 +158,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "invite": _invite,
     "phone": _phone,
     "replay": _replay,
+    "export": _export,
     "locate": _locate,
     "experiments": _experiments,
     "bench": _bench,

@@ -23,6 +23,12 @@ ARRIVAL_S = 0.05
 of the quickest took an unknown time, the same throughout."""
 
 
+def phone_imu(motion: Motion, t: float) -> PhoneImu:
+    """A reading at `t` [s] in the axes of the camera, as phones are built."""
+    R = R_cd(motion.screen_angle_deg)
+    return PhoneImu(t, R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class EncodedFrame:
     """A picture as it came, with its capture time on our clock."""
@@ -111,9 +117,7 @@ class Ingest:
         if t is None or t <= self._last_motion_t:
             return None
         self._last_motion_t = t
-        R = R_cd(motion.screen_angle_deg)
-        rate, force = R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration)
-        return self.extrinsics.felt(PhoneImu(t, rate, force))
+        return self.extrinsics.felt(phone_imu(motion, t))
 
     def _dated(self, record: Record, field: str, now: float) -> float | None:
         if not self.clock.ready:

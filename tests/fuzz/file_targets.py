@@ -15,12 +15,13 @@ from hardware.camera_file import CAMERAS, CameraFileError, load_camera
 from hardware.led_file import COUNTS, load_leds
 from hardware.led_layout.file import load_layout
 from hardware.robot_file import ROBOTS, RobotFileError, load_robot
+from server.export.decoded import DecodedRecording
 from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Codec, Picture, Pong, Record, Touch
 from server.recording.reader import device_of, read, recover
 from server.recording.writer import CAMERA_KEY, DEVICE_KEY, ENCODINGS, ROBOT_KEY, RecordingError
-from server.replay.command import timed
-from server.replay.setting import body_samples, first_shape, recorded_camera, recorded_robot
+from server.replay.dates import timed
+from server.replay.setting import body_samples, first_shape, recorded_camera
 from tests.fuzz.target import target
 
 FOLDER = Path(tempfile.mkdtemp(prefix="lightleash-fuzz-"))
@@ -122,7 +123,8 @@ def recorded(compression: CompressionType) -> bytes:
     }
     writer.add_metadata("lightleash", metadata)
     channels = {t: writer.register_channel(t, e, schema_id=0) for t, e in ENCODINGS.items()}
-    status = msgspec.json.encode({"body_samples": [[0.1 * k for k in range(7)]]})
+    sample = [0.1 * k for k in range(7)]
+    status = msgspec.json.encode({"t": 1.0, "mode": 2, "body_samples": [sample]})
     bodies = (
         Pong(1, 1_000_000),
         Touch(True, True, 1, 1),
@@ -154,7 +156,7 @@ def recording(data: bytes) -> None:
     device_of(opened)
     samples = body_samples(opened)
     assert all(a.t <= b.t for a, b in pairwise(samples))
-    recorded_robot(opened)
+    assert sum(1 for _ in DecodedRecording(opened).items()) <= len(data)
     recorded_camera(opened, first_shape(opened))
 
 

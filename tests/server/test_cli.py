@@ -60,6 +60,9 @@ def test_each_command_gets_its_own_words(name, module, monkeypatch):
     [
         ["phone", "--fps", "500"],
         ["replay"],
+        ["export", "flight.mcap"],
+        ["export", "flight.mcap", "--out", ".", "--to", "film"],
+        ["export", "flight.mcap", "--out", ".", "--discard", "all"],
         ["locate"],
         ["experiments", "fly"],
         ["experiments", "tremor", "--cutoff-hz", "9"],
