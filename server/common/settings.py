@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hmac
 import inspect
 import os
 import tomllib
+from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -60,6 +62,8 @@ class PairingSettings(BaseModel):
     )
 
 
+TURN_LIVES_S = 12 * 3600.0
+"""A relay asks for the credential again while it relays: longer than anybody flies."""
 TURN_URL = r"^(turns?:[^\s?]{1,200}(\?transport=(udp|tcp))?)?$"
 
 
@@ -76,18 +80,25 @@ class RtcSettings(BaseModel):
     turn_password: SecretStr = Field(
         default=SecretStr(""), max_length=200, description="at the relay"
     )
+    turn_secret: SecretStr = Field(
+        default=SecretStr(""),
+        max_length=200,
+        description="shared with the relay (coturn: static-auth-secret), in place of a password",
+    )
 
-    def ice_servers(self) -> list[dict[str, str]]:
-        """ICE servers for both ends; none by default: both meet on their own addresses."""
+    def ice_servers(self, unix_s: float) -> list[dict[str, str]]:
+        """ICE servers for both ends; none by default: both meet on their own addresses.
+
+        With a shared secret the credential ends `TURN_LIVES_S` after `unix_s` (draft-uberti-behave-
+        turn-rest-00, section 2.2), so that what a phone was told is soon worth nothing.
+        """
         if not self.turn_url:
             return []
-        return [
-            {
-                "urls": self.turn_url,
-                "username": self.turn_username,
-                "credential": self.turn_password.get_secret_value(),
-            }
-        ]
+        user, word = self.turn_username, self.turn_password.get_secret_value()
+        if secret := self.turn_secret.get_secret_value():
+            user = f"{round(unix_s + TURN_LIVES_S)}:{user or 'lightleash'}"
+            word = b64encode(hmac.digest(secret.encode(), user.encode(), "sha1")).decode()
+        return [{"urls": self.turn_url, "username": user, "credential": word}]
 
 
 class VirtualCameraSettings(BaseModel):

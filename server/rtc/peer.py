@@ -18,6 +18,7 @@ from aiortc import (
 from aiortc.exceptions import InvalidAccessError, InvalidStateError, OperationError
 from aiortc.rtcrtpparameters import RTCRtpCodecCapability
 
+from server.common.clock import unix_ms
 from server.common.settings import RtcSettings
 from server.protocol.wire import WireError
 from server.protocol.wire_records import Codec
@@ -66,7 +67,7 @@ class PeerConnection:
         self._listener, self._bitrate_bps = listener, bitrate_bps
         self._codecs: dict[int, Codec] = {}
         self._has_relay = bool(settings.turn_url)
-        servers = [RTCIceServer(**server) for server in settings.ice_servers()]
+        servers = [RTCIceServer(**server) for server in settings.ice_servers(1e-3 * unix_ms())]
         self._connection = RTCPeerConnection(
             RTCConfiguration(iceServers=servers, bundlePolicy=RTCBundlePolicy.MAX_BUNDLE)
         )

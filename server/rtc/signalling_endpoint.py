@@ -10,7 +10,7 @@ from fastapi import Depends
 from starlette.requests import Request
 from starlette.routing import BaseRoute
 
-from server.common.clock import now
+from server.common.clock import now, unix_ms
 from server.common.settings import RtcSettings
 from server.protocol.session import TokenBucket
 from server.protocol.signalling import Answer, Ask, Connecting, Offer
@@ -86,7 +86,7 @@ class SignallingEndpoint:
         ):  # meanwhile it was shut out, or asked anew
             self._gone(link)
             raise RefusedRequest(403, "session", NOT_LEADING)
-        return Offer(link.id, sdp, self._settings.ice_servers())
+        return Offer(link.id, sdp, self._settings.ice_servers(1e-3 * unix_ms()))
 
     async def _answer(self, request: Request, answer: Asked[Answer]) -> Told[Connecting]:
         """Take the page's answer to the newest offer."""

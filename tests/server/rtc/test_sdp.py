@@ -11,7 +11,7 @@ from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.common.settings import RtcSettings
+from server.common.settings import TURN_LIVES_S, RtcSettings
 from server.protocol.wire import WireError
 from server.protocol.wire_records import Codec
 from server.rtc.answer import MAX_BYTES, MAX_CANDIDATES, check_answer
@@ -20,6 +20,7 @@ from server.rtc.peer import PeerCallbacks, PeerConnection
 from server.virtual_phone.rtc_client import EncodedTrack
 
 SOURCE = "127.0.0.1"
+NOW_S = 1.7e9
 SILENT = PeerCallbacks(*[lambda *_: None] * 5)
 
 
@@ -62,15 +63,27 @@ def test_by_default_nobody_else_is_asked_where_we_are(descriptions):
     offer, _ = descriptions
     kinds = {line.split()[7] for line in offer.splitlines() if line.startswith("a=candidate")}
     assert kinds <= {"host"}
-    assert RtcSettings().ice_servers() == []
+    assert RtcSettings().ice_servers(NOW_S) == []
 
 
 def test_a_relay_is_told_to_both_ends_and_its_password_to_no_recording():
-    settings = RtcSettings(turn_url="turn:relay:3478", turn_username="u", turn_password="secret")
-    assert settings.ice_servers() == [
-        {"urls": "turn:relay:3478", "username": "u", "credential": "secret"}
+    settings = RtcSettings(turn_url="turn:relay:3478", turn_username="u", turn_password="hidden")
+    assert settings.ice_servers(NOW_S) == [
+        {"urls": "turn:relay:3478", "username": "u", "credential": "hidden"}
     ]
-    assert "secret" not in settings.model_dump_json()
+    assert "hidden" not in settings.model_dump_json()
+
+
+def test_with_a_shared_secret_a_relay_s_credential_ends_by_itself():
+    settings = RtcSettings(turn_url="turn:relay:3478", turn_secret="north")
+    (told,) = settings.ice_servers(NOW_S)
+    until, name = told["username"].split(":")
+    assert int(until) == NOW_S + TURN_LIVES_S
+    assert name == "lightleash"
+    # printf '%s' USERNAME | openssl dgst -binary -sha1 -hmac north | openssl base64
+    assert told["credential"] == "A3iOWM2ASUxD/E4BlJOlbezn4kc="
+    assert "north" not in settings.model_dump_json()
+    assert settings.ice_servers(NOW_S + 1) != [told]
 
 
 def test_an_answer_of_a_page_is_taken(descriptions):
