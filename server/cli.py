@@ -18,7 +18,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   invite       a link into the running server: --role viewer, operator or supervisor
   phone        a virtual phone that films the simulated robot and leads it
   replay       push a recorded phone through a server, or through the pipeline alone
-  export       a recording in a format that others read: Foxglove, CSV
+  export       a recording in a format that others read: Foxglove, rosbag2, CSV
   locate       where the robot was in each picture of a folder or film, with its uncertainty
   experiments  measure the loop, as tables and pictures
   bench        how well it sees: right, exact, honest, fast; against stated goals

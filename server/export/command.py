@@ -18,6 +18,7 @@ Write = Callable[[DecodedRecording, Sequence[Episode], Path], str]
 ABOUT = """Write a recording in a format that others read. The recording stays as it is.
 
   foxglove  one MCAP file for Foxglove, Lichtblick or Rerun: film, poses, motion, LEDs, log
+  rosbag2   a bag (MCAP inside) for ROS 2, film as foxglove_msgs/CompressedVideo
   csv       plain tables, units in the names of the columns
 
 Times are those at which things happened: of a picture, when it was taken. A recording by an older
@@ -30,14 +31,24 @@ def _foxglove() -> tuple[Write, str]:
     return write, ".foxglove.mcap"
 
 
+def _rosbag2() -> tuple[Write, str]:
+    from server.export.rosbag import write
+
+    return write, ".rosbag2"
+
+
 def _csv() -> tuple[Write, str]:
     from server.export.csv_tables import write
 
-    return write, ""
+    return write, ".csv"
 
 
-FORMATS: dict[str, Callable[[], tuple[Write, str]]] = {"foxglove": _foxglove, "csv": _csv}
-"""How to write each, and how the file's name ends that it becomes; a folder's has no end."""
+FORMATS: dict[str, Callable[[], tuple[Write, str]]] = {
+    "foxglove": _foxglove,
+    "rosbag2": _rosbag2,
+    "csv": _csv,
+}
+"""How to write each, and how the name ends of the file or folder that it becomes."""
 
 
 def _numbers(text: str) -> frozenset[int]:
@@ -70,6 +81,8 @@ def _run(arguments: argparse.Namespace) -> str:
     decoded = DecodedRecording(read(arguments.recording))
     found = list(episodes(decoded.items(), arguments.task, arguments.discard))
     place: Path = arguments.out / f"{arguments.recording.stem}{suffix}"
+    if place.exists():
+        raise FileExistsError(f"{place} is there already: name another --out")
     arguments.out.mkdir(parents=True, exist_ok=True)
     said = f"{place}: {write(decoded, found, place)}"
     if decoded.zero_ns is None:

@@ -48,7 +48,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from mcap_protobuf.writer import Writer
 
 from pipeline.camera.lens import Camera
-from pipeline.frames import Array, R_co, wxyz_from_R
+from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu
 from server.export import schemas
 from server.export.decoded import (
@@ -59,15 +59,12 @@ from server.export.decoded import (
     RecordedState,
 )
 from server.export.episodes import Episode
-from server.export.pictures import JpegMaker
-from server.protocol.wire_records import Codec
+from server.export.pictures import PicturePacker, coefficients
+from server.export.transforms import BODY, FILMED, OPTICAL, PHONE, FramePlace, covariance, places
 from server.recording.writer import CAMERA_KEY, ROBOT_KEY, SETTINGS_KEY
 
-INERTIAL, PHONE, OPTICAL, VIRTUAL = "inertial", "phone", "optical", "virtual"
-BODY, REFERENCE = "base_link", "reference"
 MODELS = {"equidistant": "kannala_brandt"}
 """Lens models that go by other names there."""
-FULL_COEFFICIENTS = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}
 LED_M = 0.03
 """Diameter of an LED as drawn."""
 LED_COLOUR = Color(r=1.0, g=0.2, b=0.1, a=1.0)
@@ -91,7 +88,7 @@ def write(decoded: DecodedRecording, episodes: Sequence[Episode], path: Path) ->
         film.begin(episodes)
         for item in decoded.items():
             film.put(item)
-    return film.summary()
+    return film.packer.summary()
 
 
 class _Film:
@@ -100,9 +97,7 @@ class _Film:
     def __init__(self, decoded: DecodedRecording, writer: Writer) -> None:
         self._decoded, self._writer = decoded, writer
         self._camera: Camera | None = None
-        self._jpeg = JpegMaker()
-        self._has_key = False
-        self._videos = self._images = self._left_out = 0
+        self.packer = PicturePacker()
 
     def begin(self, episodes: Sequence[Episode]) -> None:
         recording = self._decoded.recording
@@ -136,11 +131,6 @@ class _Film:
             case RecordedState():
                 self._state(item)
 
-    def summary(self) -> str:
-        return (
-            f"{self._videos} pictures as video, {self._images} as JPEG, {self._left_out} left out"
-        )
-
     def _put(self, topic: str, t: float, message: Message) -> None:
         ns = self._decoded.unix_ns(t)
         self._writer.write_message(topic, message, log_time=ns, publish_time=ns)
@@ -162,24 +152,13 @@ class _Film:
             key=picture.key,
         )
         self._put("/phone/picture_time", item.t, times)
-        if picture.codec == Codec.H264:
-            self._has_key = self._has_key or picture.key
-            if self._has_key:
-                video = CompressedVideo(
-                    timestamp=stamp, frame_id=OPTICAL, data=picture.data, format="h264"
-                )
+        match self.packer.packed(item):
+            case "h264", data:
+                video = CompressedVideo(timestamp=stamp, frame_id=OPTICAL, data=data, format="h264")
                 self._put("/phone/video", item.t, video)
-                self._videos += 1
-            else:
-                self._left_out += 1
-            return
-        jpeg = self._jpeg.jpeg(item)
-        if jpeg is None:
-            self._left_out += 1
-            return
-        image = CompressedImage(timestamp=stamp, frame_id=OPTICAL, data=jpeg, format="jpeg")
-        self._put("/phone/image", item.t, image)
-        self._images += 1
+            case "jpeg", data:
+                image = CompressedImage(timestamp=stamp, frame_id=OPTICAL, data=data, format="jpeg")
+                self._put("/phone/image", item.t, image)
 
     def _calibrate(self, item: DatedPicture) -> None:
         """Tell of the camera whenever it is another one."""
@@ -187,17 +166,16 @@ class _Film:
         if camera is None or camera is self._camera:
             return
         self._camera = camera
-        K, count = camera.K, FULL_COEFFICIENTS[camera.model]
         calibration = CameraCalibration(
             timestamp=self._stamp(item.t),
             frame_id=OPTICAL,
             width=camera.width,
             height=camera.height,
             distortion_model=MODELS.get(camera.model, camera.model),
-            D=np.pad(camera.distortion, (0, count - len(camera.distortion))).tolist(),
-            K=K.ravel().tolist(),
+            D=coefficients(camera).tolist(),
+            K=camera.K.ravel().tolist(),
             R=np.eye(3).ravel().tolist(),
-            P=np.column_stack((K, np.zeros(3))).ravel().tolist(),
+            P=np.column_stack((camera.K, np.zeros(3))).ravel().tolist(),
         )
         self._put("/phone/calibration", item.t, calibration)
 
@@ -212,7 +190,8 @@ class _Film:
 
     def _state(self, state: RecordedState) -> None:
         t, stamp = state.t, self._stamp(state.t)
-        self._put("/tf", t, FrameTransforms(transforms=_transforms(state, stamp)))
+        transforms = [_transform(place, stamp) for place in (FILMED, *places(state))]
+        self._put("/tf", t, FrameTransforms(transforms=transforms))
         pose = _pose(state.p_bc_in_c, state.R_cb_wxyz)
         if pose is not None:
             self._put("/robot/pose", t, PoseInFrame(timestamp=stamp, frame_id=PHONE, pose=pose))
@@ -221,7 +200,7 @@ class _Film:
                 frame_id=PHONE,
                 body_frame_id=BODY,
                 pose=pose,
-                pose_covariance=_covariance(state),
+                pose_covariance=covariance(state).ravel().tolist(),
             )
             self._put("/robot/odometry", t, odometry)
         u = state.u_bf_in_c
@@ -298,29 +277,11 @@ def _pose(p: Sequence[float] | None, wxyz: Sequence[float] | None) -> Pose | Non
     return Pose(position=_vector(p), orientation=_quaternion(wxyz))
 
 
-def _transforms(state: RecordedState, stamp: Timestamp) -> list[FrameTransform]:
-    here = (0.0, 0.0, 0.0)
-    known = (
-        (INERTIAL, PHONE, here, state.R_fc_wxyz),
-        (PHONE, OPTICAL, here, wxyz_from_R(R_co)),
-        (INERTIAL, VIRTUAL, here, state.R_fv_wxyz),
-        (PHONE, BODY, state.p_bc_in_c, state.R_cb_wxyz),
-        (VIRTUAL, REFERENCE, state.reference_p_in_v, state.reference_R_wxyz),
+def _transform(place: FramePlace, stamp: Timestamp) -> FrameTransform:
+    return FrameTransform(
+        timestamp=stamp,
+        parent_frame_id=place.parent,
+        child_frame_id=place.child,
+        translation=_vector(place.p),
+        rotation=_quaternion(place.wxyz),
     )
-    return [
-        FrameTransform(
-            timestamp=stamp,
-            parent_frame_id=parent,
-            child_frame_id=child,
-            translation=_vector(p),
-            rotation=_quaternion(wxyz),
-        )
-        for parent, child, p, wxyz in known
-        if p is not None and wxyz is not None
-    ]
-
-
-def _covariance(state: RecordedState) -> list[float]:
-    """(6, 6) in rows: the largest standard deviation of each kind, along every axis; 0: unknown."""
-    sigmas = np.repeat([state.sigma_p or 0.0, state.sigma_theta or 0.0], 3)
-    return np.diag(sigmas**2).ravel().tolist()

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 
 from hardware.codec import DecodeError, Decoder
+from pipeline.camera.lens import Camera
+from pipeline.frames import Array
 from pipeline.signals import Image
 from server.export.decoded import DatedPicture
 from server.phone.decoder import CODEC_NAMES
@@ -13,6 +15,16 @@ from server.protocol.wire_records import Codec, Picture
 
 QUALITY = 90
 """Of a JPEG, in percent."""
+
+
+FULL_COEFFICIENTS = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}
+"""How many a lens model has where none may be left out."""
+
+
+def coefficients(camera: Camera) -> Array:
+    """Distortion of a lens, those left out as 0."""
+    missing = FULL_COEFFICIENTS[camera.model] - len(camera.distortion)
+    return np.pad(camera.distortion, (0, missing))
 
 
 class ColourDecoder:
@@ -48,21 +60,39 @@ class ColourDecoder:
         return (decoder.codec, decoder.width, decoder.height) == wanted
 
 
-class JpegMaker:
-    """JPEG files of a stream: as they came, or made of what was decoded."""
+class PicturePacker:
+    """Pictures for formats that know H.264 and JPEG, but no VP8: as they came, where possible."""
 
     def __init__(self) -> None:
         """Begin with a stream."""
         self._colour = ColourDecoder()
+        self._has_key = False
+        self._counts = {"h264": 0, "jpeg": 0}
+        self._left_out = 0
 
-    def jpeg(self, dated: DatedPicture) -> bytes | None:
-        """A JPEG file; None if the picture can't be decoded."""
-        if dated.picture.codec == Codec.JPEG:
-            return dated.picture.data
+    def packed(self, dated: DatedPicture) -> tuple[str, bytes] | None:
+        """h264 or jpeg, and the bytes; None if the picture can't be decoded by itself or by us."""
+        packed = self._packed(dated)
+        if packed is None:
+            self._left_out += 1
+        else:
+            self._counts[packed[0]] += 1
+        return packed
+
+    def summary(self) -> str:
+        """How many there were."""
+        video, jpeg = self._counts.values()
+        return f"{video} pictures as video, {jpeg} as JPEG, {self._left_out} left out"
+
+    def _packed(self, dated: DatedPicture) -> tuple[str, bytes] | None:
+        picture = dated.picture
+        if picture.codec == Codec.JPEG:
+            return "jpeg", picture.data
+        if picture.codec == Codec.H264:
+            self._has_key = self._has_key or picture.key
+            return ("h264", picture.data) if self._has_key else None
         image = self._colour.decoded(dated)
         if image is None:
             return None
-        _, data = cv2.imencode(
-            ".jpg", np.ascontiguousarray(image), (cv2.IMWRITE_JPEG_QUALITY, QUALITY)
-        )
-        return data.tobytes()
+        quality = (cv2.IMWRITE_JPEG_QUALITY, QUALITY)
+        return "jpeg", cv2.imencode(".jpg", np.ascontiguousarray(image), quality)[1].tobytes()

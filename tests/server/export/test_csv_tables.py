@@ -15,7 +15,7 @@ def tables(source, folder, *arguments):
     assert main([str(source), "--to", "csv", "--out", str(folder), *arguments]) == 0
     return {
         path.stem: list(csv.DictReader(path.read_text().splitlines()))
-        for path in (folder / source.stem).glob("*.csv")
+        for path in (folder / f"{source.stem}.csv").glob("*.csv")
     }
 
 
