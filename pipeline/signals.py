@@ -73,6 +73,16 @@ class Spots:
         """Count of the spots."""
         return len(self.pixels)
 
+    def take(self, which: npt.NDArray[np.intp]) -> Spots:
+        """Some of them."""
+        return Spots(
+            self.pixels[which],
+            self.covariances[which],
+            self.brightness[which],
+            self.area[which],
+            self.bounded,
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:

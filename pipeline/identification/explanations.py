@@ -80,15 +80,26 @@ def _explanation(row: Array, leds: int, spots: npt.NDArray[np.intp]) -> Explanat
 
 
 def rivals(explanations: Sequence[Explanation]) -> list[Explanation]:
-    """The first one and all that explain as much nearly as well but say something else."""
+    """The first one and all that explain as much nearly as well but say something else.
+
+    What explains other spots alone is no rival: that is another robot, and both are true.
+    """
     best = explanations[0]
     least = cost(best, best)
     others = [
         other
         for other in explanations[1:]
-        if other.leds >= best.leds and cost(other, best) < least + LIKELIER and differ(best, other)
+        if other.leds >= best.leds
+        and cost(other, best) < least + LIKELIER
+        and differ(best, other)
+        and not are_apart(best, other)
     ]
     return [best, *others]
+
+
+def are_apart(one: Explanation, other: Explanation) -> bool:
+    """Whether they have no spot in common."""
+    return not np.isin(one.match.spot, other.match.spot).any()
 
 
 def cost(explanation: Explanation, best: Explanation) -> float:

@@ -6,7 +6,7 @@ nothing is said; both are kept until the pictures or the gyroscopes refute one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from pipeline.identification.explanations import (
 )
 from pipeline.identification.pnp import Association
 from pipeline.identification.relocalisation import Relocalisation, SearchHints
-from pipeline.signals import Spots
+from pipeline.signals import Match, Spots
 from pipeline.vision_config import IdentifyConfig
 
 AGAINST_MEMORY = np.log(1e-7)
@@ -38,6 +38,10 @@ SHOWN, UNSHOWN_PX = 0.5, 0.1
 residuals, were it more than the latter."""
 NEAR_RAD, TURN_RAD = 0.35, 0.05
 """A branch continues one within the former; the latter is how far it may be off by noise."""
+BESIDE_EFFORT = 0.15
+"""Of a search, share that is spent on another robot beside one that was found."""
+MOST_BESIDE = 2
+"""Other robots that are looked for."""
 UNDECIDED = 30
 """After so many pictures with the same rivals all begins anew."""
 
@@ -77,10 +81,14 @@ class Initialisation:
         """Begin with nothing seen; LEDs (n, 3) [m]."""
         self._camera, self._leds_in_b = camera, leds_in_b
         self._search = Relocalisation(camera, leds_in_b, config)
+        self._beside = Relocalisation(camera, leds_in_b, config)
         self._config = config
         self._pending = _Pending()
         self.ambiguous = False
         """The last picture had two explanations of equal strength."""
+        self.others: list[Association] = []
+        """What looks like the robot as well, in other spots than the one told: no fit tells which
+        of them it is."""
 
     @property
     def bounded(self) -> bool:
@@ -102,7 +110,7 @@ class Initialisation:
             hints: What is known else.
             turn: (2, 3) how c and b turned since the last picture [rad]; None if unknown.
         """
-        self.ambiguous = False
+        self.ambiguous, self.others = False, []
         if not 0.0 < t - self._pending.t < PATIENCE_S:
             self._pending = _Pending()
         self._pending.t = t
@@ -115,17 +123,35 @@ class Initialisation:
                 believed = found[0]
         if believed is None:
             return None
-        fit = pnp.solve(
-            self._camera,
-            self._leds_in_b,
-            spots,
-            believed.match,
-            (believed.p_bc_in_c, believed.R_cb),
-        )
-        if fit is None or fit.rms_px > self._config.start_rms_px:
+        association = self._solved(believed, spots)
+        if association is None:
             return None
         self._pending = _Pending()
-        return Association(believed.match, fit)
+        self.others = self._others(believed, spots, hints)
+        return association
+
+    def _solved(self, one: Explanation, spots: Spots) -> Association | None:
+        place = (one.p_bc_in_c, one.R_cb)
+        fit = pnp.solve(self._camera, self._leds_in_b, spots, one.match, place)
+        if fit is None or fit.rms_px > self._config.start_rms_px:
+            return None
+        return Association(one.match, fit)
+
+    def _others(self, first: Explanation, spots: Spots, hints: SearchHints) -> list[Association]:
+        """Robots in the spots that `first` and those found before leave, whatever is remembered."""
+        free = SearchHints(hints.up_in_c, hints.up_in_b)
+        left, found = np.setdiff1d(np.arange(len(spots)), first.match.spot), list[Association]()
+        while len(found) < MOST_BESIDE and len(left) >= self._config.min_leds:
+            rest = self._beside.explanations(spots.take(left), free, BESIDE_EFFORT)
+            if not rest or rest[0].log_chance > self._enough(rest[0], hints):
+                break
+            one = replace(rest[0], match=Match(rest[0].match.led, left[rest[0].match.spot]))
+            association = self._solved(one, spots)
+            if association is None:
+                break
+            found.append(association)
+            left = np.setdiff1d(left, one.match.spot)
+        return found
 
     def _carry(self, turn: Array | None) -> None:
         """Turn what is pending as the gyroscopes say."""
@@ -150,9 +176,13 @@ class Initialisation:
                 return None
         else:
             winner = found[0]
-        partial = winner.leds < len(self._leds_in_b) and not hints.is_upright
-        enough = SURE_PARTIAL if partial else SURE
+        enough = self._enough(winner, hints)
         return winner if winner.log_chance < enough else self._confirmed(winner, spots, enough)
+
+    def _enough(self, one: Explanation, hints: SearchHints) -> float:
+        """Logarithm of the false alarms with which an explanation is believed at once."""
+        partial = one.leds < len(self._leds_in_b) and not hints.is_upright
+        return float(SURE_PARTIAL if partial else SURE)
 
     def _against_rivals(self, equal: list[Explanation]) -> Explanation | None:
         """The one that pictures and gyroscopes together have left; None while there are more."""

@@ -83,6 +83,7 @@ class Relocalisation:
         """Which of the triples comes next, of many LEDs."""
         self._turn = 0
         """Which of the less likely candidates are tried."""
+        self._effort = 1.0
         self._at: dict[tuple[int, int], int] = {}
         """Where the next picture goes on, by LEDs demanded and triple."""
         counters, table = np.zeros(4, dtype=np.int64), np.zeros(TABLE, dtype=np.int64)
@@ -90,8 +91,11 @@ class Relocalisation:
         self.bounded = False
         """The last picture had more to try than it could."""
 
-    def explanations(self, spots: Spots, hints: SearchHints) -> list[Explanation]:
-        """Of the spots (those of one instant), the likeliest first."""
+    def explanations(
+        self, spots: Spots, hints: SearchHints, effort: float = 1.0
+    ) -> list[Explanation]:
+        """Of the spots (those of one instant), the likeliest first; `effort` of the usual work."""
+        self._effort = effort
         chosen = self._candidates(len(spots))
         self._work.counters[:] = 0
         self.bounded = len(chosen) < len(spots)
@@ -157,7 +161,7 @@ class Relocalisation:
                 return
             self._work.table[:] = 0
             reach_m = reach_rad * self._radius_m
-            upright(level, reach_m, self.looked + budget, wanted, lights, self._work)
+            upright(level, reach_m, self._until(budget), wanted, lights, self._work)
 
     def _any_way(self, lights: BinnedSpots, hints: SearchHints) -> None:
         """All LEDs, and, unless they are found, all but one; of many LEDs half."""
@@ -189,11 +193,15 @@ class Relocalisation:
         self._at[wanted.least, number] = p3p_hypotheses(
             self._triples[number],
             start if start < most else 0,
-            self.looked + budget,
+            self._until(budget),
             wanted,
             lights,
             self._work,
         )
+
+    def _until(self, budget: int) -> int:
+        """Looks until which work may go on."""
+        return self.looked + int(self._effort * budget)
 
 
 def _triples(leds_in_b: Array) -> Integers:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipeline.frames import Array, exp, log
@@ -18,8 +20,29 @@ MEMORY_RAD, GYRO_RAD_S, BLIND_RAD_S, MEMORY_MOST_RAD = 0.2, 0.03, 1.5, 0.6
 """How far a remembered attitude may be off: at first, growing by the second with and without
 gyroscopes; farther, it says nothing."""
 
+REACH_M, REACH_SIGMAS = 0.3, 5.0
+"""So far from where it is foretold nobody's robot is; and a filter's doubt besides."""
+REACH_M_S2 = 1.0
+"""How hard it may have changed its speed since it was seen."""
+REACHED_S = 10.0
+"""So long after it was seen it may be anywhere: no flight lasts as long without a picture."""
+
 Place = tuple[Array, Array]
 """p_bc_in_c (3,) [m] and R_cb (3, 3)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PossiblePlace:
+    """Where a robot may be that was seen not long ago."""
+
+    p_bc_in_c: Array
+    """(3,) [m]."""
+    radius_m: float
+
+    def holds(self, pose: RelativePose) -> bool:
+        """Whether it may be there."""
+        off = pose.p_bc_in_c - self.p_bc_in_c
+        return bool(off @ off < self.radius_m**2)
 
 
 class LastPose:
@@ -31,6 +54,8 @@ class LastPose:
     def __init__(self) -> None:
         """Nothing seen yet."""
         self._pose: RelativePose | None = None
+        self._kept: RelativePose | None = None
+        """The same, until it may be anywhere."""
         self._R_cb: Array | None = None
         """Carried to the newest picture."""
         self._t, self._t_seen = -np.inf, -np.inf
@@ -62,7 +87,7 @@ class LastPose:
         self._t = t
         self.turned = None
         if not 0.0 < dt < MAX_STEP_S:
-            self.forget()
+            self._lose()
             return
         if self._omega is None:
             self._sure = False
@@ -85,13 +110,19 @@ class LastPose:
             if self._omega is None:
                 self.omega_in_b = log(last.R_cb.T @ pose.R_cb) / (pose.t - last.t)
         self._pose, self._R_cb, self._misses = pose, pose.R_cb, 0
+        self._kept = pose
         self._t = self._t_seen = pose.t
         self._sure, self._since_kept = True, np.zeros(3)
         self.contradicts = expected is not None and _contradict(pose, expected)
 
     def forget(self) -> None:
-        """Predict nothing, not even the attitude."""
+        """Predict nothing, not even the attitude; the robot may be anywhere."""
+        self._lose()
+        self._t_seen = -np.inf
+
+    def _lose(self) -> None:
         self._pose, self._R_cb, self._misses = None, None, 0
+        self._kept = None
 
     def miss(self) -> None:
         """Note a picture that gave no pose."""
@@ -107,6 +138,25 @@ class LastPose:
         dt = min(self._t - last.t, 0.1)
         ahead = exp(-self._since_kept)
         return ahead @ last.p_bc_in_c + dt * (ahead @ self.u_in_c), R_cb
+
+    def reach(self, expected: Prediction | None) -> PossiblePlace | None:
+        """Where the robot may be in the newest picture; None: anywhere.
+
+        By the filter that expects it, unless the last pose contradicts it; else by the last pose.
+        """
+        last, dt = self._kept, self._t - self._t_seen
+        if not 0.0 <= dt < REACHED_S:
+            return None
+        if expected is not None and not self.contradicts:
+            return PossiblePlace(expected.p_bc_in_c, REACH_M + REACH_SIGMAS * expected.sigma_p)
+        if last is None:
+            return None
+        back, p = exp(-self._since_kept), last.p_bc_in_c
+        radius_m = REACH_M + 0.5 * REACH_M_S2 * dt * dt
+        radius_m += float(np.linalg.norm(self.u_in_c)) * dt
+        if not self._sure:
+            radius_m += BLIND_RAD_S * dt * float(np.linalg.norm(p))
+        return PossiblePlace(back @ p, radius_m)
 
     def attitude(self) -> tuple[Array, float] | None:
         """For the newest picture, R_cb and how far that may be off [rad]; None if it is too far."""

@@ -9,19 +9,31 @@ import numpy as np
 
 from pipeline.camera.lens import Camera
 from pipeline.camera.rolling_shutter import FrameMotion, unrolled
-from pipeline.frames import Array
+from pipeline.frames import GRAVITY, Array
 from pipeline.identification import pnp
 from pipeline.identification.initialisation import Initialisation
 from pipeline.identification.pnp import Association
 from pipeline.identification.relocalisation import SearchHints
 from pipeline.identification.tilt_bias import TiltBias
-from pipeline.signals import Frame, Match, RelativePose, Spots
+from pipeline.imu_stream import ImuStreams
+from pipeline.signals import (
+    BodyImu,
+    Frame,
+    Image,
+    Match,
+    PhoneImu,
+    RelativePose,
+    Spots,
+    VisionMeasurement,
+)
 from pipeline.spots import leds
 from pipeline.vision import few_leds
 from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.last_pose import LastPose, Place
 from pipeline.vision.led_tracker import LedTracker
+from pipeline.vision.motion_hypotheses import CandidateView
 from pipeline.vision.rays import NO_RAYS, rays_of
+from pipeline.vision.robot_identity import RobotIdentity
 from pipeline.vision_config import IdentifyConfig, LedsConfig
 
 __all__ = ["Detection", "FramePrior", "Vision", "warm_up"]
@@ -51,8 +63,9 @@ class Vision:
         leds_in_b: Array,
         leds_config: LedsConfig | None = None,
         identify_config: IdentifyConfig | None = None,
+        imus: ImuStreams | None = None,
     ) -> None:
-        """Begin with nothing seen; LEDs (n, 3) [m]."""
+        """Begin with nothing seen; LEDs (n, 3) [m]; `imus`, filled by others, tell robots apart."""
         self.camera, self._leds_in_b = camera, leds_in_b
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
@@ -63,6 +76,7 @@ class Vision:
         """Where a filter that is trusted expects the LEDs in this picture."""
         self._tracker = LedTracker(camera, leds_in_b, self._leds, self._identify)
         self._initialisation = Initialisation(camera, leds_in_b, self._identify)
+        self._identity = RobotIdentity(leds_in_b, imus)
         self._area_px_m2 = 0.0
         """Of the last named spots, times their depth squared: what an LED looks like."""
 
@@ -82,7 +96,7 @@ class Vision:
             found, searched_s = self._search(frame, motion, predicted, clock)
             took_s = took_s + searched_s
         else:
-            self._initialisation.forget()
+            self._found_again()
         started = clock()
         detection = self._told(frame.t, found)
         took_s[2] += clock() - started
@@ -119,6 +133,7 @@ class Vision:
         self._last.forget()
         self._initialisation.forget()
         self._tracker.forget()
+        self._identity.forget()
         self._tilt_bias = TiltBias()
 
     def _predictions(self, prior: FramePrior) -> list[Place]:
@@ -164,14 +179,32 @@ class Vision:
         for place in predicted:
             association = self._tracker.name(spots, place, motion)
             if association is not None:
-                self._initialisation.forget()
+                self._found_again()
                 return _Found(spots, association)
         upright = unrolled(self.camera, spots, motion)
         association = self._initialisation.step(t, upright, self._hints(), self._last.turned)
         bounded = self._initialisation.bounded or spots.bounded
+        alike = [] if association is None else [association, *self._initialisation.others]
+        association = self._ours(t, alike, spots)
         if association is not None:
             return _Found(spots, self._exactly(association, spots), bounded=bounded)
         return _Found(spots, few=self._few(upright), bounded=bounded)
+
+    def _found_again(self) -> None:
+        self._initialisation.forget()
+        self._identity.forget()
+
+    def _ours(self, t: float, alike: list[Association], spots: Spots) -> Association | None:
+        """Of what looks like the robot, ours; None: nothing tells yet."""
+        views = [self._view(t, one, spots) for one in alike]
+        reach = self._last.reach(self._prior.expected)
+        which = self._identity.which(t, views, reach, self._prior.up_in_c)
+        return None if which is None else alike[which]
+
+    def _view(self, t: float, one: Association, spots: Spots) -> CandidateView:
+        pose = pnp.pose_of(one.fit, t)
+        rays = rays_of(self.camera, spots, one.match, t, one.fit.excess)
+        return CandidateView(VisionMeasurement(t, rays, pose, self.camera.half_field), pose)
 
     def _exactly(self, association: Association, spots: Spots) -> Association:
         """Solve again with each LED's own motion during the readout, now that it is associated."""
@@ -205,6 +238,8 @@ class Vision:
             return "No light in the picture is bright enough."
         if n < needed:
             return f"{n} of {len(self._leds_in_b)} LEDs seen: {needed} are needed."
+        if self._identity.reason:
+            return self._identity.reason
         if self._initialisation.ambiguous:
             return f"{n} lights seen, and more than one way to see the robot in them."
         return f"{n} lights seen, but they do not look like the robot."
@@ -217,13 +252,26 @@ def warm_up() -> None:
     x, y, z = (0.1, 0.0, -0.1, 0.2, -0.2), (0.3, -0.3, 0.2, -0.1, 0.0), (0.2, 0.1, -0.3, -0.2, 0.3)
     robot, place = np.column_stack((x, y, z)), np.array([2.5, 0.0, 0.0])
     up, still = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-    luma = np.zeros((240, 320), dtype=np.uint8)
-    for u, v in np.round(camera.pixels(robot + place)).astype(int):
-        luma[v - 1 : v + 2, u - 1 : u + 2] = 255
-    dark = np.zeros_like(luma)
+    luma, dark = _drawn(camera, robot + place), np.zeros((240, 320), dtype=np.uint8)
     for prior in (FramePrior(up, up, still, still), FramePrior()):
         vision = Vision(camera, robot)
         for k, picture in enumerate((luma, luma, dark, luma)):
             detection = vision.step(Frame(0.03 * k, picture), prior)
             if detection.pose is not None:
                 vision.keep(detection.pose)
+    imus, aside = ImuStreams(), np.array([0.0, 0.5, 0.0])
+    for t in np.arange(-0.2, 0.2, 0.005).tolist():
+        imus.add(PhoneImu(t, still, GRAVITY * up))
+        imus.add(BodyImu(t, still, GRAVITY * up))
+    both = _drawn(camera, np.concatenate((robot + place - aside, robot + place + aside)))
+    vision = Vision(camera, robot, imus=imus)
+    for k in range(3):
+        vision.step(Frame(0.03 * k, both), FramePrior(up, up, still, still))
+
+
+def _drawn(camera: Camera, points_in_c: Array) -> Image:
+    """A dark picture with a bright spot for each of the points (n, 3) [m]."""
+    luma = np.zeros((camera.height, camera.width), dtype=np.uint8)
+    for u, v in np.round(camera.pixels(points_in_c)).astype(int):
+        luma[v - 1 : v + 2, u - 1 : u + 2] = 255
+    return luma

@@ -50,9 +50,9 @@ class VisualFrontEnd:
         """LEDs (n, 3) [m]; `clock` only times the stages."""
         self.camera = camera
         self._gates, self._clock, self._leds_in_b = gates, clock, leds_in_b
-        self._vision = Vision(camera, leds_in_b)
         self._waiting: deque[PhoneImu | BodyImu] = deque(maxlen=CAPACITY)
         imus = ImuStreams()
+        self._vision = Vision(camera, leds_in_b, imus=imus)
         self._phone, self._body = ImuBuffer(imus.phone), ImuBuffer(imus.body)
         self._predictions, self._stamps = PredictionHistory(), CameraImuDelay(imus)
         self.monitor, self.readout = (

@@ -23,6 +23,8 @@ SHAKE = np.array([0.0, 0.0, 0.0, radians(2.0), radians(3.5), radians(7.0)])
 SHAKE_HZ = np.array([1.0, 1.0, 1.0, 1.7, 1.1, 1.25])
 """Roll, pitch and yaw; yaw alone reaches 55°/s, together 60°/s."""
 LEAVE_RAD, LEAVE_S = 1.05, 2.4
+TWIN_M = (0.75, 0.95)
+"""How far beside the robot another one is: neither hides the other."""
 FLAT_LEDS = np.array(
     [
         [-0.20, 0.28, 0.14],
@@ -59,6 +61,8 @@ class PhoneAndRobotMotion:
 
     hand: MovingHand
     robot: MovingHand
+    twin: MovingHand | None = None
+    """Another robot of the same kind."""
 
     def relative(self, t: float) -> tuple[Array, Array]:
         """(R_cb (3, 3), p_bc_in_c (3,) [m]) at `t` [s]."""
@@ -72,7 +76,7 @@ def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion:
     way = rng.uniform(0.0, 2.0 * np.pi)
     yaw = rng.choice((-1.0, 1.0)) * np.deg2rad(within(rng, scene.yaw_deg))
     rpy = np.array([tilt * np.cos(way), tilt * np.sin(way), yaw])
-    robot = MovingHand((three_poles(rng, 0.3, 0.03, 1.5), tremor(rng)), np.zeros(3), rpy, 0.0)
+    robot = _robot(rng, np.zeros(3), rpy)
     distance = within(rng, scene.distance_m)
     above = distance * rng.uniform(-0.15, 0.2)
     side = distance * rng.uniform(-0.3, 0.3)
@@ -81,7 +85,20 @@ def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion:
     rpy_c = aim + np.array([0.0, atan2(above, ahead), atan2(-side, ahead)])
     place = np.array([-ahead, side, above])
     hand = MovingHand((*_parts(scene.motion, rng), tremor(rng)), place, rpy_c, 0.0)
-    return PhoneAndRobotMotion(hand, robot)
+    return PhoneAndRobotMotion(hand, robot, _twin(scene, rng) if scene.twin else None)
+
+
+def _robot(rng: np.random.Generator, place: Array, rpy: Array) -> MovingHand:
+    return MovingHand((three_poles(rng, 0.3, 0.03, 1.5), tremor(rng)), place, rpy, 0.0)
+
+
+def _twin(scene: Scene, rng: np.random.Generator) -> MovingHand:
+    """Beside the robot at the origin, turned and tilted as the scene's ranges say."""
+    tilt, way = np.deg2rad(within(rng, scene.tilt_deg)), rng.uniform(0.0, 2.0 * np.pi)
+    yaw = rng.choice((-1.0, 1.0)) * np.deg2rad(within(rng, scene.yaw_deg))
+    side = rng.choice((-1.0, 1.0)) * within(rng, TWIN_M)
+    place = np.array([rng.uniform(-0.2, 0.3), side, rng.uniform(-0.1, 0.1)])
+    return _robot(rng, place, np.array([tilt * np.cos(way), tilt * np.sin(way), yaw]))
 
 
 def _parts(motion: HandMotion, rng: np.random.Generator) -> tuple[MotionComponent, ...]:

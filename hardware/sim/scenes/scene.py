@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from math import inf
 from typing import Final
 
 from hardware.sim.camera_faults import CameraFault
@@ -84,6 +85,10 @@ class Scene:
     """Of the robot."""
     yaw_deg: Range = (0.0, 35.0)
     """Of the robot, to either side."""
+    twin: bool = False
+    """Another robot of the same kind beside it, which moves by itself."""
+    dark_after_s: float = inf
+    """So long after the film's begin the robot's own LEDs go out."""
     is_flat: bool = False
     """All LEDs in one plane."""
     picture: ImageOrientation = ImageOrientation.UPRIGHT
@@ -166,6 +171,23 @@ _ALL: Final = (
         exposure_s=(0.0008, 0.002),
         lamps=(0, 3),
         windows=(0, 1),
+    ),
+    Scene(
+        "twin",
+        "two robots of one kind side by side",
+        twin=True,
+        lamps=(0, 4),
+        distance_m=(2.5, 3.0),
+        tilt_deg=(0.0, 3.0),
+    ),
+    Scene(
+        "twin_left",
+        "two robots of one kind, of which the own one goes dark",
+        twin=True,
+        dark_after_s=1.0,
+        lamps=(0, 4),
+        distance_m=(2.5, 3.0),
+        tilt_deg=(0.0, 3.0),
     ),
     Scene("tilt", "the robot tilted far", tilt_deg=(30.0, 50.0), lamps=(0, 5)),
     Scene("flat_rig", "all LEDs in one plane", is_flat=True, lamps=(0, 5)),

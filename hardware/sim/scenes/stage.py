@@ -55,6 +55,10 @@ class Stage:
     """(n,) of their surfaces."""
     shown: Flags
     """(n,) not covered."""
+    dark_from: float
+    """When [s] the robot's own LEDs go out."""
+    twin_lights: Array
+    """(n,) of another robot's LEDs; (0,) if there is none."""
     lights: RoomLights
     mirror: Mirror | None
     bar: Bar | None
@@ -73,7 +77,7 @@ class Stage:
         """The picture whose middle row is exposed around `t` [s]."""
         ways = self._ways(sensor, camera, moving, t)
         n = len(self.leds_in_b)
-        lamps, owners = self._lamps(camera, ways)
+        lamps, owners = self._lamps(camera, ways, t)
         panes = self._panes(sensor, ways)
         room, grey = self._room(camera, moving, t)
         luma = sensor.picture(room, grey, lamps, panes, shift)
@@ -90,12 +94,15 @@ class Stage:
         return DrawnFrame(luma, ways.rows[:n, :2], visible, merged, information)
 
     def _points(self, moving: PhoneAndRobotMotion, t: float) -> tuple[Array, Array]:
-        """Points in f (m, 3): LEDs, their mirror images, lamps, windows, the bar; and in c."""
+        """Points in f (m, 3) and in c: LEDs, mirrored ones, a twin's, lamps, windows, the bar."""
         (R_fc, p_cf_in_f), (R_fb, p_bf_in_f) = moving.hand.pose(t), moving.robot.pose(t)
         leds = p_bf_in_f + self.leds_in_b @ R_fb.T
         points = [leds]
         if self.mirror is not None:
             points.append(self.mirror.images(leds))
+        if moving.twin is not None:
+            R_ft, p_tf_in_f = moving.twin.pose(t)
+            points.append(p_tf_in_f + self.leds_in_b @ R_ft.T)
         points += [self.lights.places_in_f, self.lights.windows_in_f.reshape(-1, 3)]
         if self.bar is not None:
             points.append(self.bar.edges(t))
@@ -117,15 +124,20 @@ class Stage:
         rows = _at_their_rows(powers, camera)
         return ImageTrajectories(rows, np.where(seen, depth, np.nan))
 
-    def _lamps(self, camera: Camera, ways: ImageTrajectories) -> tuple[list[Lamp], list[int]]:
-        """Round lights, and which LED each is; −1: none."""
+    def _lamps(
+        self, camera: Camera, ways: ImageTrajectories, t: float
+    ) -> tuple[list[Lamp], list[int]]:
+        """Round lights at `t` [s], and which LED each is; −1: none."""
         n, k = len(self.leds_in_b), len(self.lights.radii_m)
-        radii = np.repeat(self.led_radius_m, n)
-        lights, owners = self.led_lights, np.where(self.shown, np.arange(n), -2)
+        radii, shown = np.repeat(self.led_radius_m, n), self.shown & (t < self.dark_from)
+        lights, owners = self.led_lights, np.where(shown, np.arange(n), -2)
         if self.mirror is not None:
             radii = np.tile(radii, 2)
             lights = np.concatenate((lights, self.mirror.share * lights))
-            owners = np.concatenate((owners, np.where(self.shown, -1, -2)))
+            owners = np.concatenate((owners, np.where(shown, -1, -2)))
+        radii = np.concatenate((radii, np.repeat(self.led_radius_m, len(self.twin_lights))))
+        lights = np.concatenate((lights, self.twin_lights))
+        owners = np.concatenate((owners, np.full(len(self.twin_lights), -1)))
         radii = np.concatenate((radii, self.lights.radii_m))
         lights = np.concatenate((lights, self.lights.lights))
         owners = np.concatenate((owners, np.full(k, -1)))
@@ -138,7 +150,8 @@ class Stage:
 
     def _panes(self, sensor: Sensor, ways: ImageTrajectories) -> list[Pane]:
         o = sensor.optics
-        first = len(self.leds_in_b) * (2 if self.mirror else 1) + len(self.lights.radii_m)
+        robots = len(self.leds_in_b) * (2 if self.mirror else 1) + len(self.twin_lights)
+        first = robots + len(self.lights.radii_m)
         panes: list[Pane] = []
         for k, light in enumerate(self.lights.window_lights):
             rows, depth = ways.rows[first + 2 * k :][:2], ways.depth[first + 2 * k :][:2]

@@ -115,10 +115,13 @@ class RenderedVideo:
         lamps = int(rng.integers(scene.lamps[0], scene.lamps[1] + 1))
         windows = int(rng.integers(scene.windows[0], scene.windows[1] + 1))
         half = self.camera.half_field
+        led_light = within(rng, scene.led_light)
         return Stage(
             leds_in_b=self.leds_in_b,
             led_radius_m=LED_RADIUS_M,
-            led_lights=within(rng, scene.led_light) * rng.uniform(0.85, 1.15, n),
+            led_lights=led_light * rng.uniform(0.85, 1.15, n),
+            dark_from=START_S + scene.dark_after_s,
+            twin_lights=led_light * rng.uniform(0.85, 1.15, n if scene.twin else 0),
             shown=~np.isin(np.arange(n), covered),
             lights=lights_around(lamps, windows, R_fc, p_cf_in_f, half, rng),
             mirror=mirror_near(p_bf_in_f, R_fc, rng) if scene.mirror else None,

@@ -10,7 +10,8 @@ from pipeline.frames import R_from_rpy
 from pipeline.signals import Frame
 from pipeline.vision.detection import FramePrior
 from pipeline.vision.gating import disbelief
-from pipeline.vision.last_pose import FORGET_MISSES
+from pipeline.vision.last_pose import FORGET_MISSES, REACHED_S
+from pipeline.vision.robot_identity import ELSEWHERE
 from pipeline.vision.vision import Vision, warm_up
 from pipeline.vision_config import GatesConfig
 from tests.pipeline.seeing import (
@@ -128,11 +129,17 @@ def test_a_picture_from_another_time_is_searched_from_nothing(t):
     assert not is_wrong(detection.pose, elsewhere)
 
 
-def test_who_jumps_is_found_again_in_the_same_picture():
+def test_who_could_not_have_jumped_so_far_is_not_believed_until_ours_may_be_anywhere():
     rng = np.random.default_rng(56)
-    eye, here, there = vision(), truth_at(rng), truth_at(rng, 3.0)
+    eye, here, there = vision(), truth_at(rng), truth_at(rng, 3.2)
     follow(eye, [here], rng)
-    (detection,) = follow(eye, [there], rng, start=1)
+    for detection in follow(eye, [there] * 3, rng, start=1):
+        assert detection.pose is None
+        assert detection.reason == ELSEWHERE
+    later = round((REACHED_S + 1.0) / DT)
+    for k in range(4, later, 12):
+        eye.step(Frame(k * DT, DARK), there.prior())
+    (detection,) = follow(eye, [there], rng, start=later)
     assert not is_wrong(detection.pose, there)
 
 

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from hardware.sim.scenes.scene import SCENES, VGA
+from hardware.sim.scenes.video import RenderedVideo
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import BodyImu, Frame, PhoneImu
+from pipeline.vision.robot_identity import ELSEWHERE, TWO
 from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from tests.pipeline.seeing import CAMERA, LEDS_IN_B
@@ -35,6 +38,22 @@ def test_verticals_and_rates_are_those_of_the_frame_not_of_the_newest_samples(fr
         assert up @ (exp(-0.99 * omega) @ UP) < np.cos(np.radians(2.0))
     np.testing.assert_allclose(prior.omega_cf_in_c, PITCHING, atol=1e-12)
     np.testing.assert_allclose(prior.omega_bf_in_b, ROLLING, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_when_ours_goes_dark_no_other_one_is_told_instead():
+    film = RenderedVideo(SCENES["twin_left"], 2, VGA, 75)
+    eyes, told = VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig()), 0
+    for shot in film:
+        eyes.add_imu(*shot.phone, *shot.body)
+        detection = eyes.process(Frame(shot.t, shot.luma))
+        if detection.pose is None:
+            assert detection.reason in (TWO, ELSEWHERE)
+            continue
+        told += 1
+        assert shot.solvable
+        assert np.linalg.norm(detection.pose.p_bc_in_c - shot.p_bc_in_c) < 0.05
+    assert told > 20
 
 
 def test_of_a_sensor_that_is_silent_nothing_is_known():

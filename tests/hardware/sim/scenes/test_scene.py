@@ -258,3 +258,24 @@ def test_a_flat_rig_is_flat_and_leaving_is_a_motion():
     assert np.ptp(FLAT_LEDS[:, 0]) == 0.0
     assert SCENES["leave_return"].motion is HandMotion.LEAVING
     assert camera_of(HD, 0.01).readout_s == 0.01
+
+
+def test_another_robot_shines_beside_ours_and_moves_by_itself():
+    film = RenderedVideo(SCENES["twin"], 1, VGA, 2)
+    (shot, _), moving = list(film), film.moving
+    assert shot.visible.sum() == 5
+    (R_fc, p_cf_in_f), (R_ft, p_tf_in_f) = moving.hand.pose(shot.t), moving.twin.pose(shot.t)
+    at = film.camera.pixels((p_tf_in_f + film.leds_in_b @ R_ft.T - p_cf_in_f) @ R_fc)
+    assert np.linalg.norm(at[:, None] - shot.pixels, axis=2).min() > 20.0
+    for u, v in np.round(at).astype(int):
+        assert shot.luma[v - 2 : v + 3, u - 2 : u + 3].max() > 150
+    turns = [log(body.pose(3.0)[0].T @ body.pose(3.5)[0]) for body in (moving.robot, moving.twin)]
+    assert np.linalg.norm(turns[0] - turns[1]) > 1e-3
+
+
+def test_ours_goes_dark_and_the_other_one_shines_on():
+    first, *_, last = shots("twin_left", frames=34)
+    assert first.solvable
+    assert not last.solvable
+    assert last.visible.sum() == 0
+    assert last.luma.max() > 200

@@ -1,0 +1,160 @@
+"""Candidates, which all look like the robot, held against what both motion sensors feel.
+
+LEDs of another robot of the same kind fit as well as our own: no residual tells them apart, but
+their motion does. Some models of each candidate's motion foretell every picture: *ours* moves as
+the robot's motion sensor says, a *still* one rests in the room, a *free* one moves anyhow. What
+the first foretells better than all others is our robot; what it foretells worse is another one.
+While all rest, nobody can know.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pipeline.estimation.relative_kernels import X_OFFSET
+from pipeline.estimation.relative_start import first_checkpoint
+from pipeline.estimation.relative_track import RelativeTrack
+from pipeline.estimator_config import RelativeConfig
+from pipeline.frames import GRAVITY, Array, log
+from pipeline.imu_stream import MAX_GAP_S, ImuStream, ImuStreams
+from pipeline.signals import RelativePose, VisionMeasurement
+
+UNGATED: Final = 1e9
+"""χ² of an LED: what is held against a candidate must rest on all of it."""
+OURS: Final = RelativeConfig(gate_chi2=UNGATED)
+FREE: Final = tuple(
+    RelativeConfig(gate_chi2=UNGATED, sigma_omega_b=omega, sigma_f_b=force)
+    for omega, force in ((0.05, 0.5), (0.5, 3.0))
+)
+"""Of a robot of which nothing is felt: rates [rad/s] and forces [m/s²] of one that hovers or flies,
+white."""
+SETTLED_S: Final = 0.1
+"""Pictures and samples come in order: nothing older is made anew."""
+MOST: Final = 8.0
+"""One picture's logarithm of odds counts for no more, whatever it shows."""
+MEMORY: Final = 0.97
+"""Share of the evidence that the next picture leaves: a second's pictures count."""
+DECISIVE: Final = 24.0
+"""Logarithm of the odds by which one must be likelier ours than the others: three pictures at
+least."""
+CONTRARY: Final = -6.0
+"""What has more against it is none of ours, even if all others have still more."""
+NEAR_M: Final = 0.35
+"""A candidate is seen again so near to where it is foretold."""
+LOST_S: Final = 1.0
+"""A candidate not seen for longer must be held against the motion sensors anew."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CandidateView:
+    """A candidate in one picture."""
+
+    seen: VisionMeasurement
+    pose: RelativePose
+
+
+class MotionHypothesis:
+    """How one model of a candidate's motion foretells its pictures."""
+
+    def __init__(self, config: RelativeConfig, leds_in_b: Array, rest: Array | None) -> None:
+        """`rest` (3,): specific force in b [m/s²] of what rests; None: the robot's samples."""
+        self._track, self._rest = RelativeTrack(config, leds_in_b), rest
+        self._config = config
+        self._begun = False
+
+    def place_at(self, t: float) -> Array:
+        """Where it is foretold at the stamp `t` [s] (3,) [m]."""
+        track = self._track
+        t += float(track.newest.x[X_OFFSET])
+        p: Array = track.predicted(max(t, track.base.t)).x[0:3]
+        return p
+
+    def judge(self, view: CandidateView, imus: ImuStreams) -> float:
+        """Log-likelihood of a view, but for a constant; 0 for the first one of all."""
+        track = self._track
+        self._take_in(track.phone, imus.phone, None)
+        self._take_in(track.body, imus.body, self._rest)
+        t = view.seen.t + float(track.newest.x[X_OFFSET])
+        if not self._begun or t <= track.base.t:
+            return self._begin(view)
+        here = track.predicted(t)
+        S = track.in_picture(here) + view.pose.covariance
+        off = np.append(view.pose.p_bc_in_c - here.x[0:3], log(here.R.T @ view.pose.R_cb))
+        chi2 = float(off @ np.linalg.solve(S, off))
+        likelihood = -0.5 * (chi2 + float(np.linalg.slogdet(S)[1]))
+        if not np.isfinite(track.fuse(here, view.seen, len(view.seen.rays))):
+            return self._begin(view)
+        track.settle(t - SETTLED_S)
+        return likelihood
+
+    def _begin(self, view: CandidateView) -> float:
+        self._track.begin(first_checkpoint(view.seen, None, view.seen.t, self._config))
+        self._begun = True
+        return 0.0
+
+    def _take_in(self, own: ImuStream, felt: ImuStream, rest: Array | None) -> None:
+        """Samples that are new."""
+        times = felt.times
+        first = int(np.searchsorted(times, own.newest, side="right"))
+        if not len(own):  # no more than the first picture needs
+            first = max(0, int(np.searchsorted(times, felt.newest - LOST_S)))
+        for t, row in zip(times[first:], felt.values[first:], strict=True):
+            rate, force = (row[:3], row[3:]) if rest is None else (np.zeros(3), rest)
+            self._track.insert(own, float(t), rate, force)
+
+
+class RobotCandidate:
+    """One that looks like the robot."""
+
+    def __init__(self, leds_in_b: Array, view: CandidateView) -> None:
+        """First seen at `view`."""
+        self._leds_in_b, self._last = leds_in_b, view
+        self._models: list[MotionHypothesis] = []
+        """Ours, then still and free; none before anything was felt."""
+        self._evidence = 0.0
+        self.is_far = False
+        """It was seen where ours can't be."""
+
+    @property
+    def t(self) -> float:
+        """When it was last seen [s]."""
+        return self._last.seen.t
+
+    def odds(self, t: float) -> float:
+        """Logarithm of the odds at `t` [s] that it is ours; out of sight nothing speaks for it."""
+        return self._evidence if t - self.t < LOST_S else min(self._evidence, 0.0)
+
+    def see(self, view: CandidateView, imus: ImuStreams | None, up_in_c: Array | None) -> None:
+        """Again; without motion sensors or the vertical (3,) nothing is learnt."""
+        self._last = view
+        if imus is None or up_in_c is None or not np.isfinite(view.pose.covariance).all():
+            self._models = []
+            return
+        if not self._models:
+            rest = GRAVITY * view.pose.R_cb.T @ up_in_c
+            models = ((OURS, None), (OURS, rest), *((config, rest) for config in FREE))
+            self._models = [MotionHypothesis(c, self._leds_in_b, force) for c, force in models]
+        ours, *others = (model.judge(view, imus) for model in self._models)
+        odds = min(max(ours - max(others), -MOST), MOST)
+        self._evidence = MEMORY * self._evidence + odds
+
+    def is_near(self, view: CandidateView) -> bool:
+        """Whether it could be what is seen now."""
+        t, last = view.seen.t, self._last.pose
+        if not 0.0 < t - self.t < LOST_S:
+            return False
+        foretold = last.p_bc_in_c if not self._models else self._models[0].place_at(t)
+        off = view.pose.p_bc_in_c - foretold
+        return bool(off @ off < NEAR_M**2)
+
+    def is_at(self, view: CandidateView) -> bool:
+        """Whether that was how it looked last."""
+        return self._last is view
+
+
+def are_felt(imus: ImuStreams, t: float) -> bool:
+    """Whether both sensors' samples reach the time `t` [s]."""
+    return all(stream.between(t - MAX_GAP_S, t) is not None for stream in imus.both)

@@ -1,0 +1,95 @@
+"""Which of those that look like the robot is ours: by its place, by its motion, or none yet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from pipeline.frames import Array
+from pipeline.imu_stream import ImuStreams
+from pipeline.vision.last_pose import PossiblePlace
+from pipeline.vision.motion_hypotheses import (
+    CONTRARY,
+    DECISIVE,
+    CandidateView,
+    RobotCandidate,
+    are_felt,
+)
+
+REMEMBERED_S: Final = 10.0
+"""Another robot that was seen so recently is still there."""
+TWO = "Two robots seen: move yours a little, so that it shows which one it is."
+ELSEWHERE = "A robot seen, but where yours can't be: if it is yours, move it a little."
+
+
+class RobotIdentity:
+    """Remembers what looked like the robot until one of them is."""
+
+    def __init__(self, leds_in_b: Array, imus: ImuStreams | None) -> None:
+        """LEDs (n, 3) [m]; without motion sensors only a place can tell."""
+        self._leds_in_b, self._imus = leds_in_b, imus
+        self._candidates: list[RobotCandidate] = []
+        self.reason = ""
+        """Why none was told of those seen; empty if one was."""
+
+    def forget(self) -> None:
+        """Ours was found: whatever else there is does not matter."""
+        self._candidates.clear()
+
+    def which(
+        self,
+        t: float,
+        views: Sequence[CandidateView],
+        reach: PossiblePlace | None,
+        up_in_c: Array | None,
+    ) -> int | None:
+        """Index of ours among what looks like the robot in the picture of `t` [s]; None: unknown.
+
+        Args:
+            t: Of the picture.
+            views: All of them.
+            reach: Where ours may be; None: anywhere.
+            up_in_c: Opposite of gravity (3,); None if unknown.
+        """
+        self.reason = ""
+        if not views:
+            return None
+        recent = (one for one in self._candidates if 0.0 < t - one.t < REMEMBERED_S)
+        self._candidates = list(recent)
+        known = [self._again(view) for view in views]
+        near = [
+            k
+            for k, (view, one) in enumerate(zip(views, known, strict=True))
+            if reach is not None and reach.holds(view.pose) and not (one and one.is_far)
+        ]
+        if len(near) == 1 or (reach is None and len(views) == 1 and self._is_alone(known[0])):
+            return near[0] if near else 0
+        for k, view in enumerate(views):
+            candidate = known[k] or RobotCandidate(self._leds_in_b, view)
+            if known[k] is None:
+                self._candidates.append(candidate)
+            candidate.is_far = reach is not None and (candidate.is_far or k not in near)
+            candidate.see(view, self._imus if self._can_tell(t, up_in_c) else None, up_in_c)
+        ours = self._proven(t)
+        self.reason = "" if ours is not None else TWO if len(self._candidates) > 1 else ELSEWHERE
+        return None if ours is None else next(k for k, x in enumerate(views) if ours.is_at(x))
+
+    def _can_tell(self, t: float, up_in_c: Array | None) -> bool:
+        return up_in_c is not None and self._imus is not None and are_felt(self._imus, t)
+
+    def _again(self, view: CandidateView) -> RobotCandidate | None:
+        """What was seen before, if this is it."""
+        return next((one for one in self._candidates if one.is_near(view)), None)
+
+    def _is_alone(self, candidate: RobotCandidate | None) -> bool:
+        return all(one is candidate for one in self._candidates)
+
+    def _proven(self, t: float) -> RobotCandidate | None:
+        """What moves as ours does and as no other one."""
+        *others, best = sorted(self._candidates, key=lambda one: one.odds(t))
+        if best.t != t:
+            return None
+        if best.is_far or not others:
+            return best if best.odds(t) > DECISIVE else None
+        clear = best.odds(t) - others[-1].odds(t) > DECISIVE
+        return best if clear and best.odds(t) > CONTRARY else None

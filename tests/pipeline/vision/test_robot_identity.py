@@ -1,0 +1,77 @@
+"""Which of two robots of one kind is ours: by motion or by place, else nobody is told."""
+
+import numpy as np
+import pytest
+
+from hardware.sim.scenes.motion import START_S
+from hardware.sim.scenes.video import RATE_HZ
+from pipeline.vision.last_pose import PossiblePlace
+from pipeline.vision.robot_identity import ELSEWHERE, REMEMBERED_S, TWO
+from tests.pipeline.twins import BOTH, Twins
+
+OURS, OTHER = (True, False), (False, True)
+SEEDS = range(2)
+
+
+def first_told(twins, pictures, **how):
+    """Number of the first picture that tells a robot, and whether it is ours."""
+    for k in range(pictures):
+        told = twins.look(k, **how)
+        if told.is_ours is not None:
+            return k, told.is_ours
+        assert told.reason in (TWO, ELSEWHERE)
+    return None
+
+
+@pytest.mark.parametrize("resting", [(False, False), (True, False), (False, True)])
+def test_whoever_moves_the_motion_of_ours_tells_it(resting):
+    for seed in SEEDS:
+        k, is_ours = first_told(Twins(seed, resting), 60)
+        assert is_ours
+        assert k >= 3
+
+
+def test_while_both_rest_nobody_is_told():
+    for seed in SEEDS:
+        twins = Twins(seed, (True, True))
+        for k in range(60):
+            told = twins.look(k)
+            assert (told.looks, told.is_ours, told.reason) == (2, None, TWO)
+
+
+def test_without_motion_sensors_nobody_is_told():
+    assert first_told(Twins(0, imus=False), 40) is None
+
+
+def test_who_stands_where_ours_must_be_is_ours_at_once():
+    for seed in SEEDS:
+        twins = Twins(seed, (True, True))
+        reach = PossiblePlace(twins.place(START_S), 0.3)
+        assert twins.look(0, reach=reach).is_ours
+
+
+def test_a_robot_where_ours_cannot_be_is_not_ours_however_long_it_is_seen():
+    for seed in SEEDS:
+        twins = Twins(seed, (True, True))
+        for k in range(60):
+            reach = PossiblePlace(twins.place(START_S + k / RATE_HZ), 0.3 + 0.03 * k)
+            told = twins.look(k, OTHER, reach)
+            assert (told.is_ours, told.reason) == (None, ELSEWHERE)
+
+
+def test_ours_is_believed_elsewhere_once_it_moved_as_it_felt():
+    for seed in SEEDS:
+        wrong = PossiblePlace(np.array([4.0, 2.0, 0.0]), 0.3)
+        k, is_ours = first_told(Twins(seed), 60, shine=OURS, reach=wrong)
+        assert is_ours
+        assert k >= 3
+
+
+def test_the_other_one_alone_is_remembered_and_not_taken_for_ours():
+    for seed in SEEDS:
+        twins = Twins(seed, (True, True))
+        twins.look(0, BOTH)
+        for k in range(1, 40):
+            assert twins.look(k, OTHER).is_ours is None
+        late = 40 + round((REMEMBERED_S + 1.0) * RATE_HZ)
+        assert twins.look(late, OURS).is_ours
