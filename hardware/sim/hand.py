@@ -168,6 +168,11 @@ def recorded(path: Path) -> MotionComponent:
     return Keyed(make_interp_spline(rows[:, 0] - rows[0, 0], x, k=5, bc_type=(still, still)))
 
 
+def hovering(rng: np.random.Generator, p_bf_in_f: Array, rpy: Array) -> MovingHand:
+    """A robot that flies on the spot about `p_bf_in_f` (3,) [m], turned by `rpy` (3,) [rad]."""
+    return MovingHand((three_poles(rng, 0.3, 0.03, 1.5), tremor(rng)), p_bf_in_f, rpy, 0.0)
+
+
 def make_hand(
     kind: str,
     *,

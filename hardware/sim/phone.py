@@ -12,7 +12,7 @@ import numpy as np
 from hardware.sim.camera_faults import CameraFault, FaultyCamera
 from hardware.sim.hand import Hand
 from hardware.sim.phone_faults import SensorFault, spoilt_force, spoilt_rate
-from hardware.sim.render import RenderOptions, render
+from hardware.sim.render import RelativePoseAt, RenderOptions, render
 from pipeline.camera.lens import Camera
 from pipeline.frames import GRAVITY, Array, R_cd, exp, log, wxyz_from_R
 from pipeline.signals import Image
@@ -163,13 +163,15 @@ class VirtualPhone:
         options: PhoneOptions = PhoneOptions(),
         clock: PhoneClock = PhoneClock(),
         hidden: Callable[[float], Sequence[int]] = lambda _: (),
+        twin: BodyHistory | None = None,
     ) -> None:
         """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says.
 
         The camera's mounting is the truth, whatever a calibration knows of it.
-        `hidden` gives the LEDs that something covers at a time [s].
+        `hidden` gives the LEDs that something covers at a time [s], `twin` where another robot of
+        the same kind is.
         """
-        self._hidden = hidden
+        self._hidden, self._twin = hidden, twin
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
         self._leds_in_b, self._look = leds_in_b, look
         schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
@@ -226,11 +228,12 @@ class VirtualPhone:
         if self._last is not None and moment == self._last[0]:
             return self._last[1]
 
-        def pose(dt: float) -> tuple[Array, Array]:
-            return self.relative_pose(moment + dt, body)
+        def seen_as(robot: BodyHistory) -> RelativePoseAt:
+            return lambda dt: self.relative_pose(moment + dt, robot)
 
         shown = np.delete(self._leds_in_b, list(self._hidden(moment)), axis=0)
-        image = render(seen_by, pose, shown, self._look, self._picture_rng)
+        others = [] if self._twin is None else [(seen_as(self._twin), self._leds_in_b)]
+        image = render(seen_by, seen_as(body), shown, self._look, self._picture_rng, others)
         self._last = moment, image
         return image
 

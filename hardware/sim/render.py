@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
@@ -49,12 +49,13 @@ def render(
     leds_in_b: Array,
     look: RenderOptions,
     rng: np.random.Generator,
+    others: Sequence[tuple[RelativePoseAt, Array]] = (),
 ) -> Image:
-    """Luma (height, width), full range, sRGB-like gamma."""
+    """Luma (height, width), full range, sRGB-like gamma; `others` are robots with LEDs (n, 3)."""
     room, noise = _stage(camera.width, camera.height, look)
     du, dv = rng.integers(0, BANK, 2)
     image = room.copy()
-    for patch, v, u in _lights(camera, pose, leds_in_b, look):
+    for patch, v, u in _lights(camera, ((pose, leds_in_b), *others), look):
         v1, u1 = max(v, 0), max(u, 0)
         v2, u2 = min(v + len(patch), camera.height), min(u + patch.shape[1], camera.width)
         if v1 < v2 and u1 < u2:
@@ -66,20 +67,22 @@ def render(
 
 
 def _lights(
-    camera: Camera, pose: RelativePoseAt, leds_in_b: Array, look: RenderOptions
+    camera: Camera, robots: Sequence[tuple[RelativePoseAt, Array]], look: RenderOptions
 ) -> list[tuple[Array, int, int]]:
     """Patches of light with the row and column of their corner."""
     lights: list[tuple[Array, int, int]] = []
     times = (np.arange(look.sub_exposures) + 0.5) / look.sub_exposures - 0.5
-    pose = cache(pose)
-    delays = _row_delays(camera, pose, leds_in_b, look)
-    for led, delay in zip(leds_in_b, delays, strict=True):
-        seen = [
-            _projected(camera, pose(delay + t * look.exposure_s), led[None], look) for t in times
-        ]
-        track = [(uv[0], float(radius[0])) for uv, radius in seen if radius[0] > 0.0]
-        if track:
-            lights.append(_patch(track, look.led_light, look.sub_exposures, look))
+    for robot, leds_in_b in robots:
+        pose = cache(robot)
+        delays = _row_delays(camera, pose, leds_in_b, look)
+        for led, delay in zip(leds_in_b, delays, strict=True):
+            seen = [
+                _projected(camera, pose(delay + t * look.exposure_s), led[None], look)
+                for t in times
+            ]
+            track = [(uv[0], float(radius[0])) for uv, radius in seen if radius[0] > 0.0]
+            if track:
+                lights.append(_patch(track, look.led_light, look.sub_exposures, look))
     lamps = np.random.default_rng(look.distractors)
     for _ in range(look.distractors):
         place = lamps.uniform(0.02, 0.98, 2) * (camera.width, camera.height)

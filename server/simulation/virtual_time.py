@@ -17,7 +17,7 @@ import numpy as np
 from hardware.camera_file import find_camera
 from hardware.codec import Encoder
 from hardware.robot_file import RobotFile
-from hardware.sim.hand import Hand, make_hand
+from hardware.sim.hand import Hand, hovering, make_hand
 from hardware.sim.led_sensor_model import LedSensorModel
 from hardware.sim.phone import EventKind, PhoneClock, PhoneOptions, VirtualPhone
 from hardware.sim.plant.plant import PlantOptions
@@ -53,6 +53,8 @@ from server.simulation.trace import TrackingEvaluator, TrackingTrace
 from server.virtual_phone.phone_script import DEVICE, PhoneScript, VirtualOperator
 
 EVERY_TICKS = {"ping": 10, "touch": 7, "ready": 20, "status": 4}
+BESIDE = np.array([0.1, -0.8, 0.0])
+"""Where another robot flies [m], in f."""
 NETWORK_TICKS = 2
 """10 ms one way for what is small."""
 
@@ -80,6 +82,8 @@ class SimulationOptions:
     """... and whether the camera's file says it."""
     hidden: tuple[tuple[float, float, tuple[int, ...]], ...] = ()
     """From when to when [s] which LEDs can't be seen."""
+    twin: bool = False
+    """Another robot of the same kind flies beside, in rendered pictures."""
     led_noise_px: float | None = None
     """None: pictures are rendered and looked at; else LEDs' rays come with this noise instead."""
     camera: Camera | None = None
@@ -351,6 +355,9 @@ def make_script(
         np.random.default_rng((scene.seed, 3)),
         sensors,
         hidden=scene.hidden_at,
+        twin=hovering(np.random.default_rng((scene.seed, 13)), BESIDE, np.zeros(3)).pose
+        if scene.twin
+        else None,
     )
     size = camera.width, camera.height
     encoder = Encoder(*size, sensors.frame_rate_hz, scene.bitrate_bps, scene.codec)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hardware.plant_parameters import BodyImuParameters
 from hardware.robot_file import load_robot
-from hardware.sim.hand import MovingHand, steady_wander, three_poles, tremor
+from hardware.sim.hand import MovingHand, hovering, steady_wander, three_poles, tremor
 from hardware.sim.hand_parts import FADE_S, MotionComponent, Waves
 from hardware.sim.phone import PhoneOptions
 from hardware.sim.scenes.scene import HandMotion, Range, Scene
@@ -76,7 +76,7 @@ def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion:
     way = rng.uniform(0.0, 2.0 * np.pi)
     yaw = rng.choice((-1.0, 1.0)) * np.deg2rad(within(rng, scene.yaw_deg))
     rpy = np.array([tilt * np.cos(way), tilt * np.sin(way), yaw])
-    robot = _robot(rng, np.zeros(3), rpy)
+    robot = hovering(rng, np.zeros(3), rpy)
     distance = within(rng, scene.distance_m)
     above = distance * rng.uniform(-0.15, 0.2)
     side = distance * rng.uniform(-0.3, 0.3)
@@ -88,17 +88,13 @@ def movers(scene: Scene, rng: np.random.Generator) -> PhoneAndRobotMotion:
     return PhoneAndRobotMotion(hand, robot, _twin(scene, rng) if scene.twin else None)
 
 
-def _robot(rng: np.random.Generator, place: Array, rpy: Array) -> MovingHand:
-    return MovingHand((three_poles(rng, 0.3, 0.03, 1.5), tremor(rng)), place, rpy, 0.0)
-
-
 def _twin(scene: Scene, rng: np.random.Generator) -> MovingHand:
     """Beside the robot at the origin, turned and tilted as the scene's ranges say."""
     tilt, way = np.deg2rad(within(rng, scene.tilt_deg)), rng.uniform(0.0, 2.0 * np.pi)
     yaw = rng.choice((-1.0, 1.0)) * np.deg2rad(within(rng, scene.yaw_deg))
     side = rng.choice((-1.0, 1.0)) * within(rng, TWIN_M)
     place = np.array([rng.uniform(-0.2, 0.3), side, rng.uniform(-0.1, 0.1)])
-    return _robot(rng, place, np.array([tilt * np.cos(way), tilt * np.sin(way), yaw]))
+    return hovering(rng, place, np.array([tilt * np.cos(way), tilt * np.sin(way), yaw]))
 
 
 def _parts(motion: HandMotion, rng: np.random.Generator) -> tuple[MotionComponent, ...]:

@@ -184,7 +184,7 @@ _ALL: Final = (
         "twin_left",
         "two robots of one kind, of which the own one goes dark",
         twin=True,
-        dark_after_s=1.0,
+        dark_after_s=2.5,
         lamps=(0, 4),
         distance_m=(2.5, 3.0),
         tilt_deg=(0.0, 3.0),

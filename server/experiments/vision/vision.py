@@ -43,7 +43,8 @@ from server.experiments.vision.write import write_film
 
 FRAMES = 90
 FILM_FRAMES, LONG_FILM_FRAMES = 45, 90
-"""Of one film; more frames are more films. Who leaves and returns takes the longer ones."""
+"""Of one film; more frames are more films. Who leaves and returns, or
+has a twin, takes the longer ones."""
 ALL_SIZES = (0, 0)  # no size
 
 
@@ -172,7 +173,7 @@ def _tasks(arguments: argparse.Namespace) -> Iterator[Task]:
             scene = (
                 at_reference(SCENES[name]) if (name in REFERENCE and size == HD) else SCENES[name]
             )
-            is_long = scene.motion is HandMotion.LEAVING or scene.bar
+            is_long = scene.motion is HandMotion.LEAVING or scene.bar or scene.twin
             length = LONG_FILM_FRAMES if is_long else FILM_FRAMES
             for k, begin in enumerate(range(0, arguments.frames, length)):
                 frames = min(length, arguments.frames - begin)

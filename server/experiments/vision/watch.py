@@ -146,7 +146,12 @@ class ChannelRun:
         return wrong
 
     def _see_afresh(self, k: int, shot: RenderedFrame, frame: Frame) -> None:
-        """Now and then somebody starts from nothing, and has a few pictures for it."""
+        """Now and then somebody starts from nothing, and has a few pictures for it.
+
+        Not where another robot shines and ours is dark: who never saw ours can't know better.
+        """
+        if self._film.scene.twin and not shot.visible.any():
+            return
         if k % FRESH_EVERY == 0:
             self._fresh, self._fresh_left, self._fresh_fair = self._new(), FRESH_LOOKS, True
             self._fresh.add_imu(*self._phone, *self._body)

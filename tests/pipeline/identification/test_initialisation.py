@@ -32,6 +32,30 @@ def test_a_sure_explanation_is_told_at_once():
     assert not is_wrong(pose_of(association.fit, 0.0), truth)
 
 
+def test_another_robot_in_other_spots_is_told_beside_the_first_one():
+    rng = np.random.default_rng(87)
+    for gravity in (True, False):
+        truth = truth_at(rng)
+        twin = replace(truth, p=truth.p + np.array([0.3, 0.9, 0.1]))
+        both = np.vstack((truth.pixels(), twin.pixels()))
+        pixels = np.vstack((both, lamps_beside(both, 4, rng)))
+        eye, spots = starting(), spots_of(pixels + rng.normal(0.0, NOISE_PX, pixels.shape))
+        first = eye.step(0.0, spots, hints_of(truth, gravity=gravity), None)
+        (other,) = eye.others
+        told = [pose_of(one.fit, 0.0) for one in (first, other)]
+        assert sorted(is_wrong(pose, truth) for pose in told) == [False, True]
+        assert sorted(is_wrong(pose, twin) for pose in told) == [False, True]
+        assert not set(first.match.spot) & set(other.match.spot)
+
+
+def test_lamps_are_no_other_robot():
+    rng = np.random.default_rng(88)
+    for lamps in (4, 12, 25):
+        truth, eye = truth_at(rng), starting()
+        assert eye.step(0.0, seen(truth, rng, lamps=lamps), hints_of(truth), None) is not None
+        assert eye.others == []
+
+
 def test_four_leds_without_gravity_wait_until_the_robot_has_turned():
     rng = np.random.default_rng(81)
     late = 0

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from pipeline.frames import exp, log
+from pipeline.prediction import Prediction
 from pipeline.signals import RelativePose
-from pipeline.vision.last_pose import FORGET_MISSES, MEMORY_MOST_RAD, LastPose
+from pipeline.vision.last_pose import FORGET_MISSES, MEMORY_MOST_RAD, REACHED_S, LastPose
 
 DT = 1.0 / 30.0
 STILL = np.zeros(3)
@@ -105,3 +106,46 @@ def test_turns_between_pictures_are_told():
     np.testing.assert_allclose(last.turned, [[2.0 * DT, 0.0, 0.0], [0.0, 0.0, 0.0]])
     turned: Any = last.turned
     assert log(exp(turned[0]))[0] == pytest.approx(2.0 * DT)
+
+
+def expected_at(p, sigma_p=0.01):
+    return Prediction(DT, np.asarray(p, dtype=float), np.eye(3), STILL, sigma_p, 0.01)
+
+
+def test_a_robot_is_where_it_was_and_how_far_from_there_grows_by_the_second():
+    omega_c, p = np.array([0.0, -0.4, 0.3]), np.array([2.5, 0.2, 0.1])
+    last, radii = kept(p, omega_c=omega_c), []
+    for k in range(1, 30):
+        last.advance(k * DT, omega_c, STILL)
+        reach = last.reach(None)
+        np.testing.assert_allclose(reach.p_bc_in_c, exp(-omega_c * k * DT) @ p, atol=1e-9)
+        radii.append(reach.radius_m)
+    assert radii[0] < 0.31
+    assert (np.diff(radii) > 0.0).all()
+    assert radii[-1] < 0.8
+
+
+def test_blind_it_may_soon_be_anywhere():
+    seeing, blind = kept(), kept()
+    for k in range(1, 10):
+        seeing.advance(k * DT, STILL, STILL)
+        blind.advance(k * DT, None, None)
+    assert blind.reach(None).radius_m > seeing.reach(None).radius_m + 1.0
+
+
+def test_what_a_filter_expects_says_it_better_even_after_a_pause():
+    last = kept()
+    last.advance(0.9, STILL, STILL)
+    assert last.reach(None) is None
+    reach = last.reach(expected_at((2.4, 0.3, 0.1), 0.02))
+    np.testing.assert_array_equal(reach.p_bc_in_c, (2.4, 0.3, 0.1))
+    assert reach.radius_m == pytest.approx(0.4)
+
+
+def test_who_forgets_or_waits_for_long_excludes_nothing():
+    forgetful, patient = kept(), kept()
+    forgetful.forget()
+    patient.advance(REACHED_S + 1.0, STILL, STILL)
+    expected = expected_at((2.4, 0.3, 0.1))
+    for last in (forgetful, patient, LastPose()):
+        assert last.reach(expected) is None

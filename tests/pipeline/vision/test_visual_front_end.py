@@ -1,5 +1,7 @@
 """VisualFrontEnd: what is known before a frame is as of its own time, by both motion sensors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,7 +44,7 @@ def test_verticals_and_rates_are_those_of_the_frame_not_of_the_newest_samples(fr
 
 @pytest.mark.slow
 def test_when_ours_goes_dark_no_other_one_is_told_instead():
-    film = RenderedVideo(SCENES["twin_left"], 2, VGA, 75)
+    film = RenderedVideo(replace(SCENES["twin_left"], dark_after_s=1.0), 2, VGA, 75)
     eyes, told = VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig()), 0
     for shot in film:
         eyes.add_imu(*shot.phone, *shot.body)

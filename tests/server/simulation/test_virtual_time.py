@@ -72,3 +72,16 @@ def test_late_pictures_and_a_rolling_shutter_are_flown_with(change: dict[str, ob
     assert trace.poses > 0.95 * trace.pictures
     distances = np.linalg.norm(np.array(trace.error_in_f), axis=1)
     assert np.sqrt(np.mean(distances**2)) < 0.02
+
+
+@pytest.mark.slow
+def test_of_two_robots_in_the_picture_the_right_one_is_led_even_when_it_goes_dark() -> None:
+    dark = ((3.6, 4.0, (0, 1, 2, 3, 4)),)
+    scene = SimulationOptions(hand="moving", seed=7, codec="jpeg", twin=True, hidden=dark)
+    flight = VirtualTimeSimulation(load_robot("ames"), TeleopConfig(), scene)
+    trace = flight.run(5.5)
+    assert trace.left == ""
+    assert trace.t[-1] > 5.4
+    errors = np.linalg.norm(np.array(trace.estimate_error_in_c), axis=1)
+    assert errors.max() < 0.05
+    assert np.linalg.norm(np.array(trace.error_in_f), axis=1).max() < 0.1
