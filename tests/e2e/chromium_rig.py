@@ -15,7 +15,7 @@ from hardware.sim.hand import make_hand
 from server.diagnostics.garbage import held
 from server.experiments.vision.write import camera_text
 from tests.e2e.chromium_phone import ChromiumPhone, browser
-from tests.e2e.flight_log import Flight, FlightLog
+from tests.e2e.flight_log import Flight, FlightLog, to_its_end
 from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone
 from tests.e2e.serving import DEVICE, Serving, serving
 
@@ -32,8 +32,6 @@ MAY_ARM = """
 IS_ARMED = r"/\bARMED\b/.test(document.body.innerText)"
 MOST_TAPS = 3
 """On Arm: a page that has just begun stutters, and a robot is not armed on a stutter."""
-MOST_FLIGHTS = 4
-"""Tried for one that is wanted, on a machine that is proven to have been away each time."""
 
 
 def calibrate(folder: Path, device: str = DEVICE) -> Path:
@@ -109,16 +107,7 @@ def flown(
     Raises:
         AssertionError: it did not, and the machine was there; or it was away too often.
     """
-    for left in reversed(range(MOST_FLIGHTS)):
-        one = flight(phone, server, seconds, meanwhile)
-        if not one.ended:
-            return one
-        print(one.account())
-        phone.let_go()
-        if not one.excuse or not left:
-            break
-        print(f"once more, {left} left, for the machine was away:", *map(str, one.excuse))
-    raise AssertionError(one.account())
+    return to_its_end(lambda: flight(phone, server, seconds, meanwhile), phone.let_go)
 
 
 @contextlib.contextmanager

@@ -147,10 +147,10 @@ class Firefox:
 
 
 @contextlib.contextmanager
-def firefox(executable: str) -> Iterator[Firefox]:
-    """A Firefox with a profile of its own, ended at the end."""
+def firefox(executable: str, **prefs: object) -> Iterator[Firefox]:
+    """A Firefox with a profile of its own and further `prefs`, ended at the end."""
     profile = Path(tempfile.mkdtemp(prefix="lightleash-firefox-"))
-    lines = [f"user_pref({json.dumps(k)}, {json.dumps(v)});" for k, v in PREFS.items()]
+    lines = [f"user_pref({json.dumps(k)}, {json.dumps(v)});" for k, v in (PREFS | prefs).items()]
     (profile / "user.js").write_text("\n".join(lines))
     log = (profile / "firefox.log").open("wb")
     command = [executable, "--headless", "--no-remote", "--remote-debugging-port", "0"]

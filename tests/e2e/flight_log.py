@@ -6,6 +6,7 @@ import contextlib
 import json
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -26,6 +27,8 @@ CAUSE_S = 1.0
 """Between a hole and what it led to."""
 SHOWN_S = 0.05
 WAITED = "armed_stall_waited_ms"
+MOST_FLIGHTS = 4
+"""Tried for one that is wanted, on a machine that is proven to have been away each time."""
 KEPT = ("mode", "reason", "server")
 
 
@@ -69,6 +72,10 @@ class FlightLog:
         self.said.append(said)
         self._has_followed |= said.mode == "TRACK"
         self.is_over = self._has_followed and said.mode in (*AT_REST, "RAMP")
+
+    def request(self, what: str) -> None:
+        """Ask for something, as the page's buttons do."""
+        self._page.send(json.dumps({"type": "command", "what": what}))
 
     def close(self) -> None:
         """Leave."""
@@ -143,3 +150,21 @@ class Flight:
             for hole in sorted(shown, key=lambda hole: hole.t)
         ]
         return "\n".join(lines)
+
+
+def to_its_end(fly: Callable[[], Flight], let_go: Callable[[], object]) -> Flight:
+    """The first flight that reaches its end, again as long as the machine was proven to be away.
+
+    Raises:
+        AssertionError: one did not, and the machine was there; or it was away too often.
+    """
+    for left in reversed(range(MOST_FLIGHTS)):
+        one = fly()
+        if not one.ended:
+            return one
+        print(one.account())
+        let_go()
+        if not one.excuse or not left:
+            break
+        print(f"once more, {left} left, for the machine was away:", *map(str, one.excuse))
+    raise AssertionError(one.account())
