@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Generator
-from math import inf
 
 # Before NumPy is loaded: threads of linear algebra that wait for each other burn the processor of
 # whoever tests beside them; a law of 0.6 s took 30 s of it.
@@ -14,34 +13,16 @@ os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ
 import matplotlib
 import pytest
 from hypothesis import settings
-from numba.core import event
 
 matplotlib.use("agg")  # no test needs a display
 
+pytest_plugins = ["tests.cost"]
 IS_CI = bool(os.environ.get("CI"))
-DEAR = ("slow", "e2e", "bench")
 
 # A busy machine is not a failed law: examples have no deadline. In CI they are the same each time.
 settings.register_profile("default", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if IS_CI else "default")
-
-
-class Compilations(event.Listener):
-    """Counts kernels that are compiled: a fresh clone's tests do that, once."""
-
-    count = 0
-
-    def on_start(self, event: event.Event) -> None:
-        """Another one."""
-        self.count += 1
-
-    def on_end(self, event: event.Event) -> None:
-        """Done."""
-
-
-COMPILATIONS = Compilations()
-event.register("numba:compile", COMPILATIONS)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -53,27 +34,6 @@ def pytest_runtest_makereport(
     if IS_CI and report.skipped and not hasattr(report, "wasxfail"):
         report.outcome, report.longrepr = "failed", f"skipped in CI: {reason_of(report)}"
     return report
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """What `make fast` asks of tests that are not marked slow."""
-    words = "CPU time a test may take that is not marked slow, compiling aside"
-    parser.addoption("--most-cpu-s", type=float, default=inf, metavar="S", help=words)
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call(item: pytest.Item) -> Generator[None]:
-    """A test that computes for long is not for those who wait."""
-    most, began, compiled = item.config.getoption("--most-cpu-s"), cpu_s(), COMPILATIONS.count
-    yield
-    took, is_dear = cpu_s() - began, any(map(item.get_closest_marker, DEAR))
-    if took > most and not is_dear and COMPILATIONS.count == compiled:
-        pytest.fail(f"{took:.2f} s of CPU time, more than {most:g}: mark it slow, or cut it")
-
-
-def cpu_s() -> float:
-    """Of this process, and of its children that have ended [s]."""
-    return sum(os.times()[:4])
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

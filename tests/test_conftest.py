@@ -1,7 +1,8 @@
-"""What can't run here is told at the end, and has failed in CI."""
+"""What can't run here is told at the end and fails in CI; what is dear is not for who waits."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -40,10 +41,11 @@ def ran(folder: Path, ci: str, *words: str, tests: str = TESTS) -> tuple[int, st
     (folder / "conftest.py").write_text((ROOT / "tests/conftest.py").read_text())
     (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n    slow\n")
     (folder / "test_some.py").write_text(tests)
+    unlearnt = () if "--within-s" in words else ("-p", "no:cacheprovider")
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *words, "test_some.py"],
+        [sys.executable, "-m", "pytest", "-q", *unlearnt, "test_some.py", *words],
         cwd=folder,
-        env={**os.environ, "CI": ci},
+        env={**os.environ, "CI": ci, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
     )
@@ -77,3 +79,39 @@ def test_a_test_that_computes_for_long_without_saying_so_fails_where_people_wait
 @pytest.mark.slow
 def test_what_compiling_takes_is_nobodys_fault(tmp_path: Path) -> None:
     assert ran(tmp_path, "", "--most-cpu-s", "0.01", tests=COMPILES)[0] == 0
+
+
+def learnt(folder: Path) -> Path:
+    return folder / ".pytest_cache/v/cost/test_some.py"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [(), ("-n", "1")], ids=["one process", "workers"])
+def test_what_tests_cost_is_learnt_by_running_them(tmp_path: Path, words: tuple[str, ...]) -> None:
+    assert ran(tmp_path, "", "--within-s", "500", *words, tests=BUSY)[0] == 0
+    costs = json.loads(learnt(tmp_path).read_text())
+    assert costs["test_computes"] > 0.29
+    assert costs["test_waits"] < 0.1
+
+
+@pytest.mark.slow
+def test_where_time_is_short_the_dear_are_left_out_and_counted_and_new_files_come_first(
+    tmp_path: Path,
+) -> None:
+    learnt(tmp_path).parent.mkdir(parents=True)
+    known = {"test_quick": 1.0, "test_computes": 300.0, "test_computes_and_says_so": 400.0}
+    learnt(tmp_path).write_text(json.dumps({"test_waits": 1.0, **known}))
+    (tmp_path / "test_tidings.py").write_text("def test_new(): pass")
+    code, told = ran(tmp_path, "", "--within-s", "250", "-vv", "test_tidings.py", tests=BUSY)
+    assert code == 0
+    assert "3 passed, 2 deselected" in told
+    assert "2 dear tests left out, 300.000 s and more: `make test` runs them" in told
+    assert told.index("test_new") < told.index("test_quick")
+
+
+@pytest.mark.slow
+def test_what_no_time_is_left_for_is_skipped_and_not_taken_for_cheap(tmp_path: Path) -> None:
+    code, told = ran(tmp_path, "", "--within-s", "0", tests=BUSY)
+    assert code == 0
+    assert "NOT TESTED HERE: no time was left, next time first (4)" in told
+    assert not learnt(tmp_path).exists()
