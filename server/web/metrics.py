@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from math import radians
 
 from prometheus_client import CollectorRegistry, Gauge, generate_latest
+from prometheus_client.core import CounterMetricFamily, Metric
+from prometheus_client.registry import Collector
 
 from pipeline.signals import Mode
 from server.protocol.messages import Estimate, Status
@@ -14,7 +17,7 @@ from server.web.status import build
 
 
 def exposition(manager: SessionManager) -> bytes:
-    """The present status in Prometheus' text format."""
+    """What was counted so far, and the present status, in Prometheus' text format."""
     registry, status = CollectorRegistry(), build(manager)
     mode = Gauge("lightleash_mode", "1 for the present mode", ["mode"], registry=registry)
     for name in (*Mode.__members__, "LOST"):
@@ -23,15 +26,11 @@ def exposition(manager: SessionManager) -> bytes:
         "lightleash_stream_age_seconds", "of the newest item", ["stream"], registry=registry
     )
     rate = Gauge("lightleash_stream_rate_hertz", "items a second", ["stream"], registry=registry)
-    lost = Gauge("lightleash_stream_dropped", "items dropped", ["stream"], registry=registry)
+    registry.register(_Totals(status))
     for name, stream in status.streams.items():
         if stream.age_ms is not None:
             age.labels(name).set(1e-3 * stream.age_ms)
         rate.labels(name).set(stream.rate_hz)
-        lost.labels(name).set(stream.dropped)
-    latency = Gauge("lightleash_latency_seconds", "by stage", ["stage"], registry=registry)
-    for name, ms in status.latency_ms.items():
-        latency.labels(name).set(1e-3 * ms)
     control = Gauge(
         "lightleash_control", "lateness [ms] and missed ticks", ["figure"], registry=registry
     )
@@ -47,7 +46,30 @@ def exposition(manager: SessionManager) -> bytes:
         error.set(1e-3 * status.error_mm)
     if status.estimate is not None:
         _estimate(status.estimate, status, registry)
-    return generate_latest(registry)
+    return generate_latest(manager.tally.registry) + generate_latest(registry)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Totals(Collector):
+    """What others have counted since they started; control's begin again with it."""
+
+    status: Status
+
+    def collect(self) -> Iterable[Metric]:
+        """Each as a counter."""
+        dropped = CounterMetricFamily(
+            "lightleash_stream_dropped", "items superseded, too old or refused", labels=["stream"]
+        )
+        for name, stream in self.status.streams.items():
+            dropped.add_metric([name], stream.dropped)
+        yield dropped
+        if (told := self.status.estimate) is not None:
+            pictures = CounterMetricFamily(
+                "lightleash_estimate_pictures", "late ones are dropped ones", labels=["fate"]
+            )
+            for fate in ("fused", "dropped", "late"):
+                pictures.add_metric([fate], getattr(told, fate))
+            yield pictures
 
 
 def _estimate(told: Estimate, status: Status, registry: CollectorRegistry) -> None:
@@ -59,11 +81,6 @@ def _estimate(told: Estimate, status: Status, registry: CollectorRegistry) -> No
     for name, words, value, unit in _estimate_figures(told, status):
         if value is not None:
             Gauge(f"lightleash_estimate_{name}", words, registry=registry).set(unit * value)
-    pictures = Gauge(
-        "lightleash_estimate_pictures", "late ones are dropped ones", ["fate"], registry=registry
-    )
-    for fate in ("fused", "dropped", "late"):
-        pictures.labels(fate).set(getattr(told, fate))
     bias = Gauge(
         "lightleash_estimate_bias", "[rad/s] or [m/s²]", ["sensor", "axis"], registry=registry
     )

@@ -22,6 +22,7 @@ from server.diagnostics.blame import Blame
 from server.diagnostics.events import Events
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
+from server.diagnostics.tally import Tally
 from server.media.decoding import Decoding
 from server.phone.calibration_control import CalibrationControl
 from server.phone.client_connection import ClientConnection
@@ -78,7 +79,7 @@ class SessionManager:
         self.supervisors: set[ClientConnection] = set()
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
-        self._events = Events()
+        self._events, self.tally = Events(), Tally()
         self._last_mode = self._last_complaint = ""
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
@@ -298,6 +299,7 @@ class SessionManager:
             self.log_event(complaint)
         self._last_complaint = complaint
         self._shown = status
+        self.tally.see(status)
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
             self.log_event(paused)
         if self._decoding is not None and (ended := self._decoding.news(now())):

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
+import yaml
+from msgspec.structs import replace
 from prometheus_client.parser import text_string_to_metric_families
 
 from pipeline.signals import Mode
+from server import __version__
 from server.common.clock import now
 from server.diagnostics.pauses import Stall
+from server.diagnostics.tally import Tally
+from server.protocol.messages import Stream
 from server.web.metrics import exposition
+from server.web.status import build
 from tests.server.house import control_status, estimate_fields, house_in
+
+ALERTS = Path(__file__).parents[3] / "deploy" / "alerts.yaml"
 
 
 @pytest.fixture
@@ -51,7 +62,39 @@ def test_lateness_ages_and_the_error_are_told_in_si_units(manager):
     assert found["lightleash_control", "missed"] == 3.0
     assert found["lightleash_stream_rate_hertz", "body_imu"] == 200.0
     assert 0.0 < found["lightleash_stream_age_seconds", "body_imu"] < 1.0
-    assert found["lightleash_stream_dropped", "control"] == 4.0
+    assert found["lightleash_stream_dropped_total", "control"] == 4.0
+
+
+def test_what_a_server_saw_is_counted_and_latencies_are_kept_while_pictures_come(manager):
+    shown = build(manager)
+    manager.tally = Tally()
+    fresh, old = Stream(30.0, 30.0), Stream(500.0, 0.0)
+    for mode, video in (("TRACK", fresh), ("TRACK", fresh), ("HOLD", old), ("TRACK", fresh)):
+        streams, told = {"video": video}, {"decode": 4.0}
+        manager.tally.see(replace(shown, mode=mode, streams=streams, latency_ms=told))
+    found = samples(manager)
+    assert found["lightleash_mode_entered_total", "TRACK"] == 2.0
+    assert found["lightleash_mode_entered_total", "HOLD"] == 1.0
+    assert found["lightleash_latency_seconds_count", "decode"] == 3.0
+    assert found["lightleash_latency_seconds_bucket", "0.002", "decode"] == 0.0
+    assert found["lightleash_latency_seconds_bucket", "0.005", "decode"] == 3.0
+    assert found["lightleash_build_info", __version__] == 1.0
+    assert found[("process_open_fds",)] > 0.0
+
+
+def test_alerts_speak_of_figures_that_are_told(manager):
+    tell(manager, estimate=estimate_fields())
+    manager.tally.see(build(manager))
+    told = {name for name, *_ in samples(manager)} | {"up", "lightleash_latency_seconds_bucket"}
+    rules = [
+        rule for group in yaml.safe_load(ALERTS.read_text())["groups"] for rule in group["rules"]
+    ]
+    assert len(rules) >= 5
+    for rule in rules:
+        named = set(re.findall(r"\b(?:up|(?:lightleash|process)_\w+)", rule["expr"]))
+        assert named
+        assert named <= told, rule["alert"]
+        assert rule["annotations"]["summary"].endswith(".")
 
 
 def test_pauses_of_the_server_are_told(manager):
@@ -88,7 +131,7 @@ def test_the_estimators_telemetry_is_told_in_si_units(manager):
     assert found[("lightleash_estimate_time_offset_seconds",)] == pytest.approx(-0.012)
     assert found[("lightleash_estimate_sigma_metres",)] == pytest.approx(0.003)
     for fate, count in {"fused": 90.0, "dropped": 4.0, "late": 3.0}.items():
-        assert found["lightleash_estimate_pictures", fate] == count
+        assert found["lightleash_estimate_pictures_total", fate] == count
     told = found["lightleash_estimate_bias", "y", "phone_gyroscope"]
     assert told == pytest.approx(-0.02, abs=1e-4)
 
