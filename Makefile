@@ -9,12 +9,13 @@
 #: make mutants do tests notice small changes in what keeps a robot safe?  (ARGS="FILE --all")
 #: make hooks   let git run the quick checks before each commit
 #: make lock    write requirements/*.txt anew from pyproject.toml (UPGRADE=1: newest versions)
+#: make image   build the container image and try it: by Docker, or by buildah without an engine
 #: make clean   remove .venv, node_modules and caches
 #: Needs Python 3.11 or later and make; uses uv where there is one. PYTHON=... picks the Python.
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
-.PHONY: fast-server fast-others fuzz test-all mutants hooks lock clean
+.PHONY: fast-server fast-others fuzz test-all mutants hooks lock image clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -146,6 +147,9 @@ lock: dev
 COMPILE := --quiet --universal --python-version 3.11 --only-binary :all: --generate-hashes \
 	--no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" \
 	$(if $(UPGRADE),--upgrade)
+
+image:
+	deploy/make_image.sh
 
 clean:
 	rm -rf .venv web_client/node_modules build dist .mypy_cache .pytest_cache .ruff_cache \
