@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import os
+import platform
 import queue
 import socket
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 
+from server import __version__
 from server.common.access import PhoneClientError, access_of, add_access_arguments
+from server.common.clock import wall
 from server.common.options import Parser
 from server.common.settings import state_directory
 from server.diagnostics.link_check import LEAST_S
@@ -156,8 +161,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = Parser(prog="lightleash doctor", description=__doc__)
     parser.add_argument("--phone", action="store_true", help="of the running server: its link")
     parser.add_argument("--seconds", type=float, help="to listen (60), or of the 200 Hz test (3)")
+    parser.add_argument("--json", action="store_true", help="for programs, or to send to somebody")
     add_access_arguments(parser)
     arguments = parser.parse_args(argv)
+    if arguments.phone and arguments.json:
+        parser.error("--json: not with --phone")
     if arguments.phone:
         return _phone(parser, arguments)
     seconds = 3.0 if arguments.seconds is None else arguments.seconds
@@ -169,12 +177,30 @@ def main(argv: Sequence[str] | None = None) -> int:
         codecs,
         cameras,
     ]
-    broken = False
-    for check in checks:
-        for finding in check():
-            broken = broken or finding.grade == BAD
+    findings: list[Finding] = []
+    for finding in chain.from_iterable(check() for check in checks):
+        findings.append(finding)
+        if not arguments.json:
             print(f"[{finding.grade}] {finding.what}: {finding.found}")
             if finding.advice:
                 print(f"     → {finding.advice}")
-    print("Broken: see XX." if broken else "Ready.")
+    broken = any(finding.grade == BAD for finding in findings)
+    if arguments.json:
+        print(report(findings))
+    else:
+        print("Broken: see XX." if broken else "Ready.")
     return 1 if broken else 0
+
+
+def report(findings: Sequence[Finding]) -> str:
+    """JSON of all that was looked at, and of where."""
+    system = {
+        "lightleash": __version__,
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "machine": platform.machine(),
+        "at": wall(),
+    }
+    grades = {GOOD: "good", POOR: "poor", BAD: "broken"}
+    looked_at = [{**asdict(finding), "grade": grades[finding.grade]} for finding in findings]
+    return json.dumps({"system": system, "findings": looked_at}, indent=2, ensure_ascii=False)

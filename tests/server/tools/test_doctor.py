@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 
 import pytest
@@ -62,3 +63,19 @@ def test_the_schedule_is_measured_in_a_process_of_its_own():
     granted, held = doctor.realtime(0.2)
     assert granted.what == "real time"
     assert "p999" in held.found
+
+
+def test_a_report_for_others_holds_the_same_and_the_machine(monkeypatch, capsys):
+    for check in ("machine", "certificates", "codecs", "cameras"):
+        monkeypatch.setattr(doctor, check, lambda: iter(()))
+    monkeypatch.setattr(doctor, "ports", lambda wanted: iter((Finding(BAD, "port 1", "taken"),)))
+    monkeypatch.setattr(doctor, "realtime", lambda seconds: iter((Finding(POOR, "time", "ü"),)))
+    assert doctor.main(["--json"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert [(one["grade"], one["what"]) for one in told["findings"]] == [
+        ("poor", "time"),
+        ("broken", "port 1"),
+    ]
+    assert told["system"]["machine"]
+    with pytest.raises(SystemExit):
+        doctor.main(["--json", "--phone"])
