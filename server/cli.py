@@ -19,6 +19,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   phone        a virtual phone that films the simulated robot and leads it
   replay       push a recorded phone through a server, or through the pipeline alone
   export       a recording in a format that others read: Foxglove, rosbag2, CSV
+  import       a film of any phone, and its motion samples, as a recording
   locate       where the robot was in each picture of a folder or film, with its uncertainty
   experiments  measure the loop, as tables and pictures
   bench        how well it sees: right, exact, honest, fast; against stated goals
@@ -99,6 +100,12 @@ def _export(argv: Sequence[str]) -> int:
     return main(list(argv))
 
 
+def _import(argv: Sequence[str]) -> int:
+    from server.tools.import_film.command import main
+
+    return main(list(argv))
+
+
 def _locate(argv: Sequence[str]) -> int:
     from server.tools.locate import main
 
@@ -159,6 +166,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "phone": _phone,
     "replay": _replay,
     "export": _export,
+    "import": _import,
     "locate": _locate,
     "experiments": _experiments,
     "bench": _bench,

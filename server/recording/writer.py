@@ -21,6 +21,7 @@ import os
 import queue
 import shutil
 import threading
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +51,8 @@ DEVICE_KEY, ROBOT_KEY, CAMERA_KEY, SETTINGS_KEY = "device", "robot_file", "camer
 """Metadata: phone, text of the robot's and the camera's file, settings of the server."""
 UNIX_ZERO_KEY = "unix_zero_ns"
 """Metadata: the calendar's time at 0 of the server's clock [ns since 1970]."""
+OWN = {"protocol_version": str(VERSION), "lightleash_version": server.__version__}
+"""Metadata of every recording."""
 CHUNK_BYTES = 131_072
 FLUSH_S = 0.25
 CAPACITY = 4_096
@@ -111,8 +114,7 @@ class Recorder:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise RecordingError(self.path, str(error), "another name or directory") from error
-        own = {"protocol_version": str(VERSION), "lightleash_version": server.__version__}
-        self._metadata = {UNIX_ZERO_KEY: str(clock.unix_zero_ns())} | metadata | own
+        self._metadata = {UNIX_ZERO_KEY: str(clock.unix_zero_ns())} | metadata | OWN
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
@@ -177,6 +179,21 @@ def full_disk(directory: Path) -> str:
     """Why nothing should be recorded in a directory that exists, or ""."""
     left = shutil.disk_usage(directory).free
     return f"only {left >> 20} MB are left on the disk" if left < RESERVE_BYTES else ""
+
+
+def write_whole(
+    path: Path, metadata: dict[str, str], items: Iterable[tuple[str, float, bytes]]
+) -> None:
+    """A recording of what is known already: topic, time [s] and bytes of each item.
+
+    Raises:
+        OSError: there is a file of this name, or it can't be written.
+    """
+    with new_private_file(path) as file:
+        writer, channels = start_file(file, metadata | OWN)
+        for topic, t, data in items:
+            _add(writer, channels[topic], _Item(topic, t, data))
+        finish_file(writer, file)
 
 
 def part_of(path: Path) -> Path:

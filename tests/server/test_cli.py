@@ -63,6 +63,7 @@ def test_each_command_gets_its_own_words(name, module, monkeypatch):
         ["export", "flight.mcap"],
         ["export", "flight.mcap", "--out", ".", "--to", "film"],
         ["export", "flight.mcap", "--out", ".", "--discard", "all"],
+        ["import", "film.mp4"],
         ["locate"],
         ["experiments", "fly"],
         ["experiments", "tremor", "--cutoff-hz", "9"],

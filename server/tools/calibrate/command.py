@@ -20,6 +20,7 @@ from server.common.clock import today
 from server.common.errors import InputError
 from server.common.options import Parser
 from server.common.settings import state_directory
+from server.export.recorded_film import felt
 from server.media.tables import IMU_HEADER, load_imu
 from server.tools.calibrate.draw_board import write_board
 from server.tools.calibrate.report import draw
@@ -33,7 +34,8 @@ Print a board (--write-board board.pdf), glue it to something flat, or show /boa
 server, or board.svg, on any flat monitor. Film it for half a minute as the phone's page will film
 the robot: the same lens, picture size and orientation, no zoom, no stabilisation. Near and far,
 tilted by 30 to 45° to all sides, into every corner of the picture, gently turning to and fro: the
-readout time shows in motion only. A folder needs times.csv (frame,t_s) or --fps for that.
+readout time shows in motion only. A folder needs times.csv (frame,t_s) or --fps for that; a
+recording (.mcap) brings its times and its motion samples.
 
 --imu: motion samples in CSV, columns {",".join(IMU_HEADER)} [s, rad/s, m/s²],
 axes x along the view, y left, z up: adds how the sensors sit at the camera and how far their
@@ -97,7 +99,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _calibrate(arguments: argparse.Namespace, board: Board) -> int:
-    gyro = gyro_of(load_imu(arguments.imu)) if arguments.imu is not None else None
+    imu = load_imu(arguments.imu) if arguments.imu is not None else felt(arguments.film)[0]
+    gyro = gyro_of(imu) if imu is not None else None
     filmed = watch(arguments.film, arguments.fps, board, _bar())
     verdict = judge_views(filmed.views, filmed.pictures, board, filmed.size)
     found = None

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from server.calibration.board import Board, Detector
 from server.calibration.views import BoardView, look
-from server.media.frame_source import TIMES, open_frames
+from server.export.recorded_film import open_film
+from server.media.frame_source import TIMES
 
 MOST_PICTURES = 1500
 """Of a longer film whole runs are left out."""
@@ -42,7 +43,7 @@ def watch(
         FilmError: pictures of different sizes, or none.
         InputError: what can't be read at all.
     """
-    source, detector = open_frames(path, fps), Detector(board)
+    source, detector = open_film(path, fps), Detector(board)
     every = -(-source.count // MOST_PICTURES) if source.count else 1
     views: list[BoardView] = []
     size: tuple[int, int] | None = None

@@ -20,7 +20,8 @@ from pipeline.frames import Array
 from pipeline.vision.visual_front_end import warm_up
 from server.common.errors import InputError
 from server.common.progress import progress_bar
-from server.media.frame_source import Frames, open_frames
+from server.export.recorded_film import felt, open_film
+from server.media.frame_source import Frames
 from server.media.tables import load_imu
 from server.tools.locate import overlay, plot
 from server.tools.locate.history import History
@@ -43,11 +44,14 @@ def _run(given: argparse.Namespace) -> None:
     check_places(list(outputs.items()), inputs, given.frames)
     _, camera = load_camera(given.camera)
     _, leds_in_b = load_leds(given.robot)
-    motion = ImuRecordings(
-        *(load_imu(p) if p is not None else None for p in (given.imu, given.body_imu))
-    )
-    frames = open_frames(given.frames, given.fps)
     files = (given.imu, given.body_imu)
+    motion = ImuRecordings(
+        *(
+            load_imu(file) if file is not None else recorded
+            for file, recorded in zip(files, felt(given.frames), strict=True)
+        )
+    )
+    frames = open_film(given.frames, given.fps)
     for file, table in zip(files, (motion.camera, motion.body), strict=True):
         _check_clock(file, table, frames)
     told = len(frames.notes)

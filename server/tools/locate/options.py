@@ -15,7 +15,8 @@ PLOTS = (".png", ".pdf", ".svg")
 FORMATS = """\
 files:
   FRAMES         a folder of .png and .jpg, taken in the order of their names, all of one size;
-                 times.csv in it (header frame,t_s) dates them; or a film, dated by itself
+                 times.csv in it (header frame,t_s) dates them; or a film, dated by itself; or a
+                 recording (.mcap), which brings its motion samples too
   camera.yaml    ROS camera_info (plumb_bob, rational_polynomial, equidistant) or a Kalibr
                  camchain; rolling_shutter_readout_s: a row's time is the frame's time
                  + (row/height - 1/2) x readout
@@ -40,7 +41,9 @@ def parser() -> argparse.ArgumentParser:
         epilog=FORMATS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    words.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames, or a film")
+    words.add_argument(
+        "frames", type=Path, metavar="FRAMES", help="folder of frames, film or recording"
+    )
     words.add_argument("--camera", type=Path, required=True, metavar="camera.yaml")
     words.add_argument("--robot", required=True, metavar="robot.toml", help="or a name: ames, ...")
     words.add_argument("--imu", type=Path, metavar="imu.csv", help="the camera's motion sensors")

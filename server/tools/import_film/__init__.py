@@ -1,0 +1,1 @@
+"""`lightleash import`: a film of any phone and its motion samples become a recording."""
