@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +44,9 @@ class PossiblePlace:
         """Whether it may be there."""
         off = pose.p_bc_in_c - self.p_bc_in_c
         return bool(off @ off < self.radius_m**2)
+
+
+PossiblePlaces = Sequence[PossiblePlace]
 
 
 class LastPose:
@@ -139,24 +143,26 @@ class LastPose:
         ahead = exp(-self._since_kept)
         return ahead @ last.p_bc_in_c + dt * (ahead @ self.u_in_c), R_cb
 
-    def reach(self, expected: Prediction | None) -> PossiblePlace | None:
-        """Where the robot may be in the newest picture; None: anywhere.
+    def reach(self, expected: Prediction | None) -> PossiblePlaces:
+        """Where the robot may be in the newest picture; none: anywhere.
 
-        By the filter that expects it, unless the last pose contradicts it; else by the last pose.
+        By the last pose, and by the filter that expects it unless the last pose contradicts it;
+        either may be wrong: a filter of its doubt, the last pose about the way since then.
         """
-        last, dt = self._kept, self._t - self._t_seen
+        last, dt, places = self._kept, self._t - self._t_seen, []
         if not 0.0 <= dt < REACHED_S:
-            return None
+            return []
         if expected is not None and not self.contradicts:
-            return PossiblePlace(expected.p_bc_in_c, REACH_M + REACH_SIGMAS * expected.sigma_p)
-        if last is None:
-            return None
-        back, p = exp(-self._since_kept), last.p_bc_in_c
-        radius_m = REACH_M + 0.5 * REACH_M_S2 * dt * dt
-        radius_m += float(np.linalg.norm(self.u_in_c)) * dt
-        if not self._sure:
-            radius_m += BLIND_RAD_S * dt * float(np.linalg.norm(p))
-        return PossiblePlace(back @ p, radius_m)
+            radius_m = REACH_M + REACH_SIGMAS * expected.sigma_p
+            places.append(PossiblePlace(expected.p_bc_in_c, radius_m))
+        if last is not None:
+            p = exp(-self._since_kept) @ last.p_bc_in_c
+            radius_m = REACH_M + 0.5 * REACH_M_S2 * dt * dt
+            radius_m += float(np.linalg.norm(self.u_in_c)) * dt
+            if not self._sure:
+                radius_m += BLIND_RAD_S * dt * float(np.linalg.norm(p))
+            places.append(PossiblePlace(p, radius_m))
+        return places
 
     def attitude(self) -> tuple[Array, float] | None:
         """For the newest picture, R_cb and how far that may be off [rad]; None if it is too far."""

@@ -7,7 +7,7 @@ from typing import Final
 
 from pipeline.frames import Array
 from pipeline.imu_stream import ImuStreams
-from pipeline.vision.last_pose import PossiblePlace
+from pipeline.vision.last_pose import PossiblePlaces
 from pipeline.vision.motion_hypotheses import (
     CONTRARY,
     DECISIVE,
@@ -40,7 +40,7 @@ class RobotIdentity:
         self,
         t: float,
         views: Sequence[CandidateView],
-        reach: PossiblePlace | None,
+        reach: PossiblePlaces,
         up_in_c: Array | None,
     ) -> int | None:
         """Index of ours among what looks like the robot in the picture of `t` [s]; None: unknown.
@@ -48,7 +48,7 @@ class RobotIdentity:
         Args:
             t: Of the picture.
             views: All of them.
-            reach: Where ours may be; None: anywhere.
+            reach: Where ours may be, in any of these; none: anywhere.
             up_in_c: Opposite of gravity (3,); None if unknown.
         """
         self.reason = ""
@@ -60,15 +60,15 @@ class RobotIdentity:
         near = [
             k
             for k, (view, one) in enumerate(zip(views, known, strict=True))
-            if reach is not None and reach.holds(view.pose) and not (one and one.is_far)
+            if any(place.holds(view.pose) for place in reach) and not (one and one.is_far)
         ]
-        if len(near) == 1 or (reach is None and len(views) == 1 and self._is_alone(known[0])):
+        if len(near) == 1 or (not reach and len(views) == 1 and self._is_alone(known[0])):
             return near[0] if near else 0
         for k, view in enumerate(views):
             candidate = known[k] or RobotCandidate(self._leds_in_b, view)
             if known[k] is None:
                 self._candidates.append(candidate)
-            candidate.is_far = reach is not None and (candidate.is_far or k not in near)
+            candidate.is_far = bool(reach) and (candidate.is_far or k not in near)
             candidate.see(view, self._imus if self._can_tell(t, up_in_c) else None, up_in_c)
         ours = self._proven(t)
         self.reason = "" if ours is not None else TWO if len(self._candidates) > 1 else ELSEWHERE

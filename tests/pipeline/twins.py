@@ -62,7 +62,7 @@ class Twins:
         R_fc, p_cf_in_f = self.moving.hand.pose(t)
         return R_fc.T @ (self.moving.robot.pose(t)[1] - p_cf_in_f)
 
-    def look(self, k, shine=BOTH, reach=None):
+    def look(self, k, shine=BOTH, reach=()):
         """At picture `k`, in which ours and the other `shine`."""
         t = START_S + k / RATE_HZ
         for s in self._felt.phone(t + IMU_AHEAD_S):

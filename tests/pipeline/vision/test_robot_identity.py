@@ -46,7 +46,7 @@ def test_without_motion_sensors_nobody_is_told():
 def test_who_stands_where_ours_must_be_is_ours_at_once():
     for seed in SEEDS:
         twins = Twins(seed, (True, True))
-        reach = PossiblePlace(twins.place(START_S), 0.3)
+        reach = [PossiblePlace(twins.place(START_S), 0.3)]
         assert twins.look(0, reach=reach).is_ours
 
 
@@ -54,14 +54,14 @@ def test_a_robot_where_ours_cannot_be_is_not_ours_however_long_it_is_seen():
     for seed in SEEDS:
         twins = Twins(seed, (True, True))
         for k in range(60):
-            reach = PossiblePlace(twins.place(START_S + k / RATE_HZ), 0.3 + 0.03 * k)
+            reach = [PossiblePlace(twins.place(START_S + k / RATE_HZ), 0.3 + 0.03 * k)]
             told = twins.look(k, OTHER, reach)
             assert (told.is_ours, told.reason) == (None, ELSEWHERE)
 
 
 def test_ours_is_believed_elsewhere_once_it_moved_as_it_felt():
     for seed in SEEDS:
-        wrong = PossiblePlace(np.array([4.0, 2.0, 0.0]), 0.3)
+        wrong = [PossiblePlace(np.array([4.0, 2.0, 0.0]), 0.3)]
         k, is_ours = first_told(Twins(seed), 60, shine=OURS, reach=wrong)
         assert is_ours
         assert k >= 3
