@@ -85,6 +85,9 @@ class RtcSettings(BaseModel):
         max_length=200,
         description="shared with the relay (coturn: static-auth-secret), in place of a password",
     )
+    relay_only: bool = Field(
+        default=False, description="to try a relay: connect through it, never past it"
+    )
 
     def ice_servers(self, unix_s: float) -> list[dict[str, str]]:
         """ICE servers for both ends; none by default: both meet on their own addresses.

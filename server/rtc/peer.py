@@ -11,6 +11,7 @@ from aiortc import (
     RTCConfiguration,
     RTCDataChannel,
     RTCIceServer,
+    RTCIceTransportPolicy,
     RTCPeerConnection,
     RTCRtpReceiver,
     RTCSessionDescription,
@@ -69,7 +70,15 @@ class PeerConnection:
         self._has_relay = bool(settings.turn_url)
         servers = [RTCIceServer(**server) for server in settings.ice_servers(1e-3 * unix_ms())]
         self._connection = RTCPeerConnection(
-            RTCConfiguration(iceServers=servers, bundlePolicy=RTCBundlePolicy.MAX_BUNDLE)
+            RTCConfiguration(
+                iceServers=servers,
+                bundlePolicy=RTCBundlePolicy.MAX_BUNDLE,
+                iceTransportPolicy=(
+                    RTCIceTransportPolicy.RELAY
+                    if settings.relay_only
+                    else RTCIceTransportPolicy.ALL
+                ),
+            )
         )
         transceiver = self._connection.addTransceiver("video", direction="recvonly")
         transceiver.setCodecPreferences(_preferred())
