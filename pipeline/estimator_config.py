@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
+
+HandPrediction = Literal["learnt", "hold", "none"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,15 +70,21 @@ class NoFilterConfig:
 class HandConfig:
     """What is expected of a hand's angular rate beyond the phone's last sample."""
 
-    slow: float = 0.1
-    """Standard deviation of what the hand does on purpose [rad/s]; 0: the last sample is held."""
-    length_s: float = 0.2
+    predictor: HandPrediction = "learnt"
+    """Learnt from this hand, or for comparison: the last rate held, or none expected."""
+    memory_s: float = 5.0
+    """In which what was learnt fades."""
+    prior_s: float = 0.5
+    """So long a hand at the noise's size is not believed against the average one: a recorded hand
+    that films [rad/s], fitted."""
+    slow: float = 0.082
+    """Standard deviation of what it does on purpose [rad/s]."""
+    length_s: float = 0.28
     """How long that lasts."""
-    tremor: float = 0.03
+    tremor: float = 0.0485
     """Standard deviation of the tremor [rad/s]."""
-    tremor_hz: float = 9.5
-    coherence_s: float = 0.08
-    """Short enough for any tremor from 8 to 12 Hz."""
+    tremor_hz: float = 5.3
+    coherence_s: float = 0.087
     noise: float = 0.0013
     """Of a sample, its rounding included [rad/s]."""
 

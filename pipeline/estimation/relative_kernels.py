@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.estimation.gravity_free_kernels import step
-from pipeline.estimation.hand_motion_kernels import TAPS, extrapolate, learn
+from pipeline.estimation.hand_motion_kernels import FORETOLD_S, forecast_at
 from pipeline.estimation.imu_interpolation_kernels import put_noise, sample_at
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel, put_exp
@@ -23,9 +23,6 @@ BIASES, OFFSET = 9, 21
 X, X_BIASES, X_OFFSET = 19, 6, 18
 """Length of x, and where the same stand there."""
 MAX_STEP_S = 0.01
-DOUBT_STEPS = 4
-LASTING = 1.2
-"""Of d/dt (∫ σ dt)²: 2 for an error that keeps its sign; a tremor's does so for half a period."""
 
 
 @kernel
@@ -133,16 +130,15 @@ def transit(
 
     `noise` (2, 3, 2) by (body, phone) and (gyroscope, accelerometer): standard deviation of a
     sample, density by which the truth wanders between and after samples, its drift after the last
-    one. `hand` (6,): see `hand_motion_kernels`. R_ic (3, 3) goes on gathering the camera's rotation
-    since the phone's last sample. Gives the count of steps.
+    one. `hand` (n, 6): forecast of `hand_predictor` beyond the phone's last sample; empty: that is
+    held. R_ic (3, 3) goes on gathering the camera's rotation since it. Gives the count of steps.
     """
     F[:], G[:], Q[:] = 0.0, 0.0, 0.0
     for k in range(MOVING):
         F[k, k] = 1.0
     s, turn_c = np.empty(INPUTS), np.empty((3, 3))
     inputs, f, g, scratch = np.empty(INPUTS), np.empty((9, 9)), np.empty((9, 12)), np.empty((9, 12))
-    L, alpha = np.empty((TAPS + 1, TAPS)), np.empty((TAPS, 3))
-    taps, doubt = 0, 0.0
+    ahead, begun = np.empty(6), np.empty(6)
     t, t_end = span
     b = int(np.searchsorted(t_b, t, side="right")) - 1
     c = int(np.searchsorted(t_c, t, side="right")) - 1
@@ -161,17 +157,17 @@ def transit(
             put_noise(t_b, b, middle, beyond, noise[0], h, s[0:6])
             beyond = sample_at(t_c, v_c, c, middle, inputs[6:12])
             put_noise(t_c, c, middle, beyond, noise[1], h, s[6:12])
+            if c == last and hand.shape[0] > 0:
+                forecast_at(hand, t - t_c[last], begun)
+                forecast_at(hand, until - t_c[last], ahead)
+                unforetold = max(beyond - FORETOLD_S, 0.0)
+                for k in range(3):  # in place of the drift
+                    s[6 + k] += noise[1, 2, 0] ** 2 * (unforetold**3 - beyond**3)
+                    s[6 + k] += (ahead[3 + k] * ahead[3 + k] - begun[3 + k] * begun[3 + k]) / h
+                forecast_at(hand, middle - t_c[last], ahead)
+                inputs[6:9] = ahead[0:3]
             for k in range(INPUTS):
                 inputs[k] -= x[X_BIASES + k]
-            if c == last and hand[0] > 0.0:
-                if taps == 0:
-                    taps = learn(t_c, v_c, x[X_BIASES + 6 : X_BIASES + 9], hand, L, alpha)
-                    doubt = 0.0 if t <= t_c[last] else _doubt(t_c, taps, t, hand, L, alpha, turn_c)
-                sigma = extrapolate(t_c, taps, middle, hand, L, alpha, inputs[6:9])
-                for k in range(6, 9):  # in place of the drift
-                    s[k] -= (noise[1, 2, 0] * beyond) ** 2 * beyond
-                    s[k] += LASTING * sigma * (doubt + 0.5 * h * sigma)
-                doubt += h * sigma
             step(x, R, inputs, h, w, f, g)
             gather(F, G, Q, f, g, s, h, scratch)
             if c == last:
@@ -187,17 +183,6 @@ def transit(
 
 
 @kernel
-def _doubt(
-    t_c: Array, taps: int, t: float, hand: Array, L: Array, alpha: Array, out: Array
-) -> float:
-    """∫ σ dt from the last sample to `t`, of a transit that begins beyond it."""
-    h, doubt = (t - t_c[-1]) / DOUBT_STEPS, 0.0
-    for k in range(DOUBT_STEPS):
-        doubt += h * extrapolate(t_c, taps, t_c[-1] + (k + 0.5) * h, hand, L, alpha, out[0])
-    return doubt
-
-
-@kernel
 def inputs_at(
     t: float, x: Array, t_b: Array, v_b: Array, t_c: Array, v_c: Array, hand: Array
 ) -> Array:
@@ -207,10 +192,10 @@ def inputs_at(
     c = int(np.searchsorted(t_c, t, side="right")) - 1
     sample_at(t_b, v_b, b, t, inputs[0:6])
     sample_at(t_c, v_c, c, t, inputs[6:12])
+    if c == t_c.shape[0] - 1 and hand.shape[0] > 0:
+        ahead = np.empty(6)
+        forecast_at(hand, t - t_c[c], ahead)
+        inputs[6:9] = ahead[0:3]
     for k in range(INPUTS):
         inputs[k] -= x[X_BIASES + k]
-    if c == t_c.shape[0] - 1 and hand[0] > 0.0:
-        L, alpha = np.empty((TAPS + 1, TAPS)), np.empty((TAPS, 3))
-        taps = learn(t_c, v_c, x[X_BIASES + 6 : X_BIASES + 9], hand, L, alpha)
-        extrapolate(t_c, taps, t, hand, L, alpha, inputs[6:9])
     return inputs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.estimator_config import HandConfig, RelativeConfig
+from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 
 
@@ -13,11 +13,6 @@ def noise_of(c: RelativeConfig) -> Array:
     body = ((c.sigma_omega_b, c.sigma_f_b), (0.0, c.rough_f_b), (c.drift_omega_b, c.drift_f_b))
     phone = ((c.sigma_omega_c, c.sigma_f_c), (0.0, c.rough_f_c), (c.drift_omega_c, c.drift_f_c))
     return np.array((body, phone))
-
-
-def hand_of(c: HandConfig) -> Array:
-    """Parameters (6,) of the hand's motion, as `hand_motion_kernels.covariance` takes them."""
-    return np.array((c.slow, c.length_s, c.tremor, c.tremor_hz, c.coherence_s, c.noise))
 
 
 def walks_of(c: RelativeConfig) -> Array:

@@ -7,7 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.hand_motion_kernels import TAPS
+from pipeline.estimation.hand_motion_kernels import WINDOW
+from pipeline.estimation.hand_predictor import HandPredictor
 from pipeline.estimation.out_of_sequence import Checkpoint, OutOfSequence
 from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound
 from pipeline.estimation.relative_kernels import (
@@ -20,13 +21,14 @@ from pipeline.estimation.relative_kernels import (
     inputs_at,
     transit,
 )
-from pipeline.estimation.relative_noise import hand_of, noise_of, walks_of
+from pipeline.estimation.relative_noise import noise_of, walks_of
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, cross
+from pipeline.imu_stream import ImuStream
 from pipeline.signals import Flags, VisionMeasurement
 
-KEPT: Final = TAPS
-"""Samples up to the base that are still interpolated and extrapolated from."""
+KEPT: Final = 2 * WINDOW
+"""Samples up to the base that are still interpolated from, or learnt from."""
 BENT: Final = 2
 """The curve through a new sample and those around it changes from so many before it on."""
 
@@ -39,21 +41,28 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         super().__init__(X, N, MOVING, BENT, KEPT)
         self._leds_in_b = np.ascontiguousarray(leds_in_b)
         self._config, self._walks = config, walks_of(config)
-        self._phone_factor = 0.0
+        self._hand, self._phone_factor = HandPredictor(config.hand), 0.0
         self.doubt_phone(1.0)
         self._gate, self._still = config.gate_chi2, config.offset_still
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
         self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
         self._products = np.zeros((2, MOVING, N))
 
+    def insert(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
+        """Remember a sample of `body` or `phone`, of whose hand it tells; False: it was there."""
+        if not super().insert(stream, t, rate, force):
+            return False
+        if stream is self.phone:
+            self._hand.follow(stream)
+        return True
+
     def doubt_phone(self, factor: float) -> None:
         """From now on the variances of the phone's samples are so many times the configured."""
         if factor == self._phone_factor:
             return
         self._phone_factor = factor
-        self._noise, self._hand = noise_of(self._config), hand_of(self._config.hand)
+        self._noise = noise_of(self._config)
         self._noise[1] *= sqrt(factor)
-        self._hand[-1] *= sqrt(factor)
 
     def in_picture(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """P (6, 6) of the pose in a picture stamped for the time of `here`: that is doubted too.
@@ -72,11 +81,9 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         return self._inputs(self.now)
 
     def _inputs(self, here: Checkpoint[VisionMeasurement]) -> Array:
-        body, phone = self.body, self.phone
+        body, phone, hand = self.body, self.phone, self._hand.forecast
         return np.asarray(
-            inputs_at(
-                here.t, here.x, body.times, body.values, phone.times, phone.values, self._hand
-            )
+            inputs_at(here.t, here.x, body.times, body.values, phone.times, phone.values, hand)
         )
 
     def _fuse(
@@ -117,7 +124,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
             phone.times,
             phone.values,
             self._noise,
-            self._hand,
+            self._hand.forecast,
             self._steps,
         )
         apply(here.P, self._F, self._G, self._Q, self._walks, t - here.t, self._products)

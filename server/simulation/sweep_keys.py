@@ -94,7 +94,7 @@ SCENE: Final[Mapping[str, Allowed]] = {
 }
 ZERO_IS_GOOD: Final = (
     *("virtual_camera.tau_1", "virtual_camera.tau_2", "virtual_camera.tau_parallel"),
-    *("virtual_camera.max_speed_m_s", "relative.hand.slow", "relative.hand.tremor"),
+    *("virtual_camera.max_speed_m_s"),
     *("feedforward.high_pass_hz", "margins.unfelt"),
 )
 OTHER_RANGES: Final[Mapping[str, Number]] = {

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from pipeline.estimation.hand_predictor import NOTHING, HandPredictor
 from pipeline.estimation.relative_kernels import INPUTS, X_BIASES, N, X, apply, transit
-from pipeline.estimation.relative_noise import hand_of, noise_of, walks_of
+from pipeline.estimation.relative_noise import noise_of, walks_of
 from pipeline.estimator_config import HandConfig, RelativeConfig
 from pipeline.frames import GRAVITY, R_from_rpy
+from pipeline.imu_stream import ImuStream
 
-HELD = replace(RelativeConfig(), hand=replace(HandConfig(), slow=0.0))
-"""The phone's last sample is held: no expectation of a hand."""
 UP = np.array([0.0, 0.0, GRAVITY])
 BIAS = np.repeat((0.02, -0.3, 0.004, 0.1), 3)
 
@@ -28,11 +26,22 @@ def samples(start, stop, period, seed, phase=0.0):
 BODY, PHONE = samples(0.0, 1.0, 0.005, 1), samples(0.0, 1.0, 1 / 60, 2, 0.003)
 
 
+def forecast_after(phone):
+    """What the samples (times, values) let expect of the hand."""
+    predictor, stream = HandPredictor(HandConfig()), ImuStream()
+    for t, value in zip(*phone, strict=True):
+        stream.insert(t, value[:3], value[3:])
+        predictor.follow(stream)
+    return predictor.forecast
+
+
 class Way:
     """A state with its covariance, carried along samples."""
 
-    def __init__(self, config=HELD, body=BODY, phone=PHONE):
-        self.config, self.body, self.phone = config, body, phone
+    def __init__(self, body=BODY, phone=PHONE, *, foretells=False):
+        """The phone's last sample is held, or what follows it is foretold."""
+        self.config, self.body, self.phone = RelativeConfig(), body, phone
+        self.foretells = foretells
         self.x, self.R, self.R_ic = np.zeros(X), R_from_rpy(np.array([0.1, -0.2, 0.4])), np.eye(3)
         self.x[:6] = 2.5, 0.1, -0.2, 0.3, -0.1, 0.2
         self.x[X_BIASES : X_BIASES + INPUTS] = BIAS
@@ -54,7 +63,7 @@ class Way:
             *self.body,
             *self.phone,
             noise_of(self.config),
-            hand_of(self.config.hand),
+            forecast_after(self.phone) if self.foretells else NOTHING,
             np.empty((13, 3, 3)),
         )
         apply(

@@ -67,7 +67,7 @@ def test_two_seconds_with_few_leds_or_none_are_bridged(visible, limit_mm):
 
 @cache
 def usual():
-    return metrics.judge(tracks(worlds(8.0)))
+    return metrics.judge(tracks(worlds(8.0, tremor_relaxation=FADING)))
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def usual():
     ],
 )
 def test_what_goes_wrong_in_the_world_costs_little(options):
-    worse = metrics.judge(tracks(worlds(8.0, **options)))
+    worse = metrics.judge(tracks(worlds(8.0, tremor_relaxation=FADING, **options)))
     assert worse.now_mm < 1.35 * usual().now_mm
     assert worse.known_pct == 100.0
 

@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.estimation import gravity_free
 from pipeline.estimation.gravity_free import PredictedImu, RelativeMotion
+from pipeline.estimation.hand_predictor import NOTHING
 from pipeline.estimation.imu_interpolation_kernels import sample_at
 from pipeline.estimation.relative_kernels import (
     BIASES,
@@ -18,10 +19,8 @@ from pipeline.estimation.relative_kernels import (
     gather,
     inputs_at,
 )
-from pipeline.estimation.relative_noise import hand_of
-from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import exp, log
-from tests.pipeline.way import BIAS, BODY, HELD, PHONE, UP, Way, samples
+from tests.pipeline.way import BIAS, BODY, PHONE, UP, Way, samples
 
 
 def interpolated(of, t):
@@ -106,7 +105,7 @@ def test_a_transit_is_a_step_for_each_stretch_between_samples():
 
 def test_inputs_are_interpolated_and_freed_of_bias():
     for t in (0.31, float(BODY[0][40]), 0.9):
-        inputs = inputs_at(t, Way().x, *BODY, *PHONE, hand_of(HELD.hand))  # type: ignore[call-arg]
+        inputs = inputs_at(t, Way().x, *BODY, *PHONE, NOTHING)  # type: ignore[call-arg]
         expected = np.concatenate((interpolated(BODY, t), interpolated(PHONE, t))) - BIAS
         assert np.abs(inputs - expected).max() < 1e-12
 
@@ -160,11 +159,11 @@ def test_held_samples_are_doubted_more_and_more(what):
     assert 4.0 * growth[1] < growth[2] < growth[3] / 4.0
 
 
-@pytest.mark.parametrize("config", [HELD, RelativeConfig()], ids=["held", "hand"])
-def test_a_gap_between_samples_is_doubted_but_less_than_silence(config):
+@pytest.mark.parametrize("foretells", [False, True])
+def test_a_gap_between_samples_is_doubted_but_less_than_silence(foretells):
     sigmas = {}
     for name, stop in (("dense", 0.0), ("gap", 0.6), ("silence", 9.0)):
-        way = Way(config)
+        way = Way(foretells=foretells)
         keep = (PHONE[0] <= 0.3) | (PHONE[0] >= stop)
         way.phone = (PHONE[0][keep].copy(), PHONE[1][keep].copy())
         way.go(0.2, 0.6)
@@ -191,12 +190,12 @@ def test_samples_before_the_first_one_are_the_first_one():
     assert way.sigma(6) > 0.05
 
 
-@pytest.mark.parametrize("config", [HELD, RelativeConfig()], ids=["held", "hand"])
-def test_the_rotation_of_the_camera_since_its_last_sample(config):
+@pytest.mark.parametrize("foretells", [False, True])
+def test_the_rotation_of_the_camera_since_its_last_sample(foretells):
     """However the way there is cut; begun anew at each sample."""
     phone = PHONE[0][:31].copy(), PHONE[1][:31].copy()
     t_last = phone[0][-1]
-    once, often = Way(config, phone=phone), Way(config, phone=phone)
+    once, often = (Way(phone=phone, foretells=foretells) for _ in range(2))
     once.go(0.2, t_last + 0.05)
     for start, stop in (
         (0.2, 0.3),
@@ -207,7 +206,7 @@ def test_the_rotation_of_the_camera_since_its_last_sample(config):
         often.go(start, stop)
     assert np.abs(once.R_ic - often.R_ic).max() < 1e-6
     held = exp(0.05 * (phone[1][-1, :3] - BIAS[6:9]))
-    assert np.abs(log(held.T @ once.R_ic)).max() < (1e-12 if config is HELD else 0.05)
+    assert np.abs(log(held.T @ once.R_ic)).max() < (0.05 if foretells else 1e-12)
     once.phone = PHONE
     once.go(t_last + 0.05, t_last + 0.1)
     assert np.array_equal(once.R_ic, np.eye(3))

@@ -273,7 +273,7 @@ def test_every_key_reaches_what_is_flown(tmp_path):
         gains.set = "paper_with_ekf"
         gains.Kp.z = 150
         gains.scale = 0.5
-        teleop.relative.hand.slow = 0.2
+        teleop.relative.hand.memory_s = 2.0
         teleop.estimator = "paper"
         robot.body.mass_kg = 3.0
         plant.body.mass_kg = 3.4
@@ -286,7 +286,7 @@ def test_every_key_reaches_what_is_flown(tmp_path):
     flown = prepared(session(sweep))
     np.testing.assert_allclose(flown.config.gains.Kp, [50.0, 50.0, 75.0, 2.5, 2.5, 2.5])
     np.testing.assert_allclose(flown.config.gains.Kd, [15.0, 15.0, 15.0, 0.5, 0.5, 1.0])
-    assert flown.config.relative.hand.slow == 0.2
+    assert flown.config.relative.hand.memory_s == 2.0
     assert flown.config.estimator == "paper"
     assert (flown.robot_file.robot.mass, flown.robot_file.plant.mass) == (3.0, 3.4)
     np.testing.assert_allclose(flown.robot_file.robot.inertia, [0.05, 0.05, 0.09])
