@@ -14,6 +14,9 @@ from pipeline.robot import Robot
 
 LEAST_LED_SPREAD_M = 0.03
 """RMS distance of the LEDs from the plane that fits them best: flatter, a picture has two poses."""
+LEAST_LED_SPREAD = 0.12
+"""The same, of their RMS distance from their middle: enough for a small robot, which is led from
+nearby."""
 LEAST_LED_DISTANCE_M = 0.02
 LARGEST_ROBOT_M = 3.0
 """Anything farther from the centre of mass is a slip of the decimal point."""
@@ -143,6 +146,8 @@ def _led_faults(leds_in_b: Array) -> Iterator[tuple[str, str]]:
         if (np.linalg.norm(leds_in_b[:i] - led, axis=1) < LEAST_LED_DISTANCE_M).any():
             yield f"leds.{i}.position_in_body_m", f"{LEAST_LED_DISTANCE_M:g} m from the others"
     centred = leds_in_b - leds_in_b.mean(axis=0)
-    spread = float(np.linalg.svd(centred, compute_uv=False)[-1]) / np.sqrt(len(leds_in_b))
-    if spread < LEAST_LED_SPREAD_M:
-        yield "leds", f"not in one plane: {LEAST_LED_SPREAD_M:g} m RMS from it, not {spread:.3g} m"
+    spreads = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(leds_in_b))
+    spread, size = float(spreads[-1]), float(np.sqrt(spreads @ spreads))
+    least = min(LEAST_LED_SPREAD_M, LEAST_LED_SPREAD * size)
+    if spread < least:
+        yield "leds", f"not in one plane: {least:.2g} m RMS from it, not {spread:.3g} m"

@@ -53,7 +53,7 @@ class Stand(Section):
 class Start(Section):
     """[start]: of a simulated flight."""
 
-    distance_m: Annotated[float, Field(ge=0.5, le=10.0)] = 2.5
+    distance_m: Annotated[float, Field(ge=0.3, le=10.0)] = 2.5
     above_m: Annotated[float, Field(ge=-2.0, le=3.0)] = 0.0
     """The phone over the robot, which it looks at."""
     lift_m: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0

@@ -178,6 +178,8 @@ class VirtualPhone:
         self._faulty = FaultyCamera(
             options.camera_fault, camera, lambda t: self.hand.pose(t)[0], options.camera_fault_s
         )
+        self.films: Callable[[Camera, float, np.random.Generator], Image] | None = None
+        """What it sees at a time [s] in place of LEDs in a room."""
         self._last: tuple[float, Image] | None = None
         """The moment [s] that the last picture shows, and the picture."""
         self._bias_omega = schedule.normal(0.0, 1.0, 3) * options.bias_omega
@@ -231,9 +233,12 @@ class VirtualPhone:
         def seen_as(robot: BodyHistory) -> RelativePoseAt:
             return lambda dt: self.relative_pose(moment + dt, robot)
 
-        shown = np.delete(self._leds_in_b, list(self._hidden(moment)), axis=0)
-        others = [] if self._twin is None else [(seen_as(self._twin), self._leds_in_b)]
-        image = render(seen_by, seen_as(body), shown, self._look, self._picture_rng, others)
+        if self.films is not None:
+            image = self.films(seen_by, moment, self._picture_rng)
+        else:
+            shown = np.delete(self._leds_in_b, list(self._hidden(moment)), axis=0)
+            others = [] if self._twin is None else [(seen_as(self._twin), self._leds_in_b)]
+            image = render(seen_by, seen_as(body), shown, self._look, self._picture_rng, others)
         self._last = moment, image
         return image
 

@@ -24,7 +24,7 @@ from hardware.link.datagram import MAX_BYTES
 from hardware.link.link_key import LinkKeyError, take_key
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from hardware.sim.simulated import TICK_US, SimulatedRobot
-from hardware.sim.truth import REQUEST_BYTES, encode_truth
+from hardware.sim.truth import ahead_of, encode_truth
 
 MAX_CATCH_UP = 40
 """Ticks made up for at once (0.2 s); of a longer hole the rest never happened to the robot."""
@@ -93,13 +93,16 @@ class RobotProcess:
                     continue
                 if readable is self._link:
                     self._robot.receive(data, sender, self._now_us())
-                elif len(data) == REQUEST_BYTES:
-                    self._tell_truth(data, sender)
+                elif (ahead_s := ahead_of(data)) is not None:
+                    self._tell_truth(data, ahead_s, sender)
 
-    def _tell_truth(self, request: bytes, sender: Address) -> None:
+    def _tell_truth(self, request: bytes, ahead_s: float, sender: Address) -> None:
         assert self._truth is not None
         start = 1e-9 * self._start_ns
         poses = [(start + 1e-6 * t_us, wxyz, p) for t_us, wxyz, p in self._robot.history]
+        if poses and ahead_s > 0.0:
+            t = poses[-1][0]
+            poses += [(t + dt, wxyz, p) for dt, wxyz, p in self._robot.plant.ahead(ahead_s)]
         answer = encode_truth(request, poses, self._robot.plant.thrusts)
         with contextlib.suppress(OSError):
             self._truth.sendto(answer, sender)

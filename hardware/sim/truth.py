@@ -1,6 +1,7 @@
-"""Ground truth of the simulated robot, for simulated phones on the same machine only.
+"""Ground truth of the simulated robot, for what shows it on the same machine only.
 
-Request: any 8 bytes, to the truth port on the loopback interface. Answer, little-endian:
+Request: any 8 bytes, to the truth port on the loopback interface; with a f32 behind them, how far
+ahead [s], 0 to 0.2, it goes with the last commands held. Answer, little-endian:
 
 | offset | type    | field                                                            |
 |--------|---------|------------------------------------------------------------------|
@@ -8,7 +9,7 @@ Request: any 8 bytes, to the truth port on the loopback interface. Answer, littl
 | 8      | 4 bytes | magic `LLtr`                                                     |
 | 12     | u8      | version, 1                                                       |
 | 13     | u8      | m, thrusters                                                     |
-| 14     | u16     | n, poses, at most 50 (0.25 s at 200 Hz)                          |
+| 14     | u16     | n, poses, at most 50 (0.25 s at 200 Hz), and up to 40 ahead      |
 | 16     | n × 64  | 8 × f64, oldest first: CLOCK_MONOTONIC of this machine [s],      |
 |        |         | attitude wxyz_fb, position of the centre of mass p_bf_in_f [m]   |
 | …      | m × f32 | thrusts of the last one [N]                                      |
@@ -28,6 +29,8 @@ from hardware.follower import FollowerError
 from pipeline.frames import Array, R_from_wxyz, exp, log
 
 REQUEST_BYTES = 8
+AHEAD = struct.Struct("<f")
+MAX_AHEAD_S = 0.2
 MAGIC, VERSION = b"LLtr", 1
 HEAD = struct.Struct("<8s4sBBH")
 MAX_BYTES = 8_192
@@ -35,7 +38,7 @@ MAX_BYTES = 8_192
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """The last quarter of a second."""
+    """The last quarter of a second, and what was asked of the next."""
 
     t: Array
     """(n,) growing, monotonic clock [s]."""
@@ -59,11 +62,21 @@ class Truth:
         return R @ exp(share * turn), p
 
 
+def ahead_of(request: bytes) -> float | None:
+    """How far ahead [s] a request asks; None: it is none."""
+    if len(request) == REQUEST_BYTES:
+        return 0.0
+    if len(request) != REQUEST_BYTES + AHEAD.size:
+        return None
+    (seconds,) = AHEAD.unpack_from(request, REQUEST_BYTES)
+    return float(seconds) if 0.0 <= seconds <= MAX_AHEAD_S else None
+
+
 def encode_truth(
     request: bytes, poses: Sequence[tuple[float, Array, Array]], thrusts: Array
 ) -> bytes:
     """The answer to `request`; `poses` are (t [s], wxyz_fb, p_bf_in_f [m]), oldest first."""
-    head = HEAD.pack(request, MAGIC, VERSION, len(thrusts), len(poses))
+    head = HEAD.pack(request[:REQUEST_BYTES], MAGIC, VERSION, len(thrusts), len(poses))
     rows = b"".join(struct.pack("<8d", t, *wxyz, *p) for t, wxyz, p in poses)
     return head + rows + struct.pack(f"<{len(thrusts)}f", *thrusts)
 
@@ -93,8 +106,8 @@ class TruthClient:
         self._requests = 0
         self._newest: Truth | None = None
 
-    def latest(self) -> Truth:
-        """The newest answer.
+    def latest(self, ahead_s: float = 0.0) -> Truth:
+        """The newest answer, up to so far ahead of now, `MAX_AHEAD_S` at most.
 
         Raises:
             FollowerError: no answer in time.
@@ -103,7 +116,8 @@ class TruthClient:
         request = self._requests.to_bytes(REQUEST_BYTES, "little")
         deadline = time.monotonic() + self._timeout
         try:
-            self._socket.send(request)
+            asked = request + AHEAD.pack(ahead_s) if ahead_s > 0.0 else request
+            self._socket.send(asked)
             while (left := deadline - time.monotonic()) > 0.0:
                 self._socket.settimeout(left)
                 truth = decode_truth(self._socket.recv(MAX_BYTES), request)

@@ -32,6 +32,7 @@ from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, TouchState, VisionMeasurement
 from pipeline.teleop import Output
 from pipeline.timing.clock_synchronisation import ClockSynchronisation
+from pipeline.vision.detection import Detection
 from server.control.controller import Controller, never_too_late
 from server.control.ipc import (
     Input,
@@ -298,6 +299,11 @@ class VirtualTimeSimulation:
         self.trace.pictures += 1
         self.trace.leds.append(len(detection.rays) if detection is not None else 0)
         self._tell(detection.seen(self._frame_pipeline.camera) if detection is not None else None)
+        if detection is not None:
+            self._look_further(detection)
+
+    def _look_further(self, detection: Detection) -> None:
+        """What else the server does with a picture: nothing."""
 
     def _glimpse(self, eye: LedSensorModel, t: float) -> None:
         """A picture of which only the LEDs' rays exist; dated as others are."""

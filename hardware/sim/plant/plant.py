@@ -105,23 +105,23 @@ class Plant:
         for _ in range(round(1e3 * dt / STEP_MS)):
             while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
                 self._data.ctrl[:] = self._on_their_way.popleft()[1] * self.thruster_health
-            self._apply_surroundings()
+            self._apply_surroundings(self._data, self._now_ms)
             mujoco.mj_step(self._model, self._data)
             self._now_ms += STEP_MS
             if self._touch is not None:
                 self._touch.sample()
         mujoco.mj_forward(self._model, self._data)
 
-    def _apply_surroundings(self) -> None:
+    def _apply_surroundings(self, data: mujoco.MjData, now_ms: int) -> None:
         """Pushes and wind; and a slack cable doesn't damp, though MuJoCo's would."""
-        wrench = self._data.xfrc_applied[1]
+        wrench = data.xfrc_applied[1]
         wrench[:] = self.external_wrench_in_f
         wrench[:3] += self.parameters.air_damping * self.wind_in_f
-        if self._now_ms < self._push[0]:
+        if now_ms < self._push[0]:
             wrench += self._push[1]
         suspension = self.parameters.suspension
         if suspension is not None:
-            slack = self.cable_length <= suspension.rest_length(self.parameters.mass)
+            slack = float(data.ten_length[0]) <= suspension.rest_length(self.parameters.mass)
             damps = self.cable_whole and not slack
             self._model.tendon_damping[0] = suspension.damping if damps else 0.0
 
@@ -137,6 +137,26 @@ class Plant:
     def cable_whole(self) -> bool:
         """False after `cut_cable`, and without one."""
         return bool((self._model.tendon_stiffness > 0.0).any())
+
+    def ahead(self, seconds: float, every: float = 0.005) -> list[tuple[float, Array, Array]]:
+        """Where it goes within `seconds`, the last commands held; the robot itself doesn't move.
+
+        Rows (in how long [s], wxyz_fb (4,), p_bf_in_f (3,) [m]), `every` so often.
+        """
+        copy, waiting = mujoco.MjData(self._model), list(self._on_their_way)
+        mujoco.mj_copyData(copy, self._model, self._data)
+        damping = self._model.tendon_damping.copy()
+        steps, poses = round(1e3 * every / STEP_MS), []
+        for k in range(1, round(seconds / every) * steps + 1):
+            while waiting and waiting[0][0] < self._now_ms + k * STEP_MS:
+                copy.ctrl[:] = waiting.pop(0)[1] * self.thruster_health
+            self._apply_surroundings(copy, self._now_ms + (k - 1) * STEP_MS)
+            mujoco.mj_step(self._model, copy)
+            if k % steps == 0:
+                pose = np.array(copy.qpos[3:7]), np.array(copy.qpos[:3])
+                poses.append((1e-3 * k * STEP_MS, *pose))
+        self._model.tendon_damping[:] = damping
+        return poses
 
     @property
     def t(self) -> float:

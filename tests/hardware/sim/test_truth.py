@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardware.follower import FollowerError
-from hardware.sim.truth import MAX_BYTES, TruthClient, decode_truth, encode_truth
+from hardware.sim.truth import (
+    AHEAD,
+    MAX_BYTES,
+    TruthClient,
+    ahead_of,
+    decode_truth,
+    encode_truth,
+)
 from pipeline.frames import R_from_rpy, R_from_wxyz, log, wxyz_from_R
 
 REQUEST = b"12345678"
@@ -104,3 +111,18 @@ def test_without_a_robot_it_says_so(server):
     with pytest.raises(FollowerError, match=str(port)):
         client.at(0.0)
     client.close()
+
+
+@pytest.mark.parametrize(
+    ("tail", "ahead_s"),
+    [(b"", 0.0), (AHEAD.pack(0.0625), 0.0625), (AHEAD.pack(0.3), None), (AHEAD.pack(-0.1), None),
+     (AHEAD.pack(float("nan")), None), (b"abc", None)],
+)  # fmt: skip
+def test_a_request_says_how_far_ahead_or_is_none(tail, ahead_s):
+    assert ahead_of(REQUEST + tail) == ahead_s
+
+
+def test_an_answer_with_poses_ahead_fits_a_datagram_and_echoes_the_request():
+    data = encode_truth(REQUEST + AHEAD.pack(0.2), list(poses(90)), np.zeros(16))
+    assert len(data) < MAX_BYTES
+    assert len(decode_truth(data, REQUEST).t) == 90

@@ -282,3 +282,20 @@ def test_reset_puts_it_anywhere_at_rest():
     assert plant.t == 0.0
     assert not plant.v_bf_in_f.any()
     assert not plant.thrusts.any()
+
+
+@pytest.mark.parametrize("name", ["ames", "quadrotor"])
+def test_what_it_says_of_the_time_ahead_comes_true_and_moves_nothing(name):
+    plant = Plant(load_robot(name).plant, np.random.default_rng(0))
+    rng = np.random.default_rng(1)
+    commands = rng.uniform(0.0, 2.0, len(plant.thrusts))
+    plant.push(np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.1]), 0.03)
+    plant.step(commands)
+    before = plant.p_bf_in_f
+    foretold = plant.ahead(0.05)
+    np.testing.assert_array_equal(plant.p_bf_in_f, before)
+    assert [round(t, 6) for t, _, _ in foretold] == [0.005 * k for k in range(1, 11)]
+    for _, wxyz, p in foretold:
+        plant.step(commands)
+        np.testing.assert_array_equal(plant.p_bf_in_f, p)
+        np.testing.assert_array_equal(plant.wxyz_fb, wxyz)

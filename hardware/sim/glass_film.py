@@ -1,0 +1,68 @@
+"""A screen as a phone films it: dim fiducials, and dots of light."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+
+from hardware.sim.render import RelativePoseAt, RenderOptions, render
+from pipeline.camera.lens import Camera
+from pipeline.frames import Array
+from pipeline.glass.window import CELLS, MARKER_IDS, Glass, on_glass
+from pipeline.signals import Image
+
+CELL_PX = 8
+"""Of the drawn tile."""
+FINER = 4
+"""A tile is put into the picture at so many times its size, then made smaller: smooth edges."""
+DOT_M = 0.0015
+"""Radius of a dot."""
+
+
+def film(
+    camera: Camera,
+    glass_at: RelativePoseAt,
+    glass: Glass,
+    dots: Array,
+    rng: np.random.Generator,
+    grey: int = 70,
+    look: RenderOptions | None = None,
+) -> Image:
+    """Luma of a picture of the glass at `glass_at` (R_cg, p_gc_in_c), with `dots` (n, 2) [m] lit.
+
+    A fiducial's light parts are `grey` levels bright in the picture.
+    """
+    look = look or RenderOptions(led_radius_m=DOT_M, room=0.005)
+    image = render(camera, glass_at, on_glass(dots), look, rng)
+    R_cg, p_gc_in_c = glass_at(0.0)
+    fiducials = glass.fiducials().reshape(4, 4, 3)
+    for name, corners in zip(MARKER_IDS, fiducials, strict=True):
+        _put(image, camera.pixels(p_gc_in_c + corners @ R_cg.T), grey / 255.0 * _tile(name))
+    return image
+
+
+@cache
+def _tile(name: int) -> Array:
+    """A marker with its quiet zone, 0 to 1, `CELL_PX` each cell."""
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
+    marker = cv2.aruco.generateImageMarker(family, name, (CELLS - 2) * CELL_PX)
+    return np.pad(np.asarray(marker, dtype=np.float64) / 255.0, CELL_PX, constant_values=1.0)
+
+
+def _put(image: Image, corners_px: Array, tile: Array) -> None:
+    """Lighten the picture by a tile whose marker has these corners (4, 2)."""
+    low, high = CELL_PX, len(tile) - CELL_PX
+    source = np.array([[low, low], [high, low], [high, high], [low, high]]) - 0.5
+    reach = np.ptp(corners_px, axis=0).max()
+    left, top = np.floor(corners_px.min(axis=0) - reach).astype(int)
+    size = int(np.ceil(3.0 * reach)) + 1
+    target = (corners_px - (left, top) + 0.5) * FINER - 0.5
+    H = cv2.getPerspectiveTransform(source.astype(np.float32), target.astype(np.float32))
+    fine = cv2.warpPerspective(tile, H, (size * FINER, size * FINER))
+    patch = cv2.resize(fine, (size, size), interpolation=cv2.INTER_AREA)
+    y, x = max(top, 0), max(left, 0)
+    part = image[y : top + size, x : left + size]
+    light = 255.0 * patch[y - top : y - top + len(part), x - left : x - left + part.shape[1]]
+    part[:] = np.maximum(part, np.round(light).astype(np.uint8))

@@ -1,0 +1,108 @@
+"""Where the phone's camera is before the glass: smooth, and ahead of its newest picture.
+
+It is the relative filter again, which leads robots: its body is the glass, at rest in the world.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.estimation.relative_filter import RelativeFilter
+from pipeline.estimator_config import RelativeConfig
+from pipeline.frames import GRAVITY, Array
+from pipeline.glass.window import Glass
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
+
+AT_REST = RelativeConfig(
+    sigma_omega_b=1e-4,
+    sigma_f_b=1e-3,
+    rough_f_b=1e-3,
+    drift_omega_b=1e-3,
+    drift_f_b=1e-3,
+    walk_omega_b=1e-6,
+    initial_omega_b=1e-5,
+)
+"""Nothing moves the glass; its vertical is as wrong as the phone's accelerometer says it."""
+VERTICAL_PICTURES = 10
+"""So many tell the glass's vertical well enough to begin ..."""
+REMEMBERED_PICTURES = 300
+"""... and over so many it is learnt: ten seconds."""
+FELT_S = 0.1
+"""Over which the phone's accelerometer is averaged."""
+OLD_S = 0.15
+"""An eye that rests on no picture newer than this is nobody's."""
+UNSURE_M = 5e-3
+"""Standard deviation beyond which an eye is nobody's."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Eye:
+    """The camera's centre before the glass."""
+
+    t: float
+    p_in_g: Array
+    """(3,) [m]."""
+    v_in_g: Array
+    """(3,) [m/s]."""
+    sigma: float
+    """Largest standard deviation [m]."""
+    age: float
+    """Since the newest picture of it was taken [s]."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether light may be drawn for it."""
+        return self.age < OLD_S and self.sigma < UNSURE_M
+
+    def at(self, t: float) -> Array:
+        """Place (3,) at a time soon after [s]."""
+        place: Array = self.p_in_g + (t - self.t) * self.v_in_g
+        return place
+
+
+class EyeTracker:
+    """One phone before one glass. Pictures and motion samples in, in any order."""
+
+    def __init__(self, glass: Glass) -> None:
+        """Nothing is known of the phone."""
+        self._filter = RelativeFilter(AT_REST, glass.fiducials())
+        self._felt: deque[PhoneImu] = deque(maxlen=64)
+        self._up_in_g, self._pictures = np.zeros(3), 0
+
+    @property
+    def up_in_g(self) -> Array | None:
+        """The vertical (3,), once it is known."""
+        if self._pictures < VERTICAL_PICTURES:
+            return None
+        up: Array = self._up_in_g / np.sqrt(self._up_in_g @ self._up_in_g)
+        return up
+
+    def add_phone_imu(self, sample: PhoneImu) -> None:
+        """Take a motion sample: at that time the glass felt gravity alone."""
+        self._felt.append(sample)
+        self._filter.add_phone_imu(sample)
+        up = self.up_in_g
+        if up is not None:
+            self._filter.add_body_imu(BodyImu(sample.t, np.zeros(3), GRAVITY * up))
+
+    def add_seen(self, seen: VisionMeasurement, now: float) -> None:
+        """Take what a picture says of the glass, at `now` [s]."""
+        near = [s.a_m_cf_in_c for s in self._felt if abs(s.t - seen.t) < FELT_S]
+        if seen.pose is not None and near:
+            self._pictures += 1
+            share = 1.0 / min(self._pictures, REMEMBERED_PICTURES)
+            felt_in_g = seen.pose.R_cb.T @ np.mean(near, axis=0)
+            self._up_in_g += share * (felt_in_g - self._up_in_g)
+        self._filter.add_seen(seen, now)
+
+    def at(self, now: float) -> Eye | None:
+        """The eye at `now` [s], which does not go back; None while nothing is known."""
+        state = self._filter.state(now)
+        if state is None:
+            return None
+        R_gc = state.R_cb.T
+        place, speed = -R_gc @ state.p_bc_in_c, -R_gc @ state.u_bf_in_c
+        return Eye(now, place, speed, state.sigma_p, state.age)

@@ -1,0 +1,119 @@
+"""A robot of light, sans-I/O: what a phone saw of the glass in, what the glass shall show out.
+
+First the phone finds the glass, then it measures how late the glass is, then it sees the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.frames import Array, R_from_wxyz
+from pipeline.glass.display_lag import SWEEP_SHARE, DisplayLag, DisplayLagMeter
+from pipeline.glass.eye import Eye, EyeTracker
+from pipeline.glass.window import Glass, Hanging, pierced, seen_through
+from pipeline.signals import PhoneImu, VisionMeasurement
+
+Phase = Literal["search", "sweep", "robot"]
+"""Fiducials alone; and a light that sweeps, drawn by the page itself; and the robot's LEDs."""
+PathAhead = Callable[[float], Sequence[tuple[float, Array, Array]]]
+"""Where the robot goes within so long [s], oldest first: (t [s], wxyz_fb, p_bf_in_f [m])."""
+STEP_S = 0.01
+"""Between the places of a light that are told at once."""
+TOLD_S = 0.06
+"""So far beyond the display lag: the way to the page, and a frame of the glass."""
+NEAREST_M = 0.30
+FARTHEST_WIDTHS = 2.5
+"""Beyond, in widths of the glass, the LEDs are too small in the picture."""
+LOOK = "Point the phone at the screen, all four corners in the picture."
+LEAST_PER_HEIGHT = 1.15
+"""Height of the glass, of the LEDs' own: less, and they hardly stay on it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lights:
+    """What the glass shall show."""
+
+    phase: Phase
+    why: str = ""
+    """What is wrong, in words for the person who can mend it."""
+    t: float = 0.0
+    """Of the light of the first places [s]; the others follow, `STEP_S` apart."""
+    places: Array | None = None
+    """(k, n, 2) of each LED on the glass [m], right and up; NaN where there is none."""
+
+
+class RobotOfLight:
+    """One robot behind one glass, for one phone."""
+
+    def __init__(self, leds_in_b: Array, glass: Glass) -> None:
+        """Nothing is known of the phone and of the display."""
+        self.glass, self._leds_in_b = glass, leds_in_b
+        self._eye = EyeTracker(glass)
+        self._meter = DisplayLagMeter(SWEEP_SHARE * glass.width_m)
+        self.lag: DisplayLag | None = None
+        """Of the display, once it is measured."""
+        self.eye: Eye | None = None
+        """At the last step."""
+
+    @property
+    def is_too_small(self) -> bool:
+        """Whether this robot's LEDs don't fit the glass."""
+        heights = self._leds_in_b[:, 2]
+        return self.glass.height_m < LEAST_PER_HEIGHT * float(np.ptp(heights))
+
+    def add_phone_imu(self, sample: PhoneImu) -> None:
+        """The phone has moved."""
+        self._eye.add_phone_imu(sample)
+
+    def add_seen(self, seen: VisionMeasurement, lights_in_c: Array, now: float) -> None:
+        """The phone has seen the glass, and lights in directions (n, 3), the brightest first."""
+        self._eye.add_seen(seen, now)
+        if self.lag is None and seen.pose is not None and len(lights_in_c):
+            R_gc = seen.pose.R_cb.T
+            places = seen_through(-R_gc @ seen.pose.p_bc_in_c, lights_in_c @ R_gc.T)
+            free = self.glass.has(places) & (np.abs(places[:, 1]) < 0.5 * self.glass.tile_m)
+            if free.any():
+                self._meter.saw(seen.t, float(places[free][0, 0]))
+                self.lag = self._meter.lag()
+
+    def step(self, now: float, robot: PathAhead) -> Lights:
+        """What to show from `now` [s] on."""
+        if self.is_too_small:
+            return Lights("search", "This robot does not fit the screen: choose a larger screen, "
+                          "or start with --robot screen.")  # fmt: skip
+        self.eye = eye = self._eye.at(now)
+        up_in_g = self._eye.up_in_g
+        if eye is None or up_in_g is None or not eye.is_sure:
+            return Lights("search", LOOK)
+        if self.lag is None:
+            return Lights("sweep", self._misplaced(eye))
+        if not self.lag.is_fit:
+            late_ms = 1e3 * self.lag.value
+            return Lights("search", f"This screen shows everything {late_ms:.0f} ms late, which is "
+                          "too late to lead by: choose its game mode, or another one.")  # fmt: skip
+        return self._shown(eye, up_in_g, now, robot)
+
+    def _shown(self, eye: Eye, up_in_g: Array, now: float, robot: PathAhead) -> Lights:
+        assert self.lag is not None
+        start, hanging = now + self.lag.value, Hanging.of(up_in_g, self._leds_in_b)
+        path = robot(max(self.lag.value, 0.0) + TOLD_S)
+        times, wxyz, p = (np.array(part) for part in zip(*path, strict=True))
+        places = np.empty((round(TOLD_S / STEP_S) + 1, len(self._leds_in_b), 2))
+        for k in range(len(places)):
+            t = start + k * STEP_S
+            i = int(np.abs(times - t).argmin())  # of a path with a step of a few milliseconds
+            leds_in_g = hanging.leds_in_g(R_from_wxyz(wxyz[i]), p[i], self._leds_in_b)
+            places[k] = pierced(eye.at(t), leds_in_g)
+        return Lights("robot", self._misplaced(eye), start, places)
+
+    def _misplaced(self, eye: Eye) -> str:
+        distance = -float(eye.p_in_g[0])
+        if distance < NEAREST_M:
+            return "The phone is too near: go back a little."
+        if distance > FARTHEST_WIDTHS * self.glass.width_m:
+            return "The phone is too far away: come nearer."
+        return ""

@@ -1,0 +1,138 @@
+"""The closed loop with a robot of light, in virtual time: a phone films a screen, and leads."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from hardware.robot_file import RobotFile
+from hardware.sim.glass_film import film
+from hardware.sim.hand import Hand
+from pipeline.camera.lens import Camera
+from pipeline.config import TeleopConfig
+from pipeline.frames import Array, R_from_rpy
+from pipeline.glass.display_lag import SWEEP_SHARE, DisplayLag, swept
+from pipeline.glass.robot_of_light import STEP_S, Lights, RobotOfLight
+from pipeline.glass.window import Glass
+from pipeline.signals import BodyImu, Image, PhoneImu
+from pipeline.teleop import Output
+from pipeline.vision.detection import Detection
+from server.phone.glass_watch import GlassWatch
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
+
+INCHES_24 = Glass(0.53, 0.30)
+FRAMES_HZ = 60.0
+"""Of the display."""
+WAY_S = 0.010
+"""From the server to the page."""
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """A screen on a table."""
+
+    glass: Glass = INCHES_24
+    lag_s: float = 0.040
+    """From drawing to light."""
+    tilt_rad: float = radians(10.0)
+    """Of its upper edge, away from who looks."""
+    believed_lag_s: float | None = None
+    """Taken for its lag without measuring; None: it is measured."""
+
+
+class ScreenSimulation(VirtualTimeSimulation):
+    """One flight of a robot that is only light."""
+
+    def __init__(
+        self,
+        robot_file: RobotFile,
+        config: TeleopConfig,
+        scene: SimulationOptions,
+        display: Display,
+        hand: Hand | None = None,
+    ) -> None:
+        """Everything at rest at time 0, the robot not shown yet."""
+        super().__init__(robot_file, config, scene, hand=hand)
+        leds_in_b = robot_file.robot.leds_in_b
+        self._display, self._rest_in_f = display, leds_in_b.mean(axis=0)
+        self.phone.films = self._film
+        self._shown: deque[tuple[float, Array]] = deque(maxlen=64)
+        """(Time of its light [s], dots (n, 2) [m]) of the frames lately drawn."""
+        self._watch = GlassWatch(self._frame_pipeline.camera, display.glass)
+        self.robot_of_light = RobotOfLight(leds_in_b, display.glass)
+        if display.believed_lag_s is not None:
+            self.robot_of_light.lag = DisplayLag(display.believed_lag_s, 0.0)
+        self._told: deque[tuple[float, Lights]] = deque(maxlen=16)
+        self._t_frame = 0.0
+        self.phases: set[str] = set()
+        """Shown so far."""
+
+    @property
+    def shows(self) -> Lights:
+        """What the page was told last."""
+        return self._told[-1][1]
+
+    def advance(self) -> Output:
+        """One control period of everything, and the frames of the glass that are due."""
+        while self._t_frame <= self.t:
+            self._told.append((self._t_frame + WAY_S, self._lights(self._t_frame)))
+            self._shown.append((self._t_frame + self._display.lag_s, self._drawn()))
+            self._t_frame += 1.0 / FRAMES_HZ
+        return super().advance()
+
+    def _lights(self, t: float) -> Lights:
+        def ahead(seconds: float) -> list[tuple[float, Array, Array]]:
+            plant = self.follower.plant
+            now = [(self.t, plant.wxyz_fb, plant.p_bf_in_f)]
+            return now + [(self.t + dt, wxyz, p) for dt, wxyz, p in plant.ahead(seconds)]
+
+        lights = self.robot_of_light.step(max(t, self.t), ahead)
+        self.phases.add(lights.phase)
+        return lights
+
+    def _drawn(self) -> Array:
+        """What the page makes of the newest that it was told, at this frame."""
+        t, lag = self._t_frame, self.robot_of_light.lag
+        come = [lights for since, lights in self._told if since <= t]
+        if not come or come[-1].phase == "search":
+            return np.zeros((0, 2))
+        if come[-1].phase == "sweep":
+            right = SWEEP_SHARE * self._display.glass.width_m * float(swept(np.array(t)))
+            return np.array([[right, 0.0]])
+        lights = come[-1]
+        assert lights.places is not None
+        assert lag is not None
+        k = (t + lag.value - lights.t) / STEP_S
+        i = int(np.clip(np.floor(k), 0, len(lights.places) - 2))
+        places: Array = lights.places[i] + (k - i) * (lights.places[i + 1] - lights.places[i])
+        return places
+
+    def _feel(self, *samples: PhoneImu | BodyImu) -> None:
+        super()._feel(*samples)
+        for sample in samples:
+            if isinstance(sample, PhoneImu):
+                self.robot_of_light.add_phone_imu(sample)
+
+    def _look_further(self, detection: Detection) -> None:
+        """Look for the glass."""
+        luma = self._frame_pipeline.luma
+        if luma is None or detection.comes_again:
+            return
+        look = self._watch.look(luma, detection)
+        if look.seen is not None:
+            self.robot_of_light.add_seen(look.seen, look.lights_in_c, self.t)
+
+    def _film(self, camera: Camera, t: float, rng: np.random.Generator) -> Image:
+        """A picture of the glass taken at `t` [s]."""
+        R_fg = R_from_rpy(np.array([0.0, -self._display.tilt_rad, 0.0]))
+
+        def glass_at(dt: float) -> tuple[Array, Array]:
+            R_fc, p_cf_in_f = self.phone.hand.pose(t + dt)
+            return R_fc.T @ R_fg, R_fc.T @ (self._rest_in_f - p_cf_in_f)
+
+        lit = [dots for since, dots in self._shown if since <= t]
+        dots = lit[-1] if lit else np.zeros((0, 2))
+        return film(camera, glass_at, self._display.glass, dots[self._display.glass.has(dots)], rng)

@@ -1,0 +1,116 @@
+"""A phone that films fiducials knows where it is before the glass, smoothly and ahead."""
+
+import numpy as np
+import pytest
+
+from hardware.plant_parameters import StartParameters
+from hardware.sim.glass_film import film
+from hardware.sim.hand import make_hand
+from pipeline.camera.lens import Camera
+from pipeline.frames import R_from_rpy
+from pipeline.glass.eye import EyeTracker
+from pipeline.glass.fiducials import FiducialDetector, glass_seen
+from pipeline.glass.window import Glass, on_glass, seen_through
+from pipeline.signals import PhoneImu
+
+GLASS = Glass(0.53, 0.30)
+K = np.array([[950.0, 0.0, 639.5], [0.0, 950.0, 359.5], [0.0, 0.0, 1.0]])
+CAMERA = Camera(1280, 720, K, "plumb_bob", np.zeros(5))
+DOTS = np.array([[-0.03, 0.05], [0.04, -0.05], [-0.06, -0.03], [0.05, 0.03], [0.0, 0.02]])
+PITCH = 0.2
+"""Of a laptop's lid [rad]."""
+R_fg = R_from_rpy(np.array([0.0, PITCH, 0.0]))
+
+
+def looking(rpy, eye_in_g):
+    """(R_cg, p_gc_in_c) of a camera at `eye_in_g`, turned by `rpy` from straight ahead."""
+    R_gc = R_from_rpy(np.array(rpy))
+    return R_gc.T, -R_gc.T @ np.array(eye_in_g)
+
+
+def picture(at, seed=0, grey=70):
+    return film(CAMERA, lambda _: at, GLASS, DOTS, np.random.default_rng(seed), grey)
+
+
+@pytest.mark.parametrize("grey", [40, 70, 115])
+@pytest.mark.parametrize(
+    ("rpy", "eye"),
+    [((0, 0, 0), (-0.6, 0, 0)), ((0.1, 0.1, -0.1), (-0.7, 0.1, 0.1)), ((0, 0, 0), (-1.0, 0, 0))],
+)
+def test_the_eye_is_found_to_some_millimetres(rpy, eye, grey):
+    at = looking(rpy, eye)
+    seen = glass_seen(CAMERA, GLASS, *FiducialDetector().find(picture(at, grey=grey)), 0.0)
+    assert seen is not None
+    assert len(seen.rays) >= 12
+    assert np.abs(seen.pose.R_cb.T @ seen.pose.p_bc_in_c + eye).max() < 4e-3
+
+
+def test_a_mirrored_picture_has_no_glass_in_it():
+    mirrored = picture(looking((0, 0, 0), (-0.6, 0, 0)))[:, ::-1]
+    numbers, _ = FiducialDetector().find(mirrored)
+    assert len(numbers) == 0
+
+
+def test_a_glass_that_is_followed_is_found_as_one_that_is_searched_for():
+    followed = FiducialDetector()
+    for k in range(6):
+        image = picture(looking((0, 0.02 * k, 0.03 * k), (-0.6, 0.01 * k, 0)), seed=k)
+        numbers, pixels = followed.find(image)
+        alone, places = FiducialDetector().find(image)
+        order, same = np.argsort(numbers), np.argsort(alone)
+        np.testing.assert_array_equal(numbers[order], alone[same])
+        np.testing.assert_allclose(pixels[order], places[same], atol=0.1)
+
+
+def test_one_marker_alone_tells_nothing():
+    numbers, pixels = FiducialDetector().find(picture(looking((0, 0, 0), (-0.6, 0, 0))))
+    assert glass_seen(CAMERA, GLASS, numbers[:4], pixels[:4], 0.0) is None
+
+
+def test_a_ray_through_a_pixel_meets_the_glass_where_the_light_is():
+    R_cg, p_gc_in_c = looking((0.1, -0.1, 0.15), (-0.6, 0.1, 0.05))
+    rays_in_g = (p_gc_in_c + on_glass(DOTS) @ R_cg.T) @ R_cg
+    assert np.allclose(seen_through(np.array([-0.6, 0.1, 0.05]), rays_in_g), DOTS)
+
+
+def followed(seed, seconds=6.0):
+    """Errors (n, 3) [m] of the eye 50 ms ahead of the newest news, and the tracker."""
+    start = StartParameters(0.6, 0.0, 0.0)
+    hand, rng = make_hand("moving", seed=seed, start=start), np.random.default_rng(seed)
+    eye, errors = EyeTracker(GLASS), []
+    for k in range(int(60 * seconds)):
+        t = k / 60.0
+        R_fc, p_cf_in_f = hand.pose(t)
+        omega = hand.omega_in_c(t) + 0.001 * rng.standard_normal(3)
+        force = hand.specific_force_in_c(t) + 0.05 * rng.standard_normal(3)
+        eye.add_phone_imu(PhoneImu(t, omega, force))
+        if k % 2 == 0:
+            R_cg, p_gc_in_c = R_fc.T @ R_fg, -R_fc.T @ p_cf_in_f
+            pixels = CAMERA.pixels(p_gc_in_c + GLASS.fiducials() @ R_cg.T)
+            noisy = pixels + 0.15 * rng.standard_normal(pixels.shape)
+            seen = glass_seen(CAMERA, GLASS, np.arange(16), noisy, t)
+            eye.add_seen(seen, t + 0.02)
+        now = t + 0.02
+        found = eye.at(now)
+        if found is not None and t > 3.0:
+            ahead = now + 0.03
+            errors.append(found.at(ahead) - R_fg.T @ hand.pose(ahead)[1])
+    return np.array(errors), eye
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1000, 1001])
+def test_the_eye_is_smooth_and_ahead_of_its_pictures(seed):
+    errors, eye = followed(seed)
+    assert len(errors) > 150
+    assert np.sqrt((errors**2).sum(axis=1).mean()) < 5e-3
+    assert np.abs(np.diff(errors, axis=0)).max() < 2e-3
+    assert np.abs(eye.up_in_g - R_fg.T @ [0.0, 0.0, 1.0]).max() < 0.01
+    assert eye.at(6.02).is_sure
+
+
+@pytest.mark.slow
+def test_an_eye_without_pictures_is_soon_nobodys():
+    _, eye = followed(1002, seconds=3.0)
+    assert eye.at(3.05).is_sure
+    assert not eye.at(3.3).is_sure

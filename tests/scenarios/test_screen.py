@@ -1,0 +1,41 @@
+"""A phone that films a screen leads a robot which is only light."""
+
+import pytest
+
+from hardware.robot_file import load_robot
+from pipeline.config import TeleopConfig
+from server.control.process import teleop_config
+from server.simulation.figures import result_of
+from server.simulation.screen import Display, ScreenSimulation
+from server.simulation.virtual_time import SimulationOptions
+
+SCREEN = load_robot("screen")
+CONFIG = teleop_config(SCREEN, "phone", TeleopConfig().virtual_camera, "relative")
+
+
+def flight(display, seed):
+    """A simulation that is not flown yet."""
+    return ScreenSimulation(SCREEN, CONFIG, SimulationOptions(hand="moving", seed=seed), display)
+
+
+@pytest.mark.slow
+def test_a_phone_before_a_screen_measures_its_lag_and_leads_the_robot_of_light():
+    simulation = flight(Display(lag_s=0.04), seed=1000)
+    figures = result_of(simulation.run(9.0), simulation.scene, 0.0)
+    lag = simulation.robot_of_light.lag
+    assert {"search", "sweep", "robot"} <= simulation.phases
+    # a frame stays for 17 ms: what a phone sees is between 0 and so much later
+    assert 0.037 < lag.value < 0.040 + 0.020
+    assert figures.tracked_s > 2.0
+    assert not figures.ended
+    assert figures.rms_mm < 8.0
+
+
+@pytest.mark.slow
+def test_a_television_that_is_too_late_is_refused_and_not_flown():
+    simulation = flight(Display(lag_s=0.1), seed=1001)
+    simulation.run(4.0)
+    assert simulation.robot_of_light.lag.value > 0.09
+    assert "robot" not in simulation.phases
+    assert not simulation.trace.t
+    assert "too late" in simulation.shows.why
