@@ -18,7 +18,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   invite       a link into the running server: --role viewer, operator or supervisor
   phone        a virtual phone that films the simulated robot and leads it
   replay       push a recorded phone through a server, or through the pipeline alone
-  export       a recording in a format that others read: Foxglove, rosbag2, CSV
+  export       a recording in a format that others read: Foxglove, rosbag2, LeRobot, CSV
   import       a film of any phone, and its motion samples, as a recording
   locate       where the robot was in each picture of a folder or film, with its uncertainty
   experiments  measure the loop, as tables and pictures

@@ -19,6 +19,7 @@ ABOUT = """Write a recording in a format that others read. The recording stays a
 
   foxglove  one MCAP file for Foxglove, Lichtblick or Rerun: film, poses, motion, LEDs, log
   rosbag2   a bag (MCAP inside) for ROS 2, film as foxglove_msgs/CompressedVideo
+  lerobot   a LeRobotDataset v3.0: each press an episode, each picture a row with its true times
   csv       plain tables, units in the names of the columns
 
 Times are those at which things happened: of a picture, when it was taken. A recording by an older
@@ -37,6 +38,12 @@ def _rosbag2() -> tuple[Write, str]:
     return write, ".rosbag2"
 
 
+def _lerobot() -> tuple[Write, str]:
+    from server.export.lerobot import write
+
+    return write, ".lerobot"
+
+
 def _csv() -> tuple[Write, str]:
     from server.export.csv_tables import write
 
@@ -46,6 +53,7 @@ def _csv() -> tuple[Write, str]:
 FORMATS: dict[str, Callable[[], tuple[Write, str]]] = {
     "foxglove": _foxglove,
     "rosbag2": _rosbag2,
+    "lerobot": _lerobot,
     "csv": _csv,
 }
 """How to write each, and how the name ends of the file or folder that it becomes."""

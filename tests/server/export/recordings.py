@@ -18,8 +18,8 @@ ZERO_NS = 1_790_000_000_123_456_789
 SIZE = 320, 240
 
 
-def on_a_known_day(folder, source=FLIGHT, **metadata):
-    """The same items in a file that knows the calendar."""
+def on_a_known_day(folder, source=FLIGHT, change=lambda entry: entry.data, **metadata):
+    """The same items, or changed ones, in a file that knows the calendar."""
     recording = read(source)
     path = folder / source.name
     with path.open("wb") as file:
@@ -27,7 +27,7 @@ def on_a_known_day(folder, source=FLIGHT, **metadata):
         writer, channels = start_file(file, known)
         for entry in recording.entries():
             ns = round(1e9 * entry.t)
-            writer.add_message(channels[entry.topic], ns, entry.data, ns)
+            writer.add_message(channels[entry.topic], ns, change(entry), ns)
         finish_file(writer, file)
     return path
 
