@@ -29,6 +29,7 @@ from server.protocol import (
     link_messages,
     messages,
     people_messages,
+    screen_messages,
     wire,
     wire_records,
 )
@@ -58,6 +59,10 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Status,
     people_messages.Deed,
     link_messages.LinkReport,
+    screen_messages.ScreenSize,
+    screen_messages.ClockAsk,
+    screen_messages.ClockAnswer,
+    screen_messages.ScreenLights,
 )
 UNIONS = {"FromPage": messages.FromPage, "ToPage": messages.ToPage}
 HEADER_FIELDS = (
@@ -176,7 +181,8 @@ def js_type(hint: object) -> str:
     if origin in (Union, types.UnionType):
         return " | ".join(map(js_type, arguments))
     if origin is list:
-        return f"{js_type(arguments[0])}[]"
+        inner = js_type(arguments[0])
+        return f"({inner})[]" if "|" in inner else f"{inner}[]"
     if origin is dict:
         return f"Record<string, {js_type(arguments[1])}>"
     plain: dict[object, str] = {

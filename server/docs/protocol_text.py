@@ -187,8 +187,8 @@ come from the server's own pages (403): `Origin` is the server's, and requests c
 {requests()}
 
 Bodies up to {MAX_BODY} bytes (an answer's session description: {answer.MAX_BYTES}). Pages (`/`,
-`/supervisor`, `/board`) and their files need no role. Refusals are JSON, as below: `code`, `field`,
-`allowed`.
+`/supervisor`, `/board`, `/screen`) and their files need no role. Refusals are JSON, as below:
+`code`, `field`, `allowed`.
 
 ## Records
 

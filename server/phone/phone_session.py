@@ -27,6 +27,7 @@ from server.phone.calibration_session import CalibrationSession
 from server.phone.frame_pipeline import FramePipeline
 from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
+from server.phone.screen_door import ScreenDoor
 from server.phone.sensor_check import SensorCheck
 from server.phone.vision_thread import VisionThread
 from server.protocol.calibration_messages import Calibrate, Calibration
@@ -53,10 +54,12 @@ class PhoneSession:
         on_key_wanted: Callable[[], None],
         profiles: Path | None = None,
         make_decoder: MakeDecoder = Decoder,
+        screen: ScreenDoor | None = None,
     ) -> None:
         """`to_control` may be called from the vision thread too; calibrations go to `profiles`.
 
-        `make_decoder` says where pictures are decoded, by itself here.
+        `make_decoder` says where pictures are decoded, by itself here; `screen` is what it may film
+        in place of a robot.
         """
         self.id = secrets.token_urlsafe(12)
         self.device, self.hello = hello.device or "a phone", hello
@@ -68,6 +71,7 @@ class PhoneSession:
         self.vision: VisionThread | None = None
         self._shape: ImageFormat | None = None
         self._profiles, self._make_decoder = profiles, make_decoder
+        self._screen = screen
         self.wizard: CalibrationSession | None = None
         """The camera's calibration, while one is under way."""
         self.video_path = ""
@@ -103,6 +107,8 @@ class PhoneSession:
                 self.link.came("motion", sample.t, now)
                 self._to_control(PhoneImuInput.of(sample))
                 self._check.add_imu(sample.t, record.body)
+                if self._screen is not None:
+                    self._screen.felt(sample)
                 if self.wizard is not None:
                     self.wizard.add_imu(sample)
                 if self.vision is not None:
@@ -134,7 +140,8 @@ class PhoneSession:
         self.meters["video"].tick(now, frame.t)
         self.link.came("pictures", frame.t, now)
         shape = ImageFormat.of(frame.picture)
-        if shape != self._shape:
+        may_guess = self.camera_problem != "" and self.wizard is None and self._films_screen
+        if shape != self._shape or may_guess:
             self._open_eyes(shape)
         if self.wizard is not None:
             self.wizard.offer(frame)
@@ -143,6 +150,11 @@ class PhoneSession:
             self._on_taken(frame.sequence)
             raise WireError("calibration", "frame", self.camera_problem)
         self.vision.offer(frame)
+
+    @property
+    def _films_screen(self) -> bool:
+        """Whether there is a screen in place of a robot."""
+        return self._screen is not None and self._screen.is_open
 
     def _open_eyes(self, shape: ImageFormat) -> None:
         """Begin to look, or begin again at another size or angle: that is another camera."""
@@ -154,16 +166,23 @@ class PhoneSession:
             return
         try:
             path, camera = shape.camera(self.device, self._cameras)
+            self.camera_text = path.read_text(encoding="utf-8")
         except CameraFileError as error:
-            self.camera_problem = str(error)
-            return
-        self.camera_text = path.read_text(encoding="utf-8")
+            if not self._films_screen:
+                self.camera_problem = str(error)
+                return
+            camera, self.camera_text = shape.guessed(), ""  # enough for a robot that is only light
         self.ingest.extrinsics = camera.extrinsics
         frame_pipeline = FramePipeline(
             camera, self._robot, GatesConfig(), self._clock, self._make_decoder
         )
+        screen = self._screen
         self.vision = VisionThread(
-            frame_pipeline, partial(self._sighted, camera), self._on_taken, self._on_key_wanted
+            frame_pipeline,
+            partial(self._sighted, camera),
+            self._on_taken,
+            self._on_key_wanted,
+            partial(screen.looked, camera) if screen is not None else None,
         )
 
     def _sighted(self, camera: Camera, detection: Detection, frame: EncodedFrame) -> None:

@@ -31,11 +31,13 @@ class VisionThread(FrameThread):
         on_detection: Callable[[Detection, EncodedFrame], None],
         on_taken: Callable[[int], None],
         on_key_wanted: Callable[[], None],
+        on_picture: Callable[[Image, Detection], None] | None = None,
     ) -> None:
-        """Callbacks run in this thread."""
+        """Callbacks run in this thread; `on_picture` may look further at what was seen."""
         super().__init__("vision", on_taken)
         self._frame_pipeline = frame_pipeline
         self._on_detection, self._on_key_wanted = on_detection, on_key_wanted
+        self._on_picture = on_picture
         self._t_thumbnail = 0.0
         self.watched = False
         """Whether anyone wants thumbnails."""
@@ -63,6 +65,9 @@ class VisionThread(FrameThread):
         self._tell(lambda: self._on_detection(detection, frames[-1]))
         if detection.comes_again:
             return
+        luma = self._frame_pipeline.luma
+        if luma is not None and self._on_picture is not None:
+            self._on_picture(luma, detection)
         now = clock.now()
         if (
             self.watched

@@ -34,6 +34,7 @@ from server.recording.control import Recordings
 from server.recording.reader import recover_all
 from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
 from server.rtc.signalling_endpoint import SignallingEndpoint
+from server.screen.screen import Screen
 from server.security.admission import Admission
 from server.security.audit import Audit
 from server.security.least_role import roles_of
@@ -144,7 +145,10 @@ def _manager(
     robot = load_robot(settings.robot).robot
     profiles = private_directory(settings.state / PROFILES)
     cameras = [*settings.cameras, profiles, CAMERAS]
-    return SessionManager(given.runtime, robot, cameras, recordings, profiles, doors, decoding)
+    screen = Screen(given.truth_port, robot.leds_in_b) if given.truth_port else None
+    return SessionManager(
+        given.runtime, robot, cameras, recordings, profiles, doors, decoding, screen
+    )
 
 
 def _dashboard(settings: Settings, manager: SessionManager, view: Path) -> Dashboard:

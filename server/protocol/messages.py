@@ -15,6 +15,7 @@ from server.common.runtime_parameters import AdaptiveBeta, CutoffHz, RuntimePara
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.camera_messages import CameraHealth
 from server.protocol.people_messages import Deed, Person
+from server.protocol.screen_messages import ClockAnswer, ClockAsk, ScreenLights, ScreenSize
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import MAX_MESSAGE_BYTES, WireError
 
@@ -29,8 +30,9 @@ class Hello(msgspec.Struct, tag="hello", forbid_unknown_fields=True, frozen=True
 
     version: int
     """Protocol version of the page."""
-    role: Literal["operator", "supervisor", "video"]
-    """`video`: the second socket of an operator, for frames alone."""
+    role: Literal["operator", "supervisor", "video", "screen"]
+    """`video`: the second socket of an operator, for frames alone; `screen`: shows a
+    simulated robot's LEDs."""
     device: Text = ""
     """Names the camera's calibration: what the browser or a virtual phone says of itself."""
     session: Annotated[str, Meta(max_length=64)] = ""
@@ -232,8 +234,18 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Who is paired, in the order they came."""
 
 
-FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log
-ToPage = Welcome | Refused | Status | Command | PathChoice | Calibration | Deed
+FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log | ScreenSize | ClockAsk
+ToPage = (
+    Welcome
+    | Refused
+    | Status
+    | Command
+    | PathChoice
+    | Calibration
+    | Deed
+    | ClockAnswer
+    | ScreenLights
+)
 
 _decoder = msgspec.json.Decoder(FromPage)
 _to_page_decoder = msgspec.json.Decoder(ToPage)

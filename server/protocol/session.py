@@ -5,6 +5,7 @@ from __future__ import annotations
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.command_age import refuse_old
 from server.protocol.messages import Command, FromPage, Hello, Log, Tune, decode_message
+from server.protocol.screen_messages import ClockAsk, ScreenSize
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import VERSION, WireError, check_frame, decode, size_of
 from server.protocol.wire_records import Motion, Picture, Pong, Record, Stamp, Touch
@@ -18,6 +19,7 @@ ALLOWED: dict[str, tuple[type, ...]] = {
     "rtc": (Motion, Touch, Pong, Stamp),
     "video": (Picture,),
     "supervisor": (),
+    "screen": (),
 }
 """Kinds of record by role."""
 MESSAGES: dict[str, tuple[type, ...]] = {
@@ -25,6 +27,7 @@ MESSAGES: dict[str, tuple[type, ...]] = {
     "rtc": (),
     "video": (Log,),
     "supervisor": (Command, Tune, PathChoice, Log),
+    "screen": (ScreenSize, ClockAsk, Log),
 }
 
 
@@ -50,7 +53,7 @@ class Session:
     """State of one connection: waiting for hello, then open as a role."""
 
     def __init__(self, path_role: str, looks_only: bool = False) -> None:
-        """`path_role` is what the path says: operator, video, supervisor; rtc: a data channel.
+        """`path_role` is what the path says: a role of hello; rtc: a data channel.
 
         Who `looks_only` on a supervisor's page may say STOP there and nothing else.
         """

@@ -27,6 +27,7 @@ from server.media.decoding import Decoding
 from server.phone.calibration_control import CalibrationControl
 from server.phone.client_connection import ClientConnection
 from server.phone.phone_session import PhoneSession
+from server.phone.screen_door import ScreenDoor
 from server.phone.transports import FastTransport, Transports
 from server.phone.vision_thread import Picture, jpeg
 from server.protocol.calibration_messages import Calibrate
@@ -63,12 +64,14 @@ class SessionManager:
         profiles: Path | None = None,
         doors: Doors | None = None,
         decoding: Decoding | None = None,
+        screen: ScreenDoor | None = None,
     ) -> None:
         """Listens to control in `runtime`; `profiles` is where new calibrations go.
 
-        Without `decoding` pictures are decoded in this process.
+        Without `decoding` pictures are decoded in this process; a `screen` can show a simulated
+        robot.
         """
-        self.robot, self.recordings = robot, recordings
+        self.robot, self.recordings, self.screen = robot, recordings, screen
         self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
         self.paths = Transports(lambda data: recordings.record("server", data, now()))
         self._calibration = CalibrationControl(self.paths.send)
@@ -192,6 +195,7 @@ class SessionManager:
             on_key_wanted=partial(soon, self.paths.want_key),
             profiles=self._profiles,
             make_decoder=self._decoding.open if self._decoding is not None else Decoder,
+            screen=self.screen,
         )
         self.paths.begin(page)
         self.recordings.message("phone", encode_message(hello), now())
@@ -282,7 +286,10 @@ class SessionManager:
             return [self.unready]
         if self.phone is None:
             return ["No phone is connected: scan the code, or start the virtual phone."]
-        return self.phone.refusals(now())
+        lacks = self.phone.refusals(now())
+        if lacks and self.screen is not None and self.screen.why:
+            lacks.append(self.screen.why)
+        return lacks
 
     def _tick(self) -> None:
         self.to_control(ReadyInput(self.refusals()))

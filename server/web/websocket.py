@@ -25,6 +25,7 @@ from server.protocol.messages import (
     Welcome,
     encode_message,
 )
+from server.protocol.screen_messages import ClockAnswer, ClockAsk, ScreenLights, ScreenSize
 from server.protocol.session import Session
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import VERSION, WireError
@@ -54,6 +55,7 @@ class Connection:
         self._unsent: deque[str | bytes] = deque(maxlen=MAX_UNSENT)
         self._newest: bytes | None = None
         self._news = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
 
     def send(self, data: str | bytes) -> None:
         """Send when possible."""
@@ -69,6 +71,11 @@ class Connection:
         """Tell the page what was not taken."""
         refused = Refused(error.code, error.field, error.allowed, fatal)
         self.send(encode_message(refused))
+
+    def show(self, lights: ScreenLights) -> None:
+        """Send a screen what it shows; any thread may call it."""
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self.send, encode_message(lights))
 
     async def write(self) -> None:
         """Send what is pushed, until cancelled."""
@@ -114,7 +121,7 @@ class Connection:
 
 
 class PageServer:
-    """Serves the three kinds of socket."""
+    """Serves the four kinds of socket."""
 
     def __init__(self, manager: SessionManager, video: VideoSettings) -> None:
         """Serve the pages of one robot."""
@@ -131,6 +138,10 @@ class PageServer:
     async def supervisor(self, socket: WebSocket) -> None:
         """`/ws/supervisor`: someone who watches."""
         await self._serve(socket, "supervisor")
+
+    async def screen(self, socket: WebSocket) -> None:
+        """`/ws/screen`: shows a simulated robot's light; may wish for nothing."""
+        await self._serve(socket, "screen")
 
     async def _serve(self, socket: WebSocket, role: str) -> None:
         await socket.accept()
@@ -156,6 +167,8 @@ class PageServer:
                 if task is not None:
                     task.cancel()
             self._manager.supervisors.discard(page)
+            if role == "screen" and (screen := self._manager.screen) is not None:
+                screen.leave(page.show)
             if role == "operator" and phone is not None:
                 self._manager.disconnect_phone(phone)
             await _quietly(page.close(1008 if session.hopeless or session.hello is None else 1000))
@@ -176,6 +189,8 @@ class PageServer:
             phone = self._manager.join_video(hello.session, page)
             if phone is None:
                 raise WireError("role", "hello.session", "the session of the phone that leads")
+        elif session.role == "screen":
+            self._enter(page)
         else:
             self._manager.supervisors.add(page)
         video = self._video
@@ -194,6 +209,15 @@ class PageServer:
             )
         )
         return phone
+
+    def _enter(self, page: Connection) -> None:
+        """Let a screen show the robot; raises WireError if there is nothing to show, or no room."""
+        screen = self._manager.screen
+        if screen is None:
+            raise WireError("role", "hello.role", "a simulated robot: a real one has its own LEDs")
+        if not screen.enter(page.show):
+            raise WireError("role", "hello.role", "one screen at a time: another one is open")
+        self._manager.log_event("A screen shows the robot.", of="screen")
 
     async def _listen(
         self, page: Connection, session: Session, phone: PhoneSession | None, member: Member
@@ -224,6 +248,10 @@ class PageServer:
                 self._manager.tune(said)
             elif isinstance(said, PathChoice):
                 self._choose(said, phone)
+            elif isinstance(said, ScreenSize) and (screen := self._manager.screen) is not None:
+                screen.measure(page.show, said)
+            elif isinstance(said, ClockAsk):
+                page.send(encode_message(ClockAnswer(said.page_ms, 1e3 * t)))
             elif isinstance(said, Log):
                 self._manager.log_event(f"page: {said.text}", of=f"page of {member.name}")
         except WireError as error:

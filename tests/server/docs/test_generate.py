@@ -96,5 +96,5 @@ def test_types_are_what_json_holds():
     assert hints["position_mm"] == "number[] | null"
     assert hints["streams"] == "Record<string, Stream>"
     hello = {name: generate.js_type(hint) for name, hint, _ in generate._fields(Hello)}
-    assert hello["role"] == "'operator' | 'supervisor' | 'video'"
+    assert hello["role"] == "'operator' | 'supervisor' | 'video' | 'screen'"
     assert hello["device"] == "string"

@@ -287,3 +287,31 @@ def test_pictures_of_a_size_nobody_calibrated_are_refused_until_the_size_is_righ
         assert not any("not calibrated" in why for why in rig.why())
     finally:
         rig.phone.close()
+
+
+class OpenableScreen:
+    """A place of a screen that only says whether one is there."""
+
+    is_open, why = False, ""
+
+    def felt(self, sample: object) -> None:
+        """Nothing of it."""
+
+    def looked(self, camera: object, luma: object, detection: object) -> None:
+        """Nothing of it."""
+
+
+def test_only_before_a_screen_a_camera_without_a_calibration_may_be_guessed() -> None:
+    rig, screen = Rig("nobody's phone"), OpenableScreen()
+    rig.phone._screen = screen  # type: ignore[assignment]
+    rig.synchronise()
+    with pytest.raises(WireError):
+        rig.say(JPEG, 1)
+    assert "no calibration" in rig.phone.camera_problem
+    screen.is_open = True
+    rig.say(JPEG, 2)
+    assert rig.phone.camera_problem == ""
+    assert rig.phone.vision is not None
+    focal_px = rig.phone.vision.front_end.camera.focal_px
+    assert 0.7 * JPEG.width < focal_px < 0.9 * JPEG.width
+    rig.phone.close()

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from server.protocol import wire, wire_records
 from server.protocol.messages import Command, Hello, Log, Tune, encode_message
+from server.protocol.screen_messages import ClockAsk, ScreenSize
 from server.protocol.session import (
     BYTES_HZ,
     MAX_FAULTS,
@@ -28,7 +29,7 @@ from server.protocol.wire_records import Record
 
 FLAT = wire_records.Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
 JPEG = wire_records.Picture(wire_records.Codec.JPEG, True, 1280, 720, 0, b"\xff\xd8 not really")
-ROLES = ("operator", "video", "supervisor")
+ROLES = ("operator", "video", "supervisor", "screen")
 TOUCH = wire_records.Touch(False, True, 0, 1)
 BODIES = {
     "Motion": FLAT,
@@ -39,7 +40,12 @@ BODIES = {
     "Credit": wire_records.Credit(1),
     "Thumbnail": wire_records.Thumbnail(b"x"),
 }
-MAY = {"operator": {"Motion", "Touch", "Pong"}, "video": {"Picture"}, "supervisor": set()}
+MAY = {
+    "operator": {"Motion", "Touch", "Pong"},
+    "video": {"Picture"},
+    "supervisor": set(),
+    "screen": set(),
+}
 
 
 def hello(role: str, version: int = wire.VERSION) -> str:
@@ -307,3 +313,20 @@ def test_pictures_by_packets_are_limited_by_number_and_bytes() -> None:
 
 def test_who_said_no_hello_gets_no_picture_in_by_packets() -> None:
     assert outcome(lambda: Session("video").admit(Record(1, 2, JPEG), 0.0)) == ("order", "record")
+
+
+def test_a_screen_tells_its_size_and_asks_the_time_and_wishes_for_nothing() -> None:
+    screen = opened("screen")
+    for said in (ScreenSize(531.0, 299.0), ClockAsk(12.5), Log("no fullscreen")):
+        assert screen.receive(encode_message(said), 0.1) == said
+    for wish in (Command("arm"), Command("stop"), Command("reset"), Tune(), PathChoice("auto")):
+        assert refusal(opened("screen"), encode_message(wish)).code == "role"
+    for role in ("operator", "video", "supervisor"):
+        for said in (ScreenSize(531.0, 299.0), ClockAsk(12.5)):
+            assert refusal(opened(role), encode_message(said)).code == "role"
+
+
+@pytest.mark.parametrize("size", [(0.0, 300.0), (500.0, 4e3), (float("nan"), 300.0)])
+def test_a_screen_of_no_size_is_refused(size: tuple[float, float]) -> None:
+    text = json.dumps({"type": "glass", "width_mm": size[0], "height_mm": size[1]})
+    assert refusal(opened("screen"), text).code in ("value", "type")

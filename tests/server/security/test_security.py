@@ -29,7 +29,7 @@ OWN = {"Origin": BASE, "X-Lightleash": "1"}
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS")
 STYLES = (
     *("style", "phone", "supervisor", "calibration", "lens", "board"),
-    *("pairing", "people", "link"),
+    *("pairing", "people", "screen", "link"),
 )
 PICTURES = ("icon", "lead", "board")
 FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICTURES)}
@@ -99,7 +99,7 @@ def test_nothing_but_pages_their_files_and_pairing_opens_without_a_role(rig):
         for method in METHODS
         if rig.client.request(method, path, headers=OWN).status_code not in (401, 403, 404, 405)
     }
-    public = {"/", "/supervisor", "/board", "/healthz", *FILES}
+    public = {"/", "/supervisor", "/board", "/screen", "/healthz", *FILES}
     readable = {(method, path) for path in public for method in ("GET", "HEAD")}
     assert opened == readable | {("POST", "/api/pair")}  # which answers 400: no link
 
@@ -112,7 +112,7 @@ def test_every_route_is_known_to_this_test(rig):
 
 
 def test_every_websocket_asks_for_a_role(rig):
-    assert [refused_socket(rig, path, OWN) for path in socket_paths(rig)] == [401] * 5
+    assert [refused_socket(rig, path, OWN) for path in socket_paths(rig)] == [401] * 6
 
 
 @pytest.mark.parametrize("path", ["/src/app/main.js", "/src/dashboard/main.js", "/style.css"])

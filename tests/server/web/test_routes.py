@@ -47,7 +47,7 @@ MAY = {
 GET, POST, BOTH = ("GET",), ("POST",), ("DELETE", "POST")
 
 TABLE = {
-    **dict.fromkeys(("/", "/supervisor", "/board", "/healthz", "/ca.crt"), (READ, ALL)),
+    **dict.fromkeys(("/", "/supervisor", "/board", "/screen", "/healthz", "/ca.crt"), (READ, ALL)),
     "/src": (READ, ALL),
     "/api/pair": (POST, ALL),
     "/api/whoami": (GET, OPERATOR),
@@ -73,6 +73,7 @@ TABLE = {
 SOCKETS = {
     "/ws/phone": OPERATOR,
     "/ws/video": OPERATOR,
+    "/ws/screen": VIEWER,
     "/ws/supervisor": VIEWER,
     "/view": VIEWER,
     "/view/": VIEWER,

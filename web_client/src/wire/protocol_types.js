@@ -8,7 +8,7 @@
  * @typedef {object} Hello
  * @property {'hello'} type
  * @property {number} version Protocol version of the page.
- * @property {'operator' | 'supervisor' | 'video'} role `video`: the second socket of an operator, for frames alone.
+ * @property {'operator' | 'supervisor' | 'video' | 'screen'} role `video`: the second socket of an operator, for frames alone; `screen`: shows a simulated robot's LEDs.
  * @property {string} device Names the camera's calibration: what the browser or a virtual phone says of itself.
  * @property {string} session On the video socket: the session of the operator it belongs to.
  * @property {string} sensors Which interface delivers motion, for the supervisor to read.
@@ -262,7 +262,44 @@
  * @property {number | null} picture_gap_ms The longest wait for one.
  */
 
-/** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log} FromPage */
-/** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration | Deed} ToPage */
+/**
+ * Screen's page → server, first and at each change: its lit part; all is measured anew.
+ * @typedef {object} ScreenSize
+ * @property {'glass'} type
+ * @property {number} width_mm
+ * @property {number} height_mm
+ */
+
+/**
+ * Screen's page → server: what does your clock show?
+ * @typedef {object} ClockAsk
+ * @property {'clock_ask'} type
+ * @property {number} page_ms The page's own.
+ */
+
+/**
+ * Server → screen's page.
+ * @typedef {object} ClockAnswer
+ * @property {'clock_answer'} type
+ * @property {number} page_ms As it was asked.
+ * @property {number} server_ms
+ */
+
+/**
+ * Server → screen's page, 60 Hz: what the glass shall show.
+ * @typedef {object} ScreenLights
+ * @property {'lights'} type
+ * @property {'search' | 'sweep' | 'robot'} phase `search`: the fiducials alone, which are there always; `sweep`: and a light at sweep_mm · sin(2π server_ms / 1000) to the right of the middle, drawn for the frame's own time; `robot`: and the LEDs.
+ * @property {string} why What is wrong, in words for the person who can mend it, or "".
+ * @property {number | null} lag_ms Of the display, once it is measured: a frame's light has the frame's time and this.
+ * @property {number} t_ms Of the light of the first row, on the server's clock.
+ * @property {number} step_ms From each row to the next.
+ * @property {((number | null)[])[]} places_mm Rows of right and up of each LED from the middle of the glass; null: nowhere.
+ * @property {number} dot_mm Diameter of a light.
+ * @property {number} sweep_mm
+ */
+
+/** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log | ScreenSize | ClockAsk} FromPage */
+/** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration | Deed | ClockAnswer | ScreenLights} ToPage */
 
 export {};

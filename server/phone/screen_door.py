@@ -1,0 +1,41 @@
+"""What the rest of the server knows of a screen that shows a robot of light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from pipeline.camera.lens import Camera
+from pipeline.signals import Image, PhoneImu
+from pipeline.vision.detection import Detection
+from server.protocol.screen_messages import ScreenLights, ScreenSize
+
+Show = Callable[[ScreenLights], object]
+"""Hands lights to the page; any thread may call it."""
+
+
+class ScreenDoor(Protocol):
+    """One place for the page of a screen; a phone's session tells it what the phone sees."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a screen is there."""
+
+    @property
+    def why(self) -> str:
+        """What is wrong with what the phone sees of it, in words, or ""."""
+
+    def enter(self, show: Show) -> bool:
+        """Take the place; False while another screen has it."""
+
+    def measure(self, show: Show, glass: ScreenSize) -> None:
+        """The glass of who has the place: begin anew."""
+
+    def leave(self, show: Show) -> None:
+        """Free the place, if `show` has it."""
+
+    def felt(self, sample: PhoneImu) -> None:
+        """The phone has moved."""
+
+    def looked(self, camera: Camera, luma: Image, detection: Detection) -> None:
+        """The phone has seen something; in the vision thread."""
