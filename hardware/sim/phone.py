@@ -9,6 +9,7 @@ from math import ceil, floor, radians
 
 import numpy as np
 
+from hardware.sim.body.shape import BodyShape
 from hardware.sim.camera_faults import CameraFault, FaultyCamera
 from hardware.sim.hand import Hand
 from hardware.sim.phone_faults import SensorFault, spoilt_force, spoilt_rate
@@ -164,16 +165,17 @@ class VirtualPhone:
         clock: PhoneClock = PhoneClock(),
         hidden: Callable[[float], Sequence[int]] = lambda _: (),
         twin: BodyHistory | None = None,
+        body: BodyShape | None = None,
     ) -> None:
         """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says.
 
         The camera's mounting is the truth, whatever a calibration knows of it.
         `hidden` gives the LEDs that something covers at a time [s], `twin` where another robot of
-        the same kind is.
+        the same kind is; the LEDs' robot has a `body`.
         """
         self._hidden, self._twin = hidden, twin
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
-        self._leds_in_b, self._look = leds_in_b, look
+        self._leds_in_b, self._look, self._body = leds_in_b, look, body
         schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
         self._faulty = FaultyCamera(
             options.camera_fault, camera, lambda t: self.hand.pose(t)[0], options.camera_fault_s
@@ -238,7 +240,9 @@ class VirtualPhone:
         else:
             shown = np.delete(self._leds_in_b, list(self._hidden(moment)), axis=0)
             others = [] if self._twin is None else [(seen_as(self._twin), self._leds_in_b)]
-            image = render(seen_by, seen_as(body), shown, self._look, self._picture_rng, others)
+            image = render(
+                seen_by, seen_as(body), shown, self._look, self._picture_rng, self._body, others
+            )
         self._last = moment, image
         return image
 

@@ -1,4 +1,4 @@
-"""What a phone's camera sees of the LEDs: light, point spread, saturation, noise, gamma, 8 bits."""
+"""What a phone's camera sees of a robot: light, point spread, saturation, noise, gamma, 8 bits."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ from functools import cache, lru_cache
 import cv2
 import numpy as np
 
+from hardware.sim.body.shape import BodyShape
+from hardware.sim.body.silhouette import BEYOND, Shutter, Silhouette
+from hardware.sim.body.silhouette_kernels import Plane
+from hardware.sim.body.ways import ways_of
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import Image
@@ -17,6 +21,9 @@ RelativePoseAt = Callable[[float], tuple[Array, Array]]
 """(R_cb (3, 3), p_bc_in_c (3,) [m]) at a time [s] relative to the middle of the exposure."""
 
 ROLLING_ITERATIONS = 3
+LEVELS = 16384
+"""Of light, between which grey levels are looked up."""
+UPRIGHT = np.array([0.0, 0.0, 1.0])
 BANK = 64
 """Extra rows and columns of the noise, from which each picture takes its own part."""
 
@@ -49,13 +56,26 @@ def render(
     leds_in_b: Array,
     look: RenderOptions,
     rng: np.random.Generator,
+    body: BodyShape | None = None,
     others: Sequence[tuple[RelativePoseAt, Array]] = (),
 ) -> Image:
-    """Luma (height, width), full range, sRGB-like gamma; `others` are robots with LEDs (n, 3)."""
+    """Luma (height, width), full range, sRGB-like gamma; without a `body` LEDs float in the air.
+
+    `others` are robots with LEDs (n, 3), which do.
+    """
     room, noise = _stage(camera.width, camera.height, look)
     du, dv = rng.integers(0, BANK, 2)
-    image = room.copy()
-    for patch, v, u in _lights(camera, ((pose, leds_in_b), *others), look):
+    image, pose = room.copy(), cache(pose)
+    silhouette = _silhouette(camera, pose, body, look) if body is not None else None
+    if silhouette is not None:
+        left, top, right, bottom = silhouette.box
+        behind = _linear(image[top:bottom, left:right]).astype(np.float32)
+        silhouette.lay(behind, left, top)
+        image[top:bottom, left:right] = _GREY[(behind * LEVELS).astype(np.int32)]
+    lights = _lights(camera, pose, leds_in_b, look, silhouette)
+    for other, others_leds_in_b in others:
+        lights += _lights(camera, cache(other), others_leds_in_b, look, None)
+    for patch, v, u in (*lights, *_lamps(camera, look)):
         v1, u1 = max(v, 0), max(u, 0)
         v2, u2 = min(v + len(patch), camera.height), min(u + patch.shape[1], camera.width)
         if v1 < v2 and u1 < u2:
@@ -66,28 +86,61 @@ def render(
     return np.asarray(cv2.addWeighted(image, 1.0, grain, 1.0, -128.0), dtype=np.uint8)
 
 
+def _silhouette(
+    camera: Camera, pose: RelativePoseAt, body: BodyShape, look: RenderOptions
+) -> Silhouette:
+    """The body; a cable hangs from straight above it."""
+
+    def places_in_c(t: float) -> Array:
+        R_cb, p_bc_in_c = pose(t)
+        return p_bc_in_c + body.places(UPRIGHT) @ R_cb.T
+
+    row_s = camera.readout_s / camera.height
+    ways = ways_of(places_in_c, camera, look.exposure_s, BEYOND)
+    return Silhouette(body, camera, ways, Shutter(look.blur_px, look.exposure_s, row_s))
+
+
 def _lights(
-    camera: Camera, robots: Sequence[tuple[RelativePoseAt, Array]], look: RenderOptions
-) -> list[tuple[Array, int, int]]:
+    camera: Camera,
+    pose: RelativePoseAt,
+    leds_in_b: Array,
+    look: RenderOptions,
+    silhouette: Silhouette | None,
+) -> list[tuple[Plane, int, int]]:
     """Patches of light with the row and column of their corner."""
-    lights: list[tuple[Array, int, int]] = []
+    lights: list[tuple[Plane, int, int]] = []
     times = (np.arange(look.sub_exposures) + 0.5) / look.sub_exposures - 0.5
-    for robot, leds_in_b in robots:
-        pose = cache(robot)
-        delays = _row_delays(camera, pose, leds_in_b, look)
-        for led, delay in zip(leds_in_b, delays, strict=True):
-            seen = [
-                _projected(camera, pose(delay + t * look.exposure_s), led[None], look)
-                for t in times
-            ]
-            track = [(uv[0], float(radius[0])) for uv, radius in seen if radius[0] > 0.0]
-            if track:
-                lights.append(_patch(track, look.led_light, look.sub_exposures, look))
+    delays = _row_delays(camera, pose, leds_in_b, look)
+    for led, delay in zip(leds_in_b, delays, strict=True):
+        seen = [
+            _projected(camera, pose(delay + t * look.exposure_s), led[None], look) for t in times
+        ]
+        track = [(uv[0], float(radius[0])) for uv, radius in seen if radius[0] > 0.0]
+        if track:
+            light = _patch(track, look.led_light, look.sub_exposures, look)
+            if silhouette is not None:
+                depth = camera.focal_px * look.led_radius_m / track[0][1]
+                _shut_out(*light, track[len(track) // 2][0], depth, silhouette)
+            lights.append(light)
+    return lights
+
+
+def _lamps(camera: Camera, look: RenderOptions) -> list[tuple[Plane, int, int]]:
+    """Lights that are no LEDs, in the same form."""
+    lights: list[tuple[Plane, int, int]] = []
     lamps = np.random.default_rng(look.distractors)
     for _ in range(look.distractors):
         place = lamps.uniform(0.02, 0.98, 2) * (camera.width, camera.height)
         lights.append(_patch([(place, lamps.uniform(1.0, 4.0))], lamps.uniform(0.5, 3.0), 1, look))
     return lights
+
+
+def _shut_out(
+    patch: Plane, top: int, left: int, place: Array, depth: float, silhouette: Silhouette
+) -> None:
+    """Take from an LED's light what the body before it hides."""
+    box = np.array([left, top, left + patch.shape[1], top + len(patch)])
+    silhouette.shut_out(patch, box, silhouette.before(place, depth, box))
 
 
 def _row_delays(
@@ -116,7 +169,7 @@ def _projected(
 
 def _patch(
     track: list[tuple[Array, float]], light: float, exposures: int, look: RenderOptions
-) -> tuple[Array, int, int]:
+) -> tuple[Plane, int, int]:
     """A disc blurred by the point spread, with its halo, smeared along `track`."""
     centres = np.array([centre for centre, _ in track])
     radius = max(r for _, r in track)
@@ -132,7 +185,7 @@ def _patch(
         core = 1.0 / (1.0 + np.exp(1.702 * edge))
         halo = look.halo * np.exp(-0.5 * distance2 / (look.halo_px**2 + r * r))
         patch += light * (core + halo) / exposures
-    return patch, int(top), int(left)
+    return patch.astype(np.float32), int(top), int(left)
 
 
 @lru_cache(maxsize=4)
@@ -153,6 +206,8 @@ def _gamma(light: Array) -> Image:
 
 
 _LINEAR: Array = (np.arange(256) / 255.0) ** 2.2
+_GREY: Image = _gamma(np.arange(LEVELS + 1) / LEVELS)
+"""Grey levels of light from 0 to 1."""
 
 
 def _linear(image: Image) -> Array:

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from hardware.sim.scenes.kernels import Light
-from hardware.sim.scenes.optics import Box, Lamp, Pane, Sensor
+from hardware.sim.scenes.optics import Box, Lamp, Pane
+from hardware.sim.scenes.sensor import Sensor
 from pipeline.frames import Array
 
 STEP_PX = 0.1

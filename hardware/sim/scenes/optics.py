@@ -1,32 +1,23 @@
-"""A lens and a sensor: lights with a place and a velocity become grey levels."""
+"""A lens's light and a sensor's tones, and what shines: lamps with a velocity, and panes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import ceil, floor, log, sqrt
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtr
 from scipy.stats import ncx2
 
-from hardware.sim.scenes.kernels import STEP_PX, Light, expose, glow, spread
+from hardware.sim.scenes.kernels import STEP_PX
 from pipeline.frames import Array
 from pipeline.signals import Image
 
 Box = npt.NDArray[np.int64]
 """(4,): left, top, right, bottom; the last two are beyond the end."""
-BANK = 64
-"""Extra rows and columns of the noise, from which each picture takes its own part."""
-FAINT = 2e-4
-"""Light that is left out."""
 LEVELS = 16384
 """Of light, between which grey levels are looked up."""
-SAMPLE_PX = 0.35
-"""Between two parts of an exposure in motion."""
-SAMPLES = 160
 EDGE = 5.0
 """Standard deviations of the point spread beyond a disc's edge where its light ends."""
 
@@ -81,6 +72,8 @@ class Lamp:
     """(6,) place [px], velocity [px/s], acceleration [px/s²] at its row's exposure."""
     radius_px: float
     light: float
+    behind: tuple[int, ...] = ()
+    """Which parts of a body are before it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,114 +87,7 @@ class Pane:
     opaque: bool
 
 
-class Sensor:
-    """Draws pictures of one size; keeps its memory."""
-
-    def __init__(self, optics: Optics, width: int, height: int, row_s: float) -> None:
-        """`row_s`: how much later a row is exposed than the one above it [s]."""
-        self.optics, self.width, self.height, self._row_s = optics, width, height, row_s
-        self.light: Light = np.zeros((height, width), dtype=np.float32)
-        """Linear light of the last picture, valid where something shone."""
-        self._noise = _noise(width, height)
-
-    def picture(
-        self,
-        room: Light,
-        room_grey: Image,
-        lamps: list[Lamp],
-        panes: list[Pane],
-        shift: tuple[int, int],
-    ) -> Image:
-        """Luma (height, width), full range.
-
-        Args:
-            room: Linear light behind all lamps, of the picture's size.
-            room_grey: The same in grey levels.
-            lamps: Drawn by their order.
-            panes: Added after the lamps, opaque ones last.
-            shift: Where in the bank this picture's noise begins: column, row.
-        """
-        boxes = [self.box(lamp) for lamp in lamps] + [self.pane_box(pane) for pane in panes]
-        for box in boxes:
-            part = np.s_[box[1] : box[3], box[0] : box[2]]
-            self.light[part] = room[part]
-        for lamp, box in zip(lamps, boxes, strict=False):
-            self.shine(self.light, lamp, box)
-        for pane, box in zip(panes, boxes[len(lamps) :], strict=True):
-            _lay(self.light, pane, box)
-        picture = self._dim(room_grey, float(room[::64, ::64].mean()), shift)
-        o = self.optics
-        for box in boxes:
-            expose(self.light, box, 1.0 / o.electrons, o.read, self._noise, *shift, o.grey, picture)
-        return picture
-
-    def _dim(self, grey: Image, light: float, shift: tuple[int, int]) -> Image:
-        """The room with its noise, which shot noise and gamma make about equal in grey levels."""
-        o = self.optics
-        sigma = float(o.slope(np.array(light))) * sqrt(light / o.electrons + o.read**2)
-        bank = _grain(self.width, self.height, max(4, round(8.0 * sigma)))
-        du, dv = shift
-        grain = bank[dv : dv + self.height, du : du + self.width]
-        # the bank is offset by 128: a saturating addition of the noise in grey levels
-        return np.asarray(cv2.addWeighted(grey, 1.0, grain, 1.0, -128.0), dtype=np.uint8)
-
-    def shine(self, light: Light, lamp: Lamp, box: Box) -> None:
-        """Add a lamp's light within `box`."""
-        o = self.optics
-        speed = float(np.hypot(lamp.way[2], lamp.way[3]))
-        n = min(max(1, ceil(speed * o.exposure_s / SAMPLE_PX)), SAMPLES)
-        times = o.exposure_s * ((np.arange(n) + 0.5) / n - 0.5)
-        profile = _profile(lamp.radius_px, o.blur_px)
-        spread(light, box, lamp.way, self._row_s, times, profile, lamp.light * (1.0 - o.halo))
-        sigma, strength = self._skirt(lamp)
-        if strength > FAINT:
-            glow(light, box, lamp.way[0], lamp.way[1], sigma, strength)
-
-    def _skirt(self, lamp: Lamp) -> tuple[float, float]:
-        """Width [px] and peak of a lamp's halo, smeared as the lamp is."""
-        o = self.optics
-        smear = float(np.hypot(lamp.way[2], lamp.way[3])) * o.exposure_s
-        sigma2 = o.halo_px**2 + lamp.radius_px**2 / 4.0 + smear**2 / 24.0
-        return sqrt(sigma2), o.halo * lamp.light * lamp.radius_px**2 / (2.0 * sigma2)
-
-    def box(self, lamp: Lamp) -> Box:
-        """Where a lamp's light goes."""
-        sigma, strength = self._skirt(lamp)
-        halo = sigma * sqrt(2.0 * log(strength / FAINT)) if strength > FAINT else 0.0
-        core = lamp.radius_px + EDGE * self.optics.blur_px
-        # the row's own exposure moves the light again, by as much as rows take
-        reach = np.abs(lamp.way[2:4]) * (0.5 * self.optics.exposure_s + core * self._row_s) + core
-        reach = np.maximum(reach * (1.0 + abs(lamp.way[3]) * self._row_s), halo)
-        return self._clipped(lamp.way[:2] - reach, lamp.way[:2] + reach)
-
-    def pane_box(self, pane: Pane) -> Box:
-        """Where a pane is."""
-        far = 3.5 * pane.softness_px
-        low, high = np.array([pane.u[0], pane.v[0]]), np.array([pane.u[1], pane.v[1]])
-        return self._clipped(low - far, high + far)
-
-    def _clipped(self, low: Array, high: Array) -> Box:
-        size = (self.width, self.height)
-        left, top = (min(max(0, floor(x)), n) for x, n in zip(low, size, strict=True))
-        right, bottom = (min(max(0, ceil(x) + 1), n) for x, n in zip(high, size, strict=True))
-        return np.array([left, top, max(left, right), max(top, bottom)])
-
-
-def _lay(light: Light, pane: Pane, box: Box) -> None:
-    """A pane's light with soft edges."""
-    columns, rows = np.arange(box[0], box[2]), np.arange(box[1], box[3])
-    s = pane.softness_px
-    across = ndtr((columns - pane.u[0]) / s) - ndtr((columns - pane.u[1]) / s)
-    down = ndtr((rows - pane.v[0]) / s) - ndtr((rows - pane.v[1]) / s)
-    cover = np.outer(down, across).astype(np.float32)
-    part = light[box[1] : box[3], box[0] : box[2]]
-    if pane.opaque:
-        part += cover * (np.float32(pane.light) - part)
-    else:
-        part += np.float32(pane.light) * cover
-
-
-def _profile(radius_px: float, blur_px: float) -> Array:
+def profile_of(radius_px: float, blur_px: float) -> Array:
     """Light over the distance from the centre of a disc seen through a Gaussian point spread."""
     rhos, xs, table = _discs()
     rho = radius_px / blur_px
@@ -231,16 +117,3 @@ def _discs() -> tuple[Array, Array, Array]:
 def _grey(gamma: float, contrast: float) -> Image:
     optics = Optics(1.0, 0.0, 1.0, 1.0, 0.0, 0.0, gamma, contrast)
     return np.round(optics.tone(np.linspace(0.0, 1.0, LEVELS + 1))).astype(np.uint8)
-
-
-@lru_cache(maxsize=3)
-def _noise(width: int, height: int) -> Light:
-    rng = np.random.default_rng(0)
-    return rng.standard_normal((height + BANK, width + BANK), dtype=np.float32)
-
-
-@lru_cache(maxsize=6)
-def _grain(width: int, height: int, eighths: int) -> Image:
-    """Noise of so many eighths of a grey level, offset by 128."""
-    grain = np.round(128.0 + eighths / 8.0 * _noise(width, height))
-    return np.clip(grain, 0, 255).astype(np.uint8)

@@ -60,6 +60,8 @@ class Scene:
     sizes: tuple[Size, ...] = SIZES
     distance_m: Range = (2.2, 2.8)
     led_light: Range = (1.5, 5.0)
+    blur_px: Range = (0.75, 1.05)
+    """Standard deviation of the point spread."""
     halo: Range = (0.01, 0.03)
     """Share of a spot's light in a wide skirt."""
     halo_px: Range = (5.0, 9.0)
@@ -91,6 +93,8 @@ class Scene:
     """So long after the film's begin the robot's own LEDs go out."""
     is_flat: bool = False
     """All LEDs in one plane."""
+    has_body: bool = False
+    """Arms, hub, propellers and cable are in the picture, not the LEDs alone."""
     picture: ImageOrientation = ImageOrientation.UPRIGHT
     camera_fault: CameraFault = CameraFault.NONE
     """Begins `HONEST_S` after the film."""
@@ -188,6 +192,20 @@ _ALL: Final = (
         lamps=(0, 4),
         distance_m=(2.5, 3.0),
         tilt_deg=(0.0, 3.0),
+    ),
+    Scene(
+        "defocus",
+        "a lens that is focused on something else",
+        blur_px=(2.5, 3.5),
+        led_light=(0.8, 3.0),
+        lamps=(0, 4),
+    ),
+    Scene(
+        "dim",
+        "LEDs turned down, in a dim room",
+        led_light=(0.06, 0.2),
+        room_light=(0.004, 0.02),
+        lamps=(0, 4),
     ),
     Scene("tilt", "the robot tilted far", tilt_deg=(30.0, 50.0), lamps=(0, 5)),
     Scene("flat_rig", "all LEDs in one plane", is_flat=True, lamps=(0, 5)),

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from hardware.sim.body.shape import BodyShape
+from hardware.sim.body.silhouette import BEYOND, Silhouette
+from hardware.sim.body.ways import ImageTrajectories, ways_of
 from hardware.sim.scenes.crlb import is_merged, place_information
 from hardware.sim.scenes.motion import PhoneAndRobotMotion
-from hardware.sim.scenes.optics import Lamp, Pane, Sensor
+from hardware.sim.scenes.optics import Lamp, Pane
 from hardware.sim.scenes.room import Bar, Mirror, Room, RoomLights
+from hardware.sim.scenes.sensor import Sensor
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rpy_from_R
 from pipeline.signals import Image
 
 Flags = npt.NDArray[np.bool_]
-NODES = 5
-"""Times at which places are exact; between them a polynomial, right to 1e-3 px."""
-ROW_ITERATIONS = 4
-BEYOND = 1.25
-"""Half fields to each side outside of which nothing is drawn."""
 EVERYWHERE = (-1e4, 1e4)  # beyond any picture [px]
+WHOLE = 0.99
+"""Share of an LED's light that its robot's body must let through for it to be visible."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,16 +34,6 @@ class DrawnFrame:
     visible: Flags
     merged: Flags
     information: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ImageTrajectories:
-    """How points move over the picture around the times at which their rows are exposed."""
-
-    rows: Array
-    """(n, 6) place [px], velocity [px/s], acceleration [px/s²]."""
-    depth: Array
-    """(n,) ahead of the camera [m]; NaN: out of sight."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +55,7 @@ class Stage:
     bar: Bar | None
     room: Room
     R_fc_start: Array
+    body: BodyShape | None
 
     def draw(
         self,
@@ -75,18 +67,21 @@ class Stage:
         bound: bool,
     ) -> DrawnFrame:
         """The picture whose middle row is exposed around `t` [s]."""
-        ways = self._ways(sensor, camera, moving, t)
+        exposure_s = sensor.optics.exposure_s
+        ways = ways_of(lambda s: self._points(moving, t + s)[1], camera, exposure_s)
         n = len(self.leds_in_b)
-        lamps, owners = self._lamps(camera, ways, t)
+        body = self._silhouette(sensor, camera, moving, t)
+        lamps, owners = self._lamps(sensor, camera, ways, t, body)
         panes = self._panes(sensor, ways)
         room, grey = self._room(camera, moving, t)
-        luma = sensor.picture(room, grey, lamps, panes, shift)
+        luma = sensor.picture(room, grey, lamps, panes, shift, body)
         visible, merged = np.zeros(n, dtype=np.bool_), np.zeros(n, dtype=np.bool_)
         information = np.zeros((n, 2, 2))
         for lamp, led in zip(lamps, owners, strict=True):
             if led < 0:
                 continue
-            visible[led] = _in_sight(lamp, panes, sensor)
+            shown = sensor.share_shown(lamp, body) if body is not None else 1.0
+            visible[led] = shown > WHOLE and _in_sight(lamp, panes, sensor)
             if visible[led]:
                 merged[led] = is_merged(sensor, room, lamps, panes, lamp)
                 if bound:
@@ -109,23 +104,28 @@ class Stage:
         in_f = np.concatenate(points)
         return in_f, (in_f - p_cf_in_f) @ R_fc
 
-    def _ways(
+    def _silhouette(
         self, sensor: Sensor, camera: Camera, moving: PhoneAndRobotMotion, t: float
-    ) -> ImageTrajectories:
-        span = 0.5 * (abs(camera.readout_s) + sensor.optics.exposure_s) + 1e-4
-        nodes = np.linspace(-1.0, 1.0, NODES)
-        points = np.array([self._points(moving, t + span * s)[1] for s in nodes])
-        depth = points[NODES // 2, :, 0]
-        seen = _ahead(points, camera)
-        safe = np.where(seen[:, None], points, np.array([1.0, 0.0, 0.0]))
-        pixels = camera.pixels(safe.reshape(-1, 3)).reshape(NODES, -1)
-        powers: Array = np.linalg.inv(np.vander(nodes, increasing=True)).astype(np.float64) @ pixels
-        powers = (powers / span ** np.arange(NODES)[:, None]).reshape(NODES, -1, 2)
-        rows = _at_their_rows(powers, camera)
-        return ImageTrajectories(rows, np.where(seen, depth, np.nan))
+    ) -> Silhouette | None:
+        body = self.body
+        if body is None:
+            return None
+
+        def places_in_c(s: float) -> Array:
+            R_cb, p_bc_in_c = moving.relative(t + s)
+            up_in_b = moving.robot.pose(t + s)[0][2]
+            return p_bc_in_c + body.places(up_in_b) @ R_cb.T
+
+        ways = ways_of(places_in_c, camera, sensor.optics.exposure_s, BEYOND)
+        return Silhouette(body, camera, ways, sensor.shutter)
 
     def _lamps(
-        self, camera: Camera, ways: ImageTrajectories, t: float
+        self,
+        sensor: Sensor,
+        camera: Camera,
+        ways: ImageTrajectories,
+        t: float,
+        body: Silhouette | None,
     ) -> tuple[list[Lamp], list[int]]:
         """Round lights at `t` [s], and which LED each is; −1: none."""
         n, k = len(self.leds_in_b), len(self.lights.radii_m)
@@ -146,6 +146,11 @@ class Stage:
             Lamp(ways.rows[j], camera.focal_px * radii[j] / ways.depth[j], float(lights[j]))
             for j in drawn
         ]
+        if body is not None:
+            lamps = [
+                replace(lamp, behind=body.before(lamp.way[:2], depth, sensor.box(lamp)))
+                for lamp, depth in zip(lamps, ways.depth[drawn], strict=True)
+            ]
         return lamps, [int(owners[j]) for j in drawn]
 
     def _panes(self, sensor: Sensor, ways: ImageTrajectories) -> list[Pane]:
@@ -173,35 +178,6 @@ class Stage:
         """The background as a camera sees it that has turned since the start."""
         turned = rpy_from_R(self.R_fc_start.T @ moving.hand.pose(t)[0])
         return self.room.view(-camera.focal_px * turned[2], camera.focal_px * turned[1])
-
-
-def _ahead(points: Array, camera: Camera) -> Flags:
-    """(m,) whether points (k, m, 3) in c are near the field of view at all times."""
-    x = points[:, :, 0]
-    reach = BEYOND * np.array(camera.half_field)
-    inside = np.abs(points[:, :, 1:]) < np.maximum(x, 0.0)[:, :, None] * reach
-    return np.asarray((inside.all(axis=2) & (x > 0.1)).all(axis=0))
-
-
-def _at_their_rows(powers: Array, camera: Camera) -> Array:
-    """(n, 6) place, velocity, acceleration when a place's row is exposed.
-
-    `powers` (k, n, 2): coefficients over time [s] from the middle row's exposure.
-    """
-    orders = np.arange(len(powers))
-    t = np.zeros(powers.shape[1])
-    for _ in range(ROW_ITERATIONS if camera.readout_s != 0.0 else 0):
-        v = (powers[:, :, 1] * t ** orders[:, None]).sum(axis=0)
-        t = camera.row_delays(np.clip(v, 0.0, camera.height - 1.0))
-    rows = np.zeros((len(t), 6))
-    scale = np.ones(len(powers))
-    for order in range(3):
-        rest = powers[order:] * scale[order:, None, None]
-        rows[:, 2 * order : 2 * order + 2] = (
-            rest * t[None, :, None] ** np.arange(len(rest))[:, None, None]
-        ).sum(axis=0)
-        scale = scale * np.maximum(orders - order, 0)
-    return rows
 
 
 def _in_sight(lamp: Lamp, panes: list[Pane], sensor: Sensor) -> bool:

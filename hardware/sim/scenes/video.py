@@ -10,11 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hardware.robot_file import load_robot
+from hardware.sim.body.shape import body_of
 from hardware.sim.camera_faults import CameraFault, FaultyCamera
 from hardware.sim.scenes.motion import FLAT_LEDS, START_S, Sensors, movers, within
-from hardware.sim.scenes.optics import BANK, Optics, Sensor
+from hardware.sim.scenes.optics import Optics
 from hardware.sim.scenes.room import Room, bar_before, lights_around, mirror_near
 from hardware.sim.scenes.scene import HD, HONEST_S, VGA, ImageOrientation, Scene, Size
+from hardware.sim.scenes.sensor import BANK, Sensor
 from hardware.sim.scenes.stage import DrawnFrame, Stage
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, rotation_about_x
@@ -86,13 +88,13 @@ class RenderedVideo:
         self.scene, self.seed, self.size, self.frames = scene, seed, size, frames
         self._bound = bound
         named = np.random.SeedSequence((seed, crc32(scene.name.encode()), *size))
-        self._seeds = named.spawn(4)
+        self._seeds = named.spawn(5)
         rng = np.random.default_rng(self._seeds[0])
         self.leds_in_b = leds_of(scene)
         self.camera = camera_of(size, within(rng, scene.readout_s))
         """As a calibration knows it."""
         self.optics = Optics(
-            blur_px=float(rng.uniform(0.75, 1.05)),
+            blur_px=float(rng.uniform(*scene.blur_px)),
             halo=within(rng, scene.halo),
             halo_px=within(rng, scene.halo_px) * size[1] / HD[1],
             electrons=within(rng, scene.electrons),
@@ -114,7 +116,7 @@ class RenderedVideo:
         light = within(rng, scene.room_light)
         lamps = int(rng.integers(scene.lamps[0], scene.lamps[1] + 1))
         windows = int(rng.integers(scene.windows[0], scene.windows[1] + 1))
-        half = self.camera.half_field
+        half, building = self.camera.half_field, np.random.default_rng(self._seeds[4])
         led_light = within(rng, scene.led_light)
         return Stage(
             leds_in_b=self.leds_in_b,
@@ -128,6 +130,9 @@ class RenderedVideo:
             bar=bar_before(p_bf_in_f, p_cf_in_f, light, rng) if scene.bar else None,
             room=Room(self.size, light, scene.texture, self.optics.grey, rng),
             R_fc_start=R_fc,
+            body=body_of(self.leds_in_b, load_robot("ames").plant, light, building)
+            if scene.has_body
+            else None,
         )
 
     def __len__(self) -> int:
@@ -141,7 +146,7 @@ class RenderedVideo:
         sensor = Sensor(o, camera.width, camera.height, float(second - first))
         grain = np.random.default_rng(self._seeds[1])
         turn = rotation_about_x(TURNS.get(self.scene.picture, 0.0))
-        felt = Sensors(self.moving, turn, *map(np.random.default_rng, self._seeds[2:]))
+        felt = Sensors(self.moving, turn, *map(np.random.default_rng, self._seeds[2:4]))
         begin_s, drawn, shown = START_S + HONEST_S, None, -1.0
         faulty = FaultyCamera(self.scene.camera_fault, camera, self._R_fc, begin_s)
         for k in range(self.frames):

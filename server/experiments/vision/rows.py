@@ -28,6 +28,7 @@ COLUMNS = (
     ("depth_p95_mm", "p95", "{:.2f}"),
     ("turn_p95_deg", "p95", "{:.3f}"),
     ("nees", "NEES/6", "{:.2f}"),
+    ("nees_p95", "p95", "{:.1f}"),
     ("effective_px", "eff. px", "{:.3f}"),
     ("to_bound", "× bound", "{:.1f}"),
     ("tracking_ms", "ms", "{:.2f}"),
@@ -64,6 +65,8 @@ class VisionRow:
     turn_p95_deg: float
     nees: float
     """Over 6; 0.89 if the claimed covariance is true."""
+    nees_p95: float
+    """2.1 then."""
     effective_px: float
     """Pixel noise that would explain the pose errors."""
     to_bound: float
@@ -137,6 +140,7 @@ def _accuracy(errors: list[Error]) -> dict[str, float]:
         "depth_p95_mm": _at(depth, 95),
         "turn_p95_deg": _at(turn, 95),
         "nees": _at(_all(errors, "nees") / 6.0, 50),
+        "nees_p95": _at(_all(errors, "nees") / 6.0, 95),
         "effective_px": _at(np.sqrt(_all(errors, "pixel2") / MEDIAN_CHI2_6), 50),
         "to_bound": _at(np.sqrt(_all(errors, "bound2") / MEDIAN_CHI2_6), 50),
         "bound_lateral_mm": 1e3 * _at(_all(errors, "bound_lateral_m"), 50),

@@ -15,7 +15,7 @@ import json
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -76,6 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the first film")
     parser.add_argument(
         "--tuning", action="store_true", help=f"use the seeds below {FIRST_REPORTING_SEED}"
+    )
+    parser.add_argument(
+        "--bare", action="store_true", help="robots without bodies: their LEDs float in the air"
     )
     parser.add_argument("--no-imu", action="store_true", help="no motion sensors at all")
     parser.add_argument("--no-plain", action="store_true", help="leave plain OpenCV out")
@@ -173,6 +176,7 @@ def _tasks(arguments: argparse.Namespace) -> Iterator[Task]:
             scene = (
                 at_reference(SCENES[name]) if (name in REFERENCE and size == HD) else SCENES[name]
             )
+            scene = replace(scene, has_body=not arguments.bare)
             is_long = scene.motion is HandMotion.LEAVING or scene.bar or scene.twin
             length = LONG_FILM_FRAMES if is_long else FILM_FRAMES
             for k, begin in enumerate(range(0, arguments.frames, length)):

@@ -6,7 +6,7 @@ import pytest
 from hardware.sim.scenes.crlb import place_information
 from hardware.sim.scenes.kernels import STEP_PX
 from hardware.sim.scenes.motion import FLAT_LEDS, START_S, movers
-from hardware.sim.scenes.optics import Lamp, Optics, Pane, Sensor, _profile
+from hardware.sim.scenes.optics import Lamp, Optics, Pane, profile_of
 from hardware.sim.scenes.scene import (
     HD,
     SCENES,
@@ -17,6 +17,7 @@ from hardware.sim.scenes.scene import (
     at_reference,
     is_reporting,
 )
+from hardware.sim.scenes.sensor import Sensor
 from hardware.sim.scenes.video import RenderedVideo, camera_of
 from pipeline.frames import log
 
@@ -195,7 +196,7 @@ def test_readings_come_in_order_and_only_once():
 
 @pytest.mark.parametrize("radius_px", [0.3, 1.2, 4.0, 20.0])
 def test_the_point_spread_keeps_all_light(radius_px):
-    profile = _profile(radius_px, 0.9)
+    profile = profile_of(radius_px, 0.9)
     d = STEP_PX * np.arange(len(profile))
     flux = 2.0 * np.pi * float((profile * d).sum()) * STEP_PX
     assert flux == pytest.approx(np.pi * radius_px**2, rel=0.01)
