@@ -9,7 +9,7 @@ While all rest, nobody can know.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -24,9 +24,12 @@ from pipeline.signals import RelativePose, VisionMeasurement
 
 UNGATED: Final = 1e9
 """χ² of an LED: what is held against a candidate must rest on all of it."""
-OURS: Final = RelativeConfig(gate_chi2=UNGATED)
+OFFSET_STILL: Final = 0.1
+"""LEDs must move so fast [rad/s] before half is believed about the stamps' offset: while all rest,
+a gyroscope's noise would be taken for motion that comes too late."""
+OURS: Final = RelativeConfig(gate_chi2=UNGATED, offset_still=OFFSET_STILL)
 FREE: Final = tuple(
-    RelativeConfig(gate_chi2=UNGATED, sigma_omega_b=omega, sigma_f_b=force)
+    replace(OURS, sigma_omega_b=omega, sigma_f_b=force)
     for omega, force in ((0.05, 0.5), (0.5, 3.0))
 )
 """Of a robot of which nothing is felt: rates [rad/s] and forces [m/s²] of one that hovers or flies,
