@@ -36,12 +36,13 @@ FREE: Final = tuple(
 white."""
 SETTLED_S: Final = 0.1
 """Pictures and samples come in order: nothing older is made anew."""
-MOST: Final = 8.0
-"""One picture's logarithm of odds counts for no more, whatever it shows."""
+MOST: Final = 3.0
+"""One picture's logarithm of odds counts for no more, whatever it shows: stamps that are 40 ms off
+make the first few of a start lie."""
 MEMORY: Final = 0.97
 """Share of the evidence that the next picture leaves: a second's pictures count."""
 DECISIVE: Final = 24.0
-"""Logarithm of the odds by which one must be likelier ours than the others: three pictures at
+"""Logarithm of the odds by which one must be likelier ours than the others: four pictures at
 least."""
 CONTRARY: Final = -6.0
 """What has more against it is none of ours, even if all others have still more."""
