@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hardware.sim.phone import BodyHistory, VirtualPhone
+from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.identification import pnp
 from pipeline.imu_stream import ImuStreams
@@ -47,8 +48,9 @@ class LedSensorModel:
 
     def seen(self, t: float, stamp: float, body: BodyHistory) -> VisionMeasurement | None:
         """What a picture taken at `t` [s], and dated `stamp` [s], says; None without any LED."""
-        camera = self._phone.camera
-        pixels = self._pixels(t, body)
+        camera, lies = self._phone.camera, self._phone.lies
+        t, seen_by = lies.moment(t), lies.at(t)
+        pixels = self._pixels(t, body, seen_by)
         shown = camera.sees(pixels)
         shown[list(self._hidden(t))] = False
         led = np.flatnonzero(shown)
@@ -66,22 +68,22 @@ class LedSensorModel:
         rays = rays_of(camera, spots, match, stamp)
         return VisionMeasurement(stamp, rays, pose, camera.half_field, self._stamps.offset)
 
-    def _pixels(self, t: float, body: BodyHistory) -> Array:
+    def _pixels(self, t: float, body: BodyHistory, seen_by: Camera) -> Array:
         """(n, 2) where the LEDs are in a picture, each when its row is read; behind: nowhere."""
-        pixels = self._pixels_at(t, self._leds_in_b, body)
-        if self._phone.camera.readout_s != 0.0:
-            delays = self._phone.camera.row_delays(pixels[:, 1])
+        pixels = self._pixels_at(t, self._leds_in_b, body, seen_by)
+        if seen_by.readout_s != 0.0:
+            delays = seen_by.row_delays(pixels[:, 1])
             for k in np.flatnonzero(np.isfinite(delays)):
                 later = t + float(delays[k])
-                pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body)[0]
+                pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body, seen_by)[0]
         return pixels
 
-    def _pixels_at(self, t: float, leds_in_b: Array, body: BodyHistory) -> Array:
+    def _pixels_at(self, t: float, leds_in_b: Array, body: BodyHistory, seen_by: Camera) -> Array:
         R_cb, p_bc_in_c = self._phone.relative_pose(t, body)
         q_in_c = p_bc_in_c + leds_in_b @ R_cb.T
         pixels = np.full((len(leds_in_b), 2), np.nan)
         ahead = q_in_c[:, 0] > 0.0
-        pixels[ahead] = self._phone.camera.pixels(q_in_c[ahead])
+        pixels[ahead] = seen_by.pixels(q_in_c[ahead])
         return pixels
 
     def _spots(self, pixels: Array) -> Spots:

@@ -177,7 +177,7 @@ class VirtualPhone:
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
         self._leds_in_b, self._look, self._body = leds_in_b, look, body
         schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
-        self._faulty = FaultyCamera(
+        self.lies = FaultyCamera(
             options.camera_fault, camera, lambda t: self.hand.pose(t)[0], options.camera_fault_s
         )
         self.films: Callable[[Camera, float, np.random.Generator], Image] | None = None
@@ -228,7 +228,7 @@ class VirtualPhone:
 
     def picture(self, t: float, body: BodyHistory) -> Image:
         """Luma (height, width) of a picture whose middle row is exposed around `t` [s]."""
-        moment, seen_by = self._faulty.moment(t), self._faulty.at(t)
+        moment, seen_by = self.lies.moment(t), self.lies.at(t)
         if self._last is not None and moment == self._last[0]:
             return self._last[1]
 

@@ -123,11 +123,15 @@ class OutOfSequence(ABC, Generic[Measurement]):
         self._spoilt_from = min(self._spoilt_from, before)
         return True
 
-    def predicted(self, t: float) -> Checkpoint[Measurement]:
-        """The filter at time `t` [s], not before the base, as if no picture had come then."""
+    def predicted(self, t: float, without: float = inf) -> Checkpoint[Measurement]:
+        """The filter at time `t` [s], not before the base, as if no picture had come then.
+
+        Nor any after `without` [s], the base aside.
+        """
         self._repair()
-        here = self._empty()
-        here.copy(next(past for past in reversed(self.checkpoints) if past.t <= t))
+        here, last = self._empty(), min(t, without)
+        known = (past for past in reversed(self.checkpoints) if past.t <= last)
+        here.copy(next(known, self.base))
         self._advance(here, t)
         return here
 

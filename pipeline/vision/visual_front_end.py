@@ -20,12 +20,22 @@ from pipeline.camera.line_delay import LineDelay
 from pipeline.frames import Array
 from pipeline.imu_stream import CAPACITY, ImuStreams
 from pipeline.prediction import Prediction, PredictionHistory
-from pipeline.signals import BodyImu, Frame, PhoneImu, RelativePose, Spots
+from pipeline.signals import (
+    BodyImu,
+    Frame,
+    LedRays,
+    PhoneImu,
+    RelativePose,
+    Spots,
+    StampOffset,
+    VisionMeasurement,
+)
 from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision import vision
 from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.gating import disbelief
 from pipeline.vision.imu_buffer import ImuBuffer
+from pipeline.vision.picture_check import PictureCheck
 from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.repeated_frames import RepeatedFrames
 from pipeline.vision.vision import Vision
@@ -34,6 +44,9 @@ from pipeline.vision_config import GatesConfig
 DOUBT_S = 0.15
 """Between looks without gravity."""
 AGAIN = "The picture is the one before."
+ELSEWHERE = "Not believed: it is not where motion sensors and the pictures before say."
+MEASURED_S = 30.0
+"""So long after a lie of the camera its scale has been measured anew."""
 NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
 
 
@@ -60,6 +73,7 @@ class VisualFrontEnd:
             LineDelay(camera.readout_s),
         )
         self.exposure, self.repeats = ExposureMonitor(camera.focal_px), RepeatedFrames()
+        self.check = PictureCheck(leds_in_b)
         self.doubts_gravity = False
         """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
         self._t_doubt = -np.inf
@@ -82,6 +96,7 @@ class VisualFrontEnd:
         judged = self._judged(self._vision.step(frame, prior, self._clock), prior)
         if judged.pose is not None:
             self._watched(frame, judged, judged.pose, prior)
+        judged = self._checked(judged)
         if judged.pose is None and judged.unbelieved is None and self.doubts_gravity:
             return replace(judged, unbelieved=self._without_gravity(frame))
         return judged
@@ -89,7 +104,7 @@ class VisualFrontEnd:
     @property
     def complaint(self) -> str:
         """Why nobody should fly with these pictures; empty if all is well, or not known yet."""
-        return self.repeats.complaint or self.monitor.complaint
+        return self.repeats.complaint or self.check.complaint or self.monitor.complaint
 
     @property
     def offset_s(self) -> float:
@@ -116,6 +131,7 @@ class VisualFrontEnd:
         while self._waiting:
             sample = self._waiting.popleft()
             self.repeats.add_imu(sample)
+            self.check.add_imu(sample)
             if isinstance(sample, PhoneImu):
                 self._phone.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
             else:
@@ -164,6 +180,18 @@ class VisualFrontEnd:
             self.camera = replace(self.camera, readout_s=self.readout.in_use_s)
             self._vision.roll(self.readout.in_use_s)
 
+    def _checked(self, detection: Detection) -> Detection:
+        """Hold a believed pose against what the motion sensors predict."""
+        pose, facts = detection.pose, self.monitor.facts
+        if facts is not None and facts.t - self.check.t_named > MEASURED_S:
+            self.check.measured(facts.focal)
+        seen = detection.seen(self.camera)
+        if seen is None or (pose is None and not self.check.complaint):
+            return detection
+        believed = self.check.believed(seen)
+        reason = detection.reason if believed.pose is not None or pose is None else ELSEWHERE
+        return replace(detection, pose=believed.pose, rays=believed.rays, reason=reason)
+
     def _without_gravity(self, frame: Frame) -> RelativePose | None:
         """The pose of a picture from nothing else, now and then: the search is long."""
         if 0.0 <= frame.t - self._t_doubt < DOUBT_S:
@@ -181,10 +209,11 @@ def warm_up() -> None:
     leds = np.array([[0.1, 0.3, 0.2], [0.0, -0.3, 0.1], [-0.1, 0.2, -0.3], [0.2, -0.1, -0.2]])
     camera, place = Camera(320, 240, K, "plumb_bob", np.zeros(5)), np.array([2.5, 0.0, 0.0])
     imus, still = ImuStreams(), np.zeros(3)
-    monitor = CalibrationMonitor(camera, leds, imus)
+    monitor, check = CalibrationMonitor(camera, leds, imus), PictureCheck(leds)
     for k in range(160):
-        imus.add(PhoneImu(0.02 * k, still, still))
-        imus.add(BodyImu(0.02 * k, still, still))
+        for sample in (PhoneImu(0.02 * k, still, still), BodyImu(0.02 * k, still, still)):
+            imus.add(sample)
+            check.add_imu(sample)
     tangents = (leds[:, 1:]) / (place[0] + leds[:, :1])
     C, names = np.tile(1e-6 * np.eye(2), (len(leds), 1, 1)), np.arange(len(leds))
     for k in range(30):
@@ -192,6 +221,9 @@ def warm_up() -> None:
         monitor.saw(
             LedObservation(t, names, tangents, C, np.zeros(len(leds)), place, np.eye(3)), None
         )
+        rays = LedRays(names, np.full(len(leds), t), tangents, C)
+        pose = RelativePose(t, place, np.eye(3), 1e-6 * np.eye(6), 0.1, len(leds))
+        check.judge(VisionMeasurement(t, rays, pose, offset=StampOffset(0.0, 0.001)))
     luma = np.zeros((240, 320), dtype=np.uint8)
     luma[119:122, 159:162] = 255
     ExposureMonitor(400.0).see(Frame(0.0, luma), np.array([[160.0, 120.0]]), 2.5, still)

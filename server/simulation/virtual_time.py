@@ -147,6 +147,8 @@ class VirtualTimeSimulation:
         """Ticks from one of control's to the next; 0: it stands still."""
         self.tamper: Callable[[list[Input]], list[Input]] = list
         """What becomes of what the server tells control."""
+        self.checks_rays = False
+        """What LEDs' rays say is held against the motion sensors, as each picture is."""
         self._script = make_script(robot_file, scene, operator, hand)
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
@@ -315,7 +317,12 @@ class VirtualTimeSimulation:
         seen = eye.seen(t, stamp, self._robot_at)
         self.trace.pictures += 1
         self.trace.leds.append(len(seen.rays) if seen is not None else 0)
-        self.transit.send(self.t, "picture", partial(self._tell, seen))
+        self.transit.send(self.t, "picture", partial(self._held, seen))
+
+    def _held(self, seen: VisionMeasurement | None) -> None:
+        if seen is not None and self.checks_rays:
+            seen = self._frame_pipeline.front_end.check.believed(seen)
+        self._tell(seen)
 
     def _tell(self, seen: VisionMeasurement | None) -> None:
         if seen is not None:
@@ -324,6 +331,8 @@ class VirtualTimeSimulation:
 
     def _feel(self, *samples: PhoneImu | BodyImu) -> None:
         """Motion samples, for whoever looks."""
+        for sample in samples if self.checks_rays else ():
+            self._frame_pipeline.front_end.check.add_imu(sample)
         if self._vision_model is None:
             self._frame_pipeline.front_end.add_imu(*samples)
         elif not self.scene.knows_clock:

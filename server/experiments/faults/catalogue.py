@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Final
 
+from hardware.sim.camera_faults import CameraFault
 from server.experiments.faults import happenings as h
 from server.experiments.faults import tampering
 from server.experiments.faults.fault import Event, Fault, Happening
@@ -119,6 +120,11 @@ PICTURES: Final = (
     open_ended(
         "pictures' times 0.1 s wrong", "2", h.tampered(tampering.pictures(tampering.too_old))
     ),
+    ends("camera zooms by 8 %", "5", h.lying_camera(CameraFault.ZOOM), BLIND),
+    ends("another lens", "5", h.lying_camera(CameraFault.LENS), BLIND),
+    open_ended("picture stabilised by the browser", "5", h.lying_camera(CameraFault.ELECTRONIC)),
+    open_ended("picture stabilised by the lens", "5", h.lying_camera(CameraFault.OPTICAL)),
+    open_ended("focus breathes by 2 %", "5", h.lying_camera(CameraFault.BREATHING)),
     open_ended("LEDs mixed up", "7", h.tampered(tampering.pictures(tampering.mixed_up))),
     ends(
         "places that are no numbers",

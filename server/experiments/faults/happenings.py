@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from hardware.sim.camera_faults import CameraFault
 from pipeline.frames import Array
 from server.experiments.faults.fault import FaultyFlight, Happening
 from server.experiments.faults.tampering import Datagrams, Inputs
@@ -16,6 +17,8 @@ from server.experiments.gaps.schedule import GapSchedule, WebRtcLine
 from server.simulation.line import CleanLine, Kind
 
 FOR_EVER_S: Final = 1e6
+HONEST_S: Final = 2.0
+"""Of a camera, until its check knows enough of the motion sensors."""
 
 
 class Selective:
@@ -108,6 +111,20 @@ def tampered_with_memory(make: Callable[[], Inputs]) -> Happening:
 
     def happen(world: FaultyFlight) -> None:
         world.loop.tamper = make()
+
+    return happen
+
+
+def lying_camera(fault: CameraFault) -> Happening:
+    """The phone's camera lies, after it has told the truth for `HONEST_S`."""
+
+    def happen(world: FaultyFlight) -> None:
+        loop = world.loop
+        loop.checks_rays = True
+        while world.t < HONEST_S:
+            world.advance()
+        world.begin = loop.t
+        loop.phone.lies.fault, loop.phone.lies.begin_s = fault, loop.t
 
     return happen
 

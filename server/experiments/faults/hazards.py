@@ -80,10 +80,13 @@ HAZARDS: Final = (
     ),
     Hazard(
         "5",
-        "Another lens, zoom, stabilisation",
-        "LEDs against both gyroscopes",
-        "no arming",
+        "Another lens, zoom, stabilisation, a focus that breathes",
+        "each picture against what both motion sensors predict; LEDs against both gyroscopes",
+        "a little beside: believed less; far beside: not believed, named within 0.3 s, no arming, "
+        "as 1, until it has told the truth for 1.5 s; too little to notice: within bounds",
         (
+            "pipeline/vision/test_picture_check.py::"
+            "test_a_lie_is_named_in_time_and_nothing_is_believed_from_then_on",
             "server/phone/test_phone_session.py::test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed",
         ),
     ),

@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.camera.exposure import ADVICE, ExposureHint
 from pipeline.camera.fit import CameraFacts
+from pipeline.vision.camera_lies import SHIFTED
 from pipeline.vision.visual_front_end import VisualFrontEnd, warm_up
 from pipeline.vision_config import GatesConfig
 from server.diagnostics.camera_health import health
@@ -40,6 +41,12 @@ def test_what_was_learnt_is_told_in_the_units_of_screens():
     assert (told.time_offset_ms, told.time_offset_sigma_ms) == (30.1, 0.2)
     assert (told.larger_percent, told.larger_sigma_percent) == (3.1, 0.3)
     assert (told.held_percent, told.held_sigma_percent) == (1.2, 0.8)
+
+
+def test_a_lie_of_the_camera_is_told():
+    eye = front_end()
+    eye.check.complaint = SHIFTED
+    assert health(eye).complaint == SHIFTED
 
 
 def test_pictures_are_looked_at_as_of_when_they_were_taken():

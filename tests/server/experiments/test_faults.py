@@ -11,11 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hardware.robot_file import load_robot
+from pipeline.config import VirtualCameraConfig
 from server.control.ipc import OperatorInput, PhoneImuInput, ReadyInput, is_believable
+from server.control.process import teleop_config
 from server.experiments import main
 from server.experiments.faults import hazards, tampering
 from server.experiments.faults.catalogue import FAULTS
-from server.experiments.faults.command import goals
+from server.experiments.faults.command import FaultJob, flown, goals
 from server.experiments.faults.fault import Fault, FaultOutcome, misses
 from server.experiments.faults.live import LIVE, outcome_of
 from server.experiments.faults.measure import percentile, row_of
@@ -159,6 +162,16 @@ def test_two_faults_are_flown_written_and_drawn(tmp_path: Path) -> None:
     assert all(one["p50"] <= one["p99"] <= one["p99_9"] for one in told["times"])
     assert np.isfinite([row["excursion_mm"] for row in told["rows"]]).all()
     assert (tmp_path / "faults.png").stat().st_size > 5_000
+
+
+@pytest.mark.slow
+def test_a_zoom_in_flight_is_held_as_if_there_were_no_pictures() -> None:
+    robot_file = load_robot("ames")
+    config = teleop_config(robot_file, "phone", VirtualCameraConfig(), "relative")
+    zoom = next(fault for fault in FAULTS if fault.name == "camera zooms by 8 %")
+    (one,) = flown(FaultJob(robot_file, config, 1000, (zoom.name,)))
+    assert misses(zoom, one) == []
+    assert one.excursion_mm < 20.0
 
 
 def test_the_hazard_table_is_as_written_and_each_fault_has_a_hazard() -> None:

@@ -14,7 +14,7 @@ from pipeline.camera import verdict as camera_verdict
 from pipeline.estimation import sensor_validation
 from pipeline.frames import exp
 from pipeline.signals import LedRays, RelativePose, Spots
-from pipeline.vision import repeated_frames
+from pipeline.vision import camera_lies, repeated_frames
 from pipeline.vision.detection import Detection
 from pipeline.vision.rays import NO_RAYS
 from server.control.ipc import OperatorInput, PhoneImuInput
@@ -244,6 +244,8 @@ def test_a_camera_that_is_not_the_calibrated_one_keeps_the_robot_disarmed():
         assert not [why for why in rig.why() if "stabilisation" in why]
         rig.phone.vision.front_end.monitor.complaint = camera_verdict.STABILISED
         assert rig.why()[-1] == camera_verdict.STABILISED
+        rig.phone.vision.front_end.check.complaint = camera_lies.SHIFTED
+        assert rig.why()[-1] == camera_lies.SHIFTED
         rig.phone.vision.front_end.repeats.complaint = repeated_frames.STANDS
         assert rig.why()[-1] == repeated_frames.STANDS
     finally:

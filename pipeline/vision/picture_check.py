@@ -1,0 +1,274 @@
+"""Each picture is held against what both motion sensors foretell from the pictures before it.
+
+A stabiliser shifts the picture, a zoom, another lens or a focus that breathes scales it, a camera
+that hangs shows an old one: and LEDs still fit each other, so no residual tells. But phone and
+robot feel how they turn and accelerate. The relative filter's own model carries the robot's place
+on from `LAG_S` ago without the pictures since; what is seen beside it by more than both doubts
+bear, χ² with three degrees of freedom, is a lie of the camera, and seen so in the first pictures.
+
+* What is a little beside is believed less: its covariance takes in how far it is.
+* What is far beside is not believed. After `NAMED_S` the lie is named, and the camera is on trial:
+  nothing is believed until `TRIAL_S` have passed without another one, and a zoom is taken back.
+
+Nothing is judged without fresh samples of both sides, or before the pictures' time is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import log, sqrt
+from typing import Final
+
+import numpy as np
+
+from pipeline.camera.verdict import FOCAL
+from pipeline.estimation.out_of_sequence import Checkpoint
+from pipeline.estimation.relative_kernels import BIASES, X_BIASES, X_OFFSET
+from pipeline.estimation.relative_start import Learnt, can_start, first_checkpoint
+from pipeline.estimation.relative_track import RelativeTrack
+from pipeline.estimator_config import RelativeConfig
+from pipeline.frames import Array
+from pipeline.imu_stream import ImuStream
+from pipeline.signals import BodyImu, PhoneImu, RelativePose, VisionMeasurement
+from pipeline.vision.camera_lies import is_far, named, scaled
+from pipeline.vision.rays import NO_RAYS, widened
+
+LAG_S: Final = 0.25
+"""So long the motion sensors alone are trusted."""
+REFUSED_CHI2: Final = 30.0
+"""Once in a million pictures by chance; models err by more than noise."""
+MEDIAN_CHI2, MEDIAN_STEP = 2.37, 0.01
+"""Half of the pictures are beside their place by more than the one, by chance; each moves what is
+usual by the other share, up or down."""
+GAP_S: Final = 0.045
+"""Samples farther apart than this, two of a phone's lost, say too little of what is between."""
+DOUBTED_CHI2: Final = 5.0
+"""Once in six pictures by chance; it costs little."""
+BEND_PHONE, BEND_BODY = 0.14, 0.09
+"""Second differences of samples of specific force that the model's noise makes, squared [m²/s⁴]: 2
+times white jerk between a phone's samples, 6 times a robot's white noise."""
+LEAST_APART: Final = 0.1
+"""Share of the usual time between two samples; through nearer ones no curve can be trusted."""
+EXTREME: Final = np.array([0.5, 0.5, 0.5, 14.0, 14.0, 14.0])
+"""Rates [rad/s] and forces [m/s²] beyond which a sensor that says the same twice says no more."""
+LATELY, SURPRISED = 0.1, 2.5
+"""Share of each picture in what is remembered; mean of χ²/3 beyond which all are doubted."""
+NAMED_S: Final = 0.06
+NAMED_PICTURES: Final = 3
+"""Refused in a row before the camera is blamed."""
+AMISS_CHI2: Final = 12.0
+"""Of one of them, from before all pictures that may have misled the next: once in 140 by chance."""
+TRIAL_S: Final = 1.5
+FLOOR_RAD: Final = 2e-4
+"""How far an LED may be from where picture and robot file have it, beside noise: 0.2 px."""
+UNGATED: Final = 1e9
+"""χ² of an LED: the pose rests on all that are handed on, and so must what is held against it."""
+KNOWN_S: Final = 1.5
+"""After so long enough is known of the motion sensors to refuse a picture, and to be kept."""
+RETURNED: Final = 0.04
+"""By how much the scale may differ after a zoom was taken back; what is left the camera watch
+measures."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What became of a picture's pose."""
+
+    is_believed: bool
+    beside: tuple[Array, ...] = ()
+    """By how much (3,) the robot may be seen beside its place [m], each by itself."""
+
+
+FINE: Final = Judged(True)
+REFUSED: Final = Judged(False)
+
+
+class PictureCheck:
+    """Samples and pictures come from one thread, each sort in the order of its arrival."""
+
+    def __init__(self, leds_in_b: Array) -> None:
+        """Of a robot with LEDs (n, 3) [m]; nothing known."""
+        self._config, self._leds_in_b = RelativeConfig(gate_chi2=UNGATED), leds_in_b
+        self._track = RelativeTrack(self._config, leds_in_b)
+        self._knows = False
+        self._learnt: Learnt | None = None
+        """Of the motion sensors, while the camera told the truth."""
+        self._usual = 1.0
+        """How many times χ² is what it should be: samples may be dated badly."""
+        self._stretch = 1.0
+        """Of what is foretold, for a robot that shakes more than the model says."""
+        self._t_begun = -np.inf
+        self._refused: list[VisionMeasurement] = []
+        self._amiss = 0.0
+        """χ² of the worst of them."""
+        self._surprise, self._off2 = 1.0, np.zeros(3)
+        """Lately: χ²/3, and by how much it was missed (3,) [m²]."""
+        self._scale = 0.0
+        """Log of how much larger the picture became by what was refused."""
+        self.t_named = -np.inf
+        self.complaint = ""
+        """Why nothing is believed; empty if all is well."""
+
+    def add_imu(self, sample: PhoneImu | BodyImu) -> None:
+        """Take a motion sample of either side, in any order."""
+        track = self._track
+        if self._knows and sample.t <= track.base.t:
+            return
+        if isinstance(sample, PhoneImu):
+            track.insert(track.phone, sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
+        else:
+            track.insert(track.body, sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+
+    def believed(self, seen: VisionMeasurement) -> VisionMeasurement:
+        """The same with what is believed of it: nothing, or all, as sure as one may be."""
+        judged, pose, rays = self.judge(seen), seen.pose, seen.rays
+        if not judged.is_believed:
+            return replace(seen, pose=None, rays=NO_RAYS)
+        if pose is not None:
+            for off in judged.beside:
+                pose, rays = widened(pose, rays, self._leds_in_b, off)
+        return replace(seen, pose=pose, rays=rays)
+
+    def judge(self, seen: VisionMeasurement) -> Judged:
+        """Hold a picture with a pose against what was foretold for it."""
+        if seen.pose is None:
+            return REFUSED if self.complaint else FINE
+        seen, pose = _bounded(seen, seen.pose)
+        if not self._knows or not self._hears(seen.t):
+            self._begin(seen)
+            return self._told(FINE, pose)
+        track = self._track
+        t = seen.t + float(track.newest.x[X_OFFSET])
+        is_gone = t - track.newest.t > 4.0 * LAG_S or t <= track.base.t
+        if is_gone or any(_is_deaf(imu, t) for imu in (track.phone, track.body)):
+            self._begin(seen)
+            return self._told(FINE, pose)
+        track.settle(t - LAG_S)
+        track.doubt_phone(_bent(track.phone, t, BEND_PHONE))
+        self._stretch = _bent(track.body, t, BEND_BODY)
+        far, near = track.predicted(t, t - LAG_S), track.predicted(t)
+        (off, chi2), (off_near, chi2_near) = self._missed(pose, far), self._missed(pose, near)
+        misses = ((off, chi2, far), (off_near, chi2_near, near))
+        known_s = KNOWN_S if self._learnt is None else LAG_S
+        if seen.t - self._t_begun > known_s and any(
+            x > self._usual * REFUSED_CHI2 and self._is_far(miss, at) for miss, x, at in misses
+        ):
+            return self._refuse(seen, chi2, max(off, off_near, key=_square), far.x[0:3])
+        self._refused.clear()
+        if not np.isfinite(track.fuse(near, seen, len(seen.rays))):
+            self._begin(seen)
+        self._acquit(seen.t)
+        step = MEDIAN_STEP if max(chi2, chi2_near) > self._usual * MEDIAN_CHI2 else -MEDIAN_STEP
+        self._usual = max(1.0, (1.0 + step) * self._usual)
+        self._surprise += LATELY * (chi2 / 3.0 - self._surprise)
+        self._off2 += LATELY * (off * off - self._off2)
+        doubted = [miss for miss, x in ((off, chi2), (off_near, chi2_near)) if x > DOUBTED_CHI2]
+        if self._surprise > SURPRISED:
+            doubted.append(np.sqrt(self._off2))
+        return self._told(Judged(True, (max(doubted, key=_square),)) if doubted else FINE, pose)
+
+    def _missed(
+        self, pose: RelativePose, foretold: Checkpoint[VisionMeasurement]
+    ) -> tuple[Array, float]:
+        """Where it is seen from where it was foretold (3,) [m], and χ² of that."""
+        off = pose.p_bc_in_c - foretold.x[0:3]
+        S = self._stretch * self._track.in_picture(foretold)[:3, :3] + pose.covariance[:3, :3]
+        return off, float(off @ np.linalg.solve(S, off))
+
+    def measured(self, focal: float) -> None:
+        """Things look by so much larger than calibrated, as somebody measured since."""
+        self._scale = 0.0 if abs(focal) < FOCAL else log(1.0 + focal)
+
+    def _told(self, judged: Judged, pose: RelativePose) -> Judged:
+        if self.complaint:
+            return REFUSED
+        if self._scale == 0.0:
+            return judged
+        along = np.array([self._scale * float(pose.p_bc_in_c[0]), 0.0, 0.0])
+        return Judged(True, (*judged.beside, along))
+
+    def _hears(self, t: float) -> bool:
+        """Whether both IMUs were heard about `t` [s]."""
+        return self._track.phone.near(t) is not None and self._track.body.near(t) is not None
+
+    def _begin(self, seen: VisionMeasurement) -> None:
+        """Foretell from this picture on."""
+        if self._knows and not self.complaint and seen.t - self._t_begun > KNOWN_S:
+            base = self._track.base
+            self._learnt = base.x[X_BIASES:].copy(), base.P[BIASES:, BIASES:].copy()
+        known = seen.offset is not None or self._learnt is not None
+        self._knows = known and can_start(seen, self._config) and self._hears(seen.t)
+        self._refused.clear()
+        if self._knows:
+            self._track.begin(first_checkpoint(seen, self._learnt, np.inf, self._config))
+            self._t_begun = seen.t
+
+    def _is_far(self, off: Array, far: Checkpoint[VisionMeasurement]) -> bool:
+        return is_far(off, far.x[0:3], *self._turned(far.t))
+
+    def _turned(self, t: float) -> tuple[float, float]:
+        """How far the phone turned in the time before `t` [rad], and how fast to and fro."""
+        rates = _lately(self._track.phone, t)[:, :3]
+        if len(rates) == 0:
+            return 0.0, 0.0
+        return LAG_S * sqrt(_square(rates.mean(axis=0))), sqrt(_square(rates) / len(rates))
+
+    def _refuse(self, seen: VisionMeasurement, chi2: float, off: Array, foretold: Array) -> Judged:
+        refused = self._refused
+        refused.append(seen)
+        self._amiss = max(self._amiss, chi2) if len(refused) > 1 else chi2
+        is_lie = self._amiss > AMISS_CHI2 and seen.t - refused[0].t >= NAMED_S
+        if len(refused) < NAMED_PICTURES or not is_lie:
+            return REFUSED
+        lie = named(refused, off, foretold)
+        self._scale += lie.scale
+        self._begin(seen)
+        is_scaled = lie.scale != 0.0 or abs(self._scale) >= RETURNED
+        self.complaint = scaled(self._scale) if is_scaled else lie.words
+        self.t_named = seen.t
+        return REFUSED
+
+    def _acquit(self, t: float) -> None:
+        """End the trial of a camera that told the truth for long enough."""
+        if self.complaint and t - self._t_begun > TRIAL_S and abs(self._scale) < RETURNED:
+            self.complaint = ""
+
+
+def _lately(stream: ImuStream, t: float) -> Array:
+    """Samples (n, 6) of the time that is foretold, up to `t` [s]."""
+    since, until = np.searchsorted(stream.times, (t - LAG_S, t))
+    return stream.values[since:until]
+
+
+def _bent(stream: ImuStream, t: float, usual: float) -> float:
+    """How many times the `usual` second differences of the specific force are lately; at least 1.
+
+    What shakes quicker than it is sampled foretells less.
+    """
+    bends = np.diff(_lately(stream, t)[:, 3:], 2, axis=0)
+    return max(1.0, float(np.square(bends).mean()) / usual) if len(bends) else 1.0
+
+
+def _is_deaf(stream: ImuStream, t: float) -> bool:
+    """Whether samples lately are missing or misdated, or are clipped: shaken beyond the range."""
+    since, until = np.searchsorted(stream.times, (t - LAG_S, t))
+    since = max(since - 1, 0)
+    felt, apart = stream.values[since:until], np.diff(stream.times[since:until])
+    if len(apart) == 0:
+        return True
+    is_clipped = ((np.diff(felt, axis=0) == 0.0) & (np.abs(felt[1:]) > EXTREME)).any()
+    is_misdated = apart.min() < LEAST_APART * np.median(apart)
+    return bool(is_clipped or is_misdated or apart.max() > GAP_S)
+
+
+def _bounded(seen: VisionMeasurement, pose: RelativePose) -> tuple[VisionMeasurement, RelativePose]:
+    """The same, with LEDs known no better than `FLOOR_RAD`."""
+    C = seen.rays.covariances
+    more = 1.0 + FLOOR_RAD**2 / float(np.trace(C, axis1=1, axis2=2).mean() / 2.0)
+    pose = replace(pose, covariance=more * pose.covariance)
+    rays = replace(seen.rays, covariances=C + FLOOR_RAD**2 * np.eye(2))
+    return replace(seen, rays=rays, pose=pose), pose
+
+
+def _square(v: Array) -> float:
+    return float(np.square(v).sum())

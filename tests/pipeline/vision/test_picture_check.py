@@ -1,0 +1,106 @@
+"""A camera's lies are named within 0.3 s, its honest pictures are left in peace."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
+from pipeline.vision.picture_check import TRIAL_S, PictureCheck
+from pipeline.vision.repeated_frames import STANDS
+from tests.pipeline.faulty_camera import Faults, looks
+from tests.pipeline.honest_camera import ADVERSITIES, USUAL, judged
+from tests.pipeline.lying_camera import checked, lying, measured, seen_as
+
+NAMED_S = 0.3
+ONSET_S = 2.5
+MOVING = (0.03, float(np.deg2rad(1.0)))
+
+
+@cache
+def world(seed: int = 5, duration: float = 4.2, hand: tuple[float, float] = MOVING) -> World:
+    return World(
+        WorldOptions(
+            seed=seed,
+            duration=duration,
+            hand_sigma=hand,
+            time_offset=0.03,
+            tremor_relaxation=0.15,
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("lie", "words"),
+    [
+        ("zoom", "8 % larger"),
+        ("lens", "smaller"),
+        ("breathing", "% larger"),
+        ("electronic", "does not move as the phone turns"),
+        ("frozen", STANDS),
+        ("late", "does not move as the phone turns"),
+    ],
+)
+def test_a_lie_is_named_in_time_and_nothing_is_believed_from_then_on(lie, words) -> None:
+    _, rows = checked(world(), lying(world(), lie, ONSET_S))
+    named = next(t for t, *_, complaint in rows if complaint)
+    said = next(complaint for *_, complaint in rows if complaint)
+    assert ONSET_S < named < ONSET_S + NAMED_S
+    assert words in said
+    assert all(believed for t, believed, *_ in rows if t < ONSET_S)
+    assert not any(believed for t, believed, *_ in rows if named <= t < named + TRIAL_S)
+
+
+@pytest.mark.parametrize("lie", ["zoom", "electronic", "late", "frozen"])
+def test_what_is_believed_before_is_not_far_off(lie) -> None:
+    _, rows = checked(world(), lying(world(), lie, ONSET_S))
+    believed = [error for t, believed, error, *_ in rows if t >= ONSET_S and believed]
+    assert max(believed, default=0.0) < 0.015
+
+
+def test_a_focus_that_breathes_is_doubted_before_it_is_named() -> None:
+    _, rows = checked(world(), lying(world(), "breathing", ONSET_S))
+    nees = [nees for t, believed, _, nees, _ in rows if t >= ONSET_S and believed]
+    assert np.median(nees) < 20.0
+
+
+def test_a_zoom_that_is_taken_back_is_forgiven_after_its_trial_and_no_other() -> None:
+    long = world(duration=6.5)
+    honest = looks(long, Faults())
+    back = [1.08 if 2.5 <= one.t < 3.5 else 1.0 for one in honest]
+    check, rows = checked(long, seen_as(honest, back))
+    assert check.complaint == ""
+    assert not any(believed for t, believed, *_ in rows if 2.5 <= t < 3.5 + TRIAL_S)
+    assert all(believed for t, believed, *_ in rows if t > 3.5 + TRIAL_S + 0.5)
+    check, rows = checked(long, lying(long, "zoom", 2.5))
+    assert "8 % larger" in check.complaint
+    check.measured(0.0)
+    assert not any(believed for t, believed, *_ in rows if t > 2.5)
+
+
+def test_without_motion_samples_nothing_is_judged() -> None:
+    check = PictureCheck(LEDS_IN_B)
+    for look in lying(world(), "zoom", ONSET_S):
+        assert check.judge(measured(look, None)).is_believed
+    assert check.complaint == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("adversity", list(ADVERSITIES))
+def test_whatever_happens_to_a_phone_is_no_lie_of_its_camera(adversity: str) -> None:
+    pictures, refused, named = judged(adversity, 30, 15.0)
+    assert named == {}
+    assert refused <= 0.01 * pictures
+
+
+@pytest.mark.parametrize("hand", [MOVING, (0.05, float(np.deg2rad(3.0)))])
+def test_an_honest_camera_with_usual_errors_is_left_in_peace(hand) -> None:
+    long = world(1000, 20.0, hand)
+    _, rows = checked(long, looks(long, USUAL), gyro=USUAL.gyro)
+    assert not any(complaint for *_, complaint in rows)
+    assert sum(not believed for _, believed, *_ in rows) <= 1
+    exact = world(1001, 6.0, hand)
+    _, rows = checked(exact, looks(exact, Faults()))
+    assert 0.5 < np.mean([nees for *_, nees, _ in rows]) < 1.3
