@@ -17,16 +17,9 @@ from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState, Visi
 from pipeline.teleop import Inputs, Output, Teleop
 from server.common.runtime_parameters import RuntimeParameters, TuneInput, turned
 from server.control.gap_log import GapLog
-from server.control.ipc import (
-    ControlStatus,
-    Input,
-    OperatorInput,
-    PhoneImuInput,
-    ReadyInput,
-    RequestInput,
-)
-from server.control.ipc_estimate import EstimateFields, finite
-from server.control.ipc_vision import SeenInput, triple
+from server.control.ipc import ControlStatus
+from server.control.ipc_estimate import EstimateFields, finite, triple
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.control.tick_rate import TickRate
 
 SERVER_SILENT_S = 0.5
@@ -154,12 +147,12 @@ class Controller:
         wishes: set[str] = set()
         for message in messages:
             match message:
-                case PhoneImuInput():
-                    phone.append(PhoneImu(message.t, np.array(message.omega), np.array(message.a)))
-                case SeenInput():
-                    seen.append(message.seen())
-                case OperatorInput():
-                    operator = message.operator()
+                case PhoneImu():
+                    phone.append(message)
+                case VisionMeasurement():
+                    seen.append(message)
+                case TouchState():
+                    operator = message
                 case RequestInput():
                     wishes.add(message.what)
                 case ReadyInput():

@@ -10,7 +10,13 @@ from pipeline.config import EstimatorName
 from pipeline.estimation.estimator import Estimator, Health
 from pipeline.frames import Array
 from pipeline.signals import RelativeState
-from server.control.ipc_vision import Triple, triple
+
+Triple = tuple[float, float, float]
+
+
+def triple(v: Array) -> Triple:
+    """Plain floats of a (3,) array."""
+    return (float(v[0]), float(v[1]), float(v[2]))
 
 
 class EstimateFields(msgspec.Struct, array_like=True, frozen=True):

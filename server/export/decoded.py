@@ -21,8 +21,7 @@ from pipeline.camera.extrinsics import IDENTITY
 from pipeline.camera.lens import Camera
 from pipeline.estimator_config import RelativeConfig
 from pipeline.signals import BodyImu, Mode, PhoneImu
-from server.control.ipc_estimate import EstimateFields
-from server.control.ipc_vision import Triple
+from server.control.ipc_estimate import EstimateFields, Triple
 from server.phone.image_format import ImageFormat
 from server.phone.ingest import ARRIVAL_S, phone_imu
 from server.protocol.messages import Command, Hello, Log, Status, decode_message

@@ -33,7 +33,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu
-from server.control.ipc_vision import Triple
+from server.control.ipc_estimate import Triple
 from server.export.decoded import (
     DatedPicture,
     DatedTouch,

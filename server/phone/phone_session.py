@@ -18,8 +18,8 @@ from pipeline.robot import Robot
 from pipeline.signals import BodyImu, PhoneImu, TouchState
 from pipeline.vision.detection import Detection
 from pipeline.vision_config import GatesConfig
-from server.control.ipc import ControlStatus, Input, OperatorInput, PhoneImuInput, expected_of
-from server.control.ipc_vision import SeenInput
+from server.control.ipc import ControlStatus, expected_of
+from server.control.ipc_inputs import Input
 from server.diagnostics.link_log import LinkLog
 from server.diagnostics.meter import Meter
 from server.media.decoding import MakeDecoder
@@ -105,7 +105,7 @@ class PhoneSession:
             case PhoneImu() as sample if isinstance(record.body, Motion):
                 self.meters["phone_imu"].tick(now, sample.t)
                 self.link.came("motion", sample.t, now)
-                self._to_control(PhoneImuInput.of(sample))
+                self._to_control(sample)
                 self._check.add_imu(sample.t, record.body)
                 if self._screen is not None:
                     self._screen.felt(sample)
@@ -116,7 +116,7 @@ class PhoneSession:
                     self.vision.front_end.doubts_gravity = self._check.doubts_gravity
             case TouchState() as operator:
                 self.meters["operator"].tick(now, operator.t)
-                self._to_control(OperatorInput.of(operator))
+                self._to_control(operator)
             case EncodedFrame() as frame:
                 self._see(frame, now)
             case None if isinstance(record.body, Pong):
@@ -192,7 +192,7 @@ class PhoneSession:
         now = self._clock()
         seen = detection.seen(camera)
         if seen is not None:
-            self._to_control(SeenInput.of(seen))
+            self._to_control(seen)
         if detection.pose is not None:
             self.meters["pose"].tick(now, detection.t)
         took = {name: 1e3 * s for name, s in detection.took_s.items()}

@@ -15,8 +15,7 @@ from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, TouchState
 from pipeline.teleop import Output
 from server.control.controller import Controller
-from server.control.ipc import Input, OperatorInput, PhoneImuInput, ReadyInput, RequestInput
-from server.control.ipc_vision import SeenInput
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.phone.frame_pipeline import FramePipeline
 from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
@@ -130,9 +129,9 @@ class Offline:
         match self._ingest.record(record, now):
             case PhoneImu() as sample:
                 self._frame_pipeline.front_end.add_imu(sample)
-                self._inbox.append(PhoneImuInput.of(sample))
+                self._inbox.append(sample)
             case TouchState() as operator:
-                self._inbox.append(OperatorInput.of(operator))
+                self._inbox.append(operator)
             case EncodedFrame() as frame:
                 self._see(frame)
             case None if isinstance(record.body, Picture):  # those that follow lean on it
@@ -156,7 +155,7 @@ class Offline:
         self._seen.append((frame, detection.pose if detection is not None else None))
         seen = detection.seen(self._frame_pipeline.camera) if detection is not None else None
         if seen is not None:
-            self._inbox.append(SeenInput.of(seen))
+            self._inbox.append(seen)
 
 
 def run_offline(recording: Recording, out: Path) -> str:

@@ -34,15 +34,7 @@ from pipeline.teleop import Output
 from pipeline.timing.clock_synchronisation import ClockSynchronisation
 from pipeline.vision.detection import Detection
 from server.control.controller import Controller, never_too_late
-from server.control.ipc import (
-    Input,
-    OperatorInput,
-    PhoneImuInput,
-    ReadyInput,
-    RequestInput,
-    is_believable,
-)
-from server.control.ipc_vision import SeenInput
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput, is_believable
 from server.control.process import too_late
 from server.control.robot_clock import RobotLink
 from server.phone.frame_pipeline import FramePipeline
@@ -284,9 +276,9 @@ class VirtualTimeSimulation:
         match signal:
             case PhoneImu() as sample:
                 self._feel(sample)
-                self._inbox.append(PhoneImuInput.of(sample))
+                self._inbox.append(sample)
             case TouchState() as operator:
-                self._inbox.append(OperatorInput.of(operator))
+                self._inbox.append(operator)
             case EncodedFrame() as frame:
                 self._frames.append(frame)
                 if not self.scene.newest_only:
@@ -327,7 +319,7 @@ class VirtualTimeSimulation:
     def _tell(self, seen: VisionMeasurement | None) -> None:
         if seen is not None:
             self.trace.poses += seen.pose is not None
-            self._inbox.append(SeenInput.of(seen))
+            self._inbox.append(seen)
 
     def _feel(self, *samples: PhoneImu | BodyImu) -> None:
         """Motion samples, for whoever looks."""

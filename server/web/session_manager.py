@@ -17,7 +17,8 @@ from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.common.clock import now
 from server.common.runtime_parameters import TuneInput
-from server.control.ipc import ControlStatus, Input, ReadyInput, RequestInput, server_end
+from server.control.ipc import ControlStatus, server_end
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.diagnostics.blame import Blame
 from server.diagnostics.events import Events
 from server.diagnostics.meter import Meter

@@ -33,7 +33,7 @@ INSTRUMENTED = [
     "server.replay.setting",
     "server.recording.reader",
     "server.rtc",
-    "server.control.ipc_vision",
+    "server.control.ipc_inputs",
     "server.view.viser_proxy",
     "server.protocol.wire",
     "tomllib",

@@ -7,21 +7,13 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from pipeline.signals import PhoneImu, RelativePose, StampOffset, TouchState, VisionMeasurement
+from pipeline.vision.rays import NO_RAYS
 from server.common.runtime_parameters import TuneInput
-from server.control.ipc import (
-    LARGEST,
-    MAX_DATAGRAM,
-    ControlStatus,
-    OperatorInput,
-    PhoneImuInput,
-    ReadyInput,
-    RequestInput,
-    control_end,
-    expected_of,
-    server_end,
-)
-from server.control.ipc_vision import LedFields, PoseFields, SeenInput
+from server.control.ipc import MAX_DATAGRAM, ControlStatus, control_end, expected_of, server_end
+from server.control.ipc_inputs import LARGEST, ReadyInput, RequestInput, encode
 from tests.fuzz.target import target
+from tests.pipeline.seeing import rays_at
 from tests.server.house import control_status
 
 FOLDER = tempfile.TemporaryDirectory(prefix="lightleash-fuzz-")
@@ -30,18 +22,18 @@ OTHER = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
 
 
 def input_seeds():
-    pose = PoseFields(1.0, (2.0, 0.0, 0.0), (1.0, 0, 0, 0, 1, 0, 0, 0, 1), [0.0] * 36, 0.1, 5)
-    leds = [LedFields(k, 1.0, (0.1, 0.2), (1e-6, 0.0, 0.0, 1e-6)) for k in range(3)]
+    pose = RelativePose(1.0, np.array((2.0, 0.0, 0.0)), np.eye(3), np.zeros((6, 6)), 0.1, 5)
+    rays = rays_at(1.0, pose.p_bc_in_c, np.eye(3))
     said = (
-        PhoneImuInput(1.0, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8)),
-        OperatorInput(1.0, True, 5),
+        PhoneImu(1.0, np.array((0.1, 0.2, 0.3)), np.array((0.0, 0.0, 9.8))),
+        TouchState(1.0, True, 5),
         RequestInput("arm"),
         ReadyInput(["No phone."]),
         TuneInput(cutoff_hz=0.5, mode="full"),
-        SeenInput(1.0, leds, pose, (0.5, 0.4), (0.01, 0.001)),
-        SeenInput(1.0, [], None, (0.5, 0.4)),
+        VisionMeasurement(1.0, rays, pose, (0.5, 0.4), StampOffset(0.01, 0.001)),
+        VisionMeasurement(1.0, NO_RAYS, None, (0.5, 0.4)),
     )
-    return [msgspec.msgpack.encode(message) for message in said]
+    return [encode(message) for message in said]
 
 
 @target("control_input", input_seeds, max_bytes=2048)
@@ -52,16 +44,15 @@ def inputs(data: bytes) -> None:
     heard = CONTROL.inputs()
     assert len(heard) + CONTROL.dropped - dropped == 1
     for message in heard:
-        if isinstance(message, PhoneImuInput):
-            sample = message.sample()
-            assert abs(sample.t) <= LARGEST
-            assert np.abs(sample.omega_m_cf_in_c).max() <= LARGEST
-        elif isinstance(message, OperatorInput):
-            assert abs(message.operator().t) <= LARGEST
-        elif isinstance(message, SeenInput):
-            seen = message.seen()
-            assert np.isfinite(seen.rays.tangents).all()
-            assert seen.pose is None or np.isfinite(seen.pose.covariance).all()
+        if isinstance(message, PhoneImu):
+            assert abs(message.t) <= LARGEST
+            assert np.abs(message.omega_m_cf_in_c).max() <= LARGEST
+        elif isinstance(message, TouchState):
+            assert abs(message.t) <= LARGEST
+        elif isinstance(message, VisionMeasurement):
+            assert np.isfinite(message.rays.tangents).all()
+            assert message.rays.covariances.shape == (len(message.rays), 2, 2)
+            assert message.pose is None or np.isfinite(message.pose.covariance).all()
 
 
 def status_seeds():

@@ -16,8 +16,9 @@ from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
 from server.common.clock import now
 from server.common.settings import VideoSettings
-from server.control.ipc import ControlStatus, Input, RequestInput, control_end
+from server.control.ipc import ControlStatus, control_end
 from server.control.ipc_estimate import EstimateFields
+from server.control.ipc_inputs import Input, RequestInput
 from server.protocol.wire import VERSION, decode, encode
 from server.protocol.wire_records import Body, Codec, Picture, Ping, Pong, Record, Touch
 from server.recording.control import Recordings

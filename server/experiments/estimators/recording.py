@@ -18,9 +18,8 @@ from hardware.sim.world.sensors import Event, Sample, play
 from pipeline.config import EstimatorName
 from pipeline.estimation.estimator import Estimator, Fusion
 from pipeline.frames import Array, exp, log
-from pipeline.signals import BodyImu, RelativePose, RelativeState
-from server.control.ipc import Input, PhoneImuInput
-from server.control.ipc_vision import SeenInput
+from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
+from server.control.ipc_inputs import Input
 from server.recording.reader import Recording
 from server.recording.writer import RecordingError
 from server.replay.offline import Offline
@@ -46,13 +45,12 @@ class EstimatorInputs:
         self.times.append(now)
         self.events += [(now, sample) for sample in body]
         for message in inbox:
-            if isinstance(message, PhoneImuInput):
-                self.events.append((now, message.sample()))
-            elif isinstance(message, SeenInput):
-                seen = message.seen()
-                self.events.append((now, seen))
-                if seen.pose is not None:
-                    self.poses.append((now, seen.pose))
+            if isinstance(message, PhoneImu):
+                self.events.append((now, message))
+            elif isinstance(message, VisionMeasurement):
+                self.events.append((now, message))
+                if message.pose is not None:
+                    self.poses.append((now, message.pose))
 
 
 def play_recording(

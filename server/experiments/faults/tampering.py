@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
-import msgspec
 import numpy as np
 
-from server.control.ipc import Input, OperatorInput, PhoneImuInput
-from server.control.ipc_vision import SeenInput
+from pipeline.signals import PhoneImu, TouchState, VisionMeasurement
+from server.control.ipc_inputs import Input
 
 Datagrams = Callable[[bytes], Sequence[bytes]]
 Inputs = Callable[[list[Input]], list[Input]]
-Change = Callable[[PhoneImuInput], PhoneImuInput]
+Change = Callable[[PhoneImu], PhoneImu]
+PictureChange = Callable[[VisionMeasurement], VisionMeasurement]
 
 
 def nothing(_: bytes) -> Sequence[bytes]:
@@ -75,76 +76,76 @@ def flooded(count: int, seed: int) -> Datagrams:
 
 def motion(change: Change) -> Inputs:
     """The phone's motion samples are other ones."""
-    return lambda inputs: [change(one) if isinstance(one, PhoneImuInput) else one for one in inputs]
+    return lambda inputs: [change(one) if isinstance(one, PhoneImu) else one for one in inputs]
 
 
-def no_number(sample: PhoneImuInput) -> PhoneImuInput:
+def no_number(sample: PhoneImu) -> PhoneImu:
     """Rates that are none."""
-    return msgspec.structs.replace(sample, omega=(float("nan"),) * 3)
+    return replace(sample, omega_m_cf_in_c=np.full(3, np.nan))
 
 
-def infinite(sample: PhoneImuInput) -> PhoneImuInput:
+def infinite(sample: PhoneImu) -> PhoneImu:
     """An endless force."""
-    return msgspec.structs.replace(sample, a=(float("inf"), 0.0, 0.0))
+    return replace(sample, a_m_cf_in_c=np.array((np.inf, 0.0, 0.0)))
 
 
-def turned_axes(sample: PhoneImuInput) -> PhoneImuInput:
+def turned_axes(sample: PhoneImu) -> PhoneImu:
     """Rates about x, y, z come as those about y, z, x."""
-    x, y, z = sample.omega
-    return msgspec.structs.replace(sample, omega=(y, z, x))
+    return replace(sample, omega_m_cf_in_c=np.roll(sample.omega_m_cf_in_c, -1))
 
 
-def turned_sign(sample: PhoneImuInput) -> PhoneImuInput:
+def turned_sign(sample: PhoneImu) -> PhoneImu:
     """Accelerations point the other way."""
-    x, y, z = sample.a
-    return msgspec.structs.replace(sample, a=(-x, -y, -z))
+    return replace(sample, a_m_cf_in_c=-sample.a_m_cf_in_c)
 
 
 def stuck() -> Change:
     """Each sample says what the first one said."""
-    first: list[PhoneImuInput] = []
+    first: list[PhoneImu] = []
 
-    def stick(sample: PhoneImuInput) -> PhoneImuInput:
+    def stick(sample: PhoneImu) -> PhoneImu:
         first.append(sample)
-        return msgspec.structs.replace(sample, omega=first[0].omega, a=first[0].a)
+        return replace(first[0], t=sample.t)
 
     return stick
 
 
 def stale_touch() -> Inputs:
     """The last touch again and again, with the age that it has."""
-    last: list[OperatorInput] = []
+    last: list[TouchState] = []
 
     def repeat(inputs: list[Input]) -> list[Input]:
-        others = [one for one in inputs if not isinstance(one, OperatorInput)]
+        others = [one for one in inputs if not isinstance(one, TouchState)]
         if not last:
-            last.extend(one for one in inputs if isinstance(one, OperatorInput))
+            last.extend(one for one in inputs if isinstance(one, TouchState))
         return [*others, *last[:1]]
 
     return repeat
 
 
-def pictures(change: Callable[[SeenInput], SeenInput]) -> Inputs:
+def pictures(change: PictureChange) -> Inputs:
     """What pictures say is something else."""
-    return lambda inputs: [change(one) if isinstance(one, SeenInput) else one for one in inputs]
+    return lambda inputs: [
+        change(one) if isinstance(one, VisionMeasurement) else one for one in inputs
+    ]
 
 
-def frozen() -> Callable[[SeenInput], SeenInput]:
+def frozen() -> PictureChange:
     """Each picture shows what the first one did, with its own time."""
-    first: list[SeenInput] = []
+    first: list[VisionMeasurement] = []
 
-    def freeze(seen: SeenInput) -> SeenInput:
+    def freeze(seen: VisionMeasurement) -> VisionMeasurement:
         first.append(seen)
         return stamped(first[0], seen.t - first[0].t)
 
     return freeze
 
 
-def repeated(times: int) -> Callable[[SeenInput], SeenInput]:
+def repeated(times: int) -> PictureChange:
     """Each picture is shown so often, with the time of the showing."""
-    shown: list[SeenInput] = []
+    shown: list[VisionMeasurement] = []
 
-    def repeat(seen: SeenInput) -> SeenInput:
+    def repeat(seen: VisionMeasurement) -> VisionMeasurement:
         shown.append(seen)
         first = shown[(len(shown) - 1) // times * times]
         return stamped(first, seen.t - first.t)
@@ -152,31 +153,24 @@ def repeated(times: int) -> Callable[[SeenInput], SeenInput]:
     return repeat
 
 
-def stamped(seen: SeenInput, later_s: float) -> SeenInput:
+def stamped(seen: VisionMeasurement, later_s: float) -> VisionMeasurement:
     """Give a picture another time."""
-    change = msgspec.structs.replace
-    leds = [change(led, t=led.t + later_s) for led in seen.leds]
-    pose = change(seen.pose, t=seen.pose.t + later_s) if seen.pose is not None else None
-    return change(seen, t=seen.t + later_s, leds=leds, pose=pose)
+    rays = replace(seen.rays, t=seen.rays.t + later_s)
+    pose = replace(seen.pose, t=seen.pose.t + later_s) if seen.pose is not None else None
+    return replace(seen, t=seen.t + later_s, rays=rays, pose=pose)
 
 
-def too_old(seen: SeenInput) -> SeenInput:
+def too_old(seen: VisionMeasurement) -> VisionMeasurement:
     """A picture that is said to be 0.1 s older than it is."""
     return stamped(seen, -0.1)
 
 
-def mixed_up(seen: SeenInput) -> SeenInput:
+def mixed_up(seen: VisionMeasurement) -> VisionMeasurement:
     """LEDs have each other's names, and the pose is that of them."""
-    names = [led.led for led in seen.leds]
-    change = msgspec.structs.replace
-    leds = [
-        change(led, led=name) for led, name in zip(seen.leds, names[1:] + names[:1], strict=True)
-    ]
-    return change(seen, leds=leds, pose=None)
+    return replace(seen, rays=replace(seen.rays, led=np.roll(seen.rays.led, -1)), pose=None)
 
 
-def beside_itself(seen: SeenInput) -> SeenInput:
+def beside_itself(seen: VisionMeasurement) -> VisionMeasurement:
     """A place that is no number."""
-    change = msgspec.structs.replace
-    leds = [change(led, tangents=(float("nan"), led.tangents[1])) for led in seen.leds]
-    return change(seen, leds=leds)
+    beside = seen.rays.tangents * (np.nan, 1.0)
+    return replace(seen, rays=replace(seen.rays, tangents=beside))

@@ -16,10 +16,12 @@ import msgspec
 
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
+from pipeline.signals import TouchState
 from pipeline.vision.visual_front_end import warm_up
 from server.common.clock import now
 from server.common.settings import RtcSettings, VideoSettings
-from server.control.ipc import Input, OperatorInput, control_end
+from server.control.ipc import control_end
+from server.control.ipc_inputs import Input
 from server.phone.phone_session import PhoneSession
 from server.process.launcher import listen
 from server.protocol.wire import HEADER, MAGIC, Kind
@@ -75,7 +77,7 @@ class NotingSessionManager(SessionManager):
     def to_control(self, message: Input) -> None:
         """Note what would tell control that the operator is there."""
         super().to_control(message)
-        if isinstance(message, OperatorInput):
+        if isinstance(message, TouchState):
             self.heard.echoes.append((message.t, now()))
 
     def disconnect_phone(self, phone: PhoneSession) -> None:

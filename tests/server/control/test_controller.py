@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import inf, nan
 
 import msgspec
@@ -13,7 +14,7 @@ from hardware.follower import ThrustCommand
 from hardware.robot_file import load_robot
 from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraMode
 from pipeline.frames import GRAVITY
-from pipeline.signals import BodyImu, Mode
+from pipeline.signals import BodyImu, Mode, PhoneImu, TouchState, VisionMeasurement
 from pipeline.teleop import Output
 from server.common.runtime_parameters import TuneInput
 from server.control.controller import (
@@ -24,30 +25,20 @@ from server.control.controller import (
     never_too_late,
 )
 from server.control.gap_log import MANY, SIDES
-from server.control.ipc import (
-    ControlStatus,
-    Input,
-    OperatorInput,
-    PhoneImuInput,
-    ReadyInput,
-    RequestInput,
-    control_end,
-    expected_of,
-    server_end,
-)
-from server.control.ipc_vision import SeenInput
+from server.control.ipc import ControlStatus, control_end, expected_of, server_end
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.control.tick_rate import OVER_S
 from tests.pipeline.seeing import quiver, seen_at
 
 ROBOT = load_robot("ames").robot
-UP, STILL = (0.0, 0.0, GRAVITY), (0.0, 0.0, 0.0)
+UP, STILL = np.array((0.0, 0.0, GRAVITY)), np.zeros(3)
 COVARIANCE = np.diag([1e-6] * 6)
 
 
-def picture(t: float) -> SeenInput:
+def picture(t: float) -> VisionMeasurement:
     """Of a robot at rest, 2.5 m ahead."""
     place = np.array([2.5, 0.0, 0.0])
-    return SeenInput.of(seen_at(t, place, np.eye(3), COVARIANCE, leds_in_b=ROBOT.leds_in_b))
+    return seen_at(t, place, np.eye(3), COVARIANCE, leds_in_b=ROBOT.leds_in_b)
 
 
 class Rig:
@@ -63,12 +54,12 @@ class Rig:
     def said(self, t: float) -> list[Input]:
         said: list[Input] = []
         if self.k % 3 == 0:
-            said.append(PhoneImuInput(t - 0.02, STILL, UP))
+            said.append(PhoneImu(t - 0.02, STILL, UP))
         if self.k % 6 == 0:
             said.append(picture(t - 0.05))
         if self.ready is not None:
             said.append(ReadyInput(self.ready))
-        return [*said, OperatorInput(t - 0.01, self.held, self.press)]
+        return [*said, TouchState(t - 0.01, self.held, self.press)]
 
     def run(
         self,
@@ -228,8 +219,11 @@ def turned_by(mode: VirtualCameraMode) -> float:
     said = rig.said
 
     def turning(t: float) -> list[Input]:
-        phone = PhoneImuInput(t - 0.02, (0.0, 0.0, 0.5), UP)
-        return [*(one for one in said(t) if not isinstance(one, PhoneImuInput | SeenInput)), phone]
+        phone = PhoneImu(t - 0.02, np.array((0.0, 0.0, 0.5)), UP)
+        return [
+            *(one for one in said(t) if not isinstance(one, PhoneImu | VisionMeasurement)),
+            phone,
+        ]
 
     rig.said = turning
     rig.run(0.1, [TuneInput(mode=mode, cutoff_hz=0.1)])
@@ -293,8 +287,8 @@ def refusals_after(pause_s: float) -> tuple[str, ...]:
     """Of a pause that began at 0, where times are exact."""
     controller = Controller(ROBOT, TeleopConfig())
     for t in (0.0, pause_s):
-        said: list[Input] = [PhoneImuInput(t, STILL, UP), picture(t), ReadyInput([])]
-        said.append(OperatorInput(t, False, 0))
+        said: list[Input] = [PhoneImu(t, STILL, UP), picture(t), ReadyInput([])]
+        said.append(TouchState(t, False, 0))
         _, output = controller.tick(t, said, [BodyImu(t, np.zeros(3), np.array(UP))], "")
     return output.refusals
 
@@ -383,14 +377,14 @@ def test_a_status_tells_how_long_it_waits_and_whose_gaps_there_were():
 
 def test_a_pause_that_the_robot_bears_ends_no_gap_of_the_phone():
     controller = Controller(ROBOT, TeleopConfig())
-    said = [OperatorInput(-0.3, False, 0), PhoneImuInput(-0.3, STILL, UP)]
+    said = [TouchState(-0.3, False, 0), PhoneImu(-0.3, STILL, UP)]
     for t in (0.0, STOOD_STILL_S, STOOD_STILL_S + PERIOD_S):
         _, output = controller.tick(t, said if t == 0.0 else [], [], "")
     gaps = controller.status(output, 1, "FIFO", {}, 0.5, 0).gaps
     assert (gaps["phone"].count, gaps["server"].count) == (1, 0)
 
 
-@pytest.mark.parametrize("heard", [OperatorInput, PhoneImuInput])
+@pytest.mark.parametrize("heard", [TouchState, PhoneImu])
 def test_a_phone_of_which_only_half_is_heard_has_a_gap(heard: type):
     rig = Rig()
     rig.track()
@@ -419,16 +413,16 @@ def test_what_is_no_number_never_reaches_the_state_by_a_datagram(tmp_path):
     rig.track()
     heard: list[Input] = []
     for bad in (nan, inf, -inf, 1e300):
-        server.send(PhoneImuInput(101.5, (bad, 0.0, 0.0), UP))
-        server.send(PhoneImuInput(bad, STILL, UP))
+        server.send(PhoneImu(101.5, np.array((bad, 0.0, 0.0)), UP))
+        server.send(PhoneImu(bad, STILL, UP))
         good = picture(101.5)
-        pose, led = good.pose, good.leds[0]
+        pose, rays = good.pose, good.rays
         assert pose is not None
-        replace = msgspec.structs.replace
-        server.send(replace(good, pose=replace(pose, p=(bad, 0.0, 0.0))))
-        server.send(replace(good, pose=replace(pose, covariance=[bad] * 36)))
-        server.send(replace(good, pose=None, leds=[replace(led, tangents=(0.0, bad))]))
-        server.send(OperatorInput(bad, True, 5))
+        server.send(replace(good, pose=replace(pose, p_bc_in_c=np.array((bad, 0.0, 0.0)))))
+        server.send(replace(good, pose=replace(pose, covariance=np.full((6, 6), bad))))
+        tangents = np.where(rays.tangents == rays.tangents[0, 1], bad, rays.tangents)
+        server.send(replace(good, pose=None, rays=replace(rays, tangents=tangents)))
+        server.send(TouchState(bad, True, 5))
         heard += control.inputs()
     server.close()
     control.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from dataclasses import replace
 from math import inf, nan
 
 import msgspec
@@ -20,30 +21,41 @@ from pipeline.signals import (
     VisionMeasurement,
 )
 from pipeline.vision.rays import NO_RAYS
-from server.control.ipc import (
+from server.control.ipc import control_end, server_end
+from server.control.ipc_inputs import (
     LARGEST,
-    OperatorInput,
-    PhoneImuInput,
+    MAX_LEDS,
     ReadyInput,
     RequestInput,
-    control_end,
+    decode,
+    encode,
     is_believable,
-    server_end,
 )
-from server.control.ipc_vision import MAX_LEDS, LedFields, PoseFields, SeenInput
 from tests.server.house import control_status
 
-V = (0.1, 0.2, 0.3)
-EYE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-IMU = PhoneImuInput(1.0, V, V)
-POSE = PoseFields(1.0, V, EYE, [0.5] * 36, 0.3, 5)
-LED = LedFields(3, 1.0, (0.1, 0.2), (0.1, 0.0, 0.0, 0.1))
-SEEN = SeenInput(1.0, [LED, LED], POSE, (0.6, 0.4))
-FEW = SeenInput(1.0, [LED], None, (0.6, 0.4))
-OPERATOR = OperatorInput(1.0, True, 2)
+V = np.array((0.1, 0.2, 0.3))
+IMU = PhoneImu(1.0, V, V)
+POSE = RelativePose(1.0, V, np.eye(3), np.full((6, 6), 0.5), 0.3, 5)
+RAYS = LedRays(
+    np.array([3, 3]), np.ones(2), np.array([[0.1, 0.2]] * 2), np.array([0.1 * np.eye(2)] * 2)
+)
+SEEN = VisionMeasurement(1.0, RAYS, POSE, (0.6, 0.4), StampOffset(0.01, 0.001))
+FEW = replace(SEEN, pose=None, offset=None)
+TOUCH = TouchState(1.0, True, 2)
 REQUEST, READY = RequestInput("stop"), ReadyInput(["No phone."])
-replace = msgspec.structs.replace
 BAD = (nan, inf, -inf, 2.0 * LARGEST)
+
+
+def wire(messages):
+    """Bytes, by which messages compare that hold arrays."""
+    return list(map(encode, messages))
+
+
+def spoilt(array, bad):
+    """With another last number."""
+    array = array.copy()
+    array.flat[-1] = bad
+    return array
 
 
 @pytest.fixture
@@ -57,9 +69,11 @@ def ends(tmp_path):
 
 def test_what_the_server_says_arrives_in_order(ends):
     server, control = ends
-    said = [IMU, SEEN, FEW, OPERATOR, REQUEST, READY]
+    said = [IMU, SEEN, FEW, TOUCH, REQUEST, READY]
     assert all(server.send(message) for message in said)
-    assert control.inputs() == said
+    heard = control.inputs()
+    assert wire(heard) == wire(said)
+    assert [type(one) for one in heard] == [type(one) for one in said]
     assert control.inputs() == []
 
 
@@ -75,45 +89,81 @@ def test_what_control_says_arrives_with_ages_that_are_for_ever(ends):
 @pytest.mark.parametrize(
     "place",
     [
-        lambda x: PhoneImuInput(x, V, V),
-        lambda x: PhoneImuInput(1.0, (0.0, x, 0.0), V),
-        lambda x: PhoneImuInput(1.0, V, (0.0, 0.0, x)),
+        lambda x: PhoneImu(x, V, V),
+        lambda x: PhoneImu(1.0, spoilt(V, x), V),
+        lambda x: PhoneImu(1.0, V, spoilt(V, x)),
         lambda x: replace(SEEN, t=x),
         lambda x: replace(SEEN, half_field=(0.6, x)),
-        lambda x: replace(SEEN, offset=(0.01, x)),
-        lambda x: replace(SEEN, leds=[LED, replace(LED, t=x)]),
-        lambda x: replace(SEEN, leds=[LED, replace(LED, tangents=(x, 0.0))]),
-        lambda x: replace(FEW, leds=[replace(LED, covariance=(0.1, 0.0, 0.0, x))]),
+        lambda x: replace(SEEN, offset=StampOffset(0.01, x)),
+        lambda x: replace(SEEN, rays=replace(RAYS, t=spoilt(RAYS.t, x))),
+        lambda x: replace(SEEN, rays=replace(RAYS, tangents=spoilt(RAYS.tangents, x))),
+        lambda x: replace(FEW, rays=replace(RAYS, covariances=spoilt(RAYS.covariances, x))),
         lambda x: replace(SEEN, pose=replace(POSE, t=x)),
-        lambda x: replace(SEEN, pose=replace(POSE, p=(x, 0.0, 0.0))),
-        lambda x: replace(SEEN, pose=replace(POSE, R=(*EYE[:8], x))),
-        lambda x: replace(SEEN, pose=replace(POSE, covariance=[*[0.5] * 35, x])),
+        lambda x: replace(SEEN, pose=replace(POSE, p_bc_in_c=spoilt(V, x))),
+        lambda x: replace(SEEN, pose=replace(POSE, R_cb=spoilt(np.eye(3), x))),
+        lambda x: replace(SEEN, pose=replace(POSE, covariance=spoilt(POSE.covariance, x))),
         lambda x: replace(SEEN, pose=replace(POSE, reprojection_px=x)),
-        lambda x: OperatorInput(x, True, 1),
+        lambda x: TouchState(x, True, 1),
     ],
 )
 def test_a_number_that_is_none_is_refused_and_counted_wherever_it_stands(ends, place, bad):
     server, control = ends
     server.send(place(bad))
     server.send(IMU)
-    assert control.inputs() == [IMU]
+    assert wire(control.inputs()) == wire([IMU])
     assert control.dropped == 1
 
 
-@pytest.mark.parametrize("length", [0, 35, 37])
-def test_a_covariance_of_another_size_is_refused(ends, length):
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        PhoneImu(1.0, np.zeros(2), V),
+        PhoneImu(1.0, V, np.zeros((3, 1))),
+        PhoneImu(1.0, V.astype(np.intp), V),
+        *(replace(SEEN, pose=replace(POSE, covariance=np.zeros(n))) for n in (0, 35, 36, 37)),
+        replace(SEEN, pose=replace(POSE, R_cb=np.zeros(9))),
+        replace(SEEN, rays=replace(RAYS, t=np.zeros(1))),
+        replace(SEEN, rays=replace(RAYS, tangents=np.zeros((2, 3)))),
+        replace(SEEN, rays=replace(RAYS, covariances=np.zeros((2, 4)))),
+        replace(SEEN, rays=replace(RAYS, led=np.zeros((2, 1), dtype=np.intp))),
+        replace(SEEN, rays=replace(RAYS, led=np.zeros(2))),
+    ],
+)
+def test_an_array_of_another_shape_or_kind_is_refused(ends, wrong):
     server, control = ends
-    server.send(replace(SEEN, pose=replace(POSE, covariance=[0.5] * length)))
+    server.send(wrong)
     assert control.inputs() == []
     assert control.dropped == 1
 
 
 @pytest.mark.parametrize(
-    "leds", [[replace(LED, led=MAX_LEDS)], [replace(LED, led=-1)], [LED] * (MAX_LEDS + 1)]
+    "plain",
+    [
+        ["f", [4], V.tobytes()],
+        ["f", [-3], V.tobytes()],
+        ["f", [2**63], V.tobytes()],
+        ["f", [1] * 70, V.tobytes()],
+        ["f", [3.0], V.tobytes()],
+        ["f", [3], 10**9],
+        ["f", [3], "x" * 24],
+        [["f"], [3], V.tobytes()],
+        ["f", [3]],
+        V.tolist(),
+        None,
+    ],
 )
+def test_what_is_no_array_is_refused(plain):
+    sample = {"t": 1.0, "omega_m_cf_in_c": plain, "a_m_cf_in_c": plain}
+    with pytest.raises(ValueError, match=r"\$|shape"):
+        decode(msgspec.msgpack.encode(["imu", sample]))
+
+
+@pytest.mark.parametrize("leds", [[MAX_LEDS, 0], [0, -1], [0] * (MAX_LEDS + 1)])
 def test_leds_that_no_robot_has_are_refused(ends, leds):
     server, control = ends
-    server.send(replace(SEEN, leds=leds))
+    n = len(leds)
+    rays = LedRays(np.array(leds), np.ones(n), np.zeros((n, 2)), np.zeros((n, 2, 2)))
+    server.send(replace(SEEN, rays=rays))
     assert control.inputs() == []
     assert control.dropped == 1
 
@@ -136,13 +186,13 @@ def test_nobody_at_the_other_end_is_no_error_and_a_newcomer_is_heard(tmp_path):
     server = server_end(tmp_path)
     assert not server.send(IMU)
     control = control_end(tmp_path)
-    assert server.send(OPERATOR)
+    assert server.send(TOUCH)
     control.close()
     assert not server.send(IMU)
     assert server.dropped == 2
     successor = control_end(tmp_path)
     assert server.send(READY)
-    assert successor.inputs() == [READY]
+    assert wire(successor.inputs()) == wire([READY])
     successor.close()
     server.close()
 
@@ -158,9 +208,9 @@ def test_a_full_queue_is_no_error_and_what_is_lost_is_counted(ends):
 def test_a_turn_takes_no_more_than_its_limit(ends):
     server, control = ends
     server.send(IMU)
-    server.send(OPERATOR)
-    assert control.inputs(limit=1) == [IMU]
-    assert control.inputs(limit=1) == [OPERATOR]
+    server.send(TOUCH)
+    assert wire(control.inputs(limit=1)) == wire([IMU])
+    assert wire(control.inputs(limit=1)) == wire([TOUCH])
 
 
 def test_one_that_died_without_cleaning_up_is_replaced(tmp_path):
@@ -168,35 +218,38 @@ def test_one_that_died_without_cleaning_up_is_replaced(tmp_path):
     second = control_end(tmp_path)
     server = server_end(tmp_path)
     server.send(READY)
-    assert second.inputs() == [READY]
+    assert wire(second.inputs()) == wire([READY])
     for end in (first, second, server):
         end.close()
 
 
-def test_signals_survive_the_journey():
+def test_signals_survive_the_journey_as_arrays_of_their_own():
     rng = np.random.default_rng(0)
     a, b, c = rng.normal(size=(3, 3))
-    sample = PhoneImuInput.of(PhoneImu(1.5, a, b)).sample()
-    np.testing.assert_array_equal((sample.omega_m_cf_in_c, sample.a_m_cf_in_c), (a, b))
-    measured = RelativePose(2.5, c, rng.normal(size=(3, 3)), rng.normal(size=(6, 6)), 0.4, 6)
+    measured = RelativePose(2.5, c, rng.normal(size=(3, 3)).T, rng.normal(size=(6, 6)), 0.4, 6)
     rays = LedRays(
         np.array([4, 1]), rng.normal(size=2), rng.normal(size=(2, 2)), rng.normal(size=(2, 2, 2))
     )
-    seen = SeenInput.of(
-        VisionMeasurement(2.5, rays, measured, (0.7, 0.4), StampOffset(0.05, 0.002))
-    ).seen()
-    assert (seen.t, seen.half_field) == (2.5, (0.7, 0.4))
-    assert seen.offset == StampOffset(0.05, 0.002)
+    offset = StampOffset(0.05, 0.002)
+    sample = decode(encode(PhoneImu(1.5, a, b)))
+    assert isinstance(sample, PhoneImu)
+    np.testing.assert_array_equal((sample.omega_m_cf_in_c, sample.a_m_cf_in_c), (a, b))
+    assert sample.a_m_cf_in_c.flags.writeable  # or no kernel takes it
+    seen = decode(encode(VisionMeasurement(2.5, rays, measured, (0.7, 0.4), offset)))
+    assert isinstance(seen, VisionMeasurement)
+    assert (seen.t, seen.half_field, seen.offset) == (2.5, (0.7, 0.4), offset)
     for name in ("led", "t", "tangents", "covariances"):
         np.testing.assert_array_equal(getattr(seen.rays, name), getattr(rays, name))
     assert seen.pose is not None
     np.testing.assert_array_equal(seen.pose.R_cb, measured.R_cb)
+    assert seen.pose.R_cb.flags.c_contiguous
     np.testing.assert_array_equal(seen.pose.covariance, measured.covariance)
     assert (seen.pose.t, seen.pose.reprojection_px, seen.pose.leds) == (2.5, 0.4, 6)
-    nothing = SeenInput.of(VisionMeasurement(2.5, NO_RAYS, None)).seen()
-    assert nothing.pose is None
-    assert nothing.offset is None
+    nothing = decode(encode(VisionMeasurement(2.5, NO_RAYS, None)))
+    assert isinstance(nothing, VisionMeasurement)
+    assert (nothing.pose, nothing.offset, len(nothing.rays)) == (None, None, 0)
     assert nothing.rays.tangents.shape == (0, 2)
     assert nothing.rays.covariances.shape == (0, 2, 2)
-    operator = OperatorInput.of(TouchState(3.5, True, 9)).operator()
-    assert (operator.t, operator.held, operator.press) == (3.5, True, 9)
+    touch = decode(encode(TouchState(3.5, True, 9)))
+    assert isinstance(touch, TouchState)
+    assert (touch.t, touch.held, touch.press) == (3.5, True, 9)

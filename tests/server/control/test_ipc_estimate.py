@@ -14,8 +14,9 @@ from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.estimation.estimator import Health
 from pipeline.signals import BodyImu
 from server.control.controller import Controller
-from server.control.ipc import ControlStatus, ReadyInput
+from server.control.ipc import ControlStatus
 from server.control.ipc_estimate import EstimateFields, finite
+from server.control.ipc_inputs import ReadyInput
 from tests.server.control.test_controller import UP, Rig
 
 ROBOT = load_robot("ames").robot

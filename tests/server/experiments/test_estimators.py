@@ -14,8 +14,6 @@ from hardware.sim.world.sensors import events
 from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
 from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from server.common.text import table
-from server.control.ipc import PhoneImuInput
-from server.control.ipc_vision import SeenInput
 from server.experiments import main
 from server.experiments.estimators import command
 from server.experiments.estimators import recording as recorded
@@ -69,8 +67,8 @@ def tape_of(world, period=0.005):
     for now in np.arange(0.1, world.t[-1], period).tolist():
         heard = [sample for arrival, sample in waiting if arrival <= now]
         waiting = waiting[len(heard) :]
-        messages = [PhoneImuInput.of(s) for s in heard if isinstance(s, PhoneImu)]
-        messages += [SeenInput.of(s) for s in heard if isinstance(s, VisionMeasurement)]
+        messages = [s for s in heard if isinstance(s, PhoneImu)]
+        messages += [s for s in heard if isinstance(s, VisionMeasurement)]
         tape.tap(now, messages, [s for s in heard if isinstance(s, BodyImu)])
     return tape
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from hardware.robot_file import load_robot
 from pipeline.config import VirtualCameraConfig
-from server.control.ipc import OperatorInput, PhoneImuInput, ReadyInput, is_believable
+from pipeline.signals import PhoneImu, TouchState
+from server.control.ipc_inputs import ReadyInput, is_believable
 from server.control.process import teleop_config
 from server.experiments import main
 from server.experiments.faults import hazards, tampering
@@ -113,7 +114,7 @@ def test_a_spoilt_one_differs_by_a_bit(sent: list[bytes], seed: int) -> None:
 
 
 def test_what_is_no_number_never_reaches_control() -> None:
-    sample = PhoneImuInput(1.0, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8))
+    sample = PhoneImu(1.0, np.array((0.1, 0.2, 0.3)), np.array((0.0, 0.0, 9.8)))
     assert is_believable(sample)
     for change in (tampering.no_number, tampering.infinite):
         assert not any(map(is_believable, tampering.motion(change)([sample])))
@@ -123,7 +124,7 @@ def test_a_touch_that_comes_again_keeps_its_age() -> None:
     repeat = tampering.stale_touch()
     ready = ReadyInput([])
     assert repeat([ready]) == [ready]
-    first, second = OperatorInput(1.0, True, 1), OperatorInput(2.0, True, 1)
+    first, second = TouchState(1.0, True, 1), TouchState(2.0, True, 1)
     assert repeat([first]) == [first]
     assert repeat([second, ready]) == [ready, first]
 

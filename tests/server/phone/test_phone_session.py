@@ -13,12 +13,10 @@ from hardware.camera_file import CAMERAS
 from pipeline.camera import verdict as camera_verdict
 from pipeline.estimation import sensor_validation
 from pipeline.frames import exp
-from pipeline.signals import LedRays, RelativePose, Spots
+from pipeline.signals import LedRays, PhoneImu, RelativePose, Spots, TouchState, VisionMeasurement
 from pipeline.vision import camera_lies, repeated_frames
 from pipeline.vision.detection import Detection
 from pipeline.vision.rays import NO_RAYS
-from server.control.ipc import OperatorInput, PhoneImuInput
-from server.control.ipc_vision import SeenInput
 from server.phone.ingest import EncodedFrame
 from server.phone.phone_session import STALE_S, PhoneSession
 from server.protocol.calibration_messages import Calibrate
@@ -134,8 +132,8 @@ def test_motion_and_touch_reach_control_at_their_own_times(rig):
     rig.say(FLAT)
     rig.say(Touch(True, True, 3, rig.nonce))
     imu, operator = rig.to_control
-    assert isinstance(imu, PhoneImuInput)
-    assert isinstance(operator, OperatorInput)
+    assert isinstance(imu, PhoneImu)
+    assert isinstance(operator, TouchState)
     assert imu.t == pytest.approx(rig.t, abs=1e-3)
     assert operator.t == pytest.approx(rig.t - 0.05)
     assert operator.held
@@ -189,9 +187,9 @@ def test_the_profile_of_a_camera_turns_the_motion_as_long_as_it_films(tmp_path):
     rig.t += 0.01
     rig.say(FLAT)
     turned = rig.to_control[-1]
-    assert isinstance(plain, PhoneImuInput)
-    assert isinstance(turned, PhoneImuInput)
-    np.testing.assert_allclose(turned.a, R_ci @ plain.a)
+    assert isinstance(plain, PhoneImu)
+    assert isinstance(turned, PhoneImu)
+    np.testing.assert_allclose(turned.a_m_cf_in_c, R_ci @ plain.a_m_cf_in_c)
     rig.phone.close()
     assert (rig.phone.ingest.extrinsics.R_ci == np.eye(3)).all()
 
@@ -209,9 +207,9 @@ def test_a_few_leds_reach_control_without_a_pose_and_nothing_as_nothing(rig):
     assert rig.to_control == []
     rig.phone._sighted(CAMERA, sighting_of(None, FEW), SHOT)
     (said,) = rig.to_control
-    assert isinstance(said, SeenInput)
+    assert isinstance(said, VisionMeasurement)
     assert said.pose is None
-    assert [led.led for led in said.leds] == [0, 2]
+    assert said.rays.led.tolist() == [0, 2]
     assert said.half_field == CAMERA.half_field
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hardware.codec import Decoder
+from pipeline.signals import PhoneImu, TouchState
 from server.common.clock import now
-from server.control.ipc import OperatorInput, PhoneImuInput
 from server.protocol.touches import NEWEST_TOUCH_US
 from server.protocol.wire import decode
 from server.protocol.wire_records import Motion, Picture, Touch
@@ -102,8 +102,8 @@ def test_motion_and_touch_come_by_the_data_channel_and_reach_control(tmp_path):
         await eventually(
             lambda: [r.sequence for r, _ in house.taken if isinstance(r.body, Motion)] == motions
         )
-        heard = await house.control_hears(lambda one: isinstance(one, OperatorInput) and one.held)
-        assert any(isinstance(one, PhoneImuInput) for one in heard)
+        heard = await house.control_hears(lambda one: isinstance(one, TouchState) and one.held)
+        assert any(isinstance(one, PhoneImu) for one in heard)
         assert house.manager.phone.ingest.clock.ready
         assert house.manager.phone.ingest.clock.offset == pytest.approx(1000.0, abs=0.05)
 
@@ -131,8 +131,8 @@ def test_whichever_way_dies_without_a_word_the_finger_is_felt_by_the_other(dead,
         await eventually(lambda: page.pongs >= pongs + 3)
         for sequence, held in ((1, False), (2, True)):
             await page.touch(sequence, held)
-        heard = await house.control_hears(lambda one: isinstance(one, OperatorInput) and one.held)
-        felt = [one.held for one in heard if isinstance(one, OperatorInput)]
+        heard = await house.control_hears(lambda one: isinstance(one, TouchState) and one.held)
+        felt = [one.held for one in heard if isinstance(one, TouchState)]
         assert sorted(felt) == felt  # said again with a PING, but never in another order
         assert set(felt) == {False, True}
         age = now() - heard[-1].t

@@ -10,7 +10,7 @@ import pytest
 from pipeline.prediction import Prediction
 from server.common.clock import now
 from server.common.runtime_parameters import TuneInput
-from server.control.ipc import ReadyInput, RequestInput
+from server.control.ipc_inputs import ReadyInput, RequestInput
 from server.diagnostics.events import EVENTS
 from server.protocol.messages import Command, Hello, Tune, encode_message
 from server.protocol.wire import VERSION, decode, encode

@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
+from pipeline.signals import PhoneImu, TouchState, VisionMeasurement
 from server.common.clock import now
-from server.control.ipc import OperatorInput, PhoneImuInput, RequestInput
-from server.control.ipc_vision import SeenInput
+from server.control.ipc_inputs import RequestInput
 from server.protocol.session import MAX_FAULTS
 from server.protocol.wire import MAX_RECORD_BYTES, encode
 from server.protocol.wire_records import Codec, Credit, Motion, Picture, Record, Touch
@@ -19,7 +19,7 @@ from tests.server.house import JPEG, control_status, eventually, house_in, is_re
 pytestmark = pytest.mark.slow  # real sockets, whose server stops by its own tick
 
 FLAT = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 9.81), None, 0)
-SIGNALS = (PhoneImuInput, SeenInput, OperatorInput, RequestInput)
+SIGNALS = (PhoneImu, VisionMeasurement, TouchState, RequestInput)
 
 
 @pytest.fixture
@@ -138,7 +138,7 @@ def test_a_silent_operator_loses_its_place_and_what_it_says_later_reaches_nobody
     async def scene():
         async with server.operator("first") as first:
             await first.touch(await first.synchronise())
-            await server.control_hears(lambda m: isinstance(m, OperatorInput))
+            await server.control_hears(lambda m: isinstance(m, TouchState))
             monkeypatch.setattr("server.web.session_manager.now", lambda: now() + 2.1)
             async with server.operator("second") as second:
                 monkeypatch.undo()
@@ -149,8 +149,8 @@ def test_a_silent_operator_loses_its_place_and_what_it_says_later_reaches_nobody
                 await first.closed()
                 assert server.manager.phone.device == "second"
                 await second.touch(await second.synchronise(), held=True)
-                heard = await server.control_hears(lambda m: isinstance(m, OperatorInput))
-                assert not [m for m in heard if isinstance(m, PhoneImuInput)]
+                heard = await server.control_hears(lambda m: isinstance(m, TouchState))
+                assert not [m for m in heard if isinstance(m, PhoneImu)]
 
     play(server, scene)
 
@@ -162,9 +162,9 @@ def test_what_a_synchronised_phone_says_reaches_control_on_our_clock(server):
             asked = now()
             await page.send(FLAT)
             await page.touch(nonce, held=True)
-            heard = await server.control_hears(lambda m: isinstance(m, OperatorInput))
-            (sample,) = (m for m in heard if isinstance(m, PhoneImuInput))
-            (touch,) = (m for m in heard if isinstance(m, OperatorInput))
+            heard = await server.control_hears(lambda m: isinstance(m, TouchState))
+            (sample,) = (m for m in heard if isinstance(m, PhoneImu))
+            (touch,) = (m for m in heard if isinstance(m, TouchState))
             assert sample.t == pytest.approx(asked, abs=0.5)
             assert touch.held
             assert touch.t <= asked
