@@ -8,6 +8,8 @@ from pipeline.so3_kernels import kernel
 
 NEAR_S = 0.012
 """So near to a sample, interpolation is as good as the sample."""
+EXCESS, EXCESS_S = 0.25, 0.1
+"""By this share of full scale, and for so long, more is felt than is said: a hand that shakes."""
 
 
 @kernel
@@ -47,12 +49,13 @@ def _bend(times: Array, values: Array, i: int, t: float, out: Array) -> None:
 
 @kernel
 def put_noise(
-    times: Array, i: int, t: float, beyond: float, noise: Array, h: float, s: Array
+    times: Array, values: Array, i: int, t: float, beyond: float, noise: Array, h: float, s: Array
 ) -> None:
     """Densities (6,) of a sample's noise at `t`, and of what the samples don't say of the truth.
 
     Between two samples the truth leaves the straight line like a Brownian bridge; beyond the last
-    one it walks away, and may go on in a direction that nobody has seen.
+    one it walks away, and may go on in a direction that nobody has seen. A sample at full scale
+    says only that there is more.
     """
     n = times.shape[0]
     period, far = h, beyond
@@ -66,3 +69,7 @@ def put_noise(
         s[k] = white * white * max(period, h)
         s[k] += rough * rough * (period * period / 12.0 + far * far)
         s[k] += drift * drift * far * far * far
+        full_scale, near = noise[3, k // 3], min(max(i, 0), n - 1)
+        loudest = max(abs(values[near, k]), abs(values[min(near + 1, n - 1), k]))
+        if loudest >= full_scale:
+            s[k] += (EXCESS * full_scale) ** 2 * EXCESS_S

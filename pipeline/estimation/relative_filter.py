@@ -88,6 +88,11 @@ class RelativeFilter:
         elif not self._track.insert(stream, t, rate, force):
             self.samples_duplicate += 1
 
+    @property
+    def samples_clipped(self) -> int:
+        """Samples of which an axis was cut off: not believed there."""
+        return self._track.clipped
+
     def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Fuse the LEDs of a picture when it was taken; tells, and counts, what became of it."""
         fusion = self._judge(seen, now)

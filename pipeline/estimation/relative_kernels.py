@@ -128,10 +128,11 @@ def transit(
 ) -> int:
     """Carry x, R from span[0] to span[1] through both IMUs' samples; gather F, G, Q from nothing.
 
-    `noise` (2, 3, 2) by (body, phone) and (gyroscope, accelerometer): standard deviation of a
+    `noise` (2, 4, 2) by (body, phone) and (gyroscope, accelerometer): standard deviation of a
     sample, density by which the truth wanders between and after samples, its drift after the last
-    one. `hand` (n, 6): forecast of `hand_predictor` beyond the phone's last sample; empty: that is
-    held. R_ic (3, 3) goes on gathering the camera's rotation since it. Gives the count of steps.
+    one, full scale. `hand` (n, 6): forecast of `hand_predictor` beyond the phone's last sample;
+    empty: that is held. R_ic (3, 3) goes on gathering the camera's rotation since it. Gives the
+    count of steps.
     """
     F[:], G[:], Q[:] = 0.0, 0.0, 0.0
     for k in range(MOVING):
@@ -154,9 +155,9 @@ def transit(
         h, middle = until - t, 0.5 * (t + until)
         if h > 0.0:
             beyond = sample_at(t_b, v_b, b, middle, inputs[0:6])
-            put_noise(t_b, b, middle, beyond, noise[0], h, s[0:6])
+            put_noise(t_b, v_b, b, middle, beyond, noise[0], h, s[0:6])
             beyond = sample_at(t_c, v_c, c, middle, inputs[6:12])
-            put_noise(t_c, c, middle, beyond, noise[1], h, s[6:12])
+            put_noise(t_c, v_c, c, middle, beyond, noise[1], h, s[6:12])
             if c == last and hand.shape[0] > 0:
                 forecast_at(hand, t - t_c[last], begun)
                 forecast_at(hand, until - t_c[last], ahead)

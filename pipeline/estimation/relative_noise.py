@@ -9,10 +9,11 @@ from pipeline.frames import Array
 
 
 def noise_of(c: RelativeConfig) -> Array:
-    """Noise densities (2, 3, 2) of both IMUs' samples, as `relative_kernels.transit` takes them."""
+    """Noise densities (2, 4, 2) of both IMUs' samples, as `relative_kernels.transit` takes them."""
     body = ((c.sigma_omega_b, c.sigma_f_b), (0.0, c.rough_f_b), (c.drift_omega_b, c.drift_f_b))
     phone = ((c.sigma_omega_c, c.sigma_f_c), (0.0, c.rough_f_c), (c.drift_omega_c, c.drift_f_c))
-    return np.array((body, phone))
+    unknown = (np.inf, np.inf)
+    return np.array(((*body, unknown), (*phone, unknown)))
 
 
 def walks_of(c: RelativeConfig) -> Array:

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.estimation.full_scale import LOUD, FullScale
 from pipeline.estimation.hand_motion_kernels import WINDOW
 from pipeline.estimation.hand_predictor import HandPredictor
 from pipeline.estimation.out_of_sequence import Checkpoint, OutOfSequence
@@ -42,6 +43,10 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         self._leds_in_b = np.ascontiguousarray(leds_in_b)
         self._config, self._walks = config, walks_of(config)
         self._hand, self._phone_factor = HandPredictor(config.hand), 0.0
+        self._scales = [[FullScale(loud) for loud in LOUD] for _ in range(2)]
+        self.clipped = 0
+        """Samples of which a sensor said as much as it can."""
+        self._noise = noise_of(config)
         self.doubt_phone(1.0)
         self._gate, self._still = config.gate_chi2, config.offset_still
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
@@ -54,6 +59,13 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
             return False
         if stream is self.phone:
             self._hand.follow(stream)
+        device = int(stream is self.phone)
+        for sensor, (scale, sample) in enumerate(
+            zip(self._scales[device], (rate, force), strict=True)
+        ):
+            if scale.hear(sample):
+                self.clipped += 1
+            self._noise[device, 3, sensor] = scale.limit
         return True
 
     def doubt_phone(self, factor: float) -> None:
@@ -61,8 +73,8 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         if factor == self._phone_factor:
             return
         self._phone_factor = factor
-        self._noise = noise_of(self._config)
-        self._noise[1] *= sqrt(factor)
+        self._noise[:, :3] = noise_of(self._config)[:, :3]
+        self._noise[1, :3] *= sqrt(factor)
 
     def in_picture(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """P (6, 6) of the pose in a picture stamped for the time of `here`: that is doubted too.

@@ -41,7 +41,7 @@ class Way:
     def __init__(self, body=BODY, phone=PHONE, *, foretells=False):
         """The phone's last sample is held, or what follows it is foretold."""
         self.config, self.body, self.phone = RelativeConfig(), body, phone
-        self.foretells = foretells
+        self.foretells, self.full_scale = foretells, np.inf
         self.x, self.R, self.R_ic = np.zeros(X), R_from_rpy(np.array([0.1, -0.2, 0.4])), np.eye(3)
         self.x[:6] = 2.5, 0.1, -0.2, 0.3, -0.1, 0.2
         self.x[X_BIASES : X_BIASES + INPUTS] = BIAS
@@ -52,6 +52,8 @@ class Way:
 
     def go(self, start, stop):
         """The count of steps."""
+        noise = noise_of(self.config)
+        noise[1, 3, 1] = self.full_scale
         steps = transit(  # type: ignore[call-arg]
             self.x,
             self.R,
@@ -62,7 +64,7 @@ class Way:
             (start, stop),
             *self.body,
             *self.phone,
-            noise_of(self.config),
+            noise,
             forecast_after(self.phone) if self.foretells else NOTHING,
             np.empty((13, 3, 3)),
         )
