@@ -84,6 +84,14 @@ PARTS: Final[tuple[ReportPart, ...]] = (
         "virtual camera.",
     ),
     ReportPart(
+        "plants",
+        "plants --seed 1000",
+        "plants --seed 1000 --plants 2 --no-thrusters",
+        "Robots that nobody told of",
+        "What it costs when the robot is heavier, weaker or slower than control was told, and what "
+        "becomes of it when a thruster fails in flight.",
+    ),
+    ReportPart(
         "gaps",
         "gaps --seeds 2",
         "gaps --quick --no-traces --vanish 0 --seeds 1",
