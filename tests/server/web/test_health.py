@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from server.common import clock
 from server.common.clock import now
 from server.recording import writer
 from server.recording.writer import RecordingError
@@ -23,7 +24,7 @@ def manager(tmp_path):
 
 
 def test_a_second_of_silence_of_control_is_a_problem(manager):
-    assert problems(manager, now()) == []
+    assert problems(manager, manager.status.t) == []
     assert problems(manager, now() + SILENT_S) == ["The control process does not answer."]
 
 
@@ -36,12 +37,14 @@ def test_on_a_full_disk_nothing_is_begun_and_it_is_said_why(manager, monkeypatch
     fill_the_disk(monkeypatch)
     with pytest.raises(RecordingError, match="only 255 MB are left on the disk"):
         manager.start_recording()
-    assert "only 255 MB" in problems(manager, now())[0]
+    assert "only 255 MB" in problems(manager, manager.status.t)[0]
 
 
 def test_a_disk_that_fills_up_ends_the_recording_which_is_readable_and_people_are_told(
     manager, monkeypatch, tmp_path
 ):
+    names = iter(("first", "second"))  # two of one second would be called the same
+    monkeypatch.setattr(clock, "file_stamp", lambda: next(names))
     name = manager.start_recording()
     recorder = manager.recordings._recorder
     fill_the_disk(monkeypatch)
@@ -51,7 +54,8 @@ def test_a_disk_that_fills_up_ends_the_recording_which_is_readable_and_people_ar
     assert any("only 255 MB are left" in said for said in manager.events)
     assert next(tmp_path.rglob(f"{name}.mcap")).stat().st_size > 0
     monkeypatch.setattr(writer, "shutil", shutil)
-    assert "only 255 MB" in problems(manager, now())[0]  # until somebody has looked after it
+    heard = manager.status.t
+    assert "only 255 MB" in problems(manager, heard)[0]  # until somebody has looked after it
     manager.start_recording()
-    assert problems(manager, now()) == []
+    assert problems(manager, heard) == []
     manager.recordings.stop()
