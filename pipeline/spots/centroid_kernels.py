@@ -51,7 +51,7 @@ these shares of its length."""
 WEIGHT, SU, SV, SUU, SUV, SVV, N_UU, N_UV, N_VV, D_U, D_V, CLIPPED = range(12)
 """Sums over a spot's pixels: weight, weight × place, weight × place²; (slope × place)² and |place|
 of what is not clipped; how many are."""
-SUMS = 12
+SUMS = 12  # numbers of those
 
 
 @kernel
