@@ -16,22 +16,18 @@ from pipeline.spots.centroid_kernels import (
     CONTRAST,
     FIELDS,
     RING,
+    Box,
     U,
     V,
     centre,
 )
-from pipeline.spots.flood_kernels import Pixels, bright, brightest, flood
-from pipeline.spots.ground_kernels import Box, border, noise_of, put_ring
+from pipeline.spots.flood_kernels import Pixels, border, bright, flood, moments
 
 WINDOW = 21
 """Half of a window's side [px], at most, when it is asked for."""
 LARGEST = 45
 """The same after it has grown about a spot that did not fit."""
-SIGMAS, LEAST_GREY = 8.0, 6.0
-"""Noises, and grey levels, by which a spot rises above its surround at least."""
-DIMMER = 0.25
-"""Of the brightest contrast around: dimmer ones are no LEDs beside one, as those are alike."""
-SHARE = 0.7
+SHARE = 0.4
 """Of the contrast: what is above belongs to the spot."""
 ROUNDS, OF_ONE_WINDOW = 6, 4
 """Peaks looked at, and spots taken, of one window."""
@@ -42,12 +38,6 @@ CUT = 2
 WINDOWS = numba.types.Array(numba.int64, 2, "A", readonly=True)
 LUMA = numba.types.Array(numba.uint8, 2, "A", readonly=True)
 """Read-only and of any layout: a decoder's rows have gaps, and no picture may compile anew."""
-
-
-@kernel
-def least_contrast(usual: float, noise: float, brightest: float) -> float:
-    """Of a spot, in grey levels: the `usual` one, or less where noise and other lights allow."""
-    return min(usual, max(SIGMAS * noise, LEAST_GREY, DIMMER * brightest))
 
 
 @kernel
@@ -82,7 +72,8 @@ def _spot_at(
         return False
     ring[0], ring[1] = max(0, ring[0]), max(0, ring[1])
     ring[2], ring[3] = min(width - 1, ring[2]), min(height - 1, ring[3])
-    return centre(luma, light, slope_of, box, extent, mark, seen, ring, coded_px, spot, work)
+    moments(luma, light, box, extent, mark, seen, spot)
+    return centre(luma, light, slope_of, ring, coded_px, spot, work)
 
 
 @kernel
@@ -114,9 +105,7 @@ def _in_window(
     ground = border(luma, box)
     seen[:rows, :columns] = 0
     spot, extent, taken = np.empty(FIELDS), np.empty(4, dtype=np.int64), 0
-    noise = noise_of(work, put_ring(luma, box, work), ground)
-    least = least_contrast(limits[0], noise, brightest(luma, box) - ground)
-    count = bright(luma, box, ceil(ground + least), stack)
+    count = bright(luma, box, ceil(ground + limits[0]), stack)
     for mark in range(1, ROUNDS + 1):
         peak, pu, pv = -1, 0, 0
         for k in range(len(stack) - count, len(stack)):
@@ -160,13 +149,13 @@ def measure(
         light: (256,) about linear light of each grey level.
         slope_of: (256,) its slope; 0 where it is clipped.
         windows: (w, 3) middle and half the side [px].
-        limits: (5,) contrast in grey levels that is enough in any noise, least and most pixels,
-            most windows that grow, and what a codec adds to a place [px].
+        limits: (5,) least contrast in grey levels, least and most pixels, most windows that grow,
+            and what a codec adds to a place [px].
         table: (n, FIELDS) written, until it is full.
     """
     seen = np.empty((2 * LARGEST + 1, 2 * LARGEST + 1), dtype=np.uint8)
     stack = np.empty((2 * (2 * LARGEST + 1) ** 2, 2), dtype=np.int16)
-    work = np.empty(8 * (LARGEST + RING))
+    work = np.empty(8 * LARGEST + 8)
     wide, larger = np.zeros(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     n, grown = 0, 0.0
     for w in range(len(windows)):
