@@ -32,6 +32,8 @@ from numba.core.registry import cpu_target
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PACKAGES = ("pipeline", "hardware")
+BESIDE = os.path.join(ROOT, PACKAGES[0], "__pycache__")
+"""Where kernels beside their sources lie, for all of them."""
 _IS_COMPILED = re.compile(r"^@(?:kernel|numba\.njit)\b", re.MULTILINE)
 _IMPORTS = re.compile(r"^from ((?:pipeline|hardware)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 _COMPILES_IN = re.compile(r"\b(?:[a-z_]\w*|[A-Z][A-Z0-9_]+)\b")
@@ -91,14 +93,13 @@ def _mark_of(folder: str) -> str:
     target = cpu_target.target_context.codegen().magic_tuple()
     made_of = f"{kernel_stamp()}\0{numba.__version__}\0{target}"
     name = f"warm-{sha256(made_of.encode()).hexdigest()[:16]}"
-    return os.path.join(folder or os.path.join(ROOT, PACKAGES[0], "__pycache__"), name)
+    return os.path.join(folder or BESIDE, name)
 
 
 def _is_writable(folder: str) -> bool:
-    folder = folder or os.path.join(ROOT, PACKAGES[0], "__pycache__")
     try:
-        os.makedirs(folder, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
+        os.makedirs(folder or BESIDE, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder or BESIDE).close()
     except OSError:
         return False
     return True
