@@ -121,6 +121,14 @@ class Follower(Protocol):
     thrusters: int
     """m."""
 
+    @property
+    def epoch(self) -> int:
+        """Number of the run of commands that the robot follows; shown to supervisors."""
+
+    @property
+    def dropped(self) -> int:
+        """Messages that were not the robot's, damaged, repeated or late, since the start."""
+
     def receive(self) -> list[BodySample]:
         """Return all samples that have arrived since the last call, oldest first.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from math import pi, radians, sqrt
 from pathlib import Path
@@ -49,8 +49,12 @@ class RobotFileError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class LinkParameters:
-    """Where the robot listens and what it takes."""
+    """How the robot is reached, where it listens and what it takes."""
 
+    kind: str
+    """A key of `link/registry.py`."""
+    stopped_by: str
+    """Who stops it in silence, beside its link; "" if nobody is named."""
     host: str
     port: int
     max_rise: float
@@ -68,6 +72,11 @@ class RobotFile:
     link: LinkParameters
     keeps_attitude_in_ramp: bool
     """The robot itself, without a word from control."""
+
+    def reached(self, host: str, port: int, kind: str | None = None) -> RobotFile:
+        """The same robot, listening elsewhere, or by another kind of link."""
+        link = replace(self.link, host=host, port=port, kind=kind or self.link.kind)
+        return replace(self, link=link)
 
 
 def load_robot(name_or_path: str | Path) -> RobotFile:
@@ -205,7 +214,13 @@ def _converted(schema: RobotSchema) -> RobotFile:
         name: Gains(np.array(rows.Kp), np.array(rows.Ki), np.array(rows.Kd))
         for name, rows in schema.gains.items()
     }
-    link = LinkParameters(schema.link.host, schema.link.port, schema.link.max_rise_per_command_n)
+    link = LinkParameters(
+        schema.link.kind,
+        schema.link.stopped_by or "",
+        schema.link.host,
+        schema.link.port,
+        schema.link.max_rise_per_command_n,
+    )
     return RobotFile(
         robot,
         plant,

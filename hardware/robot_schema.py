@@ -132,8 +132,12 @@ class GainsSection(Section):
 
 
 class LinkSection(Section):
-    """[link]."""
+    """[link]: how control reaches the robot; see `link/registry.py`."""
 
+    kind: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")] = "udp"
+    """`udp` is our own link, others come by the entry points `lightleash.followers`."""
+    stopped_by: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    """Who or what stops the robot when it hears nothing, if its link does not see to that."""
     host: Annotated[str, Field(min_length=1, max_length=253)]
     port: Annotated[int, Field(ge=1, le=65535)]
     max_rise_per_command_n: Positive

@@ -112,14 +112,11 @@ class UdpFollower:
         return arrived
 
 
-def connect(
-    robot_file: RobotFile, key: bytes, epoch: int, host: str | None = None, port: int | None = None
-) -> UdpFollower:
-    """A link to the robot of a robot file; `host` and `port` override the file's.
+def connect(robot_file: RobotFile, key: bytes, epoch: int) -> UdpFollower:
+    """Link to the robot of a robot file. A `Connect` of `registry.py`.
 
     Raises:
         FollowerError: no such host.
     """
     link = robot_file.link
-    end = ControlEnd.of(robot_file, key, epoch)
-    return UdpFollower(host or link.host, port or link.port, end)
+    return UdpFollower(link.host, link.port, ControlEnd.of(robot_file, key, epoch))

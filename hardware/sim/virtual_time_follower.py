@@ -58,6 +58,11 @@ class VirtualTimeFollower:
         return self._end.epoch
 
     @property
+    def dropped(self) -> int:
+        """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
+        return self._end.dropped
+
+    @property
     def t(self) -> float:
         """Virtual time [s]; the robot's clock shows the same."""
         return 1e-6 * self._now_us

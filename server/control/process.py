@@ -19,10 +19,9 @@ import msgspec
 import numpy as np
 
 from hardware.dynamics import dynamics_of
-from hardware.follower import ThrustCommand
-from hardware.link.control_end import ControlEnd
+from hardware.follower import Follower, ThrustCommand
 from hardware.link.link_key import LinkKeyError, take_key
-from hardware.link.udp import UdpFollower
+from hardware.link.registry import SIMULATED, link_kind
 from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import PERIOD_S, EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
@@ -42,6 +41,9 @@ STATUS_EVERY = 4
 LATENESS_EVERY = 400
 """Ticks: every 2 s."""
 
+STOPPED_BY_NOBODY = (
+    "Nothing stops this robot when control falls silent: its file must say who does (stopped_by)."
+)
 UPRIGHT = "This robot flies, but does not keep its attitude by itself (keeps_attitude_in_ramp)."
 
 
@@ -115,6 +117,20 @@ def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate
     return partial(guard.refusal, gains, config.estimator)
 
 
+def unfit(robot_file: RobotFile, granted: str, *, real: bool) -> str:
+    """Why this process may never arm this robot, or ""."""
+    if real and not granted.startswith(realtime.GRANTED):
+        return f"No real robot with {granted}."
+    return never_upright(robot_file) or never_stops(robot_file)
+
+
+def never_stops(robot_file: RobotFile) -> str:
+    """Why never to arm a robot that nobody stops when this process dies, or ""."""
+    link = robot_file.link
+    stops = link_kind(link.kind).stops_in_silence or link.stopped_by
+    return "" if stops else STOPPED_BY_NOBODY
+
+
 def never_upright(robot_file: RobotFile) -> str:
     """Why never to arm a robot that would turn over when this process dies, or ""."""
     falls = robot_file.robot.weight_to_carry > 0.0 and not robot_file.keeps_attitude_in_ramp
@@ -134,21 +150,22 @@ def run(options: ControlOptions) -> None:
     However it ends, a robot that gives thrust then hears nothing any more and comes down by its own
     ramp, upright if it flies: zeros would let it fall.
     """
-    robot_file, key = load_robot(options.robot), _key()
+    kind = None if options.real else SIMULATED
+    robot_file = load_robot(options.robot).reached(options.host, options.port, kind)
+    key = _key()
     config = teleop_config(
         robot_file, options.gains, options.virtual_camera.config(), options.estimator
     )
     warm_up()
     granted = realtime.claim()
-    late = options.real and not granted.startswith(realtime.GRANTED)
     controller = Controller(
         robot_file.robot,
         config,
-        f"No real robot with {granted}." if late else never_upright(robot_file),
+        unfit(robot_file, granted, real=options.real),
         too_late(robot_file, options.gains, config),
     )
     epoch = next_epoch(options.epochs, unix_ms())
-    follower = UdpFollower(options.host, options.port, ControlEnd.of(robot_file, key, epoch))
+    follower = link_kind(robot_file.link.kind).connect(robot_file, key, epoch)
     endpoint = control_end(options.runtime)
     stopping: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT):
@@ -162,7 +179,7 @@ def run(options: ControlOptions) -> None:
 
 def _loop(
     controller: Controller,
-    follower: UdpFollower,
+    follower: Follower,
     endpoint: Endpoint,
     granted: str,
     stopping: list[int],

@@ -15,7 +15,9 @@ from pathlib import Path
 
 import msgspec
 
+from hardware.follower import FollowerError
 from hardware.link.link_key import KEY_VARIABLE, LinkKeyError, new_key
+from hardware.link.registry import link_kind
 from hardware.robot_file import RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
@@ -137,6 +139,7 @@ def children_of(
     Raises:
         RobotFileError: no such robot, or it has no such gains.
         LinkKeyError: a real robot without a key.
+        FollowerError: nobody here knows the kind of its link.
     """
     robot_file = load_robot(settings.robot)
     name = robot_file.robot.name
@@ -147,7 +150,8 @@ def children_of(
     truth_port, children = 0, []
     key, epochs = new_key(), runtime / f"{name}.epoch"
     if not settings.simulate:
-        key, epochs = key_of(settings.state, name), epoch_file(settings.state, name)
+        key = key_of(settings.state, name) if link_kind(link.kind).keyed else new_key()
+        epochs = epoch_file(settings.state, name)
     shared = {KEY_VARIABLE: key.hex()}
     if settings.simulate:
         host, port, truth_port = "127.0.0.1", free_udp_port(), free_udp_port()
@@ -220,6 +224,6 @@ def main(settings: Settings, arguments: Sequence[str]) -> int:
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, launcher.stop)
             return launcher.run()
-    except (RobotFileError, LinkKeyError, BusyError, OSError) as error:
+    except (RobotFileError, LinkKeyError, FollowerError, BusyError, OSError) as error:
         print(f"lightleash serve: {error}", file=sys.stderr)
         return 2

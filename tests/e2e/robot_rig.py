@@ -50,7 +50,7 @@ class RealTimeRig:
 
 
 def connect(port: int, epoch: int = 1, key: bytes = KEY) -> udp.UdpFollower:
-    return udp.connect(AMES, key, epoch, "127.0.0.1", port)
+    return udp.connect(AMES.reached("127.0.0.1", port), key, epoch)
 
 
 def free_port() -> int:

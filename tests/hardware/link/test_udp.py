@@ -41,7 +41,7 @@ def test_a_robot_that_is_not_there_is_silence_and_counted():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
-    follower = udp.connect(AMES, KEY, 1, "127.0.0.1", port)
+    follower = udp.connect(AMES.reached("127.0.0.1", port), KEY, 1)
     assert [exchange(follower, ZERO) for _ in range(10)] == [[]] * 10
     assert follower.lost > 0
     follower.close()
@@ -49,7 +49,7 @@ def test_a_robot_that_is_not_there_is_silence_and_counted():
 
 def test_an_unknown_host_is_an_error_that_names_it():
     with pytest.raises(FollowerError, match=r"no-such-robot\.invalid"):
-        udp.connect(AMES, KEY, 1, "no-such-robot.invalid")
+        udp.connect(AMES.reached("no-such-robot.invalid", 47001), KEY, 1)
 
 
 def test_damaged_repeated_and_overtaken_samples_are_dropped_and_counted(loopback):
@@ -69,7 +69,7 @@ FLYING = ThrustCommand(np.full(8, 0.5), armed=True)
 
 
 def another(rig, epoch, key=KEY):
-    follower = udp.connect(AMES, key, epoch, *rig.socket.getsockname())
+    follower = udp.connect(AMES.reached(*rig.socket.getsockname()), key, epoch)
     follower._clock = rig.follower._clock
     return follower
 

@@ -1,0 +1,75 @@
+"""Links by name: our own, and those of other installed packages."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from hardware.follower import FollowerError
+from hardware.link.registry import GROUP, OWN, link_kind
+from hardware.robot_file import RobotFileError, load_robot, robot_of, robot_path, robot_table
+
+OTHERS = """
+from hardware.link.registry import LinkKind
+
+def connect(robot_file, key, epoch):
+    raise AssertionError("nobody flies here")
+
+LAB = LinkKind(connect, stops_in_silence=False, keyed=False)
+NO_KIND = connect
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch):
+    """An installed package of somebody else's, with three kinds; one alone is good."""
+    (tmp_path / "lab_links.py").write_text(OTHERS)
+    info = tmp_path / "lab_links-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-links\nVersion: 1.0\n")
+    points = "lab = lab_links:LAB\nbroken = lab_links:MISSING\nno-kind = lab_links:NO_KIND\n"
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\n{points}")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield
+    sys.modules.pop("lab_links", None)
+
+
+def test_the_robots_of_this_project_name_kinds_that_are_known():
+    for name in ("ames", "quadrotor", "ground", "screen"):
+        assert link_kind(load_robot(name).link.kind) is OWN["udp"]
+
+
+@pytest.mark.usefixtures("package")
+def test_an_installed_package_brings_its_own():
+    kind = link_kind("lab")
+    assert not kind.stops_in_silence
+    assert not kind.keyed
+
+
+@pytest.mark.usefixtures("package")
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("broken", "does not load"),
+        ("no-kind", "is no LinkKind"),
+        ("uqp", r"broken, lab, no-kind, udp \(did you mean 'udp'\?\)"),
+    ],
+)
+def test_what_can_not_be_used_is_named_with_what_can(name, words):
+    with pytest.raises(FollowerError, match=words):
+        link_kind(name)
+
+
+def test_a_robot_file_may_name_a_kind_that_is_not_installed_here():
+    table = robot_table(robot_path("ames"))
+    table["link"] |= {"kind": "lab", "stopped_by": "a relay on the battery"}
+    link = robot_of(table, "lab.toml").link
+    assert (link.kind, link.stopped_by) == ("lab", "a relay on the battery")
+
+
+@pytest.mark.parametrize("kind", ["", "../udp", "UDP", "a" * 33, 3])
+def test_a_kind_is_a_plain_word(kind):
+    table = robot_table(robot_path("ames"))
+    table["link"]["kind"] = kind
+    with pytest.raises(RobotFileError, match=r"link\.kind"):
+        robot_of(table, "lab.toml")
