@@ -8,6 +8,9 @@ from pipeline.so3_kernels import kernel
 
 NEAR_S = 0.012
 """So near to a sample, interpolation is as good as the sample."""
+APART = 0.25
+"""Share of the time between two samples that their neighbours must be from them: a curve through
+nearer ones follows their noise or their stamps' rounding, not the motion."""
 EXCESS, EXCESS_S = 0.25, 0.1
 """By this share of full scale, and for so long, more is felt than is said: a hand that shakes."""
 
@@ -24,7 +27,9 @@ def sample_at(times: Array, values: Array, i: int, t: float, out: Array) -> floa
         for k in range(6):
             out[k] = values[i, k] + share * (values[i + 1, k] - values[i, k])
         if i >= 1 and i + 2 < n and times[i + 2] - times[i - 1] < MAX_GAP_S:
-            _bend(times, values, i, t, out)
+            near = APART * (times[i + 1] - times[i])
+            if times[i] - times[i - 1] >= near and times[i + 2] - times[i + 1] >= near:
+                _bend(times, values, i, t, out)
         return 0.0
     for k in range(6):
         out[k] = values[i, k]

@@ -59,15 +59,19 @@ def step(world: World, h: float) -> tuple[Array, Array]:
 def readings(world: World) -> list[Reading]:
     """All readings, in the order of their times."""
     phone, body = phone_by_state(world, world.phone.i), body_by_state(world, world.body.i)
+    phone_fault, body_fault = world.setup.phone_fault, world.setup.body_fault
+    phone_sigmas = _imu_sigmas(phone_fault.noise, sensors.PHONE_NOISE, sensors.PHONE_STEP)
+    body_sigmas = _imu_sigmas(body_fault.noise, sensors.BODY_NOISE, (0.0, 0.0))
     rows = [
-        Reading(int(i), float(a), H / _imu_sigmas(sensors.PHONE_NOISE, sensors.PHONE_STEP))
+        Reading(int(i), float(a), H / phone_sigmas)
         for i, a, H in zip(world.phone.i, world.phone.arrival, phone, strict=True)
     ]
     rows += [
-        Reading(int(i), float(a), H / _imu_sigmas(sensors.BODY_NOISE, (0.0, 0.0)))
+        Reading(int(i), float(a), H / body_sigmas)
         for i, a, H in zip(world.body.i, world.body.arrival, body, strict=True)
     ]
-    seen = tangents_by_state(world, world.pictures.i) * (sensors.FOCAL_PX / sensors.NOISE_PX)
+    noise_px = world.setup.pixel_noise * sensors.NOISE_PX
+    seen = tangents_by_state(world, world.pictures.i) * (sensors.FOCAL_PX / noise_px)
     good = world.visible & ~world.false
     rows += [
         Reading(int(i), float(a), H[g].reshape(-1, size(world)), is_picture=True)
@@ -154,7 +158,7 @@ def _processes(world: World) -> list[tuple[float, LinearProcess]]:
     ]
 
 
-def _imu_sigmas(noise: tuple[float, float], step: tuple[float, float]) -> Array:
+def _imu_sigmas(times: float, noise: tuple[float, float], step: tuple[float, float]) -> Array:
     """Standard deviations (6, 1) of noise and rounding."""
-    sigmas: Array = np.sqrt(np.square(noise) + np.square(step) / 12.0)
+    sigmas: Array = np.sqrt(np.square(times * np.array(noise)) + np.square(step) / 12.0)
     return np.repeat(sigmas, 3)[:, None]

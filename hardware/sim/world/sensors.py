@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from hardware.sim.world.rotations import exp_each, skew_each
+from hardware.sim.world.sensor_faults import TWIN_S, ImuFault
 from hardware.sim.world.world import LEDS_IN_B, Flags, Indices, World
 from pipeline.config import PERIOD_S
 from pipeline.estimation.estimator import Estimator, Fusion
@@ -62,21 +63,22 @@ def phone_samples(world: World) -> list[Event]:
     """Samples of the phone's IMU."""
     rng, i, setup = world.rng(11), world.phone.i, world.setup
     stamps = world.phone_stamps(world.t[i]) + setup.stamp_jitter * rng.normal(size=len(i))
-    sampled = zip((world.omega_c[i], world.f_c[i]), PHONE_BIAS, PHONE_NOISE, strict=True)
-    omega, f = (_disturbed(rng, *values) for values in sampled)
+    felt = (world.omega_c[i], world.f_c[i])
+    told = _told(rng, world, felt, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
     omega, f = (
         np.clip(np.rint(v / step) * step, -most, most)
-        for v, step, most in zip((omega, f), PHONE_STEP, PHONE_RANGE, strict=True)
+        for v, step, most in zip(told, PHONE_STEP, PHONE_RANGE, strict=True)
     )
     rows = zip(world.phone.arrival.tolist(), stamps.tolist(), omega, f, strict=True)
-    return [(arrival, PhoneImu(t, w, g)) for arrival, t, w, g in rows]
+    samples: list[Event] = [(arrival, PhoneImu(t, w, g)) for arrival, t, w, g in rows]
+    return samples + _twins(world.rng(15), samples, setup.phone_fault.twins)
 
 
 def body_samples(world: World) -> list[Event]:
     """Samples of the robot's IMU."""
-    rng, i = world.rng(12), world.body.i
-    sampled = zip((world.omega_b[i], world.f_b[i]), BODY_BIAS, BODY_NOISE, strict=True)
-    omega, f = (_disturbed(rng, *values) for values in sampled)
+    rng, i, fault = world.rng(12), world.body.i, world.setup.body_fault
+    felt = (world.omega_b[i], world.f_b[i])
+    omega, f = _told(rng, world, felt, i, fault, BODY_BIAS, BODY_NOISE)
     rows = zip(world.body.arrival.tolist(), world.t[i].tolist(), omega, f, strict=True)
     return [(arrival, BodyImu(t, w, g)) for arrival, t, w, g in rows]
 
@@ -85,7 +87,7 @@ def pictures(world: World) -> list[Event]:
     """Vision measurements; also those without any LED."""
     rng, i = world.rng(13), world.pictures.i
     stamps = world.phone_stamps(world.t[i]) - world.setup.time_offset
-    noise_px = NOISE_PX * rng.normal(size=(len(i), len(LEDS_IN_B), 2))
+    noise_px = world.setup.pixel_noise * NOISE_PX * rng.normal(size=(len(i), len(LEDS_IN_B), 2))
     wrong = rng.uniform(-OUTLIER_PX, OUTLIER_PX, noise_px.shape)
     true = tangents(world, i)
     noise_px = _stuck(FOCAL_PX * true, noise_px, world.setup.stick_px)
@@ -185,8 +187,36 @@ def _stuck(px: Array, noise_px: Array, stick_px: float) -> Array:
     return error
 
 
-def _disturbed(rng: np.random.Generator, truth: Array, bias: float, noise: float) -> Array:
-    return truth + rng.normal(0.0, bias, 3) + rng.normal(0.0, noise, truth.shape)
+def _told(
+    rng: np.random.Generator,
+    world: World,
+    felt: tuple[Array, Array],
+    i: Indices,
+    fault: ImuFault,
+    biases: tuple[float, float],
+    noises: tuple[float, float],
+) -> list[Array]:
+    """Rates and forces (n, 3) with biases, noise and what is wrong."""
+    added = fault.added(world.rng(16), world.t[i])
+    return [
+        truth + rng.normal(0.0, bias, 3) + fault.noise * rng.normal(0.0, noise, truth.shape) + more
+        for truth, bias, noise, more in zip(felt, biases, noises, added, strict=True)
+    ]
+
+
+def _twins(rng: np.random.Generator, samples: list[Event], probability: float) -> list[Event]:
+    """Some of the phone's samples again, nearly at the same time."""
+    twins: list[Event] = []
+    for arrival, sample in samples:
+        if isinstance(sample, PhoneImu) and rng.uniform() < probability:
+            omega, f = (
+                told + step * rng.integers(-1, 2, 3)
+                for told, step in zip(
+                    (sample.omega_m_cf_in_c, sample.a_m_cf_in_c), PHONE_STEP, strict=True
+                )
+            )
+            twins.append((arrival, PhoneImu(sample.t + TWIN_S, omega, f)))
+    return twins
 
 
 def _rays(t: float, places: Array, visible: Flags) -> LedRays:

@@ -26,10 +26,10 @@ from hardware.sim.world.random_motion import (
     tremor_motion,
 )
 from hardware.sim.world.rotations import turn_each
+from hardware.sim.world.sensor_faults import FINE, Flags, ImuFault
 from pipeline.frames import Array, R_from_rpy
 
 Indices = npt.NDArray[np.intp]
-Flags = npt.NDArray[np.bool_]
 
 GRID_S: Final = 1e-3
 BODY_PERIOD_S: Final = 0.005
@@ -84,6 +84,10 @@ class WorldOptions:
     """Probability that an LED's pixel is anything within ±60 px of the right one."""
     stick_px: float = 0.0
     """A codec leaves an LED where it drew it last until it has moved by more, its noise too."""
+    phone_fault: ImuFault = FINE
+    body_fault: ImuFault = FINE
+    pixel_noise: float = 1.0
+    """LEDs scatter by so many times what is said of them."""
     time_offset: float = 0.0
     """A picture was taken at its stamp plus this."""
     clock_offset: float = 0.0
@@ -161,12 +165,12 @@ class World:
     @cached_property
     def phone(self) -> SampleTimes:
         """Sample times of the phone's IMU."""
-        return self._schedule(1, PHONE_PERIOD_S, self.setup.phone_delay)
+        return self._heard(1, PHONE_PERIOD_S, self.setup.phone_delay, self.setup.phone_fault)
 
     @cached_property
     def body(self) -> SampleTimes:
         """Sample times of the robot's IMU."""
-        return self._schedule(2, BODY_PERIOD_S, self.setup.body_delay)
+        return self._heard(2, BODY_PERIOD_S, self.setup.body_delay, self.setup.body_fault)
 
     @cached_property
     def pictures(self) -> SampleTimes:
@@ -191,6 +195,13 @@ class World:
         drawn = self.rng(5).uniform(size=self.visible.shape)
         outliers: Flags = drawn < self.setup.outliers
         return outliers
+
+    def _heard(
+        self, what: int, period: float, delay: tuple[float, float], fault: ImuFault
+    ) -> SampleTimes:
+        drawn = self._schedule(what, period, delay)
+        said = ~fault.silent(self.t[drawn.i])
+        return SampleTimes(drawn.i[said], drawn.arrival[said])
 
     def _schedule(self, what: int, period: float, delay: tuple[float, float]) -> SampleTimes:
         rng = self.rng(what)
