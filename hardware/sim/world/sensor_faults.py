@@ -11,8 +11,6 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 
-Flags = npt.NDArray[np.bool_]
-
 TWIN_S: Final = 2e-5
 """Between the stamps of two samples that are one."""
 
@@ -50,7 +48,7 @@ class ImuFault:
             felt.append(along)
         return felt[0], felt[1]
 
-    def silent(self, t: Array) -> Flags:
+    def silent(self, t: Array) -> npt.NDArray[np.bool_]:
         """Whether samples at `t` (n,) [s] are missing."""
         missing = np.zeros(len(t), dtype=bool)
         for hole in self.holes:

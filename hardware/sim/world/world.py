@@ -26,10 +26,11 @@ from hardware.sim.world.random_motion import (
     tremor_motion,
 )
 from hardware.sim.world.rotations import turn_each
-from hardware.sim.world.sensor_faults import FINE, Flags, ImuFault
+from hardware.sim.world.sensor_faults import FINE, ImuFault
 from pipeline.frames import Array, R_from_rpy
 
 Indices = npt.NDArray[np.intp]
+Flags = npt.NDArray[np.bool_]
 
 GRID_S: Final = 1e-3
 BODY_PERIOD_S: Final = 0.005
