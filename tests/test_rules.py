@@ -14,7 +14,7 @@ ROOMS = ("pipeline", "hardware", "server")
 
 CLOCKS = {
     "server/common/clock.py": "the one that all others ask",
-    "hardware/sim/robot.py": "a robot's own clock, which no server may share",
+    "hardware/link/robot_server.py": "a robot's own clock, which no server may share",
     "hardware/sim/network/emulated_link.py": "a line between two networks, a process of its own",
     "hardware/sim/truth.py": "patience for an answer, in whatever process asks",
     "hardware/link/udp.py": "a default, in whatever process has the link",

@@ -9,11 +9,11 @@ import numpy as np
 
 from hardware.link.datagram import U64, triple
 from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
+from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import Plant, PlantOptions
 from pipeline.frames import Array
 
-TICK_US = 5_000
 HISTORY = 50
 """Poses remembered: 0.25 s."""
 

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 
 from hardware.follower import BodySample, FollowerError, FollowerState, ThrustCommand
 from hardware.link.control_end import ControlEnd
+from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import Plant, PlantOptions
-from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
+from hardware.sim.simulated import SimulatedRobot, seeded_nonces
 
 HERE = ("lockstep", 0)
 KEY = bytes(16)

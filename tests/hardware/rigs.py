@@ -5,9 +5,10 @@ from __future__ import annotations
 import socket
 
 from hardware.link.control_end import ControlEnd
+from hardware.link.robot_server import TICK_US
 from hardware.link.udp import UdpFollower
 from hardware.robot_file import RobotFile
-from hardware.sim.simulated import TICK_US, SimulatedRobot, seeded_nonces
+from hardware.sim.simulated import SimulatedRobot, seeded_nonces
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
 
 KEY = bytes(range(16))
