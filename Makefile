@@ -4,7 +4,7 @@
 #: make check   the same: lint, import rules, types, web client, all tests
 #: make fast    as many tests as fit into 15 s, the cheapest of them   (FAST_S=60)
 #: make fuzz    search each parser of outside bytes for 60 s   (FUZZ_SECONDS=600 ARGS=records)
-#: make test-all  test, then fuzz, and the robot's watchdog in C as long
+#: make test-all  test, then counterparts and fuzz, and the robot's watchdog in C as long
 #: make bench   only the measurements, on a quiet machine
 #: make mutants do tests notice small changes in what keeps a robot safe?  (ARGS="FILE --all")
 #: make hooks   let git run the quick checks before each commit
@@ -15,7 +15,7 @@
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
-.PHONY: fast-server fast-others fuzz test-all mutants hooks lock image clean
+.PHONY: fast-server fast-others fuzz test-all counterparts mutants hooks lock image clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -93,13 +93,13 @@ kernels pytest fast fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=
 
 # Real processes, and what is measured, have the machine to themselves.
 pytest: dev
-	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench" $(ARGS)
-	$(BIN)/pytest -m "e2e or bench" $(ARGS)
+	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench and not counterpart" $(ARGS)
+	$(BIN)/pytest -m "(e2e or bench) and not counterpart" $(ARGS)
 
 # Beside each other, each collecting its own half alone; what needs a browser is not even imported.
 # The cheapest tests that fit into so much CPU time of each after collecting (5 s), as measured here.
 FAST_S ?= 7
-FAST := $(BIN)/pytest -q -m "not e2e and not bench and not slow" --within-s $(FAST_S)
+FAST := $(BIN)/pytest -q -m "not e2e and not bench and not slow and not counterpart" --within-s $(FAST_S)
 SERVER := tests/server/ tests/web/
 OTHERS := $(filter-out $(SERVER) tests/e2e/ tests/bench/ tests/data/,$(wildcard tests/[a-z]*/ tests/test_*.py))
 
@@ -117,8 +117,13 @@ FUZZ_SECONDS ?= 60
 fuzz: dev
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) $(ARGS)
 
+# Programs of others, fetched and built by the tests themselves.
+counterparts: dev
+	$(BIN)/pytest -m counterpart $(ARGS)
+
 test-all:
 	$(MAKE) test
+	$(MAKE) counterparts
 	$(MAKE) fuzz
 	LIGHTLEASH_FUZZ_S=60 $(BIN)/pytest tests/hardware/link/test_watchdog_fuzz.py
 

@@ -25,8 +25,16 @@ from hardware.plant_parameters import (
     SuspensionParameters,
 )
 from hardware.robot_physics import allocation_matrix, faults
-from hardware.robot_schema import AXES, BodyImuSection, RobotSchema, Stand, Suspension, clashes
-from pipeline.frames import GRAVITY
+from hardware.robot_schema import (
+    AXES,
+    BodyImuSection,
+    FlightControllerSection,
+    RobotSchema,
+    Stand,
+    Suspension,
+    clashes,
+)
+from pipeline.frames import GRAVITY, Array
 from pipeline.gains import Gains
 from pipeline.robot import Robot
 
@@ -62,6 +70,20 @@ class LinkParameters:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FlightControllerParameters:
+    """How the robot's own computer turns its motors; see `flight_controller/betaflight.py`."""
+
+    motors: tuple[int, ...]
+    """Of each thruster, from 1."""
+    exponent: float
+    """Thrust over f_max is the motor's value to this power."""
+    R_bi: Array
+    """(3, 3) from the axes of its motion sensors to the body's."""
+    gyro_per_deg_s: float
+    acc_per_g: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RobotFile:
     """A robot."""
 
@@ -72,6 +94,7 @@ class RobotFile:
     link: LinkParameters
     keeps_attitude_in_ramp: bool
     """The robot itself, without a word from control."""
+    flight_controller: FlightControllerParameters | None = None
 
     def reached(self, host: str, port: int, kind: str | None = None) -> RobotFile:
         """The same robot, listening elsewhere, or by another kind of link."""
@@ -228,6 +251,25 @@ def _converted(schema: RobotSchema) -> RobotFile:
         gains,
         link,
         schema.keeps_attitude_in_ramp,
+        _flight_controller(schema.flight_controller),
+    )
+
+
+def _flight_controller(
+    section: FlightControllerSection | None,
+) -> FlightControllerParameters | None:
+    if section is None:
+        return None
+    rows = [
+        (-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])]
+        for axis in section.imu_axes
+    ]
+    return FlightControllerParameters(
+        tuple(section.motors),
+        section.thrust_exponent,
+        np.array(rows),
+        section.gyro_per_deg_s,
+        section.acc_per_g,
     )
 
 

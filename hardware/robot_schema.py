@@ -143,6 +143,24 @@ class LinkSection(Section):
     max_rise_per_command_n: Positive
 
 
+Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+class FlightControllerSection(Section):
+    """[flight_controller]: what turns the motors, if the robot's own computer asks it by MSP."""
+
+    stopped_by: Annotated[str, Field(min_length=1, max_length=200)]
+    """Who or what stops the motors when that computer dies: the flight controller does not."""
+    motors: Annotated[list[Annotated[int, Field(ge=1, le=16)]], Field(min_length=2, max_length=16)]
+    """Number of the motor of each thruster, in the order of [[thrusters.units]]."""
+    thrust_exponent: Annotated[float, Field(ge=0.5, le=4.0)] = 2.0
+    """Thrust grows with the motor's value to this power."""
+    imu_axes: list[Direction] = ["x", "y", "z"]
+    """Along which axis of its motion sensors each of the body's lies."""
+    gyro_per_deg_s: Positive = 16.4
+    acc_per_g: Positive = 512.0
+
+
 class RobotSchema(Section):
     """The file."""
 
@@ -163,10 +181,13 @@ class RobotSchema(Section):
     leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
     gains: Annotated[dict[str, GainsSection], Field(min_length=1)]
     link: LinkSection
+    flight_controller: FlightControllerSection | None = None
 
 
 def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
     """Keys that contradict each other: (key, what would be allowed)."""
+    if robot.flight_controller is not None:
+        yield from _miswired(robot.flight_controller, len(robot.thrusters.units))
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     if robot.suspension is not None:
@@ -181,3 +202,18 @@ def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
         yield "stand", "[stand], or [suspension] for a robot that hangs"
     if robot.ramp_s is None:
         yield "ramp_s", "how long a ramp to zero thrust lasts [s]: there is no [suspension]"
+
+
+def _miswired(section: FlightControllerSection, thrusters: int) -> Iterator[tuple[str, str]]:
+    if len(section.motors) != thrusters or len(set(section.motors)) < thrusters:
+        yield "flight_controller.motors", f"{thrusters} different numbers, one for each thruster"
+    if sorted(axis[-1] for axis in section.imu_axes) != ["x", "y", "z"]:
+        yield "flight_controller.imu_axes", "each of x, y, z once, with or without a minus"
+    elif not _is_right_handed(section.imu_axes):
+        yield "flight_controller.imu_axes", "a right-handed system: turn one minus"
+
+
+def _is_right_handed(axes: list[Direction]) -> bool:
+    letters = "".join(axis[-1] for axis in axes)
+    is_even, minuses = letters in "xyzxy", sum(axis[0] == "-" for axis in axes)
+    return is_even == (minuses % 2 == 0)

@@ -120,13 +120,15 @@ class VirtualTimeSimulation:
         operator: VirtualOperator | None = None,
         hand: Hand | None = None,
         plant: PlantOptions | None = None,
+        follower: VirtualTimeFollower | None = None,
     ) -> None:
         """Everything at rest at time 0.
 
-        The usual `operator` holds the phone, or another, and the scene's `hand` moves it.
+        The usual `operator` holds the phone, or another, and the scene's `hand` moves it; the
+        usual `follower` is the robot behind our own link, or another, which `plant` does not reach.
         """
         self.scene = scene
-        self.follower = VirtualTimeFollower(robot_file, scene.seed, options=plant)
+        self.follower = follower or VirtualTimeFollower(robot_file, scene.seed, options=plant)
         late = too_late(robot_file, scene.gains, config) if scene.gains else never_too_late
         self.controller = Controller(robot_file.robot, config, too_late=late)
         self._evaluator = TrackingEvaluator(config.virtual_camera, robot_file.robot.axes, PERIOD_S)

@@ -1,14 +1,10 @@
-"""`lightleash robot leds`: can this robot's LEDs be told apart, and would others be better.
-
-Beside it `lightleash robot key` (`robot_key.py`).
-"""
+"""`lightleash robot leds`: can this robot's LEDs be told apart, and would others be better."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import inf, radians
 from pathlib import Path
@@ -19,40 +15,17 @@ from hardware.led_layout.anneal import AnnealingOptions, improve
 from hardware.led_layout.file import Layout, load_layout
 from hardware.led_layout.margins import Margins, Progress, margins
 from hardware.led_layout.reach import Ball, Reach
-from hardware.led_layout.viewpoints import LedLayoutError, Viewpoints, looks_about
-from hardware.link.link_key import LinkKeyError
-from hardware.robot_file import RobotFileError
+from hardware.led_layout.viewpoints import Viewpoints, looks_about
 from pipeline.frames import Array
-from server.common.options import Parser
 from server.common.progress import progress_bar
-from server.process import robot_key
-from server.tools.led_layout.files import OutError, changes, figures, make_folder, toml, write
+from server.tools.led_layout.files import changes, figures, make_folder, toml, write
 from server.tools.led_layout.report import LayoutReport, judged, lines
 
 SEARCH_VIEWS = 100
 """Of all, spread evenly, that a search looks at; what it finds is judged by all."""
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry of `lightleash robot`; 1 when the layout (the better one, if asked for) is bad."""
-    parser = Parser(prog="lightleash robot", description="Examine a robot file, make a key.")
-    kinds = parser.add_subparsers(required=True, metavar="WHAT")
-    leds = kinds.add_parser("leds", help=_LEDS, description=_LEDS)
-    _add_arguments(leds)
-    leds.set_defaults(run=_run, name="leds")
-    key = kinds.add_parser("key", help=robot_key.HELP, description=robot_key.HELP)
-    robot_key.add_arguments(key)
-    key.set_defaults(run=robot_key.run, name="key")
-    arguments = parser.parse_args(argv)
-    try:
-        code: int = arguments.run(arguments)
-    except (RobotFileError, LedLayoutError, OutError, LinkKeyError) as error:
-        print(f"lightleash robot {arguments.name}: {error}", file=sys.stderr)
-        return 2
-    return code
-
-
-_LEDS = "Can the LEDs be told apart from every view, how exact is a pose, would others be better?"
+HELP = "Can the LEDs be told apart from every view, how exact is a pose, would others be better?"
 
 
 def _number(low: float, high: float) -> Callable[[str], float]:
@@ -81,7 +54,8 @@ def _distances(text: str) -> list[float]:
     return sorted({_number(0.2, 50.0)(part) for part in text.split(",")})
 
 
-def _add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
     add = parser.add_argument
     add("robot", metavar="ROBOT", help="a robot's name, or a .toml with [[leds]]")
     add("--out", type=Path, metavar="DIR", help="write leds.png, leds.json there")
@@ -110,7 +84,13 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 _REACH = "how far each LED may move where the file has no reach_m, reach_box_m, reach_segment_m"
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
+    """Examine and print; 1 when the layout (the better one, if asked for) is bad.
+
+    Raises:
+        RobotFileError, LedLayoutError: the file can't be used.
+        OutError: the folder can't be written.
+    """
     layout = load_layout(arguments.robot)
     if arguments.out is not None:
         make_folder(arguments.out)

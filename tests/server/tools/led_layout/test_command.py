@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from server.tools.led_layout.command import main
+from server.tools.robot import main
 
 QUICK = ["--views", "10", "--distances", "2.5"]
 IDENTITY = [[0.0, 0.2, 0.2], [0.0, -0.2, 0.2], [0.0, -0.2, -0.2], [0.0, 0.2, -0.2], [0.0, 0.0, 0.0]]

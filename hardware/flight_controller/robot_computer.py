@@ -1,0 +1,62 @@
+"""The robot's own computer, sans-I/O: our link's end on one side, a flight controller on the other.
+
+The gate, the watchdog and the ramp are `robot_end.py`'s, the same as in simulation; the flight
+controller only turns the motors. A robot whose flight controller does not answer gives no samples,
+so its link falls silent by itself: commands can't be answered with fresh nonces any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hardware.flight_controller.betaflight import Betaflight
+from hardware.link.datagram import triple
+from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
+from hardware.robot_file import RobotFile, RobotFileError
+
+MISSING = "missing: which motor is which thruster, and who stops the motors"
+
+
+class RobotComputer:
+    """Ticks at 200 Hz of whatever clock its owner has; times are [µs], monotonic."""
+
+    def __init__(
+        self, robot_file: RobotFile, boot_id: int, nonces: Callable[[], int], key: bytes
+    ) -> None:
+        """Refusing thrust.
+
+        Raises:
+            RobotFileError: the file has no [flight_controller].
+        """
+        if robot_file.flight_controller is None:
+            raise RobotFileError(robot_file.robot.name, "flight_controller", MISSING)
+        self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
+        self.flight_controller = Betaflight(robot_file.flight_controller, robot_file.robot.f_max)
+        self._nonces = nonces
+
+    def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
+        """A datagram has come from `peer`."""
+        self.end.receive(data, peer, now_us)
+
+    def tick(self, now_us: int) -> bytes:
+        """What to send to the flight controller this period."""
+        if self.flight_controller.unfit:
+            self.end.halt()
+        return self.flight_controller.tick(self.end.setpoint(now_us), now_us)
+
+    def feed(self, data: bytes, now_us: int) -> list[bytes]:
+        """The flight controller has said `data`; gives samples for `end.recipients`."""
+        self.flight_controller.feed(data, now_us)
+        readings, self.flight_controller.readings = self.flight_controller.readings, []
+        thrusts = self.end.setpoint(now_us)
+        return [
+            self.end.sample(
+                one.t_us, self._nonces(), triple(one.omega_in_b), triple(one.a_in_b), thrusts
+            )
+            for one in readings
+        ]
+
+    def shut_down(self) -> bytes:
+        """Motors off, for good."""
+        self.end.halt()
+        return self.flight_controller.off()

@@ -1,0 +1,43 @@
+"""`lightleash robot WHAT`: examine a robot's file, make its key, run its own computer."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from hardware.follower import FollowerError
+from hardware.led_layout.viewpoints import LedLayoutError
+from hardware.link.link_key import LinkKeyError
+from hardware.robot_file import RobotFileError
+from server.common.options import Parser
+from server.process import robot_key
+from server.tools import onboard
+from server.tools.led_layout import command as leds
+from server.tools.led_layout.files import OutError
+
+KINDS = {"leds": leds, "key": robot_key, "onboard": onboard}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry of `lightleash robot`."""
+    words = "Examine a robot file, make a key, run the robot's own computer."
+    parser = Parser(prog="lightleash robot", description=words)
+    kinds = parser.add_subparsers(required=True, metavar="WHAT", dest="name")
+    for name, kind in KINDS.items():
+        one = kinds.add_parser(name, help=kind.HELP, description=kind.HELP)
+        kind.add_arguments(one)
+        one.set_defaults(run=kind.run)
+    arguments = parser.parse_args(argv)
+    try:
+        code: int = arguments.run(arguments)
+    except (
+        RobotFileError,
+        LedLayoutError,
+        OutError,
+        LinkKeyError,
+        FollowerError,
+        OSError,
+    ) as error:
+        print(f"lightleash robot {arguments.name}: {error}", file=sys.stderr)
+        return 2
+    return code
