@@ -10,7 +10,7 @@
 | TRACK | COAST | no news from phone or robot, or control stood still |
 | TRACK | HOLD | the finger has left, another press, the camera or the estimate is lost |
 | COAST | TRACK | all fresh for a moment, and the same press still held |
-| COAST | HOLD | the finger has left, another press, or longer than the longest gap |
+| COAST | HOLD | the finger has left, another press, or too long for a gap and a picture |
 | HOLD | TRACK | another press, all good for the recovery time |
 | TRACK, COAST, HOLD | RAMP | fault, disarm, no word or no picture for too long |
 | HOLD | RAMP | held for as long as is allowed |
@@ -89,6 +89,7 @@ class FailsafeTimers:
     coast: int
     """The longest gap, less what had passed before COAST began, and what shows that it is over."""
     pose_arm: int
+    """How old a picture may be to arm; after a gap the first one may take as long."""
     pose_hold: int
     robot_ramp: int
     phone_ramp: int
@@ -355,7 +356,9 @@ def _coast(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Fai
         return let_go
     if now.good_ms >= limits.fresh:
         return _enter(now, Mode.TRACK, "Following the phone.")
-    if now.mode_ms >= limits.coast:
+    # all may speak again while the place is unsure, until a picture taken since has come
+    waits_ms = 0 if silence(inputs, limits) else limits.pose_arm
+    if now.mode_ms >= limits.coast + waits_ms:
         reason = staleness(inputs, limits) or now.reason
         return replace(_enter(now, Mode.HOLD, reason), mode_ms=now.mode_ms)
     return now

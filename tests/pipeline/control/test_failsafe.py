@@ -128,10 +128,22 @@ def test_a_gap_that_flutters_becomes_a_hold_after_a_second_and_counts_for_its_le
     for _ in range(9):
         state = run(run(state, replace(HELD, operator_ms=151), 50), HELD, 50)
         assert state.mode == Mode.COAST
-    state = run(run(state, replace(HELD, operator_ms=151), 50), HELD, 5)
+    state = run(run(state, replace(HELD, operator_ms=151), 50), HELD, 50)
+    state = run(state, replace(HELD, operator_ms=151), 5)
     assert (state.mode, state.reason) == (Mode.HOLD, "No word from the phone.")
-    assert run(state, HELD, 2_000).mode == Mode.HOLD
+    assert run(state, HELD, 1_950).mode == Mode.HOLD
     assert run(state, HELD, 2_100).mode == Mode.RAMP
+
+
+def test_after_a_gap_it_waits_for_a_picture_for_no_longer_than_one_may_take() -> None:
+    unsure, longest_ms = replace(HELD, doubt="unsure"), LIMITS.coast + LIMITS.pose_arm
+    back = run(tracking(), replace(HELD, operator_ms=800), 800)
+    waited = run(back, unsure, longest_ms - LIMITS.fresh - back.mode_ms)
+    assert run(waited, HELD, LIMITS.fresh).mode == Mode.TRACK
+    assert run(waited, unsure, LIMITS.fresh - 5).mode == Mode.COAST
+    held = run(waited, unsure, LIMITS.fresh)
+    assert (held.mode, held.reason) == (Mode.HOLD, "unsure")
+    assert run(waited, replace(HELD, robot_ms=151), 5).mode == Mode.HOLD
 
 
 def test_a_gap_that_becomes_a_hold_is_named_after_who_is_silent_now() -> None:

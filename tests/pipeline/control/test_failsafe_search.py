@@ -161,7 +161,7 @@ def check(
         if before.mode == Mode.COAST:
             assert told.press == seen.over
             assert not seen.lifted
-            assert seen.coasted_ms <= limits.coast
+            assert seen.coasted_ms <= limits.coast + limits.pose_arm
             assert now.good_ms >= limits.fresh
     if now.mode == Mode.ARMED:
         assert not told.fault
@@ -179,7 +179,9 @@ def check(
     if before.mode == Mode.RAMP:
         assert power <= failsafe.ceiling(before, limits)
         assert now.mode != before.mode or power < failsafe.ceiling(before, limits)
-    assert later.coasted_ms <= limits.coast + D
+    assert later.coasted_ms <= limits.coast + limits.pose_arm + D
+    if silent and seen.coasted_ms > limits.coast:
+        assert now.mode not in (Mode.TRACK, Mode.COAST)
     if later.silent_ms > limits.hold_max + limits.ramp + 2 * D:
         assert power == 0.0
     _check_words(told, now, limits)
@@ -244,7 +246,7 @@ def test_the_searched_limits_are_in_the_order_of_the_shipped_ones() -> None:
         assert limits.fresh < limits.recover_short < limits.recover
         assert limits.silent < limits.robot_ramp
         assert limits.silent <= limits.pose_arm < limits.pose_hold < limits.pose_ramp
-        assert limits.short < limits.coast < limits.hold_max < limits.armed_idle
+        assert limits.short < limits.coast < limits.coast + limits.pose_arm < limits.hold_max < limits.armed_idle
 
 
 def test_the_table_in_the_docstring_and_in_the_architecture_is_the_one_searched() -> None:
