@@ -91,7 +91,8 @@ class FailsafeTimers:
     pose_arm: int
     """How old a picture may be to arm; after a gap the first one may take as long."""
     pose_hold: int
-    robot_ramp: int
+    gap: int
+    """The longest silence. No word from the robot for longer: RAMP."""
     phone_ramp: int
     pose_ramp: int
     ramp: int
@@ -124,7 +125,7 @@ class FailsafeTimers:
             coast=gap - silent + fresh,
             pose_arm=pose_arm,
             pose_hold=_ms(config.pose_hold) if bridges else pose_arm,
-            robot_ramp=gap,
+            gap=gap,
             phone_ramp=gap if hangs else FOREVER_MS,
             pose_ramp=_ms(config.pose_ramp) if bridges else pose_arm + gap,
             ramp=_ms(ramp_s),
@@ -187,9 +188,15 @@ def refusals(state: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) ->
         why.append("The camera does not see the robot.")
     elif state.bad_ms > 0:
         why.append("Just recovered: wait a moment.")
-    if inputs.held:
-        why.append("Let go of the button before arming.")
+    if holds(inputs, limits):
+        first = "a reset" if state.mode == Mode.STOPPED else "arming"
+        why.append(f"Let go of the button before {first}.")
     return tuple(dict.fromkeys(why))
+
+
+def holds(inputs: FailsafeInputs, limits: FailsafeTimers) -> bool:
+    """Whether the finger is on the button; a phone silent for longer than a gap holds nothing."""
+    return inputs.held and inputs.operator_ms <= limits.gap
 
 
 def resumes(state: Failsafe, inputs: FailsafeInputs) -> bool:
@@ -225,7 +232,7 @@ def step(state: Failsafe, inputs: FailsafeInputs, dt_ms: int, limits: FailsafeTi
         return _over(_enter(now, Mode.STOPPED, "STOP was pressed."), inputs)
     match state.mode:
         case Mode.STOPPED:
-            return _over(_stopped(now, inputs), inputs)
+            return _over(_stopped(now, inputs, limits), inputs)
         case Mode.DISARMED:
             return _over(_disarmed(now, inputs, limits), inputs)
         case Mode.RAMP:
@@ -238,7 +245,7 @@ def step(state: Failsafe, inputs: FailsafeInputs, dt_ms: int, limits: FailsafeTi
             after = _ending(now, inputs, limits) or _coast(now, inputs, limits)
         case Mode.HOLD:
             after = _ending(now, inputs, limits) or _hold(now, inputs, limits)
-    return after if inputs.held else _over(after, inputs)
+    return after if holds(inputs, limits) else _over(after, inputs)
 
 
 def _timed(state: Failsafe, inputs: FailsafeInputs, dt_ms: int, limits: FailsafeTimers) -> Failsafe:
@@ -267,8 +274,8 @@ def _over(state: Failsafe, inputs: FailsafeInputs) -> Failsafe:
     return replace(state, press=inputs.press)
 
 
-def _stopped(now: Failsafe, inputs: FailsafeInputs) -> Failsafe:
-    if inputs.requests.reset and not inputs.held and not inputs.requests.stop:
+def _stopped(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
+    if inputs.requests.reset and not holds(inputs, limits) and not inputs.requests.stop:
         return _enter(now, Mode.DISARMED, "Reset after STOP.")
     return now
 
@@ -284,7 +291,7 @@ def _ramp(now: Failsafe, limits: FailsafeTimers) -> Failsafe:
 
 
 def _armed(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
-    lost = silence(inputs, limits) if _is_lost(inputs, limits.robot_ramp) else ""
+    lost = silence(inputs, limits) if _is_lost(inputs, limits.gap) else ""
     wrong = inputs.fault or lost or uncertainty(inputs, limits)
     if wrong:
         return _enter(now, Mode.DISARMED, wrong)
@@ -309,7 +316,7 @@ def _pressed(now: Failsafe, inputs: FailsafeInputs) -> Failsafe | None:
 def _endings(inputs: FailsafeInputs, limits: FailsafeTimers) -> tuple[tuple[int, int], ...]:
     """Ages, and beyond which of them a flight is over."""
     return (
-        (inputs.robot_ms, limits.robot_ramp),
+        (inputs.robot_ms, limits.gap),
         (max(inputs.operator_ms, inputs.phone_imu_ms), limits.phone_ramp),
     )
 

@@ -228,8 +228,32 @@ def test_stop_latches_until_a_reset_with_the_button_free() -> None:
     assert failsafe.ceiling(state, LIMITS) == 0.0
     assert run(state, replace(HELD, requests=RESET), 50).mode == Mode.STOPPED
     assert run(state, replace(GOOD, requests=ARM), 2000).mode == Mode.STOPPED
+    said = "Stopped: a supervisor must reset first.", "Let go of the button before a reset."
+    assert failsafe.refusals(state, HELD, LIMITS) == said
     state = run(state, replace(GOOD, requests=RESET), 5)
     assert state.mode == Mode.DISARMED
+
+
+def test_a_phone_that_vanished_with_its_button_held_keeps_nobody_from_a_reset() -> None:
+    state = run(tracking(), replace(HELD, requests=STOP), 5)
+    for age, after in [(1_000, Mode.STOPPED), (1_001, Mode.DISARMED)]:
+        vanished = replace(HELD, operator_ms=age, requests=RESET)
+        assert run(state, vanished, 5).mode == after
+    assert failsafe.refusals(state, replace(HELD, operator_ms=1_001), LIMITS) == (
+        "Stopped: a supervisor must reset first.",
+        "No word from the phone.",
+    )
+
+
+def test_a_press_that_nobody_heard_of_for_longer_than_a_gap_is_over() -> None:
+    flier = FailsafeTimers.of(FailsafeConfig(), ramp_s=2.0, hangs=False)
+    again = replace(HELD, press=2)
+    for age, after in [(1_000, Mode.TRACK), (1_001, Mode.HOLD)]:
+        state = run(tracking(), LIFTED, 20)
+        state = failsafe.step(state, replace(again, operator_ms=age), 5, flier)
+        for _ in range(120):
+            state = failsafe.step(state, again, 5, flier)
+        assert state.mode == after
 
 
 def test_an_estimator_that_cannot_bridge_holds_as_soon_as_the_picture_is_old() -> None:

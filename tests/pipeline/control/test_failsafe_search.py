@@ -35,7 +35,7 @@ LIMITS = FailsafeTimers(
     coast=4 * D,
     pose_arm=D,
     pose_hold=2 * D,
-    robot_ramp=3 * D,
+    gap=3 * D,
     phone_ramp=3 * D,
     pose_ramp=3 * D,
     ramp=3 * D,
@@ -111,10 +111,10 @@ def after(
     seen: Monitor, inputs: FailsafeInputs, before: Failsafe, now: Failsafe, good: bool
 ) -> Monitor:
     entered = now.mode == Mode.TRACK and before.mode in (Mode.ARMED, Mode.HOLD)
-    flew = before.mode in (Mode.TRACK, Mode.COAST)
+    flew, gone = before.mode in (Mode.TRACK, Mode.COAST), inputs.operator_ms > LIMITS.gap
     let_go = not inputs.held or (flew and inputs.press != seen.over)
     return Monitor(
-        over=inputs.press if entered or not inputs.held else seen.over,
+        over=inputs.press if entered or not inputs.held or gone else seen.over,
         lifted=not entered and (seen.lifted or let_go),
         coasted_ms=min(seen.coasted_ms + D, LONGEST_MS) if now.mode == Mode.COAST else 0,
         silent_ms=0 if good else min(seen.silent_ms + D, LONGEST_MS),
@@ -142,13 +142,16 @@ def check(
 ) -> None:
     """Every law, on one step."""
     power, wish = failsafe.ceiling(now, limits), told.requests
+    gone = told.operator_ms > limits.gap
+    if before.mode == Mode.STOPPED and wish.reset and not wish.stop and gone:
+        assert now.mode == Mode.DISARMED
     assert (power > 0.0) <= (now.mode in POWERED)
     assert now.mode == before.mode or (before.mode, now.mode) in EDGES
     if wish.stop:
         assert now.mode == Mode.STOPPED
     if before.mode == Mode.STOPPED and now.mode != Mode.STOPPED:
         assert wish.reset
-        assert not told.held
+        assert not told.held or gone
     silent = max(told.robot_ms, told.operator_ms, told.phone_imu_ms) > D or told.gap
     bad = bool(told.fault or told.doubt) or silent or told.pose_ms > limits.pose_hold
     if now.mode == Mode.TRACK:
@@ -172,7 +175,7 @@ def check(
             assert not told.refusals
             assert not told.held
             assert before.good_ms + D >= limits.recover_short
-    if before.mode in FLYING and (told.fault or wish.disarm or told.robot_ms > limits.robot_ramp):
+    if before.mode in FLYING and (told.fault or wish.disarm or told.robot_ms > limits.gap):
         assert now.mode in (Mode.RAMP, Mode.STOPPED)
     if before.mode == Mode.TRACK and now.mode == Mode.TRACK:
         assert not wish.disarm
@@ -239,14 +242,15 @@ def test_every_reachable_state_keeps_every_law_by_the_documented_edges_and_no_ot
 
 def test_the_searched_limits_are_in_the_order_of_the_shipped_ones() -> None:
     hangs, hovers = (FailsafeTimers.of(FailsafeConfig(), 2.3, hangs=one) for one in (True, False))
-    assert LIMITS.robot_ramp == LIMITS.phone_ramp
-    assert hangs.robot_ramp == hangs.phone_ramp
+    assert LIMITS.gap == LIMITS.phone_ramp
+    assert hangs.gap == hangs.phone_ramp
     assert HOVERS.phone_ramp == hovers.phone_ramp == FOREVER_MS
     for limits in (LIMITS, HOVERS, hangs, hovers):
         assert limits.fresh < limits.recover_short < limits.recover
-        assert limits.silent < limits.robot_ramp
+        assert limits.silent < limits.gap
         assert limits.silent <= limits.pose_arm < limits.pose_hold < limits.pose_ramp
-        assert limits.short < limits.coast < limits.coast + limits.pose_arm < limits.hold_max < limits.armed_idle
+        assert limits.short < limits.coast
+        assert limits.coast + limits.pose_arm < limits.hold_max < limits.armed_idle
 
 
 def test_the_table_in_the_docstring_and_in_the_architecture_is_the_one_searched() -> None:
