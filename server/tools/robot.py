@@ -11,11 +11,11 @@ from hardware.link.link_key import LinkKeyError
 from hardware.robot_file import RobotFileError
 from server.common.options import Parser
 from server.process import robot_key
-from server.tools import onboard
+from server.tools import onboard, robot_check
 from server.tools.led_layout import command as leds
 from server.tools.led_layout.files import OutError
 
-KINDS = {"leds": leds, "key": robot_key, "onboard": onboard}
+KINDS = {"check": robot_check, "leds": leds, "key": robot_key, "onboard": onboard}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,0 +1,173 @@
+"""`lightleash robot check`: can the robot of a file be flown, how well, and what is missing?"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from math import degrees, inf, isfinite, radians
+from pathlib import Path
+
+import numpy as np
+
+from hardware.authority import authority
+from hardware.dynamics import dynamics_of
+from hardware.follower import FollowerError
+from hardware.led_layout.margins import margins
+from hardware.led_layout.viewpoints import looks_about
+from hardware.link.registry import link_kind
+from hardware.robot_file import RobotFile, load_robot
+from hardware.robot_schema import AXES
+from pipeline.config import TeleopConfig
+from pipeline.control.margins import Loop, Sensing, axis_margins
+from pipeline.gains import Gains
+from server.common.settings import state_directory
+from server.control.process import never_stops, never_upright
+from server.process.robot_key import key_file
+from server.tools.led_layout.report import LayoutReport, judged
+
+HELP = "Can the robot of a file be flown, how well, and what is missing?"
+LEAST_FORCE_PER_WEIGHT, LEAST_REACH_M = 0.05, 0.05
+"""Below, a robot hardly answers."""
+MASSES, LAGS = (0.7, 1.0, 1.3), (0.7, 1.0, 1.5)
+"""What a robot may be beside what its file says, as factors."""
+BODY_AGE_S = 0.010
+"""Of the body's samples when they are used."""
+CORNERS = "with any mass ± 30 %, lag × 0.7-1.5"
+USUAL_LATENCY_S = 0.100
+"""Of a phone's pictures, from capture to fusion; 0.06 to 0.12 by a good network."""
+VIEWS, FOCAL_PX, NOISE_PX = 40, 914.0, 0.1
+"""A phone at 720p."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotFinding:
+    """One line of the report."""
+
+    what: str
+    ok: bool
+    said: str
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command."""
+    parser.add_argument("robot", metavar="ROBOT", help="name or .toml")
+    parser.add_argument("--state", type=Path, default=state_directory(), help="where keys are kept")
+    parser.add_argument("--json", action="store_true", help="print findings as JSON")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the findings; 1 if something speaks against flying.
+
+    Raises:
+        RobotFileError: the file can't be used; names the key and what is allowed.
+    """
+    robot_file = load_robot(arguments.robot)
+    found = list(findings(robot_file, arguments.state))
+    if arguments.json:
+        print(json.dumps([asdict(one) for one in found], indent=1, ensure_ascii=False))
+    else:
+        print(f"{robot_file.robot.name}:")
+        for one in found:
+            print(f"  {'ok' if one.ok else '!!'}  {one.what:<10} {one.said}")
+        against = sum(not one.ok for one in found)
+        print("It can be flown." if against == 0 else f"{against} against flying it: see !!")
+    return int(any(not one.ok for one in found))
+
+
+def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
+    """All of them, the robot's body first, then its LEDs, its link at the end."""
+    yield from _thrust(robot_file)
+    yield from _gains(robot_file)
+    yield _leds(robot_file)
+    yield from _link(robot_file, state)
+
+
+def _thrust(robot_file: RobotFile) -> Iterator[RobotFinding]:
+    robot = robot_file.robot
+    weight = 9.81 * robot.mass
+    for axis, one in authority(robot, dynamics_of(robot, robot_file.plant)).items():
+        unit, least = ("N", LEAST_FORCE_PER_WEIGHT * weight) if axis < 3 else ("N m", 0.0)
+        said = f"{one.down:.2f} {unit} one way, {one.up:.2f} the other"
+        if axis < 3:
+            a = min(one.down, one.up) / robot.mass
+            said += f": {a:.1f} m/s²"
+            said += f", holds it {100 * one.reach:.0f} cm away" if isfinite(one.reach) else ""
+        ok = min(one.down, one.up) > least and (axis >= 3 or one.reach > LEAST_REACH_M)
+        yield RobotFinding(AXES[axis], ok, said)
+
+
+def _gains(robot_file: RobotFile) -> Iterator[RobotFinding]:
+    """Margins of each gain set, as told and in the worst corner of what the robot may be."""
+    least = TeleopConfig().margins
+    sound = 0
+    for name, gains in robot_file.gains.items():
+        delay, phase = _margins(robot_file, gains)
+        corners = [_margins(_other(robot_file, m, lag), gains) for m in MASSES for lag in LAGS]
+        worst_delay, worst_phase = (min(values) for values in zip(*corners, strict=True))
+        ok = delay >= least.min_delay_s and phase >= least.min_phase_rad
+        sound += ok
+        said = f"margins {1e3 * delay:.0f} ms, {degrees(phase):.0f}°"
+        said += f"; {1e3 * worst_delay:.0f} ms, {degrees(worst_phase):.0f}° {CORNERS}"
+        yield RobotFinding(f"gains {name}", True, said + ("" if ok else ": too little to fly"))
+    said = f"{sound} of {len(robot_file.gains)} sets can be flown (`lightleash tune` finds others)"
+    yield RobotFinding("any gains", sound > 0, said)
+
+
+def _margins(robot_file: RobotFile, gains: Gains) -> tuple[float, float]:
+    """Least further delay [s] and phase margin [rad] of all controlled axes."""
+    config, robot = TeleopConfig(), robot_file.robot
+    feedforward = config.feedforward if config.feedforward.enabled else None
+    dynamics = dynamics_of(robot, robot_file.plant)
+    loop = Loop(dynamics, gains, config.margins, config.no_filter, feedforward)
+    sensing = Sensing("relative", USUAL_LATENCY_S, BODY_AGE_S)
+    axes = np.flatnonzero(robot.axes | robot.wrench_axes).tolist()
+    found = [axis_margins(loop, axis, sensing) for axis in axes]
+    return min(one.delay for one in found), min(one.phase for one in found)
+
+
+def _other(robot_file: RobotFile, mass: float, lag: float) -> RobotFile:
+    plant = robot_file.plant
+    other = replace(
+        plant, mass=mass * plant.mass, inertia=mass * plant.inertia, lag=lag * plant.lag
+    )
+    return replace(robot_file, plant=other)
+
+
+def _leds(robot_file: RobotFile) -> RobotFinding:
+    """As `lightleash robot leds` at the usual distance, from fewer views."""
+    start = robot_file.start
+    elevation = float(np.arcsin(np.clip(start.above / start.distance, -1.0, 1.0)))
+    looks = looks_about(
+        (0.0, elevation),
+        (radians(35.0), radians(20.0)),
+        VIEWS,
+        np.array([start.distance]),
+        FOCAL_PX,
+        radians(10.0),
+        radians(30.0),
+    )
+    leds = robot_file.robot.leds_in_b
+    found: LayoutReport = judged(
+        robot_file.robot.name, leds, looks, 0, NOISE_PX, margins(leds, looks)
+    )
+    depth = 1e3 * float(np.median(found.sigmas.depth[:, 0]))
+    said = f"told apart: {found.grade}; depth to {depth:.1f} mm at {start.distance:.1f} m"
+    return RobotFinding("LEDs", found.grade != "bad" and depth < inf, f"{said} (robot leds: more)")
+
+
+def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
+    link, name = robot_file.link, robot_file.robot.name
+    try:
+        kind = link_kind(link.kind)
+    except FollowerError as error:
+        yield RobotFinding("link", False, str(error))
+        return
+    yield RobotFinding("link", True, f"{link.kind} to {link.host}, port {link.port}")
+    falls = never_upright(robot_file) or never_stops(robot_file)
+    yield RobotFinding("in silence", not falls, falls or "the robot stops by itself")
+    if kind.keyed:
+        has = key_file(state, name).exists()
+        lacks = f"no key: `lightleash robot key {name}` (a simulated robot needs none)"
+        yield RobotFinding("key", has or link.host == "127.0.0.1", "kept" if has else lacks)

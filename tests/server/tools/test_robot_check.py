@@ -1,0 +1,71 @@
+"""`lightleash robot check`: what is wrong with a robot is told by name, and by the exit code."""
+
+import json
+
+import numpy as np
+import pytest
+
+from hardware.authority import authority
+from hardware.dynamics import dynamics_of
+from hardware.robot_file import load_robot, robot_path
+from server.tools.robot import main
+
+
+def findings(capsys, robot, tmp_path):
+    code = main(["check", str(robot), "--json", "--state", str(tmp_path)])
+    return code, {one["what"]: one for one in json.loads(capsys.readouterr().out)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground"])
+def test_the_robots_of_this_project_can_be_flown(robot, capsys, tmp_path):
+    code, found = findings(capsys, robot, tmp_path)
+    assert code == 0
+    assert all(one["ok"] for one in found.values())
+
+
+def changed(tmp_path, *changes):
+    text = robot_path("ames").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "changed.toml").write_text(text)
+    return tmp_path / "changed.toml"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("old", "new", "against"),
+    [
+        ("f_max_n = 3.0", "f_max_n = 0.6", {"x", "y", "z"}),
+        ("lag_s = 0.025", "lag_s = 0.6", {"any gains"}),
+        ('host = "127.0.0.1"', 'host = "10.0.0.9"', {"key"}),
+        ("[link] ", '[link]\nkind = "udq"\n# ', {"link"}),
+    ],
+)
+def test_what_speaks_against_flying_is_named(old, new, against, capsys, tmp_path):
+    code, found = findings(capsys, changed(tmp_path, (old, new)), tmp_path)
+    assert code == 1
+    assert {what for what, one in found.items() if not one["ok"]} == against
+
+
+def test_authority_is_what_thrusts_within_their_limits_give_and_no_more():
+    ames = load_robot("ames")
+    rng = np.random.default_rng(0)
+    wrenches = ames.robot.A @ rng.choice([0.0, ames.robot.f_max], (8, 20_000))
+    for axis, one in authority(ames.robot, dynamics_of(ames.robot, ames.plant)).items():
+        assert one.up == pytest.approx(one.down, rel=1e-6)  # opposite thrusters
+        assert 0.0 < one.up <= wrenches[axis].max()
+        assert one.reach == pytest.approx(
+            one.up / dynamics_of(ames.robot, ames.plant).stiffness[axis]
+            if dynamics_of(ames.robot, ames.plant).stiffness[axis] > 0.0
+            else np.inf
+        )
+
+
+def test_a_robot_that_flies_has_what_is_left_beside_its_weight():
+    quadrotor = load_robot("quadrotor")
+    robot = quadrotor.robot
+    z = authority(robot, dynamics_of(robot, quadrotor.plant))[2]
+    assert z.up == pytest.approx(robot.A[2].sum() * robot.f_max - robot.weight_to_carry, rel=1e-6)
+    assert z.down == pytest.approx(robot.weight_to_carry, rel=1e-6)
