@@ -8,10 +8,10 @@ import sys
 import time
 
 from hardware.flight_controller.robot_computer import RobotComputer
-from hardware.flight_controller.serial_line import SerialLine
 from hardware.follower import FollowerError
 from hardware.link.control_end import random_u64
 from hardware.link.robot_server import Address, RobotServer, be_punctual
+from hardware.link.serial_line import SerialLine
 from hardware.robot_file import RobotFile
 
 STOP_REPEATS, STOP_EVERY_S = 10, 0.01

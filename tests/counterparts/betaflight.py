@@ -20,9 +20,9 @@ import numpy as np
 
 from hardware.flight_controller.betaflight import FULL, OFF
 from hardware.flight_controller.robot_computer import RobotComputer
-from hardware.flight_controller.serial_line import SerialLine
 from hardware.follower import FollowerError
 from hardware.link.robot_server import TICK_US
+from hardware.link.serial_line import SerialLine
 from hardware.robot_file import FlightControllerParameters, RobotFile
 from hardware.sim.plant.plant import PlantOptions
 from hardware.sim.simulated import seeded_nonces

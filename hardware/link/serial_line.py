@@ -1,4 +1,4 @@
-"""Bytes to and from a flight controller: a serial port by its path, or `tcp:HOST:PORT`."""
+"""Bytes to and from what is at a serial port, or at `tcp:HOST:PORT`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class SerialLine:
             self._socket = _connected(where) if where.startswith("tcp:") else None
             self._fd = _opened(where) if self._socket is None else self._socket.fileno()
         except (OSError, ValueError, termios.error) as error:
-            what = f"flight controller at {where}: {error}"
+            what = f"{where}: {error}"
             raise FollowerError(
                 what, "a serial port like /dev/ttyACM0, or tcp:HOST:PORT"
             ) from error
@@ -49,9 +49,9 @@ class SerialLine:
         except BlockingIOError:
             return b""
         except OSError as error:
-            raise FollowerError(f"flight controller: {error}", "a line that holds") from error
+            raise FollowerError(f"serial line: {error}", "a line that holds") from error
         if not data:
-            raise FollowerError("flight controller: it has hung up", "a line that holds")
+            raise FollowerError("serial line: the other end has hung up", "a line that holds")
         return data
 
     def write(self, data: bytes) -> None:
