@@ -4,7 +4,7 @@
 #: make check   the same: lint, import rules, types, web client, all tests
 #: make fast    as many tests as fit into 15 s, the cheapest of them   (FAST_S=60)
 #: make fuzz    search each parser of outside bytes for 60 s   (FUZZ_SECONDS=600 ARGS=records)
-#: make test-all  test, then counterparts and fuzz, and the robot's watchdog in C as long
+#: make test-all  test, then long tests, counterparts and fuzz, and the watchdog in C as long
 #: make bench   only the measurements, on a quiet machine
 #: make mutants do tests notice small changes in what keeps a robot safe?  (ARGS="FILE --all")
 #: make hooks   let git run the quick checks before each commit
@@ -15,7 +15,8 @@
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
-.PHONY: fast-server fast-others fuzz test-all counterparts mutants hooks lock image clean
+.PHONY: real robots pages quiet fast-server fast-others fuzz test-all counterparts mutants
+.PHONY: hooks lock image clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -89,12 +90,30 @@ kernels: dev
 	@$(BIN)/lightleash warm
 
 # Tests start some hundred processes, each with a thousand modules: compiled once, not each time.
-kernels pytest fast fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=
+kernels real robots pages quiet fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=
 
-# Real processes, and what is measured, have the machine to themselves.
+# First flights, whose phones and robots share the machine with nobody; then what else is real, two at
+# a time. All the while what no clock hurries takes the half that those leave, for they wait.
 pytest: dev
-	$(BIN)/pytest -n auto --dist worksteal -m "not e2e and not bench and not counterpart" $(ARGS)
-	$(BIN)/pytest -m "(e2e or bench) and not counterpart" $(ARGS)
+	$(MAKE) --jobs=2 --keep-going --output-sync real quiet
+
+real: dev
+	$(BIN)/pytest -m flight $(ARGS)$(MAYBE_NONE); flown=$$?; \
+	$(MAKE) --jobs=2 --keep-going robots pages && exit $$flown
+
+robots: dev
+	$(BIN)/pytest -m "(e2e or bench) and not flight and not page and not counterpart" $(ARGS)$(MAYBE_NONE)
+
+pages: dev
+	$(BIN)/pytest -m "page and not flight" $(ARGS)$(MAYBE_NONE)
+
+quiet: dev
+	$(WHEN_IDLE) $(BIN)/pytest -n auto --dist worksteal $(ARGS) \
+		-m "not e2e and not bench and not long and not counterpart"$(MAYBE_NONE)
+
+WHEN_IDLE := $(if $(shell command -v chrt),chrt --idle 0,nice -n 19)
+# Not each of them has one of somebody's choice of tests.
+MAYBE_NONE = $(if $(ARGS), || test $$? = 5)
 
 # Beside each other, each collecting its own half alone; what needs a browser is not even imported.
 # The cheapest tests that fit into so much CPU time of each after collecting (5 s), as measured here.
@@ -123,6 +142,7 @@ counterparts: dev
 
 test-all:
 	$(MAKE) test
+	$(BIN)/pytest -n auto --dist worksteal -m long
 	$(MAKE) counterparts
 	$(MAKE) fuzz
 	LIGHTLEASH_FUZZ_S=60 $(BIN)/pytest tests/hardware/link/test_watchdog_fuzz.py

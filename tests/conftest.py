@@ -9,6 +9,8 @@ from collections.abc import Generator
 # Before NumPy is loaded: threads of linear algebra that wait for each other burn the processor of
 # whoever tests beside them; a law of 0.6 s took 30 s of it.
 os.environ |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
+# A `make` that a test starts is nobody's part: with these it would keep what it prints to itself.
+os.environ.pop("MAKEFLAGS", None)
 
 import matplotlib
 import pytest

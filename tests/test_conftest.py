@@ -65,6 +65,7 @@ def test_a_skip_is_named_last_and_fails_in_ci(tmp_path: Path, words: tuple[str, 
     assert "NOT TESTED" not in told
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_test_that_computes_for_long_without_saying_so_fails_where_people_wait(
     tmp_path: Path,
@@ -76,6 +77,7 @@ def test_a_test_that_computes_for_long_without_saying_so_fails_where_people_wait
     assert ran(tmp_path, "", tests=BUSY)[0] == 0
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_what_compiling_takes_is_nobodys_fault(tmp_path: Path) -> None:
     assert ran(tmp_path, "", "--most-cpu-s", "0.01", tests=COMPILES)[0] == 0

@@ -26,6 +26,7 @@ def test_a_picture_says_its_number_in_its_colour(brighter: int) -> None:
 
 
 @pytest.mark.e2e
+@pytest.mark.page
 def test_centroids_of_delivered_pictures_are_those_of_raw_ones(chromium: str) -> None:
     warm_up()
     film = RenderedVideo(at_reference(SCENES["typical"]), 7, HD, FRAMES)

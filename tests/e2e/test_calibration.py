@@ -13,7 +13,7 @@ from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.serving import DEVICE, serving
 from tests.server.calibration.filming import Motion
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.page]
 
 
 def test_the_page_guides_through_a_calibration_and_goes_on_with_it(

@@ -15,7 +15,7 @@ from tests.e2e.chromium_phone import ChromiumPhone
 from tests.e2e.chromium_rig import led_server
 from tests.e2e.serving import Serving
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 SLOW = """
 (() => {
   window.isSlow = false;

@@ -7,7 +7,6 @@ import itertools
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +19,12 @@ from server.protocol.wire import decode
 from server.protocol.wire_records import Codec, Picture, Record, Touch
 from server.recording.reader import read
 from tests.e2e.chromium_phone import browser
-from tests.e2e.chromium_rig import LANDSCAPE, calibrate, flown, led_server, start
+from tests.e2e.chromium_rig import LANDSCAPE, calibrate
 from tests.e2e.clock_canvas import clock_canvas, painted_ms
 from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
 from tests.e2e.serving import Serving, serving
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 FILM_S, SETTLED_S = 6.0, 1.5
 WIDTH, HEIGHT = 640, 360
 FRAME_MS = 1000.0 / 30.0
@@ -87,22 +86,26 @@ def tell_of_leaving(route: Route) -> None:
     )
 
 
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    folder = tmp_path_factory.mktemp("rtc")
+    with serving(folder, "--cameras", str(calibrate(folder))) as running:
+        yield running
+
+
 @contextlib.contextmanager
 def filming(
-    chromium: str, folder: Path, *scripts: str, flags: tuple[str, ...] = ()
-) -> Iterator[tuple[Serving, Page]]:
+    chromium: str, server: Serving, *scripts: str, flags: tuple[str, ...] = ()
+) -> Iterator[Page]:
     """A page that films its clock, tapped."""
-    with (
-        serving(folder, "--cameras", str(calibrate(folder))) as server,
-        browser(chromium, flags=flags, **LANDSCAPE) as context,
-    ):
+    with browser(chromium, flags=flags, **LANDSCAPE) as context:
         context.route("**/rtc_worker.js", tell_of_leaving)
         page = context.new_page()
         for script in (clock_canvas(WIDTH), LISTEN, KEEP_CONNECTIONS, *scripts):
             page.add_init_script(script)
         page.goto(f"{server.local_https}/{server.link()}")
         page.tap("#start")
-        yield server, page
+        yield page
 
 
 def filmed(server: Serving, page: Page) -> Film:
@@ -136,9 +139,9 @@ def each_has_its_own_record(film: Film, codec: Codec) -> None:
 
 
 def test_pictures_go_by_webrtc_with_their_records_by_websocket_when_it_ends_and_back(
-    chromium: str, tmp_path: Path
+    chromium: str, server: Serving
 ) -> None:
-    with filming(chromium, tmp_path) as (server, page):
+    with filming(chromium, server) as page:
         path_is(server, page, "WebRTC, H264, dated by record")
         film = filmed(server, page)
         becomes(page, "/^\\d+ ms$/.test(document.querySelector('#h-rtt').innerText)")
@@ -159,17 +162,17 @@ def test_pictures_go_by_webrtc_with_their_records_by_websocket_when_it_ends_and_
 
 
 def test_vp8_of_a_browser_without_transforms_has_its_records_too(
-    chromium: str, tmp_path: Path
+    chromium: str, server: Serving
 ) -> None:
-    with filming(chromium, tmp_path, NO_H264, STREAMS_ONLY) as (server, page):
+    with filming(chromium, server, NO_H264, STREAMS_ONLY) as page:
         path_is(server, page, "WebRTC, VP8, dated by record")
         film = filmed(server, page)
     each_has_its_own_record(film, Codec.VP8)
 
 
-def test_where_udp_is_blocked_pictures_go_by_websocket(chromium: str, tmp_path: Path) -> None:
+def test_where_udp_is_blocked_pictures_go_by_websocket(chromium: str, server: Serving) -> None:
     blocked = ("--webrtc-ip-handling-policy=disable_non_proxied_udp",)
-    with filming(chromium, tmp_path, flags=blocked) as (server, page):
+    with filming(chromium, server, flags=blocked) as page:
         path_is(server, page, "websocket, H264")
         becomes(page, "made.length > 0 && made.at(-1).connectionState !== 'connected'")
         film = filmed(server, page)
@@ -179,9 +182,9 @@ def test_where_udp_is_blocked_pictures_go_by_websocket(chromium: str, tmp_path: 
 
 
 def test_a_supervisor_chooses_the_way_and_the_phone_obeys_says_so_and_may_choose_again(
-    chromium: str, tmp_path: Path
+    chromium: str, server: Serving
 ) -> None:
-    with filming(chromium, tmp_path) as (server, page):
+    with filming(chromium, server) as page:
         path_is(server, page, "WebRTC, H264")
         board = page.context.new_page()
         board.goto(f"{server.http_url}/supervisor{server.link('supervisor')}")
@@ -195,33 +198,3 @@ def test_a_supervisor_chooses_the_way_and_the_phone_obeys_says_so_and_may_choose
         path_is(server, page, "WebRTC, H264")
         said = server.request("GET", "/api/status")["path_choice"]
         assert said == {"type": "path", "wish": "WebRTC", "by": "operator"}
-
-
-LEARNT_S, STEADY_S, CHANGED_S = 7.0, 11.0, 4.0
-"""Of tracking: the suspension is learnt, pictures change their way, and go on by the other."""
-
-
-def test_the_robot_is_led_by_webrtc_and_does_not_jump_when_the_way_is_changed_by_hand(
-    chromium: str, tmp_path: Path
-) -> None:
-    with led_server(chromium, tmp_path, "moving", seed=2, rest_s=4.0) as (server, _, phone):
-        start(phone, server)
-        phone.play_until("document.querySelector('#h-path').innerText === 'WebRTC'", 25.0)
-        ways = {"WebRTC": "WebRTC", "WebSocket": "websocket, H264", "JPEG": "websocket, JPEG"}
-        for before, wish in itertools.pairwise((*ways, "WebRTC")):
-            # the first one may have been left by a flight that a busy machine ended
-            wishes = [
-                (t, partial(phone.choose, "#path-wish", way))
-                for t, way in ((0.0, before), (STEADY_S, wish))
-            ]
-            flight = flown(phone, server, STEADY_S + CHANGED_S, wishes)
-            distances, status = flight.distances, flight.status
-            assert str(status["video_path"]).startswith(ways[wish])
-            steady = [d for t, d in distances if LEARNT_S <= t < STEADY_S]
-            changed = [d for t, d in distances if t >= STEADY_S]
-            assert max(changed) <= 1.5 * max(steady) + 0.03, wish
-            phone.let_go()
-            phone.tap("#wish")
-    streams = status["streams"]
-    assert isinstance(streams, dict)
-    assert streams["phone_imu"]["rate_hz"] >= 25.0  # 60 on a quiet machine

@@ -18,7 +18,7 @@ from tests.e2e.firefox import firefox
 from tests.e2e.firefox_phone import NO_MOTION, FirefoxPhone, device_of
 from tests.e2e.serving import Serving, serving
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 WAIT_S, LEAD_S = 60.0, 8.0
 REST_S = 5.0
 """The hand moves before the page is led: what is dated wrongly shows."""

@@ -14,7 +14,7 @@ from server.experiments.network.command import row_of
 from server.experiments.network.run import NetworkTestbed
 from server.experiments.network.scenarios import SCENARIOS
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.page]
 SECONDS, MANY_SECONDS = 6.0, 15.0
 """Of a run, and of one whose lost pictures are counted: a key frame that is lost costs many."""
 

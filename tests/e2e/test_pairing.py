@@ -24,7 +24,7 @@ from tests.e2e.chromium_phone import browser
 from tests.e2e.serving import START_S, Serving, serving
 from tests.e2e.test_serve import mode, processes, until
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.page]
 SCREEN = {"viewport": {"width": 1280, "height": 720}}
 WAIT_MS = 30_000
 

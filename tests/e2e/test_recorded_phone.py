@@ -25,7 +25,7 @@ from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import ANSWER_S, ZERO_N, mode, status, thrust, until
 from tests.e2e.witness import Witness
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 RECORDING = Path(__file__).parents[1] / "data" / "chromium.mcap"
 NO_3D, NO_WEBGL = ("--disable-3d-apis",), {"webgl.disabled": True}
 """Without a graphics card the robot's view would take a processor."""

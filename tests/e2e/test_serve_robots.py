@@ -6,7 +6,7 @@ import pytest
 
 from server.virtual_phone import live_loop
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from tests.e2e.flight_log import Flight, Said
 from tests.e2e.witness import Hole, Witness, holes_of, longest
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 AWAY_S = 0.3
 
 

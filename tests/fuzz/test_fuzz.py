@@ -106,6 +106,7 @@ def test_a_check_that_is_left_out_is_found(monkeypatch):
 
 
 @pytest.mark.skipif(find_spec("atheris") is None, reason="atheris is not installed")
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_command_finds_a_planted_bug_and_keeps_its_input(tmp_path):
     out = fuzz("planted", "--runs", "400000", "--out", str(tmp_path), cwd=ROOT)
@@ -120,6 +121,7 @@ def test_the_command_finds_a_planted_bug_and_keeps_its_input(tmp_path):
 
 
 @pytest.mark.skipif(find_spec("atheris") is None, reason="atheris is not installed")
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_command_tells_executions_and_edges_of_a_sound_target(tmp_path):
     out = fuzz("trailer", "--runs", "3000", "--out", str(tmp_path), cwd=ROOT)

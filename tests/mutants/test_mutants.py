@@ -98,6 +98,7 @@ def test_a_strong_test_kills_them_all(tmp_path):
     assert "@@" not in done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_what_is_listed_as_equivalent_is_not_run_and_what_is_listed_must_exist(tmp_path):
     line = {"file": "planted.py", "operator": "comparison", "line": "if speed < 50:"}
@@ -111,6 +112,7 @@ def test_what_is_listed_as_equivalent_is_not_run_and_what_is_listed_must_exist(t
     assert "no mutant any more" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_tests_that_fail_without_a_mutant_are_an_error_and_no_score(tmp_path):
     done = mutants(tmp_path, WEAK.replace("assert light(0)", "assert False"), *equivalent(tmp_path))
@@ -118,6 +120,7 @@ def test_tests_that_fail_without_a_mutant_are_an_error_and_no_score(tmp_path):
     assert "fail without a mutant" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_mutant_with_which_a_named_tests_module_fails_to_load_is_killed(tmp_path):
     """Only a name that exists with no mutant is no error."""

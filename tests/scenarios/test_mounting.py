@@ -1,5 +1,7 @@
 """A phone whose motion sensors sit askew beside its camera, in virtual time."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ ASKEW = Extrinsics(exp(np.deg2rad([2.0, -3.0, 2.5])), time_offset_s=0.015)
 """4.4°, and pictures stamped too early."""
 
 
+@cache
 def flown(**more: object) -> tuple[float, int, str]:
     """Error of the estimate (RMS, mm), ticks of tracking, why it ended."""
     scene = SimulationOptions(hand="moving", seed=8, codec="jpeg", **more)

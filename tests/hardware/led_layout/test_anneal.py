@@ -15,7 +15,7 @@ from pipeline.identification.pnp import refine
 
 LEDS = load_robot("quadrotor").robot.leds_in_b
 LOOKS = looks_about((0.0, 0.35), (0.6, 0.35), 5, np.array([2.5]), 914.0)
-SEARCH = AnnealingOptions(turns=4, starts=2, seed=1)
+SEARCH = AnnealingOptions(turns=2, starts=2, seed=1)
 REACHES = [
     Ball(np.array([0.1, -0.2, 0.3]), 0.05),
     Box(np.array([-0.1, -0.2, 0.0]), np.array([0.1, 0.0, 0.3])),

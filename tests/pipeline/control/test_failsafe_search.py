@@ -7,8 +7,8 @@ the laws speak of and the machine might not.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 
 import pytest
@@ -203,30 +203,30 @@ def _check_words(told: FailsafeInputs, now: Failsafe, limits: FailsafeTimers) ->
 def search(limits: FailsafeTimers) -> tuple[set[Mode], set[tuple[Mode, Mode]], int]:
     """Modes and edges visited, and how many states there are."""
     every = inputs()
+
+    @cache
+    def steps(state: Failsafe) -> list[tuple[FailsafeInputs, Failsafe, Failsafe]]:
+        """What it is told, what it becomes, and that without what tells nothing apart."""
+        nows = [(told, failsafe.step(state, told, D, limits)) for told in every]
+        return [(told, now, canonical(now)) for told, now in nows]
+
     start = canonical(Failsafe()), Monitor()
     reached, new = {start}, [start]
     modes, edges = {Mode.DISARMED}, set[tuple[Mode, Mode]]()
     while new:
         waiting, new = new, []
         for state, seen in waiting:
-            for told, now, later in steps(state, seen, every, limits):
+            for told, now, same in steps(state):
+                later = after(seen, told, state, now, good=now.good_ms > 0)
                 check(state, told, now, seen, later, limits)
                 modes.add(now.mode)
                 if now.mode != state.mode:
                     edges.add((state.mode, now.mode))
-                found = canonical(now), later
+                found = same, later
                 if found not in reached:
                     reached.add(found)
                     new.append(found)
     return modes, edges, len(reached)
-
-
-def steps(
-    state: Failsafe, seen: Monitor, every: list[FailsafeInputs], limits: FailsafeTimers
-) -> Iterator[tuple[FailsafeInputs, Failsafe, Monitor]]:
-    for told in every:
-        now = failsafe.step(state, told, D, limits)
-        yield told, now, after(seen, told, state, now, good=now.good_ms > 0)
 
 
 @pytest.mark.slow

@@ -131,6 +131,7 @@ def test_a_compliant_push_is_held_without_a_bounce() -> None:
     assert gaps(np.repeat(pressing, 5), trace.pushes) == 0
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_pressing_with_3_n_keeps_contact_and_the_plug_goes_in_and_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -170,6 +170,7 @@ def test_the_command_flies_it_and_says_how_far_it_is(
     assert [cell["ours"] for cell in told["table_3"]["cells"]] == [13.0, 12.0, 13.0, 12.0]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_processes_fly_the_same_as_one() -> None:
     # the quicker person, so practised that the beam is through and held within 5 s

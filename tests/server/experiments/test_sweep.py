@@ -361,6 +361,7 @@ def test_a_cluster_without_dask_or_scheduler_is_refused_in_one_line(tmp_path, ca
     assert "pip install 'lightleash[dask]'" in capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_two_workers_of_a_dask_cluster_give_the_same_figures_to_the_last_bit(tmp_path):
     from distributed import LocalCluster  # takes a while to import

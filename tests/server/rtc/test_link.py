@@ -19,7 +19,7 @@ from server.rtc.receiving.metadata_trailer import split
 from tests.server.house import eventually
 from tests.server.rtc.rtc_house import ATTITUDES, FRAME_S, rtc_house_in
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.page]
 PICTURES = 45
 
 

@@ -18,7 +18,7 @@ from server.virtual_phone.phone_script import DEVICE
 from tests.server.house import eventually
 from tests.server.rtc.rtc_house import FRAME_S, rtc_house_in
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.page]
 
 
 @pytest.fixture(autouse=True)

@@ -53,7 +53,7 @@ def test_an_improvement_is_toml_to_paste(tmp_path, capsys):
     given = np.array(IDENTITY) + moves
     file = robot(tmp_path, given.tolist())
     out = tmp_path / "out"
-    words = ["--improve", "--turns", "20", "--starts", "2", "--reach", "0.08", "--out", str(out)]
+    words = ["--improve", "--turns", "4", "--starts", "1", "--reach", "0.08", "--out", str(out)]
     assert main(["leds", file, *QUICK, *words]) in (0, 1)
     assert "To paste:" in capsys.readouterr().out
     rows = tomllib.loads((out / "leds_improved.toml").read_text())["leds"]

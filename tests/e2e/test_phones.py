@@ -1,20 +1,29 @@
-"""The lead passes between two phones' pages in two browsers that know nothing of each other."""
+"""Phones' pages at one server: refused, not calibrated, and handing the lead to one another."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.e2e.chromium_phone import browser
-from tests.e2e.serving import Serving, serving
+from tests.e2e.chromium_rig import LANDSCAPE
+from tests.e2e.played_phone import CANVAS
+from tests.e2e.serving import DEVICE, Serving, serving
 from tests.e2e.test_serve import until
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.page]
 PERMISSIONS = ["camera", "accelerometer", "gyroscope", "magnetometer"]
 PHONE = {"viewport": {"width": 412, "height": 915}}
 WAIT_MS = 30_000
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    """One that knows no camera."""
+    with serving(tmp_path_factory.mktemp("phones")) as running:
+        yield running
 
 
 def joined(context: BrowserContext, server: Serving, name: str) -> Page:
@@ -38,10 +47,32 @@ def standing_by(pages: dict[str, Page]) -> int:
     return sum(" leads. " in page.locator("#reason").inner_text() for page in pages.values())
 
 
-def test_a_leader_hands_over_and_nobody_arms_before_the_other_has_taken_it(
-    chromium: str, tmp_path: Path
+def test_yesterdays_link_is_refused_in_words(chromium: str, server: Serving) -> None:
+    with browser(chromium, **LANDSCAPE) as context:
+        page = context.new_page()
+        page.goto(f"{server.local_https}/#k=yesterday")
+        if page.locator("#start").is_visible():
+            page.tap("#start")
+        page.wait_for_selector("#problem:visible", timeout=WAIT_MS)
+        assert "expired" in page.locator("#problem").inner_text().lower()
+
+
+def test_a_phone_without_a_calibration_is_told_so_on_its_screen(
+    chromium: str, server: Serving
 ) -> None:
-    with serving(tmp_path) as server, browser(chromium, **PHONE) as first:
+    with browser(chromium, **LANDSCAPE) as context:
+        page = context.new_page()
+        page.add_init_script(CANVAS)
+        page.goto(f"{server.local_https}/{server.link()}")
+        page.tap("#start")
+        expect(page.locator("body")).to_contain_text("not calibrated", timeout=WAIT_MS)
+        expect(page.locator("body")).to_contain_text(DEVICE)
+
+
+def test_a_leader_hands_over_and_nobody_arms_before_the_other_has_taken_it(
+    chromium: str, server: Serving
+) -> None:
+    with browser(chromium, **PHONE) as first:
         assert first.browser is not None
         second = first.browser.new_context(
             ignore_https_errors=True, permissions=PERMISSIONS, **PHONE
