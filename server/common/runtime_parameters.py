@@ -49,14 +49,17 @@ class RuntimeParameters(msgspec.Struct, forbid_unknown_fields=True, frozen=True)
 
     def config(self) -> VirtualCameraConfig:
         """The configuration that stands so."""
-        return turned(VirtualCameraConfig(), TuneInput(**msgspec.structs.asdict(self)))
+        return turned(VirtualCameraConfig(), Tune(**msgspec.structs.asdict(self)))
 
 
 DEFAULT_KNOBS: Final = RuntimeParameters.of(VirtualCameraConfig())
 
 
-class TuneInput(msgspec.Struct, tag="tune", array_like=True, frozen=True):
-    """A supervisor's request, server → control: runtime parameters to set; None: leave it."""
+class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):
+    """Page → server: turn `RuntimeParameters` of the virtual camera; those left out or null stay.
+
+    `status` shows how they stand: that is the answer.
+    """
 
     cutoff_hz: CutoffHz | None = None
     mode: VirtualCameraMode | None = None
@@ -65,7 +68,7 @@ class TuneInput(msgspec.Struct, tag="tune", array_like=True, frozen=True):
     guard: bool | None = None
 
 
-def turned(config: VirtualCameraConfig, wish: TuneInput) -> VirtualCameraConfig:
+def turned(config: VirtualCameraConfig, wish: Tune) -> VirtualCameraConfig:
     """`config` with the parameters of `wish` set, all else as it is."""
     wanted = msgspec.structs.asdict(wish)
     hz = wanted.pop("cutoff_hz")

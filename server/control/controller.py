@@ -15,7 +15,7 @@ from pipeline.prediction import Prediction
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState, VisionMeasurement
 from pipeline.teleop import Inputs, Output, Teleop
-from server.common.runtime_parameters import RuntimeParameters, TuneInput, turned
+from server.common.runtime_parameters import RuntimeParameters, Tune, turned
 from server.control.gap_log import GapLog
 from server.control.ipc import ControlStatus
 from server.control.ipc_estimate import EstimateFields, finite, triple
@@ -157,7 +157,7 @@ class Controller:
                     wishes.add(message.what)
                 case ReadyInput():
                     self._refusals, self._t_ready = tuple(message.refusals), now
-                case TuneInput():
+                case Tune():
                     self._virtual_camera = turned(self._virtual_camera, message)
                     self.teleop.tune(self._virtual_camera)
         known = Requests.__slots__

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 from pipeline.signals import LedRays, PhoneImu, RelativePose, TouchState, VisionMeasurement
-from server.common.runtime_parameters import TuneInput
+from server.common.runtime_parameters import Tune
 
 LARGEST = 1e9
 """No time, sensor or pose has a number or an array of a length beyond it."""
@@ -38,7 +38,7 @@ class ReadyInput(msgspec.Struct, tag="ready", array_like=True, frozen=True):
     refusals: list[str]
 
 
-Input = PhoneImu | VisionMeasurement | TouchState | RequestInput | ReadyInput | TuneInput
+Input = PhoneImu | VisionMeasurement | TouchState | RequestInput | ReadyInput | Tune
 
 
 class _Motion(msgspec.Struct, tag="imu", array_like=True, frozen=True):
@@ -51,6 +51,10 @@ class _Seen(msgspec.Struct, tag="seen", array_like=True, frozen=True):
 
 class _Touch(msgspec.Struct, tag="touch", array_like=True, frozen=True):
     input: TouchState
+
+
+class _Tune(msgspec.Struct, tag="tune", array_like=True, frozen=True):
+    input: Tune
 
 
 def _plain(array: npt.NDArray[Any]) -> tuple[str, tuple[int, ...], bytes]:
@@ -70,10 +74,10 @@ def _array(_: type, plain: tuple[str, Sequence[int], bytes]) -> npt.NDArray[Any]
         raise ValueError(str(error)) from error
 
 
-_TAGGED = {PhoneImu: _Motion, VisionMeasurement: _Seen, TouchState: _Touch}
+_TAGGED = {PhoneImu: _Motion, VisionMeasurement: _Seen, TouchState: _Touch, Tune: _Tune}
 _encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
 _decoder = msgspec.msgpack.Decoder(
-    _Motion | _Seen | _Touch | RequestInput | ReadyInput | TuneInput, dec_hook=_array
+    _Motion | _Seen | _Touch | RequestInput | ReadyInput | _Tune, dec_hook=_array
 )
 
 

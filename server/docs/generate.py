@@ -42,7 +42,7 @@ TYPES = {"B": "u8", "H": "u16", "h": "i16", "I": "u32", "q": "i64", "Q": "u64", 
 STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Hello,
     messages.Command,
-    messages.Tune,
+    runtime_parameters.Tune,
     PathChoice,
     calibration_messages.Calibrate,
     messages.Log,

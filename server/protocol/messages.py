@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from pipeline.config import EstimatorName, VirtualCameraMode
-from server.common.runtime_parameters import AdaptiveBeta, CutoffHz, RuntimeParameters, SpeedLimit
+from pipeline.config import EstimatorName
+from server.common.runtime_parameters import RuntimeParameters, Tune
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.camera_messages import CameraHealth
 from server.protocol.people_messages import Deed, Person
@@ -55,19 +55,6 @@ class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=
     server_ms: ServerMs | None = None
     """The server's clock when this was sent, as far as the page knows: `time_ms` of the `status`
     that was least late and what has passed since that came; None: it has heard none."""
-
-
-class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):
-    """Page → server: turn `RuntimeParameters` of the virtual camera; those left out or null stay.
-
-    `status` shows how they stand: that is the answer.
-    """
-
-    cutoff_hz: CutoffHz | None = None
-    mode: VirtualCameraMode | None = None
-    adaptive_beta: AdaptiveBeta | None = None
-    max_speed_m_s: SpeedLimit | None = None
-    guard: bool | None = None
 
 
 class Log(msgspec.Struct, tag="log", forbid_unknown_fields=True, frozen=True):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from server.common.runtime_parameters import Tune
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.command_age import refuse_old
-from server.protocol.messages import Command, FromPage, Hello, Log, Tune, decode_message
+from server.protocol.messages import Command, FromPage, Hello, Log, decode_message
 from server.protocol.screen_messages import ClockAsk, ScreenSize
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import VERSION, WireError, check_frame, decode, size_of

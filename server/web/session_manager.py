@@ -16,7 +16,7 @@ from hardware.codec import Decoder
 from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.common.clock import now
-from server.common.runtime_parameters import TuneInput
+from server.common.runtime_parameters import Tune
 from server.control.ipc import ControlStatus, server_end
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.diagnostics.blame import Blame
@@ -32,7 +32,7 @@ from server.phone.screen_door import ScreenDoor
 from server.phone.transports import FastTransport, Transports
 from server.phone.vision_thread import Picture, jpeg
 from server.protocol.calibration_messages import Calibrate
-from server.protocol.messages import Command, Hello, Status, ToPage, Tune, encode_message
+from server.protocol.messages import Command, Hello, Status, ToPage, encode_message
 from server.protocol.people_messages import Deed
 from server.protocol.wire import encode
 from server.protocol.wire_records import Record, Thumbnail
@@ -144,7 +144,7 @@ class SessionManager:
         if not knobs:
             return
         told = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
-        if self._control.send(TuneInput(**knobs)):
+        if self._control.send(wish):
             self.log_event(f"supervisor: {told}", of="virtual camera")
         else:
             self.log_event(f"{told} did not reach the control process: try again.")

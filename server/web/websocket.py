@@ -12,6 +12,7 @@ from msgspec import structs
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from server.common.clock import now
+from server.common.runtime_parameters import Tune
 from server.common.settings import VideoSettings
 from server.phone.phone_session import PhoneSession
 from server.protocol.calibration_messages import Calibrate
@@ -21,7 +22,6 @@ from server.protocol.messages import (
     Hello,
     Log,
     Refused,
-    Tune,
     Welcome,
     encode_message,
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.signals import PhoneImu, RelativePose, StampOffset, TouchState, VisionMeasurement
 from pipeline.vision.rays import NO_RAYS
-from server.common.runtime_parameters import TuneInput
+from server.common.runtime_parameters import Tune
 from server.control.ipc import MAX_DATAGRAM, ControlStatus, control_end, expected_of, server_end
 from server.control.ipc_inputs import LARGEST, ReadyInput, RequestInput, encode
 from tests.fuzz.target import target
@@ -29,7 +29,7 @@ def input_seeds():
         TouchState(1.0, True, 5),
         RequestInput("arm"),
         ReadyInput(["No phone."]),
-        TuneInput(cutoff_hz=0.5, mode="full"),
+        Tune(cutoff_hz=0.5, mode="full"),
         VisionMeasurement(1.0, rays, pose, (0.5, 0.4), StampOffset(0.01, 0.001)),
         VisionMeasurement(1.0, NO_RAYS, None, (0.5, 0.4)),
     )

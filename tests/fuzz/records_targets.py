@@ -5,6 +5,7 @@ from pathlib import Path
 
 import msgspec
 
+from server.common.runtime_parameters import Tune
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol import messages, wire
 from server.protocol.calibration_messages import Calibrate, Calibration
@@ -134,7 +135,7 @@ def message_seeds():
     said = (
         messages.Hello(2, "operator", "a phone", "s", "devicemotion", "H.264"),
         messages.Command("arm"),
-        messages.Tune(cutoff_hz=0.5, guard=True),
+        Tune(cutoff_hz=0.5, guard=True),
         messages.Log("a fault"),
         PathChoice("auto", "operator"),
         Calibrate("start"),

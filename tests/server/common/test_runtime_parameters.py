@@ -17,7 +17,7 @@ from server.common.runtime_parameters import (
     FASTEST_HZ,
     SLOWEST_HZ,
     RuntimeParameters,
-    TuneInput,
+    Tune,
     turned,
 )
 from server.control.process import parse
@@ -52,9 +52,9 @@ def test_the_defaults_are_the_pipelines():
 @given(one=knobs, other=knobs)
 def test_a_wish_turns_what_it_names_and_nothing_else(one, other):
     before, wanted = one.config(), msgspec.structs.asdict(other)
-    assert turned(before, TuneInput()) == before
+    assert turned(before, Tune()) == before
     for name, value in wanted.items():
-        after = turned(before, TuneInput(**{name: value}))
+        after = turned(before, Tune(**{name: value}))
         if name == "cutoff_hz":
             assert RuntimeParameters.of(after).cutoff_hz == pytest.approx(value, abs=6e-5)
             assert replace(after, tau_1=before.tau_1, tau_2=before.tau_2) == before
@@ -75,9 +75,9 @@ def test_a_configuration_without_bounds_stands_at_the_end_of_its_range(mode):
     [("cutoff_hz", nan), ("cutoff_hz", inf), ("max_speed_m_s", -0.1), ("adaptive_beta", 11.0)],
 )
 def test_a_datagram_out_of_range_is_none(knob, value):
-    data = msgspec.msgpack.encode(TuneInput(**{knob: value}))
+    data = msgspec.msgpack.encode(Tune(**{knob: value}))
     with pytest.raises(msgspec.ValidationError):
-        msgspec.msgpack.decode(data, type=TuneInput)
+        msgspec.msgpack.decode(data, type=Tune)
 
 
 @pytest.mark.parametrize("text", ["{", "{}", '{"cutoff_hz": 99}', "0.28"])

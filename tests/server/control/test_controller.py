@@ -16,7 +16,7 @@ from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraMode
 from pipeline.frames import GRAVITY
 from pipeline.signals import BodyImu, Mode, PhoneImu, TouchState, VisionMeasurement
 from pipeline.teleop import Output
-from server.common.runtime_parameters import TuneInput
+from server.common.runtime_parameters import Tune
 from server.control.controller import (
     STOOD_STILL_S,
     Controller,
@@ -226,7 +226,7 @@ def turned_by(mode: VirtualCameraMode) -> float:
         ]
 
     rig.said = turning
-    rig.run(0.1, [TuneInput(mode=mode, cutoff_hz=0.1)])
+    rig.run(0.1, [Tune(mode=mode, cutoff_hz=0.1)])
     outputs = [output for _, output in rig.run(0.2)]
     knobs = rig.status(outputs[-1]).knobs
     assert (knobs.mode, knobs.cutoff_hz) == (mode, pytest.approx(0.1, rel=0.01))

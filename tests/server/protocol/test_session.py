@@ -12,8 +12,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from server.common.runtime_parameters import Tune
 from server.protocol import wire, wire_records
-from server.protocol.messages import Command, Hello, Log, Tune, encode_message
+from server.protocol.messages import Command, Hello, Log, encode_message
 from server.protocol.screen_messages import ClockAsk, ScreenSize
 from server.protocol.session import (
     BYTES_HZ,

@@ -9,10 +9,10 @@ import pytest
 
 from pipeline.prediction import Prediction
 from server.common.clock import now
-from server.common.runtime_parameters import TuneInput
+from server.common.runtime_parameters import Tune
 from server.control.ipc_inputs import ReadyInput, RequestInput
 from server.diagnostics.events import EVENTS
-from server.protocol.messages import Command, Hello, Tune, encode_message
+from server.protocol.messages import Command, Hello, encode_message
 from server.protocol.wire import VERSION, decode, encode
 from server.protocol.wire_records import Codec, Ping, Record
 from server.security.pairings import of_this_machine
@@ -191,7 +191,7 @@ def test_wishes_reach_control_except_those_for_phones(house):
 
 def test_a_turned_knob_reaches_control_and_is_an_event(house):
     in_loop(lambda: house.manager.tune(Tune(cutoff_hz=0.5, guard=False)))
-    assert house.control.inputs() == [TuneInput(cutoff_hz=0.5, guard=False)]
+    assert house.control.inputs() == [Tune(cutoff_hz=0.5, guard=False)]
     assert house.manager.events[0] == "supervisor: virtual camera: cutoff_hz 0.5, guard False"
 
 
