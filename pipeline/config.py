@@ -187,8 +187,9 @@ class StationConfig:
 
     bias_s: float = 5.0
     """High pass of the acceleration: bias and tilt error go [s]."""
-    rest_s: float = 2.0
-    """... and of the velocity: hands come to rest [s]."""
+    rest_s: float = 1.5
+    """... and of the velocity: hands come to rest [s]. Longer, sensors drift farther; shorter, slow
+    hands (0.15 Hz) count as resting."""
 
 
 @dataclass(frozen=True, slots=True)

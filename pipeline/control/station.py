@@ -28,7 +28,7 @@ class StationKeeping:
         """At rest."""
         self._config, self._axes = config, robot.axes[:3]
         self._Kp, self._Kd = self._axes * gains.Kp[:3], self._axes * gains.Kd[:3]
-        self._a_slow_in_f = np.zeros(3)
+        self._a_slow_in_f, self._felt_s = np.zeros(3), 0.0
         self.v_in_f: Array = np.zeros(3)
         """Velocity of the body [m/s]."""
         self._offset_in_f, self._constant_force_in_f = np.zeros(3), np.zeros(3)
@@ -36,9 +36,10 @@ class StationKeeping:
     def propagate(self, f_bf_in_b: Array, R_fb: Array, h: float) -> None:
         """Carry velocity and place on by `h` [s] of specific force (3,) [m/s²]."""
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
-        self._a_slow_in_f = self._a_slow_in_f + (1.0 - exponential(-h / self._config.bias_s)) * (
-            a_in_f - self._a_slow_in_f
-        )
+        # a mean at first: an offset must not count as speed until the high pass has forgotten it
+        self._felt_s += h
+        share = max(1.0 - exponential(-h / self._config.bias_s), h / self._felt_s)
+        self._a_slow_in_f = self._a_slow_in_f + share * (a_in_f - self._a_slow_in_f)
         v_in_f = self.v_in_f + h * (a_in_f - self._a_slow_in_f)
         self.v_in_f = v_in_f * exponential(-h / self._config.rest_s)
         self._offset_in_f = self._offset_in_f - h * self.v_in_f

@@ -24,6 +24,9 @@ HELD_S: Final = 3.2
 BLIND_S: Final = 4.4
 """Without pictures until RAMP."""
 AFTER_S: Final = 1.2
+BACK_S: Final = 0.27
+"""From the end of a gap until it follows: a picture's period (33 ms) and way (up to 120 ms), all
+good for 0.1 s, two ticks. Without a picture taken since nobody knows where the robot is."""
 FOR_EVER: Final = h.FOR_EVER_S
 Times = Mapping[Event, float]
 
@@ -79,8 +82,8 @@ LET_GO: Final[Times] = {"HOLD": 0.06, "RAMP": HELD_S, "zero": HELD_S + RAMPED_S}
 PHONE: Final = (
     gone("phone vanishes", "16", h.dark(FOR_EVER)),
     borne("phone is gone for 0.1 s", "18", h.dark(0.1)),
-    borne("phone is gone for 0.4 s", "18", h.dark(0.4), {"COAST": COAST_S, "TRACK": 0.65}),
-    borne("phone is gone for 0.8 s", "18", h.dark(0.8), {"COAST": COAST_S, "TRACK": 1.05}),
+    borne("phone is gone for 0.4 s", "18", h.dark(0.4), {"COAST": COAST_S, "TRACK": 0.4 + BACK_S}),
+    borne("phone is gone for 0.8 s", "18", h.dark(0.8), {"COAST": COAST_S, "TRACK": 0.8 + BACK_S}),
     gone("phone is gone for 3 s", "18", h.dark(3.0)),
     gone("page frozen for 3 s, then all at once", "17", h.selective(h.FROM_PHONE, 3.0, holds=True)),
     gone("page hears nothing", "18", h.selective(("ping",), FOR_EVER)),

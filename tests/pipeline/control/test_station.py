@@ -44,6 +44,15 @@ def test_a_moving_robot_is_braked_within_centimetres_and_stays() -> None:
     assert np.linalg.norm(v) < 0.05
 
 
+def test_a_sensor_offset_is_no_speed_however_short_it_has_been_felt() -> None:
+    f_bf_in_b = UP + np.array([0.0, 0.2, -0.1])
+    for seconds in (0.1, 1.0, 3.0, 10.0):
+        keeps = station()
+        for _ in range(round(seconds / H)):
+            keeps.propagate(f_bf_in_b, np.eye(3), H)
+        assert np.linalg.norm(keeps.v_in_f) < 0.002
+
+
 def test_at_rest_it_asks_for_nothing_but_what_it_takes_to_stay_in_any_attitude() -> None:
     keeps, force_in_f = station(), np.array([1.0, -2.0, 3.0])
     for R_fb in (np.eye(3), exp(np.array([0.1, -0.2, 0.3]))):
