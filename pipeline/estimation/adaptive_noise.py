@@ -22,8 +22,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.frames import Array, log
-from pipeline.signals import RelativePose
+from pipeline.frames import Array
 
 GAIN: Final = 0.1
 """Of the factor's logarithm, for each picture whose misfit is one above the tolerated."""
@@ -50,13 +49,12 @@ class AdaptiveNoise:
         """Factor of the variances, 1 to `MOST`."""
         return math.exp(self._log)
 
-    def judge(self, p_bc_in_c: Array, R_cb: Array, P: Array, pose: RelativePose) -> float:
-        """Learn from a picture's own `pose` and the one predicted for it, P (6, 6) in (δp, θ).
+    def judge(self, e: Array, P: Array, C: Array) -> float:
+        """Learn from how far (6,) a picture's own pose C (6, 6) is off the one predicted for it, P.
 
         Gives the factor, 1 as a rule, by which P must be stretched for this picture.
         """
-        e = np.concatenate((pose.p_bc_in_c - p_bc_in_c, log(R_cb.T @ pose.R_cb)))
-        S = P + pose.covariance
+        S = P + C
         misfit = _misfit(e, S)
         share = float(np.trace(np.linalg.solve(S, P))) / 6.0
         step = GAIN * share * (min(misfit, SURPRISE) - TOLERATED)
@@ -65,7 +63,7 @@ class AdaptiveNoise:
             return 1.0
         inflation = 2.0
         while inflation * self.factor <= MOST:
-            if _misfit(e, inflation * P + pose.covariance) <= 1.0:
+            if _misfit(e, inflation * P + C) <= 1.0:
                 return inflation
             inflation *= 2.0
         return 1.0

@@ -45,6 +45,8 @@ class Checkpoint(Generic[Measurement]):
     """Which parts of it were: −1 is yet to be decided, 0 left out, 1 fused."""
     inflation: float = 1.0
     """Factor of the variances of place, velocity and attitude that were predicted for it."""
+    opened: Array | None = None
+    """(m,) variances by which the error state is known worse than was predicted for it."""
 
     @classmethod
     def empty(cls, states: int, errors: int) -> Checkpoint[Measurement]:
@@ -161,7 +163,21 @@ class OutOfSequence(ABC, Generic[Measurement]):
         if here.inflation != 1.0:
             here.P[: self._moving] *= sqrt(here.inflation)
             here.P[:, : self._moving] *= sqrt(here.inflation)
+        if here.opened is not None:
+            np.fill_diagonal(here.P, here.P.diagonal() + here.opened)
         return self._fuse(here, seen, use)
+
+    def open(self, variances: Array) -> None:
+        """Let the error state have moved by `variances` (m,) meanwhile, bit by bit since the base.
+
+        What was fused since then is fused anew.
+        """
+        since = self.checkpoints[1:]
+        for here in since:
+            more = variances / len(since)
+            here.opened = more if here.opened is None else here.opened + more
+        self._spoilt_from = min(self._spoilt_from, self.base.t)
+        self._repair()
 
     def _repair(self) -> None:
         """Make anew what was spoilt; the base can't be."""

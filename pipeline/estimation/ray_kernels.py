@@ -174,3 +174,45 @@ def is_sound(x: Array, R: Array, P: Array) -> bool:
         if not 0.0 <= P[i, i] < 1e9:
             return False
     return bool(abs(R[0, 0]) <= 1.001)
+
+
+@kernel
+def misfit(
+    x: Array,
+    R: Array,
+    felt: Array,
+    leds_in_b: Array,
+    ahead: Array,
+    tangents: Array,
+    covariances: Array,
+    use: Flags,
+) -> float:
+    """χ² of the rays in `use` about the pose that fits them best: 2 n − 6 degrees of freedom.
+
+    Neither motion nor what was foretold enters: it tells of the spots alone.
+    """
+    H, expected, miss = np.empty((2, 7)), np.empty(2), np.empty(2)
+    A = np.zeros((7, 7))  # of the normal equations, last row and column the misses
+    for i in range(len(use)):
+        if use[i] != 1 or not _expect(x, R, felt, leds_in_b[i], ahead[i], expected, H):
+            continue
+        miss[:] = tangents[i] - expected
+        a = sqrt(covariances[i, 0, 0])
+        b = covariances[i, 1, 0] / a
+        c = sqrt(covariances[i, 1, 1] - b * b)
+        H[0, 6], H[1, 6] = miss[0], miss[1]
+        H[0] /= a
+        H[1] = (H[1] - b * H[0]) / c
+        for j in range(7):
+            for k in range(j + 1):
+                A[j, k] += H[0, j] * H[0, k] + H[1, j] * H[1, k]
+    for j in range(6):  # Cholesky's way: what the pose explains leaves the last pivot
+        if not A[j, j] > 0.0:
+            return np.nan
+        root = sqrt(A[j, j])
+        for i in range(j, 7):
+            A[i, j] /= root
+        for k in range(j + 1, 7):
+            for i in range(k, 7):
+                A[i, k] -= A[i, j] * A[k, j]
+    return float(A[6, 6])

@@ -13,9 +13,11 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
+from pipeline.estimation.bias_steps import BiasSteps
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
+from pipeline.estimation.relative_noise import initial_biases
 from pipeline.estimation.relative_start import (
     Learnt,
     can_start,
@@ -24,10 +26,11 @@ from pipeline.estimation.relative_start import (
 )
 from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_felt
+from pipeline.estimation.spot_noise import SpotNoise
 from pipeline.estimator_config import RelativeConfig
-from pipeline.frames import Array
+from pipeline.frames import Array, log
 from pipeline.imu_stream import ImuStream
-from pipeline.signals import BodyImu, PhoneImu, RelativeState, VisionMeasurement
+from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
 from pipeline.timing.offset_watch import OffsetMonitor
 
@@ -48,6 +51,7 @@ class RelativeFilter:
         """Knows nothing until the first picture with a pose and samples of both IMUs near it."""
         self._config, self._leds = config, len(leds_in_b)
         self._track = RelativeTrack(config, leds_in_b)
+        self._initial = initial_biases(config)
         self.pictures: Counter[Fusion] = Counter()
         """What became of them."""
         self.leds_rejected = 0
@@ -68,7 +72,8 @@ class RelativeFilter:
         self._misses, self._t_seen, self._t_start = 0, -np.inf, -np.inf
         self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
         self._offset = OffsetMonitor()
-        self._adaptive_noise = AdaptiveNoise()
+        self._adaptive_noise, self._spot_noise = AdaptiveNoise(), SpotNoise()
+        self._bias_steps = BiasSteps(self._initial)
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
@@ -113,6 +118,7 @@ class RelativeFilter:
         self._keep_up(now)
         if seen.offset is not None:
             self._offset.coarse = seen.offset
+        seen = self._spot_noise.doubted(seen)
         if not self._started:
             return self._start(seen, now)
         t = seen.t + float(self._track.newest.x[X_OFFSET])
@@ -132,9 +138,17 @@ class RelativeFilter:
         dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
             return 1.0
-        P = self._track.in_picture(predicted)
-        inflation = self._adaptive_noise.judge(predicted.x[0:3], predicted.R, P, seen.pose)
-        self._track.doubt_phone(self._adaptive_noise.factor)
+        track, C = self._track, seen.pose.covariance
+        e, P = _missed(seen.pose, predicted), track.in_picture(predicted)
+        moved = self._bias_steps.learn(predicted.t, e, P + C, predicted.P)
+        track.walk(self._bias_steps.walks)
+        if moved.any():
+            track.moved(moved)
+            predicted.copy(track.predicted(predicted.t))
+            e, P = _missed(seen.pose, predicted), track.in_picture(predicted)
+            self._adaptive_noise = AdaptiveNoise()  # another sensor was at fault
+        inflation = self._adaptive_noise.judge(e, P, C)
+        track.doubt_phone(self._adaptive_noise.factor)
         return inflation
 
     def _fuse(
@@ -151,6 +165,7 @@ class RelativeFilter:
             return self._start(seen, now)
         if used:
             self._nis.append((chi2, 2 * used))
+            self._spot_noise.learn(*self._track.misfit(here))
         if 2 * used > len(seen.rays):
             self._misses = 0
         else:
@@ -281,3 +296,9 @@ class RelativeFilter:
             bias_omega_c=biases[2],
             bias_a_c=biases[3],
         )
+
+
+def _missed(pose: RelativePose, predicted: Checkpoint[VisionMeasurement]) -> Array:
+    """(6,) by how much a picture's own pose is off what was predicted: δp in c, θ in b."""
+    turn = log(predicted.R.T @ pose.R_cb)
+    return np.concatenate((pose.p_bc_in_c - predicted.x[0:3], turn))

@@ -21,3 +21,8 @@ def walks_of(c: RelativeConfig) -> Array:
     walks = (c.walk_omega_b, c.walk_f_b, c.walk_omega_c, c.walk_f_c)
     densities: Array = np.square(np.append(np.repeat(walks, 3), c.walk_offset))
     return densities
+
+
+def initial_biases(c: RelativeConfig) -> Array:
+    """Standard deviations (4,) of the biases at a start, in the order of the inputs."""
+    return np.array((c.initial_omega_b, c.initial_f_b, c.initial_omega_c, c.initial_f_c))

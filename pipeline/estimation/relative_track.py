@@ -11,10 +11,12 @@ from pipeline.estimation.full_scale import LOUD, FullScale
 from pipeline.estimation.hand_motion_kernels import WINDOW
 from pipeline.estimation.hand_predictor import HandPredictor
 from pipeline.estimation.out_of_sequence import Checkpoint, OutOfSequence
-from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound
+from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound, misfit
 from pipeline.estimation.relative_kernels import (
+    BIASES,
     INPUTS,
     MOVING,
+    OFFSET,
     X_OFFSET,
     N,
     X,
@@ -23,6 +25,7 @@ from pipeline.estimation.relative_kernels import (
     transit,
 )
 from pipeline.estimation.relative_noise import noise_of, walks_of
+from pipeline.estimation.sample_noise import SampleNoise
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, cross
 from pipeline.imu_stream import ImuStream
@@ -41,13 +44,14 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         """Take the noise as configured; LEDs (n, 3) [m]."""
         super().__init__(X, N, MOVING, BENT, KEPT)
         self._leds_in_b = np.ascontiguousarray(leds_in_b)
-        self._config, self._walks = config, walks_of(config)
-        self._hand, self._phone_factor = HandPredictor(config.hand), 0.0
+        self._walks, self._calm = walks_of(config), walks_of(config)
+        self._hand, self._phone_factor = HandPredictor(config.hand), 1.0
         self._scales = [[FullScale(loud) for loud in LOUD] for _ in range(2)]
         self.clipped = 0
         """Samples of which a sensor said as much as it can."""
         self._noise = noise_of(config)
-        self.doubt_phone(1.0)
+        self._configured = self._noise[:, :3].copy()
+        self._heard = [SampleNoise(sigmas) for sigmas in self._configured[:, 0]]
         self._gate, self._still = config.gate_chi2, config.offset_still
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
         self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
@@ -66,15 +70,49 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
             if scale.hear(sample):
                 self.clipped += 1
             self._noise[device, 3, sensor] = scale.limit
+        self._heard[device].add(t, rate, force)
+        self._believe(device)
         return True
 
     def doubt_phone(self, factor: float) -> None:
         """From now on the variances of the phone's samples are so many times the configured."""
-        if factor == self._phone_factor:
-            return
-        self._phone_factor = factor
-        self._noise[:, :3] = noise_of(self._config)[:, :3]
-        self._noise[1, :3] *= sqrt(factor)
+        if factor != self._phone_factor:
+            self._phone_factor = factor
+            self._believe(1)
+
+    def _believe(self, device: int) -> None:
+        """Let its samples be as uncertain as configured, as they scatter, or as pictures say."""
+        noise = self._noise[device]
+        noise[:3] = self._configured[device]
+        white, rough = self._heard[device].levels.T
+        noise[0] = np.maximum(noise[0], white)
+        if device:  # a robot's samples are near enough for all that it does
+            noise[1, 1] = max(noise[1, 1], rough[1])
+            noise[:3] *= sqrt(self._phone_factor)
+
+    def moved(self, by: Array) -> None:
+        """The sensors' biases are off by so much (4,) about each axis."""
+        variances = np.zeros(N)
+        variances[BIASES:OFFSET] = np.repeat(by * by, 3)
+        self.open(variances)
+
+    def walk(self, densities: Array) -> None:
+        """Biases walk by `densities` (4,) [unit²/s] more than configured, by sensor."""
+        self._walks[:INPUTS] = self._calm[:INPUTS] + np.repeat(densities, 3)
+
+    def misfit(self, here: Checkpoint[VisionMeasurement]) -> tuple[float, int]:
+        """χ² of the LEDs fused there about the pose that fits them best; its degrees of freedom."""
+        seen, use = here.seen, here.use
+        if seen is None or use is None:
+            return 0.0, 0
+        rays, freedoms = seen.rays, 2 * int((use == 1).sum()) - 6
+        if freedoms <= 0:
+            return 0.0, 0
+        ahead = rays.t + (here.x[X_OFFSET] - here.t)
+        leds, felt = self._leds_in_b[rays.led], self._inputs(here)
+        tangents = np.array(rays.tangents, dtype=np.float64, order="C")
+        C = np.array(rays.covariances, dtype=np.float64, order="C")
+        return float(misfit(here.x, here.R, felt, leds, ahead, tangents, C, use)), freedoms
 
     def in_picture(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """P (6, 6) of the pose in a picture stamped for the time of `here`: that is doubted too.

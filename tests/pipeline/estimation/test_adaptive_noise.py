@@ -7,22 +7,17 @@ from hardware.sim.world.sensors import feed
 from hardware.sim.world.world import World, WorldOptions
 from pipeline.estimation.adaptive_noise import FAR, MOST, AdaptiveNoise
 from pipeline.estimation.estimator import Fusion
-from pipeline.frames import exp
-from pipeline.signals import RelativePose
 from tests.pipeline.flight import new
 
 P = 1e-8 * np.eye(6)
 """Of what was foretold: 0.1 mm, 0.1 mrad."""
 C = 0.25 * P
 SIGMA = np.sqrt(1.25e-8)
-FORETOLD_AT, FORETOLD_R = np.array([2.5, 0.1, -0.2]), exp(np.array([0.2, -0.1, 0.3]))
 
 
 def judged(doubt: AdaptiveNoise, error: np.ndarray, predicted: np.ndarray = P) -> float:
     """The stretch for a picture that is (δp, θ) off."""
-    R = FORETOLD_R @ exp(error[3:])
-    pose = RelativePose(0.0, FORETOLD_AT + error[:3], R, C, 0.02, 5)
-    return doubt.judge(FORETOLD_AT, FORETOLD_R, predicted, pose)
+    return doubt.judge(error, predicted, C)
 
 
 def scattered(doubt: AdaptiveNoise, times: float, count: int, seed: int = 0) -> np.ndarray:

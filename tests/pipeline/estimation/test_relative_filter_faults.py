@@ -192,7 +192,7 @@ def test_lies_of_every_kind_leave_it_finite(world, arriving, seed):
         assert not np.isnan(flight.filter.covariance).any()
         last = flight.filter.last_fused()
         assert last is None or all(np.isfinite(part).all() for part in last)
-    assert flight.error(flight.to(3.95)) < 0.03
+    assert flight.error(flight.to(3.95)) < 0.04  # doubt fades in seconds
 
 
 def test_warming_up_compiles_all_there_is(world, arriving):

@@ -11,12 +11,19 @@ from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.ray_kernels import fuse_rays
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, N, X
 from pipeline.estimation.relative_track import KEPT, RelativeTrack
+from pipeline.estimation.sample_noise import SampleNoise
 from pipeline.estimator_config import RelativeConfig
 from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 
 OPEN = replace(RelativeConfig(), gate_chi2=np.inf)
 """What is thought of an LED depends on what else has arrived: the gate is open."""
 START_S, END_S = 0.1, 0.9
+
+
+@pytest.fixture(autouse=True)
+def as_configured(monkeypatch):
+    """How far sensors scatter is learnt as their samples come, so by their order: not here."""
+    monkeypatch.setattr(SampleNoise, "add", lambda *_: None)
 
 
 @pytest.fixture(scope="module")
