@@ -1,9 +1,9 @@
-"""Compiled soft-window centroid: where a spot is to a hundredth of a pixel, with its covariance.
+"""Compiled: where a spot of light is to a hundredth of a pixel, and how sure that is.
 
-A centroid in about linear light over a soft elliptical window that follows the spot (by Newton's
-method): no pixel counts wholly or not at all, and what is as bright on both sides cancels, whether
-it is clipped, bloomed or blurred by motion. The covariance follows from each pixel's variance. An
-iteratively weighted centroid, as in Baker & Moallem, Optics Express 15 (2007) 5147.
+A centroid in about linear light of what rises above a share of the spot's contrast: behind an LED
+there is an arm on one side and a room on the other, but the brighter part hardly knows. The less
+even the ground, the higher the share; no pixel comes or goes all at once. The scatter follows from
+that of each pixel and from the ground's relief.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.frames import Array
 from pipeline.signals import Image
 from pipeline.so3_kernels import kernel
+from pipeline.spots.ground_kernels import Box, border, noise_of, put_ring, relief_of
 
-Box = npt.NDArray[np.int64]
 U, V, BRIGHTNESS, AREA, CONTRAST, UU, UV, VV, NOISE = range(9)
 C_UU, C_UV, C_VV, S_UU, S_UV, S_VV = range(9, 15)
 FIELDS = 15
@@ -26,163 +25,112 @@ in grey levels, the covariance of the place as far as it is this spot's own, and
 during the exposure adds, which all spots share."""
 RING = 3
 """Pixels between a spot's members and the ring that tells its ground."""
-EXTENT = 3.7
-"""The window has half its weight at this many second moments' ellipse, or about 1.15 times the
-radius of a disc."""
-LAG, MOST_BEND = 2, 150.0
-"""Pixels between those that are compared, and grey levels beyond which it is no noise."""
-FEWEST_NOISE = 0.29
-"""Of rounding to grey levels."""
-MODEL_PX = 0.002
-CLIPPED_PX = 0.004
-"""Of one clipped pixel: steep edges are seen by few pixels; grows with the fourth root of their
-count."""
-SLOPE_SHARE = 0.3
-"""Of what the ground's slope was worth, for it is no plane."""
+GROWN = 2
+"""Pixels beyond its members that may rise above the share, too."""
+MOST_ABOVE, BY_RELIEF = 0.35, 9.0
+"""Share of a spot's contrast in light above which a pixel has weight, by as much as it is above: at
+most, and how many times the ground's RMS."""
+SIZE_SHARE = 0.13
+"""Share of a spot's contrast in light above which a pixel is one of its area: 0.4 of it in grey."""
+MOST_OFF = 0.4
+"""Share of the contrast by which a ring's pixel counts at most: beyond, it is another light."""
+LEAST_SURE_PX = 1.5
+"""Of a place, its standard deviation: the top of a wide glow is no spot."""
+DARKEST = 3
+"""Grey levels above black: below, a gamma curve's slope says too little of noise."""
+MODEL_PX, EDGE_PX = 0.006, 0.0025
+"""What tone curve, lens and rounding leave; and what they do to an edge, over the share of light
+that it leaves to the pixel beside, which alone tells where in a pixel an edge is. That is less by
+the fourth root of the area: by the root of the edge's length."""
+STEEPEST = 0.97
+"""Share of the light that one step takes: more cannot be told from rounding."""
+RELIEF_SHARE = 0.4
+"""Of what a ground as uneven as the ring displaces at most: its parts lie on many sides."""
 DIM, MOST_DIM = 80.0, 4.0
 """Grey levels; with less contrast a codec's steps matter more."""
 ROUND_PX, OWN_SMEAR, SHARED_SMEAR = 1.0, 0.001, 0.005
 """A streak longer than a round spot seems moved while exposed, and not evenly: unsure along it, by
 these shares of its length."""
-ITERATIONS = 6
-CONVERGED_PX = 1e-4
-FARTHEST_PX = 2.0
-"""From where the window started: farther, it has followed another light."""
+
+WEIGHT, SU, SV, SUU, SUV, SVV, N_UU, N_UV, N_VV, D_U, D_V, STEP, COUNT = range(13)
+"""Sums over a spot's pixels: weight, weight × place, weight × place²; (slope × place)² and |place|
+of what is not clipped; the largest step of weight between neighbours, and how many they are."""
+SUMS = 13  # numbers of those
 
 
 @kernel
-def middle_of(values: Array, n: int) -> float:
-    """Median of values[:n], which are put in order."""
-    for i in range(1, n):
-        x, j = values[i], i - 1
-        while j >= 0 and values[j] > x:
-            values[j + 1] = values[j]
-            j -= 1
-        values[j + 1] = x
-    return 0.5 * float(values[(n - 1) // 2] + values[n // 2])
+def is_near(seen: Image, mark: int, row: int, column: int, extent: Box) -> bool:
+    """Whether it is a spot's member, or one is within reach."""
+    inside = extent[0] <= column <= extent[2] and extent[1] <= row <= extent[3]
+    if inside and seen[row, column] == mark:
+        return True
+    for r in range(max(extent[1], row - GROWN), min(extent[3], row + GROWN) + 1):
+        for c in range(max(extent[0], column - GROWN), min(extent[2], column + GROWN) + 1):
+            if seen[r, c] == mark:
+                return True
+    return False
 
 
 @kernel
-def ground_of(
-    luma: Image, light: Array, left: int, top: int, right: int, bottom: int, out: Array, work: Array
-) -> None:
-    """The plane of light beneath a spot, from the sides of a box: level, slopes, noise in grey.
-
-    Each side's median, so that a neighbour that reaches into one corner counts for little; the
-    noise by second differences, so that a halo's slope is none.
-    """
-    sides = np.empty(4)
-    off, count, dark = 0.0, 0, 0.0
-    for side in range(4):
-        n = 0
-        if side < 2:
-            row = top if side == 0 else bottom
-            for u in range(left, right + 1):
-                work[n] = luma[row, u]
-                n += 1
-        else:
-            column = left if side == 2 else right
-            for v in range(top, bottom + 1):
-                work[n] = luma[v, column]
-                n += 1
-        for i in range(LAG, n - LAG):
-            bend = abs(work[i - LAG] - 2.0 * work[i] + work[i + LAG])
-            if bend < MOST_BEND:
-                off += bend * bend / 6.0
-                count += 1
-        grey = middle_of(work, n)
-        dark += 0.25 * grey
-        below = int(grey)
-        sides[side] = light[below] + (grey - below) * (light[min(below + 1, 255)] - light[below])
-    out[0] = 0.25 * (sides[0] + sides[1] + sides[2] + sides[3])
-    out[1] = (sides[3] - sides[2]) / (right - left)
-    out[2] = (sides[1] - sides[0]) / (bottom - top)
-    noise = max(sqrt(off / max(count, 1)), FEWEST_NOISE)
-    out[3] = noise * (1.0 + max(0.0, 1.0 - 0.5 * dark / noise))  # half of it is clipped at black
-
-
-@kernel
-def _pull(
+def _gather(
     luma: Image,
     light: Array,
+    slope_of: Array,
     box: Box,
-    ground: Array,
-    shape: Array,
-    u: float,
-    v: float,
-    out: Array,
+    extent: Box,
+    mark: int,
+    seen: Image,
+    floor: float,
+    least: float,
+    sums: Array,
 ) -> None:
-    """The window about (u, v): out is the pull (2,) and how it falls as (u, v) moves (4,)."""
-    left, top, right, bottom = box[0], box[1], box[2], box[3]
-    mid_u, mid_v = 0.5 * (left + right), 0.5 * (top + bottom)
-    a, b, c = shape[0], shape[1], shape[2]
-    out[:] = 0.0
-    for y in range(top, bottom + 1):
-        dv = y - v
-        level = ground[0] + ground[2] * (y - mid_v)
-        for x in range(left, right + 1):
-            du = x - u
-            q = a * du * du + 2.0 * b * du * dv + c * dv * dv
-            if q >= 2.0:
-                continue
-            q3 = q * q * q / 16.0
-            fall = 1.0 - q3 * q
-            weight = fall * fall  # (1 − (q/2)⁴)²
-            slope = -16.0 * fall * q3  # ∂weight/∂q · 2 … times (a du + b dv)
-            grey = light[luma[y, x]] - level - ground[1] * (x - mid_u)
-            gu, gv = slope * (a * du + b * dv) * grey, slope * (b * du + c * dv) * grey
-            out[0] += weight * grey * du
-            out[1] += weight * grey * dv
-            out[2] += weight * grey + gu * du
-            out[3] += gu * dv
-            out[4] += gv * du
-            out[5] += weight * grey + gv * dv
+    """The sums over a spot's pixels above a floor, counted from `least` light on.
 
-
-@kernel
-def _scatter(
-    luma: Image, slope_of: Array, box: Box, shape: Array, u: float, v: float, out: Array
-) -> None:
-    """Sums over the window, out (6,).
-
-    Of (weight × place × slope of light by grey)²: uu, uv, vv; of weight × place²: uu, vv; and of
-    clipped pixels.
+    Places are from the middle of its extent.
     """
-    a, b, c = shape[0], shape[1], shape[2]
-    out[:] = 0.0
-    for y in range(box[1], box[3] + 1):
-        dv = y - v
-        for x in range(box[0], box[2] + 1):
-            du = x - u
-            q = a * du * du + 2.0 * b * du * dv + c * dv * dv
-            if q >= 2.0:
+    u0, v0 = box[0] + 0.5 * (extent[0] + extent[2]), box[1] + 0.5 * (extent[1] + extent[3])
+    sums[:] = 0.0
+    rows, columns = box[3] - box[1], box[2] - box[0]
+    for r in range(max(extent[1] - GROWN, 0), min(extent[3] + GROWN, rows) + 1):
+        for c in range(max(extent[0] - GROWN, 0), min(extent[2] + GROWN, columns) + 1):
+            grey = luma[box[1] + r, box[0] + c]
+            slope, weight = slope_of[grey], light[grey] - floor
+            if weight <= 0.0 or not is_near(seen, mark, r, c, extent):
                 continue
-            fall = 1.0 - q * q * q * q / 16.0
-            weight, slope = fall * fall, slope_of[luma[y, x]]
-            s = weight * weight * slope * slope
-            out[0] += s * du * du
-            out[1] += s * du * dv
-            out[2] += s * dv * dv
-            out[3] += weight * du * du
-            out[4] += weight * dv * dv
+            du, dv = box[0] + c - u0, box[1] + r - v0
+            sums[WEIGHT] += weight
+            sums[SU] += weight * du
+            sums[SV] += weight * dv
+            sums[SUU] += weight * du * du
+            sums[SUV] += weight * du * dv
+            sums[SVV] += weight * dv * dv
+            if light[grey] > least:
+                sums[COUNT] += 1.0
+            for y, x in ((r - 1, c), (r + 1, c), (r, c - 1), (r, c + 1)):
+                if 0 <= y <= rows and 0 <= x <= columns:
+                    beside = max(light[luma[box[1] + y, box[0] + x]] - floor, 0.0)
+                    sums[STEP] = max(sums[STEP], weight - beside)
             if slope == 0.0:
-                out[5] += 1.0
+                continue
+            sums[N_UU] += (slope * du) ** 2
+            sums[N_UV] += slope * slope * du * dv
+            sums[N_VV] += (slope * dv) ** 2
+            sums[D_U] += abs(du)
+            sums[D_V] += abs(dv)
 
 
 @kernel
-def _doubt(spot: Array, sums: Array, pull: Array, ground: Array, coded_px: float) -> None:
-    """The covariance of a spot: noise, the ground's slope, clipping, codec, smear."""
-    det = pull[2] * pull[5] - pull[3] * pull[4]
-    p, q, r, s = pull[5] / det, -pull[4] / det, -pull[3] / det, pull[2] / det
-    noise = spot[NOISE] ** 2
+def _doubt(spot: Array, sums: Array, top: float, relief2: float, coded_px: float) -> None:
+    """The covariance of a spot with a `top` weight: noise, relief, edge, codec, smear."""
+    whole2 = sums[WEIGHT] * sums[WEIGHT]
+    noise2, relief2 = spot[NOISE] ** 2 / whole2, RELIEF_SHARE**2 * relief2 / whole2
     dim = min(max(DIM / spot[CONTRAST], 1.0), MOST_DIM)
-    alike = MODEL_PX**2 + CLIPPED_PX**2 * sqrt(sums[5]) + (coded_px * dim) ** 2
-    slope_u, slope_v = SLOPE_SHARE * ground[1] * sums[3], SLOPE_SHARE * ground[2] * sums[4]
-    spot[C_UU] = noise * (p * p * sums[0] + 2.0 * p * q * sums[1] + q * q * sums[2]) + alike
-    spot[C_UV] = noise * (p * r * sums[0] + (p * s + q * r) * sums[1] + q * s * sums[2])
-    spot[C_VV] = noise * (r * r * sums[0] + 2.0 * r * s * sums[1] + s * s * sums[2]) + alike
-    spot[C_UU] += (p * slope_u) ** 2
-    spot[C_VV] += (s * slope_v) ** 2
+    left = 1.0 - min(sums[STEP] / top, STEEPEST)  # of the light, beside the steepest edge
+    edge_px = EDGE_PX / (left * sqrt(sqrt(sums[COUNT])))
+    alike = MODEL_PX**2 + edge_px**2 + (coded_px * dim) ** 2
+    spot[C_UU] = noise2 * sums[N_UU] + relief2 * sums[D_U] ** 2 + alike
+    spot[C_UV] = noise2 * sums[N_UV]
+    spot[C_VV] = noise2 * sums[N_VV] + relief2 * sums[D_V] ** 2 + alike
     half, tilt = 0.5 * (spot[UU] - spot[VV]), spot[UV]
     spread = 2.0 * sqrt(half * half + tilt * tilt)  # of the second moments: along minus across
     streak = max(sqrt(12.0 * spread) - ROUND_PX, 0.0)
@@ -202,50 +150,54 @@ def centre(
     light: Array,
     slope_of: Array,
     box: Box,
+    extent: Box,
+    mark: int,
+    seen: Image,
+    ring: Box,
     coded_px: float,
     spot: Array,
     work: Array,
 ) -> bool:
-    """Refine a spot's place, and tell its covariance; False if there is none within reach.
+    """Measure a spot: its place, its size and its covariance; False if nothing rises, or no spot.
 
     Args:
         luma: The picture.
         light: (256,) about linear light of each grey level.
         slope_of: (256,) its slope; 0 where it is clipped.
-        box: Left, top, right, bottom of its members with `RING` more: inside the picture.
+        box: The window.
+        extent: The box of the spot's members in the window.
+        mark: Theirs in `seen`.
+        seen: Of the window.
+        ring: Around the members, inside the picture.
         coded_px: What a codec adds to a bright spot's place.
-        spot: (FIELDS,) its place, area, contrast and moments are known, the rest is written.
-        work: (256,) or more.
+        spot: (FIELDS,) its area and contrast are known, the rest is written.
+        work: (n,) a ring's pixels or more.
     """
-    ground = np.empty(4)
-    ground_of(luma, light, box[0], box[1], box[2], box[3], ground, work)
-    moments = spot[UU] * spot[VV] - spot[UV] * spot[UV]
-    if not moments > 1e-6:
+    n, middle = put_ring(luma, ring, work), border(luma, ring)
+    noise, level = noise_of(work, n, middle), light[int(middle)]
+    peak = 0.0
+    for r in range(extent[1], extent[3] + 1):
+        for c in range(extent[0], extent[2] + 1):
+            peak = max(peak, light[luma[box[1] + r, box[0] + c]] if seen[r, c] == mark else 0.0)
+    rise = peak - level
+    if not rise > 0.0:
         return False
-    shape = np.empty(3)
-    shape[0] = spot[VV] / moments / EXTENT
-    shape[1] = -spot[UV] / moments / EXTENT
-    shape[2] = spot[UU] / moments / EXTENT
-    u, v, pull = spot[U], spot[V], np.empty(6)
-    det, trace = 0.0, 0.0
-    for _ in range(ITERATIONS):
-        _pull(luma, light, box, ground, shape, u, v, pull)
-        det, trace = pull[2] * pull[5] - pull[3] * pull[4], pull[2] + pull[5]
-        if not (trace > 0.0 and det > 0.01 * trace * trace):
-            return False
-        du = (pull[5] * pull[0] - pull[4] * pull[1]) / det
-        dv = (pull[2] * pull[1] - pull[3] * pull[0]) / det
-        step = sqrt(du * du + dv * dv)
-        if step > 0.7:
-            du, dv = 0.7 * du / step, 0.7 * dv / step
-        u, v = u + du, v + dv
-        if step < CONVERGED_PX:
-            break
-    if not (u - spot[U]) ** 2 + (v - spot[V]) ** 2 < FARTHEST_PX**2:
+    grain = noise * slope_of[min(int(middle) + DARKEST, 255)]
+    relief2 = relief_of(light, work, n, level, MOST_OFF * rise, grain)
+    share = min(BY_RELIEF * sqrt(relief2) / rise, MOST_ABOVE)
+    sums = np.empty(SUMS)
+    floor, least = level + share * rise, level + SIZE_SHARE * rise
+    _gather(luma, light, slope_of, box, extent, mark, seen, floor, least, sums)
+    whole = sums[WEIGHT]
+    if not whole > 0.0:
         return False
-    spot[U], spot[V] = u, v
-    spot[NOISE] = ground[3]
-    sums = np.empty(6)
-    _scatter(luma, slope_of, box, shape, u, v, sums)
-    _doubt(spot, sums, pull, ground, coded_px)
-    return True
+    du, dv = sums[SU] / whole, sums[SV] / whole
+    spot[U] = box[0] + 0.5 * (extent[0] + extent[2]) + du
+    spot[V] = box[1] + 0.5 * (extent[1] + extent[3]) + dv
+    spot[BRIGHTNESS], spot[NOISE], spot[AREA] = whole, noise, sums[COUNT]
+    spot[UU], spot[VV] = sums[SUU] / whole - du * du, sums[SVV] / whole - dv * dv
+    spot[UV] = sums[SUV] / whole - du * dv
+    if not spot[UU] * spot[VV] - spot[UV] * spot[UV] > 1e-6:
+        return False
+    _doubt(spot, sums, peak - floor, relief2, coded_px)
+    return bool(spot[C_UU] + spot[C_VV] < LEAST_SURE_PX**2)

@@ -5,29 +5,21 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.frames import Array
 from pipeline.signals import Image
 from pipeline.so3_kernels import kernel
-from pipeline.spots.centroid_kernels import BRIGHTNESS, UU, UV, VV, Box, U, V
+from pipeline.spots.ground_kernels import Box
 
 Pixels = npt.NDArray[np.int16]
 
 
 @kernel
-def border(luma: Image, box: Box) -> float:
-    """Median of the window's border."""
-    counts = np.zeros(256, dtype=np.int32)
-    for u in range(box[0], box[2] + 1):
-        counts[luma[box[1], u]] += 1
-        counts[luma[box[3], u]] += 1
-    for v in range(box[1] + 1, box[3]):
-        counts[luma[v, box[0]]] += 1
-        counts[luma[v, box[2]]] += 1
-    half, below, grey = (box[2] - box[0] + box[3] - box[1]), 0, 0
-    while below + counts[grey] < half:
-        below += counts[grey]
-        grey += 1
-    return float(grey)
+def brightest(luma: Image, box: Box) -> int:
+    """Highest grey level of a window."""
+    highest = 0
+    for v in range(box[1], box[3] + 1):
+        for u in range(box[0], box[2] + 1):
+            highest = max(highest, luma[v, u])
+    return highest
 
 
 @kernel
@@ -81,35 +73,3 @@ def flood(
                     is_skirt = True
     extent[0], extent[1], extent[2], extent[3] = low_c, low_r, high_c, high_r
     return 0 if is_skirt else area
-
-
-@kernel
-def moments(
-    luma: Image, light: Array, box: Box, extent: Box, mark: int, seen: Image, spot: Array
-) -> None:
-    """Centroid, sum and second moments of the members grown by one pixel."""
-    left, top = box[0], box[1]
-    floor = np.inf
-    for r in range(extent[1] - 1, extent[3] + 2):
-        for c in range(extent[0] - 1, extent[2] + 2):
-            floor = min(floor, light[luma[top + r, left + c]])
-    total = su = sv = suu = suv = svv = 0.0
-    for r in range(extent[1] - 1, extent[3] + 2):
-        for c in range(extent[0] - 1, extent[2] + 2):
-            is_near = False
-            for rr in range(max(extent[1], r - 1), min(extent[3], r + 1) + 1):
-                for cc in range(max(extent[0], c - 1), min(extent[2], c + 1) + 1):
-                    is_near = is_near or seen[rr, cc] == mark
-            if not is_near:
-                continue
-            w = light[luma[top + r, left + c]] - floor
-            u, v = float(c), float(r)
-            total += w
-            su += w * u
-            sv += w * v
-            suu += w * u * u
-            suv += w * u * v
-            svv += w * v * v
-    u, v = su / total, sv / total
-    spot[U], spot[V], spot[BRIGHTNESS] = left + u, top + v, total
-    spot[UU], spot[UV], spot[VV] = suu / total - u * u, suv / total - u * v, svv / total - v * v

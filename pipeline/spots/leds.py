@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.frames import Array
-from pipeline.signals import Frame, Spots
+from pipeline.signals import Frame, Image, Spots
 from pipeline.spots.centroid_kernels import (
     AREA,
     BRIGHTNESS,
@@ -25,8 +26,17 @@ from pipeline.spots.centroid_kernels import (
     UV,
     VV,
 )
-from pipeline.spots.relief_kernels import BOTTOM, LEFT, PLACE, RIGHT, TOP, bright_places
-from pipeline.spots.spot_kernels import WINDOW, measure
+from pipeline.spots.relief_kernels import (
+    BOTTOM,
+    LEFT,
+    PEAK,
+    PLACE,
+    RIGHT,
+    TOP,
+    Places,
+    bright_places,
+)
+from pipeline.spots.spot_kernels import DIMMER, WINDOW, measure
 from pipeline.vision_config import LedsConfig
 
 MAX_PLACES = 96
@@ -37,8 +47,13 @@ GROUND = cv2.getStructuringElement(cv2.MORPH_RECT, (13, 13))
 """What this fits into, at half resolution, is no LED but ground."""
 RELIEF_SHARE = 0.4
 """Of the least contrast: half resolution takes the peak off a small spot."""
-GAMMA = 1.8
-"""Of about linear light; true 2.2 makes the steepest edges of clipped spots count too much."""
+SPARSE, ROUGH, LEAST_RELIEF = 16, 3.0, 3.0
+"""Rows and columns that tell how rough a picture is; by how many times that, and by how many grey
+levels at half resolution, an LED rises at least."""
+FEWEST = 4
+"""LEDs of a pose."""
+GAMMA = 2.2
+"""Of about linear light: the usual tone curve's."""
 CODED_PX = 0.022
 """What a video codec adds at 2 Mbit/s."""
 USUAL_AREA_PX = 400.0
@@ -53,10 +68,9 @@ def find_spots(frame: Frame, config: LedsConfig) -> Spots:
     """
     half = cv2.resize(frame.luma, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     relief = cv2.morphologyEx(half, cv2.MORPH_TOPHAT, GROUND)
-    places = np.empty((MAX_PLACES, PLACE), dtype=np.int32)
-    least = int(RELIEF_SHARE * _contrast(frame.full_range, config))
-    n, is_bounded = bright_places(np.asarray(relief, dtype=np.uint8), least, places)
-    boxes = places[:n].astype(np.int64)
+    usual = _contrast(frame.full_range, config)
+    places, is_bounded = _places(np.asarray(relief, dtype=np.uint8), RELIEF_SHARE * usual)
+    boxes = places.astype(np.int64)
     width, height = boxes[:, RIGHT] - boxes[:, LEFT] + 1, boxes[:, BOTTOM] - boxes[:, TOP] + 1
     windows = np.column_stack(
         (
@@ -66,10 +80,30 @@ def find_spots(frame: Frame, config: LedsConfig) -> Spots:
         )
     )
     table = measured(frame, windows, config)
+    table = table[table[:, CONTRAST] >= min(usual, DIMMER * _fourth(table[:, CONTRAST]))]
     likeness = _likeness(table)
     order = np.argsort(-likeness, kind="stable")
-    bounded = bool(is_bounded) or len(table) > config.max_spots
+    bounded = is_bounded or len(table) > config.max_spots
     return spots_of(table[order[: config.max_spots]], bounded)
+
+
+def _places(relief: Image, usual: float) -> tuple[Places, bool]:
+    """Places (n, PLACE) of a relief that rise as LEDs do, and whether bright ones were left out.
+
+    Dim ones count where fewer than a pose's LEDs are much brighter. The relief is overwritten.
+    """
+    places = np.empty((MAX_PLACES, PLACE), dtype=np.int32)
+    rough = float(np.median(relief[::SPARSE, ::SPARSE]))
+    n, is_bounded = bright_places(relief, int(usual), places)
+    dim = max(LEAST_RELIEF, ROUGH * rough, DIMMER * _fourth(places[:n, PEAK]))
+    if dim < int(usual) and n < MAX_PLACES:
+        n += bright_places(relief, int(dim), places[n:])[0]
+    return places[:n], bool(is_bounded)
+
+
+def _fourth(values: npt.NDArray[np.number[Any]]) -> float:
+    """The fourth highest, as a pose takes four LEDs, which are alike; 0 if there are fewer."""
+    return float(np.sort(values)[-FEWEST]) if len(values) >= FEWEST else 0.0
 
 
 def spots_near(frame: Frame, centres: Array, half_px: Array, config: LedsConfig) -> Spots:

@@ -13,6 +13,8 @@ MOST_PIXELS = 8000
 """Of the relief that are looked at: the highest, each of which may be a place by itself."""
 GLARING = 2
 """What is left out is worth a word if it is so many times as high as the least."""
+SHARE, RIM = 0.7, 2
+"""Of its peak, what belongs to a place; and pixels of its skirt that are no place of their own."""
 PEAK, LEFT, TOP, RIGHT, BOTTOM = range(5)
 PLACE = 5  # numbers of a place
 
@@ -40,25 +42,29 @@ def _threshold(relief: Image, least: int) -> tuple[int, int]:
 
 @kernel
 def _flood(relief: Image, row: int, column: int, level: int, stack: Places, place: Places) -> None:
-    """Box and peak of the pixels above `level` about one, which are then put to zero."""
+    """Box and peak of the pixels above `level` about one, which are then put to zero with a rim."""
     height, width = relief.shape
-    place[PEAK], place[LEFT], place[TOP] = 0, column, row
+    place[PEAK], place[LEFT], place[TOP] = relief[row, column], column, row
     place[RIGHT], place[BOTTOM] = column, row
-    place[PEAK], relief[row, column] = relief[row, column], 0
+    relief[row, column] = 0
     stack[0, 0], stack[0, 1] = row, column
-    n = 1
-    while n > 0:
-        n -= 1
-        r, c = stack[n, 0], stack[n, 1]
+    n, k = 1, 0
+    while k < n:
+        r, c = stack[k, 0], stack[k, 1]
+        k += 1
         place[LEFT], place[RIGHT] = min(place[LEFT], c), max(place[RIGHT], c)
         place[TOP], place[BOTTOM] = min(place[TOP], r), max(place[BOTTOM], r)
         for rr in range(max(0, r - 1), min(height, r + 2)):
             for cc in range(max(0, c - 1), min(width, c + 2)):
                 if relief[rr, cc] > level:
-                    place[PEAK] = max(place[PEAK], relief[rr, cc])
                     relief[rr, cc] = 0
                     stack[n, 0], stack[n, 1] = rr, cc
                     n += 1
+    for k in range(n):
+        r, c = stack[k, 0], stack[k, 1]
+        for rr in range(max(0, r - RIM), min(height, r + RIM + 1)):
+            for cc in range(max(0, c - RIM), min(width, c + RIM + 1)):
+                relief[rr, cc] = 0
 
 
 @numba.njit(
@@ -67,7 +73,9 @@ def _flood(relief: Image, row: int, column: int, level: int, stack: Places, plac
     error_model="numpy",
 )
 def bright_places(relief: Image, least: int, places: Places) -> tuple[int, int]:
-    """Boxes of connected pixels above a level: how many, and 1 if bright ones were left out.
+    """Boxes about the highest pixels: how many, and 1 if bright ones were left out.
+
+    A place ends where it falls below a share of its peak: an arm that carries an LED is another.
 
     Args:
         relief: What rises above its surround; overwritten.
@@ -75,19 +83,26 @@ def bright_places(relief: Image, least: int, places: Places) -> tuple[int, int]:
         places: (k, PLACE) written, highest peak first.
     """
     level, count = _threshold(relief, least)
-    found = np.empty((count, PLACE), dtype=np.int32)
-    stack = np.empty((count + 1, 2), dtype=np.int32)
+    at, stack = np.empty((count, 2), dtype=np.int32), np.empty((count + 1, 2), dtype=np.int32)
+    peaks = np.empty(count, dtype=np.int64)
     height, width = relief.shape
-    n = 0
+    n, taken = 0, 0
     for row in range(height):
         line = relief[row]
         for column in range(width):
             if line[column] > level:
-                _flood(relief, row, column, level, stack, found[n])
+                at[n, 0], at[n, 1], peaks[n] = row, column, line[column]
                 n += 1
-    order = np.argsort(-found[:n, PEAK], kind="mergesort")
-    taken = min(n, len(places))
-    for k in range(taken):
-        places[k] = found[order[k]]
-    dropped = level if n == taken else max(level, int(found[order[taken], PEAK]))
+    order = np.argsort(-peaks, kind="mergesort")
+    dropped = level
+    for k in order:
+        row, column = at[k]
+        peak = relief[row, column]
+        if peak <= level:
+            continue
+        if taken == len(places):
+            dropped = peak
+            break
+        _flood(relief, row, column, max(level, int(SHARE * peak)), stack, places[taken])
+        taken += 1
     return taken, int(dropped > GLARING * least)

@@ -16,18 +16,22 @@ from pipeline.spots.centroid_kernels import (
     CONTRAST,
     FIELDS,
     RING,
-    Box,
     U,
     V,
     centre,
 )
-from pipeline.spots.flood_kernels import Pixels, border, bright, flood, moments
+from pipeline.spots.flood_kernels import Pixels, bright, brightest, flood
+from pipeline.spots.ground_kernels import Box, border, noise_of, put_ring
 
 WINDOW = 21
 """Half of a window's side [px], at most, when it is asked for."""
 LARGEST = 45
 """The same after it has grown about a spot that did not fit."""
-SHARE = 0.4
+SIGMAS, LEAST_GREY = 8.0, 6.0
+"""Noises, and grey levels, by which a spot rises above its surround at least."""
+DIMMER = 0.25
+"""Of the brightest contrast around: dimmer ones are no LEDs beside one, as those are alike."""
+SHARE = 0.7
 """Of the contrast: what is above belongs to the spot."""
 ROUNDS, OF_ONE_WINDOW = 6, 4
 """Peaks looked at, and spots taken, of one window."""
@@ -38,6 +42,12 @@ CUT = 2
 WINDOWS = numba.types.Array(numba.int64, 2, "A", readonly=True)
 LUMA = numba.types.Array(numba.uint8, 2, "A", readonly=True)
 """Read-only and of any layout: a decoder's rows have gaps, and no picture may compile anew."""
+
+
+@kernel
+def least_contrast(usual: float, noise: float, brightest: float) -> float:
+    """Of a spot, in grey levels: the `usual` one, or less where noise and other lights allow."""
+    return min(usual, max(SIGMAS * noise, LEAST_GREY, DIMMER * brightest))
 
 
 @kernel
@@ -72,8 +82,7 @@ def _spot_at(
         return False
     ring[0], ring[1] = max(0, ring[0]), max(0, ring[1])
     ring[2], ring[3] = min(width - 1, ring[2]), min(height - 1, ring[3])
-    moments(luma, light, box, extent, mark, seen, spot)
-    return centre(luma, light, slope_of, ring, coded_px, spot, work)
+    return centre(luma, light, slope_of, box, extent, mark, seen, ring, coded_px, spot, work)
 
 
 @kernel
@@ -105,7 +114,9 @@ def _in_window(
     ground = border(luma, box)
     seen[:rows, :columns] = 0
     spot, extent, taken = np.empty(FIELDS), np.empty(4, dtype=np.int64), 0
-    count = bright(luma, box, ceil(ground + limits[0]), stack)
+    noise = noise_of(work, put_ring(luma, box, work), ground)
+    least = least_contrast(limits[0], noise, brightest(luma, box) - ground)
+    count = bright(luma, box, ceil(ground + least), stack)
     for mark in range(1, ROUNDS + 1):
         peak, pu, pv = -1, 0, 0
         for k in range(len(stack) - count, len(stack)):
@@ -122,10 +133,12 @@ def _in_window(
                 wide[1] = box[1] + (extent[1] + extent[3]) // 2
                 wide[2] = 1
             continue
-        if not limits[1] <= area <= limits[2]:
+        if area == 0:
             continue
-        spot[AREA], spot[CONTRAST] = area, peak - ground
+        spot[CONTRAST] = peak - ground
         if not _spot_at(luma, light, slope_of, box, extent, mark, limits[4], seen, work, spot):
+            continue
+        if not limits[1] <= spot[AREA] <= limits[2]:
             continue
         if n < len(table) and _is_new(table, n, spot):
             table[n] = spot
@@ -149,13 +162,13 @@ def measure(
         light: (256,) about linear light of each grey level.
         slope_of: (256,) its slope; 0 where it is clipped.
         windows: (w, 3) middle and half the side [px].
-        limits: (5,) least contrast in grey levels, least and most pixels, most windows that grow,
-            and what a codec adds to a place [px].
+        limits: (5,) contrast in grey levels that is enough in any noise, least and most pixels,
+            most windows that grow, and what a codec adds to a place [px].
         table: (n, FIELDS) written, until it is full.
     """
     seen = np.empty((2 * LARGEST + 1, 2 * LARGEST + 1), dtype=np.uint8)
     stack = np.empty((2 * (2 * LARGEST + 1) ** 2, 2), dtype=np.int16)
-    work = np.empty(8 * LARGEST + 8)
+    work = np.empty(8 * (LARGEST + RING))
     wide, larger = np.zeros(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     n, grown = 0, 0.0
     for w in range(len(windows)):

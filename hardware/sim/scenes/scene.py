@@ -25,6 +25,8 @@ HD: Final[Size] = (1280, 720)
 FULL_HD: Final[Size] = (1920, 1080)
 """Width, height [px]."""
 SIZES: Final = (VGA, HD, FULL_HD)
+SMALL_SIZES: Final = ((320, 180), (640, 360))
+"""As phones send that can't keep up."""
 
 
 class ImageOrientation(Enum):
@@ -215,6 +217,13 @@ _ALL: Final = (
         sizes=(VGA,),
         distance_m=(4.5, 6.0),
         led_light=(3.0, 8.0),
+        lamps=(0, 4),
+    ),
+    Scene(
+        "shrunk",
+        "pictures made small by a phone that can't keep up: an LED has two pixels, sharp ones",
+        sizes=SMALL_SIZES,
+        blur_px=(0.35, 0.6),
         lamps=(0, 4),
     ),
     Scene("far", "at the end of the room", distance_m=(4.0, 6.0), led_light=(3.0, 8.0)),

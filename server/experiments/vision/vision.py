@@ -26,6 +26,7 @@ from hardware.sim.scenes.scene import (
     HD,
     SCENES,
     SIZES,
+    SMALL_SIZES,
     HandMotion,
     Scene,
     Size,
@@ -62,7 +63,7 @@ class Task:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    sizes = [f"{w}x{h}" for w, h in SIZES]
+    sizes = [f"{w}x{h}" for w, h in (*SMALL_SIZES, *SIZES)]
     parser.add_argument("--frames", type=int, default=FRAMES, help="per scene, size, codec")
     parser.add_argument("--scenes", nargs="+", choices=list(SCENES), default=list(SCENES))
     parser.add_argument("--sizes", nargs="+", choices=sizes, default=sizes)
