@@ -24,9 +24,10 @@ HELD_S: Final = 3.2
 BLIND_S: Final = 4.4
 """Without pictures until RAMP."""
 AFTER_S: Final = 1.2
-BACK_S: Final = 0.27
-"""From the end of a gap until it follows: a picture's period (33 ms) and way (up to 120 ms), all
-good for 0.1 s, two ticks. Without a picture taken since nobody knows where the robot is."""
+BACK_S: Final = 0.3
+"""From the end of a gap until it follows: two pictures' periods (0.067 s; one may be lost, or not
+believed), a picture's way (up to 0.13 s), all good for 0.1 s. Without a picture taken since nobody
+knows where the robot is."""
 FOR_EVER: Final = h.FOR_EVER_S
 Times = Mapping[Event, float]
 
