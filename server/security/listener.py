@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from server.protocol.wire import MAX_RECORD_BYTES
 from server.security.acceptor import Acceptor
@@ -60,6 +61,17 @@ class Patience(H11Protocol):
             self.transport.close()
 
 
+class ForgivingWebsockets(WebSocketsSansIOProtocol):
+    """uvicorn's websockets, which expect no broken frame before they are accepted."""
+
+    def handle_parser_exception(self) -> None:
+        """End who breaks the protocol before he was let in: there is nobody to say goodbye to."""
+        if self.conn.close_sent is None:
+            self.transport.close()
+        else:
+            super().handle_parser_exception()
+
+
 class Listener(uvicorn.Server):
     """Accepts by admission, and leaves signals to its owner."""
 
@@ -105,7 +117,7 @@ def listener(app: ASGIApp, tls: Certificate | None, admission: Admission | None 
         uvicorn.Config(
             app,
             http=Patience,
-            ws="websockets-sansio",
+            ws=ForgivingWebsockets,
             ws_max_size=MAX_RECORD_BYTES + 1024,
             ws_per_message_deflate=False,
             ws_ping_interval=5.0,

@@ -26,6 +26,10 @@ pytestmark = pytest.mark.slow  # real sockets, whose server stops by its own tic
 
 OK = b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"
 LAST = b"GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+UPGRADE = (
+    b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
 HEAD_S = 0.05
 
 
@@ -96,6 +100,34 @@ def test_a_second_head_on_the_same_connection_is_cut_off_too():
             writer.close()
 
     asyncio.run(run())
+
+
+def test_broken_frames_before_a_websocket_is_accepted_end_it_without_a_fault_of_ours(caplog):
+    asked, heard, let_in = asyncio.Event(), asyncio.Queue(), asyncio.Event()
+
+    async def hesitant(_scope, receive, _send):
+        asked.set()
+        await let_in.wait()
+        for _ in range(2):
+            await heard.put((await receive())["type"])
+
+    async def run():
+        async with listening(hesitant) as here:
+            reader, writer = await asyncio.open_connection("127.0.0.1", here.port)
+            writer.write(UPGRADE)
+            await asked.wait()
+            writer.write(b"\xf1\x80\0\0\0\0")  # reserved bits
+            async with asyncio.timeout(4.0):
+                assert await reader.read() == b""
+            writer.close()
+            let_in.set()
+            assert [await heard.get() for _ in range(2)] == [
+                "websocket.connect",
+                "websocket.disconnect",
+            ]
+
+    asyncio.run(run())
+    assert [one for one in caplog.records if one.name == "asyncio"] == []
 
 
 def test_whole_requests_in_pieces_and_in_a_row_are_answered():
