@@ -117,7 +117,7 @@ MAYBE_NONE = $(if $(ARGS), || test $$? = 5)
 
 # Beside each other, each collecting its own half alone; what needs a browser is not even imported.
 # The cheapest tests that fit into so much CPU time of each after collecting (5 s), as measured here.
-FAST_S ?= 7
+FAST_S ?= 5
 FAST := $(BIN)/pytest -q -m "not e2e and not bench and not slow and not counterpart" --within-s $(FAST_S)
 SERVER := tests/server/ tests/web/
 OTHERS := $(filter-out $(SERVER) tests/e2e/ tests/bench/ tests/data/,$(wildcard tests/[a-z]*/ tests/test_*.py))

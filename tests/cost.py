@@ -1,6 +1,6 @@
 """What each test costs, learnt whenever tests run; `make fast` takes the cheapest that fit in.
 
-    pytest --within-s 7    # of CPU time after collecting
+    pytest --within-s 5    # of CPU time after collecting
 
 The figures stay in pytest's cache, on this machine. What has none yet, a new test too, comes first.
 """
@@ -18,6 +18,8 @@ from typing import TypeAlias
 import pytest
 from numba.core import event
 
+SLOWER = 1.5
+"""So many times what was measured tests may take, on a busy machine, before one is skipped."""
 CACHED = "cost/"
 """Before a test file's path; a file of figures each, so that two runs at a time do not lose any."""
 LATE = "no time was left, next time first"
@@ -131,14 +133,12 @@ class Ledger:
         """Keep the cheapest; files with tests that were never measured come first."""
         if self._within_s == inf:
             return
-        config.stash[END] = cpu_s() + self._within_s
+        config.stash[END] = cpu_s() + SLOWER * self._within_s
         files = {item.nodeid.partition("::")[0] for item in items}
         known = {f"{path}::{n}": s for path in files for n, s in self._known(path).items()}
         measured = sorted((s, i) for i, item in enumerate(items) if (s := known.get(item.nodeid)))
-        spent = accumulate((s for s, _ in measured), initial=cpu_s())
-        dear = {
-            i for (_, i), t in zip(measured, list(spent)[1:], strict=True) if t > self._within_s
-        }
+        spent = accumulate(s for s, _ in measured)
+        dear = {i for (_, i), t in zip(measured, spent, strict=True) if t > self._within_s}
         config.hook.pytest_deselected(items=[items[i] for i in dear])
         self._left_out = [known[items[i].nodeid] for i in dear]
         new = {i.nodeid.partition("::")[0] for i in items if i.nodeid not in known}

@@ -100,11 +100,12 @@ def test_what_tests_cost_is_learnt_by_running_them(tmp_path: Path, words: tuple[
 def test_where_time_is_short_the_dear_are_left_out_and_counted_and_new_files_come_first(
     tmp_path: Path,
 ) -> None:
+    # collecting takes longer than these 0.5 s, and is not counted
     learnt(tmp_path).parent.mkdir(parents=True)
-    known = {"test_quick": 1.0, "test_computes": 300.0, "test_computes_and_says_so": 400.0}
-    learnt(tmp_path).write_text(json.dumps({"test_waits": 1.0, **known}))
+    known = {"test_quick": 0.2, "test_computes": 300.0, "test_computes_and_says_so": 400.0}
+    learnt(tmp_path).write_text(json.dumps({"test_waits": 0.2, **known}))
     (tmp_path / "test_tidings.py").write_text("def test_new(): pass")
-    code, told = ran(tmp_path, "", "--within-s", "250", "-vv", "test_tidings.py", tests=BUSY)
+    code, told = ran(tmp_path, "", "--within-s", "0.5", "-vv", "test_tidings.py", tests=BUSY)
     assert code == 0
     assert "3 passed, 2 deselected" in told
     assert "2 dear tests left out, 300.000 s and more: `make test` runs them" in told
