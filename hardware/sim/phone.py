@@ -12,7 +12,7 @@ import numpy as np
 from hardware.sim.body.shape import BodyShape
 from hardware.sim.camera_faults import CameraFault, FaultyCamera
 from hardware.sim.hand import Hand
-from hardware.sim.phone_faults import SensorFault, spoilt_force, spoilt_rate
+from hardware.sim.phone_faults import SensorFault, faulty_force, faulty_rate
 from hardware.sim.render import RelativePoseAt, RenderOptions, render
 from pipeline.camera.lens import Camera
 from pipeline.frames import GRAVITY, Array, R_cd, exp, log, wxyz_from_R
@@ -214,8 +214,8 @@ class VirtualPhone:
         omega_in_d = np.clip(omega_in_d, -o.range_omega, o.range_omega)
         a_in_d = np.clip(a_in_d, -o.range_a, o.range_a)
         return MotionReading(
-            spoilt_rate(omega_in_d, o.fault),
-            spoilt_force(a_in_d, o.fault, GRAVITY * R_ed[2]),
+            faulty_rate(omega_in_d, o.fault),
+            faulty_force(a_in_d, o.fault, GRAVITY * R_ed[2]),
             wxyz_from_R(_rounded_rotation(R_ed, o.step_angle)),
             0 if o.fault is SensorFault.SCREEN_ANGLE else o.screen_angle_deg,
         )

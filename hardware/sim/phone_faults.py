@@ -23,12 +23,12 @@ class SensorFault(Enum):
     G_UNITS = "g-units"
 
 
-def spoilt_rate(omega: Array, fault: SensorFault) -> Array:
+def faulty_rate(omega: Array, fault: SensorFault) -> Array:
     """Rates (3,) as a browser with this fault gives them."""
     return np.roll(omega, -1) if fault is SensorFault.RATE_ORDER else omega
 
 
-def spoilt_force(force: Array, fault: SensorFault, at_rest: Array) -> Array:
+def faulty_force(force: Array, fault: SensorFault, at_rest: Array) -> Array:
     """Specific force (3,) [m/s²] likewise; `at_rest` is what it would be without motion."""
     match fault:
         case SensorFault.IOS_SIGN:

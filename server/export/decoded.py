@@ -192,7 +192,7 @@ class _Decoding:
                     with suppress(WireError):
                         yield from self._wish(entry)
                 case "server/messages":
-                    yield from self._told(entry)
+                    yield from self._logged(entry)
                 case _:
                     yield from self._control(entry)
 
@@ -229,7 +229,7 @@ class _Decoding:
             case Log(text=text):
                 yield LogLine(entry.t, "phone", text, alarms=True)
 
-    def _told(self, entry: Entry) -> Iterator[Item]:
+    def _logged(self, entry: Entry) -> Iterator[Item]:
         try:
             message = _to_page.decode(entry.data)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):

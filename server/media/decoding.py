@@ -134,7 +134,7 @@ class Decoding:
         self._running: _Running | None = _Running(cpu_s)
         self.deaths = 0
         """Pictures that ended it."""
-        self._told, self._t_told = 0, -float("inf")
+        self._reported, self._t_reported = 0, -float("inf")
 
     @property
     def pid(self) -> int | None:
@@ -155,10 +155,10 @@ class Decoding:
 
     def news(self, t: float) -> str:
         """News for people at `t` [s], or ""."""
-        new = self.deaths - self._told
-        if not new or t < self._t_told + SAY_AGAIN_S:
+        new = self.deaths - self._reported
+        if not new or t < self._t_reported + SAY_AGAIN_S:
             return ""
-        self._told, self._t_told = self.deaths, t
+        self._reported, self._t_reported = self.deaths, t
         return f"Pictures of the phone ended their decoder ({new}): another one goes on."
 
     def decode(self, stream: int, codec: int, width: int, height: int, data: bytes) -> Image | None:

@@ -21,7 +21,7 @@ class CalibrationControl:
         """`push` sends to the operator's page."""
         self._push = push
         self._phone = ""
-        self._told = Calibration("off")
+        self._sent = Calibration("off")
 
     def request(self, phone: PhoneSession, wish: Calibrate, control: ControlStatus | None) -> None:
         """The phone begins to calibrate its camera, or leaves it.
@@ -40,10 +40,10 @@ class CalibrationControl:
         if phone.wizard is not None and not _is_calm(control):
             phone.calibrate(Calibrate("stop"))
         if phone.id != self._phone:
-            self._phone, self._told = phone.id, Calibration("off")
+            self._phone, self._sent = phone.id, Calibration("off")
         told = phone.calibration()
-        if told != self._told:
-            self._told = told
+        if told != self._sent:
+            self._sent = told
             self._push(encode_message(told))
 
 

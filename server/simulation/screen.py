@@ -65,7 +65,7 @@ class ScreenSimulation(VirtualTimeSimulation):
         self.robot_of_light = RobotOfLight(leds_in_b, display.glass)
         if display.believed_lag_s is not None:
             self.robot_of_light.lag = DisplayLag(display.believed_lag_s, 0.0)
-        self._told: deque[tuple[float, Lights]] = deque(maxlen=16)
+        self._sent: deque[tuple[float, Lights]] = deque(maxlen=16)
         self._t_frame = 0.0
         self.phases: set[str] = set()
         """Shown so far."""
@@ -73,12 +73,12 @@ class ScreenSimulation(VirtualTimeSimulation):
     @property
     def shows(self) -> Lights:
         """What the page was told last."""
-        return self._told[-1][1]
+        return self._sent[-1][1]
 
     def advance(self) -> Output:
         """One control period of everything, and the frames of the glass that are due."""
         while self._t_frame <= self.t:
-            self._told.append((self._t_frame + WAY_S, self._lights(self._t_frame)))
+            self._sent.append((self._t_frame + WAY_S, self._lights(self._t_frame)))
             self._shown.append((self._t_frame + self._display.lag_s, self._drawn()))
             self._t_frame += 1.0 / FRAMES_HZ
         return super().advance()
@@ -96,7 +96,7 @@ class ScreenSimulation(VirtualTimeSimulation):
     def _drawn(self) -> Array:
         """What the page makes of the newest that it was told, at this frame."""
         t, lag = self._t_frame, self.robot_of_light.lag
-        come = [lights for since, lights in self._told if since <= t]
+        come = [lights for since, lights in self._sent if since <= t]
         if not come or come[-1].phase == "search":
             return np.zeros((0, 2))
         if come[-1].phase == "sweep":

@@ -61,7 +61,7 @@ def judge(
         nees=_mean(nees.ravel()),
         in_band_pct=100.0 * in_band(nees),
         captured_nees=_mean(np.concatenate([errors.nees() for errors in captured])),
-        nis=_mean(np.concatenate([_told(track, start, stop)[:, 1] for track in tracks])),
+        nis=_mean(np.concatenate([_reported(track, start, stop)[:, 1] for track in tracks])),
         known_pct=100.0 * float(np.isfinite(nees).mean()),
     )
 
@@ -103,7 +103,7 @@ def judge_offset(
     """What is told from `start` [s] on, against the true `offsets` [s]; NaN if nothing is."""
     errors, wrong = [], 0
     for track, offset in zip(tracks, offsets, strict=True):
-        told = _told(track, start, inf)[:, 2:] - (offset, 0.0)
+        told = _reported(track, start, inf)[:, 2:] - (offset, 0.0)
         errors.append(told[:, 0])
         wrong += bool(len(told) and abs(told[-1, 0]) > max(2e-3, 5.0 * told[-1, 1]))
     e = np.concatenate(errors)
@@ -114,7 +114,7 @@ def judge_offset(
     return OffsetMetrics(1e3 * rms, 1e3 * float(np.abs(known).max()), wrong)
 
 
-def _told(track: EstimatorRun, start: float, stop: float) -> Array:
+def _reported(track: EstimatorRun, start: float, stop: float) -> Array:
     t = track.health[:, 0]
     told: Array = track.health[(t >= start) & (t < stop)]
     return told

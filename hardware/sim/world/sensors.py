@@ -64,7 +64,7 @@ def phone_samples(world: World) -> list[Event]:
     rng, i, setup = world.rng(11), world.phone.i, world.setup
     stamps = world.phone_stamps(world.t[i]) + setup.stamp_jitter * rng.normal(size=len(i))
     felt = (world.omega_c[i], world.f_c[i])
-    told = _told(rng, world, felt, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
+    told = _measured(rng, world, felt, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
     omega, f = (
         np.clip(np.rint(v / step) * step, -most, most)
         for v, step, most in zip(told, PHONE_STEP, PHONE_RANGE, strict=True)
@@ -78,7 +78,7 @@ def body_samples(world: World) -> list[Event]:
     """Samples of the robot's IMU."""
     rng, i, fault = world.rng(12), world.body.i, world.setup.body_fault
     felt = (world.omega_b[i], world.f_b[i])
-    omega, f = _told(rng, world, felt, i, fault, BODY_BIAS, BODY_NOISE)
+    omega, f = _measured(rng, world, felt, i, fault, BODY_BIAS, BODY_NOISE)
     rows = zip(world.body.arrival.tolist(), world.t[i].tolist(), omega, f, strict=True)
     return [(arrival, BodyImu(t, w, g)) for arrival, t, w, g in rows]
 
@@ -187,7 +187,7 @@ def _stuck(px: Array, noise_px: Array, stick_px: float) -> Array:
     return error
 
 
-def _told(
+def _measured(
     rng: np.random.Generator,
     world: World,
     felt: tuple[Array, Array],

@@ -97,7 +97,7 @@ def _section(chapter: Chapter, ending: Ending) -> Markup:
         "section",
         element("h2", part.heading),
         element("p", part.shows),
-        element("p", _state(chapter), f" {_told(chapter, ending)}", class_="dim"),
+        element("p", _state(chapter), f" {_summary(chapter, ending)}", class_="dim"),
         _command(chapter.command),
         *([_reason(record)] if record and record.reason else []),
         *map(shown, results.blocks),
@@ -108,7 +108,7 @@ def _section(chapter: Chapter, ending: Ending) -> Markup:
     )
 
 
-def _told(chapter: Chapter, ending: Ending) -> str:
+def _summary(chapter: Chapter, ending: Ending) -> str:
     """Seeds, duration, and the machine if it was another one."""
     record = chapter.record
     words = [f"Seeds: {chapter.seeds}."]

@@ -142,14 +142,14 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
         return [draw(runs, folder / "network.png")]
 
     return ExperimentReport(
-        [_told(row, run) for row, run in flown],
+        [_row_json(row, run) for row, run in flown],
         table(COLUMNS, [row for row, _ in flown]),
         is_good=all(row.verdict in ("", "met") for row, _ in flown),
         draw=drawn,
     )
 
 
-def _told(row: NetworkRow, run: Run) -> dict[str, object]:
+def _row_json(row: NetworkRow, run: Run) -> dict[str, object]:
     """For programs, to a thousandth."""
     rounded = {k: round(v, 3) if isinstance(v, float) else v for k, v in asdict(row).items()}
     return rounded | {"to_phone": run.counts[0], "to_server": run.counts[1]}

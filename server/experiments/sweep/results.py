@@ -34,7 +34,7 @@ class SweepResults:
             SweepError: it belongs to another sweep or other code, or can't be written.
         """
         self._folder, self._sweep = folder, sweep
-        self._told = identity(sweep)
+        self._identity = identity(sweep)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             before = self._before()
@@ -58,7 +58,7 @@ class SweepResults:
             before, _ = dict(told["sweep"]), dict(told["versions"])
         except (ValueError, KeyError, TypeError) as error:
             raise SweepError(str(path), "is no sweep's; allowed: a new --out") from error
-        for key, now in json.loads(json.dumps(self._told)).items():
+        for key, now in json.loads(json.dumps(self._identity)).items():
             if before.get(key) != now:
                 change = f"was {_short(before.get(key))} when this was begun, now {_short(now)}"
                 raise SweepError(str(self._folder), f"{key} {change}; allowed: a new --out")
@@ -129,7 +129,7 @@ class SweepResults:
     def write(self, command: Sequence[str], hands: str) -> None:
         """JSON and CSV of what is done so far."""
         told = {
-            "sweep": self._told,
+            "sweep": self._identity,
             "command": list(command),
             "flown_by": hands,
             "versions": self._versions,
