@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from hardware.sim.measured_hands import MEASURED
 from hardware.sim.world import evaluator, metrics
 from hardware.sim.world.pcrb import bound, rms
+from hardware.sim.world.sensor_faults import ImuFault
 from hardware.sim.world.world import LEDS_IN_B, Occlusion, World, WorldOptions
 from pipeline.config import TeleopConfig
 from pipeline.estimation.estimators import make_estimator
@@ -38,6 +39,33 @@ ROUGH = {
     **{"lost": 0.05, "repeated": 0.05, "delayed": 0.1, "stamp_jitter": 0.002},
     **{"clock_offset": 0.002, "clock_drift": 1e-4},
 }
+STEP_S = 6.0
+FAULTS = (
+    ("robot's noise × 20", 0.0, {"body_fault": ImuFault(noise=20.0)}),
+    ("LEDs 2.5 × noisier than said", 0.0, {"pixel_noise": 2.5}),
+    (
+        "robot's gyroscope + 0.2 rad/s",
+        STEP_S,
+        {"body_fault": ImuFault(step=(0.2, 0.0), start=STEP_S)},
+    ),
+    (
+        "robot's accelerometer + 1 m/s²",
+        STEP_S,
+        {"body_fault": ImuFault(step=(0.0, 1.0), start=STEP_S)},
+    ),
+    (
+        "phone's gyroscope + 0.05 rad/s",
+        STEP_S,
+        {"phone_fault": ImuFault(step=(0.05, 0.0), start=STEP_S)},
+    ),
+    (
+        "phone's accelerometer + 0.5 m/s²",
+        STEP_S,
+        {"phone_fault": ImuFault(step=(0.0, 0.5), start=STEP_S)},
+    ),
+    ("tone of 1 m/s² at 200.3 Hz", 4.0, {"body_fault": ImuFault(tone=(0.0, 1.0), tone_hz=200.3)}),
+)
+"""(what, when it begins [s], 0: from the start, how)."""
 
 
 @dataclass
@@ -206,6 +234,21 @@ def hands(bench, goals):
             goals.add(f"{name}: ticks inside the band [%]", score.in_band_pct, 90.0, 100.0)
 
 
+def faults(bench, goals):
+    """Sensors that are not as their data sheets say, with a hand that films."""
+    usual, _ = bench.whole("filming, sensors as said", limit=False, hand="filming")
+    for title, start, options in FAULTS:
+        score, ratio = bench.whole(title, limit=start == 0.0, hand="filming", **options)
+        if start == 0.0:
+            goals.add(f"{title}: position ÷ bound now", ratio[0], -inf, 1.5)
+            goals.add(f"{title}: ANEES(6)", score.nees, 4.7, 7.4)
+        else:
+            _, done = bench.run(hand="filming", **options)
+            after = metrics.judge([d.track for d in done], start=start + 3.0)
+            limit = 2.0 if "tone" in title else 1.3
+            goals.add(f"{title}: after 3 s ÷ usual", after.now_mm / usual.now_mm, -inf, limit)
+
+
 def occlusions(bench, goals, usual):
     print(f"\n{'last tick before the return':<34}       mm       ° worst mm     NEES")
     bench.hidden("all hidden for 0.2 s", 0.2)
@@ -245,6 +288,7 @@ def main():
         bench = Bench(arguments.name, arguments.seeds, pool)
         usual = base(bench, goals)
         hands(bench, goals)
+        faults(bench, goals)
         occlusions(bench, goals, usual)
         offsets(bench, goals, usual)
     goals.add("runs that raised", bench.raised, -inf, 0)
