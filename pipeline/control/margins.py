@@ -27,6 +27,7 @@ import numpy.typing as npt
 from pipeline.config import PERIOD_S, EstimatorName, FeedForwardConfig, MarginsConfig
 from pipeline.control.dynamics import Dynamics
 from pipeline.estimator_config import NoFilterConfig
+from pipeline.frames import Array
 from pipeline.gains import Gains
 
 Complex = npt.NDArray[np.complex128]
@@ -67,9 +68,11 @@ class AxisMargins:
     """All gains times this: unstable; 0: never."""
     crossover: float
     """Highest frequency at which the loop still acts [rad/s]."""
+    peak: float
+    """Of the sensitivity |1/(1 + L)|: how much it makes of a disturbance at the worst frequency."""
 
 
-UNSTABLE: Final = AxisMargins(False, 0.0, 0.0, 1.0, 1.0, 0.0)
+UNSTABLE: Final = AxisMargins(False, 0.0, 0.0, 1.0, 1.0, 0.0, inf)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,6 +85,8 @@ class Loop:
     no_filter: NoFilterConfig
     feedforward: FeedForwardConfig | None = None
     """None: off."""
+    told_inertia: Array | None = None
+    """(6,) what feed-forward takes for the body's mass [kg]; None: what it is."""
 
     def open_loop(self, axis: int, sensing: Sensing) -> tuple[Complex, int]:
         """L(jω) over `OMEGA`, and how many of its poles are at the origin."""
@@ -140,7 +145,8 @@ class Loop:
         modelled = 1.0 / (1.0 + config.thrust_lag_s * S)
         if self.dynamics.needs_tilt and axis in TILT_AXIS:
             modelled = self._actuator(axis, sensing)  # it knows where the thrust points
-        force = self.dynamics.inertia[axis] * S * S * np.exp(-S * sensing.body_age)
+        told = self.dynamics.inertia if self.told_inertia is None else self.told_inertia
+        force = told[axis] * S * S * np.exp(-S * sensing.body_age)
         return np.asarray((control + passed * force) / (1.0 - passed * modelled))
 
 
@@ -162,6 +168,7 @@ def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
         gain_up=min((k for k in factors if k > 1.0), default=inf),
         gain_down=max((k for k in factors if k < 1.0), default=0.0),
         crossover=max((omega for omega, _ in crossings), default=0.0),
+        peak=float((1.0 / np.abs(1.0 + L)).max()),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from math import degrees
+from math import degrees, inf, log10
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,15 @@ from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.control.margins import OMEGA, Complex, Loop, Sensing, axis_margins
+from pipeline.control.robust_margins import (
+    LAGS,
+    MASSES,
+    MAX_PEAK,
+    MIN_GAIN,
+    MIN_PHASE_RAD,
+    is_robust,
+    worst_margins,
+)
 from server.common import text
 from server.common.drawing import panels, save
 from server.experiments.runner import ExperimentReport, experiment
@@ -39,6 +48,13 @@ class MarginRow:
     gain_up: float
     gain_down: float
     crossover: float
+    worst_phase_deg: float
+    """Of all bodies that the robot may be, as the next two."""
+    worst_gain_db: float
+    """Up or down, whichever is less."""
+    worst_peak: float
+    robust: str
+    """Whether these are the margins that engineers ask for."""
 
 
 COLUMNS = (
@@ -51,6 +67,10 @@ COLUMNS = (
     ("gain_up", "gain up to ×", "{:.2f}"),
     ("gain_down", "down to ×", "{:.2f}"),
     ("crossover", "acts to rad/s", "{:.1f}"),
+    ("worst_phase_deg", "worst °", "{:.0f}"),
+    ("worst_gain_db", "worst dB", "{:.1f}"),
+    ("worst_peak", "worst peak", "{:.2f}"),
+    ("robust", "robust", "{}"),
 )
 
 
@@ -71,7 +91,8 @@ def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[Margi
 
 def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
     """Row of one axis."""
-    margins = axis_margins(loop, axis, sensing)
+    margins, worst = axis_margins(loop, axis, sensing), worst_margins(loop, axis, sensing)
+    down = 1.0 / worst.gain_down if worst.gain_down > 0.0 else inf
     return MarginRow(
         gains=gains,
         estimator=sensing.estimator,
@@ -83,6 +104,10 @@ def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
         gain_up=margins.gain_up,
         gain_down=margins.gain_down,
         crossover=margins.crossover,
+        worst_phase_deg=degrees(worst.phase),
+        worst_gain_db=20.0 * log10(min(worst.gain_up, down)),
+        worst_peak=worst.peak,
+        robust="yes" if is_robust(worst) else "no",
     )
 
 
@@ -148,11 +173,21 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     )
     found = list(rows(robot_file, arguments))
     print(text.table(COLUMNS, found))
+    print(_rule())
     arming = list(verdicts(robot_file, arguments))
     print("\n".join(arming))
     return ExperimentReport(
         {"margins": [told(one) for one in found], "arming": arming},
         draw=lambda folder: (draw(found, folder / "margins.png"),),
+    )
+
+
+def _rule() -> str:
+    return (
+        f"worst: mass and moments x {MASSES[0]:g}-{MASSES[-1]:g}, thrusters' lag x "
+        f"{LAGS[0]:g}-{LAGS[-1]:g}, with and without motion that the robot feels wrongly; robust: "
+        f"at least {degrees(MIN_PHASE_RAD):.0f}° and {20.0 * log10(MIN_GAIN):.0f} dB, peak of "
+        f"the sensitivity no more than {MAX_PEAK:g}"
     )
 
 

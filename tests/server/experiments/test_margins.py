@@ -21,6 +21,21 @@ def test_it_prints_every_axis_and_what_arming_says(capsys: pytest.CaptureFixture
     assert "arming with phone, none: Pictures are 120 ms old" in told
 
 
+def test_it_says_what_is_left_where_the_body_is_not_as_told(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["margins", "--gains", "phone", "--estimator", "relative"]) == 0
+    told = capsys.readouterr().out
+    rows = [line.split() for line in told.splitlines() if line.split()[:1] == ["phone"]]
+    assert all(float(worst) < float(nominal) for worst, nominal in map(_phases, rows))
+    assert {row[-1] for row in rows} == {"no"}
+    assert "at least 30° and 6 dB" in told
+
+
+def _phases(row: list[str]) -> tuple[str, str]:
+    return row[-4], row[4]
+
+
 def test_only_controlled_axes_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["margins", "ground", "--estimator", "paper"]) == 0
     told = capsys.readouterr().out
