@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -94,6 +94,18 @@ class ThrustCommand:
         return cls(np.zeros(thrusters), armed=False)
 
 
+@dataclass(frozen=True, slots=True)
+class BlinkOrder:
+    """Which of its LEDs a robot keeps dark when: a round of slots, again and again for a while."""
+
+    begin_us: int
+    """On the robot's monotonic clock [µs]."""
+    lasts_ms: int
+    slot_ms: int
+    dark: tuple[int, ...]
+    """LED of each slot, or −1: none."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BodySample:
     """One sample of the robot's body sensors, and what the robot says of itself."""
@@ -169,3 +181,11 @@ def check_command(command: ThrustCommand, thrusters: int, f_max: float) -> None:
         raise FollowerError(f"thrusts {thrusts} N", f"0 to {f_max:g} N each")
     if (command.stop or not command.armed) and bool(thrusts.any()):
         raise FollowerError(f"thrusts {thrusts} N with `stop` or without `armed`", "zeros")
+
+
+@runtime_checkable
+class Blinking(Protocol):
+    """A `Follower` whose robot can be told to blink."""
+
+    def blink(self, order: BlinkOrder) -> None:
+        """Send `order`; it may be lost."""

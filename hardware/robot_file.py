@@ -232,6 +232,7 @@ def _converted(schema: RobotSchema) -> RobotFile:
         axes=np.array([axis in schema.axes for axis in AXES]),
         hangs=schema.suspension is not None,
         ramp_s=_ramp_s(schema),
+        blinks=schema.blinks,
     )
     gains = {
         name: Gains(np.array(rows.Kp), np.array(rows.Ki), np.array(rows.Kd))

@@ -171,6 +171,8 @@ class RobotSchema(Section):
     """From full thrust to zero; with a suspension its period."""
     keeps_attitude_in_ramp: bool = False
     """By its own gyroscope, while its thrust falls in silence: one that flies must."""
+    blinks: bool = False
+    """Its LEDs can be told to be dark one by one, so that pictures show whose it is."""
     body: Body
     suspension: Suspension | None = None
     stand: Stand | None = None

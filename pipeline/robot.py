@@ -36,6 +36,13 @@ class Robot:
     """False: with its thrusters off it stands on the floor."""
     ramp_s: float
     """How long a ramp to zero lasts; hanging, the pendulum's period: that leaves no swing."""
+    blinks: bool = False
+    """Its LEDs can be told to be dark one by one."""
+
+    @property
+    def blinking_leds(self) -> int:
+        """How many can be told to be dark: all or none."""
+        return len(self.leds_in_b) if self.blinks else 0
 
     @property
     def weight_to_carry(self) -> float:

@@ -1,12 +1,14 @@
 /* Throws anything at the watchdog, mostly with a right MAC, and holds its laws. For a fuzzer:
  *
- *   clang -g -O1 -fsanitize=fuzzer,address,undefined -DLIBFUZZER fuzz.c watchdog.c attitude.c hmac.c -lm
+ *   clang -g -O1 -fsanitize=fuzzer,address,undefined -DLIBFUZZER fuzz.c watchdog.c blink.c attitude.c hmac.c -lm
  *
  * or alone, with numbers of its own, for so many executions from a seed:
  *
- *   gcc -g -O1 -fsanitize=address,undefined -o fuzz fuzz.c watchdog.c attitude.c hmac.c -lm
+ *   gcc -g -O1 -fsanitize=address,undefined -o fuzz fuzz.c watchdog.c blink.c attitude.c hmac.c -lm
  *   ./fuzz 1000000 1
  */
+#include "blink.h"
+#include "bytes.h"
 #include "watchdog.h"
 
 #include <math.h>
@@ -38,6 +40,38 @@ static void put(uint8_t *p, uint64_t value, int bytes)
         p[i] = (uint8_t)(value >> (8 * i));
 }
 
+/* The same 8 bytes as a blink order: whatever is in it, the watchdog stays as it is. */
+static void blink(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint64_t nonce)
+{
+    static ll_blink b;
+    uint8_t data[LL_MAX_BYTES] = {0}, digest[LL_DIGEST_BYTES];
+    memcpy(data, "LLbl\1", 5);
+    put(data + 6, in[1] & 7 ? 62 : in[2], 2);
+    put(data + 8, in[2] & 3 ? w->newest_epoch : in[5], 8);
+    put(data + 16, in[3] & 7 ? nonce : nonce - in[3], 8);
+    put(data + 24, (uint64_t)now_us - (in[4] & 1 ? 1000u * in[5] : 0), 8);
+    put(data + 32, in[6] & 1 ? 500 : in[7] << 8, 4);
+    memcpy(data + 36, in, LL_BLINK_SLOTS);
+    size_t length = 36 + LL_BLINK_SLOTS;
+    if (in[7] == 254)
+        data[in[5] % length] ^= in[6];
+    if (in[7] == 253)
+        length = in[5] % (LL_MAX_BYTES - LL_MAC_BYTES);
+    ll_hmac_of(&w->hmac, data, length, digest);
+    memcpy(data + length, digest, LL_MAC_BYTES);
+    if (in[7] == 252)
+        data[length] ^= 1;
+    ll_watchdog before = *w;
+    bool taken = ll_blink_receive(&b, w, data, length + LL_MAC_BYTES, now_us);
+    demand(memcmp(&before, w, sizeof before) == 0, "a blink order moves nothing");
+    demand(!taken || in[7] != 252, "a blink order with a wrong MAC is refused");
+    demand(!taken || read_u64(data + 8) == w->newest_epoch, "only who is heard may say blink");
+    int dark = ll_blink_dark(&b, now_us);
+    demand(dark == LL_NO_LED || (dark >= 0 && dark < 255), "one LED is dark at most");
+    demand(ll_blink_dark(&b, now_us + 10000000) == LL_NO_LED || b.begin_us > now_us,
+           "after ten seconds all LEDs shine");
+}
+
 /* One step of 8 bytes: what happens, how much time passes, what is in the datagram. */
 static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *nonce)
 {
@@ -56,6 +90,7 @@ static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *n
     ll_setpoint(w, *now_us, thrusts);
     size_t size = ll_sample(w, *now_us, ++*nonce, gyro, acc, thrusts, out);
     demand(size == 92 + 4 * N, "a sample has its size");
+    blink(w, in, *now_us, *nonce);
     memcpy(data, "LLcm\2", 5);
     data[5] = (in[1] & 31) == 31 ? in[2] : N;
     data[6] = in[1] >> 5 & 3;

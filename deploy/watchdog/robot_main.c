@@ -1,12 +1,13 @@
 /* A whole robot around the watchdog, on Linux: 200 Hz, UDP, but no thrusters and no sensors.
  * Put yours where it says YOURS.
  *
- *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c attitude.c hmac.c -lm
+ *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c blink.c attitude.c hmac.c -lm
  *   ./robot KEY_FILE PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS
  *
  * KEY_FILE is what `lightleash robot key` has made; on a microcontroller the key is in flash.
  */
 #define _GNU_SOURCE
+#include "blink.h"
 #include "watchdog.h"
 
 #include <arpa/inet.h>
@@ -82,6 +83,11 @@ static void give(const float *thrusts)
     (void)thrusts; /* YOURS: tell the motors */
 }
 
+static void shine(int dark)
+{
+    (void)dark; /* YOURS: all LEDs on but this one */
+}
+
 static void sense(float gyro[3], float accelerometer[3])
 {
     memset(gyro, 0, 3 * sizeof *gyro); /* YOURS: read the sensors, body axes, SI */
@@ -104,7 +110,7 @@ static bool same(const struct sockaddr_in *a, const struct sockaddr_in *b)
 }
 
 /* Take some of what has arrived. */
-static void receive(int fd, ll_watchdog *w, recipients *to)
+static void receive(int fd, ll_watchdog *w, ll_blink *b, recipients *to)
 {
     uint8_t data[LL_MAX_BYTES + 1];
     for (int i = 0; i < MAX_DATAGRAMS; i++) {
@@ -116,6 +122,8 @@ static void receive(int fd, ll_watchdog *w, recipients *to)
             return;
         bool answer;
         int64_t now_us = clock_us();
+        if (ll_blink_receive(b, w, data, (size_t)size, now_us))
+            continue;
         if (ll_receive(w, data, (size_t)size, now_us, &answer) == LL_NONE)
             to->control = (peer){from, now_us};
         if (answer)
@@ -128,13 +136,14 @@ static void send_to(int fd, const uint8_t *data, size_t size, const struct socka
     sendto(fd, data, size, MSG_DONTWAIT, (const struct sockaddr *)address, sizeof *address);
 }
 
-static void tick(int fd, ll_watchdog *w, recipients *to)
+static void tick(int fd, ll_watchdog *w, const ll_blink *b, recipients *to)
 {
     float thrusts[LL_MAX_THRUSTERS], gyro[3], accelerometer[3];
     uint8_t out[LL_MAX_BYTES];
     int64_t now_us = clock_us();
     ll_setpoint(w, now_us, thrusts);
     give(thrusts);
+    shine(ll_blink_dark(b, now_us));
     sense(gyro, accelerometer);
     size_t size = ll_sample(w, now_us, random_u64(), gyro, accelerometer, thrusts, out);
     bool lately = to->control.heard_us && now_us - to->control.heard_us <= FORGET_PEER_US;
@@ -161,6 +170,8 @@ int main(int argc, char **argv)
     ll_limits limits = {(uint8_t)atoi(argv[3]), atof(argv[4]), atof(argv[5]),
                         1000 * (int64_t)atoi(argv[6]), NULL};
     ll_watchdog w;
+    ll_blink b;
+    ll_blink_init(&b);
     if (!ll_init(&w, &limits, (uint32_t)random_u64(), key)) {
         fprintf(stderr, "F_MAX_N, MAX_RISE_N and RAMP_MS must be finite and above 0\n");
         return 2;
@@ -179,14 +190,14 @@ int main(int argc, char **argv)
     for (int64_t next_us = clock_us(); !stopping;) {
         int64_t wait_us = next_us - clock_us();
         if (wait_us > 0 && poll(&readable, 1, (int)((wait_us + 999) / 1000)) > 0)
-            receive(fd, &w, &to);
+            receive(fd, &w, &b, &to);
         if (clock_us() >= next_us) { /* due by the clock, whatever arrives */
-            tick(fd, &w, &to);
+            tick(fd, &w, &b, &to);
             next_us += TICK_US;
         }
     }
     ll_halt(&w);
-    tick(fd, &w, &to);
+    tick(fd, &w, &b, &to);
     close(fd);
     return 0;
 }

@@ -1,5 +1,7 @@
 #include "watchdog.h"
 
+#include "bytes.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -15,20 +17,10 @@ typedef struct {
     float thrusts[LL_MAX_THRUSTERS];
 } command;
 
-static uint32_t read_u32(const uint8_t *p)
-{
-    return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-}
-
 static void write_u32(uint8_t *p, uint32_t value)
 {
     for (int i = 0; i < 4; i++)
         p[i] = (uint8_t)(value >> (8 * i));
-}
-
-static uint64_t read_u64(const uint8_t *p)
-{
-    return (uint64_t)read_u32(p + 4) << 32 | read_u32(p);
 }
 
 static void write_u64(uint8_t *p, uint64_t value)
@@ -193,10 +185,10 @@ static bool note(ll_watchdog *w, const command *c)
     return true;
 }
 
-static ll_refusal judge_nonce(const ll_watchdog *w, const command *c, int64_t now_us)
+static ll_refusal judge_nonce(const ll_watchdog *w, uint64_t nonce, int64_t now_us)
 {
-    for (int i = 0; c->nonce != 0 && i < LL_NONCES; i++)
-        if (w->nonces[i].nonce == c->nonce)
+    for (int i = 0; nonce != 0 && i < LL_NONCES; i++)
+        if (w->nonces[i].nonce == nonce)
             return now_us - w->nonces[i].sent_us > LL_MAX_AGE_US ? LL_STALE : LL_NONE;
     return LL_NONCE;
 }
@@ -229,7 +221,7 @@ static ll_refusal judge(const ll_watchdog *w, const command *c, int64_t now_us)
 {
     if (c->thrusters != w->limits.thrusters)
         return LL_THRUSTERS;
-    ll_refusal why = judge_nonce(w, c, now_us);
+    ll_refusal why = judge_nonce(w, c->nonce, now_us);
     if (why != LL_NONE)
         return why;
     for (int i = 0; i < c->thrusters; i++)
@@ -341,6 +333,11 @@ ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t 
     if (why == LL_NONCE || why == LL_STALE)
         obey_zero(w, &c, *answer);
     return why;
+}
+
+bool ll_hears(const ll_watchdog *w, uint64_t epoch, uint64_t nonce, int64_t now_us)
+{
+    return epoch == w->newest_epoch && judge_nonce(w, nonce, now_us) == LL_NONE;
 }
 
 void ll_setpoint(ll_watchdog *w, int64_t now_us, float *thrusts)

@@ -73,6 +73,9 @@ bool ll_init(ll_watchdog *w, const ll_limits *limits, uint32_t boot_id,
 ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t now_us,
                       bool *answer);
 
+/* Whether that is the newest control process, and it has just had a sample; no effect. */
+bool ll_hears(const ll_watchdog *w, uint64_t epoch, uint64_t nonce, int64_t now_us);
+
 /* What the thrusters are to give now [N], one number for each. Ask at least every 5 ms, whatever else happens. */
 void ll_setpoint(ll_watchdog *w, int64_t now_us, float *thrusts);
 

@@ -13,7 +13,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hardware.follower import BodySample, FollowerState, ThrustCommand, check_command
+from hardware.follower import (
+    BlinkOrder,
+    BodySample,
+    FollowerState,
+    ThrustCommand,
+    check_command,
+)
+from hardware.link.blink_datagram import BlinkDatagram, encode_blink
 from hardware.link.datagram import (
     U32,
     U64,
@@ -106,6 +113,11 @@ class ControlEnd:
             ),
             self._key,
         )
+
+    def blink(self, order: BlinkOrder) -> bytes:
+        """The datagram for `order`; it is no command, and counts as none."""
+        nonce = self._newest.nonce if self._newest else 0
+        return encode_blink(BlinkDatagram(self.epoch, nonce, order), self._key)
 
     def receive(self, data: bytes, now: float) -> BodySample | None:
         """The sample in `data`; None and counted if it is none, or not to be believed."""

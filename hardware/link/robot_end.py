@@ -170,6 +170,11 @@ class RobotEnd:
             self._asking = peer
         return why
 
+    def hears(self, epoch: int, nonce: int, now_us: int) -> bool:
+        """Whether that is the newest control process, and it has just had a sample; no effect."""
+        age_us = self._age_us(nonce, now_us)
+        return epoch == self._newest[0] and age_us is not None and age_us <= self._limits.max_age_us
+
     def setpoint(self, now_us: int) -> Array:
         """Thrusts (m,) [N] the thrusters are to give now."""
         self._advance(now_us)
@@ -263,16 +268,20 @@ class RobotEnd:
         limits = self._limits
         if len(command.thrusts) != limits.thrusters:
             return Refusal.THRUSTERS
-        sent_us = next((t for nonce, t in self._nonces if nonce == command.nonce), None)
-        if sent_us is None:
+        age_us = self._age_us(command.nonce, now_us)
+        if age_us is None:
             return Refusal.NONCE
-        if now_us - sent_us > limits.max_age_us:
+        if age_us > limits.max_age_us:
             return Refusal.STALE
         if not all(map(isfinite, command.thrusts)):
             return Refusal.NOT_FINITE
         if self._is_later_zero(command):
             return Refusal.NONE
         return self._judge_thrusts(command, now_us)
+
+    def _age_us(self, nonce: int, now_us: int) -> int | None:
+        """Since the sample with this nonce was sent; None: none was, lately."""
+        return next((now_us - sent_us for sent, sent_us in self._nonces if sent == nonce), None)
 
     def _is_later_zero(self, command: CommandDatagram) -> bool:
         """Rule 3: who is newer than who flies now and who is in his handshake."""

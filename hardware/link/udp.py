@@ -3,8 +3,10 @@
 | file                | what                                                             |
 |---------------------|------------------------------------------------------------------|
 | `datagram.py`       | both datagrams, byte by byte                                     |
+| `blink_datagram.py` | a third one, that tells LEDs to blink                            |
 | `control_end.py`    | the control process's end without a socket                       |
 | `robot_end.py`      | the robot's end without a socket: gate, watchdog, ramp           |
+| `blink_end.py`      | the robot's end of it                                            |
 | `deploy/watchdog/`  | the robot's end in C, for firmware                               |
 | this file           | the socket of the control process                                |
 
@@ -18,7 +20,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from hardware.follower import BodySample, FollowerError, ThrustCommand
+from hardware.follower import BlinkOrder, BodySample, FollowerError, ThrustCommand
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import MAX_BYTES
 from hardware.robot_file import RobotFile
@@ -93,8 +95,15 @@ class UdpFollower:
         if self._closed:
             raise FollowerError("the link is closed", "an open one")
 
+    def blink(self, order: BlinkOrder) -> None:
+        """See `Blinking`."""
+        self._check_open()
+        self._post(self._end.blink(order))
+
     def _send(self, command: ThrustCommand) -> None:
-        data = self._end.command(command, self._clock())
+        self._post(self._end.command(command, self._clock()))
+
+    def _post(self, data: bytes) -> None:
         try:
             self._socket.send(data)
         except OSError:  # refused: nobody listens there (yet); or the way is down or full

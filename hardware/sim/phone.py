@@ -166,14 +166,15 @@ class VirtualPhone:
         hidden: Callable[[float], Sequence[int]] = lambda _: (),
         twin: BodyHistory | None = None,
         body: BodyShape | None = None,
+        twin_hidden: Callable[[float], Sequence[int]] = lambda _: (),
     ) -> None:
         """A phone with `camera` that sees LEDs at `leds_in_b` (n, 3) [m] as `look` says.
 
         The camera's mounting is the truth, whatever a calibration knows of it.
         `hidden` gives the LEDs that something covers at a time [s], `twin` where another robot of
-        the same kind is; the LEDs' robot has a `body`.
+        the same kind is, `twin_hidden` the same for its LEDs; the LEDs' robot has a `body`.
         """
-        self._hidden, self._twin = hidden, twin
+        self.hidden, self._twin, self._twin_hidden = hidden, twin, twin_hidden
         self.camera, self.hand, self.options, self.clock = camera, hand, options, clock
         self._leds_in_b, self._look, self._body = leds_in_b, look, body
         schedule, self._sensor_rng, self._picture_rng = rng.spawn(3)
@@ -238,8 +239,11 @@ class VirtualPhone:
         if self.films is not None:
             image = self.films(seen_by, moment, self._picture_rng)
         else:
-            shown = np.delete(self._leds_in_b, list(self._hidden(moment)), axis=0)
-            others = [] if self._twin is None else [(seen_as(self._twin), self._leds_in_b)]
+            shown = np.delete(self._leds_in_b, list(self.hidden(moment)), axis=0)
+            others = []
+            if self._twin is not None:
+                lit = np.delete(self._leds_in_b, list(self._twin_hidden(moment)), axis=0)
+                others.append((seen_as(self._twin), lit))
             image = render(
                 seen_by, seen_as(body), shown, self._look, self._picture_rng, self._body, others
             )

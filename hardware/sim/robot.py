@@ -73,7 +73,7 @@ class RobotProcess:
         if poses and ahead_s > 0.0:
             t = poses[-1][0]
             poses += [(t + dt, wxyz, p) for dt, wxyz, p in self._robot.plant.ahead(ahead_s)]
-        answer = encode_truth(request, poses, self._robot.plant.thrusts)
+        answer = encode_truth(request, poses, self._robot.plant.thrusts, self._robot.dark)
         with contextlib.suppress(OSError):
             truth.sendto(answer, sender)
 

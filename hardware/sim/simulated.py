@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hardware.link.blink_end import NO_LED, BlinkEnd
 from hardware.link.datagram import U64, triple
 from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.link.robot_server import TICK_US
@@ -42,26 +43,32 @@ class SimulatedRobot:
         robot = robot_file.robot
         self.plant = Plant(robot_file.plant, np.random.default_rng(seed), options)
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
+        self._blink = BlinkEnd(key) if robot.blinks else None
         self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
+        self.dark: deque[int] = deque(maxlen=HISTORY)
+        """The LED that was dark then, −1: none."""
         self._nonces, self._boot_id = nonces, boot_id
         self._setpoint = np.zeros(robot.A.shape[1])
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
         """A datagram has come from `peer`."""
-        self.end.receive(data, peer, now_us)
+        if self._blink is None or not self._blink.receive(data, self.end, now_us):
+            self.end.receive(data, peer, now_us)
 
     def tick(self, now_us: int) -> bytes:
         """Move on to `now_us`, one tick after the last; gives the sample to be sent."""
         self.plant.step(self._setpoint, 1e-6 * TICK_US)
         self._setpoint = self.end.setpoint(now_us)
         self.history.append((now_us, self.plant.wxyz_fb, self.plant.p_bf_in_f))
+        self.dark.append(NO_LED if self._blink is None else self._blink.dark(now_us))
         return self._sample(now_us, self.plant.thrusts)
 
     def restart(self, robot_file: RobotFile, key: bytes) -> None:
         """Start anew, refusing thrust; the body goes on as it was."""
         self._boot_id += 1
         self.end = RobotEnd(LinkLimits.of(robot_file), self._boot_id, key)
+        self._blink = BlinkEnd(key) if robot_file.robot.blinks else None
 
     def shut_down(self, now_us: int) -> bytes:
         """Thrusters off; gives the last sample."""

@@ -7,11 +7,12 @@ ahead [s], 0 to 0.2, it goes with the last commands held. Answer, little-endian:
 |--------|---------|------------------------------------------------------------------|
 | 0      | 8 bytes | those of the request                                             |
 | 8      | 4 bytes | magic `LLtr`                                                     |
-| 12     | u8      | version, 1                                                       |
+| 12     | u8      | version, 2                                                       |
 | 13     | u8      | m, thrusters                                                     |
 | 14     | u16     | n, poses, at most 50 (0.25 s at 200 Hz), and up to 40 ahead      |
 | 16     | n × 64  | 8 × f64, oldest first: CLOCK_MONOTONIC of this machine [s],      |
 |        |         | attitude wxyz_fb, position of the centre of mass p_bf_in_f [m]   |
+| …      | n × i8  | the LED that was dark then, −1: none                             |
 | …      | m × f32 | thrusts of the last one [N]                                      |
 """
 
@@ -20,10 +21,11 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from hardware.follower import FollowerError
 from pipeline.frames import Array, R_from_wxyz, exp, log
@@ -31,7 +33,7 @@ from pipeline.frames import Array, R_from_wxyz, exp, log
 REQUEST_BYTES = 8
 AHEAD = struct.Struct("<f")
 MAX_AHEAD_S = 0.2
-MAGIC, VERSION = b"LLtr", 1
+MAGIC, VERSION = b"LLtr", 2
 HEAD = struct.Struct("<8s4sBBH")
 MAX_BYTES = 8_192
 
@@ -48,6 +50,8 @@ class Truth:
     """(n, 3) [m]."""
     thrusts: Array
     """(m,) at the last of them [N]."""
+    dark: npt.NDArray[np.int8]
+    """(n,) the LED that was dark, −1: none."""
 
     def at(self, t: float) -> tuple[Array, Array]:
         """(R_fb (3, 3), p_bf_in_f (3,)) at `t` [s], between its two ticks; at either end that's."""
@@ -61,6 +65,10 @@ class Truth:
         p: Array = (1.0 - share) * self.p_bf_in_f[before] + share * self.p_bf_in_f[after]
         return R @ exp(share * turn), p
 
+    def dark_at(self, t: float) -> int:
+        """The LED that was dark at `t` [s], −1: none; as from the tick before."""
+        return int(self.dark[max(int(np.searchsorted(self.t, t, side="right")) - 1, 0)])
+
 
 def ahead_of(request: bytes) -> float | None:
     """How far ahead [s] a request asks; None: it is none."""
@@ -73,12 +81,19 @@ def ahead_of(request: bytes) -> float | None:
 
 
 def encode_truth(
-    request: bytes, poses: Sequence[tuple[float, Array, Array]], thrusts: Array
+    request: bytes,
+    poses: Sequence[tuple[float, Array, Array]],
+    thrusts: Array,
+    dark: Collection[int] = (),
 ) -> bytes:
-    """The answer to `request`; `poses` are (t [s], wxyz_fb, p_bf_in_f [m]), oldest first."""
+    """The answer to `request`; `poses` are (t [s], wxyz_fb, p_bf_in_f [m]), oldest first.
+
+    `dark` is the LED that was dark at each, −1: none; of those behind them none was.
+    """
     head = HEAD.pack(request[:REQUEST_BYTES], MAGIC, VERSION, len(thrusts), len(poses))
     rows = b"".join(struct.pack("<8d", t, *wxyz, *p) for t, wxyz, p in poses)
-    return head + rows + struct.pack(f"<{len(thrusts)}f", *thrusts)
+    leds = (*dark, *(len(poses) - len(dark)) * (-1,))
+    return head + rows + struct.pack(f"<{len(leds)}b{len(thrusts)}f", *leds, *thrusts)
 
 
 def decode_truth(data: bytes, request: bytes) -> Truth | None:
@@ -88,11 +103,12 @@ def decode_truth(data: bytes, request: bytes) -> Truth | None:
     echoed, magic, version, thrusters, n = HEAD.unpack_from(data)
     if (echoed, magic, version) != (request, MAGIC, VERSION) or n == 0:
         return None
-    if len(data) != HEAD.size + 64 * n + 4 * thrusters:
+    if len(data) != HEAD.size + 65 * n + 4 * thrusters:
         return None
     rows = np.frombuffer(data, "<f8", 8 * n, HEAD.size).reshape(n, 8).astype(np.float64)
-    thrusts = np.frombuffer(data, "<f4", thrusters, HEAD.size + 64 * n).astype(np.float64)
-    return Truth(rows[:, 0], rows[:, 1:5], rows[:, 5:8], thrusts)
+    dark = np.frombuffer(data, np.int8, n, HEAD.size + 64 * n)
+    thrusts = np.frombuffer(data, "<f4", thrusters, HEAD.size + 65 * n).astype(np.float64)
+    return Truth(rows[:, 0], rows[:, 1:5], rows[:, 5:8], thrusts, dark)
 
 
 class TruthClient:
@@ -130,8 +146,8 @@ class TruthClient:
             raise FollowerError(f"truth on port {self._port}: {error}", "a running one") from error
         raise FollowerError(f"no truth on port {self._port}", "a running simulated robot")
 
-    def at(self, t: float) -> tuple[Array, Array]:
-        """(R_fb (3, 3), p_bf_in_f (3,) [m]) at `t` [s, monotonic].
+    def about(self, t: float) -> Truth:
+        """What is told of `t` [s, monotonic].
 
         Asks the robot only if `t` is newer than what it has told. A time beyond its memory gives
         the nearest it has.
@@ -140,9 +156,15 @@ class TruthClient:
             FollowerError: no answer in time.
         """
         truth = self._newest
-        if truth is None or t > truth.t[-1]:
-            truth = self.latest()
-        return truth.at(t)
+        return self.latest() if truth is None or t > truth.t[-1] else truth
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """(R_fb (3, 3), p_bf_in_f (3,) [m]) at `t` [s, monotonic], as `about`.
+
+        Raises:
+            FollowerError: no answer in time.
+        """
+        return self.about(t).at(t)
 
     def close(self) -> None:
         """Give the socket back."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from hardware.follower import BodySample, FollowerError, FollowerState, ThrustCommand
+from hardware.follower import BlinkOrder, BodySample, FollowerError, FollowerState, ThrustCommand
+from hardware.link.blink_end import NO_LED
 from hardware.link.control_end import ControlEnd
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
@@ -69,6 +70,11 @@ class VirtualTimeFollower:
         return 1e-6 * self._now_us
 
     @property
+    def dark(self) -> int:
+        """The LED that is dark now, −1: none."""
+        return self._robot.dark[-1] if self._robot.dark else NO_LED
+
+    @property
     def state(self) -> FollowerState:
         """State of the robot, by itself."""
         return self._robot.end.state
@@ -97,6 +103,11 @@ class VirtualTimeFollower:
         self._check_open()
         self._send(command)
 
+    def blink(self, order: BlinkOrder) -> None:
+        """See `Blinking`."""
+        self._check_open()
+        self._post(self._end.blink(order))
+
     def stop(self) -> None:
         """Zero thrust."""
         if not self._closed:
@@ -111,7 +122,9 @@ class VirtualTimeFollower:
             raise FollowerError("the link is closed", "an open one")
 
     def _send(self, command: ThrustCommand) -> None:
-        data = self._end.command(command, self.t)
+        self._post(self._end.command(command, self.t))
+
+    def _post(self, data: bytes) -> None:
         if self.connected:
             for one in self.to_robot(data):
                 self._robot.receive(one, HERE, self._now_us)

@@ -21,6 +21,7 @@ from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import GRAVITY, Array, log
 from pipeline.imu_stream import MAX_GAP_S, ImuStream, ImuStreams
 from pipeline.signals import RelativePose, VisionMeasurement
+from pipeline.vision.blink_code import BlinkCode, BlinkReader
 
 UNGATED: Final = 1e9
 """χ² of an LED: what is held against a candidate must rest on all of it."""
@@ -115,6 +116,7 @@ class RobotCandidate:
 
     def __init__(self, leds_in_b: Array, view: CandidateView) -> None:
         """First seen at `view`."""
+        self._reader: BlinkReader | None = None
         self._leds_in_b, self._last = leds_in_b, view
         self._models: list[MotionHypothesis] = []
         """Ours, then still and free; none before anything was felt."""
@@ -144,6 +146,20 @@ class RobotCandidate:
         ours, *others = (model.judge(view, imus) for model in self._models)
         odds = min(max(ours - max(others), -MOST), MOST)
         self._evidence = MEMORY * self._evidence + odds
+
+    def read(self, view: CandidateView, code: BlinkCode | None) -> None:
+        """What its LEDs say at `view`; `code` is what ours blinks, None: nothing."""
+        if code is None:
+            self._reader = None
+            return
+        if self._reader is None or self._reader.code != code:
+            self._reader = BlinkReader(code, len(self._leds_in_b))
+        self._reader.see(view.seen.t, view.seen.rays.led)
+
+    @property
+    def code_odds(self) -> float:
+        """Logarithm of the odds by which its LEDs say that it is ours."""
+        return self._reader.odds if self._reader is not None else 0.0
 
     def is_near(self, view: CandidateView) -> bool:
         """Whether it could be what is seen now."""

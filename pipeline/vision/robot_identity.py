@@ -7,6 +7,7 @@ from typing import Final
 
 from pipeline.frames import Array
 from pipeline.imu_stream import ImuStreams
+from pipeline.vision.blink_code import CLEAR, BlinkCode
 from pipeline.vision.last_pose import PossiblePlaces
 from pipeline.vision.motion_hypotheses import (
     CONTRARY,
@@ -19,16 +20,23 @@ from pipeline.vision.motion_hypotheses import (
 REMEMBERED_S: Final = 10.0
 """Another robot that was seen so recently is still there."""
 TWO = "Two robots seen: move yours a little, so that it shows which one it is."
+READING = "A robot seen: its lights are being read. If that takes long, move it a little."
 ELSEWHERE = "A robot seen, but where yours can't be: if it is yours, move it a little."
 
 
 class RobotIdentity:
     """Remembers what looked like the robot until one of them is."""
 
-    def __init__(self, leds_in_b: Array, imus: ImuStreams | None) -> None:
-        """LEDs (n, 3) [m]; without motion sensors only a place can tell."""
+    def __init__(self, leds_in_b: Array, imus: ImuStreams | None, blinks: bool = False) -> None:
+        """LEDs (n, 3) [m]; without motion sensors only a place can tell.
+
+        One that `blinks` is not taken for ours just because no other is seen: ours may be dark.
+        """
+        self._blinks = blinks
         self._leds_in_b, self._imus = leds_in_b, imus
         self._candidates: list[RobotCandidate] = []
+        self.code: BlinkCode | None = None
+        """What our robot blinks now; None: it shines."""
         self.reason = ""
         """Why none was told of those seen; empty if one was."""
 
@@ -62,16 +70,20 @@ class RobotIdentity:
             for k, (view, one) in enumerate(zip(views, known, strict=True))
             if any(place.holds(view.pose) for place in reach) and not (one and one.is_far)
         ]
-        if len(near) == 1 or (not reach and len(views) == 1 and self._is_alone(known[0])):
+        alone = not reach and len(views) == 1 and self._is_alone(known[0])
+        if len(near) == 1 or (alone and not self._blinks):
             return near[0] if near else 0
         for k, view in enumerate(views):
             candidate = known[k] or RobotCandidate(self._leds_in_b, view)
             if known[k] is None:
                 self._candidates.append(candidate)
             candidate.is_far = bool(reach) and (candidate.is_far or k not in near)
+            candidate.read(view, self.code)
             candidate.see(view, self._imus if self._can_tell(t, up_in_c) else None, up_in_c)
         ours = self._proven(t)
-        self.reason = "" if ours is not None else TWO if len(self._candidates) > 1 else ELSEWHERE
+        if ours is None:
+            lone = READING if self._blinks and not reach else ELSEWHERE
+            self.reason = TWO if len(self._candidates) > 1 else lone
         return None if ours is None else next(k for k, x in enumerate(views) if ours.is_at(x))
 
     def _can_tell(self, t: float, up_in_c: Array | None) -> bool:
@@ -85,7 +97,9 @@ class RobotIdentity:
         return all(one is candidate for one in self._candidates)
 
     def _proven(self, t: float) -> RobotCandidate | None:
-        """What moves as ours does and as no other one."""
+        """What blinks as ours was told to; or what moves as ours does and as no other one."""
+        if self.code is not None and (said := self._said_so(t)) is not None:
+            return said
         *others, best = sorted(self._candidates, key=lambda one: one.odds(t))
         if best.t != t:
             return None
@@ -93,3 +107,9 @@ class RobotIdentity:
             return best if best.odds(t) > DECISIVE else None
         clear = best.odds(t) - others[-1].odds(t) > DECISIVE
         return best if clear and best.odds(t) > CONTRARY else None
+
+    def _said_so(self, t: float) -> RobotCandidate | None:
+        """What blinks as ours was told to and as no other one does."""
+        *others, best = sorted(self._candidates, key=lambda one: one.code_odds)
+        clear = best.code_odds - max((one.code_odds for one in others), default=0.0)
+        return best if best.t == t and min(best.code_odds, clear) > CLEAR else None

@@ -28,6 +28,7 @@ from pipeline.signals import (
 )
 from pipeline.spots import leds
 from pipeline.vision import few_leds
+from pipeline.vision.blink_code import BlinkCode
 from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.last_pose import LastPose, Place
 from pipeline.vision.led_tracker import LedTracker
@@ -64,8 +65,13 @@ class Vision:
         leds_config: LedsConfig | None = None,
         identify_config: IdentifyConfig | None = None,
         imus: ImuStreams | None = None,
+        *,
+        blinks: bool = False,
     ) -> None:
-        """Begin with nothing seen; LEDs (n, 3) [m]; `imus`, filled by others, tell robots apart."""
+        """Begin with nothing seen; LEDs (n, 3) [m]; `imus`, filled by others, tell robots apart.
+
+        A robot that `blinks` is believed to be ours once its code, motion or place says so.
+        """
         self.camera, self._leds_in_b = camera, leds_in_b
         self._leds = leds_config or LedsConfig()
         self._identify = identify_config or IdentifyConfig()
@@ -76,7 +82,7 @@ class Vision:
         """Where a filter that is trusted expects the LEDs in this picture."""
         self._tracker = LedTracker(camera, leds_in_b, self._leds, self._identify)
         self._initialisation = Initialisation(camera, leds_in_b, self._identify)
-        self._identity = RobotIdentity(leds_in_b, imus)
+        self._identity = RobotIdentity(leds_in_b, imus, blinks)
         self._area_px_m2 = 0.0
         """Of the last named spots, times their depth squared: what an LED looks like."""
 
@@ -123,6 +129,10 @@ class Vision:
         """`pose`, of the last picture, was believed: predict from it."""
         self._last.keep(pose, self._prior.expected)
         self._tilt_bias.learn(self._prior.up_in_c, self._prior.up_in_b, pose.R_cb)
+
+    def blinks(self, code: BlinkCode | None) -> None:
+        """The robot blinks so from now on; None: its LEDs shine."""
+        self._identity.code = code
 
     def roll(self, readout_s: float) -> None:
         """From the next picture on, the camera's rows are read in so long [s]."""

@@ -32,6 +32,7 @@ from pipeline.signals import (
 )
 from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision import vision
+from pipeline.vision.blink_code import BlinkCode
 from pipeline.vision.detection import Detection, FramePrior
 from pipeline.vision.gating import disbelief
 from pipeline.vision.imu_buffer import ImuBuffer
@@ -59,13 +60,15 @@ class VisualFrontEnd:
         leds_in_b: Array,
         gates: GatesConfig,
         clock: Callable[[], float] = lambda: 0.0,
+        *,
+        blinks: bool = False,
     ) -> None:
-        """LEDs (n, 3) [m]; `clock` only times the stages."""
+        """LEDs (n, 3) [m]; `clock` only times the stages; the robot `blinks` codes when told to."""
         self.camera = camera
         self._gates, self._clock, self._leds_in_b = gates, clock, leds_in_b
         self._waiting: deque[PhoneImu | BodyImu] = deque(maxlen=CAPACITY)
         imus = ImuStreams()
-        self._vision = Vision(camera, leds_in_b, imus=imus)
+        self._vision = Vision(camera, leds_in_b, imus=imus, blinks=blinks)
         self._phone, self._body = ImuBuffer(imus.phone), ImuBuffer(imus.body)
         self._predictions, self._stamps = PredictionHistory(), CameraImuDelay(imus)
         self.monitor, self.readout = (
@@ -85,6 +88,10 @@ class VisualFrontEnd:
     def add_prediction(self, expected: Prediction | None) -> None:
         """Follow what a filter says; None: it says nothing."""
         self._predictions.add(expected)
+
+    def blinks(self, code: BlinkCode | None) -> None:
+        """The robot blinks so from now on; None: its LEDs shine."""
+        self._vision.blinks(code)
 
     def process(self, frame: Frame) -> Detection:
         """Find the robot in a frame, with what both motion sensors said of its time."""

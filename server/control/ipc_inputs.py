@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from pipeline.frames import Array
 from pipeline.signals import LedRays, PhoneImu, RelativePose, TouchState, VisionMeasurement
+from pipeline.vision.blink_code import CODES
 from server.common.runtime_parameters import Tune
 
 LARGEST = 1e9
@@ -38,7 +39,14 @@ class ReadyInput(msgspec.Struct, tag="ready", array_like=True, frozen=True):
     refusals: list[str]
 
 
-Input = PhoneImu | VisionMeasurement | TouchState | RequestInput | ReadyInput | Tune
+class BlinkInput(msgspec.Struct, tag="blink", array_like=True, frozen=True):
+    """The robot's LEDs shall blink a code of `blink_code.book`; said again while it is wanted."""
+
+    number: int
+    t_begin: float
+
+
+Input = PhoneImu | VisionMeasurement | TouchState | RequestInput | ReadyInput | BlinkInput | Tune
 
 
 class _Motion(msgspec.Struct, tag="imu", array_like=True, frozen=True):
@@ -77,7 +85,7 @@ def _array(_: type, plain: tuple[str, Sequence[int], bytes]) -> npt.NDArray[Any]
 _TAGGED = {PhoneImu: _Motion, VisionMeasurement: _Seen, TouchState: _Touch, Tune: _Tune}
 _encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
 _decoder = msgspec.msgpack.Decoder(
-    _Motion | _Seen | _Touch | RequestInput | ReadyInput | _Tune, dec_hook=_array
+    _Motion | _Seen | _Touch | RequestInput | ReadyInput | BlinkInput | _Tune, dec_hook=_array
 )
 
 
@@ -122,6 +130,8 @@ def is_believable(message: Input) -> bool:
             )
         case TouchState():
             return abs(message.t) <= LARGEST
+        case BlinkInput():
+            return 0 <= message.number < CODES and abs(message.t_begin) <= LARGEST
         case _:
             return True
 

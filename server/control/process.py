@@ -171,7 +171,8 @@ def run(options: ControlOptions) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda n, _frame: stopping.append(n))
     try:
-        _loop(controller, follower, endpoint, granted, stopping)
+        link = RobotLink(follower, robot_file.robot.blinking_leds)
+        _loop(controller, follower, link, endpoint, granted, stopping)
     finally:
         follower.close()
         endpoint.close()
@@ -180,22 +181,22 @@ def run(options: ControlOptions) -> None:
 def _loop(
     controller: Controller,
     follower: Follower,
+    link: RobotLink,
     endpoint: Endpoint,
     granted: str,
     stopping: list[int],
 ) -> None:
     """Tick until told to stop; who gives no thrust then says so to the end."""
-    schedule, link = realtime.Schedule(PERIOD_S), RobotLink(follower)
+    schedule = realtime.Schedule(PERIOD_S)
     lateness: dict[str, float] = {}
     cpu_ms, command = np.zeros(LATENESS_EVERY), ThrustCommand.zero(follower.thrusters)
     while not stopping:
         now = schedule.wait()
         cpu = clock.thread_cpu()
-        body = link.receive(now)
-        command, output = controller.tick(
-            now, endpoint.inputs(), body, link.reason, link.gap, link.left_s
-        )
+        body, inputs = link.receive(now), endpoint.inputs()
+        command, output = controller.tick(now, inputs, body, link.reason, link.gap, link.left_s)
         follower.send(command)
+        link.pass_on(inputs, now)
         cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (clock.thread_cpu() - cpu)
         if schedule.ticks % LATENESS_EVERY == 0:
             lateness = schedule.lateness_ms()

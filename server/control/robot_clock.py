@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
 
 import numpy as np
 
-from hardware.follower import EXPLANATIONS, BodySample, Follower, FollowerState, Refusal
+from hardware.follower import (
+    EXPLANATIONS,
+    Blinking,
+    BlinkOrder,
+    BodySample,
+    Follower,
+    FollowerState,
+    Refusal,
+)
+from hardware.link.blink_datagram import LASTS_MS
 from hardware.link.robot_end import BACK_UNTIL_US, RAMP_AFTER_US, SILENCE_US
 from pipeline.signals import BodyImu
+from pipeline.vision.blink_code import SLOT_S, book
+from server.control.ipc_inputs import BlinkInput, Input
 
 
 class BodyClock:
@@ -26,11 +38,18 @@ class BodyClock:
         self._count += 1
         return BodyImu(t_robot + float(self._excess.min()), sample.omega_in_b, sample.a_in_b)
 
+    def robot_us(self, t: float) -> int | None:
+        """What the robot's clock shows at `t` [s] of ours [µs]; None before any sample."""
+        least = float(self._excess.min())
+        return round(1e6 * (t - least)) if np.isfinite(least) else None
+
     def forget(self) -> None:
         """The robot has restarted: its clock is a new one."""
         self._excess[:] = np.inf
 
 
+LINGER_S = 0.5
+"""A robot that is no longer told to blink ends it by itself."""
 DEAF = "The robot hears nothing for the moment."
 SILENCE_S, RAMP_AFTER_S = 1e-6 * SILENCE_US, 1e-6 * RAMP_AFTER_US
 RAMP_BEGUN_S = 1e-6 * (BACK_UNTIL_US - RAMP_AFTER_US)
@@ -40,9 +59,10 @@ RAMP_BEGUN_S = 1e-6 * (BACK_UNTIL_US - RAMP_AFTER_US)
 class RobotLink:
     """The robot's samples on our clock, and what it says against flying."""
 
-    def __init__(self, follower: Follower) -> None:
-        """Begin with nothing received."""
+    def __init__(self, follower: Follower, blinking_leds: int = 0) -> None:
+        """Begin with nothing received; none of a robot's LEDs blink that can't all be told to."""
         self._follower = follower
+        self._book = book(blinking_leds) if blinking_leds else None
         self._clock = BodyClock()
         self._boot_id: int | None = None
         self._restarted = False
@@ -70,6 +90,17 @@ class RobotLink:
             self._t_sample = now
         self.left_s = self._left(now)
         return dated
+
+    def pass_on(self, messages: Iterable[Input], now: float) -> None:
+        """Tell the robot to go on blinking, if it can and one of the server's messages says so."""
+        wishes = [message for message in messages if isinstance(message, BlinkInput)]
+        if not wishes or self._book is None or not isinstance(self._follower, Blinking):
+            return
+        code, begin_us = wishes[-1], self._clock.robot_us(wishes[-1].t_begin)
+        lasts_ms = round(1e3 * (now - code.t_begin + LINGER_S))
+        if begin_us is not None and begin_us >= 0 and 0 < lasts_ms <= LASTS_MS:
+            dark = tuple(self._book[code.number].tolist())
+            self._follower.blink(BlinkOrder(begin_us, lasts_ms, round(1e3 * SLOT_S), dark))
 
     def _left(self, now: float) -> float:
         """A robot that we don't hear coasts, too: commands must echo its newest samples."""

@@ -12,7 +12,9 @@ from pipeline.signals import Frame, StampOffset
 from pipeline.vision.detection import Detection
 from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
+from server.control.ipc_inputs import BlinkInput
 from server.media.decoding import MakeDecoder
+from server.phone.blink_choice import BlinkChoice
 from server.phone.decoder import FrameDecoder
 from server.phone.ingest import ARRIVAL_S, EncodedFrame
 
@@ -31,7 +33,10 @@ class FramePipeline(FrameDecoder):
         """`clock` only times the stages; `make` says where pictures are decoded."""
         super().__init__(camera.width, camera.height, make)
         self.camera, self._clock = camera, clock
-        self.front_end = VisualFrontEnd(camera, robot.leds_in_b, gates, clock)
+        self.front_end = VisualFrontEnd(camera, robot.leds_in_b, gates, clock, blinks=robot.blinks)
+        self._blink = BlinkChoice() if robot.blinks else None
+        self.wish: BlinkInput | None = None
+        """What the robot is to be told to blink, by the newest picture."""
 
     def see(self, frames: Sequence[EncodedFrame]) -> Detection | None:
         """Decode all of `frames` in order, look at the newest; None if it can't be decoded."""
@@ -45,6 +50,9 @@ class FramePipeline(FrameDecoder):
         picture = Frame(t, luma, self.full_range)
         decoded = self._clock()
         detection = self.front_end.process(picture)
+        if self._blink is not None:
+            self.wish = self._blink.look(detection, frames[-1].t_received)
+            self.front_end.blinks(self._blink.code)
         if detection.offset is None and frames[-1].picture.by_arrival:
             detection = replace(detection, offset=StampOffset(0.0, ARRIVAL_S))
         return replace(detection, took_s={"decode": decoded - started, **detection.took_s})

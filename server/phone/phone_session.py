@@ -179,11 +179,17 @@ class PhoneSession:
         screen = self._screen
         self.vision = VisionThread(
             frame_pipeline,
-            partial(self._sighted, camera),
+            partial(self._looked, frame_pipeline),
             self._on_taken,
             self._on_key_wanted,
             partial(screen.looked, camera) if screen is not None else None,
         )
+
+    def _looked(self, eye: FramePipeline, detection: Detection, frame: EncodedFrame) -> None:
+        """In the vision thread: hand on what was seen, and what the robot is to blink."""
+        if eye.wish is not None:
+            self._to_control(eye.wish)
+        self._sighted(eye.camera, detection, frame)
 
     def _sighted(self, camera: Camera, detection: Detection, frame: EncodedFrame) -> None:
         """In the vision thread: hand on what was seen, remember where the time went."""

@@ -32,6 +32,7 @@ from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, TouchState, VisionMeasurement
 from pipeline.teleop import Output
 from pipeline.timing.clock_synchronisation import ClockSynchronisation
+from pipeline.vision.blink_code import NONE, BlinkCode
 from pipeline.vision.detection import Detection
 from server.control.controller import Controller, never_too_late
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput, is_believable
@@ -77,6 +78,8 @@ class SimulationOptions:
     """From when to when [s] which LEDs can't be seen."""
     twin: bool = False
     """Another robot of the same kind flies beside, in rendered pictures."""
+    twin_code: int | None = None
+    """What the LEDs of that one blink; None: they shine."""
     led_noise_px: float | None = None
     """None: pictures are rendered and looked at; else LEDs' rays come with this noise instead."""
     camera: Camera | None = None
@@ -144,6 +147,7 @@ class VirtualTimeSimulation:
         self.checks_rays = False
         """What LEDs' rays say is held against the motion sensors, as each picture is."""
         self._script = make_script(robot_file, scene, operator, hand)
+        self.phone.hidden = self._hidden_at
         nonces = np.random.default_rng((scene.seed, 7))
         self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
         if scene.knows_clock:
@@ -153,8 +157,10 @@ class VirtualTimeSimulation:
         self._ingest.extrinsics = camera.extrinsics
         self._frame_pipeline = FramePipeline(camera, robot_file.robot, config.gates)
         self._vision_model = make_vision_model(robot_file, scene, self._script)
-        self._link = RobotLink(self.follower)
+        self._link = RobotLink(self.follower, robot_file.robot.blinking_leds)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
+        self._dark: deque[int] = deque(maxlen=120)
+        """The LED that the robot kept dark with each pose."""
         self._on_their_way: deque[tuple[int, Record]] = deque()
         self._frames: list[EncodedFrame] = []
         self._inbox: list[Input] = []
@@ -193,6 +199,7 @@ class VirtualTimeSimulation:
         self._ticks += 1
         plant = self.follower.plant
         self._poses.append((self.t, plant.wxyz_fb, plant.p_bf_in_f))
+        self._dark.append(self.follower.dark)
         self._hear_phone(t_before)
         self._hear_small_talk()
         due = self.control_every > 0 and self._ticks % self.control_every == 0
@@ -212,6 +219,7 @@ class VirtualTimeSimulation:
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._frame_pipeline.front_end.add_prediction(self.controller.expected(output))
         self.follower.send(command)
+        self._link.pass_on(inbox, self.t)
         self._feel(*felt)
         wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
         if wish is not None:
@@ -219,8 +227,16 @@ class VirtualTimeSimulation:
         return output
 
     def _robot_at(self, t: float) -> tuple[Array, Array]:
+        return self._truth().at(t)
+
+    def _hidden_at(self, t: float) -> tuple[int, ...]:
+        dark = self._truth().dark_at(t)
+        return self.scene.hidden_at(t) + ((dark,) if dark != NONE else ())
+
+    def _truth(self) -> Truth:
         times, wxyz, p = zip(*self._poses, strict=True)
-        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0)).at(t)
+        dark = np.array(self._dark, dtype=np.int8)
+        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0), dark)
 
     def _hear_phone(self, t_before: float) -> None:
         """Sensors and pictures that arrive within this period."""
@@ -292,6 +308,8 @@ class VirtualTimeSimulation:
         if not frames:
             return
         detection = self._frame_pipeline.see(frames)
+        if self._frame_pipeline.wish is not None:
+            self._inbox.append(self._frame_pipeline.wish)
         self.trace.pictures += 1
         self.trace.leds.append(len(detection.rays) if detection is not None else 0)
         self._tell(detection.seen(self._frame_pipeline.camera) if detection is not None else None)
@@ -363,7 +381,7 @@ def make_script(
         RenderOptions(),
         np.random.default_rng((scene.seed, 3)),
         sensors,
-        hidden=scene.hidden_at,
+        twin_hidden=_twin_hidden(robot_file, scene),
         twin=hovering(np.random.default_rng((scene.seed, 13)), BESIDE, np.zeros(3)).pose
         if scene.twin
         else None,
@@ -371,3 +389,11 @@ def make_script(
     size = camera.width, camera.height
     encoder = Encoder(*size, sensors.frame_rate_hz, scene.bitrate_bps, scene.codec)
     return PhoneScript(phone, encoder, operator or VirtualOperator())
+
+
+def _twin_hidden(robot_file: RobotFile, scene: SimulationOptions) -> Callable[[float], list[int]]:
+    """LEDs of the twin that are dark at a time [s]."""
+    if scene.twin_code is None:
+        return lambda _: []
+    code, leds = BlinkCode(scene.twin_code, 0.0), len(robot_file.robot.leds_in_b)
+    return lambda t: [led for led in (code.dark(t, leds),) if led != NONE]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
 
 from hardware.follower import FollowerError
+from hardware.link.blink_end import NO_LED
 from hardware.sim.phone import DelayedStream, Event
 from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
@@ -61,6 +63,14 @@ class RobotTruth:
                 self.silences += 1
         return self._last
 
+    def dark(self, t: float) -> Sequence[int]:
+        """The LEDs that it kept dark at `t` [s, monotonic], at most 0.25 s ago."""
+        led = NO_LED
+        if self._truth is not None:
+            with contextlib.suppress(FollowerError):  # `pose` counts its silences
+                led = self._truth.about(t).dark_at(t)
+        return () if led == NO_LED else (led,)
+
     def close(self) -> None:
         """Give the socket back."""
         if self._truth is not None:
@@ -84,6 +94,7 @@ class LivePhone:
         """
         self.script = script
         self._seen, self._scored = RobotTruth(truth_port), RobotTruth(truth_port)
+        script.phone.hidden = self._seen.dark
         self.client = make_client(access, self._pong, self._status)
         self.score = TrackingMetrics(script.phone, access.virtual_camera, axes)
         self.skipped = self.sent = 0

@@ -78,7 +78,8 @@ def compiled_watchdog(directory: Path) -> Path:
     """The program of a robot in C; skips the test where there is no compiler."""
     if shutil.which("gcc") is None:
         pytest.skip("NO COMPILER, not tested: gcc is not installed")
-    program, names = directory / "robot", ("robot_main.c", "watchdog.c", "attitude.c", "hmac.c")
+    program = directory / "robot"
+    names = ("robot_main.c", "watchdog.c", "blink.c", "attitude.c", "hmac.c")
     words = ("gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(program))
     subprocess.run((*words, *(str(WATCHDOG / name) for name in names), "-lm"), check=True)
     return program

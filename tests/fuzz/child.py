@@ -20,6 +20,7 @@ INSTRUMENTED = [
     "hardware.link.link_key",
     "hardware.led_file",
     "hardware.led_layout.file",
+    "hardware.link.blink_datagram",
     "hardware.link.robot_end",
     "hardware.robot_file",
     "hardware.robot_schema",

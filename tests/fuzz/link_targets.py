@@ -4,7 +4,8 @@ from math import isfinite
 
 import numpy as np
 
-from hardware.follower import FollowerState, Refusal, ThrustCommand
+from hardware.follower import BlinkOrder, FollowerState, Refusal, ThrustCommand
+from hardware.link.blink_datagram import LASTS_MS, BlinkDatagram, decode_blink, encode_blink
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import (
     COMMAND_MAGIC,
@@ -79,6 +80,21 @@ def sample(data: bytes) -> None:
     assert 0 <= decoded.t_us < 1 << 60
     assert encode_sample(decoded, KEY)[: len(data)] == data
     assert data[:4] == SAMPLE_MAGIC
+
+
+def blink_seeds():
+    for lasts_ms in (0, 500, LASTS_MS):
+        order = BlinkOrder(10**6, lasts_ms, 62, (0, 4, -1, 2, 1, 3, 3, -1))
+        yield encode_blink(BlinkDatagram(5, 7, order), KEY)[:-MAC_BYTES]
+
+
+@target("blink_order", blink_seeds, (LinkError,), max_bytes=80, mutants=4000)
+def blink_order(data: bytes) -> None:
+    """The same for blink orders, which end soon and are never taken for a command."""
+    decoded = decode_blink(sealed(data), KEY)
+    assert encode_blink(decoded, KEY)[: len(data)] == data
+    assert decoded.order.lasts_ms <= LASTS_MS
+    assert RobotEnd(LIMITS, 9, KEY).receive(sealed(data), PEER, 10**6) == Refusal.MALFORMED
 
 
 class RobotRig:

@@ -268,3 +268,10 @@ def test_only_a_robot_that_does_not_hang_says_that_it_keeps_its_attitude():
     table = robot_table(ROBOTS / "ames.toml") | {"keeps_attitude_in_ramp": True}
     with pytest.raises(RobotFileError, match="keeps_attitude_in_ramp"):
         robot_of(table, "x.toml")
+
+
+def test_a_robot_blinks_only_if_its_file_says_so():
+    table = robot_table(ROBOTS / "ames.toml")
+    assert load_robot("ames").robot.blinking_leds == 0
+    assert not robot_of({k: v for k, v in table.items() if k != "blinks"}, "x").robot.blinks
+    assert robot_of(table | {"blinks": True}, "x").robot.blinking_leds == 5

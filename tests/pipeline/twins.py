@@ -13,6 +13,7 @@ from pipeline.identification.initialisation import Initialisation
 from pipeline.identification.relocalisation import SearchHints
 from pipeline.imu_stream import ImuStreams
 from pipeline.signals import Spots, VisionMeasurement
+from pipeline.vision.blink_code import NONE
 from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision.motion_hypotheses import CandidateView
 from pipeline.vision.rays import rays_of
@@ -39,8 +40,8 @@ class Told:
 class Twins:
     """Ours and another one; each may rest or be dark."""
 
-    def __init__(self, seed, resting=(False, False), imus=True):
-        """`resting`: ours, the other."""
+    def __init__(self, seed, resting=(False, False), imus=True, code=None):
+        """`resting`: ours, the other; `code` is what ours blinks."""
         rng = np.random.default_rng((seed, 99))
         self.moving = movers(SCENES["twin"], rng)
         self._robots = (self.moving.robot, self.moving.twin)
@@ -52,7 +53,8 @@ class Twins:
         )
         streams = ImuStreams()
         self._phone, self._body = ImuBuffer(streams.phone), ImuBuffer(streams.body)
-        self.identity = RobotIdentity(LEDS_IN_B, streams if imus else None)
+        self.identity = RobotIdentity(LEDS_IN_B, streams if imus else None, code is not None)
+        self.identity.code = code
         self._start = Initialisation(CAMERA, LEDS_IN_B, IdentifyConfig())
         self._rng, self._off_px = rng, rng.normal(0.0, BIAS_PX, (2, 5, 2))
         self._knows = imus
@@ -62,15 +64,15 @@ class Twins:
         R_fc, p_cf_in_f = self.moving.hand.pose(t)
         return R_fc.T @ (self.moving.robot.pose(t)[1] - p_cf_in_f)
 
-    def look(self, k, shine=BOTH, reach=()):
-        """At picture `k`, in which ours and the other `shine`."""
+    def look(self, k, shine=BOTH, reach=(), codes=(None, None)):
+        """At picture `k`, in which ours and the other `shine`, or blink codes."""
         t = START_S + k / RATE_HZ
         for s in self._felt.phone(t + IMU_AHEAD_S):
             self._phone.add(s.t, s.omega_m_cf_in_c, s.a_m_cf_in_c)
         for b in self._felt.body(t + IMU_AHEAD_S):
             self._body.add(b.t, b.omega_m_bf_in_b, b.a_m_bf_in_b)
         ups = (self._phone.at(t).up, self._body.at(t).up) if self._knows else (None, None)
-        spots = self._spots(t, shine)
+        spots = self._spots(t, shine, codes)
         one = self._start.step(t, spots, SearchHints(*ups), None)
         alike = [] if one is None else [one, *self._start.others]
         looks = [_look(t, spots, each) for each in alike]
@@ -81,14 +83,17 @@ class Twins:
             is_ours = bool(np.linalg.norm(off) < 0.3)
         return Told(len(looks), is_ours, self.identity.reason)
 
-    def _spots(self, t, shine):
+    def _spots(self, t, shine, codes):
         R_fc, p_cf_in_f = self.moving.hand.pose(t)
         pixels = np.zeros((0, 2))
-        for robot, off_px, shines in zip(self._robots, self._off_px, shine, strict=True):
+        each = zip(self._robots, self._off_px, shine, codes, strict=True)
+        for robot, off_px, shines, code in each:
             R_fb, p_bf_in_f = robot.pose(t)
             seen = CAMERA.pixels((p_bf_in_f + LEDS_IN_B @ R_fb.T - p_cf_in_f) @ R_fc)
             seen = seen + off_px + self._rng.normal(0.0, NOISE_PX, seen.shape)
-            pixels = np.vstack((pixels, seen[: 5 * shines]))
+            dark = code.dark(t, len(LEDS_IN_B)) if code is not None else NONE
+            lit = [led for led in range(len(LEDS_IN_B)) if shines and led != dark]
+            pixels = np.vstack((pixels, seen[lit]))
         pixels, n = self._rng.permutation(pixels), len(pixels)
         covariances = np.tile(NOISE_PX**2 * np.eye(2), (n, 1, 1))
         return Spots(pixels, covariances, np.ones(n), np.full(n, 20.0))

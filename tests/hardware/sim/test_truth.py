@@ -32,7 +32,7 @@ def test_a_full_answer_is_read_as_written_and_fits_a_datagram():
     rows = list(poses())
     data = encode_truth(REQUEST, rows, np.arange(8.0))
     truth = decode_truth(data, REQUEST)
-    assert len(data) == 16 + 50 * 64 + 32 < MAX_BYTES
+    assert len(data) == 16 + 50 * 65 + 32 < MAX_BYTES
     np.testing.assert_array_equal(truth.t, [t for t, _, _ in rows])
     np.testing.assert_array_equal(truth.wxyz_fb, [q for _, q, _ in rows])
     np.testing.assert_array_equal(truth.p_bf_in_f, [p for _, _, p in rows])
@@ -126,3 +126,12 @@ def test_an_answer_with_poses_ahead_fits_a_datagram_and_echoes_the_request():
     data = encode_truth(REQUEST + AHEAD.pack(0.2), list(poses(90)), np.zeros(16))
     assert len(data) < MAX_BYTES
     assert len(decode_truth(data, REQUEST).t) == 90
+
+
+def test_the_led_that_was_dark_is_told_with_its_tick():
+    rows = list(poses(4))
+    data = encode_truth(REQUEST, rows, np.zeros(8), (-1, 2, 0))
+    truth = decode_truth(data, REQUEST)
+    assert truth.dark.tolist() == [-1, 2, 0, -1]
+    assert [truth.dark_at(t + 0.001) for t in truth.t] == [-1, 2, 0, -1]
+    assert truth.dark_at(truth.t[0] - 1.0) == -1

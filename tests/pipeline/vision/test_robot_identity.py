@@ -5,8 +5,9 @@ import pytest
 
 from hardware.sim.scenes.motion import START_S
 from hardware.sim.scenes.video import RATE_HZ
+from pipeline.vision.blink_code import BlinkCode
 from pipeline.vision.last_pose import PossiblePlace
-from pipeline.vision.robot_identity import ELSEWHERE, REMEMBERED_S, TWO
+from pipeline.vision.robot_identity import ELSEWHERE, READING, REMEMBERED_S, TWO
 from tests.pipeline.twins import BOTH, Twins
 
 OURS, OTHER = (True, False), (False, True)
@@ -21,7 +22,7 @@ def first_told(twins, pictures, **how):
         told = twins.look(k, **how)
         if told.is_ours is not None:
             return k, told.is_ours
-        assert told.reason in (TWO, ELSEWHERE)
+        assert told.reason in (TWO, ELSEWHERE, READING)
     return None
 
 
@@ -77,3 +78,36 @@ def test_the_other_one_alone_is_remembered_and_not_taken_for_ours():
             assert twins.look(k, OTHER).is_ours is None
         late = 40 + round((REMEMBERED_S + 1.0) * RATE_HZ)
         assert twins.look(late, OURS).is_ours
+
+
+CODE = BlinkCode(3, 0.0)
+
+
+@pytest.mark.parametrize("other", [None, BlinkCode(9, 0.21), BlinkCode(3, 0.25)])
+def test_who_blinks_as_it_was_told_is_ours_even_at_rest(other):
+    for seed in SEEDS:
+        twins = Twins(seed, (True, True), code=CODE)
+        k, is_ours = first_told(twins, 30, codes=(CODE, other))
+        assert is_ours
+        assert k <= 15
+
+
+def test_a_robot_alone_that_shines_or_blinks_otherwise_is_not_taken_for_ours():
+    for seed, other in enumerate((None, BlinkCode(9, 0.21))):
+        twins = Twins(seed, (True, True), code=CODE)
+        for k in range(60):
+            told = twins.look(k, OTHER, codes=(CODE, other))
+            assert told.is_ours is None
+            assert told.reason in ("", READING)
+
+
+def test_of_two_robots_that_blink_alike_nobody_is_told():
+    twins = Twins(0, (True, True), code=CODE)
+    assert first_told(twins, 45, codes=(CODE, CODE)) is None
+
+
+def test_motion_tells_a_robot_whose_code_is_not_seen():
+    for seed in SEEDS:
+        twins = Twins(seed, code=CODE)
+        _, is_ours = first_told(twins, 60)
+        assert is_ours

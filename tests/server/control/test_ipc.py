@@ -20,11 +20,13 @@ from pipeline.signals import (
     TouchState,
     VisionMeasurement,
 )
+from pipeline.vision.blink_code import CODES
 from pipeline.vision.rays import NO_RAYS
 from server.control.ipc import control_end, server_end
 from server.control.ipc_inputs import (
     LARGEST,
     MAX_LEDS,
+    BlinkInput,
     ReadyInput,
     RequestInput,
     decode,
@@ -43,6 +45,7 @@ SEEN = VisionMeasurement(1.0, RAYS, POSE, (0.6, 0.4), StampOffset(0.01, 0.001))
 FEW = replace(SEEN, pose=None, offset=None)
 TOUCH = TouchState(1.0, True, 2)
 REQUEST, READY = RequestInput("stop"), ReadyInput(["No phone."])
+BLINK = BlinkInput(3, 5.5)
 BAD = (nan, inf, -inf, 2.0 * LARGEST)
 
 
@@ -69,7 +72,7 @@ def ends(tmp_path):
 
 def test_what_the_server_says_arrives_in_order(ends):
     server, control = ends
-    said = [IMU, SEEN, FEW, TOUCH, REQUEST, READY]
+    said = [IMU, SEEN, FEW, TOUCH, REQUEST, READY, BLINK]
     assert all(server.send(message) for message in said)
     heard = control.inputs()
     assert wire(heard) == wire(said)
@@ -104,6 +107,7 @@ def test_what_control_says_arrives_with_ages_that_are_for_ever(ends):
         lambda x: replace(SEEN, pose=replace(POSE, covariance=spoilt(POSE.covariance, x))),
         lambda x: replace(SEEN, pose=replace(POSE, reprojection_px=x)),
         lambda x: TouchState(x, True, 1),
+        lambda x: BlinkInput(3, x),
     ],
 )
 def test_a_number_that_is_none_is_refused_and_counted_wherever_it_stands(ends, place, bad):
@@ -127,6 +131,7 @@ def test_a_number_that_is_none_is_refused_and_counted_wherever_it_stands(ends, p
         replace(SEEN, rays=replace(RAYS, covariances=np.zeros((2, 4)))),
         replace(SEEN, rays=replace(RAYS, led=np.zeros((2, 1), dtype=np.intp))),
         replace(SEEN, rays=replace(RAYS, led=np.zeros(2))),
+        *(BlinkInput(number, 1.0) for number in (-1, CODES)),
     ],
 )
 def test_an_array_of_another_shape_or_kind_is_refused(ends, wrong):

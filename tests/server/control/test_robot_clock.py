@@ -7,9 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hardware.follower import EXPLANATIONS, BodySample, FollowerState, Refusal, ThrustCommand
+from hardware.follower import (
+    EXPLANATIONS,
+    BlinkOrder,
+    BodySample,
+    FollowerState,
+    Refusal,
+    ThrustCommand,
+)
+from pipeline.vision.blink_code import SLOT_S, book
+from server.control.ipc_inputs import BlinkInput, RequestInput
 from server.control.robot_clock import (
     DEAF,
+    LINGER_S,
     RAMP_AFTER_S,
     RAMP_BEGUN_S,
     SILENCE_S,
@@ -170,3 +180,44 @@ def test_it_says_when_the_robot_will_ramp_by_itself() -> None:
     assert left[0.6] == pytest.approx(RAMP_AFTER_S - 0.1)
     assert left[0.8] == pytest.approx(RAMP_AFTER_S - SILENCE_S - 0.1)
     assert left[0.95] == 0.0
+
+
+class BlinkingScript(Script):
+    """One whose robot can blink."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.orders: list[BlinkOrder] = []
+
+    def blink(self, order: BlinkOrder) -> None:
+        self.orders.append(order)
+
+
+def told(follower: BlinkingScript, leds: int, *wishes: BlinkInput, now: float = 100.2) -> None:
+    """A link whose robot's clock is 90 s behind ours passes wishes on."""
+    link = RobotLink(follower, leds)
+    follower.next = [sample(10_000_000)]
+    link.receive(100.0)
+    link.pass_on([RequestInput("arm"), *wishes], now)
+
+
+def test_the_newest_wish_reaches_the_robot_on_its_own_clock() -> None:
+    follower = BlinkingScript()
+    told(follower, 5, BlinkInput(2, 99.0), BlinkInput(7, 100.1))
+    (order,) = follower.orders
+    assert order.begin_us == pytest.approx(10_100_000, abs=1)
+    assert order.lasts_ms == round(1e3 * (0.1 + LINGER_S))
+    assert order.slot_ms == round(1e3 * SLOT_S)
+    assert order.dark == tuple(book(5)[7])
+
+
+def test_nobody_blinks_that_cannot_or_for_longer_than_is_allowed() -> None:
+    silent = BlinkingScript()
+    told(silent, 0, BlinkInput(2, 100.1))
+    told(silent, 5)
+    told(silent, 5, BlinkInput(2, 100.1), now=111.0)
+    told(silent, 5, BlinkInput(2, 9.0))
+    assert silent.orders == []
+    RobotLink(silent, 5).pass_on([BlinkInput(2, 100.1)], 100.2)  # its clock is not known
+    RobotLink(Script(), 5).pass_on([BlinkInput(2, 100.1)], 100.2)
+    assert silent.orders == []

@@ -85,3 +85,28 @@ def test_of_two_robots_in_the_picture_the_right_one_is_led_even_when_it_goes_dar
     errors = np.linalg.norm(np.array(trace.estimate_error_in_c), axis=1)
     assert errors.max() < 0.05
     assert np.linalg.norm(np.array(trace.error_in_f), axis=1).max() < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("twin_code", [None, 9])
+def test_a_robot_that_blinks_is_led_and_no_other_though_it_is_dark_at_first(twin_code) -> None:
+    every = (0, 1, 2, 3, 4)
+    scene = SimulationOptions(
+        hand="moving", seed=8, codec="jpeg", twin=True, twin_code=twin_code,
+        hidden=((0.0, 0.6, every), (4.4, 4.8, every)),
+    )  # fmt: skip
+    robot_file = load_robot("ames")
+    blinking = replace(robot_file, robot=replace(robot_file.robot, blinks=True))
+    flight = VirtualTimeSimulation(blinking, TeleopConfig(), scene)
+    kept_dark = []
+    while flight.t < 6.0 and not flight.trace.left:
+        flight.advance()
+        if flight.follower.dark >= 0:
+            kept_dark.append(flight.t)
+    trace = flight.trace
+    assert trace.left == ""
+    assert trace.t[-1] > 5.9
+    assert {0, 5} <= set(trace.leds)
+    assert np.linalg.norm(np.array(trace.estimate_error_in_c), axis=1).max() < 0.05
+    assert min(kept_dark) < 0.6
+    assert not any(2.5 < t < 4.4 for t in kept_dark)  # who is tracked shines
