@@ -132,10 +132,11 @@ def test_whichever_way_dies_without_a_word_the_finger_is_felt_by_the_other(dead,
         for sequence, held in ((1, False), (2, True)):
             await page.touch(sequence, held)
         heard = await house.control_hears(lambda one: isinstance(one, TouchState) and one.held)
-        felt = [one.held for one in heard if isinstance(one, TouchState)]
+        touches = [one for one in heard if isinstance(one, TouchState)]
+        felt = [one.held for one in touches]
         assert sorted(felt) == felt  # said again with a PING, but never in another order
         assert set(felt) == {False, True}
-        age = now() - heard[-1].t
+        age = now() - touches[-1].t
         assert house.manager.phone.silent_for(now()) <= age + 0.01
 
     in_house(tmp_path, play)
