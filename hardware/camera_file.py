@@ -13,14 +13,22 @@ import numpy as np
 import yaml
 
 from pipeline.camera.extrinsics import IDENTITY, Extrinsics
-from pipeline.camera.lens import MODELS, Camera
+from pipeline.camera.lens import COLUMNS, MODELS, QUARTERS, ROWS, Camera
 from pipeline.frames import Array
 
 CAMERAS = Path(__file__).parent / "cameras"
 KALIBR_MODELS = {"radtan": "plumb_bob", "equidistant": "equidistant"}
 SIZES_PX = (16, 8192)
 READOUTS_S = (-0.1, 0.1)
-"""Negative: the picture stands on its head on the sensor, its last row is exposed first."""
+"""Negative: the other way round than the direction says."""
+DIRECTIONS = {
+    "top_to_bottom": (ROWS, 1.0),
+    "bottom_to_top": (ROWS, -1.0),
+    "left_to_right": (COLUMNS, 1.0),
+    "right_to_left": (COLUMNS, -1.0),
+}
+"""Of a rolling shutter in the picture, as data sets call them: what counts its lines, and whether
+the first or the last is exposed first."""
 SCREEN_ANGLES_DEG = (0, 90, 180, 270)
 TIME_OFFSETS_S = (-0.5, 0.5)
 YAML_FAULTS = (yaml.YAMLError, ValueError, LookupError, AttributeError)
@@ -91,20 +99,24 @@ def find_camera_file(
 
     A file belongs to a device when its camera_name, in lower case and with everything but letters
     and digits turned into dashes, is the device's. One that says how the screen was turned
-    (screen_angle_deg) fits no other angle, and comes before one that doesn't say.
+    (screen_angle_deg) comes before one that doesn't say; last come those that say another angle,
+    turned with the screen.
 
     Raises:
         CameraFileError: no calibration; says which there are.
     """
     known: list[str] = []
-    fitting: list[tuple[bool, Path, Camera]] = []
+    fitting: list[tuple[int, Path, Camera]] = []
     for path in sorted(p for folder in folders for p in folder.glob("*.yaml")):
         name, camera, angle = _read(path)
-        is_it = slug(name) == slug(device) and (camera.width, camera.height) == (width, height)
-        if is_it and (angle is None or screen_angle_deg in (None, angle)):
-            fitting.append((angle is None, path, camera))
-        turned = f" at {angle}°" if angle is not None else ""
-        known.append(f"{name} {camera.width}x{camera.height}{turned}")
+        at = f" at {angle}°" if angle is not None else ""
+        known.append(f"{name} {camera.width}x{camera.height}{at}")
+        rank = 1
+        if angle is not None and screen_angle_deg is not None:
+            quarters = (angle - screen_angle_deg) // 90
+            camera, rank = camera.turned(quarters), 2 if quarters % QUARTERS else 0
+        if slug(name) == slug(device) and (camera.width, camera.height) == (width, height):
+            fitting.append((rank, path, camera))
     if fitting:
         _, path, camera = min(fitting, key=lambda one: one[0])
         return path, camera
@@ -113,6 +125,12 @@ def find_camera_file(
         "",
         f"no calibration; there is one for: {', '.join(known) or 'no camera at all'}",
     )
+
+
+def direction_of(axis: int, readout_s: float) -> str:
+    """The word of `DIRECTIONS` for a readout along an axis, negative if its last line is first."""
+    sign = -1.0 if readout_s < 0.0 else 1.0
+    return next(word for word, of in DIRECTIONS.items() if of == (axis, sign))
 
 
 def slug(name: str) -> str:
@@ -157,7 +175,7 @@ class _CameraFileReader:
         K = np.array([[fu, 0.0, pu], [0.0, fv, pv], [0.0, 0.0, 1.0]])
         distortion = self._numbers(table, "distortion_coeffs", 4)
         return Path(self._file).stem, self._camera(
-            width, height, K, model, distortion, self._line_readout_s(name, height)
+            width, height, K, model, distortion, self._line_readout_s(name, width, height)
         )
 
     def screen_angle_deg(self) -> int | None:
@@ -188,15 +206,24 @@ class _CameraFileReader:
         U, _, Vt = np.linalg.svd(R_ci)
         return Extrinsics(U @ Vt, offset_s)
 
-    def _line_readout_s(self, name: str, height: int) -> float:
-        """Readout time of a camchain: our own key, else Kalibr's time between two rows."""
+    def _direction(self) -> tuple[int, float]:
+        """Readout axis, and the sign of the readout time."""
+        key = "rolling_shutter_direction"
+        direction = DIRECTIONS.get(self._word(self._table.get(key, "top_to_bottom"), key))
+        if direction is None:
+            self._refuse(key, ", ".join(DIRECTIONS))
+        return direction
+
+    def _line_readout_s(self, name: str, width: int, height: int) -> float:
+        """Readout time of a camchain: our own key, else Kalibr's time between two lines."""
         table = self._table[name]
         if "line_delay" not in table:
             return self._readout_s()
         if "rolling_shutter_readout_s" in self._table:
             self._refuse("rolling_shutter_readout_s", f"not beside {name}.line_delay")
-        low, high = (readout / height for readout in READOUTS_S)
-        return height * self._number(table["line_delay"], f"{name}.line_delay", low, high)
+        lines = height if self._direction()[0] == ROWS else width
+        low, high = (readout / lines for readout in READOUTS_S)
+        return lines * self._number(table["line_delay"], f"{name}.line_delay", low, high)
 
     def _camera(
         self, width: int, height: int, K: Array, model: str, distortion: Array, readout_s: float
@@ -214,7 +241,8 @@ class _CameraFileReader:
             or not np.array_equal(K[2], (0, 0, 1))
         ):
             self._refuse("camera_matrix", "[fx, 0, cx, 0, fy, cy, 0, 0, 1] with fx, fy > 0")
-        return Camera(width, height, K, model, distortion, readout_s)
+        axis, sign = self._direction()
+        return Camera(width, height, K, model, distortion, sign * readout_s, axis)
 
     def _get(self, table: dict[str, Any], key: str) -> object:
         if key not in table:

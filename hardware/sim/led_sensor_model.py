@@ -72,7 +72,7 @@ class LedSensorModel:
         """(n, 2) where the LEDs are in a picture, each when its row is read; behind: nowhere."""
         pixels = self._pixels_at(t, self._leds_in_b, body, seen_by)
         if seen_by.readout_s != 0.0:
-            delays = seen_by.row_delays(pixels[:, 1])
+            delays = seen_by.delays(pixels)
             for k in np.flatnonzero(np.isfinite(delays)):
                 later = t + float(delays[k])
                 pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body, seen_by)[0]

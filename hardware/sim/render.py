@@ -13,7 +13,7 @@ from hardware.sim.body.shape import BodyShape
 from hardware.sim.body.silhouette import BEYOND, Shutter, Silhouette
 from hardware.sim.body.silhouette_kernels import Plane
 from hardware.sim.body.ways import ways_of
-from pipeline.camera.lens import Camera
+from pipeline.camera.lens import ROWS, Camera, R_turned
 from pipeline.frames import Array
 from pipeline.signals import Image
 
@@ -63,6 +63,8 @@ def render(
 
     `others` are robots with LEDs (n, 3), which do.
     """
+    if camera.readout_axis != ROWS:
+        return _upright(camera, pose, leds_in_b, look, rng, body, others)
     room, noise = _stage(camera.width, camera.height, look)
     du, dv = rng.integers(0, BANK, 2)
     image, pose = room.copy(), cache(pose)
@@ -84,6 +86,30 @@ def render(
     grain = noise[dv : dv + camera.height, du : du + camera.width]
     # the bank is offset by 128: a saturating addition of the noise in grey levels
     return np.asarray(cv2.addWeighted(image, 1.0, grain, 1.0, -128.0), dtype=np.uint8)
+
+
+def _upright(
+    camera: Camera,
+    pose: RelativePoseAt,
+    leds_in_b: Array,
+    look: RenderOptions,
+    rng: np.random.Generator,
+    body: BodyShape | None,
+    others: Sequence[tuple[RelativePoseAt, Array]],
+) -> Image:
+    """A picture as the sensor takes it, row by row, then turned clockwise by a quarter."""
+    R = R_turned(-1)
+
+    def sensed(seen: RelativePoseAt) -> RelativePoseAt:
+        def at(t: float) -> tuple[Array, Array]:
+            R_cb, p_bc_in_c = seen(t)
+            return R @ R_cb, R @ p_bc_in_c
+
+        return at
+
+    turned = [(sensed(other), leds) for other, leds in others]
+    image = render(camera.turned(-1), sensed(pose), leds_in_b, look, rng, body, turned)
+    return np.ascontiguousarray(np.rot90(image, -1))
 
 
 def _silhouette(
@@ -148,10 +174,11 @@ def _row_delays(
 ) -> Array:
     """When (n,) the row that each LED falls on is exposed, after the middle one [s]."""
     delays = np.zeros(len(leds_in_b))
-    for _ in range(ROLLING_ITERATIONS if camera.readout_s > 0.0 else 0):
+    last = np.array([camera.width, camera.height]) - 1.0
+    for _ in range(ROLLING_ITERATIONS if camera.readout_s != 0.0 else 0):
         for k, led in enumerate(leds_in_b):
             uv, _ = _projected(camera, pose(float(delays[k])), led[None], look)
-            delays[k] = camera.row_delays(np.clip(uv[:, 1], 0.0, camera.height - 1.0))[0]
+            delays[k] = camera.delays(np.clip(uv, 0.0, last))[0]
     return delays
 
 

@@ -9,10 +9,13 @@ import numpy.typing as npt
 
 from pipeline.camera.extrinsics import IDENTITY, Extrinsics
 from pipeline.camera.lens_kernels import LENS, put_normalised, put_pixels, put_slopes
-from pipeline.frames import Array
+from pipeline.frames import Array, rotation_about_x
 
 MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
 """Distortion models (the names of ROS) and how many coefficients they take."""
+COLUMNS, ROWS = 0, 1  # the coordinate of a pixel that counts them
+QUARTERS = 4  # of a turn, until a picture stands as before
+P1, P2 = 2, 3  # of plumb_bob and rational_polynomial: tangential distortion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,8 +31,11 @@ class Camera:
     distortion: Array
     """(k,)."""
     readout_s: float = 0.0
-    """Rolling shutter: how much later a row below the last would be exposed than the first one [s];
-    negative if the last row is read first."""
+    """Rolling shutter: how much later a line beyond the last would be exposed than the first one
+    [s]; negative if the last line is read first."""
+    readout_axis: int = ROWS
+    """Which coordinate of a pixel counts those lines: `ROWS`, or `COLUMNS` where the picture was
+    turned by a quarter, as a phone's is that is held upright."""
     extrinsics: Extrinsics = IDENTITY
     """Beside the phone's motion sensors."""
 
@@ -63,10 +69,46 @@ class Camera:
         put_slopes(self.lens, np.asarray(pixels, dtype=np.float64), slopes)
         return slopes
 
-    def row_delays(self, rows: Array) -> Array:
-        """When rows (n,) are exposed after the picture's middle one [s]."""
-        delays: Array = (rows / self.height - 0.5) * self.readout_s
+    @property
+    def lines(self) -> int:
+        """How many are read one after the other."""
+        return self.height if self.readout_axis == ROWS else self.width
+
+    def readout_shares(self, pixels: Array) -> Array:
+        """Shares (n,) of the readout from the middle line to those of pixels (n, 2): −½ to ½."""
+        shares: Array = pixels[:, self.readout_axis] / self.lines - 0.5
+        return shares
+
+    def delays(self, pixels: Array) -> Array:
+        """When the lines of pixels (n, 2) are exposed after the picture's middle one [s]."""
+        delays: Array = self.readout_shares(pixels) * self.readout_s
         return delays
+
+    def turned(self, quarters: int) -> Camera:
+        """The camera whose pictures are this one's, turned clockwise by so many quarters.
+
+        Its axes c turn along: `R_turned(quarters)`. Right to the time of one line.
+        """
+        quarters %= QUARTERS
+        if quarters == 0:
+            return self
+        (fx, _, cx), (_, fy, cy), _ = self.K.tolist()
+        K = np.array([[fy, 0.0, self.height - 1.0 - cy], [0.0, fx, cx], [0.0, 0.0, 1.0]])
+        distortion = self.distortion.copy()
+        if self.model != "equidistant":
+            distortion[[P1, P2]] = self.distortion[P2], -self.distortion[P1]
+        R = R_turned(1)
+        once = replace(
+            self,
+            width=self.height,
+            height=self.width,
+            K=K,
+            distortion=distortion,
+            readout_s=-self.readout_s if self.readout_axis == ROWS else self.readout_s,
+            readout_axis=COLUMNS if self.readout_axis == ROWS else ROWS,
+            extrinsics=replace(self.extrinsics, R_ci=R @ self.extrinsics.R_ci @ R.T),
+        )
+        return once.turned(quarters - 1)
 
     def resized(self, width: int, height: int) -> Camera:
         """The camera whose picture is this one's whole, made larger or smaller to another size."""
@@ -94,6 +136,12 @@ class Camera:
         low, high = margin_px - 0.5, size - 0.5 - margin_px
         inside = (pixels > low) & (pixels < high)
         return np.asarray(inside.all(axis=1))
+
+
+def R_turned(quarters: int) -> Array:
+    """Turn from a camera's axes into those of `Camera.turned`."""
+    R: Array = np.round(rotation_about_x(0.5 * np.pi * (quarters % QUARTERS)))
+    return R
 
 
 def points_of(normalised: Array) -> Array:

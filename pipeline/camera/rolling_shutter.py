@@ -28,12 +28,12 @@ class FrameMotion:
 
 
 def unrolled(camera: Camera, spots: Spots, motion: FrameMotion | None) -> Spots:
-    """The spots as of the middle row's exposure; unchanged without rolling shutter or motion."""
+    """The spots as of the middle line's exposure; unchanged without rolling shutter or motion."""
     if camera.readout_s == 0.0 or motion is None or len(spots) == 0:
         return spots
     rays = points_of(camera.normalised(spots.pixels))  # q / q_x
     # q̇ = u − ω × q, by q_x
     rates = motion.u_bf_in_c / motion.depth_m - rays @ skew(motion.omega_cf_in_c).T
     flow = rates - rays * rates[:, :1]
-    delays = camera.row_delays(spots.pixels[:, 1])
+    delays = camera.delays(spots.pixels)
     return replace(spots, pixels=camera.pixels(rays - flow * delays[:, None]))

@@ -154,9 +154,9 @@ class LedTracker:
 
     @property
     def _size(self) -> Array:
-        camera = self.camera
+        camera, exposure_s = self.camera, self.motion_blur.exposure_s
         return np.array(
-            [camera.width, camera.height, camera.readout_s, self.motion_blur.exposure_s]
+            [camera.width, camera.height, camera.readout_s, exposure_s, camera.readout_axis]
         )
 
     def _measured(

@@ -26,6 +26,7 @@ from pipeline.spots.centroid_kernels import S_UU, S_UV, S_VV
 from pipeline.vision.predicted_windows_kernels import (
     OMEGA_B,
     OMEGA_C,
+    delay_of,
     led_at,
     predict_pixels,
     put_turn,
@@ -99,7 +100,7 @@ def put_sights(
 
     Args:
         lens: As `lens_kernels` takes it.
-        size: (4,).
+        size: (5,).
         leds_in_b: (n, 3) [m].
         pixels: (m, 2) of the spots, as they stand in the picture.
         covariances: (m, 2, 2) [px²].
@@ -120,7 +121,7 @@ def put_sights(
         s = names[i]
         if s < 0:
             continue
-        delay = (pixels[s, 1] / size[1] - 0.5) * size[2]
+        delay = delay_of(size, pixels[s])
         _put_lead(lens, leds_in_b[i], p, R, motion, delay, size[3], lead)
         unbend(lens, pixels[s, 0] - lead[0], pixels[s, 1] - lead[1], bent)
         put_slope(lens, bent, S)
@@ -174,7 +175,7 @@ def identify(
 
     Args:
         lens: As `lens_kernels` takes it.
-        size: (4,).
+        size: (5,).
         leds_in_b: (n, 3) [m].
         table: (m, FIELDS) spots as they stand in the picture.
         covariances: (m, 2, 2) of each one's own error [px²].

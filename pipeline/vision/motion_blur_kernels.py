@@ -9,7 +9,7 @@ from pipeline.camera.lens_kernels import NEAREST_M, OUT_1, TABLE, VECTOR, bend
 from pipeline.frames import Array
 from pipeline.jit import numba
 from pipeline.spots.centroid_kernels import AREA, UU, UV, VV, U, V
-from pipeline.vision.predicted_windows_kernels import led_at
+from pipeline.vision.predicted_windows_kernels import delay_of, led_at
 
 STEP_S = 1e-3
 SLOPES = 10
@@ -42,7 +42,7 @@ def add_smears(
 
     Args:
         lens: As `lens_kernels` takes it.
-        size: (4,).
+        size: (5,).
         leds_in_b: (n, 3) [m].
         led: (k,) LEDs with a name.
         spot: (k,) their rows in the table.
@@ -61,7 +61,7 @@ def add_smears(
         sums[2], sums[3] = max(sums[2], off), max(sums[3], row[AREA])
         if motion[0] == 0.0:
             continue
-        delay, seen = (row[V] / size[1] - 0.5) * size[2], True
+        delay, seen = delay_of(size, row[U : V + 1]), True
         for k in range(2):
             led_at(leds_in_b[led[i]], p, R, motion, delay + (2 * k - 1) * STEP_S, q, work)
             seen = seen and q[0] > NEAREST_M

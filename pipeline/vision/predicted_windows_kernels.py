@@ -1,9 +1,9 @@
 """Compiled predicted windows: where LEDs should be in an image, and the spots that are there.
 
 A `motion` is a row (16,): 1 if it is known, else 0; ω_c/f in c, the velocity u of the body seen
-from f in c, ω_b/f in b, and the two ω's derivatives. A row of the picture that is exposed τ later
-sees an LED at Exp(−φ_c) (p + u τ + R Exp(φ_b) led) with φ = ω τ + ω̇ τ²/2. A `size` is a row (4,):
-width, height, readout time, exposure time (0: unknown).
+from f in c, ω_b/f in b, and the two ω's derivatives. A line of the picture that is exposed τ later
+sees an LED at Exp(−φ_c) (p + u τ + R Exp(φ_b) led) with φ = ω τ + ω̇ τ²/2. A `size` is a row (5,):
+width, height, readout time, exposure time (0: unknown), and which coordinate counts the lines.
 """
 
 from __future__ import annotations
@@ -24,9 +24,17 @@ from pipeline.spots.spot_kernels import LUMA, measure
 Windows = npt.NDArray[np.int64]
 MOTION = 16  # numbers of a motion
 OMEGA_C, OMEGA_B = 1, 7  # where its rates begin
-ROW_ITERATIONS = 3
-"""A point's row says when it was read, and the time says its row."""
+LINE_ITERATIONS = 3
+"""A point's line says when it was read, and the time says its line."""
 EDGE_PX, LEAST_HALF_PX = 2.0, 5.0
+
+
+@kernel
+def delay_of(size: Array, pixel: Array) -> float:
+    """When the line that `pixel` (2,) is on is read, after the middle one [s]."""
+    axis = int(size[4])
+    delay: float = (pixel[axis] / size[axis] - 0.5) * size[2]
+    return delay
 
 
 @kernel
@@ -46,7 +54,7 @@ def put_turn(motion: Array, of: int, delay_s: float, sign: float, R: Array) -> N
 def led_at(
     led: Array, p: Array, R: Array, motion: Array, delay_s: float, q: Array, work: Array
 ) -> None:
-    """Place q (3,) of an LED in c, `delay_s` after the picture's middle row; work (3, 3, 3)."""
+    """Place q (3,) of an LED in c, `delay_s` after the picture's middle line; work (3, 3, 3)."""
     if motion[0] == 0.0 or delay_s == 0.0:
         turn(R, led, q)
         q += p
@@ -71,12 +79,11 @@ def predict_pixels(
     motion: Array,
     pixels: Array,
 ) -> None:
-    """Pixels (n, 2) where LEDs are seen, each when its own row is exposed; NaN: not in front."""
-    height, readout_s = size[1], size[2]
-    q, bent, work = np.empty(3), np.empty(6), np.empty((3, 3, 3))
+    """Pixels (n, 2) where LEDs are seen, each when its own line is exposed; NaN: not in front."""
+    q, bent, work, inside = np.empty(3), np.empty(6), np.empty((3, 3, 3)), np.empty(2)
     for i in range(len(leds_in_b)):
         delay = 0.0
-        for _ in range(ROW_ITERATIONS):
+        for _ in range(LINE_ITERATIONS):
             led_at(leds_in_b[i], p, R, motion, delay, q, work)
             if not q[0] > NEAREST_M:
                 pixels[i] = np.nan
@@ -84,8 +91,9 @@ def predict_pixels(
             bend(lens, -q[1] / q[0], -q[2] / q[0], bent)
             pixels[i, 0] = lens[1] * bent[0] + lens[3]
             pixels[i, 1] = lens[2] * bent[1] + lens[4]
-            row = min(max(pixels[i, 1], 0.0), height)
-            later = (row / height - 0.5) * readout_s
+            for k in range(2):
+                inside[k] = min(max(pixels[i, k], 0.0), size[k])
+            later = delay_of(size, inside)
             if motion[0] == 0.0 or later == delay:
                 break
             delay = later
@@ -146,7 +154,7 @@ def detect(
         slope_of: (256,).
         limits: (5,).
         lens: As `lens_kernels` takes it.
-        size: (4,).
+        size: (5,).
         leds_in_b: (n, 3) [m].
         p: Foreseen p_bc_in_c.
         R: Foreseen R_cb.

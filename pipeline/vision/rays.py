@@ -27,7 +27,7 @@ def rays_of(camera: Camera, spots: Spots, match: Match, t: float, scale: float =
     pixels = spots.pixels[match.spot]
     tangents, claimed = np.empty((len(pixels), 2)), np.empty((len(pixels), 2, 2))
     put_tangents(camera.lens, pixels, spots.covariances[match.spot], scale, tangents, claimed)
-    return LedRays(match.led, t + camera.row_delays(pixels[:, 1]), tangents, claimed)
+    return LedRays(match.led, t + camera.delays(pixels), tangents, claimed)
 
 
 def widened(

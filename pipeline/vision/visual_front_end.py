@@ -178,7 +178,7 @@ class VisualFrontEnd:
             rays.led,
             rays.tangents,
             rays.covariances,
-            pixels[:, 1] / self.camera.height - 0.5,
+            self.camera.readout_shares(pixels),
             pose.p_bc_in_c,
             pose.R_cb,
         )

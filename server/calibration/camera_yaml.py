@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from hardware.camera_file import slug
+from hardware.camera_file import direction_of, slug
 from pipeline.frames import Array
 from server.calibration.lens import matrix
 from server.calibration.solve import CalibrationSolution
@@ -41,8 +41,10 @@ def yaml_of(
         *_matrix(3, 3, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),
         "projection_matrix:",
         *_matrix(3, 4, _projection(lens)),
-        "# From the first row's exposure to the last one's; negative: the last row comes first.",
-        f"rolling_shutter_readout_s: {readout if solution.readout_known else 0.0:.6f}",
+        "# From the first line's exposure to the last one's, and which way these lines follow each",
+        "# other in the picture.",
+        f"rolling_shutter_readout_s: {abs(readout) if solution.readout_known else 0.0:.6f}",
+        f"rolling_shutter_direction: {direction_of(solution.readout_axis, readout)}",
     ]
     if screen_angle_deg is not None:
         lines.append(f"screen_angle_deg: {screen_angle_deg}")

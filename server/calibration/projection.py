@@ -1,6 +1,6 @@
 """A filmed board as a camera with a rolling shutter sees it, with derivatives by everything.
 
-The board moves past the camera: at a delay τ of its row from the picture's middle one a corner X
+The board moves past the camera: at a delay τ of its line from the picture's middle one a corner X
 stands at Exp(τ ω) R X + p + τ v.
 """
 
@@ -30,8 +30,8 @@ class BoardCorners:
     """(m, 3) on the board [m]."""
     pixels: Array
     """(m, 2)."""
-    rows: Array
-    """(m,) −½ to ½: row over height, from the middle."""
+    shares: Array
+    """(m,) of the readout, from the middle line to the corner's: −½ to ½."""
     view: npt.NDArray[np.intp]
     """(m,) whose corner it is, ascending."""
     starts: npt.NDArray[np.intp]
@@ -42,8 +42,10 @@ class BoardCorners:
         return len(self.starts)
 
 
-def film_of(views: Sequence[BoardView], board: Board, model: str, height: int) -> BoardCorners:
-    """Views as one stack of corners."""
+def film_of(
+    views: Sequence[BoardView], board: Board, model: str, size: tuple[int, int], axis: int
+) -> BoardCorners:
+    """Views as one stack of corners; `axis` counts the lines of the rolling shutter."""
     counts = np.array([len(view) for view in views])
     corners = board.corners()
     pixels = np.concatenate([view.pixels for view in views])
@@ -51,7 +53,7 @@ def film_of(views: Sequence[BoardView], board: Board, model: str, height: int) -
         model,
         np.concatenate([corners[view.ids] for view in views]),
         pixels,
-        pixels[:, 1] / height - 0.5,
+        pixels[:, axis] / size[axis] - 0.5,
         np.repeat(np.arange(len(views)), counts),
         np.concatenate(([0], np.cumsum(counts)[:-1])),
     )
@@ -73,7 +75,7 @@ class Guess:
 
 def _moved(film: BoardCorners, guess: Guess) -> tuple[Array, Array, Array]:
     """Corners in o (m, 3), R X alone (m, 3), delays (m,)."""
-    delay = film.rows * guess.shared[-1]
+    delay = film.shares * guess.shared[-1]
     turned = np.einsum("mij,mj->mi", guess.R_og[film.view], film.corners_in_g)
     rates = guess.rates[film.view]
     swung = rotated(delay[:, None] * rates[:, :3], turned)
@@ -114,5 +116,5 @@ def linear(film: BoardCorners, guess: Guess, width: int) -> tuple[Array, Array, 
         J_view = np.concatenate((J_view, delay[:, None, None] * J_view), axis=2)
     rates = guess.rates[film.view]
     speed = np.cross(rates[:, :3], swung) + rates[:, 3:]
-    by_readout = np.einsum("mij,mj->mi", by_point, speed) * film.rows[:, None]
+    by_readout = np.einsum("mij,mj->mi", by_point, speed) * film.shares[:, None]
     return film.pixels - pixels, J_view, np.concatenate((by_lens, by_readout[..., None]), axis=2)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.camera.lens import COLUMNS, ROWS
 from pipeline.frames import Array, R_co
 from server.calibration.board import Board
 from server.calibration.bundle import BoardFit, ParameterPrior, fit
@@ -53,6 +54,8 @@ class CalibrationSolution:
     fitted_px: float
     """The same of the views it did see."""
     readout_known: bool
+    readout_axis: int
+    """As of `Camera`."""
     imu: CameraImu | None
     imu_complaint: str
     """Why there is none, "" if nobody asked."""
@@ -93,6 +96,11 @@ def solve(
     if len(kept) < len(choice.fit):
         still = work.without_motion(kept)
     found, known = work.with_motion(still, kept, views) if timed else (still, False)
+    if known:  # a phone held upright: the picture's columns are the sensor's rows
+        other = work.along(COLUMNS, kept)
+        turned, known_too = other.with_motion(still, kept, views)
+        if known_too and turned.sigma_px < found.sigma_px:
+            work, found = other, turned
     return CalibrationSolution(
         model,
         size,
@@ -102,6 +110,7 @@ def solve(
         work.judged(found, choice.held_out),
         _rms(found.residuals),
         known,
+        work.axis,
         work.imu,
         work.imu_complaint,
     )
@@ -128,14 +137,22 @@ class _Work:
         self._middle = plain_lens(model, size, 0.75 * max(size))
         self._by_time: dict[float, int] = {}
         self._rates: Rates | None = None
+        self.axis = ROWS
         self.film: BoardCorners
         self.imu: CameraImu | None = None
         untimed = "imu: the pictures have no times: add times.csv or --fps"
         self.imu_complaint = untimed if gyro is not None and not timed else ""
 
+    def along(self, axis: int, views: Sequence[BoardView]) -> _Work:
+        """The same with lines read along the other axis; before it moves, nothing depends on it."""
+        other = _Work(self._board, self._size, self._model, self._gyro, timed=True)
+        other.axis = axis
+        other.film = film_of(views, self._board, self._model, self._size, axis)
+        return other
+
     def without_motion(self, views: Sequence[BoardView]) -> BoardFit:
         """Solve as if the shutter opened all rows at once."""
-        self.film = film_of(views, self._board, self._model, self._size[1])
+        self.film = film_of(views, self._board, self._model, self._size, self.axis)
         guess = first_guess(self._model, views, self._board, self._size)
         nothing = np.zeros((len(views), 6))
         return fit(self.film, guess, self._prior(nothing, nothing, 0.0), with_rates=False)
@@ -159,7 +176,7 @@ class _Work:
 
     def _rates_of_all(self, shared: Array, views: Sequence[BoardView]) -> Rates:
         """Poses of all views with the lens as it stands, and their derivatives."""
-        film = film_of(views, self._board, self._model, self._size[1])
+        film = film_of(views, self._board, self._model, self._size, self.axis)
         R, p = poses(self._model, shared[:-1], views, self._board)
         now = self._rates
         value = np.zeros((len(views), 6)) if now is None else now.value
@@ -198,7 +215,7 @@ class _Work:
         if len(views) == 0:
             return float("nan")
         shared, n = found.guess.shared, len(views)
-        film = film_of(views, self._board, self._model, self._size[1])
+        film = film_of(views, self._board, self._model, self._size, self.axis)
         R, p = poses(self._model, shared[:-1], views, self._board)
         value, sigma = np.zeros((n, 6)), np.ones((n, 6))
         if self._rates is not None:

@@ -7,11 +7,13 @@ import yaml
 from hardware.camera_file import (
     CAMERAS,
     CameraFileError,
+    direction_of,
     find_camera,
     find_camera_file,
     load_camera,
     slug,
 )
+from pipeline.camera.lens import COLUMNS, ROWS
 from pipeline.frames import exp
 
 INFO = yaml.safe_load((CAMERAS / "virtual_phone.yaml").read_text())
@@ -97,7 +99,7 @@ def test_what_kalibr_says_of_motion_sensors_is_not_read(tmp_path):
 def test_a_picture_that_stands_on_its_head_is_read_out_from_below(tmp_path):
     table = changed(INFO, ["rolling_shutter_readout_s"], -0.02)
     camera = load_camera(written(tmp_path, table))[1]
-    np.testing.assert_allclose(camera.row_delays(np.array([0.0, 720.0])), [0.01, -0.01])
+    np.testing.assert_allclose(camera.delays(np.array([[0.0, 0.0], [0.0, 720.0]])), [0.01, -0.01])
 
 
 def test_a_number_that_yaml_takes_for_a_word_is_a_number(tmp_path):
@@ -142,6 +144,7 @@ FAULTS = [
     (["image_height"], 10**9, "image_height", "a number from 16 to 8192"),
     (["screen_angle_deg"], 45, "screen_angle_deg", "0, 90, 180, 270"),
     (["screen_angle_deg"], True, "screen_angle_deg", "0, 90, 180, 270"),
+    (["rolling_shutter_direction"], "up", "rolling_shutter_direction", "bottom_to_top"),
     (["rolling_shutter_readout_s"], 16.0, "rolling_shutter_readout_s", "from -0.1 to 0.1"),
     (["rolling_shutter_readout_s"], float("nan"), "rolling_shutter_readout_s", "from -0.1 to 0.1"),
     (["camera_imu"], [1, 2], "camera_imu", "a mapping with rotation"),
@@ -246,3 +249,42 @@ def test_a_camera_nobody_calibrated_is_refused_with_those_there_are(wanted):
 def test_an_empty_folder_has_no_camera_at_all(tmp_path):
     with pytest.raises(CameraFileError, match="no camera at all"):
         find_camera("pixel-7", 1280, 720, (tmp_path,))
+
+
+@pytest.mark.parametrize(
+    ("direction", "axis", "readout_s"),
+    [
+        ("top_to_bottom", ROWS, 0.02),
+        ("bottom_to_top", ROWS, -0.02),
+        ("left_to_right", COLUMNS, 0.02),
+        ("right_to_left", COLUMNS, -0.02),
+    ],
+)
+def test_lines_are_read_in_the_direction_that_the_file_names(tmp_path, direction, axis, readout_s):
+    table = changed(INFO, ["rolling_shutter_readout_s"], 0.02)
+    table["rolling_shutter_direction"] = direction
+    camera = load_camera(written(tmp_path, table))[1]
+    assert (camera.readout_axis, camera.readout_s) == (axis, readout_s)
+    assert direction_of(axis, readout_s) == direction
+    chain = changed(KALIBR, ["cam0", "line_delay"], 2.5e-5)
+    chain["rolling_shutter_direction"] = direction
+    camera = load_camera(written(tmp_path, chain))[1]
+    lines = camera.height if axis == ROWS else camera.width
+    assert camera.readout_s == pytest.approx(np.sign(readout_s) * lines * 2.5e-5)
+
+
+@pytest.mark.parametrize(
+    ("angle", "size"), [(0, (720, 1280)), (180, (720, 1280)), (270, (1280, 720))]
+)
+def test_a_calibrated_camera_is_known_at_any_angle_of_the_screen(tmp_path, angle, size):
+    table = changed(INFO, ["camera_name"], "pixel 7")
+    table |= {"screen_angle_deg": 90, "rolling_shutter_readout_s": 0.02}
+    path = written(tmp_path, table)
+    found, camera = find_camera_file("pixel-7", size[0], size[1], [tmp_path], angle)
+    whole = load_camera(path)[1]
+    assert (found, camera.width, camera.height) == (path, *size)
+    np.testing.assert_array_equal(camera.K, whole.turned((90 - angle) // 90).K)
+    assert camera.readout_axis == (COLUMNS if size == (720, 1280) else ROWS)
+    table |= {"screen_angle_deg": angle, "image_width": size[0], "image_height": size[1]}
+    own = written(tmp_path, table, "own.yaml")
+    assert find_camera_file("pixel-7", size[0], size[1], [tmp_path], angle)[0] == own

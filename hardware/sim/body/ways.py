@@ -60,11 +60,11 @@ def _at_their_rows(powers: Array, camera: Camera) -> Array:
 
     `powers` (k, n, 2): coefficients over time [s] from the middle row's exposure.
     """
-    orders = np.arange(len(powers))
+    orders, last = np.arange(len(powers)), np.array([camera.width, camera.height]) - 1.0
     t = np.zeros(powers.shape[1])
     for _ in range(ROW_ITERATIONS if camera.readout_s != 0.0 else 0):
-        v = (powers[:, :, 1] * t ** orders[:, None]).sum(axis=0)
-        t = camera.row_delays(np.clip(v, 0.0, camera.height - 1.0))
+        pixels = (powers * t[None, :, None] ** orders[:, None, None]).sum(axis=0)
+        t = camera.delays(np.clip(pixels, 0.0, last))
     rows = np.zeros((len(t), 6))
     scale = np.ones(len(powers))
     for order in range(3):

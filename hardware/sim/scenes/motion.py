@@ -13,6 +13,7 @@ from hardware.sim.hand import MovingHand, hovering, steady_wander, three_poles, 
 from hardware.sim.hand_parts import FADE_S, MotionComponent, Waves
 from hardware.sim.phone import PhoneOptions
 from hardware.sim.scenes.scene import HandMotion, Range, Scene
+from pipeline.camera.lens import R_turned
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu
 
@@ -63,10 +64,18 @@ class PhoneAndRobotMotion:
     robot: MovingHand
     twin: MovingHand | None = None
     """Another robot of the same kind."""
+    quarters: int = 0
+    """The axes c here are those of a sensor whose pictures are turned by so many, clockwise, until
+    they stand as the hand holds them."""
+
+    def phone_pose(self, t: float) -> tuple[Array, Array]:
+        """(R_fc (3, 3), p_cf_in_f (3,) [m]) at `t` [s]."""
+        R_fc, p_cf_in_f = self.hand.pose(t)
+        return R_fc @ R_turned(self.quarters) if self.quarters else R_fc, p_cf_in_f
 
     def relative(self, t: float) -> tuple[Array, Array]:
         """(R_cb (3, 3), p_bc_in_c (3,) [m]) at `t` [s]."""
-        (R_fc, p_cf_in_f), (R_fb, p_bf_in_f) = self.hand.pose(t), self.robot.pose(t)
+        (R_fc, p_cf_in_f), (R_fb, p_bf_in_f) = self.phone_pose(t), self.robot.pose(t)
         return R_fc.T @ R_fb, R_fc.T @ (p_bf_in_f - p_cf_in_f)
 
 

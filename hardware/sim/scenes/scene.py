@@ -98,6 +98,9 @@ class Scene:
     has_body: bool = False
     """Arms, hub, propellers and cable are in the picture, not the LEDs alone."""
     picture: ImageOrientation = ImageOrientation.UPRIGHT
+    quarters: int = 0
+    """By so many a browser turns the sensor's picture, clockwise, for the phone is held so; of the
+    sensor the first row is read first, of the picture another line."""
     camera_fault: CameraFault = CameraFault.NONE
     """Begins `HONEST_S` after the film."""
 
@@ -110,6 +113,14 @@ CLEAN = Scene(
     readout_s=(0.0, 0.0),
 )
 TYPICAL = Scene("typical", "a room with a few lamps", lamps=(2, 6))
+ROLLING = Scene(
+    "rolling_shutter",
+    "rows read slowly while the hand turns at 60°/s",
+    readout_s=(0.024, 0.031),
+    exposure_s=(0.001, 0.003),
+    motion=HandMotion.SHAKEN,
+    lamps=(0, 4),
+)
 
 _ALL: Final = (
     CLEAN,
@@ -139,14 +150,16 @@ _ALL: Final = (
         led_light=(3.0, 8.0),
         lamps=(0, 4),
     ),
-    Scene(
-        "rolling_shutter",
-        "rows read slowly while the hand turns at 60°/s",
-        readout_s=(0.024, 0.031),
-        exposure_s=(0.001, 0.003),
-        motion=HandMotion.SHAKEN,
-        lamps=(0, 4),
+    ROLLING,
+    replace(ROLLING, sizes=(HD,), name="portrait", what="the same held upright", quarters=1),
+    replace(
+        ROLLING,
+        sizes=(HD,),
+        name="landscape_secondary",
+        what="the same the other way round: the last row is read first",
+        quarters=2,
     ),
+    replace(ROLLING, sizes=(HD,), name="portrait_secondary", what="held upside down", quarters=3),
     Scene(
         "distractors",
         "20 lamps and windows, or more",

@@ -90,7 +90,7 @@ class Stage:
 
     def _points(self, moving: PhoneAndRobotMotion, t: float) -> tuple[Array, Array]:
         """Points in f (m, 3) and in c: LEDs, mirrored ones, a twin's, lamps, windows, the bar."""
-        (R_fc, p_cf_in_f), (R_fb, p_bf_in_f) = moving.hand.pose(t), moving.robot.pose(t)
+        (R_fc, p_cf_in_f), (R_fb, p_bf_in_f) = moving.phone_pose(t), moving.robot.pose(t)
         leds = p_bf_in_f + self.leds_in_b @ R_fb.T
         points = [leds]
         if self.mirror is not None:
@@ -176,7 +176,7 @@ class Stage:
         self, camera: Camera, moving: PhoneAndRobotMotion, t: float
     ) -> tuple[npt.NDArray[np.float32], Image]:
         """The background as a camera sees it that has turned since the start."""
-        turned = rpy_from_R(self.R_fc_start.T @ moving.hand.pose(t)[0])
+        turned = rpy_from_R(self.R_fc_start.T @ moving.phone_pose(t)[0])
         return self.room.view(-camera.focal_px * turned[2], camera.focal_px * turned[1])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from zlib import crc32
 
 import numpy as np
@@ -30,6 +30,8 @@ LED_RADIUS_M = 0.004
 GAMMA, CONTRAST = (2.0, 2.4), (0.0, 0.15)
 """Every phone has its own tone curve, and nobody tells it."""
 DISTORTION = np.array([0.05, -0.12, 0.0005, -0.0004, 0.02])
+QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+"""Turns what is right and down clockwise."""
 TURNS = {ImageOrientation.TURNED_90: 0.5 * np.pi, ImageOrientation.TURNED_180: np.pi}
 
 
@@ -73,6 +75,16 @@ def leds_of(scene: Scene) -> Array:
     return FLAT_LEDS if scene.is_flat else load_robot("ames").robot.leds_in_b
 
 
+def _turned(drawn: DrawnFrame, quarters: int) -> tuple[Image, Array, Array]:
+    """The sensor's picture, its LEDs' places and what they tell, turned clockwise."""
+    luma, pixels, information = drawn.luma, drawn.pixels, drawn.information
+    for _ in range(quarters):
+        pixels = np.column_stack((len(luma) - 1.0 - pixels[:, 1], pixels[:, 0]))
+        luma = np.rot90(luma, -1)
+        information = QUARTER @ information @ QUARTER.T
+    return np.ascontiguousarray(luma), pixels, information
+
+
 class RenderedVideo:
     """A scene with everything drawn for one seed; going through it again gives the same shots."""
 
@@ -91,7 +103,8 @@ class RenderedVideo:
         self._seeds = named.spawn(5)
         rng = np.random.default_rng(self._seeds[0])
         self.leds_in_b = leds_of(scene)
-        self.camera = camera_of(size, within(rng, scene.readout_s))
+        self._sensor_camera = camera_of(size, within(rng, scene.readout_s))
+        self.camera = self._sensor_camera.turned(scene.quarters)
         """As a calibration knows it."""
         self.optics = Optics(
             blur_px=float(rng.uniform(*scene.blur_px)),
@@ -104,6 +117,7 @@ class RenderedVideo:
             contrast=float(rng.uniform(*CONTRAST)),
         )
         self.moving = movers(scene, rng)
+        self._sensed = replace(self.moving, quarters=scene.quarters)
         self._stage = self._staged(rng)
 
     def _staged(self, rng: np.random.Generator) -> Stage:
@@ -129,7 +143,7 @@ class RenderedVideo:
             mirror=mirror_near(p_bf_in_f, R_fc, rng) if scene.mirror else None,
             bar=bar_before(p_bf_in_f, p_cf_in_f, light, rng) if scene.bar else None,
             room=Room(self.size, light, scene.texture, self.optics.grey, rng),
-            R_fc_start=R_fc,
+            R_fc_start=self._R_fc(START_S),
             body=body_of(self.leds_in_b, load_robot("ames").plant, light, building)
             if scene.has_body
             else None,
@@ -141,8 +155,8 @@ class RenderedVideo:
 
     def __iter__(self) -> Iterator[RenderedFrame]:
         """Shots in order of time, each drawn when asked for."""
-        camera, o = self.camera, self.optics
-        first, second = camera.row_delays(np.array([0.0, 1.0]))
+        camera, o = self._sensor_camera, self.optics
+        first, second = camera.delays(np.array([[0.0, 0.0], [0.0, 1.0]]))
         sensor = Sensor(o, camera.width, camera.height, float(second - first))
         grain = np.random.default_rng(self._seeds[1])
         turn = rotation_about_x(TURNS.get(self.scene.picture, 0.0))
@@ -154,17 +168,20 @@ class RenderedVideo:
             du, dv = (int(x) for x in grain.integers(0, BANK, 2))
             before, shown, seen_by = shown, faulty.moment(t), faulty.at(t)
             if drawn is None or shown != before:
-                drawn = self._stage.draw(sensor, seen_by, self.moving, shown, (du, dv), self._bound)
-            yield self._shot(t, drawn, felt)
+                drawn = self._stage.draw(
+                    sensor, seen_by, self._sensed, shown, (du, dv), self._bound
+                )
+            # turned round, the line before is the middle one
+            yield self._shot(t + min(self.camera.readout_s, 0.0) / self.camera.lines, drawn, felt)
 
     def _R_fc(self, t: float) -> Array:
-        return self.moving.hand.pose(t)[0]
+        return self._sensed.phone_pose(t)[0]
 
     def _shot(self, t: float, drawn: DrawnFrame, felt: Sensors) -> RenderedFrame:
         R_cb, p_bc_in_c = self.moving.relative(t)
         lies = self.scene.camera_fault is not CameraFault.NONE and t >= START_S + HONEST_S
         enough = int((drawn.visible & ~drawn.merged).sum()) >= MIN_LEDS
-        luma, pixels = drawn.luma, drawn.pixels
+        luma, pixels, information = _turned(drawn, self.scene.quarters)
         if self.scene.picture is ImageOrientation.MIRRORED:
             luma = np.ascontiguousarray(luma[:, ::-1])
             pixels = np.column_stack((self.camera.width - 1 - pixels[:, 0], pixels[:, 1]))
@@ -177,7 +194,7 @@ class RenderedVideo:
             visible=drawn.visible,
             merged=drawn.merged,
             solvable=enough and not lies and self.scene.picture is ImageOrientation.UPRIGHT,
-            information=drawn.information,
+            information=information,
             phone=felt.phone(t + IMU_AHEAD_S),
             body=felt.body(t + IMU_AHEAD_S),
         )

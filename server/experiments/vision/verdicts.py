@@ -29,6 +29,9 @@ REFERENCE = {
 EFFECTIVE_PX = {
     "typical": 0.05,
     "rolling_shutter": 0.10,
+    "portrait": 0.10,
+    "landscape_secondary": 0.10,
+    "portrait_secondary": 0.10,
     "motion_blur": 0.25,
     "near_bloom": 0.12,
     "outdoor": 0.10,

@@ -76,7 +76,7 @@ class ChannelRun:
         """Begin with nothing seen."""
         self.channel, self._film = channel, film
         self._front_end = self._new()
-        self._wire = Wire(channel.codec, film.size)
+        self._wire = Wire(channel.codec, (film.camera.width, film.camera.height))
         self.record = SceneRecord(film.scene.name, film.size, channel.name)
         self._phone: deque[PhoneImu] = deque()
         self._body: deque[BodyImu] = deque()

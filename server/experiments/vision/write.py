@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import yaml
 
+from hardware.camera_file import direction_of
 from hardware.sim.scenes.video import RenderedFrame, RenderedVideo
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array, R_co, wxyz_from_R
@@ -60,7 +61,8 @@ def camera_text(camera: Camera, name: str) -> str:
             "cols": len(camera.distortion),
             "data": camera.distortion.tolist(),
         },
-        "rolling_shutter_readout_s": float(camera.readout_s),
+        "rolling_shutter_readout_s": abs(float(camera.readout_s)),
+        "rolling_shutter_direction": direction_of(camera.readout_axis, camera.readout_s),
     }
     return str(yaml.safe_dump(table, sort_keys=False))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hardware.camera_file import direction_of
 from pipeline.frames import Array
 from server.calibration.board import DICTIONARIES, Board, BoardError, parse
 from server.calibration.camera_imu import ImuError, gyro_of
@@ -160,7 +161,9 @@ def table(found: CalibrationSolution, filmed: BoardVideo) -> list[str]:
         ("  its σ", ", ".join(f"{x:.4f}" for x in sigma[4:-1])),
     ]
     if found.readout_known:
-        rows.append(("readout [ms]", f"{1e3 * value[-1]:.2f} ± {1e3 * sigma[-1]:.2f}"))
+        direction = direction_of(found.readout_axis, value[-1]).replace("_", " ")
+        words = f"{1e3 * abs(value[-1]):.2f} ± {1e3 * sigma[-1]:.2f}, {direction}"
+        rows.append(("readout [ms]", words))
     if found.imu is not None:
         angles = np.rad2deg(found.imu.sigma[:3]).max()
         offset, offset_sigma = 1e3 * found.imu.time_offset_s, 1e3 * found.imu.sigma[3]

@@ -19,7 +19,8 @@ files:
                  recording (.mcap), which brings its motion samples too
   camera.yaml    ROS camera_info (plumb_bob, rational_polynomial, equidistant) or a Kalibr
                  camchain; rolling_shutter_readout_s: a row's time is the frame's time
-                 + (row/height - 1/2) x readout
+                 + (row/height - 1/2) x readout; rolling_shutter_direction: top_to_bottom (if
+                 missing), bottom_to_top, left_to_right or right_to_left
   robot.toml     [[leds]] with position_in_body_m = [x, y, z], 3 to 32 of them
   imu.csv        t_s,gx,gy,gz,ax,ay,az in rad/s and m/s^2 (specific force: +9.8 up at rest) on the
                  frames' clock, in camera axes: x forward (optical axis), y left, z up

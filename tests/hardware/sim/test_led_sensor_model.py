@@ -13,6 +13,7 @@ from hardware.sim.hand import make_hand
 from hardware.sim.led_sensor_model import LedSensorModel
 from hardware.sim.phone import VirtualPhone
 from hardware.sim.render import RenderOptions
+from pipeline.camera.lens import COLUMNS, ROWS
 from pipeline.frames import Array
 
 LEDS = load_robot("ames").robot.leds_in_b
@@ -22,8 +23,12 @@ def at_rest(t: float) -> tuple[Array, Array]:
     return np.eye(3), np.zeros(3)
 
 
-def eye(noise_px: float, hidden: tuple[int, ...] = (), readout_s: float = 0.0) -> LedSensorModel:
-    camera = replace(find_camera("lightleash-virtual-phone", 1280, 720), readout_s=readout_s)
+def eye(
+    noise_px: float, hidden: tuple[int, ...] = (), readout_s: float = 0.0, axis: int = ROWS
+) -> LedSensorModel:
+    camera = replace(
+        find_camera("lightleash-virtual-phone", 1280, 720), readout_s=readout_s, readout_axis=axis
+    )
     rng = np.random.default_rng(1)
     phone = VirtualPhone(camera, make_hand("moving", seed=2), LEDS, RenderOptions(), rng)
     return LedSensorModel(phone, LEDS, noise_px, lambda t: hidden, np.random.default_rng(3))
@@ -64,8 +69,10 @@ def test_hidden_leds_have_no_rays_and_few_give_no_pose() -> None:
     assert eye(0.1, hidden=(0, 1, 2, 3, 4)).seen(2.0, 2.0, at_rest) is None
 
 
-def test_each_led_is_where_it_is_when_its_row_is_read() -> None:
-    rolling = eye(0.0, readout_s=0.03).seen(4.0, 4.0, at_rest)
+@pytest.mark.parametrize("axis", [ROWS, COLUMNS])
+@pytest.mark.parametrize("readout_s", [0.03, -0.03])
+def test_each_led_is_where_it_is_when_its_line_is_read(readout_s: float, axis: int) -> None:
+    rolling = eye(0.0, readout_s=readout_s, axis=axis).seen(4.0, 4.0, at_rest)
     assert rolling is not None
     for k, t in enumerate(rolling.rays.t):
         alone = eye(0.0).seen(float(t), 4.0, at_rest)

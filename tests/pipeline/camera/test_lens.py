@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.camera.extrinsics import Extrinsics
-from pipeline.camera.lens import Camera, points_of
+from pipeline.camera.lens import COLUMNS, ROWS, Camera, R_turned, points_of
+from pipeline.frames import R_cd, exp
 
 K = np.array([[930.0, 0.0, 646.0], [0.0, 931.5, 354.0], [0.0, 0.0, 1.0]])
 LENSES = {
@@ -77,3 +78,34 @@ def test_a_camera_of_another_picture_size_keeps_all_else_it_knows():
     small = whole.resized(640, 360)
     kept = {one.name for one in fields(Camera)} - {"width", "height", "K", "lens"}
     assert {name for name in kept if getattr(small, name) is not getattr(whole, name)} == set()
+
+
+def clockwise(pixels, height):
+    return np.column_stack((height - 1.0 - pixels[:, 1], pixels[:, 0]))
+
+
+@pytest.mark.parametrize("readout_s", [0.02, -0.02])
+@pytest.mark.parametrize("model", LENSES)
+def test_a_turned_camera_sees_the_turned_picture_line_for_line(model, readout_s):
+    points = points_of(np.random.default_rng(0).uniform(-0.3, 0.3, (20, 2)))
+    whole = replace(camera(model), readout_s=readout_s)
+    pixels, delays, height = whole.pixels(points), whole.delays(whole.pixels(points)), 720
+    for quarters in range(1, 5):
+        pixels, height = clockwise(pixels, height), 2000 - height  # 1280 and 720
+        turned = whole.turned(quarters)
+        there = points @ R_turned(quarters).T
+        np.testing.assert_allclose(turned.pixels(there), pixels, atol=1e-9)
+        np.testing.assert_allclose(points_of(turned.normalised(pixels)), there, atol=2e-5)
+        np.testing.assert_allclose(turned.delays(pixels), delays, atol=0.02 / 720)
+        assert turned.readout_axis == (COLUMNS if quarters % 2 else ROWS)
+        assert turned.sees(pixels).all()
+
+
+@pytest.mark.parametrize("angle", [0, 90, 180, 270])
+def test_a_camera_turned_with_the_screen_keeps_its_place_beside_the_motion_sensors(angle):
+    mounted = replace(camera(), extrinsics=Extrinsics(exp(np.array([0.1, -0.2, 0.05])), 0.01))
+    quarters = (90 - angle) // 90
+    there = mounted.turned(quarters).extrinsics
+    in_picture = R_turned(quarters) @ mounted.extrinsics.R_ci @ R_cd(90)
+    np.testing.assert_allclose(there.R_ci @ R_cd(angle), in_picture, atol=1e-12)
+    assert there.time_offset_s == 0.01

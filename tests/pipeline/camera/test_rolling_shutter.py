@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hardware.sim.render import RenderOptions, render
+from pipeline.camera.lens import COLUMNS, ROWS
 from pipeline.camera.rolling_shutter import FrameMotion, unrolled
 from pipeline.frames import cross, exp
 from pipeline.signals import Frame, Spots
@@ -25,14 +26,14 @@ def moving(truth, t, omega_b=(0.0, 0.0, 0.0)):
     return turn @ truth.R @ exp(t * np.array(omega_b)), turn @ (truth.p + t * U)
 
 
-def rolled_pixels(truth):
+def rolled_pixels(truth, rolling=ROLLING):
     """By fixed point: each LED at the time of its own row."""
     delays = np.zeros(len(LEDS_IN_B))
     for _ in range(20):
         places = [moving(truth, t) for t in delays]
         q = np.array([p + R @ led for (R, p), led in zip(places, LEDS_IN_B, strict=True)])
         pixels = CAMERA.pixels(q)
-        delays = ROLLING.row_delays(pixels[:, 1])
+        delays = rolling.delays(pixels)
     return pixels
 
 
@@ -41,12 +42,15 @@ def spots_of(pixels):
     return Spots(pixels, np.tile(np.eye(2), (n, 1, 1)), np.ones(n), np.ones(n))
 
 
-def test_known_motion_puts_the_spots_where_a_global_shutter_would():
+@pytest.mark.parametrize("axis", [ROWS, COLUMNS])
+@pytest.mark.parametrize("readout_s", [0.03, -0.03])
+def test_known_motion_puts_the_spots_where_a_global_shutter_would(readout_s, axis):
+    rolling = replace(CAMERA, readout_s=readout_s, readout_axis=axis)
     for seed in range(5):
         truth = truth_at(np.random.default_rng(seed))
-        rolled, whole = rolled_pixels(truth), truth.pixels()
+        rolled, whole = rolled_pixels(truth, rolling), truth.pixels()
         motion = FrameMotion(OMEGA, U, float(truth.p[0]))
-        righted = unrolled(ROLLING, spots_of(rolled), motion).pixels
+        righted = unrolled(rolling, spots_of(rolled), motion).pixels
         before, after = np.abs(rolled - whole).max(), np.abs(righted - whole).max()
         assert after < 0.05 * before
 
@@ -59,7 +63,7 @@ def test_motion_along_the_line_of_sight_alone_is_taken_out_too(approach):
     delays = np.zeros(len(LEDS_IN_B))
     for _ in range(20):
         pixels = CAMERA.pixels(truth.p + LEDS_IN_B @ truth.R.T + np.outer(delays, along))
-        delays = ROLLING.row_delays(pixels[:, 1])
+        delays = ROLLING.delays(pixels)
     rolled = spots_of(pixels)
     righted = unrolled(ROLLING, rolled, FrameMotion(still, along, float(truth.p[0]))).pixels
     before = np.abs(pixels - truth.pixels()).max()
@@ -136,6 +140,6 @@ def test_the_flow_is_that_of_a_point_that_moves_in_turning_axes():
     small = replace(CAMERA, readout_s=1e-4)
     pixels = small.pixels(q)
     rate = U - cross(OMEGA, q[0])
-    moved = small.pixels(q - rate * small.row_delays(pixels[:, 1])[:, None])
+    moved = small.pixels(q - rate * small.delays(pixels)[:, None])
     righted = unrolled(small, spots_of(pixels), FrameMotion(OMEGA, U, 2.0)).pixels
     np.testing.assert_allclose(righted, moved, atol=1e-5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -132,6 +132,15 @@ def gyro_rows(phone, motion, R_ci, offset_s, seconds=20.0, hz=60.0, bias=(0.01, 
     rate = np.array([R_ci.T @ R_co @ omega_cf_in_o(motion, phone, one) for one in t])
     rate = np.round((rate + bias) / np.deg2rad(0.1)) * np.deg2rad(0.1)
     return np.column_stack((t + offset_s, rate, np.zeros((len(t), 3))))
+
+
+def upright(views, phone):
+    """The same views in pictures that a browser turned clockwise by a quarter."""
+    last = phone.height - 1.0
+    return [
+        replace(view, pixels=np.column_stack((last - view.pixels[:, 1], view.pixels[:, 0])))
+        for view in views
+    ]
 
 
 class Studio:

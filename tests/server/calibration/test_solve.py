@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hardware.camera_file import find_camera_file, load_camera
+from pipeline.camera.lens import COLUMNS, ROWS
 from pipeline.frames import exp, log
 from server.calibration.camera_imu import gyro_of
 from server.calibration.camera_yaml import profile_path, store, yaml_of
@@ -15,7 +16,7 @@ from server.calibration.job import CalibrationJob, run
 from server.calibration.solve import ray_sigma, solve
 from server.calibration.verdict import Verdict, bare_side, judge, judge_views
 from server.calibration.views import BoardView
-from tests.server.calibration.filming import BOARD, Motion, Phone, corner_film, gyro_rows
+from tests.server.calibration.filming import BOARD, Motion, Phone, corner_film, gyro_rows, upright
 
 R_CI = exp(np.array([0.03, -0.02, 0.01]))
 OFFSET_S = 0.043
@@ -37,6 +38,7 @@ def test_lens_readout_and_sensors_are_found(found):
     assert found.shared[:2] == pytest.approx(phone.lens[:2], rel=0.003)
     assert found.shared[2:4] == pytest.approx(phone.lens[2:4], abs=3.0)
     assert found.shared[-1] == pytest.approx(phone.readout_s, rel=0.15)
+    assert found.readout_axis == ROWS
     assert found.imu.time_offset_s == pytest.approx(OFFSET_S, abs=0.005)
     assert np.rad2deg(log(found.imu.R_ci @ R_CI.T)) == pytest.approx(np.zeros(3), abs=0.3)
 
@@ -73,6 +75,23 @@ def test_a_picture_that_stands_on_its_head_has_a_negative_readout(seed):
     found = calibrated(Phone(readout_s=-0.015), Motion(seed=seed), gyro=False, seed=seed)
     assert found.shared[-1] == pytest.approx(-0.015, rel=0.15)
     assert found.shared[0] == pytest.approx(Phone().lens[0], rel=0.003)
+
+
+@pytest.mark.slow
+def test_a_phone_held_upright_reads_its_pictures_columns(tmp_path):
+    phone = Phone(readout_s=0.022)
+    views = upright(corner_film(phone, Motion(seed=1), 6.0, seed=1), phone)
+    found = solve(views, BOARD, (720, 1280), phone.model)
+    assert found.readout_axis == COLUMNS
+    assert found.shared[-1] == pytest.approx(-0.022, rel=0.15)
+    assert found.shared[:2] == pytest.approx(phone.lens[1::-1], rel=0.003)
+    path = tmp_path / "phone.yaml"
+    store(path, yaml_of(found, judge(found), "phone", 0, "2026-01-01"))
+    camera = load_camera(path)[1]
+    assert (camera.readout_axis, camera.readout_s) == (
+        COLUMNS,
+        pytest.approx(found.shared[-1], abs=1e-6),
+    )
 
 
 @pytest.mark.slow

@@ -120,7 +120,7 @@ class Rays:
         pixel = self._film[k].spots.pixels[spot]
         if self._camera.readout_s == 0.0:
             return np.asarray(pixel)
-        delay = float(self._camera.row_delays(pixel[1:2])[0])
+        delay = float(self._camera.delays(pixel[None])[0])
         around = [n for n in (k - 1, k, k + 1) if led in names.get(n, {})]
         first, last = around[0], around[-1]
         if first == last:

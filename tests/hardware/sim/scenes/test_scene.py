@@ -74,14 +74,33 @@ def test_a_streak_of_even_motion_is_centred_on_its_middle():
     assert np.ptp(np.nonzero(luma > 60)[1]) > np.ptp(np.nonzero(luma > 60)[0]) + 3
 
 
-def test_pixels_are_the_exact_pose_of_the_rows_time():
-    film = RenderedVideo(SCENES["rolling_shutter"], 5, VGA, 4)
+HELD = ["rolling_shutter", "portrait", "landscape_secondary", "portrait_secondary"]
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_pixels_are_the_exact_pose_of_the_lines_time(name):
+    film = RenderedVideo(SCENES[name], 5, VGA, 4)
     for shot in film:
-        delays = film.camera.row_delays(shot.pixels[:, 1])
+        delays = film.camera.delays(shot.pixels)
         for led, (place, delay) in enumerate(zip(shot.pixels, delays, strict=True)):
             R_cb, p_bc_in_c = film.moving.relative(shot.t + delay)
             exact = film.camera.pixels((p_bc_in_c + film.leds_in_b @ R_cb.T)[led : led + 1])
             np.testing.assert_allclose(place, exact[0], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_however_the_phone_is_held_light_is_where_the_pixels_say_and_gravity_is_down(name):
+    near = {"led_light": (0.6, 0.6), "distance_m": (1.5, 1.5), "exposure_s": (1e-5, 1e-5)}
+    scene = replace(SCENES[name], **near, **QUIET, **DARK)
+    film = RenderedVideo(scene, 3, HD, 1, bound=True)
+    (shot,) = film
+    assert shot.luma.shape == (film.camera.height, film.camera.width)
+    assert shot.visible.all()
+    for place in shot.pixels:
+        seen = centroid(shot.luma, place, 11, film.optics)
+        np.testing.assert_allclose(seen, place, atol=0.05)
+    assert np.mean([s.a_m_cf_in_c for s in shot.phone], axis=0)[2] == pytest.approx(9.8, abs=1.0)
+    np.testing.assert_allclose(shot.information, shot.information.transpose(0, 2, 1))
 
 
 def test_the_pose_is_the_middle_rows():
@@ -113,7 +132,8 @@ def test_seeds_vary_distance_light_and_lamps():
 @pytest.mark.parametrize("name", SCENES)
 def test_every_scene_can_be_filmed(name):
     (shot,) = shots(name, frames=1)
-    assert shot.luma.shape == (480, 640)
+    is_upright = SCENES[name].quarters % 2 == 1
+    assert shot.luma.shape == ((640, 480) if is_upright else (480, 640))
     assert shot.luma.dtype == np.uint8
     assert shot.solvable == (shot.solvable and SCENES[name].picture is ImageOrientation.UPRIGHT)
 

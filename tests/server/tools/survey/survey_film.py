@@ -54,7 +54,7 @@ def pixels_at(camera, walk, leds_in_b, t):
         for _ in range(4):
             R, p = walk.pose(t + delay)
             pixel = camera.pixels((p + R @ led)[None])[0]
-            delay = float(camera.row_delays(pixel[1:2])[0])
+            delay = float(camera.delays(pixel[None])[0])
         places.append(pixel)
     return np.array(places)
 
