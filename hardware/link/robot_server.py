@@ -8,7 +8,7 @@ import os
 import select
 import socket
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 from hardware.link.datagram import MAX_BYTES
@@ -108,14 +108,19 @@ class RobotServer:
                 self._others[readable]()
 
     def _receive(self) -> None:
-        for _ in range(MAX_DATAGRAMS):
-            try:
-                data, sender = self._link.recvfrom(MAX_BYTES + 1)
-            except BlockingIOError:
-                return
-            except OSError:  # tells that an earlier sample met a closed port
-                continue
+        for data, sender in arrived(self._link):
             self._robot.receive(data, sender, self.now_us)
+
+
+def arrived(link: socket.socket) -> Iterator[tuple[bytes, Address]]:
+    """Datagrams that have come, and from whom; so many that the clock is not forgotten."""
+    for _ in range(MAX_DATAGRAMS):
+        try:
+            yield link.recvfrom(MAX_BYTES + 1)
+        except BlockingIOError:
+            return
+        except OSError:  # tells that an earlier one of ours met a closed port
+            continue
 
 
 def bound(address: Address) -> socket.socket:

@@ -17,16 +17,13 @@ import sys
 from collections.abc import Sequence
 
 from hardware.link.control_end import random_u64
-from hardware.link.datagram import MAX_BYTES
 from hardware.link.link_key import LinkKeyError, take_key
-from hardware.link.robot_server import RobotServer, be_punctual, bound
+from hardware.link.robot_server import RobotServer, arrived, be_punctual, bound
 from hardware.robot_file import RobotFile, RobotFileError, load_robot
 from hardware.sim.simulated import SimulatedRobot
 from hardware.sim.truth import ahead_of, encode_truth
 
 Address = tuple[str, int]
-MAX_DATAGRAMS = 64
-"""Requests for the truth answered in a row."""
 
 
 class RobotProcess:
@@ -55,13 +52,7 @@ class RobotProcess:
 
     def _answer(self) -> None:
         assert self._truth is not None
-        for _ in range(MAX_DATAGRAMS):
-            try:
-                data, sender = self._truth.recvfrom(MAX_BYTES + 1)
-            except BlockingIOError:
-                return
-            except OSError:  # tells that an earlier answer met a closed port
-                continue
+        for data, sender in arrived(self._truth):
             if (ahead_s := ahead_of(data)) is not None:
                 self._tell_truth(self._truth, data, ahead_s, sender)
 
