@@ -211,7 +211,7 @@ class _Work:
         )
 
     def judged(self, found: BoardFit, views: Sequence[BoardView]) -> float:
-        """RMS error of views that were kept out, each with its own pose [px]."""
+        """RMS error of believable views that were kept out, each with its own pose [px]."""
         if len(views) == 0:
             return float("nan")
         shared, n = found.guess.shared, len(views)
@@ -223,7 +223,8 @@ class _Work:
             value, sigma = self._rates.value[at], self._rates.sigma[at]
         prior = ParameterPrior(shared, np.zeros(len(shared)), value, sigma)
         start = Guess(shared, R, p, value)
-        return _rms(fit(film, start, prior, with_rates=self._rates is not None).residuals)
+        found = fit(film, start, prior, with_rates=self._rates is not None)
+        return _rms(found.residuals[_believable(found, film)[film.view]])
 
 
 def ray_sigma(solution: CalibrationSolution) -> Array:

@@ -33,7 +33,8 @@ def test_the_page_guides_through_a_calibration_and_goes_on_with_it(
         assert "/board" in phone.page.locator("#calibration").inner_text()
         phone.roll()
         phone.play_until("#calibration-go", 120.0)
-        assert "calibrated" in phone.page.locator("#calibration-title").inner_text()
+        said = phone.page.locator("#calibration").inner_text()
+        assert "calibrated" in phone.page.locator("#calibration-title").inner_text(), said
         (profile,) = (server.state / "cameras").glob("*.yaml")
         name, camera = load_camera(profile)
         assert name == DEVICE

@@ -53,6 +53,20 @@ def test_it_says_how_sure_it_is(found):
     assert judge(found) == Verdict("good", [], [])
 
 
+def test_one_view_measured_wrongly_condemns_no_lens():
+    phone = Phone()
+    views = corner_film(phone, Motion(seed=1), 9.0, 30.0, seed=0)
+    kept_out = solve(views, BOARD, phone.size, phone.model).choice.held_out[0]
+    pixels = kept_out.pixels.copy()
+    pixels[len(pixels) // 2] += 80.0
+    wrong = replace(kept_out, pixels=pixels)
+    found = solve(
+        [wrong if view is kept_out else view for view in views], BOARD, phone.size, phone.model
+    )
+    assert wrong in found.choice.held_out
+    assert found.held_out_px == pytest.approx(0.1 * np.sqrt(2.0), rel=0.15)
+
+
 def test_the_file_is_a_camera_file(found, tmp_path):
     name = 'Pixel "7" \\ back: #1'
     path = profile_path(tmp_path, name, found.size, 90)
