@@ -51,8 +51,9 @@ def rates(t: Array, R_og: Array, p_go_in_o: Array, pose_sigma: Array) -> Rates:
                 for j in around
             ]
         )
-        value[k], sigma[k] = _derivative(t[around] - t[k], steps, pose_sigma[k])
-        known[k] = True
+        slope, doubt = _derivative(t[around] - t[k], steps, pose_sigma[k])
+        if (doubt < UNKNOWN).all():  # stamps that all but coincide tell of no rate
+            value[k], sigma[k], known[k] = slope, doubt, True
     return Rates(value, sigma, known)
 
 
