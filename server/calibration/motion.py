@@ -52,7 +52,7 @@ def rates(t: Array, R_og: Array, p_go_in_o: Array, pose_sigma: Array) -> Rates:
             ]
         )
         slope, doubt = _derivative(t[around] - t[k], steps, pose_sigma[k])
-        if (doubt < UNKNOWN).all():  # stamps that all but coincide tell of no rate
+        if (doubt < UNKNOWN).all():  # else it tells less than is known of any hand
             value[k], sigma[k], known[k] = slope, doubt, True
     return Rates(value, sigma, known)
 

@@ -223,8 +223,8 @@ class _Work:
             value, sigma = self._rates.value[at], self._rates.sigma[at]
         prior = ParameterPrior(shared, np.zeros(len(shared)), value, sigma)
         start = Guess(shared, R, p, value)
-        found = fit(film, start, prior, with_rates=self._rates is not None)
-        return _rms(found.residuals[_believable(found, film)[film.view]])
+        placed = fit(film, start, prior, with_rates=self._rates is not None)
+        return _rms(placed.residuals[_believable(placed, film)[film.view]])
 
 
 def ray_sigma(solution: CalibrationSolution) -> Array:
