@@ -6,9 +6,12 @@ robot feel how they turn and accelerate. The relative filter's own model carries
 on from `LAG_S` ago without the pictures since; what is seen beside it by more than both doubts
 bear, χ² with three degrees of freedom, is a lie of the camera, and seen so in the first pictures.
 
-* What is a little beside is believed less: its covariance takes in how far it is.
+* What is a little beside is believed less: its covariance takes in how far it is. If that happens
+  too often across the line of sight, the phone's samples are worse than they should be, and
+  foretell less (covariance matching, as in `adaptive_noise`); unless the picture is steadied.
 * What is far beside is not believed. After `NAMED_S` the lie is named, and the camera is on trial:
   nothing is believed until `TRIAL_S` have passed without another one, and a zoom is taken back.
+* What is steadied is named as well, be it ever so little beside (`steadied_picture`).
 
 Nothing is judged without fresh samples of both sides, or before the pictures' time is known.
 """
@@ -21,7 +24,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.camera.verdict import FOCAL
+from pipeline.camera.verdict import FOCAL, SURE
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, X_BIASES, X_OFFSET
 from pipeline.estimation.relative_start import Learnt, can_start, first_checkpoint
@@ -30,8 +33,9 @@ from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 from pipeline.imu_stream import ImuStream
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, VisionMeasurement
-from pipeline.vision.camera_lies import is_far, named, scaled
+from pipeline.vision.camera_lies import SHIFTED, CameraLie, is_far, named, scaled
 from pipeline.vision.rays import NO_RAYS, widened
+from pipeline.vision.steadied_picture import SteadiedPicture
 
 LAG_S: Final = 0.25
 """So long the motion sensors alone are trusted."""
@@ -40,6 +44,13 @@ REFUSED_CHI2: Final = 30.0
 MEDIAN_CHI2, MEDIAN_STEP = 2.37, 0.01
 """Half of the pictures are beside their place by more than the one, by chance; each moves what is
 usual by the other share, up or down."""
+TAIL_CHI2, TAIL, TAIL_STEP = 6.0, 0.05, 0.25
+"""Of honest pictures this share is aside of what the one before foretold by more, by chance: χ²
+with two degrees of freedom. Each one beyond moves the doubt of the phone's samples up by the step
+times the others' share, each other one down by the step times this: so samples of a busy browser
+are known for what they are within a second, and only a lie is farther off than they explain."""
+MOST_DOUBT: Final = 1e3
+"""Standard deviations 30 times as large: such samples say nothing."""
 GAP_S: Final = 0.045
 """Samples farther apart than this, two of a phone's lost, say too little of what is between."""
 DOUBTED_CHI2: Final = 5.0
@@ -56,8 +67,9 @@ LATELY, SURPRISED = 0.1, 2.5
 NAMED_S: Final = 0.06
 NAMED_PICTURES: Final = 3
 """Refused in a row before the camera is blamed."""
-AMISS_CHI2: Final = 12.0
-"""Of one of them, from before all pictures that may have misled the next: once in 140 by chance."""
+AMISS_CHI2, SHIFTED_CHI2 = 12.0, 20.0
+"""Of the last of them, from before all pictures that may have misled the next: once in 140 by
+chance; and of one that is shifted, as samples that have just become worse shift it as well."""
 TRIAL_S: Final = 1.5
 FLOOR_RAD: Final = 2e-4
 """How far an LED may be from where picture and robot file have it, beside noise: 0.2 px."""
@@ -95,12 +107,14 @@ class PictureCheck:
         """Of the motion sensors, while the camera told the truth."""
         self._usual = 1.0
         """How many times χ² is what it should be: samples may be dated badly."""
+        self._doubt = 1.0
+        """By what factor the variances of the phone's samples are greater than said: a browser
+        that is kept from work reads its sensors late."""
+        self._jumps = SteadiedPicture()
         self._stretch = 1.0
         """Of what is foretold, for a robot that shakes more than the model says."""
         self._t_begun = -np.inf
         self._refused: list[VisionMeasurement] = []
-        self._amiss = 0.0
-        """χ² of the worst of them."""
         self._surprise, self._off2 = 1.0, np.zeros(3)
         """Lately: χ²/3, and by how much it was missed (3,) [m²]."""
         self._scale = 0.0
@@ -144,16 +158,19 @@ class PictureCheck:
             self._begin(seen)
             return self._told(FINE, pose)
         track.settle(t - LAG_S)
-        track.doubt_phone(_bent(track.phone, t, BEND_PHONE))
+        track.doubt_phone(max(self._doubt, _bent(track.phone, t, BEND_PHONE)))
         self._stretch = _bent(track.body, t, BEND_BODY)
         far, near = track.predicted(t, t - LAG_S), track.predicted(t)
         (off, chi2), (off_near, chi2_near) = self._missed(pose, far), self._missed(pose, near)
+        self._doubt_samples(pose, near)
         misses = ((off, chi2, far), (off_near, chi2_near, near))
         known_s = KNOWN_S if self._learnt is None else LAG_S
         if seen.t - self._t_begun > known_s and any(
             x > self._usual * REFUSED_CHI2 and self._is_far(miss, at) for miss, x, at in misses
         ):
             return self._refuse(seen, chi2, max(off, off_near, key=_square), far.x[0:3])
+        if self._jumps.is_steadied:
+            return self._name(seen, CameraLie(SHIFTED))
         self._refused.clear()
         if not np.isfinite(track.fuse(near, seen, len(seen.rays))):
             self._begin(seen)
@@ -172,11 +189,26 @@ class PictureCheck:
     ) -> tuple[Array, float]:
         """Where it is seen from where it was foretold (3,) [m], and χ² of that."""
         off = pose.p_bc_in_c - foretold.x[0:3]
-        S = self._stretch * self._track.in_picture(foretold)[:3, :3] + pose.covariance[:3, :3]
-        return off, float(off @ np.linalg.solve(S, off))
+        return off, float(off @ np.linalg.solve(self._doubts(pose, foretold), off))
 
-    def measured(self, focal: float) -> None:
-        """Things look by so much larger than calibrated, as somebody measured since."""
+    def _doubts(self, pose: RelativePose, foretold: Checkpoint[VisionMeasurement]) -> Array:
+        """Covariance (3, 3) [m²] of where it is seen from where it was foretold."""
+        P: Array = self._track.in_picture(foretold)[:3, :3]
+        return self._stretch * P + pose.covariance[:3, :3]
+
+    def _doubt_samples(self, pose: RelativePose, near: Checkpoint[VisionMeasurement]) -> None:
+        """Learn how well the phone's samples foretell, from one picture to the next."""
+        since, aside, foretold = self._track.newest.x[1:3], pose.p_bc_in_c[1:], near.x[1:3]
+        off, S = aside - foretold, self._doubts(pose, near)[1:, 1:]
+        self._jumps.add(aside - since, foretold - since, float(np.trace(S)))
+        is_late = off @ np.linalg.solve(S, off) > TAIL_CHI2 and not self._jumps.is_still
+        step = TAIL_STEP * (1.0 - TAIL if is_late else -TAIL)
+        self._doubt = min(max(1.0, (1.0 + step) * self._doubt), MOST_DOUBT)
+
+    def measured(self, focal: float, sigma: float) -> None:
+        """Things look by so much larger than calibrated, ± `sigma`, as somebody measured since."""
+        if SURE * sigma > max(FOCAL, abs(focal)):
+            return  # says neither that the scale is right nor that it is wrong
         self._scale = 0.0 if abs(focal) < FOCAL else log(1.0 + focal)
 
     def _told(self, judged: Judged, pose: RelativePose) -> Judged:
@@ -216,11 +248,15 @@ class PictureCheck:
     def _refuse(self, seen: VisionMeasurement, chi2: float, off: Array, foretold: Array) -> Judged:
         refused = self._refused
         refused.append(seen)
-        self._amiss = max(self._amiss, chi2) if len(refused) > 1 else chi2
-        is_lie = self._amiss > AMISS_CHI2 and seen.t - refused[0].t >= NAMED_S
+        lie = named(refused, off, foretold)
+        least = self._usual * (SHIFTED_CHI2 if lie.words == SHIFTED else AMISS_CHI2)
+        is_lie = chi2 > least and seen.t - refused[0].t >= NAMED_S
         if len(refused) < NAMED_PICTURES or not is_lie:
             return REFUSED
-        lie = named(refused, off, foretold)
+        return self._name(seen, lie)
+
+    def _name(self, seen: VisionMeasurement, lie: CameraLie) -> Judged:
+        """Put the camera on trial."""
         self._scale += lie.scale
         self._begin(seen)
         is_scaled = lie.scale != 0.0 or abs(self._scale) >= RETURNED
@@ -230,7 +266,8 @@ class PictureCheck:
 
     def _acquit(self, t: float) -> None:
         """End the trial of a camera that told the truth for long enough."""
-        if self.complaint and t - self._t_begun > TRIAL_S and abs(self._scale) < RETURNED:
+        is_over = t - self._t_begun > TRIAL_S and not self._jumps.is_still
+        if self.complaint and is_over and abs(self._scale) < RETURNED:
             self.complaint = ""
 
 

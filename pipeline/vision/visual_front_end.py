@@ -191,7 +191,7 @@ class VisualFrontEnd:
         """Hold a believed pose against what the motion sensors predict."""
         pose, facts = detection.pose, self.monitor.facts
         if facts is not None and facts.t - self.check.t_named > MEASURED_S:
-            self.check.measured(facts.focal)
+            self.check.measured(facts.focal, facts.focal_sigma)
         seen = detection.seen(self.camera)
         if seen is None or (pose is None and not self.check.complaint):
             return detection

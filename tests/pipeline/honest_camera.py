@@ -57,6 +57,13 @@ ADVERSITIES = {
     "clipped gyroscope": replace(of_hand("shaken"), clipped=0.6),
     "samples lost": of_hand("filming", lost=0.1),
     "samples late and misdated": of_hand("filming", delayed=0.05, stamp_jitter=0.003),
+    "samples held": Adversity({"tremor_relaxation": 0.15, "held": (0.01, 0.02)}),
+    "samples of a busy browser": Adversity({"tremor_relaxation": 0.15, "held": (0.01, 0.04)}),
+    "a browser becomes busy": Adversity(
+        {"tremor_relaxation": 0.15, "held": (0.01, 0.04), "held_since": 8.0}
+    ),
+    "filming, and becomes busy": of_hand("filming", held=(0.01, 0.03), held_since=8.0),
+    "trembling, samples held": of_hand("trembling_13_hz", held=(0.01, 0.03)),
     "propellers shake": replace(of_hand("filming"), body_noise=1.0),
     "a slow line": of_hand("filming", time_offset=0.06, picture_delay=(0.1, 0.25)),
     "holes": replace(of_hand("walking"), hole=(0.1, 0.6)),

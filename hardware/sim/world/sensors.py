@@ -63,7 +63,8 @@ def phone_samples(world: World) -> list[Event]:
     """Samples of the phone's IMU."""
     rng, i, setup = world.rng(11), world.phone.i, world.setup
     stamps = world.phone_stamps(world.t[i]) + setup.stamp_jitter * rng.normal(size=len(i))
-    felt = (world.omega_c[i], world.f_c[i])
+    read = _held(world, i)
+    felt = (world.omega_c[read], world.f_c[read])
     told = _measured(rng, world, felt, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
     omega, f = (
         np.clip(np.rint(v / step) * step, -most, most)
@@ -72,6 +73,19 @@ def phone_samples(world: World) -> list[Event]:
     rows = zip(world.phone.arrival.tolist(), stamps.tolist(), omega, f, strict=True)
     samples: list[Event] = [(arrival, PhoneImu(t, w, g)) for arrival, t, w, g in rows]
     return samples + _twins(world.rng(15), samples, setup.phone_fault.twins)
+
+
+def _held(world: World, i: Indices) -> Indices:
+    """When (n,) on the grid was felt what is read at `i` (n,)."""
+    shortest, longest = world.setup.held
+    if longest == 0.0:
+        return i
+    most = int(world.t[-1] / shortest) + 2
+    begins = np.cumsum(world.rng(16).uniform(shortest, longest, most))
+    begins = np.concatenate(([0.0], begins))
+    last = np.searchsorted(begins, world.t[i], side="right") - 1
+    felt = np.searchsorted(world.t, begins[last])
+    return np.where(world.t[i] < world.setup.held_since, i, felt)
 
 
 def body_samples(world: World) -> list[Event]:

@@ -1,0 +1,55 @@
+"""Whether pictures jump to and fro with the phone that takes them, or a stabiliser steadies them.
+
+A hand trembles at 4 to 12 Hz, so what a picture shows jumps aside from one to the next, and back.
+The phone's gyroscope foretells how far. A stabiliser takes most of it out: the jumps that are seen
+are smaller than those foretold. Samples that a busy browser reads late, or of a wrong time, put the
+jumps elsewhere and leave their size: so the one is told from the other, whenever it began.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from pipeline.frames import Array
+
+MEMORY: Final = 0.1
+"""Share of each picture in what is remembered."""
+STEADIED: Final = 0.4
+"""Of the foretold jumps, squared: honest pictures show 0.6 and more, steadied ones 0.3 and less."""
+CLEAR: Final = 15.0
+"""Times the variance of where a picture is foretold: so far the foretold jumps are no noise."""
+PICTURES: Final = 6
+"""Clearly steadied ones in a row, until it is said."""
+
+
+class SteadiedPicture:
+    """Follows the robot's jumps in pictures, across the line of sight."""
+
+    def __init__(self) -> None:
+        """Nothing seen yet."""
+        self._moved, self._jumps = np.zeros((2, 2)), np.zeros(2)
+        """Since the picture before: as seen, as foretold [m]; mean square of how that changed."""
+        self._clear = 0
+
+    def add(self, seen: Array, foretold: Array, variance: float) -> None:
+        """Take how far (2,) the robot moved in a picture, and how far it should have [m].
+
+        `variance` [m²] of the difference, both axes together.
+        """
+        moved = np.array([seen, foretold])
+        self._jumps += MEMORY * (np.square(moved - self._moved).sum(axis=1) - self._jumps)
+        self._moved = moved
+        is_clear = self.is_still and self._jumps[1] > CLEAR * variance
+        self._clear = self._clear + 1 if is_clear else 0
+
+    @property
+    def is_still(self) -> bool:
+        """It jumps less than foretold, so that no sample can be doubted for where it is."""
+        return bool(self._jumps[0] < STEADIED * self._jumps[1])
+
+    @property
+    def is_steadied(self) -> bool:
+        """Beyond noise, and for long enough to be said."""
+        return self._clear >= PICTURES
