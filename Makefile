@@ -90,16 +90,17 @@ kernels: dev
 	@$(BIN)/lightleash warm
 
 # Tests start some hundred processes, each with a thousand modules: compiled once, not each time.
-kernels real robots pages quiet fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=
+kernels pytest real robots pages quiet fast-server fast-others: export PYTHONDONTWRITEBYTECODE :=
 
-# First flights, whose phones and robots share the machine with nobody; then what else is real, two at
-# a time. All the while what no clock hurries takes the half that those leave, for they wait.
+# First flights, whose phones and robots share the machine with nobody: what runs beside them, and be
+# it only when nobody else wants to, makes a virtual machine's processors wait. Then what else is real,
+# two at a time, and what no clock hurries takes the half that those leave, for they wait.
 pytest: dev
-	$(MAKE) --jobs=2 --keep-going --output-sync real quiet
+	$(BIN)/pytest -m flight $(ARGS)$(MAYBE_NONE); flown=$$?; \
+	$(MAKE) --jobs=2 --keep-going --output-sync real quiet && exit $$flown
 
 real: dev
-	$(BIN)/pytest -m flight $(ARGS)$(MAYBE_NONE); flown=$$?; \
-	$(MAKE) --jobs=2 --keep-going robots pages && exit $$flown
+	$(MAKE) --jobs=2 --keep-going robots pages
 
 robots: dev
 	$(BIN)/pytest -m "(e2e or bench) and not flight and not page and not counterpart" $(ARGS)$(MAYBE_NONE)
