@@ -22,6 +22,7 @@ class Recordings:
         self._directory, self._metadata = directory, metadata
         self._recorder: Recorder | None = None
         self._has_key, self._t_asked = True, -inf
+        self._knows_camera = True
         self.failure = ""
         """Why the last recording ended by itself, or ""."""
 
@@ -42,7 +43,17 @@ class Recordings:
             self._recorder = Recorder(self._directory, name, {**self._metadata, **own})
             self.failure = ""
             self._has_key, self._t_asked = False, -inf
+            self._knows_camera = bool(camera_text)
         return self.name
+
+    def learn(self, device: str, camera_text: str) -> None:
+        """The phone and its camera, if the recording began before there was one.
+
+        Of several, the first: a replay knows the others by their files, as it does without any.
+        """
+        if self._recorder is not None and camera_text and not self._knows_camera:
+            self._knows_camera = True
+            self._recorder.learn({DEVICE_KEY: device, CAMERA_KEY: camera_text})
 
     def stop(self) -> str:
         """End; gives the path of the file, or ""."""

@@ -23,6 +23,7 @@ from server.protocol.messages import Status, decode_from_server
 from server.protocol.wire import VERSION
 from server.recording.writer import (
     DEVICE_KEY,
+    METADATA,
     PHONE_RECORDS,
     SERVER_MESSAGES,
     UNIX_ZERO_KEY,
@@ -138,11 +139,10 @@ def read(path: Path) -> Recording:
     with _opened(path) as stream:
         _check_ends(path, stream)
         reader = _reader(stream)
-        metadata = next(
-            (m.metadata for m in reader.iter_metadata() if m.name == "lightleash"), None
-        )
-        if metadata is None:
+        ours = [m.metadata for m in reader.iter_metadata() if m.name == METADATA]
+        if not ours:
             raise RecordingError(path, "is no recording of Lightleash", "name another file")
+        metadata = {key: text for some in ours for key, text in some.items()}
         version = metadata.get("protocol_version", "?")
         if version != str(VERSION):
             what = f"has protocol version {version}"
@@ -204,8 +204,11 @@ def _copy_complete(source: IO[bytes], target: IO[bytes]) -> None:
     with suppress(*_DAMAGE):
         for record in reader.records:
             match record:
-                case Metadata(name="lightleash", metadata=metadata) if writer is None:
-                    writer, ours = start_file(target, metadata)
+                case Metadata(name=name, metadata=metadata) if name == METADATA:
+                    if writer is None:
+                        writer, ours = start_file(target, metadata)
+                    else:
+                        writer.add_metadata(METADATA, metadata)
                 case Channel(id=id, topic=topic):
                     topics[id] = topic
                 case Message(channel_id=id, log_time=t, publish_time=sent, data=data) if writer:

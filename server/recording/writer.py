@@ -47,6 +47,8 @@ ENCODINGS = {
     SERVER_MESSAGES: "json",
     STATUS: "json",
 }
+METADATA = "lightleash"
+"""Name of our metadata: of several later ones add to the first."""
 DEVICE_KEY, ROBOT_KEY, CAMERA_KEY, SETTINGS_KEY = "device", "robot_file", "camera_file", "settings"
 """Metadata: phone, text of the robot's and the camera's file, settings of the server."""
 UNIX_ZERO_KEY = "unix_zero_ns"
@@ -84,6 +86,10 @@ class _Item:
     data: bytes | ControlStatus
 
 
+_Learnt = dict[str, str]
+"""Metadata that was not known when the recording began."""
+
+
 class Recorder:
     """Writes one recording from its own thread; what the disk can't take in time is dropped."""
 
@@ -102,7 +108,7 @@ class Recorder:
         """Why the recording ended early, or ""."""
         self._max_bytes = max_bytes
         self._closing = threading.Event()
-        self._queue: queue.Queue[_Item | None] = queue.Queue(CAPACITY)
+        self._queue: queue.Queue[_Item | _Learnt | None] = queue.Queue(CAPACITY)
         self._directory = directory
         try:
             directory.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -131,6 +137,10 @@ class Recorder:
         """Keep a status of the control process."""
         self._put(_Item(STATUS, t, status))
 
+    def learn(self, metadata: dict[str, str]) -> None:
+        """Keep what is only known now: it counts for the whole recording."""
+        self._put(metadata)
+
     def close(self) -> None:
         """Write what is waiting, close and rename the file; waits for the disk."""
         self._closing.set()
@@ -138,7 +148,7 @@ class Recorder:
             self._queue.put_nowait(None)  # wakes the thread
         self._thread.join()
 
-    def _put(self, item: _Item) -> None:
+    def _put(self, item: _Item | _Learnt) -> None:
         if self.error or self._closing.is_set():
             self.dropped += 1
             return
@@ -162,7 +172,9 @@ class Recorder:
         while not (self._closing.is_set() and self._queue.empty()):
             with suppress(queue.Empty):
                 item = self._queue.get(timeout=FLUSH_S)
-                if item is not None:
+                if isinstance(item, dict):
+                    writer.add_metadata(METADATA, item)
+                elif item is not None:
                     _add(writer, channels[item.topic], item)
                     self.written += 1
             if clock.now() - flushed >= FLUSH_S:
@@ -205,7 +217,7 @@ def start_file(file: IO[bytes], metadata: dict[str, str]) -> tuple[Writer, dict[
     """A writer that has written the metadata, and the ids of our channels."""
     writer = Writer(file, chunk_size=CHUNK_BYTES)
     writer.start(profile="lightleash", library=f"lightleash {server.__version__}")
-    writer.add_metadata("lightleash", metadata)
+    writer.add_metadata(METADATA, metadata)
     return writer, {t: writer.register_channel(t, e, schema_id=0) for t, e in ENCODINGS.items()}
 
 

@@ -278,8 +278,9 @@ class SessionManager:
             self.status = status
             self.control_meter.tick(now(), status.t)
             self.recordings.status(status, now())
-            if self.phone is not None:
-                self.phone.know(status)
+            if (phone := self.phone) is not None:
+                self.recordings.learn(phone.device, phone.camera_text)
+                phone.know(status)
 
     def refusals(self) -> list[str]:
         """What the server has against arming."""

@@ -14,9 +14,12 @@ from server.common import clock
 from server.control.ipc import ControlStatus
 from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Ping, Pong, Record, Touch
+from server.recording.control import Recordings
 from server.recording.reader import read, recover, recover_all
 from server.recording.writer import (
+    CAMERA_KEY,
     CAPACITY,
+    DEVICE_KEY,
     PHONE_MESSAGES,
     PHONE_RECORDS,
     SERVER_RECORDS,
@@ -88,6 +91,28 @@ def test_a_recording_knows_the_day_also_when_recovered(tmp_path):
     zero = read(recorder.path).unix_zero_ns
     assert zero == pytest.approx(clock.unix_zero_ns(), abs=60e9)  # two clocks are read, not at once
     assert read(recover(recorder.path)).unix_zero_ns == zero
+
+
+def test_a_recording_that_began_before_the_phone_knows_the_phones_first_camera(tmp_path):
+    recordings = Recordings(tmp_path, METADATA)
+    recordings.start()
+    recordings.record("phone", TOUCH, 100.0)
+    recordings.learn("a browser", "")
+    recordings.learn("a browser", "its camera")
+    recordings.learn("a browser", "as it is turned")
+    path = Path(recordings.stop())
+    assert read(path).metadata[CAMERA_KEY] == "its camera"
+    recovered = read(recover(path)).metadata
+    assert (recovered[DEVICE_KEY], recovered[CAMERA_KEY]) == ("a browser", "its camera")
+    assert recovered["robot_file"] == METADATA["robot_file"]
+
+
+def test_a_recording_that_knew_its_camera_keeps_it(tmp_path):
+    recordings = Recordings(tmp_path, METADATA)
+    recordings.start("a phone", "its camera")
+    recordings.record("phone", TOUCH, 100.0)
+    recordings.learn("a phone", "as it is turned")
+    assert read(Path(recordings.stop())).metadata[CAMERA_KEY] == "its camera"
 
 
 def test_older_recordings_know_no_day_and_a_wrong_one_is_named(tmp_path):
