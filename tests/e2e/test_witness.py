@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.e2e.flight_log import Flight, Said
-from tests.e2e.witness import Hole, Witness, holes_of, longest
+from tests.e2e.witness import Hole, Steal, Witness, holes_of, longest
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 AWAY_S = 0.3
@@ -53,6 +53,19 @@ def test_many_short_holes_of_the_machine_are_a_slow_machine() -> None:
     assert {hole.where for hole in holes_of("others", ticks(0.03))} == {"others"}
     assert flight("RAMP", Hole("slow", 4.8, 0.5)).excuse
     assert not flight("RAMP", *[Hole("machine", 4.8, 0.03)] * 9).excuse
+
+
+def test_what_a_host_takes_from_one_processor_is_noted_and_a_fifth_is_an_excuse() -> None:
+    steal, noted = Steal(), list[Hole]()
+    for n in range(60):
+        taken = 0.0 if n < 20 else min(0.04 * (n - 20), 0.12)
+        noted += steal.look(0.1 * n, [0.001 * n, taken])
+    assert {hole.where for hole in noted} == {"stolen"}
+    assert max(hole.s for hole in noted) == pytest.approx(0.12)
+    assert all(2.2 < hole.t < 2.9 for hole in noted)
+    assert flight("RAMP", Hole("stolen", 4.8, 0.11)).excuse
+    assert not flight("RAMP", Hole("stolen", 4.8, 0.09)).excuse
+    assert not list(Steal().look(0.0, []))
 
 
 def test_a_flight_is_excused_by_a_hole_longer_than_is_borne_where_it_ended() -> None:

@@ -1,7 +1,8 @@
 """What the machine did beside a flight: two tickers in processes of their own, and their holes.
 
 One before everything else (SCHED_FIFO, where that is permitted): what it misses, nobody was given.
-It also judges its own rate as control judges its own: many holes, each short, are a slow machine.
+It also judges its own rate as control judges its own: many holes, each short, are a slow machine;
+and reads what a virtual machine's host took from each processor, which who sleeps does not feel.
 One like everybody else: what it misses though it asks for next to nothing, others took.
 
     python -m tests.e2e.witness machine|others    # prints "where end [s] length [s]" of each hole
@@ -12,12 +13,15 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import re
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import IO
 
 from server.control.tick_rate import OVER_S, TickRate
@@ -27,6 +31,12 @@ NOTED_S = 0.02
 PRIORITY = 90
 """Above those of robot and control."""
 WAYS = ("machine", "others")
+STAT, PROCESSOR, STEAL = Path("/proc/stat"), re.compile(r"cpu\d+"), 8
+"""Per processor, in 1/100 s: time in which it had work and its host did not run it (proc(5))."""
+TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+LOOK_S = 0.1
+TAKEN_S = 0.1
+"""Taken from one processor in `OVER_S`: a fifth, less is not noted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +44,8 @@ class Hole:
     """A while in which something did not run."""
 
     where: str
-    """`machine`, `others`, `page`; `slow` for a while in which `machine` had many."""
+    """`machine`, `others`, `page`; `slow` for a while in which `machine` had many; `stolen`: in so
+    much of the `OVER_S` before its end the host took the processor away that it took most from."""
     t: float
     """Its end [s, monotonic]."""
     s: float
@@ -105,6 +116,44 @@ def holes_of(where: str, steps: Iterable[tuple[float, float]]) -> Iterator[Hole]
             rate = TickRate(PERIOD_S, longest_s=OVER_S)
 
 
+class Steal:
+    """What the host takes from the processors. Sans-I/O."""
+
+    def __init__(self) -> None:
+        """Nothing looked at."""
+        self._looks: deque[tuple[float, Sequence[float]]] = deque()
+
+    def look(self, now: float, taken: Sequence[float]) -> Iterator[Hole]:
+        """Take what was taken from each since the machine's start [s]; noted while it is much."""
+        self._looks.append((now, taken))
+        while now - self._looks[0][0] > OVER_S + 0.5 * LOOK_S:
+            self._looks.popleft()
+        _, before = self._looks[0]
+        most = max((b - a for a, b in zip(before, taken, strict=False)), default=0.0)
+        if most >= TAKEN_S:
+            yield Hole("stolen", now, most)
+
+
+def _taken() -> list[float]:
+    """From each processor since the machine's start [s]; empty if nobody knows."""
+    with contextlib.suppress(OSError):
+        rows = [line.split() for line in STAT.read_text().splitlines()]
+        return [TICK_S * int(row[STEAL]) for row in rows if PROCESSOR.fullmatch(row[0])]
+    return []
+
+
+def _look() -> None:
+    steal = Steal()
+    while True:
+        time.sleep(LOOK_S)
+        _say(steal.look(time.monotonic(), _taken()))
+
+
+def _say(holes: Iterable[Hole]) -> None:
+    for hole in holes:
+        print(f"{hole.where} {hole.t:.4f} {hole.s:.4f}", flush=True)
+
+
 def _ticks() -> Iterator[tuple[float, float]]:
     before = time.monotonic()
     while True:
@@ -121,10 +170,10 @@ def main() -> None:
     if where == "machine":
         with contextlib.suppress(PermissionError):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        threading.Thread(target=_look, daemon=True).start()
     threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
     print("ticking", flush=True)
-    for hole in holes_of(where, _ticks()):
-        print(f"{hole.where} {hole.t:.4f} {hole.s:.4f}", flush=True)
+    _say(holes_of(where, _ticks()))
 
 
 if __name__ == "__main__":
