@@ -165,11 +165,12 @@ class PictureCheck:
         self._doubt_samples(pose, near)
         misses = ((off, chi2, far), (off_near, chi2_near, near))
         known_s = KNOWN_S if self._learnt is None else LAG_S
-        if seen.t - self._t_begun > known_s and any(
+        is_known = seen.t - self._t_begun > known_s
+        if is_known and any(
             x > self._usual * REFUSED_CHI2 and self._is_far(miss, at) for miss, x, at in misses
         ):
             return self._refuse(seen, chi2, max(off, off_near, key=_square), far.x[0:3])
-        if self._jumps.is_steadied:
+        if is_known and self._jumps.is_steadied:
             return self._name(seen, CameraLie(SHIFTED))
         self._refused.clear()
         if not np.isfinite(track.fuse(near, seen, len(seen.rays))):
@@ -200,8 +201,8 @@ class PictureCheck:
         """Learn how well the phone's samples foretell, from one picture to the next."""
         since, aside, foretold = self._track.newest.x[1:3], pose.p_bc_in_c[1:], near.x[1:3]
         off, S = aside - foretold, self._doubts(pose, near)[1:, 1:]
-        self._jumps.add(aside - since, foretold - since, float(np.trace(S)))
-        is_late = off @ np.linalg.solve(S, off) > TAIL_CHI2 and not self._jumps.is_still
+        self._jumps.add(pose.t, aside - since, foretold - since, float(np.trace(S)))
+        is_late = off @ np.linalg.solve(S, off) > TAIL_CHI2 and not self._jumps.is_clear
         step = TAIL_STEP * (1.0 - TAIL if is_late else -TAIL)
         self._doubt = min(max(1.0, (1.0 + step) * self._doubt), MOST_DOUBT)
 

@@ -4,6 +4,9 @@ A hand trembles at 4 to 12 Hz, so what a picture shows jumps aside from one to t
 The phone's gyroscope foretells how far. A stabiliser takes most of it out: the jumps that are seen
 are smaller than those foretold. Samples that a busy browser reads late, or of a wrong time, put the
 jumps elsewhere and leave their size: so the one is told from the other, whenever it began.
+
+A robot that moves on evenly is foretold to jump in a picture that is dated wrongly: only pictures
+that are as far apart as the two before them count.
 """
 
 from __future__ import annotations
@@ -20,6 +23,8 @@ STEADIED: Final = 0.4
 """Of the foretold jumps, squared: honest pictures show 0.6 and more, steadied ones 0.3 and less."""
 CLEAR: Final = 15.0
 """Times the variance of where a picture is foretold: so far the foretold jumps are no noise."""
+EVEN: Final = 0.25
+"""By so much of it the time between two pictures may differ from the time between those before."""
 PICTURES: Final = 6
 """Clearly steadied ones in a row, until it is said."""
 
@@ -32,13 +37,20 @@ class SteadiedPicture:
         self._moved, self._jumps = np.zeros((2, 2)), np.zeros(2)
         """Since the picture before: as seen, as foretold [m]; mean square of how that changed."""
         self._clear = 0
+        self._t, self._apart = 0.0, 0.0
 
-    def add(self, seen: Array, foretold: Array, variance: float) -> None:
-        """Take how far (2,) the robot moved in a picture, and how far it should have [m].
+    def add(self, t: float, seen: Array, foretold: Array, variance: float) -> None:
+        """Take how far (2,) the robot moved in a picture of `t` [s], and should have moved [m].
 
         `variance` [m²] of the difference, both axes together.
         """
-        moved = np.array([seen, foretold])
+        moved, apart = np.array([seen, foretold]), t - self._t
+        is_even = abs(apart - self._apart) < EVEN * apart
+        self._t, self._apart = t, apart
+        if not is_even:  # what was seen before is forgotten bit by bit: nobody stays accused by it
+            self._jumps += MEMORY * (self._jumps.mean() - self._jumps)
+            self._moved, self._clear = moved, 0
+            return
         self._jumps += MEMORY * (np.square(moved - self._moved).sum(axis=1) - self._jumps)
         self._moved = moved
         is_clear = self.is_still and self._jumps[1] > CLEAR * variance
@@ -46,10 +58,15 @@ class SteadiedPicture:
 
     @property
     def is_still(self) -> bool:
-        """It jumps less than foretold, so that no sample can be doubted for where it is."""
+        """It jumps less than foretold."""
         return bool(self._jumps[0] < STEADIED * self._jumps[1])
 
     @property
+    def is_clear(self) -> bool:
+        """Beyond noise, so that no sample can be doubted for where the robot is seen."""
+        return self._clear > 0
+
+    @property
     def is_steadied(self) -> bool:
-        """Beyond noise, and for long enough to be said."""
+        """For long enough to be said."""
         return self._clear >= PICTURES

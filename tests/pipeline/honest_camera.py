@@ -38,6 +38,8 @@ class Adversity:
     every: float = 4.0
     restarts: bool = False
     """In a hole there are no pictures either, and no sample of either side."""
+    dated: float = 0.0
+    """Pictures are dated wrongly by up to so much, either way [s]."""
     occluded: bool = False
     """Some LEDs or all are hidden for up to 2 s, every `every`."""
 
@@ -64,6 +66,10 @@ ADVERSITIES = {
     ),
     "filming, and becomes busy": of_hand("filming", held=(0.01, 0.03), held_since=8.0),
     "trembling, samples held": of_hand("trembling_13_hz", held=(0.01, 0.03)),
+    "pictures misdated": Adversity({"tremor_relaxation": 0.15}, dated=0.012),
+    "a browser out of breath": Adversity(
+        {"tremor_relaxation": 0.15, "held": (0.01, 0.03)}, dated=0.015
+    ),
     "propellers shake": replace(of_hand("filming"), body_noise=1.0),
     "a slow line": of_hand("filming", time_offset=0.06, picture_delay=(0.1, 0.25)),
     "holes": replace(of_hand("walking"), hole=(0.1, 0.6)),
@@ -114,7 +120,8 @@ def _pictures(world, it, rng):
     shown = [int(rng.integers(len(LEDS_IN_B))) for _ in hidden]
     told = zip(world.pictures.arrival.tolist(), looks(world, USUAL, world.setup.seed), strict=True)
     for arrival, look in told:
-        seen = measured(look, offset if arrival > 0.5 else None)
+        t = look.t + rng.uniform(-it.dated, it.dated)
+        seen = measured(replace(look, t=t), offset if arrival > 0.5 else None)
         for (begin, end), n in zip(hidden, shown, strict=True):
             if begin < look.t < end:
                 rays = seen.rays

@@ -83,7 +83,7 @@ HAZARDS: Final = (
         "Another lens, zoom, stabilisation, a focus that breathes",
         "each picture against what both motion sensors predict; LEDs against both gyroscopes",
         "a little beside: believed less; far beside: not believed, named within 0.3 s, no arming, "
-        "as 1, until it has told the truth for 1.5 s; steadied: named within 1.3 s of tremor, "
+        "as 1, until it has told the truth for 1.5 s; steadied: named within 2.6 s of tremor, "
         "however little beside; too little to notice: within bounds",
         (
             "pipeline/vision/test_picture_check.py::"

@@ -16,7 +16,7 @@ from tests.pipeline.honest_camera import ADVERSITIES, USUAL, judged
 from tests.pipeline.lying_camera import checked, lying, measured, seen_as
 
 NAMED_S = 0.3
-STEADIED_S = 1.3
+STEADIED_S = 2.6
 ONSET_S = 2.5
 MOVING = (0.03, float(np.deg2rad(1.0)))
 

@@ -9,10 +9,10 @@ NOISE_M2 = 1e-7
 JUMPS = 0.003 * np.random.default_rng(1).normal(size=(90, 2))
 
 
-def watched(seen, foretold, variance=NOISE_M2):
+def watched(seen, foretold, variance=NOISE_M2, dates=None):
     jumps = SteadiedPicture()
-    for row, there in zip(seen, foretold, strict=True):
-        jumps.add(row, there, variance)
+    for n, (row, there) in enumerate(zip(seen, foretold, strict=True)):
+        jumps.add(n / 30.0 if dates is None else dates[n], row, there, variance)
     return jumps
 
 
@@ -32,6 +32,19 @@ def test_what_moves_on_evenly_does_not_hide_it() -> None:
 def test_jumps_elsewhere_are_not_missing() -> None:
     late = np.roll(JUMPS, 1, axis=0)
     assert not watched(JUMPS, late).is_still
+
+
+def test_a_robot_that_moves_on_does_not_jump_because_pictures_are_dated_wrongly() -> None:
+    dates = np.arange(90) / 30.0 + np.random.default_rng(2).uniform(-0.012, 0.012, 90)
+    foretold = 0.2 * np.diff(dates, prepend=-1.0 / 30.0)[:, None] * np.ones(2)
+    jumps = watched(np.full_like(foretold, 0.2 / 30.0), foretold, dates=dates)
+    assert not jumps.is_steadied
+
+
+def test_a_steadied_picture_is_forgotten_where_dates_tell_nothing() -> None:
+    dates = np.concatenate((np.arange(45) / 30.0, 1.5 + np.cumsum(np.tile([0.02, 0.05], 23))[:45]))
+    assert watched(0.3 * JUMPS[:45], JUMPS[:45]).is_still
+    assert not watched(0.3 * JUMPS, JUMPS, dates=dates).is_still
 
 
 def test_noise_is_not_foretold_jumps() -> None:
