@@ -42,6 +42,12 @@ class Adversity:
     """Pictures are dated wrongly by up to so much, either way [s]."""
     occluded: bool = False
     """Some LEDs or all are hidden for up to 2 s, every `every`."""
+    refused: float = 0.01
+    """Share of the pictures that may be refused."""
+
+
+LATELY_WORSE = 0.02
+"""... where samples or dates are worse than was learnt of them: it takes a second."""
 
 
 def of_hand(hand: str, **more: Any) -> Adversity:
@@ -62,13 +68,15 @@ ADVERSITIES = {
     "samples held": Adversity({"tremor_relaxation": 0.15, "held": (0.01, 0.02)}),
     "samples of a busy browser": Adversity({"tremor_relaxation": 0.15, "held": (0.01, 0.04)}),
     "a browser becomes busy": Adversity(
-        {"tremor_relaxation": 0.15, "held": (0.01, 0.04), "held_since": 8.0}
+        {"tremor_relaxation": 0.15, "held": (0.01, 0.04), "held_since": 8.0}, refused=LATELY_WORSE
     ),
-    "filming, and becomes busy": of_hand("filming", held=(0.01, 0.03), held_since=8.0),
+    "filming, and becomes busy": replace(
+        of_hand("filming", held=(0.01, 0.03), held_since=8.0), refused=LATELY_WORSE
+    ),
     "trembling, samples held": of_hand("trembling_13_hz", held=(0.01, 0.03)),
     "pictures misdated": Adversity({"tremor_relaxation": 0.15}, dated=0.012),
     "a browser out of breath": Adversity(
-        {"tremor_relaxation": 0.15, "held": (0.01, 0.03)}, dated=0.015
+        {"tremor_relaxation": 0.15, "held": (0.01, 0.03)}, dated=0.015, refused=LATELY_WORSE
     ),
     "propellers shake": replace(of_hand("filming"), body_noise=1.0),
     "a slow line": of_hand("filming", time_offset=0.06, picture_delay=(0.1, 0.25)),

@@ -123,7 +123,7 @@ def test_without_motion_samples_nothing_is_judged() -> None:
 def test_whatever_happens_to_a_phone_is_no_lie_of_its_camera(adversity: str) -> None:
     pictures, refused, named = judged(adversity, 30, 15.0)
     assert named == {}
-    assert refused <= 0.02 * pictures
+    assert refused <= ADVERSITIES[adversity].refused * pictures
 
 
 @pytest.mark.parametrize("hand", [MOVING, (0.05, float(np.deg2rad(3.0)))])
