@@ -51,6 +51,20 @@ def test_a_recording_begins_with_a_picture_that_can_be_decoded(house):
     assert encode_message(Command("key_frame")) in asyncio.run(scene())
 
 
+def test_a_recording_that_runs_already_learns_of_the_phones_camera(house, monkeypatch):
+    told: list[tuple[str, str]] = []
+    monkeypatch.setattr(house.manager.recordings, "learn", lambda *phone: told.append(phone))
+
+    def scene():
+        phone = house.manager.connect_phone(hello("first"), Paper())
+        phone.camera_text = "its camera"
+        house.control.send(control_status())
+        house.manager._receive_status()
+
+    in_loop(scene)
+    assert told == [("first", "its camera")]
+
+
 def hello(device: str) -> Hello:
     return Hello(VERSION, "operator", device)
 
