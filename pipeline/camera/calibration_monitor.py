@@ -35,6 +35,10 @@ MARGIN_S: Final = 0.15
 """The stamps of pictures may be off by that much."""
 REDATE_S, MAX_REDATES = 0.004, 8
 """Dated so wrongly, tremor does not fit: the blocks are summed up anew with a better date."""
+SPARSE_S, SPARSE = 0.045, 0.15
+"""Share of a block's time between two of the phone's samples that are farther apart: a browser that
+reads its sensors so seldom misses what a hand did meanwhile, and a camera would be blamed for it.
+At 60 Hz, two lost in a row now and then are 0.05."""
 DRIFT: Final = 2e-3
 """A bias of the body's gyroscope that was wrong by more is put right before summing up [rad/s]."""
 
@@ -91,7 +95,9 @@ class CalibrationMonitor:
         start, stop = float(pictures.t[0]) - MARGIN_S, float(pictures.t[-1]) + MARGIN_S
         phone = _gyro(self._imus.phone, start - LEAD_S, stop)
         body = _gyro(self._imus.body, start, stop)
-        if phone is None or body is None or not self._sum_up(_Block(pictures, phone, body)):
+        if phone is None or body is None or _is_sparse(phone):
+            return False
+        if not self._sum_up(_Block(pictures, phone, body)):
             return False
         self._blocks.append(_Block(pictures, phone, body))
         facts = self._fit.facts(t)
@@ -134,6 +140,12 @@ class CalibrationMonitor:
         for block in self._blocks:
             self._sum_up(block)
         return True
+
+
+def _is_sparse(phone: GyroSamples) -> bool:
+    """Whether too much of a hand's motion was between samples."""
+    apart = np.diff(phone.t)
+    return bool(apart[apart > SPARSE_S].sum() > SPARSE * apart.sum())
 
 
 def _gyro(stream: ImuStream, start: float, stop: float) -> GyroSamples | None:

@@ -125,6 +125,30 @@ def test_a_gap_in_the_motion_samples_spoils_no_more_than_its_block():
     assert not any(said)
 
 
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_a_browser_that_reads_its_sensors_seldom_is_no_fault_of_the_camera(seed):
+    """Samples 30 to 90 ms apart, as of a page that hardly gets a processor."""
+    rng, due, said = np.random.default_rng(seed), 0.0, []
+
+    def seldom(sample):
+        nonlocal due
+        if not isinstance(sample, PhoneImu):
+            return sample
+        if sample.t < due:
+            return None
+        due = sample.t + rng.uniform(0.02, 0.08)
+        return sample
+
+    watched(
+        world(duration=30.0, seed=seed),
+        USUAL,
+        seed,
+        observe=lambda watch: said.append(watch.complaint),
+        spoil=seldom,
+    )
+    assert not any(said)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "hand"), [(1, MOVING), (2, STEADY), (3, (0.05, float(np.deg2rad(3.0)))), (4, MOVING)]
