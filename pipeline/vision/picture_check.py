@@ -8,7 +8,7 @@ bear, χ² with three degrees of freedom, is a lie of the camera, and seen so in
 
 * What is a little beside is believed less: its covariance takes in how far it is. If that happens
   too often across the line of sight, the phone's samples are worse than they should be, and
-  foretell less (covariance matching, as in `adaptive_noise`); unless the picture is steadied.
+  foretell less (`check_noise`); unless the picture is steadied.
 * What is far beside is not believed. After `NAMED_S` the lie is named, and the camera is on trial:
   nothing is believed until `TRIAL_S` have passed without another one, and a zoom is taken back.
 * What is steadied is named as well, be it ever so little beside (`steadied_picture`).
@@ -34,6 +34,7 @@ from pipeline.frames import Array
 from pipeline.imu_stream import ImuStream
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, VisionMeasurement
 from pipeline.vision.camera_lies import SHIFTED, CameraLie, is_far, named, scaled
+from pipeline.vision.check_noise import CheckNoise
 from pipeline.vision.rays import NO_RAYS, widened
 from pipeline.vision.steadied_picture import SteadiedPicture
 
@@ -41,16 +42,6 @@ LAG_S: Final = 0.25
 """So long the motion sensors alone are trusted."""
 REFUSED_CHI2: Final = 30.0
 """Once in a million pictures by chance; models err by more than noise."""
-MEDIAN_CHI2, MEDIAN_STEP = 2.37, 0.01
-"""Half of the pictures are beside their place by more than the one, by chance; each moves what is
-usual by the other share, up or down."""
-TAIL_CHI2, TAIL, TAIL_STEP = 6.0, 0.05, 0.25
-"""Of honest pictures this share is aside of what the one before foretold by more, by chance: χ²
-with two degrees of freedom. Each one beyond moves the doubt of the phone's samples up by the step
-times the others' share, each other one down by the step times this: so samples of a busy browser
-are known for what they are within a second, and only a lie is farther off than they explain."""
-MOST_DOUBT: Final = 1e3
-"""Standard deviations 30 times as large: such samples say nothing."""
 GAP_S: Final = 0.045
 """Samples farther apart than this, two of a phone's lost, say too little of what is between."""
 DOUBTED_CHI2: Final = 5.0
@@ -95,6 +86,18 @@ FINE: Final = Judged(True)
 REFUSED: Final = Judged(False)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Missed:
+    """A picture's innovation."""
+
+    off: Array
+    """(3,) where the robot is seen from where it was foretold [m]."""
+    S: Array
+    """(3, 3) its covariance [m²]."""
+    chi2: float
+    foretold: Checkpoint[VisionMeasurement]
+
+
 class PictureCheck:
     """Samples and pictures come from one thread, each sort in the order of its arrival."""
 
@@ -105,12 +108,7 @@ class PictureCheck:
         self._knows = False
         self._learnt: Learnt | None = None
         """Of the motion sensors, while the camera told the truth."""
-        self._usual = 1.0
-        """How many times χ² is what it should be: samples may be dated badly."""
-        self._doubt = 1.0
-        """By what factor the variances of the phone's samples are greater than said: a browser
-        that is kept from work reads its sensors late."""
-        self._jumps = SteadiedPicture()
+        self._noise, self._jumps = CheckNoise(), SteadiedPicture()
         self._stretch = 1.0
         """Of what is foretold, for a robot that shakes more than the model says."""
         self._t_begun = -np.inf
@@ -158,53 +156,44 @@ class PictureCheck:
             self._begin(seen)
             return self._told(FINE, pose)
         track.settle(t - LAG_S)
-        track.doubt_phone(max(self._doubt, _bent(track.phone, t, BEND_PHONE)))
+        track.doubt_phone(max(self._noise.phone, _bent(track.phone, t, BEND_PHONE)))
         self._stretch = _bent(track.body, t, BEND_BODY)
         far, near = track.predicted(t, t - LAG_S), track.predicted(t)
-        (off, chi2), (off_near, chi2_near) = self._missed(pose, far), self._missed(pose, near)
-        self._doubt_samples(pose, near)
-        misses = ((off, chi2, far), (off_near, chi2_near, near))
+        misses = self._missed(pose, far), self._missed(pose, near)
+        self._match_noise(pose, misses[1])
         known_s = KNOWN_S if self._learnt is None else LAG_S
         is_known = seen.t - self._t_begun > known_s
         if is_known and any(
-            x > self._usual * REFUSED_CHI2 and self._is_far(miss, at) for miss, x, at in misses
+            miss.chi2 > self._noise.chi2 * REFUSED_CHI2 and self._is_far(miss) for miss in misses
         ):
-            return self._refuse(seen, chi2, max(off, off_near, key=_square), far.x[0:3])
+            return self._refuse(seen, misses)
         if is_known and self._jumps.is_steadied:
             return self._name(seen, CameraLie(SHIFTED))
         self._refused.clear()
         if not np.isfinite(track.fuse(near, seen, len(seen.rays))):
             self._begin(seen)
         self._acquit(seen.t)
-        step = MEDIAN_STEP if max(chi2, chi2_near) > self._usual * MEDIAN_CHI2 else -MEDIAN_STEP
-        self._usual = max(1.0, (1.0 + step) * self._usual)
-        self._surprise += LATELY * (chi2 / 3.0 - self._surprise)
-        self._off2 += LATELY * (off * off - self._off2)
-        doubted = [miss for miss, x in ((off, chi2), (off_near, chi2_near)) if x > DOUBTED_CHI2]
+        self._noise.foretold(max(miss.chi2 for miss in misses))
+        self._surprise += LATELY * (misses[0].chi2 / 3.0 - self._surprise)
+        self._off2 += LATELY * (np.square(misses[0].off) - self._off2)
+        doubted = [miss.off for miss in misses if miss.chi2 > DOUBTED_CHI2]
         if self._surprise > SURPRISED:
             doubted.append(np.sqrt(self._off2))
         return self._told(Judged(True, (max(doubted, key=_square),)) if doubted else FINE, pose)
 
-    def _missed(
-        self, pose: RelativePose, foretold: Checkpoint[VisionMeasurement]
-    ) -> tuple[Array, float]:
-        """Where it is seen from where it was foretold (3,) [m], and χ² of that."""
+    def _missed(self, pose: RelativePose, foretold: Checkpoint[VisionMeasurement]) -> Missed:
+        """Where it is seen from where it was foretold."""
         off = pose.p_bc_in_c - foretold.x[0:3]
-        return off, float(off @ np.linalg.solve(self._doubts(pose, foretold), off))
-
-    def _doubts(self, pose: RelativePose, foretold: Checkpoint[VisionMeasurement]) -> Array:
-        """Covariance (3, 3) [m²] of where it is seen from where it was foretold."""
         P: Array = self._track.in_picture(foretold)[:3, :3]
-        return self._stretch * P + pose.covariance[:3, :3]
+        S = self._stretch * P + pose.covariance[:3, :3]
+        return Missed(off, S, float(off @ np.linalg.solve(S, off)), foretold)
 
-    def _doubt_samples(self, pose: RelativePose, near: Checkpoint[VisionMeasurement]) -> None:
+    def _match_noise(self, pose: RelativePose, near: Missed) -> None:
         """Learn how well the phone's samples foretell, from one picture to the next."""
-        since, aside, foretold = self._track.newest.x[1:3], pose.p_bc_in_c[1:], near.x[1:3]
-        off, S = aside - foretold, self._doubts(pose, near)[1:, 1:]
+        since, aside, foretold = self._track.newest.x[1:3], pose.p_bc_in_c[1:], near.foretold.x[1:3]
+        off, S = near.off[1:], near.S[1:, 1:]
         self._jumps.add(pose.t, aside - since, foretold - since, float(np.trace(S)))
-        is_late = off @ np.linalg.solve(S, off) > TAIL_CHI2 and not self._jumps.is_clear
-        step = TAIL_STEP * (1.0 - TAIL if is_late else -TAIL)
-        self._doubt = min(max(1.0, (1.0 + step) * self._doubt), MOST_DOUBT)
+        self._noise.foretold_aside(float(off @ np.linalg.solve(S, off)), self._jumps.is_clear)
 
     def measured(self, focal: float, sigma: float) -> None:
         """Things look by so much larger than calibrated, ± `sigma`, as somebody measured since."""
@@ -236,8 +225,8 @@ class PictureCheck:
             self._track.begin(first_checkpoint(seen, self._learnt, np.inf, self._config))
             self._t_begun = seen.t
 
-    def _is_far(self, off: Array, far: Checkpoint[VisionMeasurement]) -> bool:
-        return is_far(off, far.x[0:3], *self._turned(far.t))
+    def _is_far(self, miss: Missed) -> bool:
+        return is_far(miss.off, miss.foretold.x[0:3], *self._turned(miss.foretold.t))
 
     def _turned(self, t: float) -> tuple[float, float]:
         """How far the phone turned in the time before `t` [rad], and how fast to and fro."""
@@ -246,12 +235,14 @@ class PictureCheck:
             return 0.0, 0.0
         return LAG_S * sqrt(_square(rates.mean(axis=0))), sqrt(_square(rates) / len(rates))
 
-    def _refuse(self, seen: VisionMeasurement, chi2: float, off: Array, foretold: Array) -> Judged:
-        refused = self._refused
+    def _refuse(self, seen: VisionMeasurement, misses: tuple[Missed, Missed]) -> Judged:
+        """Believe nothing of it; `misses` from before all pictures that may mislead, and since."""
+        refused, far = self._refused, misses[0]
         refused.append(seen)
-        lie = named(refused, off, foretold)
-        least = self._usual * (SHIFTED_CHI2 if lie.words == SHIFTED else AMISS_CHI2)
-        is_lie = chi2 > least and seen.t - refused[0].t >= NAMED_S
+        off = max((miss.off for miss in misses), key=_square)
+        lie = named(refused, off, far.foretold.x[0:3])
+        least = self._noise.chi2 * (SHIFTED_CHI2 if lie.words == SHIFTED else AMISS_CHI2)
+        is_lie = far.chi2 > least and seen.t - refused[0].t >= NAMED_S
         if len(refused) < NAMED_PICTURES or not is_lie:
             return REFUSED
         return self._name(seen, lie)
@@ -267,7 +258,7 @@ class PictureCheck:
 
     def _acquit(self, t: float) -> None:
         """End the trial of a camera that told the truth for long enough."""
-        is_over = t - self._t_begun > TRIAL_S and not self._jumps.is_still
+        is_over = t - self._t_begun > TRIAL_S
         if self.complaint and is_over and abs(self._scale) < RETURNED:
             self.complaint = ""
 
