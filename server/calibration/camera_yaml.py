@@ -98,6 +98,7 @@ def _quality(solution: CalibrationSolution, verdict: Verdict) -> list[str]:
         "calibration:",
         f"  verdict: {verdict.level}",
         f"  views: {len(solution.choice.fit)}",
+        f"  views_left_out: {solution.left_out}",
         f"  reprojection_px: {solution.fitted_px:.4f}",
         f"  held_out_px: {held_out}",
         f"  sigma: {{{sigma}}}",

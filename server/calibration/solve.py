@@ -46,6 +46,8 @@ class CalibrationSolution:
     size: tuple[int, int]
     """Width and height [px]."""
     choice: Choice
+    left_out: int
+    """Chosen views that do not fit the others: named or measured wrongly."""
     fit: BoardFit
     film: BoardCorners
     """Of the fit."""
@@ -105,6 +107,7 @@ def solve(
         model,
         size,
         replace(choice, fit=kept),
+        len(choice.fit) - len(kept),
         found,
         work.film,
         work.judged(found, choice.held_out),

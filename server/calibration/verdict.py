@@ -49,6 +49,8 @@ UNSEEN = (
     "Check that the whole board is lit, in focus, not blurred by motion, fills a third of the"
     " picture, and is the one named by --board, --dictionary and --legacy."
 )
+ODD = 0.1
+"""Share of the views that may not fit the others: a board's markers are misread now and then."""
 MISFIT = (
     "Check that the board is flat and undistorted, that zoom and focus stay as they are, and switch"
     " the camera's electronic stabilisation off."
@@ -124,6 +126,10 @@ def _judge_film(solution: CalibrationSolution, verdict: Verdict) -> None:
     choice = solution.choice
     if len(choice.fit) < ENOUGH_VIEWS:
         verdict.worsen("usable", f"It rests on {len(choice.fit)} views only.", TOO_FEW)
+    chosen = len(choice.fit) + solution.left_out
+    if solution.left_out > ODD * chosen:
+        reason = f"{solution.left_out} of {chosen} views do not fit the others."
+        verdict.worsen("usable", reason, MISFIT)
     tilted = sum(one.tilt_deg >= TILT_DEG for one in choice.aspects)
     if tilted < TILTED_VIEWS:
         reason = f"Views in which the board is tilted by {TILT_DEG:g}° or more: {tilted}"

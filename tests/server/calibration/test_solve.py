@@ -206,6 +206,11 @@ def test_a_view_whose_corners_were_mistaken_is_left_out():
     found = solve(views, BOARD, Phone().size, "plumb_bob")
     assert found.held_out_px < 0.3
     assert found.shared[0] == pytest.approx(Phone().lens[0], rel=0.01)
+    assert found.left_out == 1
+    assert "views_left_out: 1" in yaml_of(found, judge(found), "phone", 0, "2026-01-01")
+    assert not any("do not fit" in reason for reason in judge(found).reasons)
+    many = replace(found, left_out=len(found.choice.fit) // 4)
+    assert any("do not fit the others" in reason for reason in judge(many).reasons)
 
 
 def test_the_bare_side_is_named():
