@@ -20,7 +20,13 @@ from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.fault import Fault, FaultOutcome, suffer
 from server.experiments.faults.live import LiveOutcome
-from server.experiments.faults.measure import FaultRow, row_of, times_of, vanish_times
+from server.experiments.faults.measure import (
+    FaultRow,
+    live_times,
+    row_of,
+    times_of,
+    vanish_times,
+)
 from server.experiments.forked import forked
 from server.experiments.gaps import vanish
 from server.experiments.gaps.flight import GapFlight
@@ -107,8 +113,9 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
 @experiment("faults_live")
 def run_live(arguments: argparse.Namespace) -> ExperimentReport:
     """The ones that need real processes."""
-    outcomes = []
-    for one in live.fly(arguments.robot, arguments.gains, arguments.live):
+    outcomes: list[LiveOutcome] = []
+    faults = [fault for fault in live.LIVE if arguments.only in fault.name]
+    for one in live.fly(arguments.robot, arguments.gains, arguments.live, faults):
         outcomes.append(one)
         print(text_of(one), flush=True)
     thrust = sum(one.after_zero for one in outcomes)
@@ -116,7 +123,8 @@ def run_live(arguments: argparse.Namespace) -> ExperimentReport:
         f"live: {thrust} samples with thrust after zero, in {len(outcomes)} faults": thrust == 0,
         "live: each in time": not any(one.missed for one in outcomes),
     }
-    return ExperimentReport({"rows": outcomes}, holds=holds)
+    times = live_times(outcomes)
+    return ExperimentReport({"rows": outcomes, "times": times}, dashed(TIMES, times), holds)
 
 
 def text_of(one: LiveOutcome) -> str:

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
@@ -131,12 +131,12 @@ class LiveServer:
             phone.wait()
             self.until(lambda: self.mode() == "DISARMED", DOWN_S, "DISARMED")
 
-    def look(self) -> tuple[float, float]:
-        """Largest thrust [N] and distance from rest [m]; none while the robot is dead."""
+    def look(self) -> tuple[float, float] | None:
+        """Largest thrust [N] and distance from rest [m]; None if nobody says."""
         try:
             truth = self.truth.latest()
         except FollowerError:
-            return 0.0, 0.0
+            return None
         return float(truth.thrusts.max()), float(np.linalg.norm(truth.p_bf_in_f[-1]))
 
 
@@ -150,7 +150,9 @@ def children(launcher: int) -> dict[str, int]:
     return found
 
 
-def fly(robot: str, gains: str, repeats: int) -> Iterator[LiveOutcome]:
+def fly(
+    robot: str, gains: str, repeats: int, faults: Sequence[LiveFault] = LIVE
+) -> Iterator[LiveOutcome]:
     """Each fault so often, in one server's life.
 
     Raises:
@@ -160,7 +162,7 @@ def fly(robot: str, gains: str, repeats: int) -> Iterator[LiveOutcome]:
         rig = LiveServer(environment)
         (launcher,) = (int(p) for p in _launchers())
         for repeat in range(repeats):
-            for fault in LIVE:
+            for fault in faults:
                 yield _suffered(rig, launcher, fault, repeat)
 
 
@@ -174,28 +176,44 @@ def _launchers() -> list[str]:
 
 def _suffered(rig: LiveServer, launcher: int, fault: LiveFault, seed: int) -> LiveOutcome:
     with rig.phone(seed) as phone:
-        before = _watch(rig, FLIES_S)
+        before = _watch(rig, FLIES_S, dies=False)
         mode = rig.mode()
         pid = phone.pid if fault.victim == "phone" else children(launcher)[fault.victim]
         os.kill(pid, fault.number)
         if fault.victim != "phone":
             phone.send_signal(signal.SIGSTOP)  # it would arm again
         wakes = fault.number == signal.SIGSTOP and fault.victim != "phone"
-        after = _watch(rig, STOPPED_S if wakes else WATCHED_S)
+        dies = fault.victim == "robot"
+        after = _watch(rig, STOPPED_S if wakes else WATCHED_S, dies)
         if wakes:
             os.kill(pid, signal.SIGCONT)
-            rest = _watch(rig, WATCHED_S - STOPPED_S)
+            rest = _watch(rig, WATCHED_S - STOPPED_S, dies)
             rest[:, 0] += STOPPED_S
             after = np.concatenate((after, rest))
     return outcome_of(fault, before, after, mode)
 
 
-def _watch(rig: LiveServer, seconds: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """(n, 3): time [s], largest thrust [N], distance from rest [m]."""
+def _watch(
+    rig: LiveServer, seconds: float, dies: bool
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """(n, 3): time [s], largest thrust [N], distance from rest [m].
+
+    A robot that `dies` and says nothing has no thrust; from another one nothing was heard, as
+    happens on a busy machine, and that is no sample.
+
+    Raises:
+        RuntimeError: it said nothing at all.
+    """
     begin, rows = clock.now(), []
     while (t := clock.now() - begin) < seconds:
-        rows.append((t, *rig.look()))
+        seen = rig.look()
+        if seen is not None:
+            rows.append((t, *seen))
+        elif dies:
+            rows.append((t, 0.0, 0.0))
         time.sleep(LOOK_S)
+    if not rows:
+        raise RuntimeError("the simulated robot did not say where it is")
     return np.array(rows)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from server.experiments.faults.fault import Fault, FaultOutcome, misses
+from server.experiments.faults.live import LiveOutcome
 from server.experiments.gaps.vanish import Vanished
 
 EVENTS = ("COAST", "HOLD", "RAMP", "robot", "zero")
@@ -55,12 +56,6 @@ def row_of(fault: Fault, outcomes: Sequence[FaultOutcome]) -> FaultRow:
     )
 
 
-def percentile(outcomes: Sequence[FaultOutcome], event: str, percent: float) -> float:
-    """When an event followed [s]; infinite if it did not often enough; NaN of none."""
-    times = [one.first.get(event, float("inf")) for one in outcomes]
-    return float(np.percentile(times, percent, method="higher")) if times else float("nan")
-
-
 @dataclass(frozen=True, slots=True)
 class Times:
     """When an event followed a fault [s]; infinite where it did not often enough."""
@@ -94,6 +89,24 @@ def vanish_times(vanished: Sequence[Vanished]) -> list[Times]:
     return [_times(name, event, outcomes) for event in ("COAST", "RAMP")]
 
 
+def live_times(outcomes: Sequence[LiveOutcome]) -> list[Times]:
+    """When thrust began to fall for good, and when it was none, by fault."""
+    found = []
+    for name in dict.fromkeys(one.fault for one in outcomes):
+        some = [one for one in outcomes if one.fault == name]
+        found.append(_quantiles(name, "falls", [one.falls_s for one in some]))
+        found.append(_quantiles(name, "zero", [one.zero_s for one in some]))
+    return found
+
+
+def percentile(times: Sequence[float], percent: float) -> float:
+    """By when an event had followed so often [s]; NaN of none."""
+    return float(np.percentile(times, percent, method="higher")) if times else float("nan")
+
+
 def _times(fault: str, event: str, outcomes: Sequence[FaultOutcome]) -> Times:
-    p50, p99, p99_9 = (percentile(outcomes, event, percent) for percent in (50.0, 99.0, 99.9))
-    return Times(fault, event, len(outcomes), p50, p99, p99_9)
+    return _quantiles(fault, event, [one.first.get(event, float("inf")) for one in outcomes])
+
+
+def _quantiles(fault: str, event: str, times: Sequence[float]) -> Times:
+    return Times(fault, event, len(times), *(percentile(times, q) for q in (50.0, 99.0, 99.9)))

@@ -17,12 +17,12 @@ from pipeline.signals import PhoneImu, TouchState
 from server.control.ipc_inputs import ReadyInput, is_believable
 from server.control.process import teleop_config
 from server.experiments import main
-from server.experiments.faults import hazards, tampering
+from server.experiments.faults import hazards, live, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import FaultJob, flown, goals
 from server.experiments.faults.fault import Fault, FaultOutcome, misses
-from server.experiments.faults.live import LIVE, outcome_of
-from server.experiments.faults.measure import percentile, row_of
+from server.experiments.faults.live import LIVE, LiveOutcome, outcome_of
+from server.experiments.faults.measure import live_times, row_of, times_of
 from server.experiments.forked import ForkError, forked
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -77,8 +77,37 @@ def test_a_row_is_the_worst_of_its_seeds_and_one_miss_is_a_miss() -> None:
     row = row_of(MADE_UP, [outcome(), late])
     assert (row.COAST, row.zero, row.excursion_mm) == (0.2, 3.1, 60.0)
     assert row.missed == "COAST 0.200 s > 0.17"
-    assert percentile([outcome(), late], "COAST", 99.9) == 0.2
+    (coast,) = (one for one in times_of([MADE_UP], [outcome(), late]) if one.event == "COAST")
+    assert (coast.n, coast.p99_9) == (2, 0.2)
     assert list(goals([row], 2).values()) == [True, False]
+
+
+class Rig:
+    """A robot that does not answer every other time."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def look(self) -> tuple[float, float] | None:
+        self.asked += 1
+        return (3.0, 0.01) if self.asked % 2 else None
+
+
+@pytest.mark.parametrize(("dies", "least"), [(False, 3.0), (True, 0.0)])
+def test_silence_is_no_thrust_only_of_a_robot_that_dies(dies: bool, least: float) -> None:
+    thrusts = live._watch(Rig(), 0.05, dies)[:, 1]
+    assert len(thrusts) >= 2
+    assert thrusts.min() == least
+
+
+def test_live_faults_have_their_times_by_fault() -> None:
+    falls, zeros = (0.3, 0.35, 0.31), (2.5, 2.6, 2.9)
+    killed = [LiveOutcome("killed", f, z, 0, 30.0, "") for f, z in zip(falls, zeros, strict=True)]
+    stopped = LiveOutcome("stopped", 1.0, float("inf"), 0, 30.0, "zero inf s")
+    rows = {(one.fault, one.event): one for one in live_times([*killed, stopped])}
+    assert (rows["killed", "falls"].n, rows["killed", "falls"].p50) == (3, 0.31)
+    assert rows["killed", "zero"].p99_9 == 2.9
+    assert rows["stopped", "zero"].p50 == float("inf")
 
 
 def test_the_catalogue_has_enough_faults_each_with_a_name_of_its_own() -> None:
