@@ -11,6 +11,7 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import CloseCode
 
 from server.protocol.wire import MAX_RECORD_BYTES
 from server.security.acceptor import Acceptor
@@ -62,7 +63,19 @@ class Patience(H11Protocol):
 
 
 class ForgivingWebsockets(WebSocketsSansIOProtocol):
-    """uvicorn's websockets, which expect no broken frame before they are accepted."""
+    """uvicorn's websockets, which expect no broken frame before they are accepted, nor broken text.
+
+    Who sends such is ended without a traceback in the log.
+    """
+
+    def send_receive_event_to_app(self) -> None:
+        """Hand on a whole message; end who calls text what is none (RFC 6455, section 8.1)."""
+        if self.curr_msg_data_type == "text" and not _is_utf8(b"".join(self.frames)):
+            self.frames = []
+            self.conn.fail(CloseCode.INVALID_DATA, "text is UTF-8")
+            self.handle_parser_exception()
+        else:
+            super().send_receive_event_to_app()
 
     def handle_parser_exception(self) -> None:
         """End who breaks the protocol before he was let in: there is nobody to say goodbye to."""
@@ -70,6 +83,14 @@ class ForgivingWebsockets(WebSocketsSansIOProtocol):
             self.transport.close()
         else:
             super().handle_parser_exception()
+
+
+def _is_utf8(data: bytes) -> bool:
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 class Listener(uvicorn.Server):

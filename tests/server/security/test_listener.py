@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode
 
 from server.protocol.wire import MAX_RECORD_BYTES
 from server.security import acceptor
@@ -30,6 +31,9 @@ UPGRADE = (
     b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
     b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
+RESERVED_BITS = b"\xf1\x80\0\0\0\0"
+NO_TEXT = b"\x81\x82\0\0\0\0\xc3\x28"
+NO_TEXT_IN_PIECES = b"\x01\x81\0\0\0\0\xc3" + b"\x80\x81\0\0\0\0\x28"
 HEAD_S = 0.05
 
 
@@ -102,7 +106,8 @@ def test_a_second_head_on_the_same_connection_is_cut_off_too():
     asyncio.run(run())
 
 
-def test_broken_frames_before_a_websocket_is_accepted_end_it_without_a_fault_of_ours(caplog):
+@pytest.mark.parametrize("broken", [RESERVED_BITS, NO_TEXT])
+def test_what_is_broken_before_a_websocket_is_accepted_ends_it_without_our_fault(caplog, broken):
     asked, heard, let_in = asyncio.Event(), asyncio.Queue(), asyncio.Event()
 
     async def hesitant(_scope, receive, _send):
@@ -116,7 +121,7 @@ def test_broken_frames_before_a_websocket_is_accepted_end_it_without_a_fault_of_
             reader, writer = await asyncio.open_connection("127.0.0.1", here.port)
             writer.write(UPGRADE)
             await asked.wait()
-            writer.write(b"\xf1\x80\0\0\0\0")  # reserved bits
+            writer.write(broken)
             async with asyncio.timeout(4.0):
                 assert await reader.read() == b""
             writer.close()
@@ -127,7 +132,26 @@ def test_broken_frames_before_a_websocket_is_accepted_end_it_without_a_fault_of_
             ]
 
     asyncio.run(run())
-    assert [one for one in caplog.records if one.name == "asyncio"] == []
+    assert caplog.records == []
+
+
+def test_text_that_is_none_ends_a_websocket_in_the_fields_words_and_no_traceback(caplog):
+    async def run():
+        async with listening() as here:
+            for frames in (NO_TEXT, NO_TEXT_IN_PIECES):
+                reader, writer = await asyncio.open_connection("127.0.0.1", here.port)
+                writer.write(UPGRADE)
+                assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
+                writer.write(frames)
+                async with asyncio.timeout(4.0):
+                    goodbye = await reader.read()
+                assert goodbye[0] == 0x88
+                assert int.from_bytes(goodbye[2:4], "big") == CloseCode.INVALID_DATA
+                writer.close()
+            assert await speak(here.port, LAST)
+
+    asyncio.run(run())
+    assert caplog.records == []
 
 
 def test_whole_requests_in_pieces_and_in_a_row_are_answered():
