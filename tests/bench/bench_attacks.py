@@ -48,6 +48,7 @@ from tests.bench.attacks import (
     slow_loris,
     spoken,
 )
+from tests.bench.replay_attack import replayed
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import processes
 
@@ -64,7 +65,7 @@ def everything(scale: float = 1.0) -> list[Attack]:
     """Every attack, with so many times as many sockets."""
     many = [silent(int(2_000 * scale)), idle_tls(int(200 * scale)), slow_loris(int(50 * scale))]
     floods = [flood_http(True), flood_http(False), flood_as_member, flood_datagrams]
-    return [*many, *floods, bombs, hostile_sdp]
+    return [*many, *floods, bombs, hostile_sdp, replayed]
 
 
 @dataclass(slots=True)
