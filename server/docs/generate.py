@@ -30,6 +30,7 @@ from server.protocol import (
     messages,
     people_messages,
     screen_messages,
+    sight_messages,
     wire,
     wire_records,
 )
@@ -63,6 +64,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     screen_messages.ClockAsk,
     screen_messages.ClockAnswer,
     screen_messages.ScreenLights,
+    sight_messages.Sight,
 )
 UNIONS = {"FromPage": messages.FromPage, "ToPage": messages.ToPage}
 HEADER_FIELDS = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +30,11 @@ from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
 from server.phone.screen_door import ScreenDoor
 from server.phone.sensor_check import SensorCheck
+from server.phone.sight import SIGHT_S, sight
 from server.phone.vision_thread import VisionThread
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.messages import Hello
+from server.protocol.sight_messages import Sight
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import WireError
 from server.protocol.wire_records import Motion, Picture, Pong, Record
@@ -80,6 +83,7 @@ class PhoneSession:
         self.camera_problem = self.camera_text = ""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.detection: Detection | None = None
+        self._t_sight = -inf
         self.latency_ms: dict[str, float] = {}
         self._check = SensorCheck()
         self.link = LinkLog(clock())
@@ -135,6 +139,14 @@ class PhoneSession:
             front_end, rows = self.vision.front_end, np.array(status.body_samples).reshape(-1, 7)
             front_end.add_prediction(expected_of(status))
             front_end.add_imu(*(BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows))
+
+    def sight(self, status: ControlStatus, now: float) -> Sight | None:
+        """Where things are in its picture; None if it does not look, or knows since a moment."""
+        if self.vision is None or now < self._t_sight + SIGHT_S:
+            return None
+        self._t_sight = now
+        camera = self.vision.front_end.camera
+        return sight(camera, self._robot.leds_in_b, self.detection, status, now)
 
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)

@@ -16,6 +16,7 @@ from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.camera_messages import CameraHealth
 from server.protocol.people_messages import Deed, Person
 from server.protocol.screen_messages import ClockAnswer, ClockAsk, ScreenLights, ScreenSize
+from server.protocol.sight_messages import Sight
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import MAX_MESSAGE_BYTES, WireError
 
@@ -232,6 +233,7 @@ ToPage = (
     | Deed
     | ClockAnswer
     | ScreenLights
+    | Sight
 )
 
 _decoder = msgspec.json.Decoder(FromPage)

@@ -281,6 +281,8 @@ class SessionManager:
             if (phone := self.phone) is not None:
                 self.recordings.learn(phone.device, phone.camera_text)
                 phone.know(status)
+                if (sight := phone.sight(status, now())) is not None:
+                    self.paths.send(encode_message(sight))
 
     def refusals(self) -> list[str]:
         """What the server has against arming."""

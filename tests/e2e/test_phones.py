@@ -17,6 +17,7 @@ pytestmark = [pytest.mark.e2e, pytest.mark.page]
 PERMISSIONS = ["camera", "accelerometer", "gyroscope", "magnetometer"]
 PHONE = {"viewport": {"width": 412, "height": 915}}
 WAIT_MS = 30_000
+PRESSED = ("wish", "stop", "hold")
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +68,33 @@ def test_a_phone_without_a_calibration_is_told_so_on_its_screen(
         page.tap("#start")
         expect(page.locator("body")).to_contain_text("not calibrated", timeout=WAIT_MS)
         expect(page.locator("body")).to_contain_text(DEVICE)
+
+
+@pytest.mark.parametrize("size", [(412, 915), (915, 412), (360, 640), (640, 360)])
+def test_with_text_twice_as_large_what_is_pressed_lies_on_the_screen(
+    chromium: str, server: Serving, size: tuple[int, int]
+) -> None:
+    width, height = size
+    with browser(chromium, viewport={"width": width, "height": height}) as context:
+        page = context.new_page()
+        page.add_init_script(CANVAS)
+        page.goto(f"{server.local_https}/{server.link()}")
+        page.click("#start")
+        expect(page.locator("body")).to_contain_text("not calibrated", timeout=WAIT_MS)
+        page.evaluate("document.documentElement.style.fontSize = '200%'")
+        boxes = {name: page.locator(f"#{name}").bounding_box() for name in PRESSED}
+        for name, box in boxes.items():
+            assert box is not None, name
+            right, bottom = box["x"] + box["width"], box["y"] + box["height"]
+            assert min(box["x"], box["y"], width - right, height - bottom) >= -1, (name, box)
+            assert min(box["width"], box["height"]) >= 44, (name, box)
+        mode = page.locator("#mode").bounding_box()
+        assert mode is not None
+        assert 0 <= mode["y"] < mode["y"] + mode["height"] < height / 2
+        assert page.evaluate(
+            "['wish', 'stop', 'hold'].every((id) => { const e = document.getElementById(id);"
+            " return e.scrollWidth <= e.clientWidth && e.scrollHeight <= e.clientHeight; })"
+        )
 
 
 def test_a_leader_hands_over_and_nobody_arms_before_the_other_has_taken_it(

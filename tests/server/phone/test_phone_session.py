@@ -25,7 +25,7 @@ from server.protocol.wire import VERSION, WireError
 from server.protocol.wire_records import Motion, Ping, Pong, Record, Touch
 from server.virtual_phone.phone_script import DEVICE
 from tests.pipeline.seeing import CAMERA, rays_at
-from tests.server.house import JPEG, ROBOT
+from tests.server.house import JPEG, ROBOT, control_status
 
 NO_SPOTS = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
 
@@ -315,3 +315,15 @@ def test_only_before_a_screen_a_camera_without_a_calibration_may_be_guessed() ->
     focal_px = rig.phone.vision.front_end.camera.focal_px
     assert 0.7 * JPEG.width < focal_px < 0.9 * JPEG.width
     rig.phone.close()
+
+
+def test_the_page_is_told_what_its_picture_shows_as_often_as_it_is_drawn() -> None:
+    rig = Rig(DEVICE)
+    assert rig.phone.sight(control_status(), rig.t) is None  # no picture yet: no size
+    rig.synchronise()
+    rig.say(JPEG)
+    said = [rig.phone.sight(control_status(), rig.t + 0.02 * k) for k in range(100)]
+    rig.phone.close()
+    told = [one for one in said if one is not None]
+    assert (told[0].width, told[0].height) == (JPEG.width, JPEG.height)
+    assert 24 <= len(told) <= 31

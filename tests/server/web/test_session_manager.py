@@ -18,6 +18,7 @@ from server.protocol.wire_records import Codec, Ping, Record
 from server.security.pairings import of_this_machine
 from server.web import session_manager as hub_module
 from server.web.lease import LEASE_S
+from tests.pipeline.seeing import CAMERA
 from tests.server.house import JPEG, control_status, house_in, is_request
 
 
@@ -261,7 +262,7 @@ class Eyes:
     """A vision thread and its front-end, which keep what control expects."""
 
     def __init__(self) -> None:
-        self.front_end = self
+        self.front_end, self.camera = self, CAMERA
         self.expected: list[Prediction | None] = []
 
     def add_prediction(self, expected: Prediction | None) -> None:
@@ -274,7 +275,8 @@ class Eyes:
 
 def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
     def scene():
-        phone = house.manager.connect_phone(hello("first"), Paper())
+        page = Paper()
+        phone = house.manager.connect_phone(hello("first"), page)
         phone.vision = eyes = Eyes()
         sure = {"u_bf_in_c": (0.0, 0.1, 0.0), "sigma_p": 0.01, "sigma_theta": 0.02}
         pose = {"p_bc_in_c": (2.5, 0.0, 0.0), "R_cb_wxyz": (1.0, 0.0, 0.0, 0.0)}
@@ -286,6 +288,8 @@ def test_what_control_expects_of_the_robot_reaches_the_phones_eyes(house):
         assert (after.sigma_p, after.sigma_theta, after.time_offset) == (0.01, 0.02, 0.0)
         assert after.p_bc_in_c.tolist() == [2.5, 0.0, 0.0]
         assert after.R_cb.tolist() == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        told = [one for one in page.data if '"type":"sight"' in one]
+        assert len(told) == 1  # not for each of control's words
 
     in_loop(scene)
 

@@ -18,6 +18,7 @@ import { Phone } from './phone.js';
 import { adviceFor, problemOf } from '../wire/problems.js';
 import { Rate } from '../wire/clock.js';
 import { stayAwake, toggleFullScreen } from '../ui/display.js';
+import { SightOverlay } from '../ui/sight_overlay.js';
 import { Start } from './start.js';
 import { Watch } from '../ui/standby.js';
 import { StopPost } from '../wire/stop.js';
@@ -55,6 +56,7 @@ const phone = new Phone({
     void welcomed(welcome);
   },
   onPath: ({ wish }) => choosePath(wish, 'supervisor'),
+  onSight: (sight) => overlay.draw(sight, performance.now()),
   onUnwelcome: () => void start.checkPairing(), // it hung up: perhaps it does not know this phone any more
 });
 
@@ -132,6 +134,8 @@ const start = new Start({
   pairing: new PairingCard(document, navigator, () => window.localStorage),
   choice: new ChoiceCard(document),
 });
+
+const overlay = new SightOverlay(document);
 
 const lensPanel = new LensPanel(document, platform, performance, camera, (text) => phone.log(text));
 
@@ -234,6 +238,7 @@ function reportHealth() {
   paths.look((state.heard && state.status?.streams['video']?.age_ms) || null);
   pace.wantWhole(WHOLE.includes(state.calibration?.phase ?? ''));
   void pace.look();
+  overlay.age(now);
   dispatch({ type: 'health', health: { ...paths.health(now), eased: pace.sign, imuHz: motionRate.perSecond(now) } });
   const silent = now - start.startedAtMs > SILENT_MOTION_MS && motionRate.perSecond(now) === 0;
   if (silent !== state.motionSilent) dispatch({ type: 'motion_silent', silent });

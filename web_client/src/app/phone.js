@@ -1,6 +1,6 @@
 /** The phone's two links and what travels on them: who we are, motion, touch, pictures, wishes. */
 
-/** @import {Calibrate, Command, Hello, PathChoice, ToPage, Welcome} from '../wire/protocol_types.js' */
+/** @import {Calibrate, Command, Hello, PathChoice, Sight, ToPage, Welcome} from '../wire/protocol_types.js' */
 /** @import {Motion, Received, Touch} from '../wire/protocol.js' */
 /** @import {Surroundings as LinkSurroundings} from '../wire/link.js' */
 /** @import {Event} from '../ui/session_types.js' */
@@ -34,6 +34,7 @@ const NEWEST_TOUCH_MS = 100;
  * @property {() => Identity} identity
  * @property {(welcome: Welcome) => void} onWelcome
  * @property {(choice: PathChoice) => void} onPath A supervisor's.
+ * @property {(sight: Sight) => void} onSight
  * @property {() => void} onUnwelcome A connection ended before the server welcomed us.
  */
 
@@ -120,6 +121,9 @@ export class Phone {
         break;
       case 'path':
         this.surroundings.onPath(message);
+        break;
+      case 'sight':
+        this.surroundings.onSight(message);
         break;
       case 'command':
         if (message.what === 'key_frame') this.video?.requestKey();

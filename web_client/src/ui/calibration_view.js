@@ -107,7 +107,7 @@ export class CalibrationView {
   }
 
   /**
-   * Cells and outline lie on the preview, which shows the middle of the picture as `cover` does.
+   * Cells and outline lie on the preview, which shows the whole picture.
    * @param {Calibration} calibration
    */
   draw({ width, height, columns, cells, outline, blurred }) {

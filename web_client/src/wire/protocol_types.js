@@ -299,7 +299,20 @@
  * @property {number} sweep_mm
  */
 
+/**
+ * Server → page of the phone that leads, 15 Hz: where things are in its picture. Points are x and y in turn, in shares of the picture's width and height from its upper left corner; they may lie outside of it.
+ * @typedef {object} Sight
+ * @property {'sight'} type
+ * @property {number} width Of the picture [px].
+ * @property {number} height
+ * @property {number[]} found LEDs in the newest picture.
+ * @property {number[]} robot All LEDs now, by the estimate; empty where it has none, or the robot is far outside.
+ * @property {number[]} goal All LEDs of a robot that is where it should be, while it follows.
+ * @property {number | null} toward While the robot is outside of the picture: where to, from its middle [rad], from the right clockwise.
+ * @property {number | null} distance_m From the camera to the robot.
+ */
+
 /** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log | ScreenSize | ClockAsk} FromPage */
-/** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration | Deed | ClockAnswer | ScreenLights} ToPage */
+/** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration | Deed | ClockAnswer | ScreenLights | Sight} ToPage */
 
 export {};

@@ -23,6 +23,7 @@ beforeEach(() => {
     identity: () => ({ device: 'Pixel 7', sensors: 'DeviceMotion', video: 'H.264' }),
     onWelcome: () => log.push('onWelcome'),
     onPath: ({ wish }) => log.push(`onPath ${wish}`),
+    onSight: ({ distance_m }) => log.push(`onSight ${distance_m}`),
     onUnwelcome: () => log.push('onUnwelcome'),
   });
   phone.open();
@@ -92,6 +93,14 @@ test('a way of the pictures that a supervisor chose is handed on', () => {
   main?.says(WELCOME);
   main?.says({ type: 'path', wish: 'WebSocket', by: 'supervisor' });
   assert.equal(log.at(-1), 'onPath WebSocket');
+});
+
+test('what is seen in the picture is handed on', () => {
+  const [main] = FakeSocket.made;
+  main?.opens();
+  main?.says(WELCOME);
+  main?.says({ type: 'sight', width: 4, height: 3, found: [], robot: [], goal: [], toward: null, distance_m: 2.5 });
+  assert.equal(log.at(-1), 'onSight 2.5');
 });
 
 test('hello comes first, and the video socket follows the welcome with its session', () => {

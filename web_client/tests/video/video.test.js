@@ -269,7 +269,7 @@ test('fewer and smaller pictures are asked of the encoder, and each says by how 
   assert.equal(sender.encoder?.shrunk, 1);
   offer();
   offer();
-  await new Promise((resolve) => setTimeout(resolve, 10));
+  for (let k = 0; k < 500 && headOf(sent.at(-1)).codec !== 1; k++) await new Promise((resolve) => setTimeout(resolve, 10));
   assert.deepEqual([headOf(sent.at(-1)).codec, headOf(sent.at(-1)).width], [1, 960]);
 });
 
