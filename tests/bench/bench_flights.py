@@ -1,17 +1,19 @@
 """The robot led by a real Chromium over each way of pictures; each flight is tried once.
 
     python -m tests.bench.bench_flights [--flights 1] [--seconds 60] [--by webrtc,webcodecs,jpeg]
+                                        [--record DIR]
 
 One hand, one simulated robot, one machine; the ways take turns. Why a flight ended is told, and
 every hole of more than 50 ms: of the machine, of what its host took from a processor in half a
-second, of what others left of it, of the page, and the server's own pauses. The exit code is 1 if a
-goal is missed.
+second, of what others left of it, of the page, and the server's own pauses. With `--record`, those
+that missed a goal leave a recording, to find out why. The exit code is 1 if a goal is missed.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -97,15 +99,23 @@ def _row(way: str, flown: Flight) -> Row:
     )
 
 
-def flown_by(way: str, executable: str, seconds: float) -> Flight:
-    """A real browser leads, with a server of its own."""
+def flown_by(way: str, executable: str, seconds: float, kept: Path | None) -> Flight:
+    """A real browser leads, with a server of its own; `kept` gets its recording if it missed."""
     with tempfile.TemporaryDirectory() as folder:
         rig = led_server(executable, Path(folder), HAND, seed=SEED, rest_s=REST_S)
         with rig as (server, _, phone):
             for script in LACKING[way]:
                 phone.page.add_init_script(script)
             start(phone, server)
-            return flight(phone, server, seconds)
+            if kept is None:
+                return flight(phone, server, seconds)
+            server.request("POST", "/api/recording")
+            flown = flight(phone, server, seconds)
+            recorded = str(server.request("DELETE", "/api/recording")["path"])
+            if not all(met for met, _ in goals([_row(way, flown)])):
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                shutil.move(recorded, kept)
+            return flown
 
 
 def goals(rows: Sequence[Row]) -> Iterator[tuple[bool, str]]:
@@ -133,6 +143,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--flights", type=int, default=1, help="by each way")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--by", type=_ways, default=list(WAYS.values()), metavar=",".join(WAYS))
+    parser.add_argument("--record", type=Path, metavar="DIR")
     return parser.parse_args()
 
 
@@ -143,7 +154,8 @@ def main() -> int:
         sys.exit("no Chromium found: apt-get install chromium")
     rows: list[Row] = []
     for n, way in product(range(told.flights), told.by):
-        one = flown_by(way, executable, told.seconds)
+        kept = told.record and told.record / f"{way.lower()}_{n + 1}.mcap"
+        one = flown_by(way, executable, told.seconds, kept)
         rows.append(_row(way, one))
         seen = f"{rows[-1].rms_mm:.1f} mm RMS, load {os.getloadavg()[0]:.1f}"
         print(f"{way} {n + 1}, {seen}: {one.account()}", flush=True)
