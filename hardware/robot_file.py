@@ -17,6 +17,7 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from hardware.dynamics import restoring_in_f
 from hardware.plant_parameters import (
     BodyImuParameters,
     PlantParameters,
@@ -221,6 +222,7 @@ def _converted(schema: RobotSchema) -> RobotFile:
         delay=schema.thrusters.delay_s,
         imu=_imu(schema.body_imu),
     )
+    stiffness_in_f, damping_in_f = restoring_in_f(plant)
     robot = Robot(
         name=schema.name,
         leds_in_b=np.array([led.position_in_body_m for led in schema.leds]),
@@ -233,6 +235,8 @@ def _converted(schema: RobotSchema) -> RobotFile:
         hangs=schema.suspension is not None,
         ramp_s=_ramp_s(schema),
         blinks=schema.blinks,
+        stiffness_in_f=stiffness_in_f,
+        damping_in_f=damping_in_f,
     )
     gains = {
         name: Gains(np.array(rows.Kp), np.array(rows.Ki), np.array(rows.Kd))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,11 @@ class Robot:
     """How long a ramp to zero lasts; hanging, the pendulum's period: that leaves no swing."""
     blinks: bool = False
     """Its LEDs can be told to be dark one by one."""
+    stiffness_in_f: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) how hard what it hangs from pulls it back to its rest, along x, y, z [N/m]; zeros:
+    nothing does."""
+    damping_in_f: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) how air and cable brake it [N s/m]."""
 
     @property
     def blinking_leds(self) -> int:

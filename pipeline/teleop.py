@@ -12,7 +12,9 @@ from pipeline.control import failsafe, flight_envelope, resumption
 from pipeline.control.actuation import Actuation
 from pipeline.control.flight_envelope import Ages
 from pipeline.control.hold import Hold
+from pipeline.control.leading import PLAIN, Leading, aim_of, led, suits
 from pipeline.control.pid import PoseError, Reference, pose_error
+from pipeline.control.place import SuspendedPlace
 from pipeline.control.station import StationKeeping
 from pipeline.control.tracking import Situation, Tracking
 from pipeline.control.virtual_camera import VirtualCamera
@@ -78,6 +80,9 @@ class Output:
     R_fc: Array | None
     view: VirtualView | None
     reference: Reference | None
+    """Where the robot shall be now."""
+    leading: Leading
+    """In force since the last press."""
     error: PoseError | None
     saturated: bool
     ages: Ages
@@ -109,11 +114,18 @@ class Teleop:
         self._repeated = RepeatedPicture()
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
+        self._place = SuspendedPlace(robot, config.feedforward.thrust_lag_s)
+        self._leading = self.next_leading = PLAIN
+        self._aim: Reference | None = None
         self._force_in_b = self._given_in_b = np.zeros(3)
 
     def tune(self, virtual_camera: VirtualCameraConfig) -> None:
         """Set the virtual camera's runtime parameters in flight, without a jump."""
         self._virtual_camera.tune(virtual_camera)
+
+    def lead(self, leading: Leading) -> None:
+        """Lead so from the next press on; as the paper does, if this robot can't be led so."""
+        self.next_leading = leading if suits(leading, self._robot) else PLAIN
 
     def push(self, wrench_in_b: Array) -> None:
         """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
@@ -130,6 +142,7 @@ class Teleop:
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
             self._tracking.observe(known, self._given_in_b, self._h)
+            self._propagate_place(known)
             self._propagate_station(known, inputs.t)
         # the reference moves before its error is taken: else a period of the way back is missing
         if self._failsafe.mode == Mode.TRACK:
@@ -151,6 +164,7 @@ class Teleop:
         # last, what was given: feed-forward takes it off the next period's specific force
         thrusts, saturated = self._act(known, error)
         self._given_in_b = self._robot.A[:3] @ thrusts - self._actuation.push_in_b[:3]
+        self._aim = self._aim_now(known, error)
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
         return Output(
             t=inputs.t,
@@ -163,7 +177,8 @@ class Teleop:
             relative=relative,
             R_fc=R_fc,
             view=known.view if known is not None else None,
-            reference=self._reference,
+            reference=self._aim,
+            leading=self._leading,
             error=error,
             saturated=saturated,
             ages=ages,
@@ -221,9 +236,13 @@ class Teleop:
         """Step the virtual camera by a period, and see the robot from it."""
         if relative is None or R_fc is None:
             return None
-        p_ref_in_v = self._reference.p_rv_in_v if self._reference is not None else None
-        self._virtual_camera.turn(self.attitude.take_turn())
-        if self._failsafe.mode == Mode.COAST:
+        led_to = self._aim if self._reference is not None else None
+        p_ref_in_v = led_to.p_rv_in_v if led_to is not None else None
+        turn_of_f = self.attitude.take_turn()
+        stays = self._leading.keeps_attitude and self._reference is not None
+        if not stays:  # one that stands still in f has the better vertical at once
+            self._virtual_camera.turn(turn_of_f)
+        if self._failsafe.mode == Mode.COAST or stays:
             return Situation(relative, R_fc, self._virtual_camera.still(relative, R_fc))
         view = self._virtual_camera.view(relative, R_fc, self._h, p_ref_in_v, self._half_field)
         return Situation(relative, R_fc, view)
@@ -233,7 +252,11 @@ class Teleop:
             return None
         if self._failsafe.mode == Mode.COAST:
             return self._station.error(known.view) if self._keeps_station else None
-        return pose_error(known.view, self._reference, self._robot.axes)
+        error = pose_error(known.view, self._reference, self._robot.axes)
+        shares_in_f = self._leading.shares_in_f
+        if shares_in_f is None:
+            return error
+        return led(error, known.view, shares_in_f, self._place.x_in_f, self._place.v_in_f)
 
     def _judge(
         self, inputs: Inputs, known: Situation | None, error: PoseError | None, ages: Ages
@@ -267,6 +290,8 @@ class Teleop:
         """Why it must not follow again by itself after a gap; empty if it may."""
         if self._failsafe.mode != Mode.COAST or known is None or self._led_to is None:
             return ""
+        if not self._leading.is_plain:
+            return ""  # it will be led on from where it is
         near = resumption.is_near(self._config.resumption, self._led_to, known.relative)
         return "" if near else "Too far from where it was led."
 
@@ -279,10 +304,14 @@ class Teleop:
             # v = c first, then a view from there, then the reference: the error begins at zero, and
             # the lag that the virtual camera had before is no wish of the operator's
             self._reference = None
+            if before != Mode.COAST:
+                self._leading = self.next_leading
             self._virtual_camera.reset()
+            self._place.start()
             known = self._look(known.relative, known.R_fc) or known
             self._reference = Reference.here(known.view)
-            if before != Mode.COAST or self._led_to is None:
+            # by a share, or with turns that count for nothing, a gap is like a new press
+            if before != Mode.COAST or self._led_to is None or not self._leading.is_plain:
                 self._led_to = self._reference
             held_in_f = known.view.R_fv @ known.view.R_vb @ self._force_in_b
             self._tracking.start(held_in_f if before != Mode.ARMED else None)
@@ -320,6 +349,19 @@ class Teleop:
             known.relative.f_bf_in_b, self._hold.R_fb if coasts else R_fb, self._h
         )
 
+    def _propagate_place(self, known: Situation) -> None:
+        """Carry on where the robot is."""
+        R_fb = known.view.R_fv @ known.view.R_vb
+        self._place.propagate(known.relative.f_bf_in_b, R_fb, self._given_in_b, self._h)
+
+    def _aim_now(self, known: Situation | None, error: PoseError | None) -> Reference | None:
+        """Where the robot shall be; in a gap where it should be before."""
+        if self._reference is None or self._leading.shares_in_f is None:
+            return self._reference
+        if self._failsafe.mode == Mode.TRACK and known is not None and error is not None:
+            return aim_of(error, known.view, self._reference)
+        return self._aim
+
     def _follow_back(self) -> None:
         """Bring the reference after a gap slowly back to where it was led: nothing jumps."""
         reference, led_to = self._reference, self._led_to
@@ -333,7 +375,10 @@ class Teleop:
         omega_m_bf_in_b = self._body.omega_m_bf_in_b
         if mode == Mode.TRACK and known and reference and error:
             R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
-            wrench_in_b = self._tracking.wrench(known, reference, error, self._h)  # Eq. (20)
+            shares_in_f = self._leading.shares_in_f
+            wrench_in_b = self._tracking.wrench(  # Eq. (20)
+                known, reference, error, self._h, shares_in_f
+            )
             self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._h)
         elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
             wrench_in_b = self._hold.wrench(omega_m_bf_in_b, self._h)

@@ -58,12 +58,22 @@ class Tracking:
         R_fb = now.view.R_fv @ now.view.R_vb
         self._ahead.observe(now.relative.f_bf_in_b, R_fb, given_force_in_b, h)
 
-    def wrench(self, now: Situation, reference: Reference, error: PoseError, h: float) -> Array:
-        """Force and torque in b (6,) [N, N m], `h` [s] after the last. Eq. (20)."""
+    def wrench(
+        self,
+        now: Situation,
+        reference: Reference,
+        error: PoseError,
+        h: float,
+        shares_in_f: Array | None = None,
+    ) -> Array:
+        """Force and torque in b (6,) [N, N m], `h` [s] after the last. Eq. (20).
+
+        `shares_in_f` (3,) of the reference's motion are to be gone; None: all of it.
+        """
         wrench_in_b = self._pid.wrench(error, now.view)
         if self._looks_ahead:
             ahead_in_b = self._ahead.wrench(
-                now.relative, now.R_fc, now.view, reference.p_rv_in_v, h
+                now.relative, now.R_fc, now.view, reference.p_rv_in_v, h, shares_in_f
             )
             wrench_in_b = wrench_in_b + (
                 ahead_in_b if self._robot.needs_tilt else ahead_in_b * self._robot.axes

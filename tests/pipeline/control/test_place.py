@@ -1,0 +1,88 @@
+"""Where a robot that hangs is, by what pulls it back: right at once and right for minutes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hardware.robot_file import load_robot
+from pipeline.control.place import SuspendedPlace
+from pipeline.frames import GRAVITY, Array, exp
+
+ROBOT = load_robot("ames").robot
+UP, H, LAG_S = np.array([0.0, 0.0, GRAVITY]), 0.005, 0.04
+
+
+class Swing:
+    """A mass on springs, pushed by thrusters that lag; what it feels goes to `SuspendedPlace`."""
+
+    def __init__(self, bias: Array, R_fb: Array, gain: float = 1.0) -> None:
+        self.place = SuspendedPlace(ROBOT, LAG_S)
+        self.x, self.v, self._thrust = np.zeros(3), np.zeros(3), np.zeros(3)
+        self._bias, self._R_fb, self._gain = bias, R_fb, gain
+
+    def step(self, force_in_f: Array) -> None:
+        self._thrust = self._thrust + H / LAG_S * (self._gain * force_in_f - self._thrust)
+        pull = -ROBOT.stiffness_in_f * self.x - ROBOT.damping_in_f * self.v
+        a = (self._thrust + pull) / ROBOT.mass
+        self.v = self.v + H * a
+        self.x = self.x + H * self.v
+        f_bf_in_b = self._R_fb.T @ (a + UP) + self._bias
+        self.place.propagate(f_bf_in_b, self._R_fb, self._R_fb.T @ force_in_f, H)
+
+
+BIAS, R_FB = np.array([0.3, -0.2, 0.1]), exp(np.array([0.05, -0.1, 0.7]))
+
+
+def test_a_hands_motion_is_known_to_a_tenth_though_the_accelerometer_is_off() -> None:
+    swing, errors, rates, sizes = Swing(BIAS, R_FB), [], [], []
+    for k in range(round(40.0 / H)):
+        t = k * H
+        if k == round(10.0 / H):
+            swing.place.start()
+            x_start = swing.x
+        swing.step(np.array([1.5, 1.0, 2.0]) * np.sin(2.0 * np.pi * np.array([0.3, 0.2, 0.4]) * t))
+        if t >= 12.0:
+            errors.append(swing.place.x_in_f - (swing.x - x_start))
+            rates.append(swing.place.v_in_f - swing.v)
+            sizes.append((*swing.x, *swing.v))
+    size = np.std(sizes, axis=0)
+    assert (np.std(errors, axis=0) < 0.1 * size[:3]).all()
+    assert (np.std(rates, axis=0) < 0.1 * size[3:]).all()
+
+
+@pytest.mark.parametrize("seconds", [3.0, 60.0])
+def test_a_place_that_is_kept_is_known_after_a_minute_as_after_seconds(seconds: float) -> None:
+    swing = Swing(BIAS, R_FB)
+    for _ in range(round(8.0 / H)):
+        swing.step(np.zeros(3))
+    swing.place.start()
+    for _ in range(round(seconds / H)):
+        swing.step(np.array([2.6, -1.3, 2.1]))
+    np.testing.assert_allclose(swing.place.x_in_f, swing.x, atol=0.004)
+    np.testing.assert_allclose(swing.place.v_in_f, swing.v, atol=0.01)
+    assert swing.x[0] > 0.08
+
+
+def test_thrusters_that_give_less_than_told_make_it_as_much_too_large() -> None:
+    swing = Swing(np.zeros(3), np.eye(3), gain=0.9)
+    for _ in range(round(20.0 / H)):
+        swing.step(np.array([2.6, 0.0, 0.0]))
+    assert swing.place.x_in_f[0] == pytest.approx(swing.x[0] / 0.9, rel=0.01)
+
+
+def test_each_start_counts_from_there() -> None:
+    swing = Swing(BIAS, R_FB)
+    for _ in range(400):
+        swing.step(np.array([2.0, 0.0, 0.0]))
+    swing.place.start()
+    np.testing.assert_array_equal(swing.place.x_in_f, np.zeros(3))
+
+
+def test_a_robot_that_nothing_pulls_back_is_said_to_stay() -> None:
+    place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)), LAG_S)
+    for _ in range(2000):
+        place.propagate(UP + BIAS, np.eye(3), np.ones(3), H)
+    assert np.abs(place.x_in_f).max() < 0.2
