@@ -21,6 +21,7 @@ from server.control.ipc import ControlStatus
 from server.control.ipc_estimate import EstimateFields, finite, triple
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.control.tick_rate import TickRate
+from server.protocol.lead_messages import Lead
 
 SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
@@ -160,6 +161,8 @@ class Controller:
                 case Tune():
                     self._virtual_camera = turned(self._virtual_camera, message)
                     self.teleop.tune(self._virtual_camera)
+                case Lead():
+                    self.teleop.lead(message.leading)
         known = Requests.__slots__
         return phone, seen, operator, Requests(**{w: True for w in wishes if w in known})
 
@@ -243,6 +246,8 @@ class Controller:
             resumes=output.resumes,
             gaps=self._gaps.lately(),
             warnings=self._gaps.warnings(),
+            lead=Lead.of(output.leading),
+            next_lead=Lead.of(self.teleop.next_leading),
         )
 
 

@@ -19,6 +19,7 @@ from server.common.runtime_parameters import RuntimeParameters
 from server.control.gap_log import GapStatistics
 from server.control.ipc_estimate import EstimateFields, Triple
 from server.control.ipc_inputs import Input, decode, encode
+from server.protocol.lead_messages import Lead
 
 MAX_DATAGRAM = 16_384
 """Bytes that are read of one."""
@@ -83,6 +84,10 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Short silences of `phone`, `robot` and `server` (control stood still) in the last minute."""
     warnings: list[str] = []
     """What somebody who arms should know; refuses nothing."""
+    lead: Lead | None = None
+    """How the hand leads since the last press ..."""
+    next_lead: Lead | None = None
+    """... and from the next one on."""
 
 
 def expected_of(status: ControlStatus) -> Prediction | None:

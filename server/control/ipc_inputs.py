@@ -18,6 +18,7 @@ from pipeline.frames import Array
 from pipeline.signals import LedRays, PhoneImu, RelativePose, TouchState, VisionMeasurement
 from pipeline.vision.blink_code import CODES
 from server.common.runtime_parameters import Tune
+from server.protocol.lead_messages import Lead
 
 LARGEST = 1e9
 """No time, sensor or pose has a number or an array of a length beyond it."""
@@ -46,7 +47,9 @@ class BlinkInput(msgspec.Struct, tag="blink", array_like=True, frozen=True):
     t_begin: float
 
 
-Input = PhoneImu | VisionMeasurement | TouchState | RequestInput | ReadyInput | BlinkInput | Tune
+Input = (
+    PhoneImu | VisionMeasurement | TouchState | RequestInput | ReadyInput | BlinkInput | Tune | Lead
+)
 
 
 class _Motion(msgspec.Struct, tag="imu", array_like=True, frozen=True):
@@ -63,6 +66,10 @@ class _Touch(msgspec.Struct, tag="touch", array_like=True, frozen=True):
 
 class _Tune(msgspec.Struct, tag="tune", array_like=True, frozen=True):
     input: Tune
+
+
+class _Lead(msgspec.Struct, tag="lead", array_like=True, frozen=True):
+    input: Lead
 
 
 def _plain(array: npt.NDArray[Any]) -> tuple[str, tuple[int, ...], bytes]:
@@ -82,10 +89,17 @@ def _array(_: type, plain: tuple[str, Sequence[int], bytes]) -> npt.NDArray[Any]
         raise ValueError(str(error)) from error
 
 
-_TAGGED = {PhoneImu: _Motion, VisionMeasurement: _Seen, TouchState: _Touch, Tune: _Tune}
+_TAGGED = {
+    PhoneImu: _Motion,
+    VisionMeasurement: _Seen,
+    TouchState: _Touch,
+    Tune: _Tune,
+    Lead: _Lead,
+}
 _encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
 _decoder = msgspec.msgpack.Decoder(
-    _Motion | _Seen | _Touch | RequestInput | ReadyInput | BlinkInput | _Tune, dec_hook=_array
+    _Motion | _Seen | _Touch | RequestInput | ReadyInput | BlinkInput | _Tune | _Lead,
+    dec_hook=_array,
 )
 
 

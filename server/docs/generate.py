@@ -26,6 +26,7 @@ from server.docs.protocol_text import RECORDS, page
 from server.protocol import (
     calibration_messages,
     camera_messages,
+    lead_messages,
     link_messages,
     messages,
     people_messages,
@@ -44,6 +45,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Hello,
     messages.Command,
     runtime_parameters.Tune,
+    lead_messages.Lead,
     PathChoice,
     calibration_messages.Calibrate,
     messages.Log,
@@ -55,6 +57,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     runtime_parameters.RuntimeParameters,
     messages.VirtualCameraStatus,
     messages.Estimate,
+    lead_messages.LeadingStatus,
     camera_messages.CameraHealth,
     people_messages.Person,
     messages.Status,

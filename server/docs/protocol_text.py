@@ -140,11 +140,11 @@ those, not this.
 
 | websocket | least role | page → server | server → page |
 |---|---|---|---|
-| `/ws/phone` | operator | `hello`, `command`, `path`, `calibrate`, `log`; MOTION, TOUCH, PONG | \
-`welcome`, `status`, `refused`, `calibration`, `path`, `command` (`key_frame`); PING |
+| `/ws/phone` | operator | `hello`, `command`, `lead`, `path`, `calibrate`, `log`; MOTION, TOUCH, \
+PONG | `welcome`, `status`, `refused`, `calibration`, `path`, `command` (`key_frame`); PING |
 | `/ws/video` | operator | `hello`, `log`; FRAME | `welcome`, `refused`; CREDIT |
-| `/ws/supervisor` | viewer | `hello`, `command`, `tune`, `path`, `log` | `welcome`, `status`, \
-`refused`; PICTURE |
+| `/ws/supervisor` | viewer | `hello`, `command`, `tune`, `lead`, `path`, `log` | `welcome`, \
+`status`, `refused`; PICTURE |
 
 A binary websocket message is one *record*, a text message is one JSON *message*. Compression is
 off. Phones come by HTTPS; the HTTP listener is for this machine alone.

@@ -5,15 +5,16 @@ Together with the records of `wire.py` they are the whole protocol.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import msgspec
-from msgspec import Meta
+from msgspec import Meta, inspect
 
 from pipeline.config import EstimatorName
 from server.common.runtime_parameters import RuntimeParameters, Tune
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.camera_messages import CameraHealth
+from server.protocol.lead_messages import Lead, LeadingStatus
 from server.protocol.people_messages import Deed, Person
 from server.protocol.screen_messages import ClockAnswer, ClockAsk, ScreenLights, ScreenSize
 from server.protocol.sight_messages import Sight
@@ -220,9 +221,11 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     the longest, gc_ms, and number of full ones, gc_full."""
     people: list[Person] = []
     """Who is paired, in the order they came."""
+    leading: LeadingStatus | None = None
+    """None before the control process has told of it."""
 
 
-FromPage = Hello | Command | Tune | PathChoice | Calibrate | Log | ScreenSize | ClockAsk
+FromPage = Hello | Command | Tune | Lead | PathChoice | Calibrate | Log | ScreenSize | ClockAsk
 ToPage = (
     Welcome
     | Refused
@@ -235,6 +238,15 @@ ToPage = (
     | ScreenLights
     | Sight
 )
+
+CHOICES = {
+    (str(kind.__struct_config__.tag), f"$.{field.encode_name}"): ", ".join(map(str, one.values))
+    for kind in get_args(FromPage)
+    for field in inspect.type_info(kind).fields  # type: ignore[attr-defined]
+    for one in getattr(field.type, "types", (field.type,))
+    if isinstance(one, inspect.LiteralType)
+}
+"""What is allowed of a message's field that takes some words alone: by tag and JSON path."""
 
 _decoder = msgspec.json.Decoder(FromPage)
 _to_page_decoder = msgspec.json.Decoder(ToPage)
@@ -258,10 +270,20 @@ def decode_message(text: str | bytes) -> FromPage:
         message: FromPage = _decoder.decode(text)
     except msgspec.ValidationError as error:
         reason, _, path = str(error).partition(" - at ")
-        raise WireError("value", path.strip("`") or "message", reason) from error
+        field = path.strip("`") or "message"
+        raise WireError("value", field, _allowed(text, field) or reason) from error
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise WireError("type", "message", "JSON text") from error
     return message
+
+
+def _allowed(text: str | bytes, field: str) -> str:
+    """The words that a field takes, if it takes words alone and the rest of the text is JSON."""
+    try:
+        said = msgspec.json.decode(text)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return ""
+    return CHOICES.get((str(said.get("type")), field), "") if isinstance(said, dict) else ""
 
 
 def decode_from_server(text: str | bytes) -> ToPage:

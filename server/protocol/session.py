@@ -5,6 +5,7 @@ from __future__ import annotations
 from server.common.runtime_parameters import Tune
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.command_age import refuse_old
+from server.protocol.lead_messages import Lead
 from server.protocol.messages import Command, FromPage, Hello, Log, decode_message
 from server.protocol.screen_messages import ClockAsk, ScreenSize
 from server.protocol.video_path_messages import PathChoice
@@ -24,10 +25,10 @@ ALLOWED: dict[str, tuple[type, ...]] = {
 }
 """Kinds of record by role."""
 MESSAGES: dict[str, tuple[type, ...]] = {
-    "operator": (Command, PathChoice, Calibrate, Log),
+    "operator": (Command, Lead, PathChoice, Calibrate, Log),
     "rtc": (),
     "video": (Log,),
-    "supervisor": (Command, Tune, PathChoice, Log),
+    "supervisor": (Command, Tune, Lead, PathChoice, Log),
     "screen": (ScreenSize, ClockAsk, Log),
 }
 

@@ -19,6 +19,7 @@ from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.phone.frame_pipeline import FramePipeline
 from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
+from server.protocol.lead_messages import Lead
 from server.protocol.messages import Command, Hello, decode_message
 from server.protocol.wire import WireError, decode
 from server.protocol.wire_records import Picture, Ping, Record
@@ -112,6 +113,8 @@ class Offline:
                 message = decode_message(entry.data)
                 if isinstance(message, Hello):
                     self._greet()
+                elif isinstance(message, Lead):
+                    self._inbox.append(message)
                 elif isinstance(message, Command):
                     self._inbox.append(RequestInput(message.what))
                 return

@@ -13,6 +13,7 @@ import msgspec
 from msgspec.structs import asdict
 
 from hardware.codec import Decoder
+from pipeline.control.leading import suits
 from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.common.clock import now
@@ -32,9 +33,10 @@ from server.phone.screen_door import ScreenDoor
 from server.phone.transports import FastTransport, Transports
 from server.phone.vision_thread import Picture, jpeg
 from server.protocol.calibration_messages import Calibrate
+from server.protocol.lead_messages import AS_EVER, Lead
 from server.protocol.messages import Command, Hello, Status, ToPage, encode_message
 from server.protocol.people_messages import Deed
-from server.protocol.wire import encode
+from server.protocol.wire import WireError, encode
 from server.protocol.wire_records import Record, Thumbnail
 from server.recording.control import Recordings
 from server.security.pairings import Member, of_this_machine
@@ -149,6 +151,23 @@ class SessionManager:
         else:
             self.log_event(f"{told} did not reach the control process: try again.")
 
+    def lead(self, wish: Lead, who: Member) -> None:
+        """Send control how the next press is to lead.
+
+        Raises:
+            WireError: this robot can't be led so.
+        """
+        if not suits(wish.leading, self.robot):
+            field = "scale" if wish.scale != 1.0 else "axes"
+            allowed = "1" if field == "scale" else "all or shift"
+            raise WireError("value", f"lead.{field}", f"{allowed}: this robot hangs from nothing")
+        told = f"from the next press: {wish.scale:g} times as far, {wish.axes}"
+        if self._control.send(wish):
+            self.people.note("leading", who, told)
+            self.log_event(f"{who.name}: {told}", of="leading")
+        else:
+            self.log_event(f"{told} did not reach the control process: try again.")
+
     def calibrate(self, wish: Calibrate) -> None:
         """Let the operator's phone begin its camera's calibration, or leave it."""
         if (phone := self.phone) is not None:
@@ -201,6 +220,8 @@ class SessionManager:
         self.paths.begin(page)
         self.recordings.message("phone", encode_message(hello), now())
         self.disarm()  # never go on with another hand
+        if self.people.lease.is_of_another(who.id):
+            self.to_control(AS_EVER)
         self.people.lease.take(who.id)
         self.people.note("lead", who, self.phone.device)
         self.log_event(f"{who.name} leads: {self.phone.device}.")

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from math import acos, degrees, isfinite
 from typing import Literal, Protocol, cast
 
+from pipeline.control.leading import knows_its_place
 from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.common.clock import now
@@ -15,6 +16,7 @@ from server.diagnostics.camera_health import health
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
 from server.phone.phone_session import PhoneSession
+from server.protocol.lead_messages import LeadingStatus
 from server.protocol.messages import Estimate, GapCount, Status, Stream, VirtualCameraStatus
 from server.recording.control import Recordings
 from server.security.security import UNSAVED
@@ -96,6 +98,7 @@ def build(manager: StatusSource) -> Status:
         warnings=[*warnings(gaps), *([UNSAVED] if manager.people.doors.is_unsaved else [])],
         server=manager.pauses.figures(),
         people=manager.people.present(),
+        leading=_leading(manager.robot, control),
     )
 
 
@@ -129,6 +132,15 @@ def _virtual_camera(control: ControlStatus | None) -> VirtualCameraStatus | None
         knobs=control.knobs,
         lag_deg=_rounded(lag, 1, degrees(1.0)),
         guarding=round(control.guarding, 2),
+    )
+
+
+def _leading(robot: Robot, control: ControlStatus | None) -> LeadingStatus | None:
+    if control is None or control.lead is None or control.next_lead is None:
+        return None
+    held, chosen = control.lead, control.next_lead
+    return LeadingStatus(
+        chosen.scale, chosen.axes, held.scale, held.axes, any=knows_its_place(robot)
     )
 
 

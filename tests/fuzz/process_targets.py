@@ -12,6 +12,7 @@ from pipeline.vision.rays import NO_RAYS
 from server.common.runtime_parameters import Tune
 from server.control.ipc import MAX_DATAGRAM, ControlStatus, control_end, expected_of, server_end
 from server.control.ipc_inputs import LARGEST, ReadyInput, RequestInput, encode
+from server.protocol.lead_messages import Lead
 from tests.fuzz.target import target
 from tests.pipeline.seeing import rays_at
 from tests.server.house import control_status
@@ -30,6 +31,7 @@ def input_seeds():
         RequestInput("arm"),
         ReadyInput(["No phone."]),
         Tune(cutoff_hz=0.5, mode="full"),
+        Lead(0.5, "level"),
         VisionMeasurement(1.0, rays, pose, (0.5, 0.4), StampOffset(0.01, 0.001)),
         VisionMeasurement(1.0, NO_RAYS, None, (0.5, 0.4)),
     )

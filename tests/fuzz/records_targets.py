@@ -9,6 +9,7 @@ from server.common.runtime_parameters import Tune
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol import messages, wire
 from server.protocol.calibration_messages import Calibrate, Calibration
+from server.protocol.lead_messages import Lead
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import MAX_MESSAGE_BYTES, MAX_PIXELS, MAX_RECORD_BYTES, WireError
 from server.protocol.wire_records import (
@@ -136,6 +137,7 @@ def message_seeds():
         messages.Hello(2, "operator", "a phone", "s", "devicemotion", "H.264"),
         messages.Command("arm"),
         Tune(cutoff_hz=0.5, guard=True),
+        Lead(0.5, "level"),
         messages.Log("a fault"),
         PathChoice("auto", "operator"),
         Calibrate("start"),

@@ -12,6 +12,7 @@ from server.common.clock import now
 from server.common.runtime_parameters import Tune
 from server.control.ipc_inputs import ReadyInput, RequestInput
 from server.diagnostics.events import EVENTS
+from server.protocol.lead_messages import AS_EVER, Lead
 from server.protocol.messages import Command, Hello, encode_message
 from server.protocol.wire import VERSION, decode, encode
 from server.protocol.wire_records import Codec, Ping, Record
@@ -314,3 +315,31 @@ def test_a_recording_asks_for_a_key_again_until_one_has_come(house, monkeypatch)
         assert fast.keys == asked
 
     in_loop(scene)
+
+
+def test_who_leads_after_somebody_else_leads_by_all_of_the_motion(house):
+    """Nobody finds a scale that another hand has chosen; one who comes back finds his own."""
+
+    def leads():
+        return [m for m in house.control.inputs() if isinstance(m, Lead)]
+
+    def scene():
+        house.manager.status = control_status()
+        one, other = (of_this_machine(role) for role in ("operator", "supervisor"))
+        first = house.manager.connect_phone(hello("first"), Paper(), one)
+        house.manager.lead(Lead(0.5, "level"), one)
+        assert leads() == [Lead(0.5, "level")]
+        house.manager.disconnect_phone(first)
+        again = house.manager.connect_phone(hello("first"), Paper(), one)
+        assert leads() == []
+        house.manager.disconnect_phone(again)
+        assert house.manager.connect_phone(hello("second"), Paper(), other) is not None
+        assert leads() == [AS_EVER]
+
+    in_loop(scene)
+
+
+def test_a_choice_of_leading_that_does_not_reach_control_is_told(house):
+    house.control.close()
+    in_loop(lambda: house.manager.lead(AS_EVER, of_this_machine("operator")))
+    assert "did not reach" in house.manager.events[0]

@@ -36,6 +36,14 @@
  */
 
 /**
+ * Page of the phone that leads, or of a supervisor → server: lead so from the next press on. Refused where the robot can't be led so (`leading.any` of a status); `status` shows how it stands. Another person who leads begins with all of the motion anew.
+ * @typedef {object} Lead
+ * @property {'lead'} type
+ * @property {number} scale The robot goes so many times as far as the hand.
+ * @property {'all' | 'shift' | 'turn' | 'level'} axes `all`; `shift`: turns of the phone lead nothing; `turn`: the robot stays in its place, and turns; `level`: it keeps its height.
+ */
+
+/**
  * Which way the pictures of the phone that leads shall come by, and who chose it. A supervisor's page → server → operator's page: choose so. Operator's page → server: so it stands, when welcomed and at each choice; `status` shows that to all.
  * @typedef {object} PathChoice
  * @property {'path'} type
@@ -155,6 +163,16 @@
  */
 
 /**
+ * How a hand leads, by the control process.
+ * @typedef {object} LeadingStatus
+ * @property {number} scale Of the next press.
+ * @property {'all' | 'shift' | 'turn' | 'level'} axes
+ * @property {number} held_scale Of the last one, which holds while the button does.
+ * @property {'all' | 'shift' | 'turn' | 'level'} held_axes
+ * @property {boolean} any All can be chosen; else nothing but `shift` and `all`, at scale 1: the robot hangs from nothing, so nobody knows where it is.
+ */
+
+/**
  * Is it the camera that was calibrated, and is it set well for LEDs?
  * @typedef {object} CameraHealth
  * @property {string} complaint Why nobody should fly with it, or "".
@@ -224,6 +242,7 @@
  * @property {string[]} warnings What who arms should know, each in words; refuses nothing.
  * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a processor for armed_stall_waited_ms; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
  * @property {Person[]} people Who is paired, in the order they came.
+ * @property {LeadingStatus | null} leading null before the control process has told of it.
  */
 
 /**
@@ -312,7 +331,7 @@
  * @property {number | null} distance_m From the camera to the robot.
  */
 
-/** @typedef {Hello | Command | Tune | PathChoice | Calibrate | Log | ScreenSize | ClockAsk} FromPage */
+/** @typedef {Hello | Command | Tune | Lead | PathChoice | Calibrate | Log | ScreenSize | ClockAsk} FromPage */
 /** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration | Deed | ClockAnswer | ScreenLights | Sight} ToPage */
 
 export {};
