@@ -9,6 +9,8 @@ bear, χ² with three degrees of freedom, is a lie of the camera, and seen so in
 * What is a little beside is believed less: its covariance takes in how far it is. If that happens
   too often across the line of sight, the phone's samples are worse than they should be, and
   foretell less (`check_noise`); unless the picture is steadied.
+* What alone is beside where the picture before foretold it, however far, is dated badly, as a busy
+  browser does it now and then: it is believed less, and moves what is foretold next less.
 * What is far beside is not believed. After `NAMED_S` the lie is named, and the camera is on trial:
   nothing is believed until `TRIAL_S` have passed without another one, and a zoom is taken back.
 * What is steadied is named as well, be it ever so little beside (`steadied_picture`).
@@ -46,6 +48,8 @@ GAP_S: Final = 0.045
 """Samples farther apart than this, two of a phone's lost, say too little of what is between."""
 DOUBTED_CHI2: Final = 5.0
 """Once in six pictures by chance; it costs little."""
+LONE_CHI2: Final = 9.0
+"""Once in 34 by chance; beyond, and if the one before was not, a picture is dated badly."""
 BEND_PHONE, BEND_BODY = 0.14, 0.09
 """Second differences of samples of specific force that the model's noise makes, squared [m²/s⁴]: 2
 times white jerk between a phone's samples, 6 times a robot's white noise."""
@@ -111,6 +115,8 @@ class PictureCheck:
         self._noise, self._jumps = CheckNoise(), SteadiedPicture()
         self._stretch = 1.0
         """Of what is foretold, for a robot that shakes more than the model says."""
+        self._was_beside = False
+        """The picture before was beside its place."""
         self._t_begun = -np.inf
         self._refused: list[VisionMeasurement] = []
         self._surprise, self._off2 = 1.0, np.zeros(3)
@@ -163,14 +169,13 @@ class PictureCheck:
         self._match_noise(pose, misses[1])
         known_s = KNOWN_S if self._learnt is None else LAG_S
         is_known = seen.t - self._t_begun > known_s
-        if is_known and any(
-            miss.chi2 > self._noise.chi2 * REFUSED_CHI2 and self._is_far(miss) for miss in misses
-        ):
+        far_amiss, near_amiss = (self._is_amiss(miss) for miss in misses)
+        if is_known and (far_amiss or (near_amiss and self._was_beside)):
             return self._refuse(seen, misses)
         if is_known and self._jumps.is_steadied:
             return self._name(seen, CameraLie(SHIFTED))
         self._refused.clear()
-        if not np.isfinite(track.fuse(near, seen, len(seen.rays))):
+        if not np.isfinite(track.fuse(near, self._doubted(seen, pose, misses[1]), len(seen.rays))):
             self._begin(seen)
         self._acquit(seen.t)
         self._noise.foretold(max(miss.chi2 for miss in misses))
@@ -180,6 +185,21 @@ class PictureCheck:
         if self._surprise > SURPRISED:
             doubted.append(np.sqrt(self._off2))
         return self._told(Judged(True, (max(doubted, key=_square),)) if doubted else FINE, pose)
+
+    def _doubted(
+        self, seen: VisionMeasurement, pose: RelativePose, near: Missed
+    ) -> VisionMeasurement:
+        """The same, believed less if it alone is beside its place.
+
+        One that is dated badly would leave a speed behind, and what is foretold by that would blame
+        pictures which are right.
+        """
+        is_beside = near.chi2 > LONE_CHI2
+        is_lone, self._was_beside = is_beside and not self._was_beside, is_beside
+        if not is_lone or self._jumps.is_still:
+            return seen
+        pose, rays = widened(pose, seen.rays, self._leds_in_b, near.off)
+        return replace(seen, pose=pose, rays=rays)
 
     def _missed(self, pose: RelativePose, foretold: Checkpoint[VisionMeasurement]) -> Missed:
         """Where it is seen from where it was foretold."""
@@ -224,6 +244,9 @@ class PictureCheck:
         if self._knows:
             self._track.begin(first_checkpoint(seen, self._learnt, np.inf, self._config))
             self._t_begun = seen.t
+
+    def _is_amiss(self, miss: Missed) -> bool:
+        return miss.chi2 > self._noise.chi2 * REFUSED_CHI2 and self._is_far(miss)
 
     def _is_far(self, miss: Missed) -> bool:
         return is_far(miss.off, miss.foretold.x[0:3], *self._turned(miss.foretold.t))

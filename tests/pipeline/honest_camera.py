@@ -40,6 +40,8 @@ class Adversity:
     """In a hole there are no pictures either, and no sample of either side."""
     dated: float = 0.0
     """Pictures are dated wrongly by up to so much, either way [s]."""
+    stumbles: float = 0.0
+    """Share of the pictures that are dated wrongly by 10 to 35 ms."""
     occluded: bool = False
     """Some LEDs or all are hidden for up to 2 s, every `every`."""
     refused: float = 0.01
@@ -78,6 +80,10 @@ ADVERSITIES = {
     "a browser out of breath": Adversity(
         {"tremor_relaxation": 0.15, "held": (0.01, 0.03)}, dated=0.015, refused=LATELY_WORSE
     ),
+    "dates that stumble": Adversity(
+        {"tremor_relaxation": 0.15, "held": (0.01, 0.02)}, stumbles=0.04
+    ),
+    "filming, dates that stumble": replace(of_hand("filming", held=(0.01, 0.02)), stumbles=0.04),
     "propellers shake": replace(of_hand("filming"), body_noise=1.0),
     "a slow line": of_hand("filming", time_offset=0.06, picture_delay=(0.1, 0.25)),
     "holes": replace(of_hand("walking"), hole=(0.1, 0.6)),
@@ -129,6 +135,8 @@ def _pictures(world, it, rng):
     told = zip(world.pictures.arrival.tolist(), looks(world, USUAL, world.setup.seed), strict=True)
     for arrival, look in told:
         t = look.t + rng.uniform(-it.dated, it.dated)
+        if it.stumbles and rng.uniform() < it.stumbles:
+            t += rng.choice((-1.0, 1.0)) * rng.uniform(0.010, 0.035)
         seen = measured(replace(look, t=t), offset if arrival > 0.5 else None)
         for (begin, end), n in zip(hidden, shown, strict=True):
             if begin < look.t < end:
