@@ -185,12 +185,18 @@ def announce(run: Mapping[str, object]) -> None:
         print(f"Supervisor:  {supervisor.here}")
         print(f"Each opens once, within {phone.lives_s / 60:g} minutes; `lightleash invite`, with")
         print("--role viewer or supervisor or without, prints another one.")
+        print(f"A warning?   {_without_tls(str(run['https_url']))}/ says how to trust this server.")
     else:
         print(f"\nPhone:       {run['https_url']}/ by a link of `lightleash invite`")
         print(f"Supervisor:  {run['http_url']}/supervisor by `lightleash invite --role supervisor`")
     if run["truth_port"]:  # the robot is a simulated one
         print("No phone at hand? Press “Start virtual phone” on the supervisor's page.")
     print("Ctrl-C stops, robot first.", flush=True)
+
+
+def _without_tls(url: str) -> str:
+    """Where the same port tells who speaks plain HTTP what to do."""
+    return url.replace("https://", "http://", 1)
 
 
 def _compile() -> None:

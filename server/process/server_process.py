@@ -13,8 +13,6 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-from starlette.types import ASGIApp
-
 from hardware.camera_file import CAMERAS
 from hardware.robot_file import ROBOTS, load_robot
 from pipeline.vision.visual_front_end import warm_up
@@ -48,6 +46,7 @@ from server.view.viser_view import Dashboard
 from server.web.app import Api, make_app
 from server.web.people_api import PeopleApi
 from server.web.session_manager import SessionManager
+from server.web.trust_page import trust_app
 from server.web.websocket import PageServer
 
 ANY_ADDRESS = ("0.0.0.0", "::")
@@ -98,13 +97,20 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     app = make_app(api, PageServer(manager, settings.video), routes)
     admission = Admission(limits_for(raise_handles()))
     hosts = [*own_names(), *settings.names]
-    guarded = Guard(app, doors, hosts, admission, roles=roles_of(app.routes))
+    guarded, trust = (
+        Guard(one, doors, hosts, admission, roles=roles_of(one.routes))
+        for one in (app, trust_app(tls.authority))
+    )
     if settings.record:
         manager.start_recording()
     run = json.dumps(_run(settings, given, base, doors))
     telling = asyncio.create_task(_tell_when_ready(manager, warming, given.runtime / RUN_FILE, run))
     try:
-        await _until_signalled(manager, doors_of(guarded, tls, given, admission))
+        listeners = [
+            (listener(guarded, tls, admission, trust), given.https),
+            (listener(guarded, None, admission), given.http),
+        ]
+        await _until_signalled(manager, listeners)
     finally:
         telling.cancel()
         await signalling.close()
@@ -175,16 +181,6 @@ def _run(settings: Settings, given: LaunchContext, base: str, doors: Doors) -> d
 def _seen_from_anywhere(robot: str) -> str:
     """A name as it is, a path as an absolute one."""
     return str(Path(robot).absolute()) if robot.endswith(".toml") else robot
-
-
-def doors_of(
-    app: ASGIApp, tls: Certificate, given: LaunchContext, admission: Admission
-) -> list[tuple[Listener, socket.socket]]:
-    """HTTPS for phones and HTTP for this machine, with their sockets."""
-    return [
-        (listener(app, tls, admission), given.https),
-        (listener(app, None, admission), given.http),
-    ]
 
 
 async def _until_signalled(

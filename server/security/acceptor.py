@@ -1,5 +1,8 @@
 """Accepts connections: admission first, then a first byte, then TLS, then HTTP.
 
+Whose first byte begins no TLS, where TLS is spoken, meets another protocol: most are browsers that
+were given an address without `https://`.
+
 Until its first byte a connection costs a file handle and no memory for TLS, and it has three
 seconds for the whole handshake.
 """
@@ -23,6 +26,8 @@ GOODBYE_S = 2.0
 """For the other end's part of ending TLS."""
 STRANGER_S = 60.0
 """A connection without a role, from an address that is not known, ends after this."""
+TLS_HANDSHAKE = b"\x16"
+"""First byte of every ClientHello (RFC 8446, section 5.1)."""
 AT_ONCE = 32
 """Connections accepted in one turn of the event loop."""
 BACK_OFF_S = 0.1
@@ -74,10 +79,11 @@ class Acceptor:
         tls: ssl.SSLContext | None,
         protocol: Callable[[], asyncio.Protocol],
         admission: Admission,
+        plain: Callable[[], asyncio.Protocol] | None = None,
     ) -> None:
-        """Accepts nothing before `start`."""
+        """Accepts nothing before `start`; `plain` is for who speaks no TLS, if there is `tls`."""
         self._bound, self._tls, self._protocol = bound, tls, protocol
-        self._admission = admission
+        self._admission, self._plain = admission, plain
         self._door: int = bound.getsockname()[1]
         self._loop = asyncio.get_running_loop()
         self._handshakes: set[asyncio.Task[None]] = set()
@@ -127,13 +133,16 @@ class Acceptor:
         """Bring a connection from its first byte to the protocol that takes over."""
         try:
             async with asyncio.timeout(HELLO_S):
-                await self._first_byte(guest)
+                first = await self._first_byte(guest)
+                protocol, tls = self._protocol, self._tls
+                if tls is not None and self._plain is not None and first != TLS_HANDSHAKE:
+                    protocol, tls = self._plain, None
                 transport, _ = await self._loop.connect_accepted_socket(
-                    self._protocol,
+                    protocol,
                     guest,
-                    ssl=self._tls,
-                    ssl_handshake_timeout=HELLO_S if self._tls else None,
-                    ssl_shutdown_timeout=GOODBYE_S if self._tls else None,
+                    ssl=tls,
+                    ssl_handshake_timeout=HELLO_S if tls else None,
+                    ssl_shutdown_timeout=GOODBYE_S if tls else None,
                 )
         except (OSError, TimeoutError):  # whoever came has left, was late or spoke no TLS
             return
@@ -149,15 +158,17 @@ class Acceptor:
         if not done.cancelled() and (error := done.exception()) is not None:
             log.error("port %d: a handshake failed", self._door, exc_info=error)
 
-    async def _first_byte(self, guest: Guest) -> None:
+    async def _first_byte(self, guest: Guest) -> bytes:
         came = asyncio.Event()
         self._loop.add_reader(guest, came.set)
         try:
             await came.wait()
         finally:
             self._loop.remove_reader(guest)
-        if not guest.recv(1, socket.MSG_PEEK):
+        first = guest.recv(1, socket.MSG_PEEK)
+        if not first:
             raise ConnectionAbortedError("it left without a word")
+        return first
 
     def _back_off(self, error: OSError) -> None:
         """No handles: one of the strangers goes, and the next try is a little later."""

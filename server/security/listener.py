@@ -96,10 +96,12 @@ def _is_utf8(data: bytes) -> bool:
 class Listener(uvicorn.Server):
     """Accepts by admission, and leaves signals to its owner."""
 
-    def __init__(self, config: uvicorn.Config, admission: Admission) -> None:
+    def __init__(
+        self, config: uvicorn.Config, admission: Admission, plain: uvicorn.Config | None = None
+    ) -> None:
         """Listens when it is run, at the sockets that it is given then."""
         super().__init__(config)
-        self._admission = admission
+        self._admission, self._plain = admission, plain
         self._acceptors: list[Acceptor] = []
 
     @contextlib.contextmanager
@@ -111,8 +113,12 @@ class Listener(uvicorn.Server):
         """Open the doors."""
         await self.lifespan.startup()
         self.servers = []  # of asyncio's own: none
+        plain = None
+        if self._plain is not None:
+            self._plain.load()
+            plain = self._plain_protocol
         self._acceptors = [
-            Acceptor(bound, self.config.ssl, self._protocol, self._admission)
+            Acceptor(bound, self.config.ssl, self._protocol, self._admission, plain)
             for bound in sockets or ()
         ]
         for acceptor in self._acceptors:
@@ -128,30 +134,42 @@ class Listener(uvicorn.Server):
     def _protocol(self) -> Patience:
         return Patience(self.config, self.server_state, self.lifespan.state)
 
+    def _plain_protocol(self) -> Patience:
+        assert self._plain is not None
+        return Patience(self._plain, self.server_state, self.lifespan.state)
 
-def listener(app: ASGIApp, tls: Certificate | None, admission: Admission | None = None) -> Listener:
+
+def listener(
+    app: ASGIApp,
+    tls: Certificate | None,
+    admission: Admission | None = None,
+    plain: ASGIApp | None = None,
+) -> Listener:
     """A server of `app`, with TLS or without; it is given its socket when it is run.
 
-    Listeners that share an `admission` share the places.
+    With TLS, who speaks plain HTTP is served `plain`, if there is one. Listeners that share an
+    `admission` share the places.
     """
-    return Listener(
-        uvicorn.Config(
-            app,
-            http=Patience,
-            ws=ForgivingWebsockets,
-            ws_max_size=MAX_RECORD_BYTES + 1024,
-            ws_per_message_deflate=False,
-            ws_ping_interval=5.0,
-            ws_ping_timeout=5.0,
-            lifespan="off",
-            log_config=None,
-            access_log=False,
-            server_header=False,
-            proxy_headers=False,  # who asks is who connected, whatever programs of this machine say
-            timeout_keep_alive=5,
-            timeout_graceful_shutdown=1,
-            ssl_certfile=tls.cert if tls else None,
-            ssl_keyfile=tls.key if tls else None,
-        ),
-        Admission() if admission is None else admission,
+    admission = Admission() if admission is None else admission
+    return Listener(_config(app, tls), admission, None if plain is None else _config(plain, None))
+
+
+def _config(app: ASGIApp, tls: Certificate | None) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        http=Patience,
+        ws=ForgivingWebsockets,
+        ws_max_size=MAX_RECORD_BYTES + 1024,
+        ws_per_message_deflate=False,
+        ws_ping_interval=5.0,
+        ws_ping_timeout=5.0,
+        lifespan="off",
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,  # who asks is who connected, whatever programs of this machine say
+        timeout_keep_alive=5,
+        timeout_graceful_shutdown=1,
+        ssl_certfile=tls.cert if tls else None,
+        ssl_keyfile=tls.key if tls else None,
     )

@@ -82,6 +82,7 @@ def realtime(seconds: float) -> Iterator[Finding]:
 def certificates() -> Iterator[Finding]:
     """What phones will be shown."""
     from server.security.tls import certificate, own_addresses
+    from server.web.trust_page import fingerprint
 
     try:
         made = certificate(state_directory())
@@ -90,6 +91,8 @@ def certificates() -> Iterator[Finding]:
         return
     addresses = ", ".join(own_addresses())
     yield Finding(GOOD, "certificate", f"{made.cert} for {addresses}", "install /ca.crt on phones")
+    if made.authority is not None:
+        yield Finding(GOOD, "fingerprint of ca.crt", f"SHA-256 {fingerprint(made.authority)}")
 
 
 def ports(numbers: Sequence[int]) -> Iterator[Finding]:

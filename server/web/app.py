@@ -191,12 +191,17 @@ class Api:
     async def _certificate(self, _request: Request) -> Response:
         if self._authority is None:
             raise RefusedRequest(404, "ca.crt", "this server has a certificate of its owner's")
-        return FileResponse(self._authority, media_type="application/x-x509-ca-cert")
+        return authority_file(self._authority)
 
     async def _health(self, _request: Request) -> Response:
         reasons = problems(self._manager, now())
         code = HTTPStatus.SERVICE_UNAVAILABLE if reasons else HTTPStatus.OK
         return JSONResponse({"ok": not reasons, "reasons": reasons}, code)
+
+
+def authority_file(authority: Path) -> Response:
+    """The certificate authority, by the type at which phones offer to install it."""
+    return FileResponse(authority, media_type="application/x-x509-ca-cert")
 
 
 def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAPI:

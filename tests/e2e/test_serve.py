@@ -18,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
 from websockets.sync.client import connect
 
 from hardware.follower import FollowerError
@@ -128,6 +130,20 @@ def test_its_addresses_answer_and_the_certificate_holds_for_who_trusts_its_autho
     with pytest.raises(urllib.error.URLError, match="CERTIFICATE"):
         get(f"{server.https_url}/")
     assert b"src/dashboard/main.js" in get(f"{server.http_url}/supervisor")[1]
+
+
+def test_who_asks_the_https_port_in_plain_text_is_told_how_to_trust_it_and_nothing_else(
+    server: Serving,
+) -> None:
+    plain = server.https_url.replace("https://", "http://")
+    _, page = get(f"{plain}/")
+    _, authority = get(f"{plain}/ca.crt")
+    shown = x509.load_pem_x509_certificate(authority).fingerprint(hashes.SHA256()).hex(":").upper()
+    assert shown in page.decode()
+    assert f'href="{server.https_url}/"' in page.decode()
+    for path in ("/supervisor", "/api/status", "/src/app/main.js", "/healthz"):
+        with pytest.raises(urllib.error.HTTPError, match=r"40[1234]"):
+            get(f"{plain}{path}")
     assert json.loads(get(f"{server.http_url}/healthz")[1])["ok"]
 
 

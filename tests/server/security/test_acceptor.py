@@ -54,10 +54,10 @@ def hurried(monkeypatch):
 
 
 @contextlib.asynccontextmanager
-async def door(context=None, limits=None):
+async def door(context=None, limits=None, plain=None):
     admission = Admission(limits)
     with socket.create_server((HOST, 0), backlog=1024) as bound:
-        one = Acceptor(bound, context, Echo, admission)
+        one = Acceptor(bound, context, Echo, admission, plain)
         one.start()
         try:
             yield SimpleNamespace(
@@ -142,6 +142,35 @@ def test_half_a_handshake_or_none_is_cut_without_a_word_in_the_log(secure, hello
 
     asyncio.run(run())
     assert caplog.records == []
+
+
+class Help(Echo):
+    """Says something else."""
+
+    def data_received(self, data):
+        self.transport.write(b"HELP!")
+
+
+def test_who_speaks_no_tls_meets_the_other_protocol_and_its_place_is_given_back(secure):
+    async def run():
+        async with door(secure.context, plain=Help) as here:
+            assert await echoed(*await come(here.port, ssl=secure.trust))
+            reader, writer = await come(here.port)
+            writer.write(b"GET / HTTP/1.1\r\n\r\n")
+            async with asyncio.timeout(4.0):
+                assert await reader.readexactly(5) == b"HELP!"
+            writer.transport.abort()
+            await eventually(lambda: len(here.admission) == 0)
+
+    asyncio.run(run())
+
+
+def test_where_no_tls_is_spoken_nobody_meets_the_other_protocol():
+    async def run():
+        async with door(None, plain=Help) as here:
+            assert await echoed(*await come(here.port))
+
+    asyncio.run(run())
 
 
 @pytest.mark.parametrize("with_tls", [False, True])
