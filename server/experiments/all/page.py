@@ -9,7 +9,7 @@ from typing import Final
 
 from markupsafe import Markup
 
-from server.experiments.all.markup import document, element
+from server.common.markup import document, element
 from server.experiments.all.parts import ReportPart
 from server.experiments.all.results import PartResults
 from server.experiments.all.running import RunRecord

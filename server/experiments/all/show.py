@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup
 
-from server.experiments.all.markup import element, joined
+from server.common.markup import element, joined
 from server.experiments.all.results import Figure
 from server.experiments.all.tables import Block, Cell, Lines, Statements, Table, Text
 
