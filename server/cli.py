@@ -29,6 +29,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   tune         find a robot's gains for a measured latency, under stated margins
   survey       where the LEDs are, from a film of the robot at rest
   warm         compile what must be fast, once; `serve` does so by itself
+  check        what a recording tells of its phone: is it fit to lead with, and what to change
   doctor       what this machine can do: real time, certificates, ports, codecs; --phone: a link
 """
 
@@ -155,6 +156,12 @@ def _warm(argv: Sequence[str]) -> int:
     return main(list(argv))
 
 
+def _check(argv: Sequence[str]) -> int:
+    from server.tools.check.command import main
+
+    return main(list(argv))
+
+
 def _doctor(argv: Sequence[str]) -> int:
     from server.tools.doctor import main
 
@@ -176,6 +183,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "tune": _tune,
     "survey": _survey,
     "warm": _warm,
+    "check": _check,
     "doctor": _doctor,
     "_server": _server,
 }

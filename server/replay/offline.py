@@ -14,6 +14,7 @@ from pathlib import Path
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, TouchState
 from pipeline.teleop import Output
+from pipeline.vision.detection import Detection
 from server.control.controller import Controller
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.phone.frame_pipeline import FramePipeline
@@ -22,7 +23,7 @@ from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.lead_messages import Lead
 from server.protocol.messages import Command, Hello, decode_message
 from server.protocol.wire import WireError, decode
-from server.protocol.wire_records import Picture, Ping, Record
+from server.protocol.wire_records import Motion, Picture, Ping, Record
 from server.recording.reader import Entry, Recording
 from server.recording.writer import PHONE_MESSAGES, PHONE_RECORDS, SERVER_RECORDS, RecordingError
 from server.replay.setting import body_samples, first_shape, recorded_camera, recorded_robot
@@ -130,9 +131,10 @@ class Offline:
     def _take(self, record: Record, now: float) -> None:
         """A record of the phone."""
         match self._ingest.record(record, now):
-            case PhoneImu() as sample:
+            case PhoneImu() as sample if isinstance(record.body, Motion):
                 self._frame_pipeline.front_end.add_imu(sample)
                 self._inbox.append(sample)
+                self._felt(sample, record.body, now)
             case TouchState() as operator:
                 self._inbox.append(operator)
             case EncodedFrame() as frame:
@@ -155,10 +157,17 @@ class Offline:
     def _see(self, frame: EncodedFrame) -> None:
         self._fit(frame.picture)
         detection = None if self._is_blind else self._frame_pipeline.see([frame])
+        self._looked(frame, detection)
         self._seen.append((frame, detection.pose if detection is not None else None))
         seen = detection.seen(self._frame_pipeline.camera) if detection is not None else None
         if seen is not None:
             self._inbox.append(seen)
+
+    def _felt(self, sample: PhoneImu, motion: Motion, now: float) -> None:
+        """What else is made of a motion sample: nothing."""
+
+    def _looked(self, frame: EncodedFrame, detection: Detection | None) -> None:
+        """What else is made of a picture: nothing."""
 
 
 def run_offline(recording: Recording, out: Path) -> str:

@@ -1,0 +1,1 @@
+"""`lightleash check`: what a recording tells of the phone that made it."""
