@@ -41,6 +41,8 @@ class Display:
     """Of its upper edge, away from who looks."""
     believed_lag_s: float | None = None
     """Taken for its lag without measuring; None: it is measured."""
+    grey: int = 70
+    """Of the fiducials in a picture, of 255; 0: there are none."""
 
 
 class ScreenSimulation(VirtualTimeSimulation):
@@ -69,6 +71,8 @@ class ScreenSimulation(VirtualTimeSimulation):
         self._t_frame = 0.0
         self.phases: set[str] = set()
         """Shown so far."""
+        self.drawn_before_s: list[float] = []
+        """How long before each picture its light had been drawn."""
 
     @property
     def shows(self) -> Lights:
@@ -133,6 +137,9 @@ class ScreenSimulation(VirtualTimeSimulation):
             R_fc, p_cf_in_f = self.phone.hand.pose(t + dt)
             return R_fc.T @ R_fg, R_fc.T @ (self._rest_in_f - p_cf_in_f)
 
-        lit = [dots for since, dots in self._shown if since <= t]
-        dots = lit[-1] if lit else np.zeros((0, 2))
-        return film(camera, glass_at, self._display.glass, dots[self._display.glass.has(dots)], rng)
+        glass, dots = self._display.glass, np.zeros((0, 2))
+        lit = [frame for frame in self._shown if frame[0] <= t]
+        if lit:
+            since, dots = lit[-1]
+            self.drawn_before_s.append(t - since + self._display.lag_s)
+        return film(camera, glass_at, glass, dots[glass.has(dots)], rng, self._display.grey)

@@ -92,6 +92,14 @@ PARTS: Final[tuple[ReportPart, ...]] = (
         "becomes of it when a thruster fails in flight.",
     ),
     ReportPart(
+        "screen",
+        "screen --seeds 3 --seed 1000",
+        "screen --seeds 1 --seed 1000 --seconds 6",
+        "A robot of light",
+        "Leading a robot that is only light on a screen, beside the same robot if it were real: "
+        "what a display's lag costs, and what is refused.",
+    ),
+    ReportPart(
         "gaps",
         "gaps --seeds 2",
         "gaps --quick --no-traces --vanish 0 --seeds 1",

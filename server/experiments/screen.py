@@ -1,0 +1,281 @@
+"""`lightleash experiments screen`: a robot of light, led through a screen, in virtual time.
+
+The same small robot flies as if it were real, and as light on displays that are more or less late,
+of which the lag is measured or misjudged; pictures are rendered and encoded. What nobody can lead
+by, a television that is too late or a glass without fiducials, must be refused and not flown.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import inf, nan, sqrt
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from hardware.robot_file import RobotFile, load_robot
+from pipeline.config import PERIOD_S, TeleopConfig
+from server.common import processes
+from server.common.drawing import panels, save
+from server.common.ranges import number, whole
+from server.common.text import Column, dashed, flights
+from server.control.process import teleop_config
+from server.experiments.runner import ExperimentReport, experiment
+from server.simulation.figures import SETTLE_S, result_of
+from server.simulation.screen import FRAMES_HZ, Display, ScreenSimulation
+from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
+
+REAL: Final = "real"
+LAGS_MS: Final = (20.0, 40.0, 60.0)
+MISJUDGED_MS: Final = 20.0
+LATE_MS: Final = 100.0
+"""A television's."""
+MOST_BEFORE_S: Final = 12.0
+"""Until it is led: the screen is found, its lag measured, the robot armed."""
+REFUSED_S: Final = 6.0
+"""By then a robot that is not refused is led."""
+MOST_RATIO: Final = 1.3
+"""RMS error through a screen, to that of the same robot if it were real."""
+MOST_OFF_MS: Final = 3.0
+"""Of a measured lag."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenCase:
+    """What is led."""
+
+    name: str
+    display: Display | None = None
+    """None: the robot itself is there."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenFlight:
+    """One flight; lengths in mm, times in ms."""
+
+    case: str
+    seed: int
+    rms_mm: float
+    max_mm: float
+    lag_ms: float
+    """How late light was, on average; NaN where there was no screen."""
+    found_ms: float
+    """What was measured or believed of that."""
+    ended: str
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenRow:
+    """All flights of one case."""
+
+    case: str
+    flights: int
+    rms_mm: float
+    """Over all."""
+    ratio: float
+    """To the real robot's."""
+    worst_mm: float
+    """RMS of the worst flight."""
+    max_mm: float
+    lag_ms: float
+    off_ms: float
+    """By how much the lag was misjudged, at most."""
+    ended: str
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedScreen:
+    """What became of a screen that nobody can lead by."""
+
+    case: str
+    is_flown: bool
+    why: str
+
+
+COLUMNS: Final[tuple[Column, ...]] = (
+    ("case", "robot", "{}"),
+    ("flights", "flights", "{}"),
+    ("rms_mm", "RMS mm", "{:.2f}"),
+    ("ratio", "to real", "{:.2f}"),
+    ("worst_mm", "worst mm", "{:.2f}"),
+    ("max_mm", "max mm", "{:.1f}"),
+    ("lag_ms", "lag ms", "{:.1f}"),
+    ("off_ms", "off ms", "{:.1f}"),
+)
+REFUSALS: Final[tuple[Column, ...]] = (
+    ("case", "screen", "{}"),
+    ("is_flown", "flown", "{}"),
+    ("why", "why", "{}"),
+)
+
+
+def cases() -> Iterator[ScreenCase]:
+    """The real robot first."""
+    yield ScreenCase(REAL)
+    for lag_ms in LAGS_MS:
+        yield ScreenCase(f"{lag_ms:g} ms", Display(lag_s=1e-3 * lag_ms))
+    for lag_ms, off_ms in ((20.0, MISJUDGED_MS), (40.0, -MISJUDGED_MS), (60.0, -MISJUDGED_MS)):
+        light_s = 1e-3 * lag_ms + 0.5 / FRAMES_HZ  # a frame stays until the next
+        display = Display(lag_s=1e-3 * lag_ms, believed_lag_s=light_s + 1e-3 * off_ms)
+        yield ScreenCase(f"{lag_ms:g} ms, believed {off_ms:+g}", display)
+
+
+def unfit() -> Iterator[ScreenCase]:
+    """What must be refused."""
+    yield ScreenCase(f"{LATE_MS:g} ms", Display(lag_s=1e-3 * LATE_MS))
+    yield ScreenCase("no fiducials", Display(grey=0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScreenSetting:
+    """What all flights share."""
+
+    robot_file: RobotFile
+    config: TeleopConfig
+    hand: str
+
+    def simulation(self, display: Display, seed: int) -> ScreenSimulation:
+        """At rest before a screen."""
+        scene = SimulationOptions(hand=self.hand, seed=seed)
+        return ScreenSimulation(self.robot_file, self.config, scene, display)
+
+    def real(self, seed: int) -> VirtualTimeSimulation:
+        """At rest before the robot itself."""
+        scene = SimulationOptions(hand=self.hand, seed=seed)
+        return VirtualTimeSimulation(self.robot_file, self.config, scene)
+
+
+def fly(setting: ScreenSetting, seconds: float, job: tuple[ScreenCase, int]) -> ScreenFlight:
+    """Lead for so long, from the press on."""
+    case, seed = job
+    if case.display is None:
+        simulation, lag_ms, found_ms = setting.real(seed), nan, nan
+        _lead(simulation, seconds)
+    else:
+        screen = simulation = setting.simulation(case.display, seed)
+        _lead(screen, seconds)
+        lag = screen.robot_of_light.lag
+        lag_ms = 1e3 * float(np.mean(screen.drawn_before_s or [nan]))
+        found_ms = 1e3 * lag.value if lag is not None else nan
+    figures = result_of(simulation.trace, simulation.scene, 0.0)
+    is_whole = figures.tracked_s >= seconds - SETTLE_S - PERIOD_S
+    ended = figures.ended or ("" if is_whole else f"{simulation.t:.1f} s: it was not led")
+    return ScreenFlight(
+        case.name, seed, figures.rms_mm, figures.max_mm, lag_ms, found_ms, ended
+    )  # fmt: skip
+
+
+def _lead(simulation: VirtualTimeSimulation, seconds: float) -> None:
+    trace, end = simulation.trace, MOST_BEFORE_S + seconds
+    while simulation.t < end and len(trace.t) * PERIOD_S < seconds and not trace.left:
+        simulation.advance()
+
+
+def refused(setting: ScreenSetting, seed: int, case: ScreenCase) -> RefusedScreen:
+    """Whether it is flown nevertheless, and what the page says."""
+    assert case.display is not None
+    simulation = setting.simulation(case.display, seed)
+    simulation.run(REFUSED_S)
+    is_flown = "robot" in simulation.phases or bool(simulation.trace.t)
+    return RefusedScreen(case.name, is_flown, simulation.shows.why)
+
+
+def rows_of(flown: Sequence[ScreenFlight]) -> list[ScreenRow]:
+    """A row a case, in the order of the flights."""
+    by_case: dict[str, list[ScreenFlight]] = {}
+    for one in flown:
+        by_case.setdefault(one.case, []).append(one)
+    real = _rms([one.rms_mm for one in by_case[REAL]])
+    return [_row(name, some, real) for name, some in by_case.items()]
+
+
+def _row(name: str, some: Sequence[ScreenFlight], real_mm: float) -> ScreenRow:
+    rms = _rms([one.rms_mm for one in some])
+    return ScreenRow(
+        case=name,
+        flights=len(some),
+        rms_mm=rms,
+        ratio=rms / real_mm,
+        worst_mm=max((one.rms_mm for one in some), key=_nan_last),
+        max_mm=max((one.max_mm for one in some), key=_nan_last),
+        lag_ms=float(np.mean([one.lag_ms for one in some])),
+        off_ms=max((one.found_ms - one.lag_ms for one in some), key=lambda ms: _nan_last(abs(ms))),
+        ended=next((one.ended for one in some if one.ended), ""),
+    )
+
+
+def _rms(values: Sequence[float]) -> float:
+    return sqrt(float(np.mean(np.square(values))))
+
+
+def _nan_last(value: float) -> float:
+    return inf if value != value else value
+
+
+def goals(rows: Sequence[ScreenRow], refusals: Sequence[RefusedScreen]) -> Mapping[str, bool]:
+    """What was asked for; NaN keeps no goal."""
+    held = {"no flight ended": not any(row.ended for row in rows)}
+    for row in rows:
+        if row.case != REAL:
+            near = f"{row.case}: RMS no more than {MOST_RATIO:g} times the real robot's"
+            held[near] = row.ratio <= MOST_RATIO
+    measured = [row for row in rows if row.case in {f"{lag:g} ms" for lag in LAGS_MS}]
+    held[f"lags found to {MOST_OFF_MS:g} ms"] = all(
+        abs(row.off_ms) <= MOST_OFF_MS for row in measured
+    )
+    for one in refusals:
+        held[f"{one.case}: not flown, and told why"] = not one.is_flown and bool(one.why)
+    return held
+
+
+def draw(flown: Sequence[ScreenFlight], path: Path) -> Path:
+    """Each flight's RMS by what was led, beside what was asked for."""
+    figure, axes = panels(figsize=(8.0, 3.6))
+    names = list(dict.fromkeys(one.case for one in flown))
+    axes.plot([names.index(one.case) for one in flown], [one.rms_mm for one in flown], "o", ms=4)
+    real = _rms([one.rms_mm for one in flown if one.case == REAL])
+    axes.axhline(MOST_RATIO * real, color="k", lw=0.8, ls="--", label=f"{MOST_RATIO:g} × real")
+    axes.set_xticks(range(len(names)), names, rotation=20, ha="right")
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("tracking error, RMS [mm]")
+    axes.legend()
+    return save(figure, path)
+
+
+@experiment("screen")
+def run(arguments: argparse.Namespace) -> ExperimentReport:
+    """Fly the robot itself, and as light on each display."""
+    robot_file = load_robot("screen")
+    config = teleop_config(robot_file, "phone", TeleopConfig().virtual_camera, "relative")
+    setting = ScreenSetting(robot_file, config, arguments.hand)
+    first, workers = arguments.seed, arguments.workers
+    jobs = [(case, seed) for case in cases() for seed in range(first, first + arguments.seeds)]
+    flown = list(processes.each(partial(fly, setting, arguments.seconds), jobs, workers))
+    by_name = {case.name: k for k, case in enumerate(cases())}
+    flown.sort(key=lambda one: (by_name[one.case], one.seed))  # the same whatever the workers
+    rows = rows_of(flown)
+    refusals = [refused(setting, first, case) for case in unfit()]
+    return ExperimentReport(
+        {"rows": rows, "flights": flown, "refused": refusals},
+        f"{flights(COLUMNS, rows)}\n\n{dashed(REFUSALS, refusals)}",
+        goals(rows, refusals),
+        draw=lambda folder: (draw(flown, folder / "screen.png"),),
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument("--hand", default="moving", help="of the virtual phone")
+    parser.add_argument("--seeds", type=whole(1, 1000), default=3, help="flights of each kind")
+    parser.add_argument("--seed", type=int, default=1000, help="of the first flight")
+    parser.add_argument(
+        "--seconds", type=number(5.0, 600.0), default=12.0, help="each is led for so long"
+    )
+    parser.add_argument(
+        "--workers", type=whole(1, 256), default=1, help="processes that fly at a time"
+    )
+    parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")
