@@ -186,7 +186,8 @@ def led(server: Serving) -> Iterator[Leader]:
         finally:
             phone.terminate()
             said, _ = phone.communicate()
-        leader.error_mm = json.loads(said.splitlines()[-1])["rms_mm"] or float("nan")
+        if lines := said.splitlines():  # else it was cut off, and says so itself
+            leader.error_mm = json.loads(lines[-1])["rms_mm"] or float("nan")
 
 
 @dataclass(frozen=True, slots=True)
