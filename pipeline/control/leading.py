@@ -29,8 +29,9 @@ from pipeline.signals import VirtualView
 LeadingAxes = Literal["all", "shift", "turn", "level"]
 LEAST_SCALE: Final = 0.25
 """Way of the robot over that of its reference: less, the error of its place outweighs it."""
-MOST_SCALE: Final = 2.0
-"""More, a hand that moves by 10 cm has it out of the AMES's reach."""
+MOST_SCALE: Final = 1.0
+"""Beyond it S − I would push a robot that something blocks: what its thrusters then give without
+moving it, `SuspendedPlace` takes for a way that is gone, and the law for more to go."""
 
 
 @dataclass(frozen=True, slots=True)
