@@ -66,11 +66,11 @@ test('no module is left over', () => {
 test('every element the views look for is in their page', () => {
   for (const [page, ...views] of [
     ['index.html', 'src/ui/view.js', 'src/ui/calibration_view.js', 'src/ui/constraints_panel.js', 'src/ui/link_check.js', 'src/ui/pairing_card.js', 'src/ui/choice_card.js',
-      'src/ui/handover_card.js', 'src/ui/sight_overlay.js'],
+      'src/ui/handover_card.js', 'src/ui/sight_overlay.js', 'src/ui/leading_choice.js'],
     ['board.html', 'src/app/board.js'],
     ['screen.html', 'src/screen/main.js'],
     ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/runtime_parameters.js',
-      'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js', 'src/ui/choice_card.js'],
+      'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js', 'src/ui/choice_card.js', 'src/ui/leading_choice.js'],
   ]) {
     const ids = new Set([...read(page ?? '').matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));
     for (const view of views) {

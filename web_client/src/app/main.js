@@ -12,6 +12,7 @@ import { PaceKeeper } from '../video/rate_control.js';
 import { WakefulClock, commandOf } from '../wire/command.js';
 import { HandoverCard } from '../ui/handover_card.js';
 import { Imu } from '../motion/imu.js';
+import { LeadingChoice } from '../ui/leading_choice.js';
 import { LinkCheck } from '../ui/link_check.js';
 import { PairingCard } from '../ui/pairing_card.js';
 import { Phone } from './phone.js';
@@ -141,6 +142,8 @@ const lensPanel = new LensPanel(document, platform, performance, camera, (text) 
 
 const handover = new HandoverCard(document, fetchHere, { onTake: () => dispatch({ type: 'take_lead' }), tell: notice });
 
+const leading = new LeadingChoice(document, (lead) => void phone.link.sendMessage(lead), () => performance.now());
+
 const linkCheck = new LinkCheck(document, performance, fetchHere);
 
 /** @param {Event} event */
@@ -162,6 +165,7 @@ function show() {
   lensPanel.render(state.standby ? { ...state, status: null } : state); // it is another phone’s camera
   linkCheck.render(state);
   handover.render(state);
+  leading.take(!state.standby && state.heard ? state.status?.leading ?? null : null, state.held);
 }
 
 /** @param {Effect} effect */

@@ -12,6 +12,7 @@ import { ChoiceCard } from '../ui/choice_card.js';
 import { EstimatePanel } from './estimate.js';
 import { EMPTY, reduce } from './model.js';
 import { KnobPanel } from './runtime_parameters.js';
+import { LeadingChoice } from '../ui/leading_choice.js';
 import { ServerTime, WakefulClock, commandOf } from '../wire/command.js';
 import { Link, socketUrl } from '../wire/link.js';
 import { PathSelect } from './path_select.js';
@@ -62,6 +63,7 @@ const view = new BoardView(document, {
   onReload: () => window.location.reload(),
 });
 const knobs = new KnobPanel(document, (tune) => void link.sendMessage(tune), () => performance.now());
+const leading = new LeadingChoice(document, (lead) => void link.sendMessage(lead), () => performance.now());
 const path = new PathSelect(document, (choice) => void link.sendMessage(choice), () => performance.now());
 const estimate = new EstimatePanel(document);
 const choice = new ChoiceCard(document);
@@ -81,6 +83,7 @@ function dispatch(event) {
     estimate.render(board);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);
     path.take(board.heard ? board.status?.path_choice ?? null : null);
+    leading.take(board.heard ? board.status?.leading ?? null : null, role !== 'supervisor');
     people.render(board.status?.people ?? [], role === 'supervisor');
     view.text('virtual', isVirtual() ? 'Stop virtual phone' : 'Start virtual phone');
   });

@@ -8,6 +8,7 @@
 import { MODE_WORDS, gapWords } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
+import { leadWords } from './leading_choice.js';
 import { standbyWords } from './standby.js';
 import { endWords, stopWords } from '../wire/stop.js';
 import { goesOn, shownMode, untilRamp, wish } from './session.js';
@@ -207,7 +208,9 @@ export class View {
     this.data('hold', 'look', look);
     this.find('hold').setAttribute('aria-pressed', String(state.held));
     this.text('hold-title', title);
-    this.text('hold-hint', hint);
+    const led = state.status?.leading;
+    const words = !led ? '' : look === 'moving' ? leadWords(led.held_scale, led.held_axes) : leadWords(led.scale, led.axes);
+    this.text('hold-hint', [words, hint].filter(Boolean).join(' · '));
   }
 
   /**
