@@ -58,7 +58,7 @@ class BiasSteps:
         self._learnt: Array = np.zeros((4, 3, 3))
 
     def learn(self, t: float, e: Array, S: Array, P: Array) -> Array:
-        """Learn from a picture of `t` [s] that is (6,) beside what P (22, 22) foretold, S (6, 6).
+        """Learn from a picture of `t` [s] that is (6,) beside what P (22, 22) predicted, S (6, 6).
 
         Gives by how much (4,) each sensor's bias must be off, about each axis [unit].
         """

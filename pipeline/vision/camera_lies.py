@@ -18,7 +18,7 @@ ACROSS_RAD, ACROSS_SHARE, ACROSS_S = 0.001, 0.05, 0.003
 meanwhile, for a camera that sits 3° beside where its calibration says; what it turns in a time by
 which stamps may be wrong."""
 ALONG: Final = 0.008
-"""Nearer or farther than foretold by less than this share it may be."""
+"""Nearer or farther than predicted by less than this share it may be."""
 STILL: Final = 3e-4
 """Tangents that change less while the robot should pass show an old picture."""
 SHIFTED = (
@@ -42,7 +42,7 @@ class CameraLie:
 
 
 def is_far(off: Array, p: Array, turned: float, rate: float) -> bool:
-    """Whether a place `off` (3,) beside where it was foretold, p (3,) [m], is no small error.
+    """Whether a place `off` (3,) beside where it was predicted, p (3,) [m], is no small error.
 
     The phone `turned` so far meanwhile [rad], to and fro at a `rate` [rad/s].
     """

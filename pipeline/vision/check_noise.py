@@ -1,6 +1,6 @@
-"""How much worse than said motion sensors foretell pictures: covariance matching by quantiles.
+"""How much worse than said motion sensors predict pictures: covariance matching by quantiles.
 
-Where pictures are seen from where they were foretold is χ² distributed, if all noise is as said. A
+Where pictures are seen from where they were predicted is χ² distributed, if all noise is as said. A
 median follows one that is badly dated for long; a tail, the more it is passed, samples that have
 just become worse. Quantiles and not means, since a lie is far beyond both and must not be learnt.
 """
@@ -14,7 +14,7 @@ MEDIAN_CHI2, MEDIAN_STEP = 2.37, 0.01
 moves what is usual by the step, up or down."""
 TAIL_CHI2, TAIL, TAIL_STEP = 6.0, 0.05, 0.25
 """Of two degrees of freedom, across the line of sight: by chance this share of honest pictures is
-aside of what the one before foretold by more. Each one beyond moves the scale up by the step times
+aside of what the one before predicted by more. Each one beyond moves the scale up by the step times
 the others' share, each other one down by the step times this: so samples of a busy browser are
 known for what they are within a second, and only a lie is farther off than they explain."""
 MOST: Final = 1e3
@@ -31,13 +31,13 @@ class CheckNoise:
         self.phone = 1.0
         """Of the phone's samples: a browser that is kept from work reads its sensors late."""
 
-    def foretold(self, chi2: float) -> None:
+    def add_innovation(self, chi2: float) -> None:
         """Take a believed picture's χ² (3)."""
         step = MEDIAN_STEP if chi2 > self.chi2 * MEDIAN_CHI2 else -MEDIAN_STEP
         self.chi2 = max(1.0, (1.0 + step) * self.chi2)
 
-    def foretold_aside(self, chi2: float, is_clear: bool) -> None:
-        """Take χ² (2) of a picture by what the one before foretold.
+    def add_lateral_innovation(self, chi2: float, is_clear: bool) -> None:
+        """Take χ² (2) of a picture by what the one before predicted.
 
         `is_clear`: no sample can be doubted for it, the picture is steadied.
         """

@@ -22,7 +22,7 @@ MEMORY_RAD, GYRO_RAD_S, BLIND_RAD_S, MEMORY_MOST_RAD = 0.2, 0.03, 1.5, 0.6
 gyroscopes; farther, it says nothing."""
 
 REACH_M, REACH_SIGMAS = 0.3, 5.0
-"""So far from where it is foretold nobody's robot is; and a filter's doubt besides."""
+"""So far from where it is predicted nobody's robot is; and a filter's doubt besides."""
 REACH_M_S2 = 1.0
 """How hard it may have changed its speed since it was seen."""
 REACHED_S = 10.0

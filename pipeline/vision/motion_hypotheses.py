@@ -1,9 +1,9 @@
 """Candidates, which all look like the robot, held against what both motion sensors feel.
 
 LEDs of another robot of the same kind fit as well as our own: no residual tells them apart, but
-their motion does. Some models of each candidate's motion foretell every picture: *ours* moves as
+their motion does. Some models of each candidate's motion predict every picture: *ours* moves as
 the robot's motion sensor says, a *still* one rests in the room, a *free* one moves anyhow. What
-the first foretells better than all others is our robot; what it foretells worse is another one.
+the first predicts better than all others is our robot; what it predicts worse is another one.
 While all rest, nobody can know.
 """
 
@@ -48,7 +48,7 @@ least."""
 CONTRARY: Final = -6.0
 """What has more against it is none of ours, even if all others have still more."""
 NEAR_M: Final = 0.35
-"""A candidate is seen again so near to where it is foretold."""
+"""A candidate is seen again so near to where it is predicted."""
 LOST_S: Final = 1.0
 """A candidate not seen for longer must be held against the motion sensors anew."""
 
@@ -62,7 +62,7 @@ class CandidateView:
 
 
 class MotionHypothesis:
-    """How one model of a candidate's motion foretells its pictures."""
+    """How one model of a candidate's motion predicts its pictures."""
 
     def __init__(self, config: RelativeConfig, leds_in_b: Array, rest: Array | None) -> None:
         """`rest` (3,): specific force in b [m/s²] of what rests; None: the robot's samples."""
@@ -71,7 +71,7 @@ class MotionHypothesis:
         self._begun = False
 
     def place_at(self, t: float) -> Array:
-        """Where it is foretold at the stamp `t` [s] (3,) [m]."""
+        """Where it is predicted at the stamp `t` [s] (3,) [m]."""
         track = self._track
         t += float(track.newest.x[X_OFFSET])
         p: Array = track.predicted(max(t, track.base.t)).x[0:3]
@@ -166,8 +166,8 @@ class RobotCandidate:
         t, last = view.seen.t, self._last.pose
         if not 0.0 < t - self.t < LOST_S:
             return False
-        foretold = last.p_bc_in_c if not self._models else self._models[0].place_at(t)
-        off = view.pose.p_bc_in_c - foretold
+        predicted = last.p_bc_in_c if not self._models else self._models[0].place_at(t)
+        off = view.pose.p_bc_in_c - predicted
         return bool(off @ off < NEAR_M**2)
 
     def is_at(self, view: CandidateView) -> bool:

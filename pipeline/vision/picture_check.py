@@ -1,4 +1,4 @@
-"""Each picture is held against what both motion sensors foretell from the pictures before it.
+"""Each picture is held against what both motion sensors predict from the pictures before it.
 
 A stabiliser shifts the picture, a zoom, another lens or a focus that breathes scales it, a camera
 that hangs shows an old one: and LEDs still fit each other, so no residual tells. But phone and
@@ -8,9 +8,9 @@ bear, χ² with three degrees of freedom, is a lie of the camera, and seen so in
 
 * What is a little beside is believed less: its covariance takes in how far it is. If that happens
   too often across the line of sight, the phone's samples are worse than they should be, and
-  foretell less (`check_noise`); unless the picture is steadied.
-* What alone is beside where the picture before foretold it, however far, is dated badly, as a busy
-  browser does it now and then: it is believed less, and moves what is foretold next less.
+  predict less (`check_noise`); unless the picture is steadied.
+* What alone is beside where the picture before predicted it, however far, is dated badly, as a busy
+  browser does it now and then: it is believed less, and moves what is predicted next less.
 * What is far beside is not believed. After `NAMED_S` the lie is named, and the camera is on trial:
   nothing is believed until `TRIAL_S` have passed without another one, and a zoom is taken back.
 * What is steadied is named as well, be it ever so little beside (`steadied_picture`).
@@ -95,11 +95,11 @@ class Missed:
     """A picture's innovation."""
 
     off: Array
-    """(3,) where the robot is seen from where it was foretold [m]."""
+    """(3,) where the robot is seen from where it was predicted [m]."""
     S: Array
     """(3, 3) its covariance [m²]."""
     chi2: float
-    foretold: Checkpoint[VisionMeasurement]
+    predicted: Checkpoint[VisionMeasurement]
 
 
 class PictureCheck:
@@ -114,7 +114,7 @@ class PictureCheck:
         """Of the motion sensors, while the camera told the truth."""
         self._noise, self._jumps = CheckNoise(), SteadiedPicture()
         self._stretch = 1.0
-        """Of what is foretold, for a robot that shakes more than the model says."""
+        """Of what is predicted, for a robot that shakes more than the model says."""
         self._was_beside = False
         """The picture before was beside its place."""
         self._t_begun = -np.inf
@@ -148,7 +148,7 @@ class PictureCheck:
         return replace(seen, pose=pose, rays=rays)
 
     def judge(self, seen: VisionMeasurement) -> Judged:
-        """Hold a picture with a pose against what was foretold for it."""
+        """Hold a picture with a pose against what was predicted for it."""
         if seen.pose is None:
             return REFUSED if self.complaint else FINE
         seen, pose = _bounded(seen, seen.pose)
@@ -178,7 +178,7 @@ class PictureCheck:
         if not np.isfinite(track.fuse(near, self._doubted(seen, pose, misses[1]), len(seen.rays))):
             self._begin(seen)
         self._acquit(seen.t)
-        self._noise.foretold(max(miss.chi2 for miss in misses))
+        self._noise.add_innovation(max(miss.chi2 for miss in misses))
         self._surprise += LATELY * (misses[0].chi2 / 3.0 - self._surprise)
         self._off2 += LATELY * (np.square(misses[0].off) - self._off2)
         doubted = [miss.off for miss in misses if miss.chi2 > DOUBTED_CHI2]
@@ -191,7 +191,7 @@ class PictureCheck:
     ) -> VisionMeasurement:
         """The same, believed less if it alone is beside its place.
 
-        One that is dated badly would leave a speed behind, and what is foretold by that would blame
+        One that is dated badly would leave a speed behind, and what that predicts would blame
         pictures which are right.
         """
         is_beside = near.chi2 > LONE_CHI2
@@ -201,19 +201,20 @@ class PictureCheck:
         pose, rays = widened(pose, seen.rays, self._leds_in_b, near.off)
         return replace(seen, pose=pose, rays=rays)
 
-    def _missed(self, pose: RelativePose, foretold: Checkpoint[VisionMeasurement]) -> Missed:
-        """Where it is seen from where it was foretold."""
-        off = pose.p_bc_in_c - foretold.x[0:3]
-        P: Array = self._track.in_picture(foretold)[:3, :3]
+    def _missed(self, pose: RelativePose, predicted: Checkpoint[VisionMeasurement]) -> Missed:
+        """Where it is seen from where it was predicted."""
+        off = pose.p_bc_in_c - predicted.x[0:3]
+        P: Array = self._track.in_picture(predicted)[:3, :3]
         S = self._stretch * P + pose.covariance[:3, :3]
-        return Missed(off, S, float(off @ np.linalg.solve(S, off)), foretold)
+        return Missed(off, S, float(off @ np.linalg.solve(S, off)), predicted)
 
     def _match_noise(self, pose: RelativePose, near: Missed) -> None:
-        """Learn how well the phone's samples foretell, from one picture to the next."""
-        since, aside, foretold = self._track.newest.x[1:3], pose.p_bc_in_c[1:], near.foretold.x[1:3]
-        off, S = near.off[1:], near.S[1:, 1:]
-        self._jumps.add(pose.t, aside - since, foretold - since, float(np.trace(S)))
-        self._noise.foretold_aside(float(off @ np.linalg.solve(S, off)), self._jumps.is_clear)
+        """Learn how well the phone's samples predict, from one picture to the next."""
+        since, predicted = self._track.newest.x[1:3], near.predicted.x[1:3]
+        aside, off, S = pose.p_bc_in_c[1:], near.off[1:], near.S[1:, 1:]
+        chi2 = float(off @ np.linalg.solve(S, off))
+        self._jumps.add(pose.t, aside - since, predicted - since, float(np.trace(S)))
+        self._noise.add_lateral_innovation(chi2, self._jumps.is_clear)
 
     def measured(self, focal: float, sigma: float) -> None:
         """Things look by so much larger than calibrated, ± `sigma`, as somebody measured since."""
@@ -234,7 +235,7 @@ class PictureCheck:
         return self._track.phone.near(t) is not None and self._track.body.near(t) is not None
 
     def _begin(self, seen: VisionMeasurement) -> None:
-        """Foretell from this picture on."""
+        """Predict from this picture on."""
         if self._knows and not self.complaint and seen.t - self._t_begun > KNOWN_S:
             base = self._track.base
             self._learnt = base.x[X_BIASES:].copy(), base.P[BIASES:, BIASES:].copy()
@@ -249,7 +250,7 @@ class PictureCheck:
         return miss.chi2 > self._noise.chi2 * REFUSED_CHI2 and self._is_far(miss)
 
     def _is_far(self, miss: Missed) -> bool:
-        return is_far(miss.off, miss.foretold.x[0:3], *self._turned(miss.foretold.t))
+        return is_far(miss.off, miss.predicted.x[0:3], *self._turned(miss.predicted.t))
 
     def _turned(self, t: float) -> tuple[float, float]:
         """How far the phone turned in the time before `t` [rad], and how fast to and fro."""
@@ -263,7 +264,7 @@ class PictureCheck:
         refused, far = self._refused, misses[0]
         refused.append(seen)
         off = max((miss.off for miss in misses), key=_square)
-        lie = named(refused, off, far.foretold.x[0:3])
+        lie = named(refused, off, far.predicted.x[0:3])
         least = self._noise.chi2 * (SHIFTED_CHI2 if lie.words == SHIFTED else AMISS_CHI2)
         is_lie = far.chi2 > least and seen.t - refused[0].t >= NAMED_S
         if len(refused) < NAMED_PICTURES or not is_lie:
@@ -287,7 +288,7 @@ class PictureCheck:
 
 
 def _lately(stream: ImuStream, t: float) -> Array:
-    """Samples (n, 6) of the time that is foretold, up to `t` [s]."""
+    """Samples (n, 6) of the time that is predicted, up to `t` [s]."""
     since, until = np.searchsorted(stream.times, (t - LAG_S, t))
     return stream.values[since:until]
 
@@ -295,7 +296,7 @@ def _lately(stream: ImuStream, t: float) -> Array:
 def _bent(stream: ImuStream, t: float, usual: float) -> float:
     """How many times the `usual` second differences of the specific force are lately; at least 1.
 
-    What shakes quicker than it is sampled foretells less.
+    What shakes quicker than it is sampled predicts less.
     """
     bends = np.diff(_lately(stream, t)[:, 3:], 2, axis=0)
     return max(1.0, float(np.square(bends).mean()) / usual) if len(bends) else 1.0

@@ -1,11 +1,11 @@
 """Whether pictures jump to and fro with the phone that takes them, or a stabiliser steadies them.
 
 A hand trembles at 4 to 12 Hz, so what a picture shows jumps aside from one to the next, and back.
-The phone's gyroscope foretells how far. A stabiliser takes most of it out: the jumps that are seen
-are smaller than those foretold. Samples that a busy browser reads late, or of a wrong time, put the
-jumps elsewhere and leave their size: so the one is told from the other, whenever it began.
+The phone's gyroscope predicts how far. A stabiliser takes most of it out: the jumps that are seen
+are smaller than those predicted. Samples that a busy browser reads late, or of a wrong time, put
+the jumps elsewhere and leave their size: so the one is told from the other, whenever it began.
 
-A robot that moves on evenly is foretold to jump in a picture that is dated wrongly: only pictures
+A robot that moves on evenly is predicted to jump in a picture that is dated wrongly: only pictures
 that are as far apart as the two before them count.
 """
 
@@ -20,11 +20,11 @@ from pipeline.frames import Array
 MEMORY: Final = 0.1
 """Share of each picture in what is remembered."""
 STEADIED: Final = 0.4
-"""Of the foretold jumps, squared: measured were 0.9 and more of honest pictures by all codecs, 0.45
-with late samples, 0.2 with those that are also held while the hand trembles (which do not last);
-steadied ones show 0.3 and less."""
+"""Of the predicted jumps, squared: measured were 0.9 and more of honest pictures by all codecs,
+0.45 with late samples, 0.2 with those that are also held while the hand trembles (which do not
+last); steadied ones show 0.3 and less."""
 CLEAR: Final = 15.0
-"""Times the variance of where a picture is foretold: so far the foretold jumps are no noise."""
+"""Times the variance of where a picture is predicted: so far the predicted jumps are no noise."""
 EVEN: Final = 0.25
 """By so much of it the time between two pictures may differ from the time between those before."""
 PICTURES: Final = 6
@@ -37,16 +37,16 @@ class SteadiedPicture:
     def __init__(self) -> None:
         """Nothing seen yet."""
         self._moved, self._jumps = np.zeros((2, 2)), np.zeros(2)
-        """Since the picture before: as seen, as foretold [m]; mean square of how that changed."""
+        """Since the picture before: as seen, as predicted [m]; mean square of how that changed."""
         self._clear = 0
         self._t, self._apart = 0.0, 0.0
 
-    def add(self, t: float, seen: Array, foretold: Array, variance: float) -> None:
+    def add(self, t: float, seen: Array, predicted: Array, variance: float) -> None:
         """Take how far (2,) the robot moved in a picture of `t` [s], and should have moved [m].
 
         `variance` [m²] of the difference, both axes together.
         """
-        moved, apart = np.array([seen, foretold]), t - self._t
+        moved, apart = np.array([seen, predicted]), t - self._t
         is_even = abs(apart - self._apart) < EVEN * apart
         self._t, self._apart = t, apart
         if not is_even:  # what was seen before is forgotten bit by bit: nobody stays accused by it
@@ -60,7 +60,7 @@ class SteadiedPicture:
 
     @property
     def is_still(self) -> bool:
-        """It jumps less than foretold."""
+        """It jumps less than predicted."""
         return bool(self._jumps[0] < STEADIED * self._jumps[1])
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from hardware.sim.hand import Hand
 from tests.e2e.firefox import Firefox
 from tests.e2e.page_scripts import LENS
-from tests.e2e.played_phone import CANVAS, FORETOLD_S, PlayedPhone
+from tests.e2e.played_phone import AHEAD_S, CANVAS, PlayedPhone
 
 WIDTH, HEIGHT = 915, 412
 FEEL = """
@@ -66,8 +66,8 @@ class FirefoxPhone(PlayedPhone):
 
     def _show(self, spots: str) -> None:
         now = time.monotonic()
-        times = (1e3 * (now - self._page_epoch() + FORETOLD_S)).tolist()
-        felt = [self._reading(now + ahead) for ahead in FORETOLD_S]
+        times = (1e3 * (now - self._page_epoch() + AHEAD_S)).tolist()
+        felt = [self._reading(now + ahead) for ahead in AHEAD_S]
         self.evaluate(f"({spots}, tellFelt({json.dumps(times)}, {json.dumps(felt)}), null)")
 
     def _reading(self, t: float) -> list[list[float]]:

@@ -22,7 +22,7 @@ from tests.e2e.witness import Hole, Witness
 
 STEP_S = 0.01
 """The hand is told so often, to the page where that manages."""
-FORETOLD_S = np.array((0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.12, 0.16, 0.2))
+AHEAD_S = np.array((0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.12, 0.16, 0.2))
 """When the lights are told from now on: a page that is told late still shows where the hand is."""
 RECENT_S = 0.02
 """The robot's last motion, which is taken to go on."""
@@ -158,11 +158,11 @@ class PlayedPhone(ABC):
     def _shown(self, truth: Truth) -> str:
         """The expression that paints the lights from now on."""
         t = float(truth.t[-1])
-        times = (1e3 * (t - self._page_epoch() + FORETOLD_S)).tolist()
+        times = (1e3 * (t - self._page_epoch() + AHEAD_S)).tolist()
         bodies = _onwards(truth)
         spots = [
             self._spots(self._hand.pose(t + ahead), body)
-            for ahead, body in zip(FORETOLD_S, bodies, strict=True)
+            for ahead, body in zip(AHEAD_S, bodies, strict=True)
         ]
         return f"tellSpots({json.dumps(times)}, {json.dumps(spots)})"
 
@@ -246,8 +246,8 @@ class PlayedPhone(ABC):
 
 
 def _onwards(truth: Truth) -> list[Pose]:
-    """Of the body at all times foretold, if it goes on as it did."""
+    """Of the body at all times predicted, if it goes on as it did."""
     t = float(truth.t[-1])
     (R_before, p_before), (R, p) = truth.at(t - RECENT_S), truth.at(t)
     v, turn = (p - p_before) / RECENT_S, log(R @ R_before.T) / RECENT_S
-    return [(exp(ahead * turn) @ R, p + ahead * v) for ahead in FORETOLD_S]
+    return [(exp(ahead * turn) @ R, p + ahead * v) for ahead in AHEAD_S]

@@ -38,10 +38,10 @@ def forecast_after(phone):
 class Way:
     """A state with its covariance, carried along samples."""
 
-    def __init__(self, body=BODY, phone=PHONE, *, foretells=False):
-        """The phone's last sample is held, or what follows it is foretold."""
+    def __init__(self, body=BODY, phone=PHONE, *, predicts=False):
+        """The phone's last sample is held, or what follows it is predicted."""
         self.config, self.body, self.phone = RelativeConfig(), body, phone
-        self.foretells, self.full_scale = foretells, np.inf
+        self.predicts, self.full_scale = predicts, np.inf
         self.x, self.R, self.R_ic = np.zeros(X), R_from_rpy(np.array([0.1, -0.2, 0.4])), np.eye(3)
         self.x[:6] = 2.5, 0.1, -0.2, 0.3, -0.1, 0.2
         self.x[X_BIASES : X_BIASES + INPUTS] = BIAS
@@ -65,7 +65,7 @@ class Way:
             *self.body,
             *self.phone,
             noise,
-            forecast_after(self.phone) if self.foretells else NOTHING,
+            forecast_after(self.phone) if self.predicts else NOTHING,
             np.empty((13, 3, 3)),
         )
         apply(

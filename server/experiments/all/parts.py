@@ -147,7 +147,7 @@ CAPTIONS: Final[Mapping[tuple[str, str], str]] = {
     ("loop", "loop"): "Where the robot was meant to be (dashed) and was, and how far apart that "
     "is, over time; dotted: the RMS.",
     ("contact", "contact"): "Force on the wall and in the socket while the hand presses; shaded: "
-    "the band about what is foretold; dotted: the time that counts.",
+    "the band about what is predicted; dotted: the time that counts.",
     ("sweep", "sweep"): "Tracking error over each swept key; points are seeds, lines are medians, "
     "crosses on top ended early.",
     ("estimators", "estimators"): "Error of each estimator over time, with ±3 σ as it believes.",

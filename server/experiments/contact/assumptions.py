@@ -76,7 +76,7 @@ def _judging(plant: PlantParameters, seeds: int) -> Iterator[Assumption]:
     yield Assumption("force", "MuJoCo's contact force, every millisecond", "chosen")
     yield Assumption(
         "band",
-        f"± {BAND_N:g} N about what is foretold: compliance's limit, less the suspension's "
+        f"± {BAND_N:g} N about what is predicted: compliance's limit, less the suspension's "
         f"{spring_n_m(plant):.1f} N/m times the way to the obstacle; stiff is held against the "
         "highest limit's",
         "chosen",

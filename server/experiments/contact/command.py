@@ -15,7 +15,7 @@ from server.experiments.contact import assumptions, picture
 from server.experiments.contact.flight import ContactTrace, fly
 from server.experiments.contact.free import NEAR, Free, free_flights, free_table
 from server.experiments.contact.measure import ContactRow, row_of, table_of
-from server.experiments.contact.setting import LEAST_N, ContactScene, Way, foretold_n
+from server.experiments.contact.setting import LEAST_N, ContactScene, Way, predicted_n
 from server.experiments.paper.setup.variants import check_gains
 from server.experiments.runner import ExperimentReport, RefusedError, experiment
 from server.simulation.sensors import PAPER, Leader, phone
@@ -38,9 +38,9 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
     rows: list[ContactRow] = []
     shown: list[tuple[ContactRow, ContactTrace]] = []
     for scene, way in flown:
-        foretold = foretold_n(way.limit_n or max(arguments.limit_n), scene, robot_file.plant)
+        predicted = predicted_n(way.limit_n or max(arguments.limit_n), scene, robot_file.plant)
         traces = [_flown(robot_file, leader, scene, way, seed) for seed in seeds]
-        rows.append(row_of(scene, way, foretold, traces))
+        rows.append(row_of(scene, way, predicted, traces))
         shown.append((rows[-1], traces[0]))
     free = free_flights(robot_file, leader, [STIFF, *_soft(arguments)], list(seeds))
     return ExperimentReport(
@@ -66,10 +66,10 @@ def flown_of(
         soft = [
             way
             for way in _soft(arguments)
-            if foretold_n(way.limit_n or 0.0, scene, robot_file.plant) >= LEAST_N
+            if predicted_n(way.limit_n or 0.0, scene, robot_file.plant) >= LEAST_N
         ]
         if not soft:
-            least = LEAST_N - foretold_n(0.0, scene, robot_file.plant)
+            least = LEAST_N - predicted_n(0.0, scene, robot_file.plant)
             raise RefusedError(
                 f"--limit-n: none reaches the {scene.name}, the suspension pulls back; "
                 f"allowed: one of {least:.1f} or more, or a smaller --gap-mm"

@@ -45,7 +45,7 @@ class Touching:
     impact_n: float
     """Largest force of a millisecond."""
     overshoot_pct: float
-    """Of the averaged force beyond what is foretold, at its largest after the impact."""
+    """Of the averaged force beyond what is predicted, at its largest after the impact."""
     settling_s: float
     """From the first touch until it stays in the band for `STAYS_S`; NaN: never."""
     bounces: float
@@ -64,7 +64,7 @@ class ContactRow:
 
     scene: str
     way: str
-    foretold_n: float
+    predicted_n: float
     """Middle of the band."""
     mean_n: float
     deviation_n: float
@@ -87,7 +87,7 @@ class ContactRow:
 COLUMNS: Final[tuple[Column, ...]] = (
     ("scene", "scene", "{}"),
     ("way", "controller", "{}"),
-    ("foretold_n", "foretold N", "{:.2f}"),
+    ("predicted_n", "predicted N", "{:.2f}"),
     ("mean_n", "force N", "{:.2f}"),
     ("deviation_n", "± N", "{:.2f}"),
     ("touching_pct", "touching %", "{:.1f}"),
@@ -116,11 +116,11 @@ def smooth(force_n: Array) -> Array:
     return averaged
 
 
-def touching(trace: ContactTrace, foretold_n: float) -> Touching:
+def touching(trace: ContactTrace, predicted_n: float) -> Touching:
     """Figures of a flight that did not end early."""
     pressing = (trace.t >= GO_S + SETTLE_S) & (trace.t < GO_S + STAY_S)
     force = smooth(trace.force_n)
-    inside = np.abs(force - foretold_n) <= BAND_N
+    inside = np.abs(force - predicted_n) <= BAND_N
     touches = trace.peak_n > 0.0
     first = int(np.argmax(touches)) if touches.any() else len(trace.t)
     later = (np.arange(len(trace.t)) >= first + IMPACT_S / PERIOD_S) & (trace.t < GO_S + STAY_S)
@@ -132,7 +132,7 @@ def touching(trace: ContactTrace, foretold_n: float) -> Touching:
         touching_pct=100.0 * float(trace.pushes[np.repeat(pressing, PER_PERIOD)].mean()),
         in_band_pct=100.0 * float(inside[pressing].mean()),
         impact_n=float(trace.peak_n.max()),
-        overshoot_pct=100.0 * (peak / foretold_n - 1.0),
+        overshoot_pct=100.0 * (peak / predicted_n - 1.0),
         settling_s=settling(inside[first:]),
         bounces=gaps(np.repeat(early, PER_PERIOD), trace.pushes),
         lost=gaps(np.repeat(pressing, PER_PERIOD), trace.pushes),
@@ -156,11 +156,11 @@ def gaps(within: npt.NDArray[np.bool_], pushes: npt.NDArray[np.bool_]) -> int:
 
 
 def row_of(
-    scene: ContactScene, way: Way, foretold_n: float, traces: Sequence[ContactTrace]
+    scene: ContactScene, way: Way, predicted_n: float, traces: Sequence[ContactTrace]
 ) -> ContactRow:
     """Over the flights of a controller in a scene."""
     ended = next((trace.ended for trace in traces if trace.ended), "")
-    ones = [] if ended else [touching(trace, foretold_n) for trace in traces]
+    ones = [] if ended else [touching(trace, predicted_n) for trace in traces]
 
     def mean(value: Callable[[Touching], float]) -> float:
         return float(np.mean([value(one) for one in ones])) if ones else nan
@@ -170,7 +170,7 @@ def row_of(
     return ContactRow(
         scene=scene.name,
         way=way.name,
-        foretold_n=foretold_n,
+        predicted_n=predicted_n,
         mean_n=mean(lambda one: one.mean_n),
         deviation_n=rms(np.array([one.deviation_n for one in ones])),
         touching_pct=mean(lambda one: one.touching_pct),

@@ -24,7 +24,7 @@ def draw(shown: Sequence[tuple[ContactRow, ContactTrace]], path: Path) -> Path:
                 continue
             axis.plot(trace.t, smooth(trace.force_n), color=colour, lw=1.0, label=row.way)
             if k > 0:
-                edges = row.foretold_n - BAND_N, row.foretold_n + BAND_N
+                edges = row.predicted_n - BAND_N, row.predicted_n + BAND_N
                 axis.axhspan(*edges, color=colour, alpha=0.15)
         for moment in (GO_S, GO_S + STAY_S):
             axis.axvline(moment, color="k", ls=":", lw=0.8)

@@ -1,4 +1,4 @@
-"""What is touched and how the hand goes about it; what force the compliance law foretells."""
+"""What is touched and how the hand goes about it; what force the compliance law predicts."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ AIM_M: Final = 0.003
 BAND_N: Final = 0.4
 """Half the width of the band; the suspension changes its pull by as much over 15 mm."""
 LEAST_N: Final = 0.2
-"""Smaller foretold forces have no band worth the name."""
+"""Smaller predicted forces have no band worth the name."""
 FULL: Final = 0.9
 """Share of the socket's depth at which the plug is in."""
 
@@ -88,7 +88,7 @@ def spring_n_m(plant: PlantParameters) -> float:
     return plant.mass * GRAVITY / hangs.length if hangs is not None else 0.0
 
 
-def foretold_n(limit_n: float, scene: ContactScene, plant: PlantParameters) -> float:
+def predicted_n(limit_n: float, scene: ContactScene, plant: PlantParameters) -> float:
     """The force on the wall, or on the socket's bottom [N].
 
     The law gives the limit beyond what held the robot at the start, however far behind the

@@ -10,7 +10,7 @@ from pipeline.estimation.estimator import Fusion
 from tests.pipeline.flight import new
 
 P = 1e-8 * np.eye(6)
-"""Of what was foretold: 0.1 mm, 0.1 mrad."""
+"""Of what was predicted: 0.1 mm, 0.1 mrad."""
 C = 0.25 * P
 SIGMA = np.sqrt(1.25e-8)
 
@@ -26,14 +26,14 @@ def scattered(doubt: AdaptiveNoise, times: float, count: int, seed: int = 0) -> 
     return np.array([judged(doubt, times * SIGMA * rng.normal(size=6)) for _ in range(count)])
 
 
-def test_who_foretells_as_well_as_said_is_believed():
+def test_who_predicts_as_well_as_said_is_believed():
     doubt = AdaptiveNoise()
     assert (scattered(doubt, 1.0, 3000) > 1.0).mean() < 0.004
     factors = [(scattered(doubt, 1.0, 30, seed), doubt.factor)[1] for seed in range(50)]
     assert np.mean(factors) < 1.2
 
 
-def test_samples_that_foretell_worse_are_doubted_and_believed_again():
+def test_samples_that_predict_worse_are_doubted_and_believed_again():
     doubt = AdaptiveNoise()
     scattered(doubt, 4.0, 30)
     assert doubt.factor > 16.0
@@ -41,7 +41,7 @@ def test_samples_that_foretell_worse_are_doubted_and_believed_again():
     assert doubt.factor == 1.0
 
 
-def test_a_picture_far_off_stretches_what_was_foretold_until_it_fits():
+def test_a_picture_far_off_stretches_what_was_predicted_until_it_fits():
     error = 30.0 * SIGMA * np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     inflation = judged(AdaptiveNoise(), error)
     for times, fits in ((1.0, True), (0.5, False)):

@@ -26,7 +26,7 @@ def turn(forecast, ahead_s):
 
 
 def wrong_by(world, predictor, ahead_s, start_s):
-    """Errors (n, 3) of the turns foretold after each sample, and what was believed of them."""
+    """Errors (n, 3) of the turns predicted after each sample, and what was believed of them."""
     turned = np.cumsum(GRID_S * world.omega_c, axis=0)
     stream, errors, sigmas, row = ImuStream(), [], [], np.zeros(6)
     for _, sample in sorted(sensors.phone_samples(world), key=lambda event: event[1].t):
@@ -89,7 +89,7 @@ def test_of_noise_nothing_is_expected():
 
 
 @pytest.mark.parametrize("period_s", [1 / 50, 1 / 60, 1 / 100, 1 / 200])
-def test_a_tremor_is_foretold_whatever_the_rate_of_the_samples(period_s):
+def test_a_tremor_is_predicted_whatever_the_rate_of_the_samples(period_s):
     predictor = HandPredictor(HandConfig())
     t = period_s * np.arange(round(8.0 / period_s))
 
@@ -119,7 +119,7 @@ def test_learning_is_least_squares_that_forget():
     assert np.abs(predictor._weights[LEARNT] - np.linalg.solve(A, B)).max() < 1e-6
 
 
-def test_without_enough_samples_nothing_is_foretold():
+def test_without_enough_samples_nothing_is_predicted():
     predictor, rates = HandPredictor(HandConfig()), np.tile(BIAS, (TAPS, 1))
     feed(predictor, rates[:-1])
     assert predictor.forecast is NOTHING

@@ -159,11 +159,11 @@ def test_held_samples_are_doubted_more_and_more(what):
     assert 4.0 * growth[1] < growth[2] < growth[3] / 4.0
 
 
-@pytest.mark.parametrize("foretells", [False, True])
-def test_a_gap_between_samples_is_doubted_but_less_than_silence(foretells):
+@pytest.mark.parametrize("predicts", [False, True])
+def test_a_gap_between_samples_is_doubted_but_less_than_silence(predicts):
     sigmas = {}
     for name, stop in (("dense", 0.0), ("gap", 0.6), ("silence", 9.0)):
-        way = Way(foretells=foretells)
+        way = Way(predicts=predicts)
         keep = (PHONE[0] <= 0.3) | (PHONE[0] >= stop)
         way.phone = (PHONE[0][keep].copy(), PHONE[1][keep].copy())
         way.go(0.2, 0.6)
@@ -190,12 +190,12 @@ def test_samples_before_the_first_one_are_the_first_one():
     assert way.sigma(6) > 0.05
 
 
-@pytest.mark.parametrize("foretells", [False, True])
-def test_the_rotation_of_the_camera_since_its_last_sample(foretells):
+@pytest.mark.parametrize("predicts", [False, True])
+def test_the_rotation_of_the_camera_since_its_last_sample(predicts):
     """However the way there is cut; begun anew at each sample."""
     phone = PHONE[0][:31].copy(), PHONE[1][:31].copy()
     t_last = phone[0][-1]
-    once, often = (Way(phone=phone, foretells=foretells) for _ in range(2))
+    once, often = (Way(phone=phone, predicts=predicts) for _ in range(2))
     once.go(0.2, t_last + 0.05)
     for start, stop in (
         (0.2, 0.3),
@@ -206,7 +206,7 @@ def test_the_rotation_of_the_camera_since_its_last_sample(foretells):
         often.go(start, stop)
     assert np.abs(once.R_ic - often.R_ic).max() < 1e-6
     held = exp(0.05 * (phone[1][-1, :3] - BIAS[6:9]))
-    assert np.abs(log(held.T @ once.R_ic)).max() < (0.05 if foretells else 1e-12)
+    assert np.abs(log(held.T @ once.R_ic)).max() < (0.05 if predicts else 1e-12)
     once.phone = PHONE
     once.go(t_last + 0.05, t_last + 0.1)
     assert np.array_equal(once.R_ic, np.eye(3))

@@ -9,14 +9,14 @@ NOISE_M2 = 1e-7
 JUMPS = 0.003 * np.random.default_rng(1).normal(size=(90, 2))
 
 
-def watched(seen, foretold, variance=NOISE_M2, dates=None):
+def watched(seen, predicted, variance=NOISE_M2, dates=None):
     jumps = SteadiedPicture()
-    for n, (row, there) in enumerate(zip(seen, foretold, strict=True)):
+    for n, (row, there) in enumerate(zip(seen, predicted, strict=True)):
         jumps.add(n / 30.0 if dates is None else dates[n], row, there, variance)
     return jumps
 
 
-def test_a_picture_that_moves_as_foretold_is_not_steadied() -> None:
+def test_a_picture_that_moves_as_predicted_is_not_steadied() -> None:
     assert not watched(JUMPS, JUMPS).is_still
 
 
@@ -36,8 +36,8 @@ def test_jumps_elsewhere_are_not_missing() -> None:
 
 def test_a_robot_that_moves_on_does_not_jump_because_pictures_are_dated_wrongly() -> None:
     dates = np.arange(90) / 30.0 + np.random.default_rng(2).uniform(-0.012, 0.012, 90)
-    foretold = 0.2 * np.diff(dates, prepend=-1.0 / 30.0)[:, None] * np.ones(2)
-    jumps = watched(np.full_like(foretold, 0.2 / 30.0), foretold, dates=dates)
+    predicted = 0.2 * np.diff(dates, prepend=-1.0 / 30.0)[:, None] * np.ones(2)
+    jumps = watched(np.full_like(predicted, 0.2 / 30.0), predicted, dates=dates)
     assert not jumps.is_steadied
 
 
@@ -47,7 +47,7 @@ def test_a_steadied_picture_is_forgotten_where_dates_tell_nothing() -> None:
     assert not watched(0.3 * JUMPS, JUMPS, dates=dates).is_still
 
 
-def test_noise_is_not_foretold_jumps() -> None:
+def test_noise_is_not_predicted_jumps() -> None:
     assert not watched(0.0 * JUMPS, JUMPS, variance=1e-5).is_steadied
 
 

@@ -1,4 +1,4 @@
-"""`experiments contact`: pressing holds the foretold force, and what is said has a shape."""
+"""`experiments contact`: pressing holds the predicted force, and what is said has a shape."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from server.experiments.contact.setting import (
     STAY_S,
     ContactScene,
     Way,
-    foretold_n,
+    predicted_n,
     spring_n_m,
 )
 from server.experiments.paper.setup import flight as paper_flight
@@ -83,7 +83,7 @@ def test_the_table_has_a_line_for_each_and_says_what_ended() -> None:
     good = row_of(WALL, SOFT, 2.5, [trace_of(pressed(2.4))])
     bad = row_of(SOCKET, SOFT, 1.2, [trace_of(pressed(2.4), "+3 s: lost")])
     title, first, second = table_of([good, bad]).splitlines()
-    assert "foretold N" in title
+    assert "predicted N" in title
     assert "in band %" in title
     assert first.split()[:6] == ["wall", "compliant", "3", "N", "2.50", "2.40"]
     assert second.endswith("ended at +3 s: lost")
@@ -100,9 +100,9 @@ def test_the_goal_is_missed_if_contact_is_lost_or_the_plug_stays_out() -> None:
     assert not all(command.goals([wall], slow).values())
 
 
-def test_the_law_foretells_the_limit_less_the_suspensions_part() -> None:
+def test_the_law_predicts_the_limit_less_the_suspensions_part() -> None:
     assert spring_n_m(AMES.plant) == pytest.approx(26.4, abs=0.05)
-    assert foretold_n(3.0, WALL, AMES.plant) == pytest.approx(3.0 - 26.4 * 0.02, abs=0.01)
+    assert predicted_n(3.0, WALL, AMES.plant) == pytest.approx(3.0 - 26.4 * 0.02, abs=0.01)
     assert spring_n_m(load_robot("ground").plant) == 0.0
 
 
@@ -125,9 +125,9 @@ def test_a_compliant_push_is_held_without_a_bounce() -> None:
     trace = fly(AMES, phone(), WALL, Way("compliant 1.5 N", limit), 1, 6.0)
     assert trace.ended == ""
     pressing = trace.t > GO_S
-    foretold = foretold_n(limit, WALL, AMES.plant)
-    assert trace.force_n[pressing].mean() == pytest.approx(foretold, abs=BAND_N)
-    assert np.abs(smooth(trace.force_n)[pressing] - foretold).max() < BAND_N
+    predicted = predicted_n(limit, WALL, AMES.plant)
+    assert trace.force_n[pressing].mean() == pytest.approx(predicted, abs=BAND_N)
+    assert np.abs(smooth(trace.force_n)[pressing] - predicted).max() < BAND_N
     assert gaps(np.repeat(pressing, 5), trace.pushes) == 0
 
 

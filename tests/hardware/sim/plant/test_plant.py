@@ -292,10 +292,10 @@ def test_what_it_says_of_the_time_ahead_comes_true_and_moves_nothing(name):
     plant.push(np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.1]), 0.03)
     plant.step(commands)
     before = plant.p_bf_in_f
-    foretold = plant.ahead(0.05)
+    predicted = plant.ahead(0.05)
     np.testing.assert_array_equal(plant.p_bf_in_f, before)
-    assert [round(t, 6) for t, _, _ in foretold] == [0.005 * k for k in range(1, 11)]
-    for _, wxyz, p in foretold:
+    assert [round(t, 6) for t, _, _ in predicted] == [0.005 * k for k in range(1, 11)]
+    for _, wxyz, p in predicted:
         plant.step(commands)
         np.testing.assert_array_equal(plant.p_bf_in_f, p)
         np.testing.assert_array_equal(plant.wxyz_fb, wxyz)
