@@ -64,7 +64,7 @@ class LedSensorModel:
             fit = pnp.solve(camera, self._leds_in_b, spots, match, (p_bc_in_c, R_cb))
             pose = pnp.pose_of(fit, stamp) if fit is not None else None
         if pose is not None:
-            self._stamps.saw(pose)
+            self._stamps.add_pose(pose)
         rays = rays_of(camera, spots, match, stamp)
         return VisionMeasurement(stamp, rays, pose, camera.half_field, self._stamps.offset)
 

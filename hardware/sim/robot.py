@@ -54,9 +54,9 @@ class RobotProcess:
         assert self._truth is not None
         for data, sender in arrived(self._truth):
             if (ahead_s := ahead_of(data)) is not None:
-                self._tell_truth(self._truth, data, ahead_s, sender)
+                self._send_truth(self._truth, data, ahead_s, sender)
 
-    def _tell_truth(
+    def _send_truth(
         self, truth: socket.socket, request: bytes, ahead_s: float, sender: Address
     ) -> None:
         start = 1e-9 * self.server.start_ns

@@ -72,7 +72,7 @@ class CalibrationMonitor:
         self.complaint = ""
         """Why nobody should fly with this camera; empty if all is well, or not known yet."""
 
-    def saw(self, look: LedObservation, coarse: StampOffset | None) -> bool:
+    def add_observation(self, look: LedObservation, coarse: StampOffset | None) -> bool:
         """Take the named LEDs of a believed pose and, if known, how wrong the stamps are.
 
         Returns:

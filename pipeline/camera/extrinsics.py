@@ -19,7 +19,7 @@ class Extrinsics:
     time_offset_s: float = 0.0
     """A picture was taken at its stamp plus this, on the sensors' clock."""
 
-    def felt(self, sample: PhoneImu) -> PhoneImu:
+    def in_camera_axes(self, sample: PhoneImu) -> PhoneImu:
         """Turn a sample of the sensors into the camera's axes."""
         R = self.R_ci
         return PhoneImu(sample.t, R @ sample.omega_m_cf_in_c, R @ sample.a_m_cf_in_c)

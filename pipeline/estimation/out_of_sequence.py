@@ -77,8 +77,8 @@ class OutOfSequence(ABC, Generic[Measurement]):
         self.body, self.phone = ImuStream(), ImuStream()
         self.checkpoints = [self._empty()]
         self.now, self._frontier = self._empty(), self._empty()
-        self._spoilt_from = -inf
-        """Checkpoints and frontier after this time must be made anew; inf: none."""
+        self._replay_from = -inf
+        """Checkpoints and frontier after this time [s] are to be replayed; inf: none."""
 
     def _empty(self) -> Checkpoint[Measurement]:
         return Checkpoint.empty(*self._sizes)
@@ -113,7 +113,7 @@ class OutOfSequence(ABC, Generic[Measurement]):
     def begin(self, start: Checkpoint[Measurement]) -> None:
         """Start from there."""
         self.checkpoints = [start]
-        self._spoilt_from = -inf
+        self._replay_from = -inf
 
     def insert(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
         """Remember a sample of `body` or `phone`; False: it was there already."""
@@ -122,7 +122,7 @@ class OutOfSequence(ABC, Generic[Measurement]):
         before = float(times[i]) if i >= 0 else -inf
         if not stream.insert(t, rate, force):
             return False
-        self._spoilt_from = min(self._spoilt_from, before)
+        self._replay_from = min(self._replay_from, before)
         return True
 
     def predicted(self, t: float, without: float = inf) -> Checkpoint[Measurement]:
@@ -155,7 +155,7 @@ class OutOfSequence(ABC, Generic[Measurement]):
         here.seen, here.use = seen, np.full(parts, -1, dtype=np.int8)
         here.inflation = inflation
         chi2 = self._look(here, seen, here.use)
-        self._spoilt_from = here.t
+        self._replay_from = here.t
         self._repair()
         return chi2
 
@@ -176,15 +176,15 @@ class OutOfSequence(ABC, Generic[Measurement]):
         for here in since:
             more = variances / len(since)
             here.opened = more if here.opened is None else here.opened + more
-        self._spoilt_from = min(self._spoilt_from, self.base.t)
+        self._replay_from = min(self._replay_from, self.base.t)
         self._repair()
 
     def _repair(self) -> None:
-        """Make anew what was spoilt; the base can't be."""
-        if self._spoilt_from == inf:
+        """Replay what a late sample or picture changes; the base can't be."""
+        if self._replay_from == inf:
             return
         k = len(self.checkpoints)
-        while k > 1 and self.checkpoints[k - 1].t > self._spoilt_from:
+        while k > 1 and self.checkpoints[k - 1].t > self._replay_from:
             k -= 1
         for before, here in pairwise(self.checkpoints[k - 1 :]):
             t = here.t
@@ -192,9 +192,9 @@ class OutOfSequence(ABC, Generic[Measurement]):
             self._advance(here, t)
             if here.seen is not None and here.use is not None:
                 self._look(here, here.seen, here.use)
-        if self._frontier.t > self._spoilt_from or self._frontier.t <= self.newest.t:
+        if self._frontier.t > self._replay_from or self._frontier.t <= self.newest.t:
             self._frontier.copy(self.newest)
-        self._spoilt_from = inf
+        self._replay_from = inf
 
     def settle(self, oldest: float) -> None:
         """Let the base follow at time `oldest` [s]: nothing from before it will be made anew."""

@@ -79,11 +79,11 @@ class RateAxes:
         explained = np.einsum("ijl,mjl->mi", by_way, WAYS)
         self._weigh(change - explained, self._config.rate_felt_rad)
 
-    def see(self, turn: Array, felt: Array) -> None:
+    def see(self, turn: Array, gyro_turn: Array) -> None:
         """Take a turn (3,) [rad] as pictures saw it, and the sum of the rates meanwhile [rad]."""
         size = float(np.sqrt(turn @ turn))
         sigma = self._config.rate_seen_rad + self._config.rate_seen_share * size
-        self._weigh(turn - WAYS @ felt, sigma)
+        self._weigh(turn - WAYS @ gyro_turn, sigma)
 
     def _weigh(self, left: Array, sigma: float) -> None:
         misfits = 0.5 * np.square(left / sigma).sum(axis=1)

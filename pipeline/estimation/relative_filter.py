@@ -118,7 +118,7 @@ class RelativeFilter:
         self._keep_up(now)
         if seen.offset is not None:
             self._offset.coarse = seen.offset
-        seen = self._spot_noise.doubted(seen)
+        seen = self._spot_noise.inflated(seen)
         if not self._started:
             return self._start(seen, now)
         t = seen.t + float(self._track.newest.x[X_OFFSET])

@@ -71,16 +71,16 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
                 self.clipped += 1
             self._noise[device, 3, sensor] = scale.limit
         self._heard[device].add(t, rate, force)
-        self._believe(device)
+        self._set_sample_noise(device)
         return True
 
     def doubt_phone(self, factor: float) -> None:
         """From now on the variances of the phone's samples are so many times the configured."""
         if factor != self._phone_factor:
             self._phone_factor = factor
-            self._believe(1)
+            self._set_sample_noise(1)
 
-    def _believe(self, device: int) -> None:
+    def _set_sample_noise(self, device: int) -> None:
         """Let its samples be as uncertain as configured, as they scatter, or as pictures say."""
         noise = self._noise[device]
         noise[:3] = self._configured[device]

@@ -39,7 +39,7 @@ class SpotNoise:
         self._chi2 = KEPT * self._chi2 + chi2
         self._freedoms = KEPT * self._freedoms + freedoms
 
-    def doubted(self, seen: VisionMeasurement) -> VisionMeasurement:
+    def inflated(self, seen: VisionMeasurement) -> VisionMeasurement:
         """The same with variances that have the factor."""
         if self.factor == 1.0:
             return seen

@@ -59,7 +59,7 @@ class DisplayLagMeter:
         self._amplitude_m = amplitude_m
         self._seen: deque[tuple[float, float]] = deque()
 
-    def saw(self, t: float, right_m: float) -> None:
+    def add_position(self, t: float, right_m: float) -> None:
         """A picture taken at `t` [s] saw the light so far to the right of the middle."""
         self._seen.append((t, right_m))
         while t - self._seen[0][0] > KEPT_S:

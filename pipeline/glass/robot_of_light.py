@@ -77,7 +77,7 @@ class RobotOfLight:
             places = seen_through(-R_gc @ seen.pose.p_bc_in_c, lights_in_c @ R_gc.T)
             free = self.glass.has(places) & (np.abs(places[:, 1]) < 0.5 * self.glass.tile_m)
             if free.any():
-                self._meter.saw(seen.t, float(places[free][0, 0]))
+                self._meter.add_position(seen.t, float(places[free][0, 0]))
                 self.lag = self._meter.lag()
 
     def step(self, now: float, robot: PathAhead) -> Lights:

@@ -24,7 +24,7 @@ class CameraImuDelay:
         self.offset: StampOffset | None = None
         """As of the last search that found one."""
 
-    def saw(self, pose: RelativePose) -> None:
+    def add_pose(self, pose: RelativePose) -> None:
         """Take a believed pose; now and then search."""
         self._search.add_pose(pose.t, pose.R_cb, pose.covariance[3:, 3:])
         self._pictures += 1

@@ -87,7 +87,7 @@ class TimeOffset:
 
     def estimate(self) -> Offset | None:
         """The offset by the pictures of the window; None with a `reason`."""
-        self._take_in()
+        self._add_covered_poses()
         if self._new >= self._config.every:
             self._new = 0
             judged = self._judged()
@@ -95,7 +95,7 @@ class TimeOffset:
             self.reason = "" if isinstance(judged, Offset) else judged
         return self._offset
 
-    def _take_in(self) -> None:
+    def _add_covered_poses(self) -> None:
         """Pictures whose neighbourhood both gyroscopes have covered by now."""
         reach, config, phone, body = self._config.reach_s, self._config, *self._imus.both
         until, since = min(phone.newest, body.newest), max(phone.oldest, body.oldest)

@@ -80,8 +80,8 @@ class MotionHypothesis:
     def judge(self, view: CandidateView, imus: ImuStreams) -> float:
         """Log-likelihood of a view, but for a constant; 0 for the first one of all."""
         track = self._track
-        self._take_in(track.phone, imus.phone, None)
-        self._take_in(track.body, imus.body, self._rest)
+        self._add_new_samples(track.phone, imus.phone, None)
+        self._add_new_samples(track.body, imus.body, self._rest)
         t = view.seen.t + float(track.newest.x[X_OFFSET])
         if not self._begun or t <= track.base.t:
             return self._begin(view)
@@ -100,13 +100,13 @@ class MotionHypothesis:
         self._begun = True
         return 0.0
 
-    def _take_in(self, own: ImuStream, felt: ImuStream, rest: Array | None) -> None:
+    def _add_new_samples(self, own: ImuStream, shared: ImuStream, rest: Array | None) -> None:
         """Samples that are new."""
-        times = felt.times
+        times = shared.times
         first = int(np.searchsorted(times, own.newest, side="right"))
         if not len(own):  # no more than the first picture needs
-            first = max(0, int(np.searchsorted(times, felt.newest - LOST_S)))
-        for t, row in zip(times[first:], felt.values[first:], strict=True):
+            first = max(0, int(np.searchsorted(times, shared.newest - LOST_S)))
+        for t, row in zip(times[first:], shared.values[first:], strict=True):
             rate, force = (row[:3], row[3:]) if rest is None else (np.zeros(3), rest)
             self._track.insert(own, float(t), rate, force)
 

@@ -154,13 +154,13 @@ class PictureCheck:
         seen, pose = _bounded(seen, seen.pose)
         if not self._knows or not self._hears(seen.t):
             self._begin(seen)
-            return self._told(FINE, pose)
+            return self._with_scale(FINE, pose)
         track = self._track
         t = seen.t + float(track.newest.x[X_OFFSET])
         is_gone = t - track.newest.t > 4.0 * LAG_S or t <= track.base.t
         if is_gone or any(_is_deaf(imu, t) for imu in (track.phone, track.body)):
             self._begin(seen)
-            return self._told(FINE, pose)
+            return self._with_scale(FINE, pose)
         track.settle(t - LAG_S)
         track.doubt_phone(max(self._noise.phone, _bent(track.phone, t, BEND_PHONE)))
         self._stretch = _bent(track.body, t, BEND_BODY)
@@ -184,7 +184,9 @@ class PictureCheck:
         doubted = [miss.off for miss in misses if miss.chi2 > DOUBTED_CHI2]
         if self._surprise > SURPRISED:
             doubted.append(np.sqrt(self._off2))
-        return self._told(Judged(True, (max(doubted, key=_square),)) if doubted else FINE, pose)
+        return self._with_scale(
+            Judged(True, (max(doubted, key=_square),)) if doubted else FINE, pose
+        )
 
     def _doubted(
         self, seen: VisionMeasurement, pose: RelativePose, near: Missed
@@ -222,7 +224,7 @@ class PictureCheck:
             return  # says neither that the scale is right nor that it is wrong
         self._scale = 0.0 if abs(focal) < FOCAL else log(1.0 + focal)
 
-    def _told(self, judged: Judged, pose: RelativePose) -> Judged:
+    def _with_scale(self, judged: Judged, pose: RelativePose) -> Judged:
         if self.complaint:
             return REFUSED
         if self._scale == 0.0:

@@ -104,12 +104,12 @@ class Vision:
         else:
             self._found_again()
         started = clock()
-        detection = self._told(frame.t, found)
+        detection = self._detection_of(frame.t, found)
         took_s[2] += clock() - started
         took = dict(zip(STAGES, took_s.tolist(), strict=True))
         return replace(detection, took_s=took, prior=prior)
 
-    def _told(self, t: float, found: _Found) -> Detection:
+    def _detection_of(self, t: float, found: _Found) -> Detection:
         spots, association, few = found.spots, found.association, found.few
         if association is not None:
             depth = float(association.fit.p_bc_in_c[0])

@@ -123,7 +123,7 @@ class VisualFrontEnd:
 
     def prior(self, t: float) -> FramePrior:
         """What is known before a picture with stamp `t` [s] is looked at."""
-        self._take_in()
+        self._add_waiting_samples()
         phone = self._phone.at(t + self.offset_s)
         body = self._body.at(t + self.offset_s)
         return FramePrior(
@@ -134,7 +134,7 @@ class VisualFrontEnd:
             self._predictions.at(t),
         )
 
-    def _take_in(self) -> None:
+    def _add_waiting_samples(self) -> None:
         while self._waiting:
             sample = self._waiting.popleft()
             self.repeats.add_imu(sample)
@@ -159,7 +159,7 @@ class VisualFrontEnd:
                 unbelieved=detection.pose if alone else None,
             )
         self._vision.keep(detection.pose)
-        self._stamps.saw(detection.pose)
+        self._stamps.add_pose(detection.pose)
         return replace(detection, offset=self._stamps.offset)
 
     def _watched(
@@ -182,7 +182,7 @@ class VisualFrontEnd:
             pose.p_bc_in_c,
             pose.R_cb,
         )
-        news, facts = self.monitor.saw(look, self._stamps.offset), self.monitor.facts
+        news, facts = self.monitor.add_observation(look, self._stamps.offset), self.monitor.facts
         if news and facts is not None and not self.monitor.complaint and self.readout.learn(facts):
             self.camera = replace(self.camera, readout_s=self.readout.in_use_s)
             self._vision.roll(self.readout.in_use_s)
@@ -225,7 +225,7 @@ def warm_up() -> None:
     C, names = np.tile(1e-6 * np.eye(2), (len(leds), 1, 1)), np.arange(len(leds))
     for k in range(30):
         t = 0.1 * k + 0.1
-        monitor.saw(
+        monitor.add_observation(
             LedObservation(t, names, tangents, C, np.zeros(len(leds)), place, np.eye(3)), None
         )
         rays = LedRays(names, np.full(len(leds), t), tangents, C)

@@ -83,9 +83,9 @@ class CameraImu:
     """What is left between both rates [rad/s]."""
     t: Array
     """(n,) middles of the steps, for the report [s]."""
-    seen: Array
+    image_rate: Array
     """(n, 3) the camera's rate in its own axes by the pictures [rad/s]."""
-    felt: Array
+    gyro_rate: Array
     """(n, 3) the same by the gyroscope."""
 
 
@@ -132,8 +132,8 @@ def align(t: Array, R_og: Array, gyro: GyroSpline) -> CameraImu:
         sigma=_sigma(np.asarray(found.jac), left, middle),
         rms=float(np.sqrt(((left / steps.dt[:, None]) ** 2).mean())),
         t=middle,
-        seen=rate,
-        felt=(gyro.rate(middle + x[3]) - x[4:]) @ R_ci.T,
+        image_rate=rate,
+        gyro_rate=(gyro.rate(middle + x[3]) - x[4:]) @ R_ci.T,
     )
 
 
@@ -149,13 +149,13 @@ def _coarse(steps: _Steps, gyro: GyroSpline) -> tuple[Array, float, Array]:
     best: tuple[float, Array, float, Array] | None = None
     for offset in OFFSETS_S:
         angles = gyro.angle(steps.end + offset) - gyro.angle(steps.begin + offset)
-        felt = angles / steps.dt[:, None]
-        a, b = seen - seen.mean(axis=0), felt - felt.mean(axis=0)
+        gyro_rate = angles / steps.dt[:, None]
+        a, b = seen - seen.mean(axis=0), gyro_rate - gyro_rate.mean(axis=0)
         U, _, Vt = np.linalg.svd(a.T @ b)
         R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
         cost = float(np.abs(a - b @ R.T).mean())
         if best is None or cost < best[0]:
-            best = (cost, R, float(offset), felt.mean(axis=0) - R.T @ seen.mean(axis=0))
+            best = (cost, R, float(offset), gyro_rate.mean(axis=0) - R.T @ seen.mean(axis=0))
     assert best is not None
     return best[1:]
 
@@ -163,8 +163,8 @@ def _coarse(steps: _Steps, gyro: GyroSpline) -> tuple[Array, float, Array]:
 def _residuals(x: Array, R_ci: Array, steps: _Steps, gyro: GyroSpline) -> Array:
     """(n, 3) [rad]."""
     angles = gyro.angle(steps.end + x[3]) - gyro.angle(steps.begin + x[3])
-    felt = (angles - x[4:] * steps.dt[:, None]) @ (exp(x[:3]) @ R_ci).T
-    left: Array = steps.turned_in_c - felt
+    gyro_rate = (angles - x[4:] * steps.dt[:, None]) @ (exp(x[:3]) @ R_ci).T
+    left: Array = steps.turned_in_c - gyro_rate
     return left
 
 

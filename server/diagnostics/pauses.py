@@ -59,7 +59,7 @@ class LoopWatch:
         self.armed = Stall()
         """The longest while a robot was armed, the last time it was."""
 
-    def saw(self, t: float, stall: Stall, armed: bool) -> None:
+    def add_stall(self, t: float, stall: Stall, armed: bool) -> None:
         """A tick at `t` [s] was late."""
         if armed and stall.late_s > self.armed.late_s:
             self.armed = stall
@@ -108,7 +108,7 @@ class Pauses:
             t, now_cpu, now_wait = self._clock(), self._cpu(), waited()
             late = max(0.0, t - due)
             stall = Stall(late, min(late, now_cpu - cpu), min(late, now_wait - wait))
-            self.loop.saw(t, stall, self._is_armed)
+            self.loop.add_stall(t, stall, self._is_armed)
             if self._on_stall is not None:
                 self._on_stall(t, late)
             due, cpu, wait = t + LOOK_S, now_cpu, now_wait

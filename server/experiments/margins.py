@@ -177,7 +177,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     arming = list(verdicts(robot_file, arguments))
     print("\n".join(arming))
     return ExperimentReport(
-        {"margins": [told(one) for one in found], "arming": arming},
+        {"margins": [row_values(one) for one in found], "arming": arming},
         draw=lambda folder: (draw(found, folder / "margins.png"),),
     )
 
@@ -191,7 +191,7 @@ def _rule() -> str:
     )
 
 
-def told(one: MarginRow) -> dict[str, object]:
+def row_values(one: MarginRow) -> dict[str, object]:
     """Values for programs, without the response."""
     return {f.name: getattr(one, f.name) for f in fields(one) if f.name != "response"}
 

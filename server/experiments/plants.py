@@ -196,7 +196,7 @@ def goals(plants: Sequence[PlantRow], thrusters: Sequence[ThrusterRow]) -> Mappi
     return held
 
 
-def told(plants: Sequence[PlantRow], thrusters: Sequence[ThrusterRow]) -> Iterator[str]:
+def tables(plants: Sequence[PlantRow], thrusters: Sequence[ThrusterRow]) -> Iterator[str]:
     """Tables of what was flown, the worst plant last."""
     if plants:
         by_ratio = sorted(plants, key=lambda row: row.ratio)
@@ -222,7 +222,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
     thrusters = list(processes.each(one_thruster, failing, workers)) if failing else []
     return ExperimentReport(
         {"plants": plants, "thrusters": thrusters},
-        "\n\n".join(told(plants, thrusters)),
+        "\n\n".join(tables(plants, thrusters)),
         goals(plants, thrusters),
     )
 

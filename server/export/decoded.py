@@ -200,7 +200,7 @@ class _Decoding:
         match record.body:
             case Motion() if t > self._t_motion:
                 self._t_motion = t
-                yield self._extrinsics.felt(phone_imu(record.body, t))
+                yield self._extrinsics.in_camera_axes(phone_imu(record.body, t))
             case Touch() if record.sequence > self._last_touch:  # it comes by two ways
                 self._last_touch = record.sequence
                 yield DatedTouch(t, record.body.held, record.body.visible, record.body.press)

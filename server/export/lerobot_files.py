@@ -54,7 +54,7 @@ class Feature:
         return pa.list_(one, len(self.names)) if self.names else one
 
     @property
-    def told(self) -> dict[str, Any]:
+    def info(self) -> dict[str, Any]:
         """As `info.json` has it."""
         shape = [len(self.names)] if self.names else [1]
         return {"dtype": self.dtype, "shape": shape, "names": list(self.names) or None}
@@ -130,7 +130,7 @@ class FilmWriter:
         return shaped | {"count": [len(self._samples)]}
 
     @property
-    def told(self) -> dict[str, Any]:
+    def info(self) -> dict[str, Any]:
         """As `info.json` has it."""
         width, height = self.size
         return {

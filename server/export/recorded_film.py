@@ -35,7 +35,7 @@ def open_film(path: Path, fps: float | None = None) -> Frames:
     return RecordedFilm(_opened(path))
 
 
-def felt(path: Path) -> tuple[Array | None, Array | None]:
+def imu_samples(path: Path) -> tuple[Array | None, Array | None]:
     """Samples (n, 7) t [s], rate [rad/s], force [m/s²] of phone, in c, and robot, in b; None: none.
 
     Of what is no recording there are none.

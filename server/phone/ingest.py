@@ -117,7 +117,7 @@ class Ingest:
         if t is None or t <= self._last_motion_t:
             return None
         self._last_motion_t = t
-        return self.extrinsics.felt(phone_imu(motion, t))
+        return self.extrinsics.in_camera_axes(phone_imu(motion, t))
 
     def _dated(self, record: Record, field: str, now: float) -> float | None:
         if not self.clock.ready:

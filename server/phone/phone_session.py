@@ -112,7 +112,7 @@ class PhoneSession:
                 self._to_control(sample)
                 self._check.add_imu(sample.t, record.body)
                 if self._screen is not None:
-                    self._screen.felt(sample)
+                    self._screen.add_imu(sample)
                 if self.wizard is not None:
                     self.wizard.add_imu(sample)
                 if self.vision is not None:
@@ -132,9 +132,9 @@ class PhoneSession:
         """Ask for a picture that can be decoded alone."""
         self._on_key_wanted()
 
-    def know(self, status: ControlStatus) -> None:
+    def add_status(self, status: ControlStatus) -> None:
         """What control says of the robot, for eyes and tests."""
-        self._check.know(status)
+        self._check.add_status(status)
         if self.vision is not None:
             front_end, rows = self.vision.front_end, np.array(status.body_samples).reshape(-1, 7)
             front_end.add_prediction(expected_of(status))
@@ -191,13 +191,13 @@ class PhoneSession:
         screen = self._screen
         self.vision = VisionThread(
             frame_pipeline,
-            partial(self._looked, frame_pipeline),
+            partial(self._on_detection, frame_pipeline),
             self._on_taken,
             self._on_key_wanted,
-            partial(screen.looked, camera) if screen is not None else None,
+            partial(screen.add_detection, camera) if screen is not None else None,
         )
 
-    def _looked(self, eye: FramePipeline, detection: Detection, frame: EncodedFrame) -> None:
+    def _on_detection(self, eye: FramePipeline, detection: Detection, frame: EncodedFrame) -> None:
         """In the vision thread: hand on what was seen, and what the robot is to blink."""
         if eye.wish is not None:
             self._to_control(eye.wish)
@@ -219,7 +219,7 @@ class PhoneSession:
             "waiting": 1e3 * (now - frame.t_received) - sum(took.values()),
             **took,
         }
-        self._check.saw(detection)
+        self._check.add_detection(detection)
         self.detection = detection
 
     def thumbnail(self, wanted: bool) -> npt.NDArray[np.uint8] | None:

@@ -34,8 +34,8 @@ class ScreenDoor(Protocol):
     def leave(self, show: Show) -> None:
         """Free the place, if `show` has it."""
 
-    def felt(self, sample: PhoneImu) -> None:
+    def add_imu(self, sample: PhoneImu) -> None:
         """The phone has moved."""
 
-    def looked(self, camera: Camera, luma: Image, detection: Detection) -> None:
+    def add_detection(self, camera: Camera, luma: Image, detection: Detection) -> None:
         """The phone has seen something; in the vision thread."""

@@ -18,7 +18,7 @@ MAX_WAITING = 64
 
 
 class SensorCheck:
-    """Collects what the test needs; `saw` may be called from another thread."""
+    """Collects what the test needs; `add_detection` may be called from another thread."""
 
     def __init__(self) -> None:
         """Begin with nothing tested."""
@@ -32,12 +32,12 @@ class SensorCheck:
         while self._poses:
             self._test.add_pose(*self._poses.popleft())
 
-    def know(self, status: ControlStatus) -> None:
+    def add_status(self, status: ControlStatus) -> None:
         """What the robot's own sensors said."""
         for t, x, y, z, *_ in status.body_samples:
             self._test.add_body(t, np.array((x, y, z)))
 
-    def saw(self, detection: Detection) -> None:
+    def add_detection(self, detection: Detection) -> None:
         """A picture was looked at."""
         pose, up_in_b = detection.pose or detection.unbelieved, detection.prior.up_in_b
         if pose is not None and up_in_b is not None:

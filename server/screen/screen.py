@@ -36,7 +36,7 @@ MAX_NEWS = 256
 
 
 class Screen:
-    """See `ScreenDoor`. Belongs to the event loop, but for `looked`."""
+    """See `ScreenDoor`. Belongs to the event loop, but for `add_detection`."""
 
     def __init__(self, truth_port: int, leds_in_b: Array) -> None:
         """Nobody is there; the simulated robot tells its truth on `truth_port`."""
@@ -76,12 +76,12 @@ class Screen:
             self._show = None
             self._end()
 
-    def felt(self, sample: PhoneImu) -> None:
+    def add_imu(self, sample: PhoneImu) -> None:
         """The phone has moved."""
         if self._thread is not None:
             self._thread.tell(sample)
 
-    def looked(self, camera: Camera, luma: Image, detection: Detection) -> None:
+    def add_detection(self, camera: Camera, luma: Image, detection: Detection) -> None:
         """The phone has seen something; in the vision thread."""
         thread = self._thread
         if thread is not None:

@@ -15,7 +15,7 @@ from server.security.least_role import RefusedRequest
 from server.security.pairings import PairingError
 
 
-async def told(connection: HTTPConnection, error: Exception) -> Response:
+async def error_response(connection: HTTPConnection, error: Exception) -> Response:
     """The answer to a request or websocket that ended in `error`."""
     refused = _refused(error)
     answer = JSONResponse(refused.detail, refused.status_code)
@@ -40,5 +40,5 @@ def _refused(error: Exception) -> RefusedRequest:
 
 
 HANDLERS: dict[Any, Callable[..., Any]] = dict.fromkeys(
-    (RefusedRequest, PairingError, WireError, RequestValidationError), told
+    (RefusedRequest, PairingError, WireError, RequestValidationError), error_response
 )

@@ -301,7 +301,7 @@ class SessionManager:
             self.recordings.status(status, now())
             if (phone := self.phone) is not None:
                 self.recordings.learn(phone.device, phone.camera_text)
-                phone.know(status)
+                phone.add_status(status)
                 if (sight := phone.sight(status, now())) is not None:
                     self.paths.send(encode_message(sight))
 

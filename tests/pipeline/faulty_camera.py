@@ -80,7 +80,7 @@ def watched(
     offset = StampOffset(world.setup.time_offset + 0.002, 0.002) if coarse else None
     for arrival, event in events:
         if isinstance(event, LedObservation):
-            watch.saw(event, offset if arrival > 4.0 else None)
+            watch.add_observation(event, offset if arrival > 4.0 else None)
             observe(watch)
         elif (sample := spoil(event)) is not None:
             imus.add(sample)

@@ -23,7 +23,7 @@ class Flight:
     def __init__(self, world, arriving):
         self.filter, self.now, self._world = new(), 0.1, world
         self._queue = list(arriving)
-        self.told = []
+        self.outcomes = []
         """(picture, what became of it)."""
 
     def to(self, until, change=lambda sample: sample, ask=True):
@@ -41,7 +41,7 @@ class Flight:
     def give(self, sample):
         fusion = give(self.filter, sample, self.now)
         if isinstance(sample, VisionMeasurement):
-            self.told.append((sample, fusion))
+            self.outcomes.append((sample, fusion))
         return fusion
 
     def error(self, state):

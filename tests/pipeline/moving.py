@@ -48,7 +48,7 @@ def eta_bc(t):
     return rpy_from_R(pose_in_f(0, t)[1].T @ pose_in_f(1, t)[1])
 
 
-def felt(who, t):
+def imu_of(who, t):
     """(R, ω, ω̇, specific force) in own axes, from the poses alone."""
     R, R1 = pose_in_f(who, t)[1], rate(lambda s: pose_in_f(who, s)[1], t)
     R2 = second_rate(lambda s: pose_in_f(who, s)[1], t)

@@ -160,7 +160,7 @@ class RenderedVideo:
         sensor = Sensor(o, camera.width, camera.height, float(second - first))
         grain = np.random.default_rng(self._seeds[1])
         turn = rotation_about_x(TURNS.get(self.scene.picture, 0.0))
-        felt = Sensors(self.moving, turn, *map(np.random.default_rng, self._seeds[2:4]))
+        sensors = Sensors(self.moving, turn, *map(np.random.default_rng, self._seeds[2:4]))
         begin_s, drawn, shown = START_S + HONEST_S, None, -1.0
         faulty = FaultyCamera(self.scene.camera_fault, camera, self._R_fc, begin_s)
         for k in range(self.frames):
@@ -172,12 +172,14 @@ class RenderedVideo:
                     sensor, seen_by, self._sensed, shown, (du, dv), self._bound
                 )
             # turned round, the line before is the middle one
-            yield self._shot(t + min(self.camera.readout_s, 0.0) / self.camera.lines, drawn, felt)
+            yield self._shot(
+                t + min(self.camera.readout_s, 0.0) / self.camera.lines, drawn, sensors
+            )
 
     def _R_fc(self, t: float) -> Array:
         return self._sensed.phone_pose(t)[0]
 
-    def _shot(self, t: float, drawn: DrawnFrame, felt: Sensors) -> RenderedFrame:
+    def _shot(self, t: float, drawn: DrawnFrame, sensors: Sensors) -> RenderedFrame:
         R_cb, p_bc_in_c = self.moving.relative(t)
         lies = self.scene.camera_fault is not CameraFault.NONE and t >= START_S + HONEST_S
         enough = int((drawn.visible & ~drawn.merged).sum()) >= MIN_LEDS
@@ -195,6 +197,6 @@ class RenderedVideo:
             merged=drawn.merged,
             solvable=enough and not lies and self.scene.picture is ImageOrientation.UPRIGHT,
             information=information,
-            phone=felt.phone(t + IMU_AHEAD_S),
-            body=felt.body(t + IMU_AHEAD_S),
+            phone=sensors.phone(t + IMU_AHEAD_S),
+            body=sensors.body(t + IMU_AHEAD_S),
         )

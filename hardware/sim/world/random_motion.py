@@ -106,8 +106,8 @@ def _root(C: Array) -> Array:
     return root
 
 
-def felt(motion: Array) -> tuple[Array, Array, Array]:
-    """Attitude (n, 3, 3) in f, and in own axes angular velocity and specific force (n, 3)."""
+def imu_of(motion: Array) -> tuple[Array, Array, Array]:
+    """Attitude (n, 3, 3) in f; what an ideal IMU reads (n, 3), in own axes: ω [rad/s], f [m/s²]."""
     eta, rates = motion[0, :, 3:], motion[1, :, 3:]
     R = rpy_each(eta)
     omega = turn_each(rates_each(eta), rates)

@@ -64,8 +64,8 @@ def phone_samples(world: World) -> list[Event]:
     rng, i, setup = world.rng(11), world.phone.i, world.setup
     stamps = world.phone_stamps(world.t[i]) + setup.stamp_jitter * rng.normal(size=len(i))
     read = _held(world, i)
-    felt = (world.omega_c[read], world.f_c[read])
-    told = _measured(rng, world, felt, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
+    true_values = (world.omega_c[read], world.f_c[read])
+    told = _measured(rng, world, true_values, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
     omega, f = (
         np.clip(np.rint(v / step) * step, -most, most)
         for v, step, most in zip(told, PHONE_STEP, PHONE_RANGE, strict=True)
@@ -84,15 +84,15 @@ def _held(world: World, i: Indices) -> Indices:
     begins = np.cumsum(world.rng(16).uniform(shortest, longest, most))
     begins = np.concatenate(([0.0], begins))
     last = np.searchsorted(begins, world.t[i], side="right") - 1
-    felt = np.searchsorted(world.t, begins[last])
-    return np.where(world.t[i] < world.setup.held_since, i, felt)
+    held = np.searchsorted(world.t, begins[last])
+    return np.where(world.t[i] < world.setup.held_since, i, held)
 
 
 def body_samples(world: World) -> list[Event]:
     """Samples of the robot's IMU."""
     rng, i, fault = world.rng(12), world.body.i, world.setup.body_fault
-    felt = (world.omega_b[i], world.f_b[i])
-    omega, f = _measured(rng, world, felt, i, fault, BODY_BIAS, BODY_NOISE)
+    true_values = (world.omega_b[i], world.f_b[i])
+    omega, f = _measured(rng, world, true_values, i, fault, BODY_BIAS, BODY_NOISE)
     rows = zip(world.body.arrival.tolist(), world.t[i].tolist(), omega, f, strict=True)
     return [(arrival, BodyImu(t, w, g)) for arrival, t, w, g in rows]
 
@@ -146,7 +146,7 @@ def stamped(arriving: Iterable[Event]) -> Iterator[Event]:
             yield arrival, sample
             continue
         if sample.pose is not None:
-            search.saw(sample.pose)
+            search.add_pose(sample.pose)
         yield arrival, replace(sample, offset=search.offset)
 
 
@@ -204,7 +204,7 @@ def _stuck(px: Array, noise_px: Array, stick_px: float) -> Array:
 def _measured(
     rng: np.random.Generator,
     world: World,
-    felt: tuple[Array, Array],
+    true_values: tuple[Array, Array],
     i: Indices,
     fault: ImuFault,
     biases: tuple[float, float],
@@ -214,7 +214,7 @@ def _measured(
     added = fault.added(world.rng(16), world.t[i])
     return [
         truth + rng.normal(0.0, bias, 3) + fault.noise * rng.normal(0.0, noise, truth.shape) + more
-        for truth, bias, noise, more in zip(felt, biases, noises, added, strict=True)
+        for truth, bias, noise, more in zip(true_values, biases, noises, added, strict=True)
     ]
 
 

@@ -19,7 +19,7 @@ from hardware.sim.measured_hands import MEASURED
 from hardware.sim.world.hand_processes import Axis, motion_of, processes_of
 from hardware.sim.world.random_motion import (
     TREMOR_SIGMA,
-    felt,
+    imu_of,
     slow_motion,
     three_pole,
     tremor,
@@ -139,8 +139,8 @@ class World:
         """The same; its attitude is that of b turned back by `R_mean`."""
         self.robot[0, :, 0] += setup.distance
         self.R_mean = R_from_rpy(np.array(setup.eta_bc))
-        self.R_fc, self.omega_c, self.f_c = felt(self.hand)
-        self.R_fb, self.omega_b, self.f_b = felt(self.robot)
+        self.R_fc, self.omega_c, self.f_c = imu_of(self.hand)
+        self.R_fb, self.omega_b, self.f_b = imu_of(self.robot)
         self.R_fb = self.R_fb @ self.R_mean
         self.omega_b, self.f_b = self.omega_b @ self.R_mean, self.f_b @ self.R_mean
         R_cf = self.R_fc.transpose(0, 2, 1)

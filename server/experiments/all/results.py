@@ -60,7 +60,7 @@ def read(folder: Path, name: str, assumed: Sequence[object] = ()) -> PartResults
         try:
             if path.suffix == ".json":
                 value = _without(json.loads(path.read_text(encoding="utf-8")), assumed)
-                found += blocks(value, _untold(titled(path.stem), name))
+                found += blocks(value, _own_title(titled(path.stem), name))
                 seeds = seeds or _seeds(value)
             elif path.suffix in (".txt", ".csv"):
                 found.append(_text(path) if path.suffix == ".txt" else _sheet(path))
@@ -90,7 +90,7 @@ class UnshownError(Exception):
     """A file that does not fit into the page; says why."""
 
 
-def _untold(title: str, name: str) -> str:
+def _own_title(title: str, name: str) -> str:
     """No title that says the part's name again."""
     return "" if title == name else title
 

@@ -131,7 +131,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
     flown: list[tuple[NetworkRow, Run]] = []
     for scenario, path, one in measure(arguments):
         flown.append((row_of(scenario, path, one), one))
-        print(f"{scenario.name}, {path}: {scenario.told}", file=sys.stderr, flush=True)
+        print(f"{scenario.name}, {path}: {scenario.description}", file=sys.stderr, flush=True)
     print(
         f"640x480, {FRAME_RATE_HZ:g} pictures a second, {arguments.seconds:g} s each, seed "
         f"{arguments.seed}; both directions alike; goals are those of webrtc"
@@ -164,7 +164,9 @@ def _seconds(text: str) -> float:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    told = "; ".join(f"{one.name}: {one.told}" for one in SCENARIOS.values()).replace("%", "%%")
+    told = "; ".join(f"{one.name}: {one.description}" for one in SCENARIOS.values()).replace(
+        "%", "%%"
+    )
     parser.add_argument(
         "--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), help=told
     )

@@ -83,7 +83,7 @@ async def play(access: Access, path: str, seed: int) -> LivePhone:
     return live
 
 
-def told(access: Access, path: str, seed: int) -> dict[str, object]:
+def played(access: Access, path: str, seed: int) -> dict[str, object]:
     """Play, and say what it came to."""
     try:
         live = asyncio.run(play(access, path, seed))
@@ -101,7 +101,7 @@ def main() -> int:
     sys.stdout.flush()
     for line in sys.stdin:
         path, seed = line.split()
-        sys.stdout.write(f"{json.dumps(told(access, path, int(seed)))}\n")
+        sys.stdout.write(f"{json.dumps(played(access, path, int(seed)))}\n")
         sys.stdout.flush()
     return 0
 

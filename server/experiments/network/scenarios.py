@@ -28,7 +28,7 @@ class Scenario:
     """A line, the same in both directions."""
 
     name: str
-    told: str
+    description: str
     line: Conditions
     fault: Fault | None = None
     fault_s: float = 1.0

@@ -21,7 +21,7 @@ from server.common.clock import today
 from server.common.errors import InputError
 from server.common.options import Parser
 from server.common.settings import state_directory
-from server.export.recorded_film import felt
+from server.export.recorded_film import imu_samples
 from server.media.tables import IMU_HEADER, load_imu
 from server.tools.calibrate.draw_board import write_board
 from server.tools.calibrate.report import draw
@@ -100,7 +100,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _calibrate(arguments: argparse.Namespace, board: Board) -> int:
-    imu = load_imu(arguments.imu) if arguments.imu is not None else felt(arguments.film)[0]
+    imu = load_imu(arguments.imu) if arguments.imu is not None else imu_samples(arguments.film)[0]
     gyro = gyro_of(imu) if imu is not None else None
     filmed = watch(arguments.film, arguments.fps, board, _bar())
     verdict = judge_views(filmed.views, filmed.pictures, board, filmed.size)

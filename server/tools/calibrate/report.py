@@ -96,9 +96,13 @@ def _rates(solution: CalibrationSolution, axis: Axes) -> None:
     else:
         for k, colour in enumerate(("#0b57d0", "#c2410c", "#15703a")):
             axis.plot(
-                imu.t, np.rad2deg(imu.felt[:, k]), color=colour, lw=1.0, label=f"gyro {'xyz'[k]}"
+                imu.t,
+                np.rad2deg(imu.gyro_rate[:, k]),
+                color=colour,
+                lw=1.0,
+                label=f"gyro {'xyz'[k]}",
             )
-            axis.plot(imu.t, np.rad2deg(imu.seen[:, k]), ".", color=colour, ms=2.5)
+            axis.plot(imu.t, np.rad2deg(imu.image_rate[:, k]), ".", color=colour, ms=2.5)
         axis.set_ylabel("camera's rate [°/s]; dots: by the pictures")
         axis.legend(loc="upper right", fontsize="small", ncols=3)
         words += f", camera to sensors {1e3 * imu.time_offset_s:.1f} ± {1e3 * imu.sigma[3]:.1f} ms"

@@ -186,7 +186,7 @@ class RecordedPhone(Offline):
         if self._looked_at == 0:  # one that leans on pictures of before the recording is not lost
             self._undecodable_first = self._frame_pipeline.undecodable
         self._looked_at += 1
-        self._sensors.saw(detection)
+        self._sensors.add_detection(detection)
         complaint = self._frame_pipeline.front_end.complaint
         if complaint:
             self._complaints.setdefault(complaint, frame.t)

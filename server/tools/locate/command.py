@@ -20,7 +20,7 @@ from pipeline.frames import Array
 from pipeline.vision.visual_front_end import warm_up
 from server.common.errors import InputError
 from server.common.progress import progress_bar
-from server.export.recorded_film import felt, open_film
+from server.export.recorded_film import imu_samples, open_film
 from server.media.frame_source import Frames
 from server.media.tables import load_imu
 from server.tools.locate import overlay, plot
@@ -48,7 +48,7 @@ def _run(given: argparse.Namespace) -> None:
     motion = ImuRecordings(
         *(
             load_imu(file) if file is not None else recorded
-            for file, recorded in zip(files, felt(given.frames), strict=True)
+            for file, recorded in zip(files, imu_samples(given.frames), strict=True)
         )
     )
     frames = open_film(given.frames, given.fps)

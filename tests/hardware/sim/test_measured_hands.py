@@ -21,7 +21,7 @@ def band_rms(samples, period_s, band):
     return np.sqrt(2.0 * power[chosen].sum() / np.square(window).sum() / len(samples))
 
 
-def felt(kind, seconds, start=MOVES_S, seed=1):
+def readings(kind, seconds, start=MOVES_S, seed=1):
     """(rates [°/s], forces less gravity [m/s²]) of a hand."""
     hand = make_hand(kind, seed=seed)
     times = np.arange(start, start + seconds, PERIOD_S).tolist()
@@ -33,7 +33,7 @@ def felt(kind, seconds, start=MOVES_S, seed=1):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SPECTRA)
 def test_a_hand_of_sines_turns_as_fast_as_the_recorded_one_in_every_band(name):
-    spectrum, (rates, forces) = SPECTRA[name], felt(name, 30.0)
+    spectrum, (rates, forces) = SPECTRA[name], readings(name, 30.0)
     for band, wanted in zip(BANDS_HZ, spectrum.rates_deg_s, strict=True):
         assert band_rms(rates, PERIOD_S, band) == pytest.approx(wanted, rel=0.2, abs=0.1), band
     for band, wanted in zip(FORCE_BANDS_HZ, spectrum.forces, strict=True):
@@ -42,7 +42,7 @@ def test_a_hand_of_sines_turns_as_fast_as_the_recorded_one_in_every_band(name):
 
 @pytest.mark.slow
 def test_no_hand_knows_its_phase_a_second_later():
-    rates, _ = felt("quiet", 20.0)
+    rates, _ = readings("quiet", 20.0)
     for later_s in (0.9, 1.1, 1.7, 2.3):
         k = round(later_s / PERIOD_S)
         alike = (rates[k:] * rates[:-k]).sum() / np.square(rates).sum()
@@ -51,7 +51,7 @@ def test_no_hand_knows_its_phase_a_second_later():
 
 @pytest.mark.slow
 def test_a_walking_hand_goes_up_and_down_twice_a_second():
-    up = [felt("walking", 12.0, seed=seed)[1][:, 2:] for seed in range(4)]
+    up = [readings("walking", 12.0, seed=seed)[1][:, 2:] for seed in range(4)]
     steps = np.array([band_rms(u, PERIOD_S, (1.7, 2.3)) for u in up])
     assert np.sqrt(np.square(steps).mean()) == pytest.approx(2.0 / np.sqrt(2.0), rel=0.3)
     assert max(band_rms(u, PERIOD_S, (2.5, 12.0)) for u in up) < 0.4
@@ -76,6 +76,6 @@ def test_a_shaken_phone_feels_more_than_2_g():
 @pytest.mark.parametrize("hz", [6.0, 11.0, 13.0])
 def test_a_strong_tremor_is_a_narrow_band(hz):
     """0.09° RMS of each axis."""
-    rates, _ = felt(f"trembling_{hz:.0f}_hz", 15.0)
+    rates, _ = readings(f"trembling_{hz:.0f}_hz", 15.0)
     expected = 0.09 * 2.0 * np.pi * hz * np.sqrt(3.0)
     assert band_rms(rates, PERIOD_S, (hz - 1.5, hz + 1.5)) == pytest.approx(expected, rel=0.35)

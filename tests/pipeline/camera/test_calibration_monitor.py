@@ -104,7 +104,7 @@ def test_a_hand_that_only_trembles_is_not_judged():
 
 def test_pictures_without_motion_samples_teach_nothing():
     watch = CalibrationMonitor(CAMERA, LEDS_IN_B, ImuStreams())
-    assert not any(watch.saw(look, None) for look in looks(world(), Faults()))
+    assert not any(watch.add_observation(look, None) for look in looks(world(), Faults()))
     assert watch.facts is None
 
 
@@ -177,6 +177,6 @@ def test_the_coarse_offset_of_the_stamps_bears_a_rolling_shutter_nobody_models(r
         while samples and samples[0][0] <= arrival:
             imus.add(samples.pop(0)[1])
         C = np.diag([*[1e-8] * 3, *[1e-6] * 3])
-        search.saw(RelativePose(look.t, look.p_bc_in_c, look.R_cb, C, 0.1, 5))
+        search.add_pose(RelativePose(look.t, look.p_bc_in_c, look.R_cb, C, 0.1, 5))
     assert search.offset is not None
     assert search.offset.value == pytest.approx(DATED_S, abs=0.005)

@@ -7,7 +7,7 @@ from pipeline.estimation import gravity_free, relative_model
 from pipeline.estimation.gravity_free import PredictedImu, RelativeMotion
 from pipeline.estimation.relative_model import States
 from pipeline.frames import R_from_rpy, S_in_b, cross, exp, log
-from tests.pipeline.moving import H, felt, p_bc_in_c, pose_in_f, rate, vee, worst
+from tests.pipeline.moving import H, imu_of, p_bc_in_c, pose_in_f, rate, vee, worst
 
 LED = np.array([0.2, -0.3, 0.1])
 
@@ -26,7 +26,7 @@ def true_motion(t):
 
 
 def true_felt(t):
-    (_, omega_c, _, f_c), (_, omega_b, _, f_b) = felt(0, t), felt(1, t)
+    (_, omega_c, _, f_c), (_, omega_b, _, f_b) = imu_of(0, t), imu_of(1, t)
     return PredictedImu(omega_b, f_b, omega_c, f_c)
 
 

@@ -40,7 +40,7 @@ def test_nothing_is_known_before_the_first_picture(arriving):
 def test_a_start_waits_for_samples_of_both_imus(world, arriving, missing):
     flight = Flight(world, arriving)
     assert flight.to(0.5, lambda s: None if isinstance(s, missing) else s) is None
-    assert {fusion for _, fusion in flight.told} == {Fusion.WAITING}
+    assert {fusion for _, fusion in flight.outcomes} == {Fusion.WAITING}
     assert flight.to(0.8) is not None
 
 
@@ -59,7 +59,7 @@ def test_a_start_needs_a_pose_that_fits_and_is_in_front(world, arriving, change)
         0.6, lambda s: replace(s, pose=change(s.pose)) if isinstance(s, VisionMeasurement) else s
     )
     assert doubtful is None
-    assert {fusion for _, fusion in flight.told} == {Fusion.BLIND}
+    assert {fusion for _, fusion in flight.outcomes} == {Fusion.BLIND}
     state = flight.to(1.2)
     assert flight.error(state) < 0.05
 
@@ -130,7 +130,7 @@ def test_after_half_a_minute_in_the_dark_it_begins_anew_at_the_first_picture():
     flight.to(14.05)
     while flight.filter.pictures[Fusion.STARTED] == 1:
         state = flight.to(flight.now + 0.005)
-    assert flight.told[-1][1] is Fusion.STARTED
+    assert flight.outcomes[-1][1] is Fusion.STARTED
     assert flight.filter.pictures[Fusion.GATED] == 0
     assert flight.error(state) < 0.1
     assert flight.error(flight.to(14.9)) < 0.015
@@ -156,9 +156,9 @@ def test_three_pictures_in_a_row_that_do_not_fit_are_a_new_beginning(world, arri
     """Two are refused, at the third it begins where they say; what was learnt of sensors stays."""
     flight = Flight(world, arriving)
     flight.to(3.0)
-    learnt, n = flight.filter.health, len(flight.told)
+    learnt, n = flight.filter.health, len(flight.outcomes)
     state = flight.to(3.15, elsewhere)
-    fusions = [fusion for _, fusion in flight.told[n:]]
+    fusions = [fusion for _, fusion in flight.outcomes[n:]]
     assert fusions[:3] == [Fusion.GATED, Fusion.GATED, Fusion.STARTED]
     there = world.p[world.index(state.t)] + np.array([0.0, 0.5, 0.2])
     assert np.abs(state.p_bc_in_c - there).max() < 0.1

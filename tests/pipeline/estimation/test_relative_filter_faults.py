@@ -161,7 +161,7 @@ def bad_pictures(seen):
 def test_what_is_no_measurement_is_refused_and_changes_nothing(world, arriving):
     flight = Flight(world, arriving)
     flight.to(2.0)
-    samples, refused = list(bad_samples(1.99)), list(bad_pictures(flight.told[-1][0]))
+    samples, refused = list(bad_samples(1.99)), list(bad_pictures(flight.outcomes[-1][0]))
     for sample in samples:
         flight.give(sample)
     assert flight.filter.samples_invalid == len(samples)

@@ -25,7 +25,7 @@ def test_what_arrives_late_twice_or_too_early_is_counted(world, arriving):
     flight = Flight(world, arriving)
     flight.to(2.0)
     estimator, counted = flight.filter, flight.filter.pictures.copy()
-    newest = flight.told[-1][0]
+    newest = flight.outcomes[-1][0]
     assert flight.give(newest) is Fusion.DUPLICATE
     assert flight.give(shifted(newest, dt=-0.61)) is Fusion.LATE
     assert flight.give(shifted(newest, dt=0.2)) is Fusion.EARLY
@@ -33,7 +33,7 @@ def test_what_arrives_late_twice_or_too_early_is_counted(world, arriving):
         (Fusion.DUPLICATE, Fusion.LATE, Fusion.EARLY), 1
     )
     health = estimator.health
-    assert health.fused + health.dropped == estimator.pictures.total() == len(flight.told)
+    assert health.fused + health.dropped == estimator.pictures.total() == len(flight.outcomes)
     assert health.late == 1
     for _, sample in arriving[:40]:
         if not isinstance(sample, VisionMeasurement):
@@ -51,7 +51,7 @@ def test_pictures_that_come_twice_change_not_one_bit(world, arriving):
     once.to(1.5)
     twice.to(1.5)
     for until in (1.6, 1.9):
-        for seen in [seen for seen, fusion in twice.told[-6:] if fusion is Fusion.FUSED]:
+        for seen in [seen for seen, fusion in twice.outcomes[-6:] if fusion is Fusion.FUSED]:
             assert twice.give(seen) is Fusion.DUPLICATE
         a, b = once.to(until), twice.to(until)
         for part in ("p_bc_in_c", "R_cb", "u_bf_in_c", "omega_bf_in_b", "R_ic", "sigma_p"):

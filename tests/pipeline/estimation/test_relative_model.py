@@ -19,14 +19,14 @@ from pipeline.estimation.relative_model import (
     transition,
 )
 from pipeline.frames import R_from_rpy, S_in_a, S_in_b, cross, rpy_from_R, skew
-from tests.pipeline.moving import H, eta_bc, felt, p_bc_in_c, pose_in_f, rate, second_rate, worst
+from tests.pipeline.moving import H, eta_bc, imu_of, p_bc_in_c, pose_in_f, rate, second_rate, worst
 
 
 @cache
 def true_state(t):
     x = np.zeros(N)
-    _, omega_c, delta_c, f_c = felt(0, t)
-    _, omega_b, _, f_b = felt(1, t)
+    _, omega_c, delta_c, f_c = imu_of(0, t)
+    _, omega_b, _, f_b = imu_of(1, t)
     x[States.p_bc_in_c], x[States.eta_bc] = p_bc_in_c(t), eta_bc(t)
     x[States.v_bc_in_c] = rate(p_bc_in_c, t)
     x[States.omega_bf_in_b], x[States.omega_cf_in_c] = omega_b, omega_c
@@ -82,7 +82,7 @@ def test_camera_rate_and_held_quantities():
     """Eq. (11): ω̇_c = δ_c as seen from c; the rest is constant."""
     part = States.omega_cf_in_c
     assert (
-        worst(lambda t: derivative(true_state(t))[part] - rate(lambda s: felt(0, s)[1], t)) < 1e-9
+        worst(lambda t: derivative(true_state(t))[part] - rate(lambda s: imu_of(0, s)[1], t)) < 1e-9
     )
     assert np.array_equal(derivative(true_state(1.0))[15:], np.zeros(15))
 

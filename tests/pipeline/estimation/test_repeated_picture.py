@@ -20,7 +20,7 @@ def seen(t: float, leds: list[int] | None = None) -> VisionMeasurement:
     return VisionMeasurement(t, rays_at(t, P, LEVEL, leds), None)
 
 
-def felt(repeated: RepeatedPicture, side: type[PhoneImu] | type[BodyImu], omega: np.ndarray):
+def add_shaking(repeated: RepeatedPicture, side: type[PhoneImu] | type[BodyImu], omega: np.ndarray):
     for t in np.arange(-0.3, 0.03, 0.01):
         repeated.add_imu(side(t, np.sin(30.0 * t) * omega, np.zeros(3)))
 
@@ -29,7 +29,7 @@ def felt(repeated: RepeatedPicture, side: type[PhoneImu] | type[BodyImu], omega:
 def test_a_picture_that_stays_while_either_side_turns_is_no_news(side) -> None:
     repeated = RepeatedPicture()
     assert not repeated.comes_again(seen(0.0))
-    felt(repeated, side, TURNING)
+    add_shaking(repeated, side, TURNING)
     assert repeated.comes_again(seen(0.03))
     assert repeated.comes_again(seen(0.06))
 
@@ -38,7 +38,7 @@ def test_a_picture_that_stays_while_either_side_turns_is_no_news(side) -> None:
 def test_the_last_bit_of_one_place_makes_it_news(number) -> None:
     repeated = RepeatedPicture()
     repeated.comes_again(seen(0.0))
-    felt(repeated, PhoneImu, TURNING)
+    add_shaking(repeated, PhoneImu, TURNING)
     rays = rays_at(0.03, P, LEVEL)
     tangents = rays.tangents.copy()
     tangents[number] = np.nextafter(tangents[number], np.inf)
@@ -48,7 +48,7 @@ def test_the_last_bit_of_one_place_makes_it_news(number) -> None:
 def test_other_leds_and_none_at_all_are_news() -> None:
     repeated = RepeatedPicture()
     repeated.comes_again(seen(0.0))
-    felt(repeated, PhoneImu, TURNING)
+    add_shaking(repeated, PhoneImu, TURNING)
     assert not repeated.comes_again(seen(0.03, [0, 1, 2, 3]))
     assert not repeated.comes_again(seen(0.06, []))
     assert not repeated.comes_again(seen(0.09, []))
@@ -57,7 +57,7 @@ def test_other_leds_and_none_at_all_are_news() -> None:
 def test_where_nothing_turns_nothing_need_change() -> None:
     repeated = RepeatedPicture()
     repeated.comes_again(seen(0.0))
-    felt(repeated, PhoneImu, np.zeros(3))
+    add_shaking(repeated, PhoneImu, np.zeros(3))
     assert not repeated.comes_again(seen(0.03))
 
 
@@ -74,7 +74,7 @@ def test_noise_and_bias_of_a_minute_at_rest_turn_nothing(side, rate_hz) -> None:
 def test_what_turned_since_a_picture_came_stays_turned() -> None:
     repeated = RepeatedPicture()
     repeated.comes_again(seen(0.0))
-    felt(repeated, BodyImu, TURNING)
+    add_shaking(repeated, BodyImu, TURNING)
     for t in np.arange(0.03, 2.0, 0.01):
         repeated.add_imu(BodyImu(t, np.zeros(3), np.zeros(3)))
     assert repeated.comes_again(seen(2.0))
@@ -82,7 +82,7 @@ def test_what_turned_since_a_picture_came_stays_turned() -> None:
 
 def test_what_rested_when_a_picture_came_may_have_turned_before() -> None:
     repeated = RepeatedPicture()
-    felt(repeated, PhoneImu, TURNING)
+    add_shaking(repeated, PhoneImu, TURNING)
     repeated.comes_again(seen(0.0))
     for t in np.arange(0.03, 0.5, 0.01):
         repeated.add_imu(PhoneImu(t, np.zeros(3), np.zeros(3)))

@@ -14,7 +14,7 @@ def filmed(lag, seconds=3.0, noise_m=3e-4, seed=0, rate_hz=30.0, middle=0.004):
     for k in range(int(seconds * rate_hz)):
         t = 100.0 + k / rate_hz
         right = A_M * float(swept(np.array(t - lag))) + middle + noise_m * rng.standard_normal()
-        meter.saw(t, right)
+        meter.add_position(t, right)
     return meter
 
 
@@ -36,7 +36,7 @@ def test_it_is_not_said_before_two_seconds_were_filmed():
 def test_what_does_not_sweep_gives_no_lag(what):
     rng, meter = np.random.default_rng(3), DisplayLagMeter(A_M)
     for k in range(100):
-        meter.saw(k / 30.0, 0.02 if what == "still" else rng.uniform(-A_M, A_M))
+        meter.add_position(k / 30.0, 0.02 if what == "still" else rng.uniform(-A_M, A_M))
     assert meter.lag() is None
 
 

@@ -36,7 +36,7 @@ def watched(pauses: Pauses, work: list[float], clock: Clock, cpu: Clock) -> None
 def test_the_longest_stall_of_the_last_minute_is_told() -> None:
     watch = LoopWatch()
     for t, late in ((0.0, 0.01), (1.0, 0.09), (2.0, 0.03), (50.0, 0.02)):
-        watch.saw(t, Stall(late), armed=False)
+        watch.add_stall(t, Stall(late), armed=False)
     assert watch.lately(50.0).late_s == 0.09
     assert watch.lately(1.5 + WINDOW_S).late_s == 0.03
     assert watch.lately(2.5 + WINDOW_S).late_s == 0.02
@@ -65,7 +65,7 @@ def test_stalls_are_said_while_armed_the_longest_and_not_all_the_time() -> None:
     pauses = Pauses(clock, lambda: 0.0, lambda: 0.0)
 
     def stall(seconds: float) -> str:
-        pauses.loop.saw(clock(), Stall(seconds, 0.5 * seconds, 0.25 * seconds), armed=True)
+        pauses.loop.add_stall(clock(), Stall(seconds, 0.5 * seconds, 0.25 * seconds), armed=True)
         return pauses.tick(armed=True, idle=False)
 
     assert pauses.tick(armed=True, idle=False) == ""

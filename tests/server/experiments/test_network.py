@@ -145,4 +145,4 @@ def test_help_tells_every_line(capsys):
     assert ended.value.code == 0
     told = "".join(capsys.readouterr().out.split())  # lines are broken anywhere
     for one in SCENARIOS.values():
-        assert "".join(f"{one.name}: {one.told}".split()) in told
+        assert "".join(f"{one.name}: {one.description}".split()) in told

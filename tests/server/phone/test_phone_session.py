@@ -294,10 +294,10 @@ class OpenableScreen:
 
     is_open, why = False, ""
 
-    def felt(self, sample: object) -> None:
+    def add_imu(self, sample: object) -> None:
         """Nothing of it."""
 
-    def looked(self, camera: object, luma: object, detection: object) -> None:
+    def add_detection(self, camera: object, luma: object, detection: object) -> None:
         """Nothing of it."""
 
 

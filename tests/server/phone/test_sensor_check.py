@@ -78,7 +78,7 @@ class Rig:
         """All that arrives within, each picture looked at before the next thing."""
         for tick in range(round(seconds * 50)):
             before, self.t = self.t, self.t + 0.02
-            self.phone.know(self.robot_says())
+            self.phone.add_status(self.robot_says())
             if tick % 3 == 0:
                 self.pong()
             for event in self.script.phone.events(before, self.t):

@@ -99,8 +99,8 @@ def test_alerts_speak_of_figures_that_are_told(manager):
 
 def test_pauses_of_the_server_are_told(manager):
     manager.pauses.tick(armed=True, idle=False)
-    manager.pauses.loop.saw(now() - 70.0, Stall(0.043, 0.012), armed=True)
-    manager.pauses.loop.saw(now(), Stall(0.025, 0.001), armed=True)
+    manager.pauses.loop.add_stall(now() - 70.0, Stall(0.043, 0.012), armed=True)
+    manager.pauses.loop.add_stall(now(), Stall(0.025, 0.001), armed=True)
     found = samples(manager)
     assert found["lightleash_server", "stall_ms"] == 25.0
     assert found["lightleash_server", "armed_stall_ms"] == 43.0

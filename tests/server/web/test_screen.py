@@ -39,10 +39,10 @@ class Door:
         if show == self.show:
             self.show = None
 
-    def felt(self, sample):
+    def add_imu(self, sample):
         raise AssertionError("no phone is here")
 
-    def looked(self, camera, luma, detection):
+    def add_detection(self, camera, luma, detection):
         raise AssertionError("no phone is here")
 
 

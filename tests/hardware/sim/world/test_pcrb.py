@@ -7,7 +7,7 @@ import pytest
 
 from hardware.sim.world import model, sensors
 from hardware.sim.world.pcrb import bound, rms
-from hardware.sim.world.random_motion import felt
+from hardware.sim.world.random_motion import imu_of
 from hardware.sim.world.rotations import log_each, turn_each
 from hardware.sim.world.world import GRID_S, LEDS_IN_B, Occlusion, World, WorldOptions
 
@@ -61,8 +61,8 @@ def test_the_bound_of_a_picture_is_that_of_all_that_was_taken_before(world):
 
 def observed(hand, robot, R_mean):
     """What phone and body feel, tangents, p and R, of motions (3, 1, 6)."""
-    R_fc, omega_c, f_c = felt(hand)
-    R_fb, omega_b, f_b = felt(robot)
+    R_fc, omega_c, f_c = imu_of(hand)
+    R_fb, omega_b, f_b = imu_of(robot)
     R = R_fc.transpose(0, 2, 1) @ R_fb @ R_mean
     p = turn_each(R_fc.transpose(0, 2, 1), robot[0, :, :3] - hand[0, :, :3])
     q = p + LEDS_IN_B @ R[0].T

@@ -10,7 +10,7 @@ from hardware.camera_file import CAMERAS
 from pipeline.signals import PhoneImu
 from server.cli import main
 from server.export.decoded import DatedPicture, DecodedRecording
-from server.export.recorded_film import felt, open_film
+from server.export.recorded_film import imu_samples, open_film
 from server.media.frame_source import open_frames
 from server.protocol.wire_records import Codec
 from server.recording.reader import read
@@ -44,7 +44,7 @@ def as_anybodys(source, folder):
             packet.pts = packet.dts = round((item.t - first) * TICKS_HZ)
             packet.is_keyframe = item.picture.key
             container.mux(packet)
-    samples = felt(source)[0]
+    samples = imu_samples(source)[0]
     write_imu(folder / "imu.csv", samples)
     return first, pictures, samples
 
@@ -167,7 +167,7 @@ def test_motion_keeps_its_axes_at_each_angle_of_the_screen(tmp_path, angle):
     imu = write_imu(tmp_path / "imu.csv", rows)
     words = ["import", str(film), "--imu", str(imu), "--screen-angle", str(angle)]
     assert main([*words, "--out", str(tmp_path / "a.mcap")]) == 0
-    samples, body = felt(tmp_path / "a.mcap")
+    samples, body = imu_samples(tmp_path / "a.mcap")
     assert body is None
     assert len(samples) == 60
     np.testing.assert_allclose(samples[:, 1:], np.array(rows)[:, 1:], atol=1e-6)
@@ -214,7 +214,7 @@ def test_a_real_browsers_recording_is_a_film_too():
     assert [shot.problem for shot in shots if shot.luma is None] == [
         "It leans on a picture that is not in the recording."
     ]
-    phone, body = felt(CHROMIUM)
+    phone, body = imu_samples(CHROMIUM)
     assert len(body) == 1424
     assert np.all(np.diff(phone[:, 0]) > 0.0)
 
