@@ -7,9 +7,10 @@ the laws speak of and the machine might not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import product
+from typing import NamedTuple
 
 import pytest
 
@@ -94,8 +95,23 @@ def inputs() -> list[FailsafeInputs]:
     ]
 
 
-@dataclass(frozen=True, slots=True)
-class Monitor:
+class Step(NamedTuple):
+    """One step of the machine: all of it that a history depends on."""
+
+    before: Mode
+    mode: Mode
+    power: float
+    held: bool
+    press: int
+    is_gone: bool
+    """The phone was silent for longer than the gap."""
+    is_silent: bool
+    is_good: bool
+    same: int
+    """Number of the state that it leads to."""
+
+
+class Monitor(NamedTuple):
     """What has happened, whatever the machine remembers of it."""
 
     over: int = 0
@@ -107,17 +123,15 @@ class Monitor:
     """For how long nothing has been good, without a break."""
 
 
-def after(
-    seen: Monitor, inputs: FailsafeInputs, before: Failsafe, now: Failsafe, good: bool
-) -> Monitor:
-    entered = now.mode == Mode.TRACK and before.mode in (Mode.ARMED, Mode.HOLD)
-    flew, gone = before.mode in (Mode.TRACK, Mode.COAST), inputs.operator_ms > LIMITS.gap
-    let_go = not inputs.held or (flew and inputs.press != seen.over)
+def after(seen: Monitor, step: Step) -> Monitor:
+    entered = step.mode == Mode.TRACK and step.before in (Mode.ARMED, Mode.HOLD)
+    flew = step.before in (Mode.TRACK, Mode.COAST)
+    let_go = not step.held or (flew and step.press != seen.over)
     return Monitor(
-        over=inputs.press if entered or not inputs.held or gone else seen.over,
+        over=step.press if entered or not step.held or step.is_gone else seen.over,
         lifted=not entered and (seen.lifted or let_go),
-        coasted_ms=min(seen.coasted_ms + D, LONGEST_MS) if now.mode == Mode.COAST else 0,
-        silent_ms=0 if good else min(seen.silent_ms + D, LONGEST_MS),
+        coasted_ms=min(seen.coasted_ms + D, LONGEST_MS) if step.mode == Mode.COAST else 0,
+        silent_ms=0 if step.is_good else min(seen.silent_ms + D, LONGEST_MS),
     )
 
 
@@ -132,15 +146,12 @@ def canonical(state: Failsafe) -> Failsafe:
     )
 
 
-def check(
-    before: Failsafe,
-    told: FailsafeInputs,
-    now: Failsafe,
-    seen: Monitor,
-    later: Monitor,
-    limits: FailsafeTimers,
-) -> None:
-    """Every law, on one step."""
+def is_silent(told: FailsafeInputs) -> bool:
+    return max(told.robot_ms, told.operator_ms, told.phone_imu_ms) > D or bool(told.gap)
+
+
+def check(before: Failsafe, told: FailsafeInputs, now: Failsafe, limits: FailsafeTimers) -> None:
+    """Every law on one step that holds whatever was before."""
     power, wish = failsafe.ceiling(now, limits), told.requests
     gone = told.operator_ms > limits.gap
     if before.mode == Mode.STOPPED and wish.reset and not wish.stop and gone:
@@ -152,19 +163,13 @@ def check(
     if before.mode == Mode.STOPPED and now.mode != Mode.STOPPED:
         assert wish.reset
         assert not told.held or gone
-    silent = max(told.robot_ms, told.operator_ms, told.phone_imu_ms) > D or told.gap
-    bad = bool(told.fault or told.doubt) or silent or told.pose_ms > limits.pose_hold
+    bad = bool(told.fault or told.doubt) or is_silent(told) or told.pose_ms > limits.pose_hold
     if now.mode == Mode.TRACK:
         assert told.held
         assert not bad
-        assert not later.lifted
         if before.mode in (Mode.ARMED, Mode.HOLD):
-            assert told.press != seen.over
             assert before.good_ms + D >= limits.recover_short
         if before.mode == Mode.COAST:
-            assert told.press == seen.over
-            assert not seen.lifted
-            assert seen.coasted_ms <= limits.coast + limits.pose_arm
             assert now.good_ms >= limits.fresh
     if now.mode == Mode.ARMED:
         assert not told.fault
@@ -182,12 +187,24 @@ def check(
     if before.mode == Mode.RAMP:
         assert power <= failsafe.ceiling(before, limits)
         assert now.mode != before.mode or power < failsafe.ceiling(before, limits)
-    assert later.coasted_ms <= limits.coast + limits.pose_arm + D
-    if silent and seen.coasted_ms > limits.coast:
-        assert now.mode not in (Mode.TRACK, Mode.COAST)
-    if later.silent_ms > limits.hold_max + limits.ramp + 2 * D:
-        assert power == 0.0
     _check_words(told, now, limits)
+
+
+def check_history(step: Step, seen: Monitor, later: Monitor, limits: FailsafeTimers) -> None:
+    """Every law on one step that speaks of what was before."""
+    if step.mode == Mode.TRACK:
+        assert not later.lifted
+        if step.before in (Mode.ARMED, Mode.HOLD):
+            assert step.press != seen.over
+        if step.before == Mode.COAST:
+            assert step.press == seen.over
+            assert not seen.lifted
+            assert seen.coasted_ms <= limits.coast + limits.pose_arm
+    assert later.coasted_ms <= limits.coast + limits.pose_arm + D
+    if step.is_silent and seen.coasted_ms > limits.coast:
+        assert step.mode not in (Mode.TRACK, Mode.COAST)
+    if later.silent_ms > limits.hold_max + limits.ramp + 2 * D:
+        assert step.power == 0.0
 
 
 def _check_words(told: FailsafeInputs, now: Failsafe, limits: FailsafeTimers) -> None:
@@ -201,28 +218,47 @@ def _check_words(told: FailsafeInputs, now: Failsafe, limits: FailsafeTimers) ->
 
 
 def search(limits: FailsafeTimers) -> tuple[set[Mode], set[tuple[Mode, Mode]], int]:
-    """Modes and edges visited, and how many states there are."""
-    every = inputs()
+    """Modes and edges visited, and how many states there are, histories included."""
+    every, start = inputs(), canonical(Failsafe())
+    states, numbers = [start], {start: 0}
 
     @cache
-    def steps(state: Failsafe) -> list[tuple[FailsafeInputs, Failsafe, Failsafe]]:
-        """What it is told, what it becomes, and that without what tells nothing apart."""
-        nows = [(told, failsafe.step(state, told, D, limits)) for told in every]
-        return [(told, now, canonical(now)) for told, now in nows]
+    def steps(number: int) -> list[Step]:
+        """What a state can become, each held against the laws: different ones, once each."""
+        before, found = states[number], dict[Step, None]()
+        for told in every:
+            now = failsafe.step(before, told, D, limits)
+            check(before, told, now, limits)
+            same = canonical(now)
+            if same not in numbers:
+                numbers[same] = len(states)
+                states.append(same)
+            step = Step(
+                before.mode,
+                now.mode,
+                failsafe.ceiling(now, limits),
+                told.held,
+                told.press,
+                told.operator_ms > LIMITS.gap,
+                is_silent(told),
+                now.good_ms > 0,
+                numbers[same],
+            )
+            found[step] = None
+        return list(found)
 
-    start = canonical(Failsafe()), Monitor()
-    reached, new = {start}, [start]
+    reached, new = {(0, Monitor())}, [(0, Monitor())]
     modes, edges = {Mode.DISARMED}, set[tuple[Mode, Mode]]()
     while new:
         waiting, new = new, []
-        for state, seen in waiting:
-            for told, now, same in steps(state):
-                later = after(seen, told, state, now, good=now.good_ms > 0)
-                check(state, told, now, seen, later, limits)
-                modes.add(now.mode)
-                if now.mode != state.mode:
-                    edges.add((state.mode, now.mode))
-                found = same, later
+        for number, seen in waiting:
+            for step in steps(number):
+                later = after(seen, step)
+                check_history(step, seen, later, limits)
+                modes.add(step.mode)
+                if step.mode != step.before:
+                    edges.add((step.before, step.mode))
+                found = step.same, later
                 if found not in reached:
                     reached.add(found)
                     new.append(found)
