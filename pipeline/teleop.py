@@ -270,7 +270,8 @@ class Teleop:
             or self._sensor_fault(),
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
-            or self._astray(known),
+            or self._astray(known)
+            or self._blocked(),
             refusals=inputs.refusals,
             requests=inputs.requests,
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
@@ -294,6 +295,12 @@ class Teleop:
             return ""  # it will be led on from where it is
         near = resumption.is_near(self._config.resumption, self._led_to, known.relative)
         return "" if near else "Too far from where it was led."
+
+    def _blocked(self) -> str:
+        """Why it must not go on by a share: its place is wrong, and it would bounce."""
+        is_led = self._failsafe.mode == Mode.TRACK and self._leading.needs_place
+        touches = is_led and self._place.is_pushed
+        return "It touches something: lead by all of the motion." if touches else ""
 
     def _change_mode(
         self, before: Mode, known: Situation | None, error: PoseError | None

@@ -29,6 +29,9 @@ from pipeline.robot import Robot
 POLES: float = 3.0
 """ω [1/s]: the pendulum's own is 2.7. Faster, thrusters' lag and damping count for motion; slower,
 an error of the vertical, which the accelerometer takes for a / ω²."""
+PUSHED_N, PUSHED_S = 5.0, 0.02
+"""A force [N] that neither thrusters nor suspension explain, and quicker than ω, is a wall's or a
+push; smoothed over [s]."""
 
 
 class SuspendedPlace:
@@ -44,6 +47,7 @@ class SuspendedPlace:
         self._l_1 = 3.0 * POLES - self._lead_s * self._l_2
         self._thrust_in_f, self._bias_in_f = np.zeros(3), np.zeros(3)
         self._p_in_f, self._p_start_in_f = np.zeros(3), np.zeros(3)
+        self._stiffness_in_f, self._push_in_f = robot.stiffness_in_f, np.zeros(3)
         self.v_in_f: Array = np.zeros(3)
         """Velocity of the body (3,) [m/s]."""
 
@@ -52,6 +56,11 @@ class SuspendedPlace:
         """Displacement of the body since `start` (3,) [m]."""
         x_in_f: Array = self._p_in_f - self._p_start_in_f
         return x_in_f
+
+    @property
+    def is_pushed(self) -> bool:
+        """Whether something else than thrusters and suspension has pushed just now: x is wrong."""
+        return float(self._push_in_f @ self._push_in_f) > PUSHED_N**2
 
     def start(self) -> None:
         """From here on its displacement is counted."""
@@ -71,6 +80,8 @@ class SuspendedPlace:
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         pulled_in_f = self._softness_in_f * (self._thrust_in_f - self._m * a_in_f)
         e_in_f = pulled_in_f - self._p_in_f - self._lead_s * self.v_in_f
+        push_in_f = self._stiffness_in_f * e_in_f - self._push_in_f
+        self._push_in_f = self._push_in_f + (1.0 - exponential(-h / PUSHED_S)) * push_in_f
         self._p_in_f = self._p_in_f + h * (self.v_in_f + self._l_1 * e_in_f)
         self.v_in_f = self.v_in_f + h * (a_in_f - self._bias_in_f + self._l_2 * e_in_f)
         self._bias_in_f = self._bias_in_f - h * POLES**3 * e_in_f

@@ -86,3 +86,14 @@ def test_a_robot_that_nothing_pulls_back_is_said_to_stay() -> None:
     for _ in range(2000):
         place.propagate(UP + BIAS, np.eye(3), np.ones(3), H)
     assert np.abs(place.x_in_f).max() < 0.2
+
+
+def test_a_knock_is_told_from_thrust_and_swing() -> None:
+    swing = Swing(BIAS, R_FB)
+    for k in range(round(20.0 / H)):
+        swing.step(np.array([1.5, 1.0, 2.0]) * np.sin(2.0 * np.pi * 0.4 * k * H))
+        assert k * H < 8.0 or not swing.place.is_pushed
+    for _ in range(10):
+        knock = R_FB.T @ np.array([-10.0 / ROBOT.mass, 0.0, 0.0])
+        swing.place.propagate(R_FB.T @ UP + BIAS + knock, R_FB, np.zeros(3), H)
+    assert swing.place.is_pushed

@@ -11,6 +11,8 @@ from scipy.interpolate import make_interp_spline
 from hardware.robot_file import load_robot
 from hardware.sim.hand import MovingHand
 from hardware.sim.hand_parts import Keyed, MotionComponent
+from hardware.sim.plant.obstacle import Obstacle
+from hardware.sim.plant.plant import PlantOptions
 from pipeline.config import TeleopConfig
 from pipeline.control.leading import PLAIN, Leading
 from pipeline.frames import Array, log
@@ -61,11 +63,12 @@ class Finger(VirtualOperator):
 class LedFlight:
     """A flight whose hand and finger the test moves."""
 
-    def __init__(self, leading: Leading, seed: int = 3) -> None:
+    def __init__(self, leading: Leading, seed: int = 3, obstacle: Obstacle | None = None) -> None:
         self.moves, self.finger = Moves(), Finger()
         hand = MovingHand((self.moves,), START_IN_F, np.zeros(3), 0.0)
         scene = SimulationOptions(seed=seed, led_noise_px=0.02, knows_clock=True)
-        self.sim = VirtualTimeSimulation(AMES, TeleopConfig(), scene, self.finger, hand)
+        plant = PlantOptions(obstacle=obstacle)
+        self.sim = VirtualTimeSimulation(AMES, TeleopConfig(), scene, self.finger, hand, plant)
         self.sim.controller.teleop.lead(leading)
         self.until(lambda output: output.failsafe.mode == Mode.ARMED)
 
@@ -228,3 +231,18 @@ def test_with_turns_locked_a_phone_at_rest_leads_by_no_more_than_its_gyroscopes_
     drift_m = flight.body[1] - before
     assert np.abs(drift_m[:2]).max() < 15.0 * 0.004
     assert abs(drift_m[2]) < 0.05
+
+
+@pytest.mark.parametrize("scale", [0.25, 0.5])
+def test_who_is_led_by_a_share_against_a_wall_holds_in_place_of_bouncing(scale: float) -> None:
+    flight = LedFlight(Leading(scale), obstacle=Obstacle(gap_m=0.02))
+    flight.press()
+    plant = flight.sim.follower.plant
+    flight.moves.go(flight.sim.t, np.array([0.03 / scale, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    held = flight.until(lambda output: output.failsafe.mode == Mode.HOLD)
+    assert "touches" in held.failsafe.reason
+    peaks = []
+    for _ in range(300):
+        flight.sim.advance()
+        peaks.append(plant.touched.peak_n)
+    assert max(peaks[60:]) == 0.0
