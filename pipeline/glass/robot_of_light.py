@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.frames import Array, R_from_wxyz
 from pipeline.glass.display_lag import SWEEP_SHARE, DisplayLag, DisplayLagMeter
 from pipeline.glass.eye import Eye, EyeTracker
+from pipeline.glass.lag_tracker import LagTracker
 from pipeline.glass.window import Glass, Hanging, pierced, seen_through
 from pipeline.signals import PhoneImu, VisionMeasurement
 
@@ -28,7 +29,11 @@ TOLD_S = 0.06
 NEAREST_M = 0.30
 FARTHEST_WIDTHS = 2.5
 """Beyond, in widths of the glass, the LEDs are too small in the picture."""
+CORRECTED_S = 0.010
+"""By so much at most a lag is corrected at once: the lights jump by it times their speed."""
 LOOK = "Point the phone at the screen, all four corners in the picture."
+SURE = 2.0
+"""Standard deviations by which a lag must be wrong before it is corrected."""
 LEAST_PER_HEIGHT = 1.15
 """Height of the glass, of the LEDs' own: less, and they hardly stay on it."""
 
@@ -54,8 +59,9 @@ class RobotOfLight:
         self.glass, self._leds_in_b = glass, leds_in_b
         self._eye = EyeTracker(glass)
         self._meter = DisplayLagMeter(SWEEP_SHARE * glass.width_m)
+        self._tracker = LagTracker()
         self.lag: DisplayLag | None = None
-        """Of the display, once it is measured."""
+        """Of the display, once it is measured; followed from then on."""
         self.eye: Eye | None = None
         """At the last step."""
 
@@ -72,13 +78,30 @@ class RobotOfLight:
     def add_seen(self, seen: VisionMeasurement, lights_in_c: Array, now: float) -> None:
         """The phone has seen the glass, and lights in directions (n, 3), the brightest first."""
         self._eye.add_seen(seen, now)
-        if self.lag is None and seen.pose is not None and len(lights_in_c):
-            R_gc = seen.pose.R_cb.T
-            places = seen_through(-R_gc @ seen.pose.p_bc_in_c, lights_in_c @ R_gc.T)
-            free = self.glass.has(places) & (np.abs(places[:, 1]) < 0.5 * self.glass.tile_m)
-            if free.any():
-                self._meter.add_position(seen.t, float(places[free][0, 0]))
-                self.lag = self._meter.lag()
+        if seen.pose is None or not len(lights_in_c):
+            return
+        R_gc = seen.pose.R_cb.T
+        places = seen_through(-R_gc @ seen.pose.p_bc_in_c, lights_in_c @ R_gc.T)
+        if self.lag is None:
+            self._measure(seen.t, places)
+        else:
+            self._tracker.add_seen(seen.t, places[self.glass.has(places)])
+            self._follow(self.lag)
+
+    def _measure(self, t: float, places: Array) -> None:
+        """Take where a light sweeps, clear of the fiducials."""
+        free = self.glass.has(places) & (np.abs(places[:, 1]) < 0.5 * self.glass.tile_m)
+        if free.any():
+            self._meter.add_position(t, float(places[free][0, 0]))
+            self.lag = self._meter.lag()
+
+    def _follow(self, lag: DisplayLag) -> None:
+        """Correct a lag that the robot's own lights deny."""
+        error = self._tracker.error()
+        if error is not None and abs(error.value) > SURE * error.sigma:
+            step = min(max(error.value, -CORRECTED_S), CORRECTED_S)
+            self.lag = DisplayLag(lag.value - step, error.sigma)
+            self._tracker = LagTracker()  # what was seen rests on the lag of then
 
     def step(self, now: float, robot: PathAhead) -> Lights:
         """What to show from `now` [s] on."""
@@ -108,6 +131,7 @@ class RobotOfLight:
             i = int(np.abs(times - t).argmin())  # of a path with a step of a few milliseconds
             leds_in_g = hanging.leds_in_g(R_from_wxyz(wxyz[i]), p[i], self._leds_in_b)
             places[k] = pierced(eye.at(t), leds_in_g)
+        self._tracker.add_drawn(start, places[0])
         return Lights("robot", self._misplaced(eye), start, places)
 
     def _misplaced(self, eye: Eye) -> str:

@@ -1,0 +1,70 @@
+"""A lag that was misjudged is seen in lights that move, and in no others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.frames import Array
+from pipeline.glass.lag_tracker import LEAST, LagTracker
+
+PLACES = np.array([[-0.05, 0.02], [0.0, 0.05], [0.06, 0.0], [0.01, -0.04], [-0.03, -0.05]])
+SIZE_M = 0.010
+
+
+def places(t: float, size_m: float = SIZE_M) -> Array:
+    """Five lights that move together, 5 cm/s at most."""
+    moved: Array = PLACES + size_m * np.array([np.sin(4.0 * t), np.cos(5.0 * t)])
+    return moved
+
+
+def filmed(
+    error_s: float, seconds: float = 3.0, size_m: float = SIZE_M, seed: int = 0
+) -> LagTracker:
+    """Lights drawn for 60 times a second, filmed 30 times, `error_s` after what is believed."""
+    rng, tracker = np.random.default_rng(seed), LagTracker()
+    for k in range(int(60 * seconds)):
+        t = 100.0 + k / 60.0
+        tracker.add_drawn(t + 0.05, places(t + 0.05, size_m))
+        if k % 2 and k > 6:
+            eye = 2e-4 * rng.standard_normal(2)
+            seen = places(t + error_s, size_m) + 0.001 + eye + 1e-4 * rng.standard_normal((5, 2))
+            stray = rng.uniform(-0.2, 0.2, (1, 2))
+            tracker.add_seen(t, np.concatenate((stray, seen)))
+    return tracker
+
+
+@pytest.mark.parametrize("seed", range(1000, 1004))
+@pytest.mark.parametrize("error_s", [0.0, 0.02, -0.02, 0.005])
+def test_it_is_found_to_three_milliseconds_and_as_sure_as_it_says(
+    error_s: float, seed: int
+) -> None:
+    found = filmed(error_s, seed=seed).error()
+    assert found is not None
+    assert abs(found.value - error_s) < 0.003
+    assert abs(found.value - error_s) < 4.0 * found.sigma
+
+
+def test_lights_that_stand_tell_nothing() -> None:
+    assert filmed(0.02, size_m=0.0).error() is None
+    assert filmed(0.02, size_m=1e-4).error() is None
+
+
+def test_too_few_tell_nothing() -> None:
+    assert filmed(0.02, seconds=LEAST / 5 / 30 * 0.9).error() is None
+
+
+def test_lights_that_are_not_the_robots_count_for_nothing() -> None:
+    tracker = LagTracker()
+    for k in range(300):
+        tracker.add_drawn(0.01 * k, places(0.01 * k))
+        tracker.add_seen(0.01 * k - 0.03, places(0.01 * k) + 0.02)
+    assert tracker.error() is None
+
+
+def test_places_that_are_not_on_the_glass_are_no_places() -> None:
+    tracker = LagTracker()
+    for k in range(300):
+        tracker.add_drawn(0.01 * k, np.full((5, 2), np.nan))
+        tracker.add_seen(0.01 * k - 0.03, places(0.01 * k))
+    assert tracker.error() is None
