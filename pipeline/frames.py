@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+Triple = tuple[float, float, float]
+"""Plain floats of an array (3,), as messages carry them."""
 
 GRAVITY = 9.80665
 """Standard gravity [m/s²]; ^f g = (0, 0, -GRAVITY)."""
@@ -35,6 +37,11 @@ def R_cd(screen_angle_deg: float) -> Array:
     device's +x.
     """
     return rotation_about_x(-float(np.deg2rad(screen_angle_deg))) @ R_cd_portrait
+
+
+def triple(v: Array) -> Triple:
+    """Plain floats of an array (3,)."""
+    return float(v[0]), float(v[1]), float(v[2])
 
 
 def skew(v: Array) -> Array:

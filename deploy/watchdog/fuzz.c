@@ -40,11 +40,27 @@ static void put(uint8_t *p, uint64_t value, int bytes)
         p[i] = (uint8_t)(value >> (8 * i));
 }
 
+/* Signs a datagram, now and then one with another byte within `reach` or of another length, or signs
+ * it wrongly; gives its length with the MAC. */
+static size_t seal(const ll_watchdog *w, const uint8_t *in, uint8_t *data, size_t length, size_t reach)
+{
+    uint8_t digest[LL_DIGEST_BYTES];
+    if (in[7] == 254)
+        data[in[5] % reach] ^= in[6];
+    if (in[7] == 253)
+        length = in[5] % (LL_MAX_BYTES - LL_MAC_BYTES);
+    ll_hmac_of(&w->hmac, data, length, digest);
+    memcpy(data + length, digest, LL_MAC_BYTES);
+    if (in[7] == 252)
+        data[length] ^= 1;
+    return length + LL_MAC_BYTES;
+}
+
 /* The same 8 bytes as a blink order: whatever is in it, the watchdog stays as it is. */
 static void blink(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint64_t nonce)
 {
     static ll_blink b;
-    uint8_t data[LL_MAX_BYTES] = {0}, digest[LL_DIGEST_BYTES];
+    uint8_t data[LL_MAX_BYTES] = {0};
     memcpy(data, "LLbl\1", 5);
     put(data + 6, in[1] & 7 ? 62 : in[2], 2);
     put(data + 8, in[2] & 3 ? w->newest_epoch : in[5], 8);
@@ -52,17 +68,9 @@ static void blink(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint6
     put(data + 24, (uint64_t)now_us - (in[4] & 1 ? 1000u * in[5] : 0), 8);
     put(data + 32, in[6] & 1 ? 500 : in[7] << 8, 4);
     memcpy(data + 36, in, LL_BLINK_SLOTS);
-    size_t length = 36 + LL_BLINK_SLOTS;
-    if (in[7] == 254)
-        data[in[5] % length] ^= in[6];
-    if (in[7] == 253)
-        length = in[5] % (LL_MAX_BYTES - LL_MAC_BYTES);
-    ll_hmac_of(&w->hmac, data, length, digest);
-    memcpy(data + length, digest, LL_MAC_BYTES);
-    if (in[7] == 252)
-        data[length] ^= 1;
+    size_t length = seal(w, in, data, 36 + LL_BLINK_SLOTS, 36 + LL_BLINK_SLOTS);
     ll_watchdog before = *w;
-    bool taken = ll_blink_receive(&b, w, data, length + LL_MAC_BYTES, now_us);
+    bool taken = ll_blink_receive(&b, w, data, length, now_us);
     demand(memcmp(&before, w, sizeof before) == 0, "a blink order moves nothing");
     demand(!taken || in[7] != 252, "a blink order with a wrong MAC is refused");
     demand(!taken || read_u64(data + 8) == w->newest_epoch, "only who is heard may say blink");
@@ -76,7 +84,7 @@ static void blink(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint6
 static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *nonce)
 {
     static const int64_t PASSES[8] = {5000, 5000, 5000, 0, 41000, 61000, 300000, 3000000};
-    uint8_t data[LL_MAX_BYTES + 1] = {0}, digest[LL_DIGEST_BYTES], out[LL_MAX_BYTES];
+    uint8_t data[LL_MAX_BYTES + 1] = {0}, out[LL_MAX_BYTES];
     float thrusts[N], gyro[3], acc[3];
     *now_us += in[6] == 254 ? -20000 : PASSES[in[0] & 7];
     for (int i = 0; i < 3; i++) {
@@ -103,21 +111,13 @@ static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *n
         if (in[6] == 255)
             memset(data + 36 + 4 * i, in[7], 4);
     }
-    size_t length = COMMAND_BYTES;
-    if (in[7] == 254) /* another length, another word, no right MAC */
-        data[in[5] % LL_MAX_BYTES] ^= in[6];
-    if (in[7] == 253)
-        length = in[5] % (LL_MAX_BYTES - LL_MAC_BYTES);
-    ll_hmac_of(&w->hmac, data, length, digest);
-    memcpy(data + length, digest, LL_MAC_BYTES);
-    if (in[7] == 252)
-        data[length] ^= 1;
+    size_t length = seal(w, in, data, COMMAND_BYTES, LL_MAX_BYTES);
     bool answer;
     ll_state before = w->state;
     float given = 0.0f, now = 0.0f;
     for (int i = 0; i < N; i++)
         given += thrusts[i];
-    ll_refusal why = ll_receive(w, data, length + LL_MAC_BYTES, *now_us, &answer);
+    ll_refusal why = ll_receive(w, data, length, *now_us, &answer);
     demand(in[7] != 252 || why == LL_MALFORMED, "a wrong MAC is refused");
     ll_setpoint(w, *now_us, thrusts);
     for (int i = 0; i < N; i++) {

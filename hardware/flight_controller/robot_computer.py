@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hardware.flight_controller.betaflight import Betaflight
-from hardware.link.datagram import triple
 from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.robot_file import RobotFile, RobotFileError
+from pipeline.frames import triple
 
 MISSING = "missing: which motor is which thruster, and who stops the motors"
 

@@ -50,7 +50,7 @@ from math import isfinite
 
 from hardware.follower import FollowerState, Refusal
 from hardware.link.link_key import MAC_BYTES, is_authentic, mac
-from pipeline.frames import Array
+from pipeline.frames import Triple
 
 VERSION = 2  # of these datagrams
 COMMAND_MAGIC, SAMPLE_MAGIC = b"LLcm", b"LLsm"
@@ -62,8 +62,6 @@ ARMED, STOP = 1, 2
 """Bits of a command's flags."""
 U32, U64 = 1 << 32, 1 << 64
 """Where counters and epochs go round."""
-
-Triple = tuple[float, float, float]
 
 
 class LinkError(ValueError):
@@ -230,8 +228,3 @@ def _checked(data: bytes, key: bytes, magic: bytes, overhead: int) -> int:
 def is_later(a: int, b: int) -> bool:
     """Whether counter `a` comes after `b`, round the corner of 32 bits."""
     return 0 < (a - b) % U32 < U32 // 2
-
-
-def triple(values: Array) -> Triple:
-    """Three floats of an array (3,)."""
-    return float(values[0]), float(values[1]), float(values[2])

@@ -56,14 +56,13 @@ from hardware.link.datagram import (
     CommandDatagram,
     LinkError,
     SampleDatagram,
-    Triple,
     decode_command,
     encode_sample,
     is_later,
 )
 from hardware.robot_file import RobotFile
 from pipeline.config import HoldConfig
-from pipeline.frames import Array
+from pipeline.frames import Array, Triple
 
 Peer = tuple[str, int]
 """Address and port."""

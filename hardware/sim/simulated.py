@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 
 from hardware.link.blink_end import NO_LED, BlinkEnd
-from hardware.link.datagram import U64, triple
+from hardware.link.datagram import U64
 from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import Plant, PlantOptions
-from pipeline.frames import Array
+from pipeline.frames import Array, triple
 
 HISTORY = 50
 """Poses remembered: 0.25 s."""

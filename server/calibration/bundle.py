@@ -122,11 +122,11 @@ def _normal(
     J_shared = J_shared[:, :, free]
     w = _weights(r, noise)
     weighted = w[:, None, None] * J_view
-    A = _by_view(film, np.einsum("mki,mkj->mij", weighted, J_view))
-    B = _by_view(film, np.einsum("mki,mkj->mij", weighted, J_shared))
+    A = by_view(film, np.einsum("mki,mkj->mij", weighted, J_view))
+    B = by_view(film, np.einsum("mki,mkj->mij", weighted, J_shared))
     C_each = np.einsum("m,mki,mkj->ij", w, J_shared, J_shared)
-    g_view = _by_view(film, np.einsum("mki,mk->mi", weighted, r))
-    g_shared = _by_view(film, np.einsum("m,mki,mk->mi", w, J_shared, r))
+    g_view = by_view(film, np.einsum("mki,mk->mi", weighted, r))
+    g_shared = by_view(film, np.einsum("m,mki,mk->mi", w, J_shared, r))
     size2 = (r * r).sum(axis=1) / noise**2 / 2.0
     bound = HUBER**2
     cost = np.where(size2 < bound, size2, 2.0 * HUBER * np.sqrt(size2) - bound).sum()
@@ -142,7 +142,8 @@ def _normal(
     return _Normal(A, B, C_each, g_view, g_shared, float(cost))
 
 
-def _by_view(film: BoardCorners, rows: Array) -> Array:
+def by_view(film: BoardCorners, rows: Array) -> Array:
+    """Sums (n, ...) over each view's corners of `rows` (m, ...)."""
     sums: Array = np.add.reduceat(rows, film.starts, axis=0)
     return sums
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pipeline.camera.lens import COLUMNS, ROWS
 from pipeline.frames import Array, R_co
 from server.calibration.board import Board
-from server.calibration.bundle import BoardFit, ParameterPrior, fit
+from server.calibration.bundle import BoardFit, ParameterPrior, by_view, fit
 from server.calibration.camera_imu import CameraImu, GyroSpline, ImuError, align
 from server.calibration.choice import Choice, choose
 from server.calibration.lens import normalised, prior_sigma, project
@@ -121,7 +121,7 @@ def solve(
 
 def _believable(found: BoardFit, film: BoardCorners) -> npt.NDArray[np.bool_]:
     """Whether (n,) a view's error is an ordinary one."""
-    errors = np.sqrt(np.add.reduceat((found.residuals**2).sum(axis=1), film.starts))
+    errors = np.sqrt(by_view(film, (found.residuals**2).sum(axis=1)))
     errors = errors / np.sqrt(np.diff(np.append(film.starts, len(film.view))))
     return np.asarray(errors <= max(OUTLIER * float(np.median(errors)), 0.3))
 

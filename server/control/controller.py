@@ -10,7 +10,7 @@ import numpy as np
 from hardware.follower import ThrustCommand
 from hardware.link.robot_end import SILENCE_US
 from pipeline.config import PERIOD_S, TeleopConfig
-from pipeline.frames import Array, wxyz_from_R
+from pipeline.frames import Array, triple, wxyz_from_R
 from pipeline.prediction import Prediction
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState, VisionMeasurement
@@ -18,7 +18,7 @@ from pipeline.teleop import Inputs, Output, Teleop
 from server.common.runtime_parameters import RuntimeParameters, Tune, turned
 from server.control.gap_log import GapLog
 from server.control.ipc import ControlStatus
-from server.control.ipc_estimate import EstimateFields, finite, triple
+from server.control.ipc_estimate import EstimateFields, finite
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.control.tick_rate import TickRate
 from server.protocol.lead_messages import Lead

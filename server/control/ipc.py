@@ -13,11 +13,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from pipeline.frames import R_from_wxyz
+from pipeline.frames import R_from_wxyz, Triple
 from pipeline.prediction import Prediction
 from server.common.runtime_parameters import RuntimeParameters
 from server.control.gap_log import GapStatistics
-from server.control.ipc_estimate import EstimateFields, Triple
+from server.control.ipc_estimate import EstimateFields
 from server.control.ipc_inputs import Input, decode, encode
 from server.protocol.lead_messages import Lead
 

@@ -8,15 +8,8 @@ import msgspec
 
 from pipeline.config import EstimatorName
 from pipeline.estimation.estimator import Estimator, Health
-from pipeline.frames import Array
+from pipeline.frames import Array, Triple, triple
 from pipeline.signals import RelativeState
-
-Triple = tuple[float, float, float]
-
-
-def triple(v: Array) -> Triple:
-    """Plain floats of a (3,) array."""
-    return (float(v[0]), float(v[1]), float(v[2]))
 
 
 class EstimateFields(msgspec.Struct, array_like=True, frozen=True):

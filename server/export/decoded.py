@@ -20,8 +20,9 @@ from hardware.robot_file import RobotFile
 from pipeline.camera.extrinsics import IDENTITY
 from pipeline.camera.lens import Camera
 from pipeline.estimator_config import RelativeConfig
+from pipeline.frames import Triple
 from pipeline.signals import BodyImu, Mode, PhoneImu
-from server.control.ipc_estimate import EstimateFields, Triple
+from server.control.ipc_estimate import EstimateFields
 from server.phone.image_format import ImageFormat
 from server.phone.ingest import ARRIVAL_S, phone_imu
 from server.protocol.messages import Command, Hello, Log, Status, decode_message

@@ -31,9 +31,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pipeline.camera.lens import Camera
-from pipeline.frames import Array
+from pipeline.frames import Array, Triple
 from pipeline.signals import BodyImu, PhoneImu
-from server.control.ipc_estimate import Triple
 from server.export.decoded import (
     DatedPicture,
     DatedTouch,

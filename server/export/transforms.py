@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.frames import Array, R_co, wxyz_from_R
-from server.control.ipc_estimate import Triple
+from pipeline.frames import Array, R_co, Triple, wxyz_from_R
 from server.export.decoded import Quaternion, RecordedState
 
 INERTIAL, PHONE, OPTICAL, VIRTUAL = "inertial", "phone", "optical", "virtual"
