@@ -237,6 +237,8 @@ def _converted(schema: RobotSchema) -> RobotFile:
         blinks=schema.blinks,
         stiffness_in_f=stiffness_in_f,
         damping_in_f=damping_in_f,
+        thrust_lag_s=plant.lag,
+        thrust_delay_s=plant.delay,
     )
     gains = {
         name: Gains(np.array(rows.Kp), np.array(rows.Ki), np.array(rows.Kd))

@@ -43,6 +43,10 @@ class Robot:
     nothing does."""
     damping_in_f: Array = field(default_factory=lambda: np.zeros(3))
     """(3,) how air and cable brake it [N s/m]."""
+    thrust_lag_s: float = 0.025
+    """Of a thruster, first order ..."""
+    thrust_delay_s: float = 0.015
+    """... and from a command to its beginning [s]."""
 
     @property
     def blinking_leds(self) -> int:

@@ -16,6 +16,7 @@ from pipeline.control.leading import PLAIN, Leading, aim_of, led, suits
 from pipeline.control.pid import PoseError, Reference, pose_error
 from pipeline.control.place import SuspendedPlace
 from pipeline.control.station import StationKeeping
+from pipeline.control.thruster_health import ThrusterHealth
 from pipeline.control.tracking import Situation, Tracking
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.estimation.attitude import Attitude
@@ -38,6 +39,8 @@ from pipeline.signals import (
 
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-4, 0.060
 """What filters and integrals go on by in a step; whoever is longer away than that stood still."""
+MEND = "{} Mend it, then press STOP and Reset."
+"""Why arming is refused, behind what is known of a thruster."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +89,8 @@ class Output:
     error: PoseError | None
     saturated: bool
     ages: Ages
+    thrusters: tuple[str, ...] = ()
+    """Those that don't give what they are told, in words."""
 
 
 class Teleop:
@@ -103,6 +108,8 @@ class Teleop:
         self._virtual_camera = VirtualCamera(config.virtual_camera)
         self._tracking, self._hold = Tracking(robot, config), Hold(config.hold, robot)
         self._actuation = Actuation(robot, config)
+        self._thruster_health = ThrusterHealth(robot)
+        self._thrusts = np.zeros(robot.A.shape[1])
         self._station = StationKeeping(config.station, config.gains, robot)
         # what stands on the floor brakes and stays by itself
         self._keeps_station = robot.hangs or robot.weight_to_carry > 0.0
@@ -127,6 +134,11 @@ class Teleop:
         """Lead so from the next press on; as the paper does, if this robot can't be led so."""
         self.next_leading = leading if suits(leading, self._robot) else PLAIN
 
+    @property
+    def weak_thrusters(self) -> tuple[str, ...]:
+        """Those that don't give what they are told, in words."""
+        return self._thruster_health.words
+
     def push(self, wrench_in_b: Array) -> None:
         """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
         self._actuation.push_in_b = wrench_in_b
@@ -137,6 +149,7 @@ class Teleop:
         dt_ms = self._pass_time(inputs.t)
         # news before the state: a late image is fused when it was taken, then predicted to now
         self._fuse(inputs)
+        self._watch_thrusters(inputs)
         relative = self.estimator.state(inputs.t)  # Eq. (5)-(13)
         R_fc = self._R_fc_now(relative)
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
@@ -163,8 +176,9 @@ class Teleop:
             known, error = self._change_mode(before, known, error)
         # last, what was given: feed-forward takes it off the next period's specific force
         thrusts, saturated = self._act(known, error)
-        self._given_in_b = self._robot.A[:3] @ thrusts - self._actuation.push_in_b[:3]
         self._aim = self._aim_now(known, error)
+        self._thrusts = thrusts
+        self._given_in_b = self._actuation.A[:3] @ thrusts - self._actuation.push_in_b[:3]
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
         return Output(
             t=inputs.t,
@@ -182,6 +196,7 @@ class Teleop:
             error=error,
             saturated=saturated,
             ages=ages,
+            thrusters=self._thruster_health.words,
         )
 
     def _pass_time(self, t: float) -> int:
@@ -216,6 +231,14 @@ class Teleop:
                 self._t_seen = max(self._t_seen, seen.t)
         if inputs.operator is not None:
             self._operator = inputs.operator
+
+    def _watch_thrusters(self, inputs: Inputs) -> None:
+        """While the robot obeys: does each thruster give what it was told?"""
+        flies = self._failsafe.mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
+        if not flies or inputs.gap or self._is_deaf(inputs.t):
+            self._thruster_health.start()
+        elif self._thruster_health.follow(self._thrusts, self._body, self._h):
+            self._actuation.weaken(self._thruster_health.gains)
 
     def _R_fc_now(self, relative: RelativeState | None) -> Array | None:
         """Attitude of the phone, if need be by way of the robot; None before the first sample."""
@@ -267,12 +290,13 @@ class Teleop:
             press=self._operator.press,
             fault=inputs.fault
             or flight_envelope.fault(limits, is_tracking, known, error)
-            or self._sensor_fault(),
+            or self._sensor_fault()
+            or self._thruster_fault(),
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
             or self._astray(known)
             or self._blocked(),
-            refusals=inputs.refusals,
+            refusals=(*inputs.refusals, *map(MEND.format, self._thruster_health.words)),
             requests=inputs.requests,
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
             **ages.in_ms(),
@@ -286,6 +310,12 @@ class Teleop:
             if flies and self._frozen_imu.is_frozen
             else ""
         )
+
+    def _thruster_fault(self) -> str:
+        """Words if what its thrusters still give can't carry it; a cable would."""
+        if self._actuation.can_hover:
+            return ""
+        return f"{self._thruster_health.words[0]} The robot can't hover."
 
     def _astray(self, known: Situation | None) -> str:
         """Why it must not follow again by itself after a gap; empty if it may."""
@@ -341,6 +371,9 @@ class Teleop:
             )
         if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
             self._tracking.reset()
+        if before == Mode.STOPPED:  # a supervisor's reset: somebody has looked at the robot
+            self._thruster_health.reset()
+            self._actuation.weaken(self._thruster_health.gains)
         if mode != Mode.COAST:
             self._reference = self._led_to = None
         return known, None

@@ -248,6 +248,7 @@ class Controller:
             warnings=self._gaps.warnings(),
             lead=Lead.of(output.leading),
             next_lead=Lead.of(self.teleop.next_leading),
+            thrusters_weak=list(output.thrusters),
         )
 
 

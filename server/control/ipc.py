@@ -88,6 +88,8 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """How the hand leads since the last press ..."""
     next_lead: Lead | None = None
     """... and from the next one on."""
+    thrusters_weak: list[str] = []
+    """Each that does not give what it is told, in words."""
 
 
 def expected_of(status: ControlStatus) -> Prediction | None:

@@ -49,6 +49,8 @@ SHARES: Final = (0.0, 0.6)
 """What a thruster that fails still gives."""
 MOST_RATIO: Final = 1.25
 """RMS error of a plant, to that of the known one."""
+SAID_S: Final = 0.3
+"""By when people are told of a thruster that has failed."""
 MOST_TURN_DEG: Final = 2.0
 """RMS turn with a thruster that has failed."""
 
@@ -75,6 +77,8 @@ class PlantRow:
     rms_deg: float
     chatter_n: float
     ended: str
+    named: str = ""
+    """Thrusters that were called weak, though none had failed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +91,10 @@ class ThrusterRow:
     max_mm: float
     turn_deg: float
     ended: str
+    said_s: float = nan
+    """From the failure until people were told of this thruster; NaN if they never were."""
+    wrong: str = ""
+    """What else they were told of thrusters."""
 
 
 PLANT_COLUMNS: Final[tuple[Column, ...]] = (
@@ -105,6 +113,7 @@ THRUSTER_COLUMNS: Final[tuple[Column, ...]] = (
     ("rms_mm", "RMS mm", "{:.1f}"),
     ("max_mm", "max mm", "{:.1f}"),
     ("turn_deg", "RMS °", "{:.2f}"),
+    ("said_s", "said s", "{:.2f}"),
 )
 
 
@@ -141,9 +150,9 @@ def drawn(known: PlantParameters, rng: np.random.Generator) -> UntoldPlant:
 def fly_plant(setting: Setting, seconds: float, seed: int) -> PlantRow:
     """Fly the plant of a seed, and the known one by the same hand."""
     plant = drawn(setting.robot_file.plant, np.random.default_rng((seed, 17)))
+    flights = setting.flight(seed), setting.flight(seed, plant)
     told, real = (
-        result_of(simulation.run(seconds), simulation.scene, 0.0)
-        for simulation in (setting.flight(seed), setting.flight(seed, plant))
+        result_of(simulation.run(seconds), simulation.scene, 0.0) for simulation in flights
     )
     return PlantRow(
         seed=seed,
@@ -155,6 +164,7 @@ def fly_plant(setting: Setting, seconds: float, seed: int) -> PlantRow:
         rms_deg=real.rms_deg,
         chatter_n=real.chatter_n,
         ended=real.ended,
+        named=" ".join(word for one in flights for word in one.controller.teleop.weak_thrusters),
     )
 
 
@@ -164,7 +174,12 @@ def fly_thruster(setting: Setting, seed: int, failing: tuple[int, float]) -> Thr
     simulation = setting.flight(seed)
     simulation.run(FAILS_AT_S)
     simulation.follower.plant.thruster_health[thruster] = gives
-    trace = simulation.run(FAILS_AT_S + AFTER_S + JUDGED_S)
+    words: dict[str, float] = {}
+    trace = simulation.trace
+    while simulation.t < FAILS_AT_S + AFTER_S + JUDGED_S and not trace.left:
+        for told in simulation.advance().thrusters:
+            words.setdefault(told, simulation.t - FAILS_AT_S)
+    right = f"Thruster {thruster + 1} "
     judged = np.array(trace.t) >= FAILS_AT_S + AFTER_S
     off_mm = 1e3 * np.linalg.norm(rows_of(trace.error_in_f)[judged], axis=1)
     turn_deg = np.rad2deg(np.linalg.norm(rows_of(trace.turn)[judged], axis=1))
@@ -175,7 +190,14 @@ def fly_thruster(setting: Setting, seed: int, failing: tuple[int, float]) -> Thr
         max_mm=float(off_mm.max(initial=0.0)) if len(off_mm) else nan,
         turn_deg=_rms(turn_deg),
         ended=trace.left,
+        said_s=min((t for word, t in words.items() if word.startswith(right)), default=nan),
+        wrong=" ".join(word for word in words if not word.startswith(right)),
     )
+
+
+def _fly_failing(setting: Setting, flight: tuple[int, int, float]) -> ThrusterRow:
+    seed, thruster, gives = flight
+    return fly_thruster(setting, seed, (thruster, gives))
 
 
 def _rms(values: Array) -> float:
@@ -189,10 +211,14 @@ def goals(plants: Sequence[PlantRow], thrusters: Sequence[ThrusterRow]) -> Mappi
         small = f"every plant: RMS no more than {MOST_RATIO} times the known one's"
         held[small] = all(row.ratio <= MOST_RATIO for row in plants)
         held["every plant: no flight ended"] = not any(row.ended for row in plants)
+        held["every plant: no thruster is called weak"] = not any(row.named for row in plants)
     if thrusters:
         level = f"a thruster fails: turned by no more than {MOST_TURN_DEG:g}° RMS"
         held[level] = all(row.turn_deg <= MOST_TURN_DEG for row in thrusters)
         held["a thruster fails: no flight ended"] = not any(row.ended for row in thrusters)
+        soon = f"a thruster fails: said within {SAID_S:g} s"
+        held[soon] = all(row.said_s <= SAID_S for row in thrusters)
+        held["a thruster fails: no other is called weak"] = not any(row.wrong for row in thrusters)
     return held
 
 
@@ -215,9 +241,14 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
     first, workers = arguments.seed, arguments.workers
     seeds = range(first, first + arguments.plants)
     units = len(robot_file.plant.thruster_torques) if arguments.thrusters else 0
-    failing = [(unit, gives) for gives in SHARES for unit in range(units)]
+    failing = [
+        (seed, unit, gives)
+        for gives in SHARES
+        for unit in range(units)
+        for seed in range(first, first + arguments.thruster_seeds)
+    ]
     one_plant = partial(fly_plant, setting, arguments.seconds)
-    one_thruster = partial(fly_thruster, setting, first)
+    one_thruster = partial(_fly_failing, setting)
     plants = list(processes.each(one_plant, seeds, workers)) if seeds else []
     thrusters = list(processes.each(one_thruster, failing, workers)) if failing else []
     return ExperimentReport(
@@ -241,6 +272,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="let each thruster fail in turn",
+    )
+    parser.add_argument(
+        "--thruster-seeds", type=whole(1, 1000), default=1, help="flights of each that fails"
     )
     parser.add_argument("--seed", type=int, default=1000, help="of the first plant")
     parser.add_argument(

@@ -214,6 +214,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """By side: `phone` (or its link), `robot` (its link), `server` (its computer stood still)."""
     warnings: list[str] = []
     """What who arms should know, each in words; refuses nothing."""
+    thrusters_weak: list[str] = []
+    """Each thruster that does not give what it is told, in words; arming is refused."""
     server: dict[str, float] = {}
     """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
     while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a

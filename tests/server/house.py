@@ -63,6 +63,7 @@ def control_status(**changes: object) -> ControlStatus:
         "resumes": False,
         "gaps": {},
         "warnings": [],
+        "thrusters_weak": [],
     }
     return ControlStatus(**{**values, **changes})
 

@@ -240,7 +240,11 @@ HAZARDS: Final = (
         ),
     ),
     Hazard(
-        "29", "A thruster is dead or weak", "tilt and error beyond their limits", "borne, or RAMP"
+        "29",
+        "A thruster is dead or weak",
+        "what the body feels, against what its thrusters were told",
+        "named on both pages, wrenches shared anew; arming is refused; who can't hover: RAMP",
+        ("pipeline/control/test_thruster_health.py::test_who_fails_is_named_soon_and_alone",),
     ),
     Hazard(
         "31",

@@ -15,7 +15,7 @@ from server.experiments.plants import PlantRow, Setting, ThrusterRow, drawn, fly
 
 AMES = load_robot("ames")
 PLANT = PlantRow(1000, 3.5, 25.0, 4.0, 5.0, 1.25, 0.3, 0.1, "")
-THRUSTER = ThrusterRow(0, 0.0, 5.0, 9.0, 2.0, "")
+THRUSTER = ThrusterRow(0, 0.0, 5.0, 9.0, 2.0, "", 0.3)
 
 
 def test_plants_are_drawn_over_the_whole_range_and_no_further() -> None:
@@ -52,6 +52,10 @@ def test_control_believes_the_file_and_the_plant_is_another() -> None:
         (replace(PLANT, ratio=1.26), THRUSTER, ["every plant: RMS"]),
         (replace(PLANT, ratio=nan), THRUSTER, ["every plant: RMS"]),
         (replace(PLANT, ended="3 s: fault"), THRUSTER, ["every plant: no flight"]),
+        (replace(PLANT, named="Thruster 2 ..."), THRUSTER, ["every plant: no thruster"]),
+        (PLANT, replace(THRUSTER, said_s=0.31), ["a thruster fails: said"]),
+        (PLANT, replace(THRUSTER, said_s=nan), ["a thruster fails: said"]),
+        (PLANT, replace(THRUSTER, wrong="Thruster 2 ..."), ["a thruster fails: no other"]),
         (PLANT, replace(THRUSTER, turn_deg=2.1), ["a thruster fails: turned"]),
         (PLANT, replace(THRUSTER, turn_deg=nan), ["a thruster fails: turned"]),
         (PLANT, replace(THRUSTER, ended="8 s: fault"), ["a thruster fails: no flight"]),
@@ -61,7 +65,7 @@ def test_each_goal_is_missed_by_what_it_is_about(
     plant: PlantRow, thruster: ThrusterRow, missed: list[str]
 ) -> None:
     held = goals([PLANT, plant], [THRUSTER, thruster])
-    assert len(held) == 4
+    assert len(held) == 7
     found = [goal for goal, good in held.items() if not good]
     assert len(found) == len(missed)
     assert all(goal.startswith(start) for goal, start in zip(found, missed, strict=True))
@@ -72,8 +76,11 @@ def test_nothing_is_promised_of_what_was_not_flown() -> None:
 
 
 @pytest.mark.slow
-def test_a_dead_thruster_turns_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dead_thruster_is_said_in_time_and_the_robot_stays_level(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(plants, "JUDGED_S", 1.0)
-    setting = Setting(AMES, TeleopConfig(), "steady")
-    whole, dead = (fly_thruster(setting, 1000, (0, gives)) for gives in (1.0, 0.0))
-    assert dead.turn_deg > 3.0 * whole.turn_deg
+    dead = fly_thruster(Setting(AMES, TeleopConfig(), "moving"), 1001, (1, 0.0))
+    assert dead.said_s <= plants.SAID_S
+    assert (dead.wrong, dead.ended) == ("", "")
+    assert dead.turn_deg <= plants.MOST_TURN_DEG

@@ -82,13 +82,13 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  arming({ ready, refusals, mode, warnings }) {
+  arming({ ready, refusals, mode, warnings, thrusters_weak: weak }) {
     const waiting = mode === 'DISARMED';
     this.text('ready', !waiting ? mode.toLowerCase() : ready ? 'ready' : `${refusals.length} to mend`);
     this.find('ready').className = `badge ${waiting ? (ready ? 'good' : 'bad') : ''}`;
     const fine = refusals.length === 0;
     this.list('refusals', fine ? ['Nothing is in the way'] : refusals);
-    this.list('warnings', warnings);
+    this.list('warnings', waiting ? warnings : [...weak, ...warnings]);
     this.find('refusals').firstElementChild?.classList.toggle('fine', fine);
   }
 

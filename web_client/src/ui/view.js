@@ -162,7 +162,10 @@ export class View {
     this.text('reason', advice?.title ?? own ?? state.status?.reason ?? '');
     const refusals = advice?.steps ?? (mode === 'DISARMED' && !state.standby ? state.status?.refusals ?? [] : []);
     this.list('refusals', refusals, MOST_REFUSALS);
-    this.list('warnings', !state.standby && (mode === 'DISARMED' || mode === 'ARMED') ? state.status?.warnings ?? [] : [], MOST_WARNINGS);
+    const calm = mode === 'DISARMED' || mode === 'ARMED';
+    // a weak thruster is news in flight; on the ground it stands among the refusals
+    const known = (calm ? state.status?.warnings : state.status?.thrusters_weak) ?? [];
+    this.list('warnings', state.standby ? [] : known, MOST_WARNINGS);
   }
 
   /** @param {{ seconds: number, share: number } | null} left Until the thrust fades. */
