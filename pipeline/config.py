@@ -139,6 +139,29 @@ class ComplianceConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class LeashConfig:
+    """How near to the end of its reach a robot that hangs may be led."""
+
+    enabled: bool = False
+    """Off: what it does to a robot that touches something is not measured yet."""
+    kept: float = 0.1
+    """Share of each thruster's largest thrust that no place may take up: it is left for control."""
+    free: float = 0.85
+    """Share of the reach within which the leash changes nothing, to the bit."""
+
+    def __post_init__(self) -> None:
+        """Refuse shares that are none.
+
+        Raises:
+            ValueError: a field out of its range.
+        """
+        for name in ("kept", "free"):
+            value = getattr(self, name)
+            if not 0.0 <= value < 1.0:
+                raise ValueError(f"leash.{name} is {value}: from 0 to below 1")
+
+
+@dataclass(frozen=True, slots=True)
 class FailsafeConfig:
     """Timers of the failsafe machine [s]; the ramp's length is the robot's (`Robot.ramp_s`)."""
 
@@ -233,6 +256,7 @@ class TeleopConfig:
     feedforward: FeedForwardConfig = field(default_factory=FeedForwardConfig)
     allocation: AllocationConfig = field(default_factory=AllocationConfig)
     compliance: ComplianceConfig = field(default_factory=ComplianceConfig)
+    leash: LeashConfig = field(default_factory=LeashConfig)
     margins: MarginsConfig = field(default_factory=MarginsConfig)
     gates: GatesConfig = field(default_factory=GatesConfig)
     failsafe: FailsafeConfig = field(default_factory=FailsafeConfig)

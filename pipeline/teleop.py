@@ -13,6 +13,7 @@ from pipeline.control.actuation import Actuation
 from pipeline.control.flight_envelope import Ages
 from pipeline.control.hold import Hold
 from pipeline.control.leading import PLAIN, Leading, aim_of, led, suits
+from pipeline.control.leash import Leashed, leash_of
 from pipeline.control.pid import PoseError, Reference, pose_error
 from pipeline.control.place import SuspendedPlace
 from pipeline.control.station import StationKeeping
@@ -88,6 +89,8 @@ class Output:
     """In force since the last press."""
     error: PoseError | None
     saturated: bool
+    at_limit: bool
+    """It is led to where its thrusters can't hold it, and stays at the border of its reach."""
     ages: Ages
     thrusters: tuple[str, ...] = ()
     """Those that don't give what they are told, in words."""
@@ -122,6 +125,7 @@ class Teleop:
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
         self._place = SuspendedPlace(robot, config.feedforward.thrust_lag_s)
+        self._leash = leash_of(robot, config.leash)
         self._leading = self.next_leading = PLAIN
         self._aim: Reference | None = None
         self._force_in_b = self._given_in_b = np.zeros(3)
@@ -160,23 +164,26 @@ class Teleop:
         # the reference moves before its error is taken: else a period of the way back is missing
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
-        error = self._error(known)  # Eq. (14)-(19)
+        wished = self._error(known)  # Eq. (14)-(19)
+        leashed = self._leashed(known, wished)
         ages = Ages(
             inputs.t - self._operator.t,
             inputs.t - self._t_seen,
             inputs.t - self._t_phone,
             inputs.t - self._body.t,
         )
-        # the machine decides by this period's error, and its mode holds for these thrusts already:
-        # whoever lets go gets no thrust of tracking any more
-        judged = self._judge(inputs, known, error, ages)
+        # the machine decides by this period's error, the leash left aside: a robot far from where
+        # it is led ends the flight all the same. The mode holds for these thrusts already: whoever
+        # lets go gets no thrust of tracking any more
+        judged = self._judge(inputs, known, wished, leashed, ages)
         before = self._failsafe.mode
         self._failsafe = failsafe.step(self._failsafe, judged, dt_ms, self._limits)
         if self._failsafe.mode != before:
-            known, error = self._change_mode(before, known, error)
+            known, wished = self._change_mode(before, known, leashed)
+            leashed = self._leashed(known, wished)
         # last, what was given: feed-forward takes it off the next period's specific force
-        thrusts, saturated = self._act(known, error)
-        self._aim = self._aim_now(known, error)
+        thrusts, saturated = self._act(known, leashed)
+        self._aim = self._aim_now(known, wished)
         self._thrusts = thrusts
         self._given_in_b = self._actuation.A[:3] @ thrusts - self._actuation.push_in_b[:3]
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
@@ -193,8 +200,9 @@ class Teleop:
             view=known.view if known is not None else None,
             reference=self._aim,
             leading=self._leading,
-            error=error,
+            error=leashed.error if leashed is not None else None,
             saturated=saturated,
+            at_limit=leashed is not None and leashed.at_limit,
             ages=ages,
             thrusters=self._thruster_health.words,
         )
@@ -281,8 +289,24 @@ class Teleop:
             return error
         return led(error, known.view, shares_in_f, self._place.x_in_f, self._place.v_in_f)
 
+    def _leashed(self, known: Situation | None, error: PoseError | None) -> Leashed | None:
+        """The error that is to vanish: to where the robot can be held."""
+        if known is None or error is None:
+            return None
+        reference = self._reference
+        if self._leash is None or reference is None or self._failsafe.mode != Mode.TRACK:
+            return Leashed(error)
+        R_fv, place = known.view.R_fv, self._place
+        R_fr = R_fv @ reference.R_vr
+        return self._leash.hold(error, R_fv, R_fr, place.from_rest_in_f, place.v_in_f)
+
     def _judge(
-        self, inputs: Inputs, known: Situation | None, error: PoseError | None, ages: Ages
+        self,
+        inputs: Inputs,
+        known: Situation | None,
+        error: PoseError | None,
+        leashed: Leashed | None,
+        ages: Ages,
     ) -> failsafe.FailsafeInputs:
         limits, is_tracking = self._config.envelope, self._failsafe.mode == Mode.TRACK
         return failsafe.FailsafeInputs(
@@ -295,7 +319,7 @@ class Teleop:
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
             or self._astray(known)
-            or self._blocked(),
+            or self._blocked(leashed),
             refusals=(*inputs.refusals, *map(MEND.format, self._thruster_health.words)),
             requests=inputs.requests,
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
@@ -326,14 +350,17 @@ class Teleop:
         near = resumption.is_near(self._config.resumption, self._led_to, known.relative)
         return "" if near else "Too far from where it was led."
 
-    def _blocked(self) -> str:
+    def _blocked(self, leashed: Leashed | None) -> str:
         """Why it must not go on by a share: its place is wrong, and it would bounce."""
-        is_led = self._failsafe.mode == Mode.TRACK and self._leading.needs_place
-        touches = is_led and self._place.is_pushed
-        return "It touches something: lead by all of the motion." if touches else ""
+        if self._failsafe.mode != Mode.TRACK or not self._place.is_pushed:
+            return ""
+        if self._leading.needs_place:
+            return "It touches something: lead by all of the motion."
+        is_held = leashed is not None and leashed.shares_in_f is not None
+        return "It touches something at the end of its reach." if is_held else ""
 
     def _change_mode(
-        self, before: Mode, known: Situation | None, error: PoseError | None
+        self, before: Mode, known: Situation | None, leashed: Leashed | None
     ) -> tuple[Situation | None, PoseError | None]:
         """Bumpless: tracking starts where the robot is, holding starts from what tracking did."""
         mode = self._failsafe.mode
@@ -358,8 +385,8 @@ class Teleop:
             R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
             constant_in_f = self._tracking.constant_force_in_f
             self._hold.start(self._force_in_b, R_fb, u_in_f, constant_in_f)
-            if error is not None:
-                offset_in_f = known.view.R_fv @ error.e_p_in_v
+            if leashed is not None:
+                offset_in_f = known.view.R_fv @ leashed.error.e_p_in_v
                 self._station.start(offset_in_f, constant_in_f)
         # after a gap the velocity is the station's, which dead reckoning has kept
         if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._keeps_station:
@@ -409,15 +436,21 @@ class Teleop:
             return
         self._reference = resumption.toward(self._config.resumption, reference, led_to, self._h)
 
-    def _act(self, known: Situation | None, error: PoseError | None) -> tuple[Array, bool]:
+    def _shares_in_f(self, leashed: Leashed) -> Array | None:
+        """(3, 3) what of the reference's motion is to be gone; None: all of it."""
+        led_in_f = self._leading.shares_in_f
+        if led_in_f is None:
+            return leashed.shares_in_f
+        return np.diag(led_in_f) if leashed.shares_in_f is None else leashed.shares_in_f * led_in_f
+
+    def _act(self, known: Situation | None, leashed: Leashed | None) -> tuple[Array, bool]:
         """Wrench of the mode, given by the thrusters, under the failsafe's ceiling."""
         mode, reference = self._failsafe.mode, self._reference
         omega_m_bf_in_b = self._body.omega_m_bf_in_b
-        if mode == Mode.TRACK and known and reference and error:
+        if mode == Mode.TRACK and known and reference and leashed:
             R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
-            shares_in_f = self._leading.shares_in_f
             wrench_in_b = self._tracking.wrench(  # Eq. (20)
-                known, reference, error, self._h, shares_in_f
+                known, reference, leashed.error, self._h, self._shares_in_f(leashed)
             )
             self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._h)
         elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
@@ -429,8 +462,8 @@ class Teleop:
             return np.zeros(self._robot.A.shape[1]), False
         given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
         self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
-        if mode == Mode.TRACK and error is not None and known is not None:
-            self._tracking.learn(error, known.view, given.missing_in_b, self._h)
+        if mode == Mode.TRACK and leashed is not None and known is not None:
+            self._tracking.learn(leashed.error, known.view, given.missing_in_b, self._h)
         if not np.isfinite(given.thrusts).all():
             return np.zeros_like(given.thrusts), True
         return given.thrusts * failsafe.ceiling(self._failsafe, self._limits), given.saturated

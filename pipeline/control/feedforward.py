@@ -86,7 +86,7 @@ class FeedForward:
             view: The robot from v.
             p_rv_in_v: Where the robot should be, constant in v [m].
             h: Since the last call [s].
-            shares_in_f: (3,) of its acceleration, if the robot is to go only these.
+            shares_in_f: (3, 3), of its acceleration, if the robot is to go only these.
         """
         quick = _share(2.0 * pi * self._config.low_pass_hz * h)
         turning_in_v = self._turning(view.omega_vf_in_v, p_rv_in_v, quick, h)
@@ -97,7 +97,7 @@ class FeedForward:
         once, twice = self._a_in_f
         once = once + quick * (a_in_f - slow - once)
         self._a_in_f = once, twice + quick * (once - twice)
-        a_r_in_f = self._a_in_f[1] if shares_in_f is None else shares_in_f * self._a_in_f[1]
+        a_r_in_f = self._a_in_f[1] if shares_in_f is None else shares_in_f @ self._a_in_f[1]
         force_in_f = self._m * a_r_in_f - (self._pull_in_f - self._pull_at_start_in_f)
         force_in_b = view.R_vb.T @ (view.R_fv.T @ force_in_f)
         return np.concatenate((force_in_b, self._J * (view.R_vb.T @ self._omega_rate_v)))

@@ -26,6 +26,8 @@ from pipeline.control.feedforward import G_IN_F
 from pipeline.frames import Array
 from pipeline.robot import Robot
 
+REST_S: float = 5.0
+"""How fast is learnt what is felt at rest, thrusters off [s]: two swings of the AMES."""
 POLES: float = 3.0
 """ω [1/s]: the pendulum's own is 2.7. Faster, thrusters' lag and damping count for motion; slower,
 an error of the vertical, which the accelerometer takes for a / ω²."""
@@ -48,6 +50,7 @@ class SuspendedPlace:
         self._thrust_in_f, self._bias_in_f = np.zeros(3), np.zeros(3)
         self._p_in_f, self._p_start_in_f = np.zeros(3), np.zeros(3)
         self._stiffness_in_f, self._push_in_f = robot.stiffness_in_f, np.zeros(3)
+        self._rest_in_f, self._rested_s = np.zeros(3), 0.0
         self.v_in_f: Array = np.zeros(3)
         """Velocity of the body (3,) [m/s]."""
 
@@ -61,6 +64,15 @@ class SuspendedPlace:
     def is_pushed(self) -> bool:
         """Whether something else than thrusters and suspension has pushed just now: x is wrong."""
         return float(self._push_in_f @ self._push_in_f) > PUSHED_N**2
+
+    @property
+    def from_rest_in_f(self) -> Array:
+        """Displacement of the body from where it hangs without thrust (3,) [m].
+
+        The accelerometer's bias and the tilt's error at rest are taken off it.
+        """
+        x_in_f: Array = self._p_in_f - self._rest_in_f
+        return x_in_f
 
     def start(self) -> None:
         """From here on its displacement is counted."""
@@ -79,6 +91,10 @@ class SuspendedPlace:
         self._thrust_in_f = self._thrust_in_f + given * (R_fb @ force_in_b - self._thrust_in_f)
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         pulled_in_f = self._softness_in_f * (self._thrust_in_f - self._m * a_in_f)
+        if not force_in_b.any():
+            self._rested_s += h
+            share = max(1.0 - exponential(-h / REST_S), h / self._rested_s)
+            self._rest_in_f = self._rest_in_f + share * (pulled_in_f - self._rest_in_f)
         e_in_f = pulled_in_f - self._p_in_f - self._lead_s * self.v_in_f
         push_in_f = self._stiffness_in_f * e_in_f - self._push_in_f
         self._push_in_f = self._push_in_f + (1.0 - exponential(-h / PUSHED_S)) * push_in_f

@@ -68,7 +68,7 @@ class Tracking:
     ) -> Array:
         """Force and torque in b (6,) [N, N m], `h` [s] after the last. Eq. (20).
 
-        `shares_in_f` (3,) of the reference's motion are to be gone; None: all of it.
+        `shares_in_f` (3, 3) of the reference's motion are to be gone; None: all of it.
         """
         wrench_in_b = self._pid.wrench(error, now.view)
         if self._looks_ahead:

@@ -97,3 +97,14 @@ def test_a_knock_is_told_from_thrust_and_swing() -> None:
         knock = R_FB.T @ np.array([-10.0 / ROBOT.mass, 0.0, 0.0])
         swing.place.propagate(R_FB.T @ UP + BIAS + knock, R_FB, np.zeros(3), H)
     assert swing.place.is_pushed
+
+
+def test_the_way_from_its_rest_is_known_though_the_accelerometer_is_off() -> None:
+    swing = Swing(BIAS, R_FB)
+    for _ in range(round(8.0 / H)):
+        swing.step(np.zeros(3))
+    for press_s in (1.0, 6.0):
+        swing.place.start()
+        for _ in range(round(press_s / H)):
+            swing.step(np.array([2.6, -1.3, 2.1]))
+    np.testing.assert_allclose(swing.place.from_rest_in_f, swing.x, atol=0.004)
