@@ -82,13 +82,17 @@ class ThrusterHealth:
         """(m,) share of what it is told that each gives: 1, or what was found."""
         self.words: tuple[str, ...] = ()
         """What people should know of each that gives less, counted from 1."""
+        self._omega, self._f = np.zeros(3), np.zeros(3)
         self.reset()
-        judge(*self._asked())  # compiles or loads the kernel here: never inside the loop
+        # compile or load the kernels here, of the very arrays of flight: never inside the loop
+        self._put(PERIOD_S)
+        judge(*self._asked())
+        self.start()
 
     def reset(self) -> None:
         """Somebody has mended them."""
         self.gains, self.words = np.ones_like(self.gains), ()
-        self._A = self._robot.A
+        self._A = self._robot.A.copy()
         self.start()
 
     def start(self) -> None:
@@ -112,12 +116,16 @@ class ThrusterHealth:
         share = 1.0 - exponential(-h / self._robot.thrust_lag_s)
         self._thrusts = self._thrusts + share * (self._on_their_way[0] - self._thrusts)
         self._k = (self._k + 1) % len(self._rows)
-        omega, f = body.omega_m_bf_in_b, body.a_m_bf_in_b
-        put_row(self._rows, self._k, self._A, self._inertia, omega, f, self._thrusts, h)
+        self._omega[:], self._f[:] = body.omega_m_bf_in_b, body.a_m_bf_in_b
+        self._put(float(h))
         self._filled += 1
         if self._filled < len(self._rows) or self._filled % EVERY or not self._can_tell:
             return False
         return self._found(judge(*self._asked()))
+
+    def _put(self, h: float) -> None:
+        sample = self._omega, self._f
+        put_row(self._rows, self._k, self._A, self._inertia, *sample, self._thrusts, h)
 
     def _asked(
         self,
@@ -180,7 +188,7 @@ class ThrusterHealth:
         gains[which] *= 1.0 - float(self._lost[which])
         gains[which] *= gains[which] > DEAD
         self.gains, self.words = gains, _words(gains)
-        self._A = self._robot.A * gains
+        self._A = np.ascontiguousarray(self._robot.A * gains)
         self.start()
 
 
