@@ -219,6 +219,16 @@ def load(path: Path) -> x509.Certificate:
     return x509.load_pem_x509_certificate(path.read_bytes())
 
 
+def fingerprint(authority: Path) -> str:
+    """SHA-256 of a certificate, as browsers and phones show it.
+
+    Raises:
+        OSError: there is no such file.
+        ValueError: it holds no certificate.
+    """
+    return load(authority).fingerprint(hashes.SHA256()).hex(":").upper()
+
+
 def _limits_of(authority: x509.Certificate) -> x509.NameConstraints:
     return authority.extensions.get_extension_for_class(x509.NameConstraints).value
 

@@ -81,8 +81,7 @@ def realtime(seconds: float) -> Iterator[Finding]:
 
 def certificates() -> Iterator[Finding]:
     """What phones will be shown."""
-    from server.security.tls import certificate, own_addresses
-    from server.web.trust_page import fingerprint
+    from server.security.tls import certificate, fingerprint, own_addresses
 
     try:
         made = certificate(state_directory())

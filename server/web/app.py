@@ -214,17 +214,17 @@ def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAP
         telemetry=NO_TELEMETRY,
         exception_handlers=HANDLERS,
         routes=[
-            Route("/", _file("index.html")),
-            Route("/supervisor", _file("supervisor.html")),
-            Route("/board", _file("board.html")),
-            Route("/screen", _file("screen.html")),
+            Route("/", page_file("index.html")),
+            Route("/supervisor", page_file("supervisor.html")),
+            Route("/board", page_file("board.html")),
+            Route("/screen", page_file("screen.html")),
             *api.routes(),
             APIWebSocketRoute("/ws/phone", pages.phone, dependencies=leads),
             APIWebSocketRoute("/ws/video", pages.video, dependencies=leads),
             APIWebSocketRoute("/ws/supervisor", pages.supervisor, dependencies=watches),
             APIWebSocketRoute("/ws/screen", pages.screen, dependencies=watches),
             *others,
-            *(Route(f"/{path.name}", _file(path.name)) for path in LOOKS),
+            *(Route(f"/{path.name}", page_file(path.name)) for path in LOOKS),
             Mount("/src", StaticFiles(directory=CLIENT / "src")),
         ],
     )
@@ -235,7 +235,9 @@ async def _openapi(request: Request) -> JSONResponse:
     return JSONResponse(request.app.openapi())
 
 
-def _file(name: str) -> Callable[[Request], Awaitable[Response]]:
+def page_file(name: str) -> Callable[[Request], Awaitable[Response]]:
+    """The route of a file of the pages."""
+
     async def file(_request: Request) -> Response:
         return FileResponse(CLIENT / name)
 

@@ -6,19 +6,17 @@ past a warning to learn what the warning means.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 from string import Template
 
-from cryptography.hazmat.primitives import hashes
 from markupsafe import escape
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from server.security.tls import load
-from server.web.app import CLIENT, authority_file
+from server.security.tls import fingerprint
+from server.web.app import CLIENT, authority_file, page_file
 
 STYLES = ("style.css", "trust.css")
 
@@ -40,18 +38,8 @@ def trust_app(authority: Path | None) -> Starlette:
     async def certificate(_request: Request) -> Response:
         return authority_file(authority)
 
-    looks = [Route(f"/{name}", _look(name)) for name in STYLES]
+    looks = [Route(f"/{name}", page_file(name)) for name in STYLES]
     return Starlette(routes=[Route("/", page), Route("/ca.crt", certificate), *looks])
-
-
-def fingerprint(authority: Path) -> str:
-    """SHA-256 of a certificate, as browsers and phones show it.
-
-    Raises:
-        OSError: there is no such file.
-        ValueError: it holds no certificate.
-    """
-    return load(authority).fingerprint(hashes.SHA256()).hex(":").upper()
 
 
 def _secure(request: Request) -> str:
@@ -60,10 +48,3 @@ def _secure(request: Request) -> str:
 
 async def _onward(request: Request) -> Response:
     return RedirectResponse(_secure(request), 308)
-
-
-def _look(name: str) -> Callable[[Request], Awaitable[Response]]:
-    async def look(_request: Request) -> Response:
-        return FileResponse(CLIENT / name)
-
-    return look
