@@ -26,7 +26,7 @@ from server.common.ranges import number, whole
 from server.common.text import Column, flights
 from server.control.process import teleop_config
 from server.experiments.runner import ExperimentReport, experiment
-from server.simulation.figures import result_of, rows_of
+from server.simulation.figures import result_of, rms, rows_of
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 MASS: Final = 0.30
@@ -186,9 +186,9 @@ def fly_thruster(setting: Setting, seed: int, failing: tuple[int, float]) -> Thr
     return ThrusterRow(
         thruster=thruster,
         gives=gives,
-        rms_mm=_rms(off_mm),
+        rms_mm=rms(off_mm),
         max_mm=float(off_mm.max(initial=0.0)) if len(off_mm) else nan,
-        turn_deg=_rms(turn_deg),
+        turn_deg=rms(turn_deg),
         ended=trace.left,
         said_s=min((t for word, t in words.items() if word.startswith(right)), default=nan),
         wrong=" ".join(word for word in words if not word.startswith(right)),
@@ -198,10 +198,6 @@ def fly_thruster(setting: Setting, seed: int, failing: tuple[int, float]) -> Thr
 def _fly_failing(setting: Setting, flight: tuple[int, int, float]) -> ThrusterRow:
     seed, thruster, gives = flight
     return fly_thruster(setting, seed, (thruster, gives))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else nan
 
 
 def goals(plants: Sequence[PlantRow], thrusters: Sequence[ThrusterRow]) -> Mapping[str, bool]:

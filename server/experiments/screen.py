@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import inf, nan, sqrt
+from math import inf, nan
 from pathlib import Path
 from typing import Final
 
@@ -25,7 +25,7 @@ from server.common.ranges import number, whole
 from server.common.text import Column, dashed, flights
 from server.control.process import teleop_config
 from server.experiments.runner import ExperimentReport, experiment
-from server.simulation.figures import SETTLE_S, result_of
+from server.simulation.figures import SETTLE_S, result_of, rms
 from server.simulation.screen import FRAMES_HZ, Display, ScreenSimulation
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
@@ -189,17 +189,17 @@ def rows_of(flown: Sequence[ScreenFlight]) -> list[ScreenRow]:
     by_case: dict[str, list[ScreenFlight]] = {}
     for one in flown:
         by_case.setdefault(one.case, []).append(one)
-    real = _rms([one.rms_mm for one in by_case[REAL]])
+    real = _over_all(by_case[REAL])
     return [_row(name, some, real) for name, some in by_case.items()]
 
 
 def _row(name: str, some: Sequence[ScreenFlight], real_mm: float) -> ScreenRow:
-    rms = _rms([one.rms_mm for one in some])
+    rms_mm = _over_all(some)
     return ScreenRow(
         case=name,
         flights=len(some),
-        rms_mm=rms,
-        ratio=rms / real_mm,
+        rms_mm=rms_mm,
+        ratio=rms_mm / real_mm,
         worst_mm=max((one.rms_mm for one in some), key=_nan_last),
         max_mm=max((one.max_mm for one in some), key=_nan_last),
         lag_ms=float(np.mean([one.lag_ms for one in some])),
@@ -208,8 +208,8 @@ def _row(name: str, some: Sequence[ScreenFlight], real_mm: float) -> ScreenRow:
     )
 
 
-def _rms(values: Sequence[float]) -> float:
-    return sqrt(float(np.mean(np.square(values))))
+def _over_all(some: Sequence[ScreenFlight]) -> float:
+    return rms(np.array([one.rms_mm for one in some]))
 
 
 def _nan_last(value: float) -> float:
@@ -237,7 +237,7 @@ def draw(flown: Sequence[ScreenFlight], path: Path) -> Path:
     figure, axes = panels(figsize=(8.0, 3.6))
     names = list(dict.fromkeys(one.case for one in flown))
     axes.plot([names.index(one.case) for one in flown], [one.rms_mm for one in flown], "o", ms=4)
-    real = _rms([one.rms_mm for one in flown if one.case == REAL])
+    real = _over_all([one for one in flown if one.case == REAL])
     axes.axhline(MOST_RATIO * real, color="k", lw=0.8, ls="--", label=f"{MOST_RATIO:g} × real")
     axes.set_xticks(range(len(names)), names, rotation=20, ha="right")
     axes.set_ylim(bottom=0.0)

@@ -134,7 +134,7 @@ class Offline:
             case PhoneImu() as sample if isinstance(record.body, Motion):
                 self._frame_pipeline.front_end.add_imu(sample)
                 self._inbox.append(sample)
-                self._felt(sample, record.body, now)
+                self._on_motion(sample, record.body, now)
             case TouchState() as operator:
                 self._inbox.append(operator)
             case EncodedFrame() as frame:
@@ -157,16 +157,16 @@ class Offline:
     def _see(self, frame: EncodedFrame) -> None:
         self._fit(frame.picture)
         detection = None if self._is_blind else self._frame_pipeline.see([frame])
-        self._looked(frame, detection)
+        self._on_detection(frame, detection)
         self._seen.append((frame, detection.pose if detection is not None else None))
         seen = detection.seen(self._frame_pipeline.camera) if detection is not None else None
         if seen is not None:
             self._inbox.append(seen)
 
-    def _felt(self, sample: PhoneImu, motion: Motion, now: float) -> None:
+    def _on_motion(self, sample: PhoneImu, motion: Motion, now: float) -> None:
         """What else is made of a motion sample: nothing."""
 
-    def _looked(self, frame: EncodedFrame, detection: Detection | None) -> None:
+    def _on_detection(self, frame: EncodedFrame, detection: Detection | None) -> None:
         """What else is made of a picture: nothing."""
 
 

@@ -50,12 +50,12 @@ def result_of(
         hand=scene.hand,
         seed=scene.seed,
         tracked_s=round(PERIOD_S * len(errors), 2),
-        rms_mm=1e3 * _rms(distance),
+        rms_mm=1e3 * rms(distance),
         max_mm=1e3 * float(distance.max(initial=0.0)),
-        rms_deg=float(np.rad2deg(_rms(np.linalg.norm(rows_of(trace.turn)[skip:], axis=1)))),
+        rms_deg=float(np.rad2deg(rms(np.linalg.norm(rows_of(trace.turn)[skip:], axis=1)))),
         estimate_rms_mm=1e3
-        * _rms(np.linalg.norm(rows_of(trace.estimate_error_in_c)[skip:], axis=1)),
-        chatter_n=_rms(steps.ravel()),
+        * rms(np.linalg.norm(rows_of(trace.estimate_error_in_c)[skip:], axis=1)),
+        chatter_n=rms(steps.ravel()),
         saturated_pct=100.0 * float(np.mean(trace.saturated[skip:] or [False])),
         found_pct=100.0 * trace.poses / max(1, trace.pictures),
         cpu_s=cpu_s,
@@ -68,5 +68,6 @@ def rows_of(values: Sequence[Array]) -> Array:
     return np.array(values) if values else np.zeros((0, 3))
 
 
-def _rms(values: Array) -> float:
+def rms(values: Array) -> float:
+    """Root of the mean square; NaN of none."""
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")

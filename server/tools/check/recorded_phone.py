@@ -94,11 +94,11 @@ class RecordedPhone(Offline):
         self._rates: list[Array] = []
         self._forces: list[Array] = []
         self._pictures: list[Arrival] = []
-        self._frames: list[EncodedFrame] = []
+        self._first: EncodedFrame | None = None
         self._bytes = 0
         self._looked_at = self._found = self._undecodable = self._undecodable_first = 0
         self._noise: list[float] = []
-        self._complaints: dict[str, float] = {}
+        self._complaints: list[str] = []
         self._sensors = SensorCheck()
         super().__init__(recording)
 
@@ -124,9 +124,7 @@ class RecordedPhone(Offline):
             tuple(self._motion),
             tuple(self._pictures),
         )
-        first = self._frames[0].picture if self._frames else None
-        for fault in self._sensors.faults():
-            self._complaints.setdefault(fault, recording.t_last)
+        first = self._first.picture if self._first is not None else None
         clock = self._ingest.clock
         return PhoneFigures(
             device=device_of(recording) or "unknown",
@@ -150,12 +148,12 @@ class RecordedPhone(Offline):
             found_pct=100.0 * self._found / self._looked_at if self._looked_at else nan,
             noise_px=float(np.median(self._noise)) if self._noise else nan,
             camera=camera_health.health(self._frame_pipeline.front_end),
-            complaints=tuple(self._complaints),
+            complaints=tuple(dict.fromkeys((*self._complaints, *self._sensors.faults()))),
             link=check(series, FailsafeConfig()),
         )
 
     def _new_sight(self) -> None:
-        if self._frames:
+        if self._first is not None:
             self._undecodable += self._frame_pipeline.undecodable
         super()._new_sight()
 
@@ -171,15 +169,15 @@ class RecordedPhone(Offline):
         if isinstance(record.body, Pong):  # else it was refused
             self._answers.append((1e-6 * record.body.server_time_us, now))
 
-    def _felt(self, sample: PhoneImu, motion: Motion, now: float) -> None:
+    def _on_motion(self, sample: PhoneImu, motion: Motion, now: float) -> None:
         self._motion.append((sample.t, now))
         self._rates.append(sample.omega_m_cf_in_c)
         self._forces.append(sample.a_m_cf_in_c)
         self._sensors.add_imu(sample.t, motion)
 
-    def _looked(self, frame: EncodedFrame, detection: Detection | None) -> None:
+    def _on_detection(self, frame: EncodedFrame, detection: Detection | None) -> None:
         self._pictures.append((frame.t, frame.t_received))
-        self._frames = self._frames or [frame]
+        self._first = self._first or frame
         self._bytes += len(frame.picture.data)
         if detection is None:
             return
@@ -188,8 +186,8 @@ class RecordedPhone(Offline):
         self._looked_at += 1
         self._sensors.add_detection(detection)
         complaint = self._frame_pipeline.front_end.complaint
-        if complaint:
-            self._complaints.setdefault(complaint, frame.t)
+        if complaint and complaint not in self._complaints:
+            self._complaints.append(complaint)
         if detection.pose is not None:
             self._found += 1
             spare = 2 * detection.pose.leds - POSE_UNKNOWNS
