@@ -398,7 +398,8 @@ class Teleop:
             )
         if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
             self._tracking.reset()
-        if before == Mode.STOPPED:  # a supervisor's reset: somebody has looked at the robot
+        # a supervisor's reset: somebody has looked at the robot
+        if before == Mode.STOPPED and self._thruster_health.words:
             self._thruster_health.reset()
             self._actuation.weaken(self._thruster_health.gains)
         if mode != Mode.COAST:

@@ -16,12 +16,12 @@ high end its rounding and the hand's tremor. F_pull is low-passed.
 
 from __future__ import annotations
 
-from math import exp as exponential
 from math import pi
 
 import numpy as np
 
 from pipeline.config import FeedForwardConfig
+from pipeline.control import low_pass
 from pipeline.frames import GRAVITY, Array, cross
 from pipeline.robot import Robot
 from pipeline.signals import RelativeState, VirtualView
@@ -63,11 +63,11 @@ class FeedForward:
             h: Since the last call [s].
         """
         thrust, pull = self._thrust_in_f, self._pull_in_f
-        self._thrust_in_f = thrust + _share(h / self._config.thrust_lag_s) * (
+        self._thrust_in_f = thrust + low_pass.share(h / self._config.thrust_lag_s) * (
             R_fb @ force_in_b - thrust
         )
         felt = self._m * (R_fb @ f_bf_in_b + G_IN_F) - self._thrust_in_f
-        self._pull_in_f = pull + _share(2.0 * pi * self._config.pull_hz * h) * (felt - pull)
+        self._pull_in_f = pull + low_pass.share(2.0 * pi * self._config.pull_hz * h) * (felt - pull)
 
     def wrench(
         self,
@@ -88,11 +88,11 @@ class FeedForward:
             h: Since the last call [s].
             shares_in_f: (3, 3), of its acceleration, if the robot is to go only these.
         """
-        quick = _share(2.0 * pi * self._config.low_pass_hz * h)
+        quick = low_pass.share(2.0 * pi * self._config.low_pass_hz * h)
         turning_in_v = self._turning(view.omega_vf_in_v, p_rv_in_v, quick, h)
         a_in_f = R_fc @ relative.f_cf_in_c + G_IN_F + view.R_fv @ turning_in_v
         slow = a_in_f if self._a_slow_in_f is None else self._a_slow_in_f
-        slow = slow + _share(2.0 * pi * self._config.high_pass_hz * h) * (a_in_f - slow)
+        slow = slow + low_pass.share(2.0 * pi * self._config.high_pass_hz * h) * (a_in_f - slow)
         self._a_slow_in_f = slow
         once, twice = self._a_in_f
         once = once + quick * (a_in_f - slow - once)
@@ -109,8 +109,3 @@ class FeedForward:
         rate = self._omega_rate_v
         self._omega_rate_v = rate + quick * ((omega - before) / h - rate)
         return cross(self._omega_rate_v, p) + cross(omega, cross(omega, p))
-
-
-def _share(x: float) -> float:
-    """Share of the way that a first-order low pass goes in `x` time constants."""
-    return 1.0 - exponential(-x)

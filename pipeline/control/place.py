@@ -18,10 +18,9 @@ What is left: 1° of tilt in R_fb is 2 cm for a cable of 1.3 m; a steady push of
 
 from __future__ import annotations
 
-from math import exp as exponential
-
 import numpy as np
 
+from pipeline.control import low_pass
 from pipeline.control.feedforward import G_IN_F
 from pipeline.frames import Array
 from pipeline.robot import Robot
@@ -87,17 +86,17 @@ class SuspendedPlace:
             force_in_b: Of the thrusters last commanded (3,) [N].
             h: Since the last call [s].
         """
-        given = 1.0 - exponential(-h / self._lag_s)
+        given = low_pass.share(h / self._lag_s)
         self._thrust_in_f = self._thrust_in_f + given * (R_fb @ force_in_b - self._thrust_in_f)
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         pulled_in_f = self._softness_in_f * (self._thrust_in_f - self._m * a_in_f)
         if not force_in_b.any():
             self._rested_s += h
-            share = max(1.0 - exponential(-h / REST_S), h / self._rested_s)
+            share = max(low_pass.share(h / REST_S), h / self._rested_s)
             self._rest_in_f = self._rest_in_f + share * (pulled_in_f - self._rest_in_f)
         e_in_f = pulled_in_f - self._p_in_f - self._lead_s * self.v_in_f
         push_in_f = self._stiffness_in_f * e_in_f - self._push_in_f
-        self._push_in_f = self._push_in_f + (1.0 - exponential(-h / PUSHED_S)) * push_in_f
+        self._push_in_f = self._push_in_f + low_pass.share(h / PUSHED_S) * push_in_f
         self._p_in_f = self._p_in_f + h * (self.v_in_f + self._l_1 * e_in_f)
         self.v_in_f = self.v_in_f + h * (a_in_f - self._bias_in_f + self._l_2 * e_in_f)
         self._bias_in_f = self._bias_in_f - h * POLES**3 * e_in_f

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from math import exp as exponential
-
 import numpy as np
 
 from pipeline.config import ResumptionConfig
+from pipeline.control import low_pass
 from pipeline.control.pid import Reference
 from pipeline.frames import exp, log
 from pipeline.signals import RelativeState
@@ -26,7 +25,7 @@ def toward(
     config: ResumptionConfig, reference: Reference, led_to: Reference, h: float
 ) -> Reference:
     """The reference after another `h` [s] on its way to `led_to`; no faster than is allowed."""
-    share = 1.0 - exponential(-h / config.settle_s)
+    share = low_pass.share(h / config.settle_s)
     offset_in_v = led_to.p_rv_in_v - reference.p_rv_in_v
     turn = log(reference.R_vr.T @ led_to.R_vr)
     way = min(share, h * config.max_speed_m_s / max(float(np.linalg.norm(offset_in_v)), 1e-9))

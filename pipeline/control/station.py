@@ -13,6 +13,7 @@ from math import exp as exponential
 import numpy as np
 
 from pipeline.config import StationConfig
+from pipeline.control import low_pass
 from pipeline.control.feedforward import G_IN_F
 from pipeline.control.pid import PoseError
 from pipeline.frames import Array
@@ -38,7 +39,7 @@ class StationKeeping:
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         # a mean at first: an offset must not count as speed until the high pass has forgotten it
         self._felt_s += h
-        share = max(1.0 - exponential(-h / self._config.bias_s), h / self._felt_s)
+        share = max(low_pass.share(h / self._config.bias_s), h / self._felt_s)
         self._a_slow_in_f = self._a_slow_in_f + share * (a_in_f - self._a_slow_in_f)
         v_in_f = self.v_in_f + h * (a_in_f - self._a_slow_in_f)
         self.v_in_f = v_in_f * exponential(-h / self._config.rest_s)

@@ -15,12 +15,12 @@ Willsky and Jones 1976 (generalised likelihood ratio), over windows in place of 
 from __future__ import annotations
 
 from collections import deque
-from math import exp as exponential
 from typing import Final
 
 import numpy as np
 
 from pipeline.config import PERIOD_S
+from pipeline.control import low_pass
 from pipeline.control.thruster_health_kernels import judge, put_row
 from pipeline.frames import Array
 from pipeline.robot import Robot
@@ -113,7 +113,7 @@ class ThrusterHealth:
         delay = round(self._robot.thrust_delay_s / PERIOD_S)
         while len(self._on_their_way) > delay + 1:
             self._on_their_way.popleft()
-        share = 1.0 - exponential(-h / self._robot.thrust_lag_s)
+        share = low_pass.share(h / self._robot.thrust_lag_s)
         self._thrusts = self._thrusts + share * (self._on_their_way[0] - self._thrusts)
         self._k = (self._k + 1) % len(self._rows)
         self._omega[:], self._f[:] = body.omega_m_bf_in_b, body.a_m_bf_in_b

@@ -13,10 +13,11 @@ from pipeline.so3_kernels import kernel
 def put_row(
     rows: Array, k: int, A: Array, inertia: Array, omega: Array, f: Array, u: Array, h: float
 ) -> None:
-    """Row k of (n, 14 + m), after row k − 1: what has been felt and predicted until now.
+    """Row k of (n, 16 + 2 m), after row k − 1: what has been felt and predicted until now.
 
     Sums since the beginning of h [s]; of the felt wrench, of the same less the thrusters', (6,)
-    each [N s, N m s]; of thrusts (m,) [N s]; the newest thrusts' own rate is taken from `u`.
+    each [N s, N m s]; of thrusts (m,) [N s]; then the thrusts of now (m,) [N], and the sum of the
+    gyroscopic torque (3,) [N m s].
 
     Args:
         rows: The ring.

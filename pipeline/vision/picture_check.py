@@ -175,7 +175,7 @@ class PictureCheck:
         if is_known and self._jumps.is_steadied:
             return self._name(seen, CameraLie(SHIFTED))
         self._refused.clear()
-        if not np.isfinite(track.fuse(near, self._doubted(seen, pose, misses[1]), len(seen.rays))):
+        if not np.isfinite(track.fuse(near, self._inflated(seen, pose, misses[1]), len(seen.rays))):
             self._begin(seen)
         self._acquit(seen.t)
         self._noise.add_innovation(max(miss.chi2 for miss in misses))
@@ -188,7 +188,7 @@ class PictureCheck:
             Judged(True, (max(doubted, key=_square),)) if doubted else FINE, pose
         )
 
-    def _doubted(
+    def _inflated(
         self, seen: VisionMeasurement, pose: RelativePose, near: Missed
     ) -> VisionMeasurement:
         """The same, believed less if it alone is beside its place.
