@@ -7,10 +7,13 @@ from dataclasses import replace
 from math import nan
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace as with_fields
 
-from server.recording.reader import read
+from pipeline.vision.detection import Detection
+from server.phone.ingest import EncodedFrame
+from server.recording.reader import Recording, read
 from server.tools.check.command import POOR, REFUSED, main
 from server.tools.check.page import page
 from server.tools.check.recorded_phone import PhoneFigures, RecordedPhone
@@ -64,6 +67,30 @@ def test_a_virtual_phone_shows_what_it_was_made_with(found: PhoneFigures) -> Non
     assert found.found_pct > 95.0
     assert 0.0 < found.noise_px < 0.3
     assert found.complaints == ()
+
+
+class Thinned(RecordedPhone):
+    """Of which every tenth picture is lost on its way."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.came, self.residuals = 0, list[float]()
+        super().__init__(recording)
+
+    def _on_detection(self, frame: EncodedFrame, detection: Detection | None) -> None:
+        self.came += 1
+        if detection is not None and detection.pose is not None:
+            assert detection.pose.leds == 5
+            self.residuals.append(detection.pose.reprojection_px)
+        if self.came % 10 != 5:
+            super()._on_detection(frame, detection)
+
+
+def test_pictures_that_are_missing_are_counted_and_residuals_are_no_noise_yet() -> None:
+    """Five LEDs leave 10 − 6 of their coordinates' errors to be seen: σ² = 5 r² / 4."""
+    thinned = Thinned(read(FLIGHT))
+    found = thinned.figures()
+    assert found.lost_pct == pytest.approx(10.0, abs=1.5)
+    assert found.noise_px == pytest.approx(1.118 * np.median(thinned.residuals), rel=0.05)
 
 
 def test_nothing_speaks_against_a_fine_phone(fine: PhoneFigures) -> None:
