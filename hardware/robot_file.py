@@ -28,6 +28,7 @@ from hardware.plant_parameters import (
 from hardware.robot_physics import allocation_matrix, faults
 from hardware.robot_schema import (
     AXES,
+    USUAL_PORTS,
     BodyImuSection,
     FlightControllerSection,
     RobotSchema,
@@ -66,6 +67,7 @@ class LinkParameters:
     """Who stops it in silence, beside its link; "" if nobody is named."""
     host: str
     port: int
+    """There, or ours if the robot is the one who calls."""
     max_rise: float
     """How much more a thruster may be told than one command before [N]."""
 
@@ -248,7 +250,7 @@ def _converted(schema: RobotSchema) -> RobotFile:
         schema.link.kind,
         schema.link.stopped_by or "",
         schema.link.host,
-        schema.link.port,
+        schema.link.port or USUAL_PORTS[schema.link.kind],
         schema.link.max_rise_per_command_n,
     )
     return RobotFile(

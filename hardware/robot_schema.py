@@ -131,15 +131,21 @@ class GainsSection(Section):
     """[N s/m, N m s/rad]."""
 
 
+USUAL_PORTS = {"rpit": 31415}
+"""UDP ports of kinds of links that have one which everybody uses."""
+
+
 class LinkSection(Section):
     """[link]: how control reaches the robot; see `link/registry.py`."""
 
     kind: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")] = "udp"
-    """`udp` is our own link, others come by the entry points `lightleash.followers`."""
+    """`udp` is our own link, `rpit` RPIt's; others by the entry points `lightleash.followers`."""
     stopped_by: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     """Who or what stops the robot when it hears nothing, if its link does not see to that."""
     host: Annotated[str, Field(min_length=1, max_length=253)]
-    port: Annotated[int, Field(ge=1, le=65535)]
+    """The robot's; with `rpit` 0.0.0.0 is whoever speaks first."""
+    port: Annotated[int, Field(ge=1, le=65535)] | None = None
+    """Where the robot listens; with `rpit`, where we do. May be missing if it has a usual one."""
     max_rise_per_command_n: Positive
 
 
@@ -188,6 +194,8 @@ class RobotSchema(Section):
 
 def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
     """Keys that contradict each other: (key, what would be allowed)."""
+    if robot.link.port is None and robot.link.kind not in USUAL_PORTS:
+        yield "link.port", f"missing: a link of kind {robot.link.kind!r} has no usual one"
     if robot.flight_controller is not None:
         yield from _miswired(robot.flight_controller, len(robot.thrusters.units))
     if len(set(robot.axes)) < len(robot.axes):

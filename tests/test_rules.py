@@ -18,6 +18,7 @@ CLOCKS = {
     "hardware/sim/network/emulated_link.py": "a line between two networks, a process of its own",
     "hardware/sim/truth.py": "patience for an answer, in whatever process asks",
     "hardware/link/udp.py": "a default, in whatever process has the link",
+    "hardware/link/rpit/rpit_follower.py": "the same",
 }
 """Who reads a clock, and why."""
 READINGS = {

@@ -93,6 +93,14 @@ class ControlEnd:
         Raises:
             FollowerError: a command no robot may be told.
         """
+        return encode_command(self.next_command(command, now), self._key)
+
+    def next_command(self, command: ThrustCommand, now: float) -> CommandDatagram:
+        """The same, for a link that writes it in bytes of its own.
+
+        Raises:
+            FollowerError: a command no robot may be told.
+        """
         check_command(command, self.thrusters, self._f_max)
         if not command.armed and self._newest and self._is_outdated(self._newest):
             self._renew(self._newest)
@@ -101,17 +109,14 @@ class ControlEnd:
         challenge = self._new_challenge()
         self._sent_at[self._counter % SENT_KEPT] = now
         self._challenges[self._counter % SENT_KEPT] = challenge
-        return encode_command(
-            CommandDatagram(
-                epoch=self.epoch,
-                counter=self._counter,
-                nonce=self._newest.nonce if self._newest else 0,
-                challenge=challenge,
-                armed=command.armed,
-                thrusts=tuple(self._last.tolist()),
-                stop=command.stop,
-            ),
-            self._key,
+        return CommandDatagram(
+            epoch=self.epoch,
+            counter=self._counter,
+            nonce=self._newest.nonce if self._newest else 0,
+            challenge=challenge,
+            armed=command.armed,
+            thrusts=tuple(self._last.tolist()),
+            stop=command.stop,
         )
 
     def blink(self, order: BlinkOrder) -> bytes:
@@ -126,6 +131,10 @@ class ControlEnd:
         except LinkError:
             self.dropped += 1
             return None
+        return self.believe(sample, now)
+
+    def believe(self, sample: SampleDatagram, now: float) -> BodySample | None:
+        """The same of what a link has read in bytes of its own."""
         if len(sample.thrusts) != self.thrusters or not self._is_believed(sample):
             self.dropped += 1
             return None

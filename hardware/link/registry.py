@@ -13,6 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 from hardware.follower import Follower, FollowerError
 from hardware.link import udp
+from hardware.link.rpit import rpit_follower
 from hardware.robot_file import RobotFile
 
 GROUP = "lightleash.followers"
@@ -35,7 +36,10 @@ class LinkKind:
     """Both ends share a key of `lightleash robot key`."""
 
 
-OWN = {"udp": LinkKind(udp.connect, stops_in_silence=True, keyed=True)}
+OWN = {
+    "udp": LinkKind(udp.connect, stops_in_silence=True, keyed=True),
+    "rpit": LinkKind(rpit_follower.connect, stops_in_silence=False, keyed=False),
+}
 
 
 def link_kind(name: str) -> LinkKind:

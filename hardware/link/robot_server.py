@@ -127,7 +127,11 @@ def bound(address: Address) -> socket.socket:
     """A UDP socket that does not wait."""
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     made.setblocking(False)
-    made.bind(address)
+    try:
+        made.bind(address)
+    except OSError:
+        made.close()
+        raise
     return made
 
 

@@ -1,5 +1,6 @@
 """The robot's link: datagrams and both ends, with its key: fuzzed is what lies behind the MAC."""
 
+import struct
 from math import isfinite
 
 import numpy as np
@@ -21,6 +22,7 @@ from hardware.link.datagram import (
 )
 from hardware.link.link_key import MAC_BYTES, mac
 from hardware.link.robot_end import LinkLimits, RobotEnd
+from hardware.link.rpit.structs import decode_con
 from tests.fuzz.sequence import pieces, together
 from tests.fuzz.target import target
 
@@ -80,6 +82,26 @@ def sample(data: bytes) -> None:
     assert 0 <= decoded.t_us < 1 << 60
     assert encode_sample(decoded, KEY)[: len(data)] == data
     assert data[:4] == SAMPLE_MAGIC
+
+
+def con_seeds():
+    for m, state in ((1, 0.0), (8, 1.0), (16, 4.0)):
+        head = [1.0, float(m), 5.0, 7.0, 2.0**53 - 1.0, 11.0, 13.0, state, 2.0, 17.0]
+        values = [*head, 0.1, 0.2, 0.3, 0.0, 0.0, 9.8, *m * [0.5], *(134 - m) * [0.0]]
+        yield struct.pack("<I4xQ150d", 3141592, 10**15, *values)
+
+
+@target("rpit_con", con_seeds, (LinkError,), max_bytes=1300, mutants=4000)
+def rpit_con(data: bytes) -> None:
+    """What is taken of RPIt's struct are its numbers, whole or finite as they have to be."""
+    con = decode_con(data)
+    values, said = struct.unpack("<I4xQ150d", data)[2:], con.sample
+    assert 1 <= len(said.thrusts) <= MAX_THRUSTERS
+    assert all(map(isfinite, (*said.omega_in_b, *said.a_in_b, *said.thrusts)))
+    assert said.boot_id > 0
+    assert said.t_us == said.nonce > 0
+    head = (said.epoch, said.accepted, said.challenge, said.boot_id, said.t_us, said.state)
+    assert values[2:8] == tuple(map(float, head))
 
 
 def blink_seeds():

@@ -100,6 +100,7 @@ MISTAKES = {
     "text for a number": ("mass_kg = 3.5", 'mass_kg = "3.5"', "body.mass_kg", "number"),
     "true for a number": ("mass_kg = 3.5", "mass_kg = true", "body.mass_kg", "number"),
     "a fraction for a port": ("port = 47001", "port = 1.5", "link.port", "integer"),
+    "a link without its port": ("port = 47001", "", "link.port", "of kind 'udp' has no usual"),
     "not a number": ("mass_kg = 3.5", "mass_kg = nan", "body.mass_kg", "finite"),
     "infinite": ("f_max_n = 3.0", "f_max_n = inf", "thrusters.f_max_n", "finite"),
     "negative mass": ("mass_kg = 3.5", "mass_kg = -1", "body.mass_kg", "greater than 0.05"),

@@ -29,3 +29,11 @@ def test_one_that_flies_and_does_not_keep_its_attitude_may_not():
     assert never_upright(replace(load_robot("quadrotor"), keeps_attitude_in_ramp=False)) == UPRIGHT
     for name in ("ames", "ground"):
         assert never_upright(replace(load_robot(name), keeps_attitude_in_ramp=False)) == ""
+
+
+def test_one_behind_rpits_block_which_stops_nothing_is_armed_only_if_its_file_says_who_does():
+    ames = load_robot("ames")
+    rpit = replace(ames, link=replace(ames.link, kind="rpit"))
+    assert unfit(rpit, GRANTED, real=True) == STOPPED_BY_NOBODY
+    said = replace(ames.link, kind="rpit", stopped_by="the model, by docs/rpit.md")
+    assert unfit(replace(ames, link=said), GRANTED, real=True) == ""
