@@ -166,7 +166,8 @@ def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
         return
     yield RobotFinding("link", True, f"{link.kind} to {link.host}, port {link.port}")
     falls = never_upright(robot_file) or never_stops(robot_file)
-    yield RobotFinding("in silence", not falls, falls or "the robot stops by itself")
+    stops = "the robot stops by itself" if kind.stops_in_silence else f"stops: {link.stopped_by}"
+    yield RobotFinding("in silence", not falls, falls or stops)
     if kind.keyed:
         has = key_file(state, name).exists()
         lacks = f"no key: `lightleash robot key {name}` (a simulated robot needs none)"

@@ -41,12 +41,21 @@ def changed(tmp_path, *changes):
         ("lag_s = 0.025", "lag_s = 0.6", {"any gains"}),
         ('host = "127.0.0.1"', 'host = "10.0.0.9"', {"key"}),
         ("[link] ", '[link]\nkind = "udq"\n# ', {"link"}),
+        ("[link] ", '[link]\nkind = "rpit"\n# ', {"in silence"}),
     ],
 )
 def test_what_speaks_against_flying_is_named(old, new, against, capsys, tmp_path):
     code, found = findings(capsys, changed(tmp_path, (old, new)), tmp_path)
     assert code == 1
     assert {what for what, one in found.items() if not one["ok"]} == against
+
+
+@pytest.mark.slow
+def test_who_stops_a_robot_in_silence_is_said(capsys, tmp_path):
+    link = '[link]\nkind = "rpit"\nstopped_by = "a relay on the battery"\n# '
+    code, found = findings(capsys, changed(tmp_path, ("[link] ", link)), tmp_path)
+    assert code == 0
+    assert found["in silence"]["said"] == "stops: a relay on the battery"
 
 
 def test_authority_is_what_thrusts_within_their_limits_give_and_no_more():
