@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
 from pipeline.estimation.bias_steps import BiasSteps
 from pipeline.estimation.estimator import Fusion, Health
+from pipeline.estimation.misdated_picture import MisdatedPictures
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
 from pipeline.estimation.relative_noise import initial_biases
@@ -49,7 +50,7 @@ class RelativeFilter:
 
     def __init__(self, config: RelativeConfig, leds_in_b: Array) -> None:
         """Knows nothing until the first picture with a pose and samples of both IMUs near it."""
-        self._config, self._leds = config, len(leds_in_b)
+        self._config, self._leds_in_b = config, leds_in_b
         self._track = RelativeTrack(config, leds_in_b)
         self._initial = initial_biases(config)
         self.pictures: Counter[Fusion] = Counter()
@@ -73,7 +74,7 @@ class RelativeFilter:
         self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
         self._offset = OffsetMonitor()
         self._adaptive_noise, self._spot_noise = AdaptiveNoise(), SpotNoise()
-        self._bias_steps = BiasSteps(self._initial)
+        self._bias_steps, self._misdated = BiasSteps(self._initial), MisdatedPictures()
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
@@ -105,7 +106,7 @@ class RelativeFilter:
         return fusion
 
     def _judge(self, seen: VisionMeasurement, now: float) -> Fusion:
-        if not is_believable(seen, self._leds):
+        if not is_believable(seen, len(self._leds_in_b)):
             return Fusion.INVALID
         if len(seen.rays) == 0:
             return Fusion.BLIND
@@ -131,15 +132,22 @@ class RelativeFilter:
             return Fusion.STARTED
         return self._fuse(seen, predicted, now)
 
-    def _inflation(
+    def _doubted(
         self, seen: VisionMeasurement, predicted: Checkpoint[VisionMeasurement]
-    ) -> float:
-        """How far what is predicted must be doubted for this picture; learns of the sensors."""
+    ) -> tuple[VisionMeasurement, float]:
+        """What is believed of it, and how far what is predicted must be doubted for it.
+
+        Learns of the sensors, if it is not the date that is wrong.
+        """
         dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
-            return 1.0
+            return seen, 1.0
         track, C = self._track, seen.pose.covariance
         e, P = _missed(seen.pose, predicted), track.in_picture(predicted)
+        passing = track.passing(predicted)
+        misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
+        if misdated is not None:
+            return misdated, 1.0
         moved = self._bias_steps.learn(predicted.t, e, P + C, predicted.P)
         track.walk(self._bias_steps.walks)
         if moved.any():
@@ -149,13 +157,14 @@ class RelativeFilter:
             self._adaptive_noise = AdaptiveNoise()  # another sensor was at fault
         inflation = self._adaptive_noise.judge(e, P, C)
         track.doubt_phone(self._adaptive_noise.factor)
-        return inflation
+        return seen, inflation
 
     def _fuse(
         self, seen: VisionMeasurement, here: Checkpoint[VisionMeasurement], now: float
     ) -> Fusion:
         """Fuse, or begin again when too many pictures in a row didn't fit."""
-        chi2 = self._track.fuse(here, seen, len(seen.rays), self._inflation(seen, here))
+        seen, inflation = self._doubted(seen, here)
+        chi2 = self._track.fuse(here, seen, len(seen.rays), inflation)
         self._recent.append(seen.t)
         used = int((here.use == 1).sum()) if here.use is not None else 0
         self.leds_rejected += len(seen.rays) - used

@@ -119,12 +119,15 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
 
         The pose passes at ṗ = u − ω_c × p, Ṙ = R [ω_b − Rᵀ ω_c]×.
         """
-        felt, p = self._inputs(here), here.x[0:3]
         passing = np.eye(6, 7)
-        passing[0:3, 6] = here.x[3:6] - cross(felt[6:9], p)
-        passing[3:6, 6] = felt[0:3] - here.R.T @ felt[6:9]
+        passing[:, 6] = self.passing(here)
         P: Array = passing @ here.P[TOUCHED[:, None], TOUCHED] @ passing.T
         return P
+
+    def passing(self, here: Checkpoint[VisionMeasurement]) -> Array:
+        """(6,) how the pose passes there: ṗ in c [m/s], the attitude's rate in b [rad/s]."""
+        felt, p = self._inputs(here), here.x[0:3]
+        return np.concatenate((here.x[3:6] - cross(felt[6:9], p), felt[0:3] - here.R.T @ felt[6:9]))
 
     def inputs_now(self) -> Array:
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""

@@ -27,6 +27,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.camera.verdict import FOCAL, SURE
+from pipeline.estimation.believed_less import widened
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, X_BIASES, X_OFFSET
 from pipeline.estimation.relative_start import Learnt, can_start, first_checkpoint
@@ -37,7 +38,7 @@ from pipeline.imu_stream import ImuStream
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, VisionMeasurement
 from pipeline.vision.camera_lies import SHIFTED, CameraLie, is_far, named, scaled
 from pipeline.vision.check_noise import CheckNoise
-from pipeline.vision.rays import NO_RAYS, widened
+from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.steadied_picture import SteadiedPicture
 
 LAG_S: Final = 0.25

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from pipeline.camera.lens import Camera
 from pipeline.camera.lens_kernels import put_tangents
-from pipeline.frames import Array
-from pipeline.signals import LedRays, Match, RelativePose, Spots
+from pipeline.signals import LedRays, Match, Spots
 
 NO_RAYS = LedRays(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)))
 
@@ -28,14 +25,3 @@ def rays_of(camera: Camera, spots: Spots, match: Match, t: float, scale: float =
     tangents, claimed = np.empty((len(pixels), 2)), np.empty((len(pixels), 2, 2))
     put_tangents(camera.lens, pixels, spots.covariances[match.spot], scale, tangents, claimed)
     return LedRays(match.led, t + camera.delays(pixels), tangents, claimed)
-
-
-def widened(
-    pose: RelativePose, rays: LedRays, leds_in_b: Array, beside: Array
-) -> tuple[RelativePose, LedRays]:
-    """The same, less sure: all may be wrong by `beside` (3,) [m] together."""
-    p, q = pose.covariance.copy(), pose.p_bc_in_c + leds_in_b[rays.led] @ pose.R_cb.T
-    p[:3, :3] += np.outer(beside, beside)
-    off = (beside[1:] - rays.tangents * beside[0]) / q[:, :1]
-    shared = len(rays) * off[:, :, None] * off[:, None, :]
-    return replace(pose, covariance=p), replace(rays, covariances=rays.covariances + shared)

@@ -6,13 +6,17 @@
 from __future__ import annotations
 
 import argparse
+from collections import deque
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from hardware.sim.world.sensors import body_samples, phone_samples
+from hardware.sim.world.sensors import body_samples, give, phone_samples
 from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
+from pipeline.config import PERIOD_S
+from pipeline.estimation.relative_filter import RelativeFilter
+from pipeline.estimator_config import RelativeConfig
 from pipeline.signals import LedRays, PhoneImu, StampOffset
 from pipeline.vision.picture_check import PictureCheck
 from tests.pipeline.faulty_camera import Faults, looks
@@ -84,6 +88,11 @@ ADVERSITIES = {
         {"tremor_relaxation": 0.15, "held": (0.01, 0.02)}, stumbles=0.04
     ),
     "filming, dates that stumble": replace(of_hand("filming", held=(0.01, 0.02)), stumbles=0.04),
+    "a starved browser": Adversity(
+        {"tremor_relaxation": 0.15, "held": (0.01, 0.03), "lost": 0.4},
+        stumbles=0.04,
+        refused=LATELY_WORSE,
+    ),
     "propellers shake": replace(of_hand("filming"), body_noise=1.0),
     "a slow line": of_hand("filming", time_offset=0.06, picture_delay=(0.1, 0.25)),
     "holes": replace(of_hand("walking"), hole=(0.1, 0.6)),
@@ -109,6 +118,34 @@ def judged(name: str, seed: int, seconds: float) -> tuple[int, int, dict[str, fl
         else:
             check.add_imu(event)
     return pictures, refused, named
+
+
+def followed(name: str, seed: int, seconds: float) -> tuple[float, float]:
+    """Farthest error [m] of the default estimator behind the check, and its largest σ [m].
+
+    From 5 s on; what is off throughout is the calibration's, and left out.
+    """
+    it = ADVERSITIES[name]
+    world = World(WorldOptions(**{"time_offset": 0.03, **it.world, "seed": seed}, duration=seconds))
+    rng = np.random.default_rng((seed, 77))
+    check, estimator = PictureCheck(LEDS_IN_B), RelativeFilter(RelativeConfig(), LEDS_IN_B)
+    happening = [*_samples(world, it, rng), *_pictures(world, it, rng)]
+    queue = deque(sorted(_arriving(happening, world, it, rng), key=lambda one: one[0]))
+    off, sigma = [], 0.0
+    for now in np.arange(0.1, seconds - 0.01, PERIOD_S).tolist():
+        while queue and queue[0][0] <= now:
+            event = queue.popleft()[1]
+            if hasattr(event, "rays"):
+                estimator.add_seen(check.believed(event), now)
+            else:
+                check.add_imu(event)
+                give(estimator, event, now)
+        state = estimator.state(now)
+        if state is not None and now > 5.0:
+            off.append(state.p_bc_in_c - world.p[world.index(state.t)])
+            sigma = max(sigma, state.sigma_p)
+    errors = np.array(off) - np.median(off, axis=0)
+    return float(np.linalg.norm(errors, axis=1).max()), sigma
 
 
 def _samples(world, it, rng):

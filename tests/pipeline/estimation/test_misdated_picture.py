@@ -1,0 +1,67 @@
+"""A picture of a wrong date is told from a wrong prediction, and believed less along its motion."""
+
+import numpy as np
+import pytest
+
+from hardware.sim.world.sensors import events
+from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
+from pipeline.estimation.adaptive_noise import FAR
+from pipeline.estimation.misdated_picture import MisdatedPictures
+from pipeline.signals import VisionMeasurement
+from tests.pipeline.honest_camera import followed
+
+S = np.diag(np.square([0.003, 0.0005, 0.0005, 0.001, 0.0014, 0.0014]))
+PASSING = np.array([0.05, 0.3, -0.2, 0.02, -0.05, 0.1])
+
+
+@pytest.fixture(scope="module")
+def seen():
+    arriving = events(World(WorldOptions(seed=11, duration=0.5)))
+    return next(one for _, one in arriving if isinstance(one, VisionMeasurement))
+
+
+def misfit(e, S):
+    return float(e @ np.linalg.solve(S, e)) / 6.0
+
+
+@pytest.mark.parametrize("late_s", [-0.03, 0.02, 0.035])
+def test_what_its_date_explains_is_believed_less_along_its_motion_alone(seen, late_s):
+    e = late_s * PASSING
+    assert misfit(e, S) > FAR
+    less = MisdatedPictures().explained(seen, LEDS_IN_B, e, S, PASSING)
+    more = less.pose.covariance - seen.pose.covariance
+    assert misfit(e, S + more) < 1.0
+    across = np.array([0.0, 2.0, 3.0, 0.0, 0.0, 0.0])
+    assert across @ more @ across == pytest.approx(0.0, abs=1e-12)
+    wider = less.rays.covariances - seen.rays.covariances
+    assert (np.linalg.eigvalsh(wider)[:, 1] > 1e-7).all()
+    assert np.abs(np.linalg.eigvalsh(wider)[:, 0]).max() < 1e-12
+
+
+def test_what_no_date_explains_is_a_wrong_prediction(seen):
+    aside = 0.02 * np.array([0.0, 0.2, 0.3, 0.0, 0.0, 0.0])
+    assert misfit(aside, S) > FAR
+    assert MisdatedPictures().explained(seen, LEDS_IN_B, aside, S, PASSING) is None
+
+
+def test_a_date_is_not_wrong_by_a_tenth_of_a_second(seen):
+    assert MisdatedPictures().explained(seen, LEDS_IN_B, 0.3 * PASSING, S, PASSING) is None
+
+
+def test_twice_running_is_no_stumble(seen):
+    misdated, e = MisdatedPictures(), 0.03 * PASSING
+    assert misdated.explained(seen, LEDS_IN_B, e, S, PASSING) is not None
+    assert misdated.explained(seen, LEDS_IN_B, e, S, PASSING) is None
+    assert misdated.explained(seen, LEDS_IN_B, 0.0 * e, S, PASSING) is None
+    assert misdated.explained(seen, LEDS_IN_B, e, S, PASSING) is not None
+
+
+@pytest.mark.parametrize(
+    ("adversity", "seed"),
+    [("dates that stumble", 3000), ("dates that stumble", 3003), ("a starved browser", 3004)],
+)
+def test_a_browser_that_misdates_pictures_does_not_throw_the_estimate_off(adversity, seed):
+    """624, 348 and 441 mm, while such a picture was fused into a speed."""
+    farthest, sigma = followed(adversity, seed, 20.0)
+    assert farthest < 0.06
+    assert sigma < 0.12
