@@ -216,7 +216,8 @@ class PictureCheck:
         since, predicted = self._track.newest.x[1:3], near.predicted.x[1:3]
         aside, off, S = pose.p_bc_in_c[1:], near.off[1:], near.S[1:, 1:]
         chi2 = float(off @ np.linalg.solve(S, off))
-        self._jumps.add(pose.t, aside - since, predicted - since, float(np.trace(S)))
+        t, t_since = near.predicted.t, self._track.newest.t
+        self._jumps.add(t, t_since, aside - since, predicted - since, float(np.trace(S)))
         self._noise.add_lateral_innovation(chi2, self._jumps.is_clear)
 
     def measured(self, focal: float, sigma: float) -> None:

@@ -5,8 +5,9 @@ The phone's gyroscope predicts how far. A stabiliser takes most of it out: the j
 are smaller than those predicted. Samples that a busy browser reads late, or of a wrong time, put
 the jumps elsewhere and leave their size: so the one is told from the other, whenever it began.
 
-A robot that moves on evenly is predicted to jump in a picture that is dated wrongly: only pictures
-that are as far apart as the two before them count.
+A robot that moves on evenly is predicted to jump in a picture that is dated wrongly, and after some
+that were not believed: only pictures count that follow a believed one, and are as far from it as
+that from the one before.
 """
 
 from __future__ import annotations
@@ -41,13 +42,18 @@ class SteadiedPicture:
         self._clear = 0
         self._t, self._apart = 0.0, 0.0
 
-    def add(self, t: float, seen: Array, predicted: Array, variance: float) -> None:
-        """Take how far (2,) the robot moved in a picture of `t` [s], and should have moved [m].
+    def add(self, t: float, since: float, seen: Array, predicted: Array, variance: float) -> None:
+        """Take how far the robot moved in a picture of `t` [s], and should have moved.
 
-        `variance` [m²] of the difference, both axes together.
+        Args:
+            t: When it was taken [s].
+            since: When the last one was taken that was believed [s].
+            seen: (2,) [m].
+            predicted: (2,) [m].
+            variance: Of the difference [m²], both axes together.
         """
-        moved, apart = np.array([seen, predicted]), t - self._t
-        is_even = abs(apart - self._apart) < EVEN * apart
+        moved, apart = np.array([seen, predicted]), t - since
+        is_even = since == self._t and abs(apart - self._apart) < EVEN * apart
         self._t, self._apart = t, apart
         if not is_even:  # what was seen before is forgotten bit by bit: nobody stays accused by it
             self._jumps += MEMORY * (self._jumps.mean() - self._jumps)

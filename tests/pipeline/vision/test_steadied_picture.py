@@ -11,8 +11,9 @@ JUMPS = 0.003 * np.random.default_rng(1).normal(size=(90, 2))
 
 def watched(seen, predicted, variance=NOISE_M2, dates=None):
     jumps = SteadiedPicture()
+    dates = np.arange(len(seen)) / 30.0 if dates is None else dates
     for n, (row, there) in enumerate(zip(seen, predicted, strict=True)):
-        jumps.add(n / 30.0 if dates is None else dates[n], row, there, variance)
+        jumps.add(dates[n], dates[n - 1] if n else -1.0, row, there, variance)
     return jumps
 
 
@@ -45,6 +46,17 @@ def test_a_steadied_picture_is_forgotten_where_dates_tell_nothing() -> None:
     dates = np.concatenate((np.arange(45) / 30.0, 1.5 + np.cumsum(np.tile([0.02, 0.05], 23))[:45]))
     assert watched(0.3 * JUMPS[:45], JUMPS[:45]).is_still
     assert not watched(0.3 * JUMPS, JUMPS, dates=dates).is_still
+
+
+def test_pictures_that_were_not_believed_are_no_jump() -> None:
+    """Each is held against where the last one believed was: what is predicted grows, and is back
+    with the next one believed."""
+    jumps, step_m = SteadiedPicture(), 0.2 / 30.0
+    for n in range(60):
+        believed = n - 1 if not 20 < n < 40 else 20
+        there = np.array([step_m * (n - believed), 0.0])
+        jumps.add(n / 30.0, believed / 30.0, np.array([step_m, 0.0]), there, NOISE_M2)
+        assert not jumps.is_still
 
 
 def test_noise_is_not_predicted_jumps() -> None:
