@@ -159,8 +159,7 @@ class Teleop:
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
             self._tracking.observe(known, self._given_in_b, self._h)
-            self._propagate_place(known)
-            self._propagate_station(known, inputs.t)
+            self._propagate_motion(known, inputs.t)
         # the reference moves before its error is taken: else a period of the way back is missing
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
@@ -406,21 +405,23 @@ class Teleop:
             self._reference = self._led_to = None
         return known, None
 
-    def _propagate_station(self, known: Situation, t: float) -> None:
-        """Carry the station on; in a gap by the gyroscope alone: f is put right only after it."""
+    def _propagate_motion(self, known: Situation, t: float) -> None:
+        """Carry on where the robot is and how fast, by its own sensors.
+
+        In a gap by the gyroscope alone: f is put right only after it.
+        """
         R_fb = known.view.R_fv @ known.view.R_vb
-        if self._is_deaf(t):
+        is_deaf = self._is_deaf(t)
+        if is_deaf:
             self._station.reset()
             self._hold.R_fb = R_fb
-        coasts = self._failsafe.mode == Mode.COAST
-        self._station.propagate(
-            known.relative.f_bf_in_b, self._hold.R_fb if coasts else R_fb, self._h
-        )
-
-    def _propagate_place(self, known: Situation) -> None:
-        """Carry on where the robot is."""
-        R_fb = known.view.R_fv @ known.view.R_vb
-        self._place.propagate(known.relative.f_bf_in_b, R_fb, self._given_in_b, self._h)
+        if self._failsafe.mode == Mode.COAST:
+            R_fb = self._hold.R_fb
+        f_bf_in_b, place, x_before_in_f = known.relative.f_bf_in_b, self._place, self._place.x_in_f
+        place.propagate(f_bf_in_b, R_fb, self._given_in_b, self._h)
+        suspended = (place.x_in_f - x_before_in_f, place.v_in_f)
+        is_known = place.is_known and not is_deaf
+        self._station.propagate(f_bf_in_b, R_fb, self._h, suspended if is_known else None)
 
     def _aim_now(self, known: Situation | None, error: PoseError | None) -> Reference | None:
         """Where the robot shall be; in a gap where it should be before."""

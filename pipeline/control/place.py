@@ -33,6 +33,11 @@ an error of the vertical, which the accelerometer takes for a / ω²."""
 PUSHED_N, PUSHED_S = 5.0, 0.02
 """A force [N] that neither thrusters nor suspension explain, and quicker than ω, is a wall's or a
 push; smoothed over [s]."""
+TOUCHED_N, SETTLED_S = 1.0, 2.5
+"""A smaller one is taken for a motion as well, until it has been forgotten [s]: seven and a half
+time constants. In free flight, with hands of any kind, there is 0.4 N at most ..."""
+IN_TRANSIT = 0.5
+"""... and this share of what thrusters are on their way to give: they lag in their own way."""
 
 
 class SuspendedPlace:
@@ -50,6 +55,7 @@ class SuspendedPlace:
         self._p_in_f, self._p_start_in_f = np.zeros(3), np.zeros(3)
         self._stiffness_in_f, self._push_in_f = robot.stiffness_in_f, np.zeros(3)
         self._rest_in_f, self._rested_s = np.zeros(3), 0.0
+        self._hangs, self._untouched_s, self._ahead_n = hangs, 0.0, 0.0
         self.v_in_f: Array = np.zeros(3)
         """Velocity of the body (3,) [m/s]."""
 
@@ -63,6 +69,11 @@ class SuspendedPlace:
     def is_pushed(self) -> bool:
         """Whether something else than thrusters and suspension has pushed just now: x is wrong."""
         return float(self._push_in_f @ self._push_in_f) > PUSHED_N**2
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it hangs, and nothing else has touched it for long enough: x and v are right."""
+        return self._hangs and self._untouched_s > SETTLED_S
 
     @property
     def from_rest_in_f(self) -> Array:
@@ -97,6 +108,11 @@ class SuspendedPlace:
         e_in_f = pulled_in_f - self._p_in_f - self._lead_s * self.v_in_f
         push_in_f = self._stiffness_in_f * e_in_f - self._push_in_f
         self._push_in_f = self._push_in_f + low_pass.share(h / PUSHED_S) * push_in_f
+        ahead_n = float(np.linalg.norm(R_fb @ force_in_b - self._thrust_in_f))
+        self._ahead_n += low_pass.share(h / PUSHED_S) * (ahead_n - self._ahead_n)
+        push_n = float(np.linalg.norm(self._push_in_f))
+        is_touched = push_n > TOUCHED_N + IN_TRANSIT * self._ahead_n
+        self._untouched_s = 0.0 if is_touched else self._untouched_s + h
         self._p_in_f = self._p_in_f + h * (self.v_in_f + self._l_1 * e_in_f)
         self.v_in_f = self.v_in_f + h * (a_in_f - self._bias_in_f + self._l_2 * e_in_f)
         self._bias_in_f = self._bias_in_f - h * POLES**3 * e_in_f

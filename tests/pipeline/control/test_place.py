@@ -12,6 +12,7 @@ from pipeline.control.place import SuspendedPlace
 from pipeline.frames import GRAVITY, Array, exp
 
 ROBOT = load_robot("ames").robot
+ZERO = np.zeros(3)
 UP, H, LAG_S = np.array([0.0, 0.0, GRAVITY]), 0.005, 0.04
 
 
@@ -23,10 +24,10 @@ class Swing:
         self.x, self.v, self._thrust = np.zeros(3), np.zeros(3), np.zeros(3)
         self._bias, self._R_fb, self._gain = bias, R_fb, gain
 
-    def step(self, force_in_f: Array) -> None:
+    def step(self, force_in_f: Array, touched_in_f: Array = ZERO) -> None:
         self._thrust = self._thrust + H / LAG_S * (self._gain * force_in_f - self._thrust)
         pull = -ROBOT.stiffness_in_f * self.x - ROBOT.damping_in_f * self.v
-        a = (self._thrust + pull) / ROBOT.mass
+        a = (self._thrust + pull + touched_in_f) / ROBOT.mass
         self.v = self.v + H * a
         self.x = self.x + H * self.v
         f_bf_in_b = self._R_fb.T @ (a + UP) + self._bias
@@ -97,6 +98,42 @@ def test_a_knock_is_told_from_thrust_and_swing() -> None:
         knock = R_FB.T @ np.array([-10.0 / ROBOT.mass, 0.0, 0.0])
         swing.place.propagate(R_FB.T @ UP + BIAS + knock, R_FB, np.zeros(3), H)
     assert swing.place.is_pushed
+
+
+def swung(force_n: float = 5.0) -> Swing:
+    """One that swings with a hand, and whose thrusters are commanded steps."""
+    swing = Swing(BIAS, R_FB)
+    for k in range(round(16.0 / H)):
+        hand = np.array([1.5, 1.0, 2.0]) * np.sin(2.0 * np.pi * 0.4 * k * H)
+        swing.step(hand + force_n * (k * H % 4.0 > 3.0) * np.array([0.6, -0.8, 0.0]))
+        assert k * H < 8.0 or swing.place.is_known
+    return swing
+
+
+def test_steps_of_its_own_thrust_are_no_touch() -> None:
+    assert swung().place.is_known
+
+
+def test_whoever_touches_it_gently_is_no_motion_until_that_is_forgotten() -> None:
+    """3 N, which compliance yields to: its speed is off by 0.2 m/s meanwhile."""
+    swing, touched = swung(), np.array([0.0, -3.0, 0.0])
+    for _ in range(400):
+        swing.step(np.zeros(3))
+    off, known = [], []
+    for k in range(round(6.0 / H)):
+        swing.step(np.zeros(3), touched if k * H < 1.0 else np.zeros(3))
+        off.append(float(np.linalg.norm(swing.place.v_in_f - swing.v)))
+        known.append(swing.place.is_known)
+    assert max(off) > 0.15
+    assert max(one for one, is_known in zip(off, known, strict=True) if is_known) < 0.05
+    assert known[-1]
+
+
+def test_a_robot_that_stands_is_never_known_by_what_pulls_it_back() -> None:
+    place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)), LAG_S)
+    for _ in range(2000):
+        place.propagate(UP, np.eye(3), np.zeros(3), H)
+    assert not place.is_known
 
 
 def test_the_way_from_its_rest_is_known_though_the_accelerometer_is_off() -> None:

@@ -68,6 +68,21 @@ def test_it_goes_to_the_place_it_is_given() -> None:
     assert keeps.force_in_b(np.eye(3))[0] == pytest.approx(0.05 * PHONE.Kp[0])
 
 
+def test_what_is_known_better_is_taken_and_the_rest_is_there_when_it_ends() -> None:
+    keeps, twin = station(), station()
+    v_in_f, felt = np.array([0.1, 0.0, -0.2]), UP + np.array([0.3, 0.0, 0.0])
+    keeps.start(np.zeros(3), np.zeros(3))
+    for _ in range(20):
+        keeps.propagate(felt, np.eye(3), H, (H * v_in_f, v_in_f))
+        twin.propagate(felt, np.eye(3), H)
+    np.testing.assert_array_equal(keeps.v_in_f, v_in_f)
+    expected = -20 * H * PHONE.Kp[:3] * v_in_f - PHONE.Kd[:3] * v_in_f
+    np.testing.assert_allclose(keeps.force_in_b(np.eye(3)), expected)
+    keeps.propagate(felt, np.eye(3), H)
+    twin.propagate(felt, np.eye(3), H)
+    np.testing.assert_array_equal(keeps.v_in_f, twin.v_in_f)
+
+
 def test_who_felt_nothing_for_a_while_stays_where_he_is() -> None:
     keeps, _, _ = swayed(5.0, bias=np.zeros(3))
     keeps.start(np.array([0.05, 0.0, 0.0]), np.zeros(3))

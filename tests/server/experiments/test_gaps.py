@@ -12,9 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hardware.robot_file import load_robot
+from pipeline.config import VirtualCameraConfig
 from pipeline.signals import Mode
+from server.control.process import teleop_config
 from server.experiments import main
-from server.experiments.gaps.flight import Case, FlightLog, released
+from server.experiments.gaps.flight import Case, FlightLog, fly, released
 from server.experiments.gaps.goals import goals, waits_longer_pct
 from server.experiments.gaps.measure import FlightFigures, flight_of, row_of, spans
 from server.experiments.gaps.schedule import GapSchedule, WebRtcLine, WebSocketLine, heard_again
@@ -202,3 +205,13 @@ def test_it_flies_writes_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture
     assert all(one["coast_s"] < 0.2 < 0.9 < one["ramp_s"] < 1.1 for one in told["vanished"])
     assert (tmp_path / "gaps.png").stat().st_size > 10_000
     assert "vanished phone: COAST" in capsys.readouterr().out
+
+
+def test_a_robot_that_hangs_stays_where_it_is_through_a_gap_of_tcp() -> None:
+    """By its suspension, which knows its speed: 142 mm, by its accelerometer alone."""
+    ames = load_robot("ames")
+    config = teleop_config(ames, "phone", VirtualCameraConfig())
+    case = Case("phone", "websocket", 0.25, 5.0)
+    flight = flight_of(fly(ames, config, case, seed=2, seconds=8.0))
+    assert flight.resumed >= 1
+    assert flight.drift_mm < 40.0
