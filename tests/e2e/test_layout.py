@@ -1,0 +1,83 @@
+"""The pages' own style in a real Chromium: no text leaves its card, none lies on another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import BrowserContext, Page, Route
+
+from tests.e2e.chromium_phone import browser
+
+pytestmark = [pytest.mark.e2e, pytest.mark.page]
+ORIGIN = "http://pages.test/"
+CLIENT = Path(__file__).parents[2] / "web_client"
+DESKTOPS = [(820, 1180), (1280, 720), (1440, 900)]
+
+FILL = """
+([id, figures]) => document.getElementById(id).replaceChildren(...figures.map(([name, value]) => {
+  const [div, dt, dd] = ['div', 'dt', 'dd'].map((tag) => document.createElement(tag));
+  dt.textContent = name;
+  dd.textContent = value;
+  div.append(dt, dd);
+  return div;
+}))
+"""
+OUTSIDE = """
+(selector) => {
+  const card = document.querySelector(selector).getBoundingClientRect();
+  return [...document.querySelectorAll(`${selector} *`)].filter((one) => {
+    const box = one.getBoundingClientRect();
+    return box.width > 0 && (box.left < card.left || box.right > card.right + 0.5
+      || box.bottom > card.bottom + 0.5 || one.scrollWidth > one.clientWidth + 1
+      && getComputedStyle(one).display !== 'inline');
+  }).map((one) => one.textContent.trim());
+}
+"""
+NAMES = [
+    *("NIS / dof", "Age", "Rejected", "Fused", "Dropped", "Late", "Offset", "σ offset"),
+    *("σ pos.", "σ att.", "Readout", "σ readout", "Larger", "Held", "Exposed"),
+]
+"""In the order of `web_client/src/dashboard/estimate.js`."""
+
+
+@pytest.fixture(scope="module")
+def context(chromium: str) -> Iterator[BrowserContext]:
+    """Files of the pages, without their scripts: what stands in them is the test's."""
+
+    def answer(route: Route) -> None:
+        path = CLIENT / route.request.url.removeprefix(ORIGIN)
+        if path.suffix in {".html", ".css", ".svg"} and path.is_file():
+            route.fulfill(path=path)
+        else:
+            route.abort()
+
+    with browser(chromium) as opened:
+        opened.route("**/*", answer)
+        yield opened
+
+
+def supervisor(context: BrowserContext, size: tuple[int, int]) -> Page:
+    page = context.new_page()
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.goto(f"{ORIGIN}supervisor.html")
+    return page
+
+
+@pytest.mark.parametrize("size", DESKTOPS)
+def test_the_phone_cards_buttons_stay_in_it(context: BrowserContext, size: tuple[int, int]) -> None:
+    page = supervisor(context, size)
+    assert page.evaluate(OUTSIDE, ".card.phone > footer") == []
+    page.close()
+
+
+@pytest.mark.parametrize("size", DESKTOPS)
+def test_a_large_sigma_lies_on_no_other_number(
+    context: BrowserContext, size: tuple[int, int]
+) -> None:
+    page = supervisor(context, size)
+    large = {"σ pos.": "123456.7mm", "Fused": "123456", "σ offset": "12345.67ms"}
+    page.evaluate(FILL, ["estimate", [(name, large.get(name, "12.3")) for name in NAMES]])
+    assert page.evaluate(OUTSIDE, "#estimate") == []
+    page.close()
