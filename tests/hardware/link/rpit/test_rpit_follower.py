@@ -10,6 +10,8 @@ import pytest
 
 from hardware.follower import FollowerError, FollowerState, ThrustCommand
 from hardware.link.registry import link_kind
+from hardware.link.robot_server import bound
+from hardware.link.rpit.ground_end import ANYBODY
 from hardware.robot_file import load_robot, robot_of, robot_path, robot_table
 from tests.hardware.follower_contract import FollowerContract, exchange
 from tests.hardware.link.rpit.lab_robot import RUNNING, Block, Model
@@ -309,6 +311,25 @@ def test_by_its_kind_it_listens_where_the_file_says_and_leads_the_robot(loopback
     assert loopback.robot.model.epoch == 5
 
 
+@pytest.mark.parametrize(
+    ("host", "here"),
+    [
+        (LOCALHOST, LOCALHOST),
+        ("127.0.0.3", "127.0.0.3"),
+        ("192.0.2.1", ANYBODY),
+        (ANYBODY, ANYBODY),
+    ],
+)
+def test_a_robot_of_this_machine_is_not_listened_for_on_the_network(monkeypatch, host, here):
+    asked = []
+    monkeypatch.setattr(
+        "hardware.link.rpit.rpit_follower.bound",
+        lambda at: asked.append(at) or bound((LOCALHOST, 0)),
+    )
+    link_kind("rpit").connect(AMES.reached(host, 31415), b"", 5).close()
+    assert asked == [(here, 31415)]
+
+
 def lab_file(**link):
     table = robot_table(robot_path("ames"))
     del table["link"]["port"]
@@ -337,3 +358,17 @@ def test_stop_is_obeyed_by_a_robot_that_hears_old_news_only(loopback):
     loopback.follower.stop()
     loopback.advance(0.005)
     assert loopback.robot.set == [0.0] * 8
+
+
+def test_stop_is_said_often_enough_for_a_bad_line_and_never_after_the_end(loopback, stranger):
+    stranger.say(1)
+    loopback.follower.receive()
+    loopback.follower.send(FLYING)
+    loopback.follower.stop()
+    said = [struct.unpack("<IxxxxQ150d", mes)[2:] for mes in iter(stranger.heard, None)]
+    assert max(said[0][16:24]) > 0.0
+    assert [mes[3] for mes in said[1:]] == [2.0, 3.0, 4.0, 5.0, 6.0]
+    assert all(set(mes[16:24]) == {0.0} and mes[7] == 0.0 for mes in said[1:])
+    loopback.follower.close()
+    loopback.follower.stop()
+    assert loopback.follower.lost == 0
