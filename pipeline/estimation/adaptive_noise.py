@@ -55,19 +55,20 @@ class AdaptiveNoise:
         Gives the factor, 1 as a rule, by which P must be stretched for this picture.
         """
         S = P + C
-        misfit = _misfit(e, S)
+        surprise = misfit(e, S)
         share = float(np.trace(np.linalg.solve(S, P))) / 6.0
-        step = GAIN * share * (min(misfit, SURPRISE) - TOLERATED)
+        step = GAIN * share * (min(surprise, SURPRISE) - TOLERATED)
         self._log = min(max(self._log + step, 0.0), math.log(MOST))
-        if misfit <= FAR:
+        if surprise <= FAR:
             return 1.0
         inflation = 2.0
         while inflation * self.factor <= MOST:
-            if _misfit(e, inflation * P + C) <= 1.0:
+            if misfit(e, inflation * P + C) <= 1.0:
                 return inflation
             inflation *= 2.0
         return 1.0
 
 
-def _misfit(e: Array, S: Array) -> float:
+def misfit(e: Array, S: Array) -> float:
+    """χ² of an innovation (n,) of covariance S (n, n), by its degrees of freedom."""
     return float(e @ np.linalg.solve(S, e)) / len(e)

@@ -19,7 +19,15 @@ def widened(
     beside: Array,
     turned_in_b: Array = NO_TURN,
 ) -> tuple[RelativePose, LedRays]:
-    """The same, less sure: all may be wrong by `beside` (3,) [m] and a turn (3,) [rad] together."""
+    """The same, less sure: all LEDs may be wrong together.
+
+    Args:
+        pose: Of the picture, ...
+        rays: ... and what it says of each LED.
+        leds_in_b: (n, 3) [m].
+        beside: By how much (3,) in c [m], ...
+        turned_in_b: ... and by what turn (3,) [rad].
+    """
     arms = leds_in_b[rays.led]
     q = pose.p_bc_in_c + arms @ pose.R_cb.T
     moved = beside + np.cross(turned_in_b, arms) @ pose.R_cb.T

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.adaptive_noise import FAR
+from pipeline.estimation.adaptive_noise import FAR, misfit
 from pipeline.estimation.believed_less import widened
 from pipeline.frames import Array
 from pipeline.signals import VisionMeasurement
@@ -41,19 +41,15 @@ class MisdatedPictures:
             leds_in_b: (n, 3) [m].
             e: (6,) by how much its pose is off what was predicted: δp in c [m], θ in b [rad].
             S: (6, 6) covariance of that, were its date right.
-            passing: (6,) how the predicted pose passes.
+            passing: (6,) how the predicted pose passes: ṗ in c [m/s], attitude in b [rad/s].
         """
-        was_far, self._was_far = self._was_far, _misfit(e, S) > FAR
+        was_far, self._was_far = self._was_far, misfit(e, S) > FAR
         if not self._was_far or was_far or seen.pose is None:
             return None
         stumbled = S + STUMBLE_S**2 * np.outer(passing, passing)
-        if _misfit(e, stumbled) > FAR:
+        if misfit(e, stumbled) > FAR:
             return None
         late_s = STUMBLE_S**2 * float(passing @ np.linalg.solve(stumbled, e))
         moved = late_s * passing
         pose, rays = widened(seen.pose, seen.rays, leds_in_b, moved[:3], moved[3:])
         return replace(seen, pose=pose, rays=rays)
-
-
-def _misfit(e: Array, S: Array) -> float:
-    return float(e @ np.linalg.solve(S, e)) / len(e)

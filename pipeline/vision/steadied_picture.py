@@ -48,8 +48,8 @@ class SteadiedPicture:
         Args:
             t: When it was taken [s].
             since: When the last one was taken that was believed [s].
-            seen: (2,) [m].
-            predicted: (2,) [m].
+            seen: (2,) along y and z of c [m].
+            predicted: (2,) likewise [m].
             variance: Of the difference [m²], both axes together.
         """
         moved, apart = np.array([seen, predicted]), t - since

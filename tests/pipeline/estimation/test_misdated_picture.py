@@ -5,8 +5,10 @@ import pytest
 
 from hardware.sim.world.sensors import events
 from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
-from pipeline.estimation.adaptive_noise import FAR
+from pipeline.estimation.adaptive_noise import FAR, misfit
+from pipeline.estimation.believed_less import widened
 from pipeline.estimation.misdated_picture import MisdatedPictures
+from pipeline.frames import exp
 from pipeline.signals import VisionMeasurement
 from tests.pipeline.honest_camera import followed
 
@@ -18,10 +20,6 @@ PASSING = np.array([0.05, 0.3, -0.2, 0.02, -0.05, 0.1])
 def seen():
     arriving = events(World(WorldOptions(seed=11, duration=0.5)))
     return next(one for _, one in arriving if isinstance(one, VisionMeasurement))
-
-
-def misfit(e, S):
-    return float(e @ np.linalg.solve(S, e)) / 6.0
 
 
 @pytest.mark.parametrize("late_s", [-0.03, 0.02, 0.035])
@@ -38,6 +36,21 @@ def test_what_its_date_explains_is_believed_less_along_its_motion_alone(seen, la
     assert np.abs(np.linalg.eigvalsh(wider)[:, 0]).max() < 1e-12
 
 
+def test_what_all_leds_are_off_by_together_is_one_error_not_five(seen):
+    """Each as unsure as that alone would say, they would average it out."""
+    moved = 0.02 * PASSING
+    _, rays = widened(seen.pose, seen.rays, LEDS_IN_B, moved[:3], moved[3:])
+    led, ahead = seen.rays.led, 1e-6
+    p, R = seen.pose.p_bc_in_c, seen.pose.R_cb
+    here, there = (
+        q + LEDS_IN_B[led] @ Q.T
+        for q, Q in ((p, R), (p + ahead * moved[:3], R @ exp(ahead * moved[3:])))
+    )
+    off = (there[:, 1:] / there[:, :1] - here[:, 1:] / here[:, :1]) / ahead
+    sizes = np.einsum("ni,nij,nj->n", off, np.linalg.inv(rays.covariances), off)
+    assert 0.9 < sizes.sum() < 1.0
+
+
 def test_what_no_date_explains_is_a_wrong_prediction(seen):
     aside = 0.02 * np.array([0.0, 0.2, 0.3, 0.0, 0.0, 0.0])
     assert misfit(aside, S) > FAR
@@ -45,7 +58,7 @@ def test_what_no_date_explains_is_a_wrong_prediction(seen):
 
 
 def test_a_date_is_not_wrong_by_a_tenth_of_a_second(seen):
-    assert MisdatedPictures().explained(seen, LEDS_IN_B, 0.3 * PASSING, S, PASSING) is None
+    assert MisdatedPictures().explained(seen, LEDS_IN_B, 0.1 * PASSING, S, PASSING) is None
 
 
 def test_twice_running_is_no_stumble(seen):
