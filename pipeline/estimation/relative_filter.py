@@ -39,6 +39,8 @@ MAX_SLEEP_S: Final = 2.0
 """If nobody asked for so long, what was known is forgotten; no sample comes from so far ahead."""
 DATED_S: Final = 0.005
 """While the pictures' time is known worse [s], a miss tells of it, not of the motion samples."""
+ONE_DATE_S: Final = 0.002
+"""While it is known worse [s], a miss along the motion tells of it, not of one picture's date."""
 FRESH_S: Final = 2.0
 """A restart so soon after the last one: what was kept of the sensors is wrong as well."""
 NIS_PICTURES: Final = 30
@@ -139,15 +141,17 @@ class RelativeFilter:
 
         Learns of the sensors, if it is not the date that is wrong.
         """
-        dated = self._track.newest.P[OFFSET, OFFSET] < DATED_S**2
+        variance = float(self._track.newest.P[OFFSET, OFFSET])
+        dated = variance < DATED_S**2
         if seen.pose is None or not dated or not can_start(seen, self._config):
             return seen, 1.0
         track, C = self._track, seen.pose.covariance
         e, P = _missed(seen.pose, predicted), track.in_picture(predicted)
-        passing = track.passing(predicted)
-        misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
-        if misdated is not None:
-            return misdated, 1.0
+        if variance < ONE_DATE_S**2:
+            passing = track.passing(predicted)
+            misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
+            if misdated is not None:
+                return misdated, 1.0
         moved = self._bias_steps.learn(predicted.t, e, P + C, predicted.P)
         track.walk(self._bias_steps.walks)
         if moved.any():
