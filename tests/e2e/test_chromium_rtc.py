@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import itertools
 import time
-from collections.abc import Iterator
+import urllib.parse
+import urllib.request
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -75,15 +77,22 @@ def becomes(page: Page, condition: str, seconds: float = 20.0) -> None:
         page.wait_for_timeout(50)
 
 
-def tell_of_leaving(route: Route) -> None:
-    """The worker as it is, but it says when each picture leaves it."""
-    response = route.fetch()
-    code = response.text()
-    assert LEAVE in code
-    code = code.replace(LEAVE, LEAVE + TELL_LEAVING)
-    route.fulfill(
-        response=response, body=f"{code}\nconst leaving = new BroadcastChannel('left');\n"
-    )
+def telling_of_leaving(server: Serving) -> Callable[[Route], None]:
+    """The worker as it is served, but it says when each picture leaves it.
+
+    Each request by a connection of its own: `route.fetch` keeps one, and a second request on it
+    meets the server's closing of one that was silent for `timeout_keep_alive`.
+    """
+
+    def answer(route: Route) -> None:
+        path = urllib.parse.urlsplit(route.request.url).path
+        with urllib.request.urlopen(server.http_url + path, timeout=5.0) as response:
+            code, headers = response.read().decode(), dict(response.headers)
+        assert LEAVE in code
+        body = code.replace(LEAVE, LEAVE + TELL_LEAVING) + CHANNEL
+        route.fulfill(headers=headers | {"content-length": str(len(body.encode()))}, body=body)
+
+    return answer
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +108,7 @@ def filming(
 ) -> Iterator[Page]:
     """A page that films its clock, tapped."""
     with browser(chromium, flags=flags, **LANDSCAPE) as context:
-        context.route("**/rtc_worker.js", tell_of_leaving)
+        context.route("**/rtc_worker.js", telling_of_leaving(server))
         page = context.new_page()
         for script in (clock_canvas(WIDTH), LISTEN, KEEP_CONNECTIONS, *scripts):
             page.add_init_script(script)
