@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import ssl
 import subprocess
 import sys
 import time
@@ -39,6 +40,11 @@ class Serving:
     def local_https(self) -> str:
         """HTTPS on the loopback interface."""
         return f"https://127.0.0.1:{self.https_url.rsplit(':', 1)[1]}"
+
+    def trusting(self) -> ssl.SSLContext:
+        """TLS of a client that trusts its authority, which it hands out."""
+        with urllib.request.urlopen(f"{self.http_url}/ca.crt", timeout=5.0) as response:
+            return ssl.create_default_context(cadata=response.read().decode())
 
     def link(self, role: str = "operator") -> str:
         """What stands behind a page's address to be let in once: `#k=…`."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import time
-import urllib.parse
 import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -84,9 +83,10 @@ def telling_of_leaving(server: Serving) -> Callable[[Route], None]:
     meets the server's closing of one that was silent for `timeout_keep_alive`.
     """
 
+    trusting = server.trusting()
+
     def answer(route: Route) -> None:
-        path = urllib.parse.urlsplit(route.request.url).path
-        with urllib.request.urlopen(server.http_url + path, timeout=5.0) as response:
+        with urllib.request.urlopen(route.request.url, timeout=5.0, context=trusting) as response:
             code, headers = response.read().decode(), dict(response.headers)
         assert LEAVE in code
         body = code.replace(LEAVE, LEAVE + TELL_LEAVING) + CHANNEL

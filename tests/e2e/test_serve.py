@@ -123,8 +123,7 @@ def get(url: str, context: ssl.SSLContext | None = None) -> tuple[int, bytes]:
 def test_its_addresses_answer_and_the_certificate_holds_for_who_trusts_its_authority(
     server: Serving,
 ) -> None:
-    _, authority = get(f"{server.http_url}/ca.crt")
-    trusting = ssl.create_default_context(cadata=authority.decode())
+    trusting = server.trusting()
     for base in (server.https_url, server.local_https):
         assert b"src/app/main.js" in get(f"{base}/", trusting)[1]
     with pytest.raises(urllib.error.URLError, match="CERTIFICATE"):
