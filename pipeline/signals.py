@@ -223,10 +223,10 @@ class Mode(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TouchState:
-    """What the page's main thread last said, judged by the age of the nonce it echoed."""
+    """What the page's main thread last said, judged by what is certain of its age."""
 
     t: float
-    """When the echoed nonce was sent [s]: the message can't be younger than it claims."""
+    """It was made no earlier [s]: when the echoed nonce was sent, or later by its stamp."""
     held: bool
     """The hold-to-move button is pressed."""
     press: int

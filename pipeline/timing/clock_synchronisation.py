@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
-from math import isfinite
+from math import inf, isfinite
 from typing import Final
 
 from pipeline.timing.clock_line import MAX_DRIFT, ClockLine, OffsetBound, TightestBounds, fit
@@ -41,6 +41,8 @@ class ClockSynchronisation:
         self._trips: deque[tuple[float, float]] = deque()
         self._line: ClockLine | None = None
         self._mapping = ClockMapping()
+        self._surest = (-inf, inf)
+        """Question [ours] and stamp [theirs] of the answer that says most of later stamps."""
         self.restarts = 0
         """Times the clock had jumped."""
         self.reason = ""
@@ -101,6 +103,16 @@ class ClockSynchronisation:
         self._known()
         return self._mapping.local(t_remote)
 
+    def earliest(self, t_remote: float) -> float:
+        """The earliest that our clock can have shown at the remote time `t_remote` [s].
+
+        Whatever delays and drift are: an answer stamped before was stamped after its question, and
+        their clock has run on since. Later for later; -inf for what was before the answer.
+        """
+        t_asked, t_stamped = self._surest
+        since = t_remote - t_stamped
+        return t_asked + since / (1.0 + MAX_DRIFT) if since >= 0.0 else -inf
+
     def _known(self) -> ClockLine:
         if self._line is None:
             raise ValueError("no answer yet")
@@ -120,6 +132,7 @@ class ClockSynchronisation:
         self._buckets.clear()
         self._trips.clear()
         self._answers, self._line = 0, None
+        self._surest = (-inf, inf)
         self.restarts += 1
         self.reason = reason
         for answer in answers:
@@ -130,6 +143,8 @@ class ClockSynchronisation:
         lower = OffsetBound(t_answered, t_remote - t_answered)
         upper = OffsetBound(t_asked, t_remote - t_asked)
         is_news = self._remember(lower, upper, drift)
+        if t_asked >= self.earliest(t_remote):
+            self._surest = (t_asked, t_remote)
         self._answers += 1
         self._trips.append((t_answered, t_answered - t_asked))
         while self._trips[0][0] < t_answered - WINDOW_S:

@@ -263,8 +263,10 @@ between the clocks (NTP's rule). MOTION and FRAME are dated by that; before it i
 dropped. Dated after their arrival they count as taken then, by more than
 {1e3 * ingest.FUTURE_S:g} ms they are refused.
 
-TOUCH is made by the page's main thread and returns the newest nonce. The operator's age is that of
-the nonce, so old bytes, a hung page or a proxy that answers pings can't keep the robot flying. Of
+TOUCH is made by the page's main thread and returns the newest nonce. It counts as made when that
+PING was sent; or later, up to {ingest.UNHEARD_S:g} s, as its own stamp says by the worst that the
+answers' round trips leave possible. So old bytes, a hung page or a proxy that answers pings can't
+keep the robot flying, and who is heard well is not taken for silent while our PINGs are late. Of
 the last {ingest.REMEMBERED_NONCES} nonces each is taken; nonce 0 says that none has come yet. A
 PONG is taken once.
 

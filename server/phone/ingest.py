@@ -22,6 +22,10 @@ ARRIVAL_S = 0.05
 """How far the date of a picture may be off that is dated by its arrival: capture, encoding and way
 of the quickest took an unknown time, the same throughout."""
 
+UNHEARD_S = 1.0
+"""A touch counts as younger than the PING that it echoes by no more: a page that hears nothing of
+us for longer leads nobody, however well we hear it (`FailsafeConfig.gap`)."""
+
 
 def phone_imu(motion: Motion, t: float) -> PhoneImu:
     """A reading at `t` [s] in the axes of the camera, as phones are built."""
@@ -86,7 +90,7 @@ class Ingest:
                 self._pong(record, record.body, now)
                 return None
             case Touch():
-                return self._touch(record.sequence, record.body)
+                return self._touch(record, record.body, now)
             case Motion():
                 return self._motion(record, record.body, now)
             case Picture():
@@ -101,16 +105,28 @@ class Ingest:
         self._answered.add(pong.nonce)
         self.clock.add(asked, record.t_us * 1e-6, now)
 
-    def _touch(self, sequence: int, touch: Touch) -> TouchState | None:
-        if sequence <= self._last_touch:  # overtaken, or heard already: it comes by two ways
+    def _touch(self, record: Record, touch: Touch, now: float) -> TouchState | None:
+        if record.sequence <= self._last_touch:  # overtaken, or heard already: it comes by two ways
             return None
         asked = self._asked.get(touch.nonce)
         if asked is None and touch.nonce != 0:
             raise WireError("value", "touch.nonce", "the nonce of a PING of the last 3 s")
-        self._last_touch, self.visible = sequence, touch.visible
+        self._last_touch, self.visible = record.sequence, touch.visible
         if asked is None:  # before the first PING reached the page
             return None
-        return TouchState(asked, touch.held and touch.visible, self._press_base + touch.press)
+        t = self._certain(record, asked, now)
+        return TouchState(t, touch.held and touch.visible, self._press_base + touch.press)
+
+    def _certain(self, record: Record, asked: float, now: float) -> float:
+        """Since when a touch is certain to have been made: it answers what was `asked` then.
+
+        Its own stamp says more while our PINGs are late and the page is heard well; it counts as
+        early as round trips allow, for the finger may have left since.
+        """
+        stamped = self.clock.earliest(record.t_us * 1e-6)
+        if not self.clock.ready or stamped > now:  # unknown, or it jumped
+            return asked
+        return max(asked, min(stamped, asked + UNHEARD_S))
 
     def _motion(self, record: Record, motion: Motion, now: float) -> PhoneImu | None:
         t = self._dated(record, "motion.time", now)

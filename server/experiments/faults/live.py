@@ -97,7 +97,8 @@ class LiveServer:
         request = urllib.request.Request(f"{self._run['http_url']}/api/status", headers=headers)
         try:
             with urllib.request.urlopen(request, timeout=2.0) as answer:
-                return str(json.loads(answer.read())["mode"])
+                status = json.loads(answer.read())  # null as long as control has not spoken
+                return str(status["mode"]) if status is not None else ""
         except (OSError, ValueError, KeyError):
             return ""
 

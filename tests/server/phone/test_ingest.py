@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pipeline.camera.extrinsics import Extrinsics
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import PhoneImu, TouchState
-from server.phone.ingest import REMEMBERED_NONCES, EncodedFrame, Ingest
+from pipeline.timing.clock_line import MAX_DRIFT
+from server.phone.ingest import REMEMBERED_NONCES, UNHEARD_S, EncodedFrame, Ingest
 from server.protocol.wire import WireError
 from server.protocol.wire_records import Codec, Motion, Picture, Ping, Pong, Record, Touch
 
@@ -99,9 +102,60 @@ def test_motion_comes_out_in_the_axes_of_a_camera_that_sits_askew() -> None:
 def test_the_operator_is_as_old_as_the_nonce_it_echoes() -> None:
     ingest = synchronised()
     ping = ingest.ping(2.0)
-    said = ingest.record(Record(9, at(2.5), Touch(True, True, 4, nonce_of(ping))), 2.5)
+    said = ingest.record(Record(9, at(2.0), Touch(True, True, 4, nonce_of(ping))), 2.5)
     assert isinstance(said, TouchState)
     assert (said.t, said.held, said.press & 0xFFFFFFFF) == (2.0, True, 4)
+
+
+def touched(ingest: Ingest, ping: Record, t: float, now: float) -> float:
+    """From when on a touch counts that was stamped at `t` and heard at `now`."""
+    said = ingest.record(Record(9, at(t), Touch(True, True, 4, nonce_of(ping))), now)
+    assert isinstance(said, TouchState)
+    return said.t
+
+
+def test_who_is_heard_while_our_pings_are_late_is_no_older_than_his_stamp_allows() -> None:
+    ingest = synchronised()
+    heard = touched(ingest, ingest.ping(2.0), 2.5, 2.51)
+    assert 2.5 - 0.002 - 2.5 * MAX_DRIFT <= heard <= 2.5
+
+
+def test_a_page_that_hears_nothing_grows_old_however_well_it_is_heard() -> None:
+    ingest = synchronised()
+    assert touched(ingest, ingest.ping(2.0), 4.5, 4.51) == 2.0 + UNHEARD_S
+
+
+def test_stamps_say_nothing_while_the_clock_is_unknown_or_contradicted() -> None:
+    unknown = counting()
+    assert touched(unknown, unknown.ping(2.0), 2.5, 2.51) == 2.0
+    jumped = synchronised()
+    jumped.record(pong(jumped.ping(2.0), 2.0 + 0.7), 2.01)  # the clock ran on by 0.7 s
+    assert touched(jumped, jumped.ping(2.1), 2.5 + 0.7, 2.51) == 2.1
+
+
+def test_a_stamp_from_the_future_says_nothing() -> None:
+    ingest = synchronised()
+    assert touched(ingest, ingest.ping(2.0), 2.9, 2.51) == 2.0
+
+
+@given(
+    delays=st.lists(st.tuples(st.floats(0.0, 0.3), st.floats(0.0, 0.3)), min_size=5, max_size=40),
+    drift=st.floats(-3e-4, 3e-4),
+    late=st.floats(0.0, 0.9),
+)
+def test_no_touch_counts_as_younger_than_it_is(
+    delays: list[tuple[float, float]], drift: float, late: float
+) -> None:
+    ingest = counting()
+    now = 0.0
+    for there, back in delays:  # whatever their delays, each way by itself
+        made = now + there
+        ping = ingest.ping(now)
+        answer = Pong(nonce_of(ping), ping.t_us)
+        ingest.record(Record(1, at(made + drift * made), answer), made + back)
+        now = made + back + 0.01
+    ping, made = ingest.ping(now), now + late
+    assert touched(ingest, ping, made + drift * made, made + 0.2) <= made + 2e-6
 
 
 def test_a_touch_that_was_overtaken_says_nothing() -> None:
