@@ -386,7 +386,11 @@ class Teleop:
             self._hold.start(self._force_in_b, R_fb, u_in_f, constant_in_f)
             if leashed is not None:
                 offset_in_f = known.view.R_fv @ leashed.error.e_p_in_v
-                self._station.start(offset_in_f, constant_in_f)
+                # what the suspension pulls there; the integral is without the feed-forward's part
+                stays_in_f = self._place.force_to_stay_in_f(offset_in_f)
+                self._station.start(
+                    offset_in_f, stays_in_f if self._place.is_known else constant_in_f
+                )
         # after a gap the velocity is the station's, which dead reckoning has kept
         if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._keeps_station:
             self._hold.start(

@@ -84,6 +84,14 @@ class SuspendedPlace:
         x_in_f: Array = self._p_in_f - self._rest_in_f
         return x_in_f
 
+    def force_to_stay_in_f(self, offset_in_f: Array) -> Array:
+        """What the thrusters must give (3,) [N] for it to stay `offset_in_f` (3,) [m] from here.
+
+        In the units in which they are commanded: an error of K or of all thrusts goes out.
+        """
+        force_in_f: Array = self._stiffness_in_f * (self.from_rest_in_f + offset_in_f)
+        return force_in_f
+
     def start(self) -> None:
         """From here on its displacement is counted."""
         self._p_start_in_f = self._p_in_f

@@ -162,3 +162,18 @@ def test_the_way_from_its_rest_is_known_though_the_accelerometer_is_off() -> Non
         for _ in range(round(press_s / H)):
             swing.step(np.array([2.6, -1.3, 2.1]))
     np.testing.assert_allclose(swing.place.from_rest_in_f, swing.x, atol=0.004)
+
+
+@pytest.mark.parametrize("gain", [1.0, 0.85])
+def test_it_stays_by_the_force_it_names_though_thrusters_give_less(gain: float) -> None:
+    swing = Swing(BIAS, R_FB, gain)
+    for _ in range(round(8.0 / H)):
+        swing.step(np.zeros(3))
+    for _ in range(round(6.0 / H)):
+        swing.step(np.array([2.6, -1.3, 2.1]))
+    away_in_f = np.array([-0.02, 0.03, 0.04])
+    due_in_f = swing.x + away_in_f
+    force_in_f = swing.place.force_to_stay_in_f(away_in_f / gain)  # as far as it takes it to be
+    for _ in range(round(12.0 / H)):
+        swing.step(force_in_f)
+    np.testing.assert_allclose(swing.x, due_in_f, atol=0.006)
