@@ -170,8 +170,9 @@ class FailsafeConfig:
     gap: float = 1.0
     """The longest silence after which it follows again by itself. Operator, phone IMU or robot
     silent for longer: RAMP (operator and phone only where the robot hangs: another one hovers)."""
-    fresh: float = 0.100
-    """All good for this long: the gap is over."""
+    fresh: float = 0.060
+    """All good for this long: the gap is over. Three signs of life in a row, at 60 Hz; each moment
+    more is lost to the one who leads by a bad radio, at each of its gaps."""
     pose_arm: float = 0.300
     """Since the last believed picture was *taken*: latency, a frame, as long again on the IMUs."""
     pose_hold: float = 2.5

@@ -187,7 +187,7 @@ def test_one_that_does_not_hang_hovers_without_a_phone_for_as_long_as_hold_may_l
     for ms in range(5, 4_000, 5):
         state = failsafe.step(state, replace(HELD, operator_ms=146 + ms), 5, flier)
         modes.setdefault(state.mode, ms)
-    assert modes == {Mode.COAST: 5, Mode.HOLD: 955, Mode.RAMP: 3_005}
+    assert modes == {Mode.COAST: 5, Mode.HOLD: 5 + flier.coast, Mode.RAMP: 3_005}
 
 
 def test_it_says_how_long_it_waits_and_whether_it_follows_again() -> None:
