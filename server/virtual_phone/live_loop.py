@@ -10,9 +10,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from server.common import clock
+from server.common.child import die_with
 from server.common.runtime import RUN_FILE
 
 START_S = 180.0
@@ -41,6 +43,7 @@ def server(robot: str, gains: str, estimator: str = "relative") -> Iterator[dict
                 env=environment,
                 stdout=file,
                 stderr=subprocess.STDOUT,
+                preexec_fn=partial(die_with, os.getpid()),  # killed outright we end nobody
             )
         try:
             end = clock.now() + START_S

@@ -15,6 +15,7 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final, Literal
 
@@ -23,6 +24,7 @@ import numpy as np
 from hardware.follower import FollowerError
 from hardware.sim.truth import TruthClient
 from server.common import clock
+from server.common.child import die_with
 from server.common.runtime import RUN_FILE
 from server.experiments.faults.catalogue import RAMP_S, RAMPED_S, ROBOT_RAMP_S
 from server.experiments.faults.fault import ZERO_N
@@ -123,6 +125,7 @@ class LiveServer:
             env=self._environment,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            preexec_fn=partial(die_with, os.getpid()),
         )
         try:
             self.until(lambda: self.mode() == "TRACK", TRACK_S, "TRACK")
