@@ -8,6 +8,7 @@ from pathlib import Path
 
 from server.cli import COMMANDS
 from server.experiments import EXPERIMENTS
+from tests.sources import parsed
 
 ROOT = Path(__file__).resolve().parents[1]
 CITED = re.compile(r"Eq\.\s*((?:\(\d+\)(?:\s*-\s*|,\s*|\s+and\s+)?)+)")
@@ -25,7 +26,7 @@ def equations(text: str) -> set[int]:
 def docstrings(path: Path) -> str:
     """Docstrings of the functions, classes and methods of a module, without its own."""
     kinds = (ast.FunctionDef, ast.ClassDef)
-    nodes = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, kinds)]
+    nodes = [node for node in ast.walk(parsed(path.read_text())) if isinstance(node, kinds)]
     return "\n".join(ast.get_docstring(node) or "" for node in nodes)
 
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
-ROOMS = ("pipeline", "hardware", "server")
+from tests.sources import parsed, texts
 
 CLOCKS = {
     "server/common/clock.py": "the one that all others ask",
@@ -42,15 +40,13 @@ NUMERIC = (
 
 def modules() -> Iterator[tuple[str, str]]:
     """(path, text) of each module of the product."""
-    for room in ROOMS:
-        for path in sorted((ROOT / room).rglob("*.py")):
-            yield path.relative_to(ROOT).as_posix(), path.read_text()
+    return ((path.as_posix(), text) for path, text in texts().items())
 
 
 def readings(text: str) -> list[str]:
     """What a module takes from a clock."""
     found = []
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(parsed(text)):
         if isinstance(node, ast.Attribute):
             of = node.value
             name = getattr(of, "attr", getattr(of, "id", ""))
@@ -66,7 +62,7 @@ def numbers(text: str) -> Iterator[tuple[str, bool]]:
 
     Words stand under it, or under the lines it is one of, or in a comment beside it.
     """
-    lines, body = text.splitlines(), ast.parse(text).body
+    lines, body = text.splitlines(), parsed(text).body
     for k, node in enumerate(body):
         names = named(node)
         if not names:

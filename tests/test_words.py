@@ -10,17 +10,15 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-ROOMS = ("pipeline", "hardware", "server")
+from tests.sources import parsed, texts
+
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 NAME = re.compile(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)(?:\(\))?`")
 
 
-@cache
-def modules() -> dict[Path, ast.Module]:
+def modules() -> Iterator[tuple[Path, ast.Module]]:
     """The product's modules."""
-    paths = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
-    return {path.relative_to(ROOT): ast.parse(path.read_text()) for path in paths}
+    return ((path, parsed(text)) for path, text in texts().items())
 
 
 def defined(tree: ast.Module) -> Iterator[str]:
@@ -46,9 +44,9 @@ def defined(tree: ast.Module) -> Iterator[str]:
 @cache
 def names() -> frozenset[str]:
     """All of them, modules, folders and builtins included."""
-    found = {part for path in modules() for part in (*path.parts, path.stem)}
-    for tree in modules().values():
-        found.update(defined(tree))
+    found: set[str] = set()
+    for path, tree in modules():
+        found.update(path.parts, (path.stem,), defined(tree))
     return frozenset(found | set(dir(builtins)))
 
 
@@ -64,7 +62,7 @@ def docstrings(tree: ast.Module) -> Iterator[tuple[int, str]]:
 
 def test_a_class_name_stands_for_one_thing() -> None:
     homes = defaultdict(list)
-    for path, tree in modules().items():
+    for path, tree in modules():
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
                 homes[node.name].append(f"{path}:{node.lineno}")
@@ -74,7 +72,7 @@ def test_a_class_name_stands_for_one_thing() -> None:
 def test_names_in_back_ticks_exist() -> None:
     missing = [
         f"{path}:{line}: `{name}`"
-        for path, tree in modules().items()
+        for path, tree in modules()
         for line, text in docstrings(tree)
         for name in NAME.findall(text)
         if name not in names() and not names().issuperset(name.split("."))

@@ -113,25 +113,21 @@ class LedFlight:
         return np.rad2deg(log(R_fb @ R_before.T)), np.mean(places, axis=0) - p_before
 
 
-@pytest.mark.parametrize("scale", [0.25, 0.5])
-def test_the_robot_goes_its_share_of_the_hands_way(scale: float) -> None:
+@pytest.mark.parametrize(("scale", "stay_s"), [(0.25, 0.0), (0.5, 15.0)])
+def test_the_robot_goes_its_share_of_the_hands_way_and_keeps_the_place(
+    scale: float, stay_s: float
+) -> None:
     flight = LedFlight(Leading(scale))
     flight.press()
     turn_deg, way_m = flight.led_by(0.0, 0.10, 0.0, 0.0, 0.0, 0.0)
     assert way_m[1] == pytest.approx(scale * 0.10, abs=0.012)
     assert np.abs(way_m[[0, 2]]).max() < 0.012
     assert np.abs(turn_deg).max() < 1.0
+    before = flight.body[1]
+    flight.run(stay_s)
+    assert np.linalg.norm(flight.body[1] - before) < 0.01
     _, up_m = flight.led_by(0.0, 0.0, 0.05, 0.0, 0.0, 0.0)
     assert up_m[2] == pytest.approx(scale * 0.05, abs=0.012)
-
-
-def test_a_place_led_to_by_a_share_is_kept() -> None:
-    flight = LedFlight(Leading(0.5))
-    flight.press()
-    flight.led_by(0.0, 0.10, 0.0, 0.0, 0.0, 0.0)
-    before = flight.body[1]
-    flight.run(15.0)
-    assert np.linalg.norm(flight.body[1] - before) < 0.01
 
 
 def test_with_turns_locked_the_phones_turns_move_and_turn_nothing() -> None:
@@ -188,15 +184,11 @@ def test_what_is_chosen_in_flight_counts_from_the_next_press_on() -> None:
     assert flight.sim.advance().leading == Leading(0.25)
 
 
-@pytest.mark.parametrize("leading", [PLAIN, Leading(0.5)], ids=str)
-def test_a_press_moves_nothing(leading: Leading) -> None:
+def assert_a_press_elsewhere_moves_nothing(flight: LedFlight) -> None:
     """Let go, point anew, press again: the robot takes up where it is, thrust without a jump."""
-    flight = LedFlight(leading)
-    flight.press()
-    flight.led_by(0.0, 0.08, 0.0, 0.0, 0.0, 0.0)
     flight.release()
-    flight.moves.go(flight.sim.t, np.array([0.0, -0.08, 0.0, 0.0, 0.0, 0.05]), 0.6)
-    flight.run(0.9)
+    flight.moves.go(flight.sim.t, np.array([0.0, -0.08, 0.0, 0.0, 0.0, 0.05]), 0.4)
+    flight.run(0.5)
     flight.finger.down = True
     first = flight.until(lambda output: output.failsafe.mode == Mode.TRACK)
     assert first.error is not None
@@ -209,17 +201,22 @@ def test_a_press_moves_nothing(leading: Leading) -> None:
     assert np.linalg.norm(flight.body[1] - place) < 0.01
 
 
-def test_three_presses_bring_the_robot_three_times_as_far() -> None:
+def test_a_press_moves_nothing() -> None:
+    flight = LedFlight(PLAIN)
+    flight.press()
+    flight.led_by(0.0, 0.08, 0.0, 0.0, 0.0, 0.0)
+    assert_a_press_elsewhere_moves_nothing(flight)
+
+
+def test_three_presses_that_move_nothing_bring_the_robot_three_times_as_far() -> None:
     flight = LedFlight(Leading(0.5))
     rest = flight.body[1]
+    flight.press(0.3)
     for press in range(3):
-        flight.press(0.3)
         _, way_m = flight.led_by(0.0, 0.08, 0.0, 0.0, 0.0, 0.0, seconds=1.0)
         assert way_m[1] == pytest.approx(0.04, abs=0.012)
         if press < 2:
-            flight.release()
-            flight.moves.go(flight.sim.t, np.array([0.0, -0.08, 0.0, 0.0, 0.0, 0.0]), 0.4)
-            flight.run(0.5)
+            assert_a_press_elsewhere_moves_nothing(flight)
     assert flight.body[1][1] - rest[1] == pytest.approx(3.0 * 0.04, abs=0.02)
 
 

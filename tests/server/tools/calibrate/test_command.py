@@ -25,7 +25,7 @@ def write_film(folder, phone, motion, count, fps=30.0):
 @pytest.mark.slow
 def test_a_folder_of_pictures_becomes_a_camera_file(tmp_path, capsys):
     phone = scaled(Phone(), 640)
-    write_film(tmp_path, phone, Motion(seed=1, tremor=0.0), 150)
+    write_film(tmp_path, phone, Motion(seed=1, tremor=0.0), 75, fps=15.0)
     out, report = tmp_path / "camera.yaml", tmp_path / "report.png"
     words = [str(tmp_path), *BOARD, "--name", "lab phone", "--out", str(out)]
     assert main([*words, "--report", str(report)]) == 0
