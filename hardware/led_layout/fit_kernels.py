@@ -8,9 +8,9 @@ import numpy as np
 
 from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
+from pipeline.identification.projection_kernels import put_jacobian, put_moved
 from pipeline.jit import numba
 from pipeline.linear_kernels import cholesky, solve_by
-from pipeline.so3_kernels import multiply, put_exp
 
 kernel = numba.njit(cache=True, nogil=True, error_model="numpy")
 """Compiled at the first call, then cached; threads run it side by side."""
@@ -19,7 +19,7 @@ FREE, TILT, TURN = 0, 1, 2
 ITERATIONS = 12
 WALL_PX = 3000.0
 """Per radian beyond the limit: a twentieth of a degree costs some pixels."""
-SCRATCH = 191
+SCRATCH = 197
 """Numbers that a fit of at most 16 LEDs needs."""
 HOPELESS = 2.0
 """Times the best so far: what a linear step still promises, when a fit is given up."""
@@ -81,22 +81,15 @@ def _add_row(row: Array, residual: float, H: Array, g: Array) -> None:
 
 @kernel
 def _put_normal(
-    leds: Array, f: float, R: Array, q: Array, residuals: Array, H: Array, g: Array, row: Array
+    leds: Array, f: float, R: Array, q: Array, residuals: Array, H: Array, g: Array, J: Array
 ) -> None:
     """Normal equations of (δp in c, θ in b): lower H (6, 6) and g (6,)."""
     H[:], g[:] = 0.0, 0.0
     for k in range(leds.shape[0]):
         x = q[k, 0]
+        put_jacobian(x, q[k, 1] / x, q[k, 2] / x, R, leds[k], -f, J)
         for side in range(2):
-            along, across = f * q[k, 1 + side] / (x * x), -f / x
-            row[0], row[1], row[2] = along, 0.0, 0.0
-            row[1 + side] = across
-            b0 = along * R[0, 0] + across * R[1 + side, 0]
-            b1 = along * R[0, 1] + across * R[1 + side, 1]
-            b2 = along * R[0, 2] + across * R[1 + side, 2]
-            l0, l1, l2 = leds[k, 0], leds[k, 1], leds[k, 2]
-            row[3], row[4], row[5] = l1 * b2 - l2 * b1, l2 * b0 - l0 * b2, l0 * b1 - l1 * b0
-            _add_row(row, residuals[k, side], H, g)
+            _add_row(J[side], residuals[k, side], H, g)
 
 
 @kernel
@@ -126,14 +119,6 @@ def _wall(
         row[k] *= WALL_PX
     _add_row(row, -WALL_PX * excess, H, g)
     return (WALL_PX * excess) ** 2
-
-
-@kernel
-def _stepped(R: Array, p: Array, step: Array, work: Array, R_new: Array, p_new: Array) -> None:
-    put_exp(step[3], step[4], step[5], work)
-    multiply(R, work, R_new)
-    for i in range(3):
-        p_new[i] = p[i] + step[i]
 
 
 @kernel
@@ -178,14 +163,16 @@ def refine(
     """
     m = leds.shape[0]
     H, L = work[0:36].reshape(6, 6), work[36:72].reshape(6, 6)
-    g, step, row, p_new = work[72:78], work[78:84], work[84:90], work[90:93]
-    R_new, turn = work[93:102].reshape(3, 3), work[102:111].reshape(3, 3)
-    q = work[111 : 111 + 3 * m].reshape(m, 3)
-    residuals = work[159 : 159 + 2 * m].reshape(m, 2)
+    g, step, p_new = work[72:78], work[78:84], work[84:87]
+    J = work[87:99].reshape(2, 6)
+    R_new, turn = work[99:108].reshape(3, 3), work[108:117].reshape(3, 3)
+    q = work[117 : 117 + 3 * m].reshape(m, 3)
+    residuals = work[165 : 165 + 2 * m].reshape(m, 2)
+    row = J[0]
     damping, cost = 1e-6, np.inf
     light = _errors(leds, px, f, R, p, q, residuals)
     for iteration in range(ITERATIONS if light < np.inf else 0):
-        _put_normal(leds, f, R, q, residuals, H, g, row)
+        _put_normal(leds, f, R, q, residuals, H, g, J)
         cost = light + _wall(R, R_true, known, limit, row, H, g)
         if not _solve(H, g, damping, L, step):
             return cost
@@ -197,7 +184,7 @@ def refine(
         if cost - promised < 1e-6 * cost + 1e-9:
             return cost
         for _ in range(8):
-            _stepped(R, p, step, turn, R_new, p_new)
+            put_moved(p, R, step, turn, p_new, R_new)
             new = _cost(leds, px, f, R_new, p_new, R_true, known, limit, q, residuals, row)
             if new < cost:
                 damping = max(1e-9, 0.1 * damping)

@@ -9,34 +9,14 @@ import numpy as np
 from pipeline.camera.lens_kernels import NEAREST_M
 from pipeline.frames import Array
 from pipeline.identification.association_kernels import BinnedSpots, Integers, place
+from pipeline.identification.projection_kernels import put_jacobian, put_moved
 from pipeline.linear_kernels import cholesky, solve_by
-from pipeline.so3_kernels import kernel, multiply, put_exp
+from pipeline.so3_kernels import kernel
 
 ITERATIONS = 6
 CONVERGED = 1e-12
 LEAP2 = 4.0
 """A step longer than 2 (m, rad) leads nowhere."""
-
-
-@kernel
-def _add(
-    R: Array, leds: Array, k: int, at: tuple[float, float, float], row: Array, A: Array
-) -> None:
-    """Rows (2, 6) of the Jacobian [1/f] with respect to (δp in c, θ in b), and their squares."""
-    x, y, z = at
-    for r in range(2):
-        w = y if r == 0 else z
-        row[r, 0], row[r, 1], row[r, 2] = -w / x, 0.0, 0.0
-        row[r, r + 1] = 1.0 / x
-        m0 = (R[r + 1, 0] - w * R[0, 0]) / x
-        m1 = (R[r + 1, 1] - w * R[0, 1]) / x
-        m2 = (R[r + 1, 2] - w * R[0, 2]) / x
-        row[r, 3] = m2 * leds[k, 1] - m1 * leds[k, 2]
-        row[r, 4] = m0 * leds[k, 2] - m2 * leds[k, 0]
-        row[r, 5] = m1 * leds[k, 0] - m0 * leds[k, 1]
-        for i in range(6):
-            for j in range(i + 1):
-                A[i, j] += row[r, i] * row[r, j]
 
 
 @kernel
@@ -49,7 +29,7 @@ def _linearised(
     lights: BinnedSpots,
     A: Array,
     b: Array,
-    row: Array,
+    J: Array,
 ) -> float:
     """Normal equations A (6, 6), b (6,); squared residuals (tangents), < 0 behind the camera."""
     total = 0.0
@@ -57,15 +37,17 @@ def _linearised(
     for k in range(leds.shape[0]):
         if names[k] < 0 or k == without:
             continue
-        at = place(p, R, leds, k)
-        if at[0] < NEAREST_M:
+        x, left, up = place(p, R, leds, k)
+        if x < NEAREST_M:
             return -1.0
-        _add(R, leds, k, at, row, A)
+        put_jacobian(x, left, up, R, leds[k], 1.0, J)
         for r in range(2):
-            residual = lights.tangents[names[k], r] - at[r + 1]
+            residual = lights.tangents[names[k], r] - (left if r == 0 else up)
             total += residual * residual
             for i in range(6):
-                b[i] += row[r, i] * residual
+                b[i] += J[r, i] * residual
+                for j in range(i + 1):
+                    A[i, j] += J[r, i] * J[r, j]
     return total
 
 
@@ -78,10 +60,10 @@ def fit(
     Returns:
         Sum of the squared residuals, in tangents; negative if there is no fit.
     """
-    A, b, row = np.empty((6, 6)), np.empty(6), np.empty((2, 6))
+    A, b, J = np.empty((6, 6)), np.empty(6), np.empty((2, 6))
     T, U = np.empty((3, 3)), np.empty((3, 3))
     for _ in range(ITERATIONS):
-        total = _linearised(p, R, leds, names, without, lights, A, b, row)
+        total = _linearised(p, R, leds, names, without, lights, A, b, J)
         if total < 0.0:
             return -1.0
         for i in range(6):
@@ -94,14 +76,11 @@ def fit(
             step2 += b[i] * b[i]
         if not step2 < LEAP2:
             return -1.0
-        for i in range(3):
-            p[i] += b[i]
-        put_exp(b[3], b[4], b[5], T)
-        multiply(R, T, U)
+        put_moved(p, R, b, T, p, U)
         R[:] = U
         if step2 < CONVERGED:
             break
-    return _linearised(p, R, leds, names, without, lights, A, b, row)
+    return _linearised(p, R, leds, names, without, lights, A, b, J)
 
 
 @kernel

@@ -8,9 +8,10 @@ import numpy as np
 
 from pipeline.camera.lens_kernels import CUBE, NEAREST_M, OUT_1, OUT_2, TABLE
 from pipeline.frames import Array
+from pipeline.identification.projection_kernels import put_jacobian, put_moved
 from pipeline.jit import numba
 from pipeline.linear_kernels import cholesky, solve_by
-from pipeline.so3_kernels import kernel, multiply, put_exp
+from pipeline.so3_kernels import kernel
 
 ITERATIONS = 10
 CONVERGED = 1e-10
@@ -33,16 +34,9 @@ def put_residual(
     x, y, z = p[0] + shift[0] + a0, p[1] + shift[1] + a1, p[2] + shift[2] + a2
     if not x > NEAREST_M:
         return False
-    r[0], r[1] = f * (flat[0] + y / x), f * (flat[1] + z / x)
-    s = f / x
-    J[0, 0], J[0, 1], J[0, 2] = s * y / x, -s, 0.0
-    J[1, 0], J[1, 1], J[1, 2] = s * z / x, 0.0, -s
-    for k in range(2):
-        for j in range(3):  # −D R [led]×
-            m, n = (j + 1) % 3, (j + 2) % 3
-            d_m = J[k, 0] * R[0, m] + J[k, 1] * R[1, m] + J[k, 2] * R[2, m]
-            d_n = J[k, 0] * R[0, n] + J[k, 1] * R[1, n] + J[k, 2] * R[2, n]
-            J[k, 3 + j] = d_n * led[m] - d_m * led[n]
+    y, z = y / x, z / x
+    r[0], r[1] = f * (flat[0] + y), f * (flat[1] + z)
+    put_jacobian(x, y, z, R, led, -f, J)
     return True
 
 
@@ -121,9 +115,7 @@ def refine(
         size = sqrt((step * step).sum())
         if size > LONGEST_STEP:
             step *= 0.5 * LONGEST_STEP / size
-        p += step[:3]
-        put_exp(step[3], step[4], step[5], turn)
-        multiply(R, turn, turned)
+        put_moved(p, R, step, turn, p, turned)
         R[:] = turned
         if size * size < CONVERGED:
             break
