@@ -197,7 +197,7 @@ def _projected(
 def _patch(
     track: list[tuple[Array, float]], light: float, exposures: int, look: RenderOptions
 ) -> tuple[Plane, int, int]:
-    """A disc blurred by the point spread, with its halo, smeared along `track`."""
+    """A disc blurred by the point spread, with its halo, blurred along `track`."""
     centres = np.array([centre for centre, _ in track])
     radius = max(r for _, r in track)
     reach = radius + 3.0 * look.halo_px

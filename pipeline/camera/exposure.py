@@ -29,9 +29,9 @@ END_S: Final = 1.5
 """A hint comes and goes after so long."""
 MAX_GAP_S: Final = 0.5
 TOO_LONG_S: Final = 0.008
-"""At 60°/s that is 8 px of smear with the usual lens."""
+"""At 60°/s that is 8 px of motion blur with the usual lens."""
 SPEED_PX: Final = 80.0
-"""Slower than this per second nothing smears."""
+"""Slower than this per second nothing is blurred."""
 STEADY: Final = 1e9
 """Sum of speeds to the fourth [px⁴/s⁴] that gives an exposure: a second of 100 px/s."""
 FORGET: Final = 0.99
@@ -70,15 +70,15 @@ class ExposureMonitor:
         self._t = -np.inf
         self._levels = np.full(4, np.nan)
         """Contrast of 1, clipped area, area of the LED, σ across the motion [px], smoothed."""
-        self._smear = np.zeros(2)
+        self._motion_blur = np.zeros(2)
         self._next, self._since = ExposureHint.NONE, -np.inf
         self.hint = ExposureHint.NONE
 
     @property
     def exposure_s(self) -> float | None:
-        """How long a picture is exposed, by how LEDs smear; None while the phone has not moved."""
-        smear, weight = self._smear
-        return sqrt(max(0.0, float(smear / weight))) if weight > STEADY else None
+        """How long a picture is exposed, by the length of LEDs; None before the phone moves."""
+        motion_blur, weight = self._motion_blur
+        return sqrt(max(0.0, float(motion_blur / weight))) if weight > STEADY else None
 
     def see(self, frame: Frame, leds_px: Array, depth_m: float, omega_cf_in_c: Array) -> None:
         """Look at named LEDs (n, 2) [px], so far ahead, while the phone turns as told [rad/s]."""
@@ -90,13 +90,13 @@ class ExposureMonitor:
         if len(looks) == 0:
             return
         speed = self._focal_px * np.array([omega_cf_in_c[2], -omega_cf_in_c[1]])
-        across = self._learn_smear(looks, speed)
+        across = self._learn_motion_blur(looks, speed)
         contrast = float(np.median(looks[:, CONTRAST])) / BLACK_TO_WHITE[frame.full_range]
         area = pi * (self._focal_px * LED_M / depth_m) ** 2
         self._smooth(frame.t, np.array([contrast, np.median(looks[:, CLIPPED]), area, across]))
         self._decide(frame.t)
 
-    def _learn_smear(self, looks: Array, speed: Array) -> float:
+    def _learn_motion_blur(self, looks: Array, speed: Array) -> float:
         """Take in how much longer LEDs are along their motion; gives σ across it [px]."""
         v2 = float(speed @ speed)
         along = speed / sqrt(v2) if v2 > 0.0 else np.array([1.0, 0.0])
@@ -105,7 +105,10 @@ class ExposureMonitor:
         across = float(np.trace(C)) - length
         if v2 > SPEED_PX**2:
             # a line of length vT has the variance (vT)²/12
-            self._smear = FORGET * self._smear + (12.0 * (length - across) * v2, v2 * v2)
+            self._motion_blur = FORGET * self._motion_blur + (
+                12.0 * (length - across) * v2,
+                v2 * v2,
+            )
         return sqrt(max(0.0, min(across, length)))
 
     def _smooth(self, t: float, levels: Array) -> None:
@@ -128,11 +131,11 @@ class ExposureMonitor:
     def _due(self) -> ExposureHint:
         contrast, clipped, area, across = self._levels.tolist()
         exposure = self.exposure_s
-        smeared = 0.0 if exposure is None else exposure / TOO_LONG_S
+        blurred = 0.0 if exposure is None else exposure / TOO_LONG_S
         excess = {
             ExposureHint.TOO_BRIGHT: clipped / (20.0 + 3.0 * area),
             ExposureHint.OUT_OF_FOCUS: across / (1.8 + 0.5 * sqrt(area / pi)) * (clipped < area),
-            ExposureHint.BLURRED: smeared,
+            ExposureHint.BLURRED: blurred,
             ExposureHint.TOO_DIM: 0.25 / contrast,
         }
         for hint, value in excess.items():

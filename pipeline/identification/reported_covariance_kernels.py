@@ -41,7 +41,7 @@ def put_shared(
     used: npt.NDArray[np.int64],
     pose: Array,
     information: Array,
-    smear: Array,
+    displacement: Array,
     sigma_u: float,
     C: Array,
 ) -> None:
@@ -57,7 +57,7 @@ def put_shared(
         used: (m,) those that the pose rests on.
         pose: (POSE,).
         information: (6, 6) of the pose.
-        smear: (2, 2) covariance by which all spots are displaced alike [px²].
+        displacement: (2, 2) covariance by which all spots are displaced alike [px²].
         sigma_u: Of the velocity that rows were carried to one time by [m/s].
         C: Written.
     """
@@ -77,7 +77,7 @@ def put_shared(
                 by_shift[j, a] += g
                 for m in range(3):
                     by_speed[j, m] += g * J[a, m] * delays[i]
-    _respond(L, by_shift, smear, C)
+    _respond(L, by_shift, displacement, C)
     _respond(L, by_speed, sigma_u * sigma_u * np.eye(3), C)
 
 

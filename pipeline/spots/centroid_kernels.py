@@ -48,7 +48,7 @@ RELIEF_SHARE = 0.4
 """Of what a ground as uneven as the ring displaces at most: its parts lie on many sides."""
 DIM, MOST_DIM = 80.0, 4.0
 """Grey levels; with less contrast a codec's steps matter more."""
-ROUND_PX, OWN_SMEAR, SHARED_SMEAR = 1.0, 0.001, 0.005
+ROUND_PX, OWN_MOTION_BLUR, SHARED_MOTION_BLUR = 1.0, 0.001, 0.005
 """A streak longer than a round spot seems moved while exposed, and not evenly: unsure along it, by
 these shares of its length."""
 
@@ -121,7 +121,7 @@ def _gather(
 
 @kernel
 def _doubt(spot: Array, sums: Array, top: float, relief2: float, coded_px: float) -> None:
-    """The covariance of a spot with a `top` weight: noise, relief, edge, codec, smear."""
+    """The covariance of a spot with a `top` weight: noise, relief, edge, codec, motion blur."""
     whole2 = sums[WEIGHT] * sums[WEIGHT]
     noise2, relief2 = spot[NOISE] ** 2 / whole2, RELIEF_SHARE**2 * relief2 / whole2
     dim = min(max(DIM / spot[CONTRAST], 1.0), MOST_DIM)
@@ -137,7 +137,7 @@ def _doubt(spot: Array, sums: Array, top: float, relief2: float, coded_px: float
     # of twice the angle of the streak
     cosine, sine = 2.0 * half / max(spread, 1e-9), 2.0 * tilt / max(spread, 1e-9)
     shape_uu, shape_uv, shape_vv = 0.5 * (1.0 + cosine), 0.5 * sine, 0.5 * (1.0 - cosine)
-    own, shared = (OWN_SMEAR * streak) ** 2, (SHARED_SMEAR * streak) ** 2
+    own, shared = (OWN_MOTION_BLUR * streak) ** 2, (SHARED_MOTION_BLUR * streak) ** 2
     spot[C_UU] += own * shape_uu
     spot[C_UV] += own * shape_uv
     spot[C_VV] += own * shape_vv

@@ -140,11 +140,11 @@ def put_sights(
 
 
 @kernel
-def _add_smear(spot: Array, share: float, smear: Array) -> None:
-    smear[0, 0] += share * spot[S_UU]
-    smear[0, 1] += share * spot[S_UV]
-    smear[1, 0] += share * spot[S_UV]
-    smear[1, 1] += share * spot[S_VV]
+def _add_displacement(spot: Array, share: float, displacement: Array) -> None:
+    displacement[0, 0] += share * spot[S_UU]
+    displacement[0, 1] += share * spot[S_UV]
+    displacement[1, 0] += share * spot[S_UV]
+    displacement[1, 1] += share * spot[S_VV]
 
 
 @numba.njit(
@@ -210,22 +210,22 @@ def identify(
         leds, flat, shifts, weights, f, limits[1], int(limits[2]), used[:m], pose, information,
         residuals,
     )  # fmt: skip
-    k, of_named, smear, common = 0, 0, np.zeros((2, 2)), 0.0
+    k, of_named, displacement, common = 0, 0, np.zeros((2, 2)), 0.0
     for i in range(n):
         if names[i] < 0:
             continue
         if k < left and used[k] == of_named:
             led[k], spot[k] = i, names[i]
-            _add_smear(table[names[i]], 1.0 / left, smear)
+            _add_displacement(table[names[i]], 1.0 / left, displacement)
             own = covariances[names[i], 0, 0] + covariances[names[i], 1, 1]
             common += 0.5 * own * limits[5] / left
             k += 1
         of_named += 1
     common += (limits[4] * size[3] * size[3] / 24.0) ** 2
-    smear[0, 0] += common
-    smear[1, 1] += common
+    displacement[0, 0] += common
+    displacement[1, 1] += common
     put_shared(
-        leds, flat, shifts, weights, delays, f, used[:k], pose, information, smear, limits[3],
-        shared,
+        leds, flat, shifts, weights, delays, f, used[:k], pose, information, displacement,
+        limits[3], shared,
     )  # fmt: skip
     return left, chi2

@@ -10,7 +10,7 @@ from pipeline.camera.lens import Camera
 from pipeline.camera.rolling_shutter import FrameMotion
 from pipeline.frames import Array
 from pipeline.identification.pnp import Association
-from pipeline.vision.motion_blur_kernels import SLOPES, add_smears, put_slopes
+from pipeline.vision.motion_blur_kernels import SLOPES, add_motion_blur, put_slopes
 from pipeline.vision.predicted_windows_kernels import MOTION
 
 MOST_STEP_S = 0.2
@@ -26,7 +26,7 @@ class MotionBlur:
     def __init__(self) -> None:
         """Nothing known."""
         self.sums = np.zeros(4)
-        """`add_smears`."""
+        """`add_motion_blur`."""
         self._t, self._row = -np.inf, np.zeros(MOTION)
         """Of the newest picture."""
         self._slopes = np.full(6, np.nan)
@@ -55,7 +55,7 @@ class MotionBlur:
         """
         fit, match, sums = association.fit, association.match, self.sums
         sums *= KEPT
-        add_smears(
+        add_motion_blur(
             camera.lens, size, leds_in_b, match.led, match.spot, table, expected, self._row,
             fit.p_bc_in_c, fit.R_cb, sums,
         )  # fmt: skip

@@ -22,7 +22,7 @@ _INDICES = numba.types.Array(numba.int64, 1, "A", readonly=True)
     cache=True,
     error_model="numpy",
 )
-def add_smears(
+def add_motion_blur(
     lens: Array,
     size: Array,
     leds_in_b: Array,
@@ -37,7 +37,7 @@ def add_smears(
 ) -> None:
     """Add to sums[:2] speed² times the second moment along the way less that across, and speed⁴.
 
-    A spot of speed s [px/s] exposed for T is smeared by s T, which adds (s T)²/12 along its way.
+    A spot of speed s [px/s] exposed for T is blurred by s T, which adds (s T)²/12 along its way.
     sums[2:] are the largest distance from where an LED was predicted [px] and the largest area.
 
     Args:

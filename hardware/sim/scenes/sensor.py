@@ -126,10 +126,10 @@ class Sensor:
         spread(light, box, lamp.way, self.shutter.row_s, times, profile, strength)
 
     def _skirt(self, lamp: Lamp) -> tuple[float, float]:
-        """Width [px] and peak of a lamp's halo, smeared as the lamp is."""
+        """Width [px] and peak of a lamp's halo, blurred as the lamp is."""
         o = self.optics
-        smear = float(np.hypot(lamp.way[2], lamp.way[3])) * o.exposure_s
-        sigma2 = o.halo_px**2 + lamp.radius_px**2 / 4.0 + smear**2 / 24.0
+        motion_blur = float(np.hypot(lamp.way[2], lamp.way[3])) * o.exposure_s
+        sigma2 = o.halo_px**2 + lamp.radius_px**2 / 4.0 + motion_blur**2 / 24.0
         return sqrt(sigma2), o.halo * lamp.light * lamp.radius_px**2 / (2.0 * sigma2)
 
     def box(self, lamp: Lamp) -> Box:

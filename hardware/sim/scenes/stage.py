@@ -161,14 +161,14 @@ class Stage:
         for k, light in enumerate(self.lights.window_lights):
             rows, depth = ways.rows[first + 2 * k :][:2], ways.depth[first + 2 * k :][:2]
             if np.isfinite(depth).all():
-                smear = float(np.hypot(*rows[0, 2:4])) * o.exposure_s / np.sqrt(12.0)
-                softness = float(np.hypot(2.0 * o.blur_px, smear))
+                motion_blur = float(np.hypot(*rows[0, 2:4])) * o.exposure_s / np.sqrt(12.0)
+                softness = float(np.hypot(2.0 * o.blur_px, motion_blur))
                 u, v = np.sort(rows[:, 0]), np.sort(rows[:, 1])
                 panes.append(Pane((u[0], u[1]), (v[0], v[1]), float(light), softness, False))
         if self.bar is not None and np.isfinite(ways.depth[-2:]).all():
             u = np.sort(ways.rows[-2:, 0])
-            smear = abs(float(ways.rows[-1, 2])) * o.exposure_s / np.sqrt(12.0)
-            softness = float(np.hypot(2.0 * o.blur_px, smear))
+            motion_blur = abs(float(ways.rows[-1, 2])) * o.exposure_s / np.sqrt(12.0)
+            softness = float(np.hypot(2.0 * o.blur_px, motion_blur))
             panes.append(Pane((u[0], u[1]), EVERYWHERE, self.bar.light, softness, True))
         return panes
 
@@ -182,8 +182,8 @@ class Stage:
 
 def _in_sight(lamp: Lamp, panes: list[Pane], sensor: Sensor) -> bool:
     """Whether all of a light is in the picture and before nothing opaque."""
-    smear = 0.5 * np.abs(lamp.way[2:4]) * sensor.optics.exposure_s
-    reach = lamp.radius_px + 2.5 * sensor.optics.blur_px + smear
+    motion_blur = 0.5 * np.abs(lamp.way[2:4]) * sensor.optics.exposure_s
+    reach = lamp.radius_px + 2.5 * sensor.optics.blur_px + motion_blur
     u, v = float(lamp.way[0]), float(lamp.way[1])
     if not (reach[0] <= u <= sensor.width - 1 - reach[0]):
         return False

@@ -56,7 +56,7 @@ def test_strong_light_saturates_and_weak_does_not():
     assert shot(still(), replace(DARK, led_light=0.3)).max() < 200
 
 
-def test_motion_smears_along_its_way_and_leaves_the_middle():
+def test_motion_blurs_along_its_way_and_leaves_the_middle():
     def moving(t):
         return np.eye(3), np.array([2.5, 0.1 + 4.0 * t, 0.05])  # 15 px in 10 ms
 

@@ -61,7 +61,7 @@ def test_what_is_lacking_is_told_after_a_moment(look, hint):
 
 
 @pytest.mark.parametrize("exposure_s", [0.004, 0.012, 0.02])
-def test_how_long_a_picture_is_exposed_is_seen_by_its_smear(exposure_s):
+def test_how_long_a_picture_is_exposed_is_seen_by_its_motion_blur(exposure_s):
     look = replace(GOOD, led_light=1.2 * 4.0, exposure_s=exposure_s, sub_exposures=16)
     watch = watched(look, omega=PAN)
     assert watch.exposure_s == pytest.approx(exposure_s, rel=0.35)

@@ -132,7 +132,7 @@ def test_a_turn_that_changes_is_taken_out_of_a_rolling_shutter():
     assert errors[-1] < 0.5 * errors[0]
 
 
-def test_an_exposure_is_learnt_from_how_far_moving_spots_are_smeared():
+def test_an_exposure_is_learnt_from_how_far_moving_spots_are_blurred():
     rng = np.random.default_rng(47)
     truth, omega = truth_at(rng), np.array([0.1, 0.9, 0.6])
     follower, look = (

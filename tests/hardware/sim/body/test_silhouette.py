@@ -113,12 +113,12 @@ def test_a_disc_from_its_edge_is_as_thick_as_its_blade():
     assert thin[24, 24] > 3.0 * thin[21, 24]
 
 
-def test_motion_smears_a_disc_and_keeps_what_it_covers():
+def test_motion_blurs_a_disc_and_keeps_what_it_covers():
     still = disc((24.0, 24.0), (6.0, 0.0), (0.0, 6.0))
     times = np.linspace(-5e-3, 5e-3, 21)
-    smeared = disc((24.0, 24.0), (6.0, 0.0), (0.0, 6.0), 0.0, times, (1200.0, 0.0))
-    assert smeared.sum() == pytest.approx(still.sum(), rel=1e-3)
-    assert (smeared > 0.02).any(axis=0).sum() > (still > 0.02).any(axis=0).sum() + 8
+    blurred = disc((24.0, 24.0), (6.0, 0.0), (0.0, 6.0), 0.0, times, (1200.0, 0.0))
+    assert blurred.sum() == pytest.approx(still.sum(), rel=1e-3)
+    assert (blurred > 0.02).any(axis=0).sum() > (still > 0.02).any(axis=0).sum() + 8
 
 
 def test_a_rod_joins_the_places_at_which_its_ends_are_seen_whatever_its_rows_times():
