@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from pipeline.frames import Array, log
 from pipeline.identification.initialisation_kernels import (
-    CHANCE,
     COUNT,
+    FALSE_ALARMS,
     NAMES,
     PLACE,
     SUM,
@@ -45,7 +45,7 @@ class Explanation:
     """Sum of the squared residuals [px²]."""
     tilt: float
     """Between the verticals [rad]; 0 if they are unknown."""
-    log_chance: float
+    log_false_alarms: float
     """Logarithm of the count of explanations as good as this that chance gives in a picture."""
 
     @property
@@ -62,7 +62,7 @@ def ranked(rows: Array, leds: int, spots: npt.NDArray[np.intp]) -> list[Explanat
         leds: How many the robot has.
         spots: Indices of the candidates that the rows speak of.
     """
-    order = np.lexsort(rows[:, [PLACE + 2, PLACE + 1, PLACE, SUM, COUNT, CHANCE]].T)
+    order = np.lexsort(rows[:, [PLACE + 2, PLACE + 1, PLACE, SUM, COUNT, FALSE_ALARMS]].T)
     return [_explanation(rows[k], leds, spots) for k in order]
 
 
@@ -75,7 +75,7 @@ def _explanation(row: Array, leds: int, spots: npt.NDArray[np.intp]) -> Explanat
         R_cb=row[TURN : TURN + 9].reshape(3, 3).copy(),
         squared_px=float(row[SUM]),
         tilt=max(float(row[TILT]), 0.0),
-        log_chance=float(row[CHANCE]),
+        log_false_alarms=float(row[FALSE_ALARMS]),
     )
 
 

@@ -94,7 +94,7 @@ def log_false_alarms(
     radius = radius_m / p[0]
     near = (_unnamed_near(p, names, lights, radius) + 1.0) / (pi * (radius * f) ** 2)
     off_px = FLOOR_PX + LEVERAGE * sqrt(squared_px / (count - 3.0))
-    chance = min(1.0, max(n / picture_px2, near) * pi * off_px * off_px)
+    probability = min(1.0, max(n / picture_px2, near) * pi * off_px * off_px)
     agreed = 0.25 * max(tilt_rad, SURE_TILT_RAD) ** 2 if tilt_rad >= 0.0 else 1.0
     alike = _log_alike(p, R, leds, names, lights)
-    return log(tests) + (count - 3.0) * log(chance) + log(agreed) + log(share) + alike
+    return log(tests) + (count - 3.0) * log(probability) + log(agreed) + log(share) + alike

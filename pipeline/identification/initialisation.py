@@ -119,7 +119,7 @@ class Initialisation:
         if believed is None and hints.R_cb is not None and not self.ambiguous:
             free = SearchHints(hints.up_in_c, hints.up_in_b, area_px_m2=hints.area_px_m2)
             found = self._search.explanations(spots, free)
-            if found and len(rivals(found)) == 1 and found[0].log_chance < AGAINST_MEMORY:
+            if found and len(rivals(found)) == 1 and found[0].log_false_alarms < AGAINST_MEMORY:
                 believed = found[0]
         if believed is None:
             return None
@@ -143,7 +143,7 @@ class Initialisation:
         left, found = np.setdiff1d(np.arange(len(spots)), first.match.spot), list[Association]()
         while len(found) < MOST_BESIDE and len(left) >= self._config.min_leds:
             rest = self._beside.explanations(spots.take(left), free, BESIDE_EFFORT)
-            if not rest or rest[0].log_chance > self._enough(rest[0], hints):
+            if not rest or rest[0].log_false_alarms > self._enough(rest[0], hints):
                 break
             one = replace(rest[0], match=Match(rest[0].match.led, left[rest[0].match.spot]))
             association = self._solved(one, spots)
@@ -166,7 +166,7 @@ class Initialisation:
     def _believed(
         self, found: list[Explanation], spots: Spots, hints: SearchHints
     ) -> Explanation | None:
-        if not found or found[0].log_chance > WEAK:
+        if not found or found[0].log_false_alarms > WEAK:
             return None
         equal = rivals(found)
         if len(equal) > 1 or self._pending.branches:
@@ -177,7 +177,9 @@ class Initialisation:
         else:
             winner = found[0]
         enough = self._enough(winner, hints)
-        return winner if winner.log_chance < enough else self._confirmed(winner, spots, enough)
+        return (
+            winner if winner.log_false_alarms < enough else self._confirmed(winner, spots, enough)
+        )
 
     def _enough(self, one: Explanation, hints: SearchHints) -> float:
         """Logarithm of the false alarms with which an explanation is believed at once."""
@@ -215,8 +217,8 @@ class Initialisation:
         before = np.array([weak.seen[led] for led in now])
         unshown_px = UNSHOWN_PX + 2.0 * np.sqrt(one.squared_px / one.leds)
         told = max(0.0, np.log(SHOWN * _reshaped(before, at) / unshown_px))
-        log_chance = one.log_chance - (2 * one.leds - 6) * told
-        return one if weak.pictures >= CONFIRMED and log_chance < enough else None
+        log_false_alarms = one.log_false_alarms - (2 * one.leds - 6) * told
+        return one if weak.pictures >= CONFIRMED and log_false_alarms < enough else None
 
 
 def _turned(weak: _Weak, one: Explanation) -> float:

@@ -20,7 +20,7 @@ TABLE = 4096
 FOUND, LOOKED, FITTED, BOUNDED = 0, 1, 2, 3
 """Counters: explanations, hypotheses, fits, whether work was left undone."""
 MOST_LEDS = 32
-COUNT, SUM, TILT, CHANCE, PLACE, TURN, NAMES = 0, 1, 2, 3, 4, 7, 16
+COUNT, SUM, TILT, FALSE_ALARMS, PLACE, TURN, NAMES = 0, 1, 2, 3, 4, 7, 16
 """Columns of an explanation: count of LEDs, squared residuals [px²], angle between the verticals,
 the logarithm of how many as good ones chance would give, place, attitude by rows, spots by LED."""
 ROW = NAMES + MOST_LEDS
@@ -197,7 +197,7 @@ def _are_alike(p: Array, R: Array, names: Integers, wanted: Wanted, lights: Binn
 
 
 @kernel
-def _slot(p: Array, R: Array, chance: float, work: Work) -> int:
+def _slot(p: Array, R: Array, false_alarms: float, work: Work) -> int:
     """Where an explanation goes: in place of the same one or of the worst; −1: nowhere."""
     found, n = work.found, work.counters[FOUND]
     for e in range(n):
@@ -206,15 +206,15 @@ def _slot(p: Array, R: Array, chance: float, work: Work) -> int:
             d2 += (found[e, PLACE + i] - p[i]) ** 2
         known = found[e, TURN : TURN + 9].reshape(3, 3)
         if d2 < (SAME_SHARE * p[0]) ** 2 and is_turned_less(R, known, SAME_RAD):
-            return e if chance < found[e, CHANCE] else -1
+            return e if false_alarms < found[e, FALSE_ALARMS] else -1
     if n < KEPT:
         work.counters[FOUND] += 1
         return int(n)
     worst_one = 0
     for e in range(n):
-        if found[e, CHANCE] > found[worst_one, CHANCE]:
+        if found[e, FALSE_ALARMS] > found[worst_one, FALSE_ALARMS]:
             worst_one = e
-    return worst_one if chance < found[worst_one, CHANCE] else -1
+    return worst_one if false_alarms < found[worst_one, FALSE_ALARMS] else -1
 
 
 @kernel
@@ -231,12 +231,12 @@ def _keep(
     """Enter an explanation."""
     w, count = wanted, _count(names)
     known = tilt, w.share, w.radius_m, w.f, w.picture_px2
-    chance = log_false_alarms(p, R, w.leds, names, count, squared_px, known, lights)
-    slot = _slot(p, R, chance, work)
+    false_alarms = log_false_alarms(p, R, w.leds, names, count, squared_px, known, lights)
+    slot = _slot(p, R, false_alarms, work)
     if slot < 0:
         return
     row = work.found[slot]
-    row[COUNT], row[SUM], row[TILT], row[CHANCE] = count, squared_px, tilt, chance
+    row[COUNT], row[SUM], row[TILT], row[FALSE_ALARMS] = count, squared_px, tilt, false_alarms
     for i in range(3):
         row[PLACE + i] = p[i]
         for j in range(3):

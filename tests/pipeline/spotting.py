@@ -53,7 +53,7 @@ def hints_of(truth, tilt=None, gravity=True):
 def best(spots, hints, search=None):
     """The explanation that is sure and has no rival."""
     found = (search or Relocalisation(CAMERA, LEDS_IN_B, CONFIG)).explanations(spots, hints)
-    if not found or found[0].log_chance > SURE or len(rivals(found)) > 1:
+    if not found or found[0].log_false_alarms > SURE or len(rivals(found)) > 1:
         return None
     return found[0]
 

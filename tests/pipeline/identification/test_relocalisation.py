@@ -195,7 +195,7 @@ def test_a_remembered_attitude_makes_four_leds_surer(gravity):
         search = Relocalisation(CAMERA, LEDS_IN_B, CONFIG)
         sure, unsure = (search.explanations(spots, hints)[0] for hints in (known, blind))
         assert explains_truly(sure, truth, spots)
-        assert sure.log_chance < unsure.log_chance - 2.0
+        assert sure.log_false_alarms < unsure.log_false_alarms - 2.0
 
 
 def test_an_attitude_that_is_remembered_wrong_is_not_confirmed():
