@@ -11,7 +11,7 @@ from pipeline.signals import RelativePose
 from pipeline.vision_config import GatesConfig
 
 
-def disbelief(
+def gate_rejection(
     pose: RelativePose, up_in_c: Array | None, up_in_b: Array | None, config: GatesConfig
 ) -> str | None:
     """Why `pose` is not believed, or None.

@@ -34,7 +34,7 @@ from pipeline.timing.camera_imu_delay import CameraImuDelay
 from pipeline.vision import vision
 from pipeline.vision.blink_code import BlinkCode
 from pipeline.vision.detection import Detection, FramePrior
-from pipeline.vision.gating import disbelief
+from pipeline.vision.gating import gate_rejection
 from pipeline.vision.imu_buffer import ImuBuffer
 from pipeline.vision.picture_check import PictureCheck
 from pipeline.vision.rays import NO_RAYS
@@ -147,10 +147,10 @@ class VisualFrontEnd:
     def _judged(self, detection: Detection, prior: FramePrior) -> Detection:
         if detection.pose is None:
             return detection
-        lie = disbelief(detection.pose, prior.up_in_c, prior.up_in_b, self._gates)
+        lie = gate_rejection(detection.pose, prior.up_in_c, prior.up_in_b, self._gates)
         if lie is not None:
             self._vision.forget()
-            alone = disbelief(detection.pose, None, None, self._gates) is None
+            alone = gate_rejection(detection.pose, None, None, self._gates) is None
             return replace(
                 detection,
                 pose=None,
@@ -205,7 +205,7 @@ class VisualFrontEnd:
             return None
         self._t_doubt = frame.t
         pose = Vision(self.camera, self._leds_in_b).step(frame, FramePrior()).pose
-        is_good = pose is not None and disbelief(pose, None, None, self._gates) is None
+        is_good = pose is not None and gate_rejection(pose, None, None, self._gates) is None
         return pose if is_good else None
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.frames import exp, rotation_about_x
 from pipeline.signals import RelativePose
-from pipeline.vision.gating import disbelief
+from pipeline.vision.gating import gate_rejection
 from pipeline.vision_config import GatesConfig
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -32,12 +32,12 @@ LIES = {
 
 def test_the_truth_is_believed_with_and_without_gravity() -> None:
     up_in_b = TRUE.R_cb.T @ UP
-    assert disbelief(TRUE, UP, up_in_b, GatesConfig()) is None
-    assert disbelief(TRUE, None, None, GatesConfig()) is None
+    assert gate_rejection(TRUE, UP, up_in_b, GatesConfig()) is None
+    assert gate_rejection(TRUE, None, None, GatesConfig()) is None
 
 
 @pytest.mark.parametrize("word", LIES)
 def test_a_lie_is_refused_with_its_reason(word: str) -> None:
-    reason = disbelief(LIES[word], UP, TRUE.R_cb.T @ UP, GatesConfig())
+    reason = gate_rejection(LIES[word], UP, TRUE.R_cb.T @ UP, GatesConfig())
     assert reason is not None
     assert word in reason

@@ -9,7 +9,7 @@ from hardware.sim.render import RenderOptions
 from pipeline.frames import R_from_rpy
 from pipeline.signals import Frame
 from pipeline.vision.detection import FramePrior
-from pipeline.vision.gating import disbelief
+from pipeline.vision.gating import gate_rejection
 from pipeline.vision.last_pose import FORGET_MISSES, REACHED_S
 from pipeline.vision.robot_identity import ELSEWHERE
 from pipeline.vision.vision import Vision, warm_up
@@ -205,7 +205,10 @@ def test_a_mirrored_picture_is_refused():
 
 def assert_refused(frame, prior):
     pose = vision().step(frame, prior).pose
-    assert pose is None or disbelief(pose, prior.up_in_c, prior.up_in_b, GatesConfig()) is not None
+    assert (
+        pose is None
+        or gate_rejection(pose, prior.up_in_c, prior.up_in_b, GatesConfig()) is not None
+    )
 
 
 def test_the_same_pictures_give_the_same_bits():
