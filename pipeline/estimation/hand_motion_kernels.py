@@ -20,8 +20,8 @@ STEP_S = 1.0 / 60.0
 TAPS = 8
 """Points looked back at."""
 AHEAD = 8
-"""Points foretold."""
-FORETOLD_S = AHEAD * STEP_S
+"""Points predicted."""
+PREDICTED_S = AHEAD * STEP_S
 WINDOW = TAPS + AHEAD
 
 

@@ -189,7 +189,7 @@ def misfit(
 ) -> float:
     """χ² of the rays in `use` about the pose that fits them best: 2 n − 6 degrees of freedom.
 
-    Neither motion nor what was foretold enters: it tells of the spots alone.
+    Neither motion nor what was predicted enters: it tells of the spots alone.
     """
     H, expected, miss = np.empty((2, 7)), np.empty(2), np.empty(2)
     A = np.zeros((7, 7))  # of the normal equations, last row and column the misses

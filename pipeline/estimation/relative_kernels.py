@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.estimation.gravity_free_kernels import step
-from pipeline.estimation.hand_motion_kernels import FORETOLD_S, forecast_at
+from pipeline.estimation.hand_motion_kernels import PREDICTED_S, forecast_at
 from pipeline.estimation.imu_interpolation_kernels import put_noise, sample_at
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel, put_exp
@@ -161,9 +161,9 @@ def transit(
             if c == last and hand.shape[0] > 0:
                 forecast_at(hand, t - t_c[last], begun)
                 forecast_at(hand, until - t_c[last], ahead)
-                unforetold = max(beyond - FORETOLD_S, 0.0)
+                unpredicted = max(beyond - PREDICTED_S, 0.0)
                 for k in range(3):  # in place of the drift
-                    s[6 + k] += noise[1, 2, 0] ** 2 * (unforetold**3 - beyond**3)
+                    s[6 + k] += noise[1, 2, 0] ** 2 * (unpredicted**3 - beyond**3)
                     s[6 + k] += (ahead[3 + k] * ahead[3 + k] - begun[3 + k] * begun[3 + k]) / h
                 forecast_at(hand, middle - t_c[last], ahead)
                 inputs[6:9] = ahead[0:3]
