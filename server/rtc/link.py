@@ -42,7 +42,7 @@ class RtcLink:
         self.id = secrets.token_urlsafe(12)
         self.is_closing = False
         self._manager, self._phone, self._on_gone = manager, phone, on_gone
-        self._dating = FrameTimestamping()
+        self._timestamping = FrameTimestamping()
         self._trip = RoundTrip()
         self._size: tuple[int, int] | None = None
         self._screen_angle_deg = 0
@@ -116,7 +116,7 @@ class RtcLink:
     def _take(self, record: Record, data: str | bytes, t: float) -> None:
         body = record.body
         if isinstance(body, Stamp):
-            self._dating.pair(body.rtp_timestamp, record.t_us)
+            self._timestamping.pair(body.rtp_timestamp, record.t_us)
             return
         if isinstance(body, Pong):
             self._trip.add(1e-6 * body.server_time_us, t)
@@ -154,7 +154,7 @@ class RtcLink:
             self.undated += 1
             return None
         arrival_us = 1e6 * (t + clock.offset) if clock.ready else 0.0
-        date = self._dating.date(said, frame.timestamp, arrival_us)
+        date = self._timestamping.date(said, frame.timestamp, arrival_us)
         angle = said.screen_angle_deg if said is not None else self._screen_angle_deg
         sequence = said.sequence if said is not None else frame.number
         self._phone.video_path = f"WebRTC, {codec.name}, dated by {date.source}"
