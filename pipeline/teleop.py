@@ -9,16 +9,13 @@ import numpy as np
 
 from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraConfig
 from pipeline.control import failsafe, flight_envelope, resumption
-from pipeline.control.actuation import Actuation
+from pipeline.control.acting import Acting, Moment
 from pipeline.control.flight_envelope import Ages
-from pipeline.control.hold import Hold
-from pipeline.control.leading import PLAIN, Leading, aim_of, led, suits
-from pipeline.control.leash import Leashed, leash_of
+from pipeline.control.leading import PLAIN, Leading, aim_of, suits
+from pipeline.control.leash import Leashed
 from pipeline.control.pid import PoseError, Reference, pose_error
-from pipeline.control.place import SuspendedPlace
-from pipeline.control.station import StationKeeping
-from pipeline.control.thruster_health import ThrusterHealth
-from pipeline.control.tracking import Situation, Tracking
+from pipeline.control.thrust_acting import ThrustActing
+from pipeline.control.tracking import Situation
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.estimation.attitude import Attitude
 from pipeline.estimation.estimators import make_estimator
@@ -109,13 +106,7 @@ class Teleop:
             config.failsafe, robot.ramp_s, robot.hangs, bridges=config.estimator != "none"
         )
         self._virtual_camera = VirtualCamera(config.virtual_camera)
-        self._tracking, self._hold = Tracking(robot, config), Hold(config.hold, robot)
-        self._actuation = Actuation(robot, config)
-        self._thruster_health = ThrusterHealth(robot)
-        self._thrusts = np.zeros(robot.A.shape[1])
-        self._station = StationKeeping(config.station, config.gains, robot)
-        # what stands on the floor brakes and stays by itself
-        self._keeps_station = robot.hangs or robot.weight_to_carry > 0.0
+        self._acting: Acting = ThrustActing(robot, config)
         self._failsafe = failsafe.Failsafe()
         self._operator = TouchState(-np.inf, held=False, press=0)
         self._half_field: tuple[float, float] | None = None
@@ -124,11 +115,8 @@ class Teleop:
         self._repeated = RepeatedPicture()
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
-        self._place = SuspendedPlace(robot, config.feedforward.thrust_lag_s)
-        self._leash = leash_of(robot, config.leash)
         self._leading = self.next_leading = PLAIN
         self._aim: Reference | None = None
-        self._force_in_b = self._given_in_b = np.zeros(3)
 
     def tune(self, virtual_camera: VirtualCameraConfig) -> None:
         """Set the virtual camera's runtime parameters in flight, without a jump."""
@@ -141,11 +129,11 @@ class Teleop:
     @property
     def weak_thrusters(self) -> tuple[str, ...]:
         """Those that don't give what they are told, in words."""
-        return self._thruster_health.words
+        return self._acting.weak_thrusters
 
     def push(self, wrench_in_b: Array) -> None:
         """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
-        self._actuation.push_in_b = wrench_in_b
+        self._acting.push(wrench_in_b)
 
     def step(self, inputs: Inputs) -> Output:
         """One control period. Fig. 4."""
@@ -153,13 +141,14 @@ class Teleop:
         dt_ms = self._pass_time(inputs.t)
         # news before the state: a late image is fused when it was taken, then predicted to now
         self._fuse(inputs)
-        self._watch_thrusters(inputs)
+        flies = self._failsafe.mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
+        obeyed = flies and not inputs.gap and not self._is_deaf(inputs.t)
+        self._acting.watch(obeyed, self._body, self._h)
         relative = self.estimator.state(inputs.t)  # Eq. (5)-(13)
         R_fc = self._R_fc_now(relative)
         known = self._look(relative, R_fc)  # Eq. (21)-(24)
         if known is not None:
-            self._tracking.observe(known, self._given_in_b, self._h)
-            self._propagate_motion(known, inputs.t)
+            self._acting.observe(known, self._moment(inputs.t))
         # the reference moves before its error is taken: else a period of the way back is missing
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
@@ -181,14 +170,13 @@ class Teleop:
             known, wished = self._change_mode(before, known, leashed)
             leashed = self._leashed(known, wished)
         # last, what was given: feed-forward takes it off the next period's specific force
-        thrusts, saturated = self._act(known, leashed)
+        share = failsafe.ceiling(self._failsafe, self._limits)
+        acted = self._acting.act(known, leashed, self._moment(inputs.t), share)
         self._aim = self._aim_now(known, wished)
-        self._thrusts = thrusts
-        self._given_in_b = self._actuation.A[:3] @ thrusts - self._actuation.push_in_b[:3]
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
         return Output(
             t=inputs.t,
-            thrusts=thrusts,
+            thrusts=acted.thrusts,
             armed=self._failsafe.mode in (*failsafe.FLYING, Mode.RAMP),
             failsafe=self._failsafe,
             refusals=failsafe.refusals(self._failsafe, judged, self._limits),
@@ -200,10 +188,20 @@ class Teleop:
             reference=self._aim,
             leading=self._leading,
             error=leashed.error if leashed is not None else None,
-            saturated=saturated,
+            saturated=acted.saturated,
             at_limit=leashed is not None and leashed.at_limit,
             ages=ages,
-            thrusters=self._thruster_health.words,
+            thrusters=self._acting.weak_thrusters,
+        )
+
+    def _moment(self, t: float) -> Moment:
+        return Moment(
+            self._failsafe.mode,
+            self._reference,
+            self._leading,
+            self._body,
+            self._is_deaf(t),
+            self._h,
         )
 
     def _pass_time(self, t: float) -> int:
@@ -239,14 +237,6 @@ class Teleop:
         if inputs.operator is not None:
             self._operator = inputs.operator
 
-    def _watch_thrusters(self, inputs: Inputs) -> None:
-        """While the robot obeys: does each thruster give what it was told?"""
-        flies = self._failsafe.mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
-        if not flies or inputs.gap or self._is_deaf(inputs.t):
-            self._thruster_health.start()
-        elif self._thruster_health.follow(self._thrusts, self._body, self._h):
-            self._actuation.weaken(self._thruster_health.gains)
-
     def _R_fc_now(self, relative: RelativeState | None) -> Array | None:
         """Attitude of the phone, if need be by way of the robot; None before the first sample."""
         if relative is None or self._is_deaf(relative.t):
@@ -281,23 +271,17 @@ class Teleop:
         if known is None or self._reference is None:
             return None
         if self._failsafe.mode == Mode.COAST:
-            return self._station.error(known.view) if self._keeps_station else None
+            return self._acting.coast_error(known.view)
         error = pose_error(known.view, self._reference, self._robot.axes)
-        shares_in_f = self._leading.shares_in_f
-        if shares_in_f is None:
-            return error
-        return led(error, known.view, shares_in_f, self._place.x_in_f, self._place.v_in_f)
+        return self._acting.led(error, known.view, self._leading)
 
     def _leashed(self, known: Situation | None, error: PoseError | None) -> Leashed | None:
         """The error that is to vanish: to where the robot can be held."""
         if known is None or error is None:
             return None
-        reference = self._reference
-        if self._leash is None or reference is None or self._failsafe.mode != Mode.TRACK:
+        if self._reference is None or self._failsafe.mode != Mode.TRACK:
             return Leashed(error)
-        R_fv, place = known.view.R_fv, self._place
-        R_fr = R_fv @ reference.R_vr
-        return self._leash.hold(error, R_fv, R_fr, place.from_rest_in_f, place.v_in_f)
+        return self._acting.leashed(error, known.view, self._reference)
 
     def _judge(
         self,
@@ -314,12 +298,12 @@ class Teleop:
             fault=inputs.fault
             or flight_envelope.fault(limits, is_tracking, known, error)
             or self._sensor_fault()
-            or self._thruster_fault(),
+            or self._acting.fault,
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
             or self._astray(known)
             or self._blocked(leashed),
-            refusals=(*inputs.refusals, *map(MEND.format, self._thruster_health.words)),
+            refusals=(*inputs.refusals, *map(MEND.format, self._acting.weak_thrusters)),
             requests=inputs.requests,
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
             **ages.in_ms(),
@@ -334,12 +318,6 @@ class Teleop:
             else ""
         )
 
-    def _thruster_fault(self) -> str:
-        """Words if what its thrusters still give can't carry it; a cable would."""
-        if self._actuation.can_hover:
-            return ""
-        return f"{self._thruster_health.words[0]} The robot can't hover."
-
     def _astray(self, known: Situation | None) -> str:
         """Why it must not follow again by itself after a gap; empty if it may."""
         if self._failsafe.mode != Mode.COAST or known is None or self._led_to is None:
@@ -351,7 +329,7 @@ class Teleop:
 
     def _blocked(self, leashed: Leashed | None) -> str:
         """Why it must not go on by a share: its place is wrong, and it would bounce."""
-        if self._failsafe.mode != Mode.TRACK or not self._place.is_pushed:
+        if self._failsafe.mode != Mode.TRACK or not self._acting.is_pushed:
             return ""
         if self._leading.needs_place:
             return "It touches something: lead by all of the motion."
@@ -370,62 +348,18 @@ class Teleop:
             if before != Mode.COAST:
                 self._leading = self.next_leading
             self._virtual_camera.reset()
-            self._place.start()
+            self._acting.start_place()
             known = self._look(known.relative, known.R_fc) or known
             self._reference = Reference.here(known.view)
             # by a share, or with turns that count for nothing, a gap is like a new press
             if before != Mode.COAST or self._led_to is None or not self._leading.is_plain:
                 self._led_to = self._reference
-            held_in_f = known.view.R_fv @ known.view.R_vb @ self._force_in_b
-            self._tracking.start(held_in_f if before != Mode.ARMED else None)
+            self._acting.start(known, from_rest=before == Mode.ARMED)
             return known, self._error(known)
-        # hold and station take over from what tracking last gave, so before its integrals are reset
-        if before == Mode.TRACK and known is not None:
-            R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
-            constant_in_f = self._tracking.constant_force_in_f
-            self._hold.start(self._force_in_b, R_fb, u_in_f, constant_in_f)
-            if leashed is not None:
-                offset_in_f = known.view.R_fv @ leashed.error.e_p_in_v
-                # what the suspension pulls there; the integral is without the feed-forward's part
-                stays_in_f = self._place.force_to_stay_in_f(offset_in_f)
-                self._station.start(
-                    offset_in_f, stays_in_f if self._place.is_known else constant_in_f
-                )
-        # after a gap the velocity is the station's, which dead reckoning has kept
-        if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._keeps_station:
-            self._hold.start(
-                self._force_in_b,
-                self._hold.R_fb,
-                self._station.v_in_f,
-                self._tracking.constant_force_in_f,
-            )
-        if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
-            self._tracking.reset()
-        # a supervisor's reset: somebody has looked at the robot
-        if before == Mode.STOPPED and self._thruster_health.words:
-            self._thruster_health.reset()
-            self._actuation.weaken(self._thruster_health.gains)
+        self._acting.change_mode(before, mode, known, leashed)
         if mode != Mode.COAST:
             self._reference = self._led_to = None
         return known, None
-
-    def _propagate_motion(self, known: Situation, t: float) -> None:
-        """Carry on where the robot is and how fast, by its own sensors.
-
-        In a gap by the gyroscope alone: f is put right only after it.
-        """
-        R_fb = known.view.R_fv @ known.view.R_vb
-        is_deaf = self._is_deaf(t)
-        if is_deaf:
-            self._station.reset()
-            self._hold.R_fb = R_fb
-        if self._failsafe.mode == Mode.COAST:
-            R_fb = self._hold.R_fb
-        f_bf_in_b, place, x_before_in_f = known.relative.f_bf_in_b, self._place, self._place.x_in_f
-        place.propagate(f_bf_in_b, R_fb, self._given_in_b, self._h)
-        suspended = (place.x_in_f - x_before_in_f, place.v_in_f)
-        is_known = place.is_known and not is_deaf
-        self._station.propagate(f_bf_in_b, R_fb, self._h, suspended if is_known else None)
 
     def _aim_now(self, known: Situation | None, error: PoseError | None) -> Reference | None:
         """Where the robot shall be; in a gap where it should be before."""
@@ -441,35 +375,3 @@ class Teleop:
         if reference is None or led_to is None or reference is led_to:
             return
         self._reference = resumption.toward(self._config.resumption, reference, led_to, self._h)
-
-    def _shares_in_f(self, leashed: Leashed) -> Array | None:
-        """(3, 3) what of the reference's motion is to be gone; None: all of it."""
-        led_in_f = self._leading.shares_in_f
-        if led_in_f is None:
-            return leashed.shares_in_f
-        return np.diag(led_in_f) if leashed.shares_in_f is None else leashed.shares_in_f * led_in_f
-
-    def _act(self, known: Situation | None, leashed: Leashed | None) -> tuple[Array, bool]:
-        """Wrench of the mode, given by the thrusters, under the failsafe's ceiling."""
-        mode, reference = self._failsafe.mode, self._reference
-        omega_m_bf_in_b = self._body.omega_m_bf_in_b
-        if mode == Mode.TRACK and known and reference and leashed:
-            R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
-            wrench_in_b = self._tracking.wrench(  # Eq. (20)
-                known, reference, leashed.error, self._h, self._shares_in_f(leashed)
-            )
-            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, self._h)
-        elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
-            wrench_in_b = self._hold.wrench(omega_m_bf_in_b, self._h)
-            if mode == Mode.COAST and self._keeps_station:
-                wrench_in_b[:3] = self._station.force_in_b(self._hold.R_fb)
-            R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
-        else:
-            return np.zeros(self._robot.A.shape[1]), False
-        given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
-        self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
-        if mode == Mode.TRACK and leashed is not None and known is not None:
-            self._tracking.learn(leashed.error, known.view, given.missing_in_b, self._h)
-        if not np.isfinite(given.thrusts).all():
-            return np.zeros_like(given.thrusts), True
-        return given.thrusts * failsafe.ceiling(self._failsafe, self._limits), given.saturated

@@ -1,0 +1,187 @@
+"""A robot that is told thrusts: PID, feed-forward, hold and station, given by its thrusters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.config import TeleopConfig
+from pipeline.control.acting import Acted, Moment
+from pipeline.control.actuation import Actuation
+from pipeline.control.hold import Hold
+from pipeline.control.leading import Leading, led
+from pipeline.control.leash import Leashed, leash_of
+from pipeline.control.pid import PoseError, Reference
+from pipeline.control.place import SuspendedPlace
+from pipeline.control.station import StationKeeping
+from pipeline.control.thruster_health import ThrusterHealth
+from pipeline.control.tracking import Situation, Tracking
+from pipeline.frames import Array
+from pipeline.robot import Robot
+from pipeline.signals import BodyImu, Mode, VirtualView
+
+
+class ThrustActing:
+    """An `Acting` whose last step is the allocation of a wrench."""
+
+    def __init__(self, robot: Robot, config: TeleopConfig) -> None:
+        """For one robot, at rest."""
+        self._tracking, self._hold = Tracking(robot, config), Hold(config.hold, robot)
+        self._actuation = Actuation(robot, config)
+        self._thruster_health = ThrusterHealth(robot)
+        self._thrusts = np.zeros(robot.A.shape[1])
+        self._station = StationKeeping(config.station, config.gains, robot)
+        # what stands on the floor brakes and stays by itself
+        self._keeps_station = robot.hangs or robot.weight_to_carry > 0.0
+        self._place = SuspendedPlace(robot, config.feedforward.thrust_lag_s)
+        self._leash = leash_of(robot, config.leash)
+        self._force_in_b = self._given_in_b = np.zeros(3)
+
+    @property
+    def weak_thrusters(self) -> tuple[str, ...]:
+        """Those that don't give what they are told, in words."""
+        return self._thruster_health.words
+
+    @property
+    def fault(self) -> str:
+        """Words if what its thrusters still give can't carry it; a cable would."""
+        if self._actuation.can_hover:
+            return ""
+        return f"{self._thruster_health.words[0]} The robot can't hover."
+
+    @property
+    def is_pushed(self) -> bool:
+        """Something that neither thrusters nor suspension explain pushes it."""
+        return self._place.is_pushed
+
+    def push(self, wrench_in_b: Array) -> None:
+        """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
+        self._actuation.push_in_b = wrench_in_b
+
+    def watch(self, obeyed: bool, body: BodyImu, h: float) -> None:
+        """While the robot obeys: does each thruster give what it was told?"""
+        if not obeyed:
+            self._thruster_health.start()
+        elif self._thruster_health.follow(self._thrusts, body, h):
+            self._actuation.weaken(self._thruster_health.gains)
+
+    def observe(self, known: Situation, now: Moment) -> None:
+        """Carry on where the robot is and how fast, by its own sensors.
+
+        In a gap by the gyroscope alone: f is put right only after it.
+        """
+        self._tracking.observe(known, self._given_in_b, now.h)
+        R_fb = known.view.R_fv @ known.view.R_vb
+        if now.is_deaf:
+            self._station.reset()
+            self._hold.R_fb = R_fb
+        if now.mode == Mode.COAST:
+            R_fb = self._hold.R_fb
+        f_bf_in_b, place, x_before_in_f = known.relative.f_bf_in_b, self._place, self._place.x_in_f
+        place.propagate(f_bf_in_b, R_fb, self._given_in_b, now.h)
+        suspended = (place.x_in_f - x_before_in_f, place.v_in_f)
+        is_known = place.is_known and not now.is_deaf
+        self._station.propagate(f_bf_in_b, R_fb, now.h, suspended if is_known else None)
+
+    def coast_error(self, view: VirtualView) -> PoseError | None:
+        """What is missing to the station that it keeps."""
+        return self._station.error(view) if self._keeps_station else None
+
+    def led(self, error: PoseError, view: VirtualView, leading: Leading) -> PoseError:
+        """The error to where `leading` has the robot."""
+        shares_in_f = leading.shares_in_f
+        if shares_in_f is None:
+            return error
+        return led(error, view, shares_in_f, self._place.x_in_f, self._place.v_in_f)
+
+    def leashed(self, error: PoseError, view: VirtualView, reference: Reference) -> Leashed:
+        """The error to where its thrusters can hold the robot."""
+        if self._leash is None:
+            return Leashed(error)
+        R_fv, place = view.R_fv, self._place
+        R_fr = R_fv @ reference.R_vr
+        return self._leash.hold(error, R_fv, R_fr, place.from_rest_in_f, place.v_in_f)
+
+    def start_place(self) -> None:
+        """A press: from here its way counts."""
+        self._place.start()
+
+    def start(self, known: Situation, from_rest: bool) -> None:
+        """Begin to track, from rest or from the force that was held."""
+        held_in_f = known.view.R_fv @ known.view.R_vb @ self._force_in_b
+        self._tracking.start(None if from_rest else held_in_f)
+
+    def change_mode(
+        self, before: Mode, mode: Mode, known: Situation | None, leashed: Leashed | None
+    ) -> None:
+        """Bumpless: holding starts from what tracking did."""
+        # hold and station take over from what tracking last gave, so before its integrals are reset
+        if before == Mode.TRACK and known is not None:
+            R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
+            constant_in_f = self._tracking.constant_force_in_f
+            self._hold.start(self._force_in_b, R_fb, u_in_f, constant_in_f)
+            if leashed is not None:
+                offset_in_f = known.view.R_fv @ leashed.error.e_p_in_v
+                # what the suspension pulls there; the integral is without the feed-forward's part
+                stays_in_f = self._place.force_to_stay_in_f(offset_in_f)
+                self._station.start(
+                    offset_in_f, stays_in_f if self._place.is_known else constant_in_f
+                )
+        # after a gap the velocity is the station's, which dead reckoning has kept
+        if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._keeps_station:
+            self._hold.start(
+                self._force_in_b,
+                self._hold.R_fb,
+                self._station.v_in_f,
+                self._tracking.constant_force_in_f,
+            )
+        if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
+            self._tracking.reset()
+        # a supervisor's reset: somebody has looked at the robot
+        if before == Mode.STOPPED and self._thruster_health.words:
+            self._thruster_health.reset()
+            self._actuation.weaken(self._thruster_health.gains)
+
+    def act(
+        self, known: Situation | None, leashed: Leashed | None, now: Moment, share: float
+    ) -> Acted:
+        """Wrench of the mode, given by the thrusters, under the failsafe's ceiling."""
+        acted = self._given(known, leashed, now, share)
+        self._thrusts = acted.thrusts
+        push_in_b = self._actuation.push_in_b
+        self._given_in_b = self._actuation.A[:3] @ acted.thrusts - push_in_b[:3]
+        return acted
+
+    def _given(
+        self, known: Situation | None, leashed: Leashed | None, now: Moment, share: float
+    ) -> Acted:
+        mode, reference = now.mode, now.reference
+        omega_m_bf_in_b = now.body.omega_m_bf_in_b
+        if mode == Mode.TRACK and known and reference and leashed:
+            R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
+            shares_in_f = _shares_in_f(leashed, now.leading)
+            wrench_in_b = self._tracking.wrench(  # Eq. (20)
+                known, reference, leashed.error, now.h, shares_in_f
+            )
+            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, now.h)
+        elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
+            wrench_in_b = self._hold.wrench(omega_m_bf_in_b, now.h)
+            if mode == Mode.COAST and self._keeps_station:
+                wrench_in_b[:3] = self._station.force_in_b(self._hold.R_fb)
+            R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
+        else:
+            return Acted(np.zeros_like(self._thrusts), saturated=False)
+        given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
+        self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
+        if mode == Mode.TRACK and leashed is not None and known is not None:
+            self._tracking.learn(leashed.error, known.view, given.missing_in_b, now.h)
+        if not np.isfinite(given.thrusts).all():
+            return Acted(np.zeros_like(given.thrusts), saturated=True)
+        return Acted(given.thrusts * share, given.saturated)
+
+
+def _shares_in_f(leashed: Leashed, leading: Leading) -> Array | None:
+    """(3, 3) what of the reference's motion is to be gone; None: all of it."""
+    led_in_f = leading.shares_in_f
+    if led_in_f is None:
+        return leashed.shares_in_f
+    return np.diag(led_in_f) if leashed.shares_in_f is None else leashed.shares_in_f * led_in_f
