@@ -1,4 +1,4 @@
-"""The interface to every robot, real or simulated: thrusts in, samples of its body sensors out."""
+"""The interface to every robot, real or simulated: commands in, samples of its body sensors out."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from pipeline.frames import Array
+from pipeline.robot import Robot, TwistDrive
+
+ROUNDING = 1.0 + 1e-6
+"""Commands travel as float32: by this factor they may be larger than they were."""
 
 
 class FollowerError(RuntimeError):
@@ -94,6 +98,32 @@ class ThrustCommand:
         return cls(np.zeros(thrusters), armed=False)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TwistCommand:
+    """Set-point for the next period, of a robot that follows a velocity by itself."""
+
+    twist_in_b: Array
+    """(6,) velocity of the body's origin and its angular rate in f, in b [m/s, rad/s]."""
+    armed: bool
+    """Motion is meant. False demands zeros, as of thrusts."""
+    stop: bool = False
+    """Somebody pressed STOP: zero at once."""
+
+    @classmethod
+    def zero(cls) -> TwistCommand:
+        """No motion, disarmed."""
+        return cls(np.zeros(6), armed=False)
+
+
+RobotCommand = ThrustCommand | TwistCommand
+"""What robots are told; each takes one kind, which `[link] takes` of its file names."""
+
+
+def zero_command(robot: Robot) -> RobotCommand:
+    """Nothing, disarmed, of the kind that `robot` takes."""
+    return TwistCommand.zero() if robot.twist else ThrustCommand.zero(robot.A.shape[1])
+
+
 @dataclass(frozen=True, slots=True)
 class BlinkOrder:
     """Which of its LEDs a robot keeps dark when: a round of slots, again and again for a while."""
@@ -125,13 +155,15 @@ class BodySample:
     """Why the state is RAMP or REFUSING; else why the newest command was not taken."""
     round_trip_s: float | None
     """From sending the newest accepted command to this sample's arrival [s]; None if unknown."""
+    twist_in_b: Array | None = None
+    """(6,) as the robot measures it [m/s, rad/s], of one that takes a twist: it has no thrusts."""
 
 
 class Follower(Protocol):
     """Interface to one robot. Used from one thread; no method waits for the robot."""
 
     thrusters: int
-    """m."""
+    """m; 0 of a robot that takes a twist."""
 
     @property
     def epoch(self) -> int:
@@ -148,16 +180,17 @@ class Follower(Protocol):
             FollowerError: closed. A lost link is no error: samples stay away.
         """
 
-    def send(self, command: ThrustCommand) -> None:
+    def send(self, command: RobotCommand) -> None:
         """Send `command`, which was made of what `receive` last gave.
 
         Raises:
-            FollowerError: wrong shape, not finite, outside the limits, thrust while not armed, or
-                closed. Nothing was sent. A lost link is no error.
+            FollowerError: of a kind that it does not take, wrong shape, not finite, outside the
+                limits, not zero while not armed, or closed. Nothing was sent. A lost link is no
+                error.
         """
 
     def stop(self) -> None:
-        """Command zero thrust at once, several times; never raises for a lost link."""
+        """Command zero at once, several times; never raises for a lost link."""
 
     def close(self) -> None:
         """Give the link back, without a word: a robot that gives thrust comes down by itself.
@@ -166,12 +199,14 @@ class Follower(Protocol):
         """
 
 
-def check_command(command: ThrustCommand, thrusters: int, f_max: float) -> None:
-    """Refuse what no robot may be told.
+def check_command(command: RobotCommand, thrusters: int, f_max: float) -> None:
+    """Refuse what no robot with thrusters may be told.
 
     Raises:
         FollowerError: says what is allowed.
     """
+    if isinstance(command, TwistCommand):
+        raise FollowerError("a twist", f"{thrusters} thrusts: this robot takes nothing else")
     thrusts = command.thrusts
     if thrusts.shape != (thrusters,):
         raise FollowerError(f"thrusts of shape {thrusts.shape}", f"({thrusters},)")
@@ -181,6 +216,26 @@ def check_command(command: ThrustCommand, thrusters: int, f_max: float) -> None:
         raise FollowerError(f"thrusts {thrusts} N", f"0 to {f_max:g} N each")
     if (command.stop or not command.armed) and bool(thrusts.any()):
         raise FollowerError(f"thrusts {thrusts} N with `stop` or without `armed`", "zeros")
+
+
+def check_twist(command: RobotCommand, drive: TwistDrive) -> None:
+    """Refuse what no robot that takes a twist may be told.
+
+    Raises:
+        FollowerError: says what is allowed.
+    """
+    if isinstance(command, ThrustCommand):
+        raise FollowerError("thrusts", "a twist: this robot takes nothing else")
+    twist_in_b = command.twist_in_b
+    if twist_in_b.shape != (6,):
+        raise FollowerError(f"twist of shape {twist_in_b.shape}", "(6,)")
+    if not bool(np.isfinite(twist_in_b).all()):
+        raise FollowerError(f"twist {twist_in_b}", "finite numbers")
+    if drive.exceeds(twist_in_b, ROUNDING):
+        allowed = f"no more than {drive.speed:g} m/s and {drive.rate:.3g} rad/s"
+        raise FollowerError(f"twist {twist_in_b}", allowed)
+    if (command.stop or not command.armed) and bool(twist_in_b.any()):
+        raise FollowerError(f"twist {twist_in_b} with `stop` or without `armed`", "zeros")
 
 
 @runtime_checkable

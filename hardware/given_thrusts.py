@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hardware.attitude_keeper import AttitudeKeeper
+from hardware.follower import ROUNDING
 from pipeline.frames import Array
 
 
@@ -12,19 +13,34 @@ class GivenThrusts:
     """Thrusts (m,) [N] of a robot, in and after a silence. Times are [µs]."""
 
     def __init__(
-        self, thrusters: int, max_rise: float, ramp_us: int, keeper: AttitudeKeeper | None
+        self,
+        thrusters: int,
+        f_max: float,
+        max_rise: float,
+        ramp_us: int,
+        keeper: AttitudeKeeper | None,
     ) -> None:
         """Zero. `keeper`: of a robot that flies."""
         self.commanded = np.zeros(thrusters)
         """By the last command."""
         self._base = np.zeros(thrusters)
-        self._max_rise, self._ramp_us, self._keeper = max_rise, ramp_us, keeper
+        self._f_max, self._max_rise = f_max, max_rise
+        self._ramp_us, self._keeper = ramp_us, keeper
         self._fading_since_us: int | None = None
         self._catching_up = False
 
     def __bool__(self) -> bool:
         """Whether there is any thrust."""
         return bool(self._base.any())
+
+    def is_beyond(self, thrusts: Array) -> bool:
+        """Whether a thrust of these (m,) is outside [0, f_max]."""
+        return bool((thrusts < 0.0).any() or (thrusts > self._f_max * ROUNDING).any())
+
+    def is_too_steep(self, thrusts: Array, ahead: int) -> bool:
+        """Whether a command so many counters later than the last rises too much."""
+        most = (self.commanded + ahead * self._max_rise) * ROUNDING
+        return bool((thrusts > most).any())
 
     def at(self, now_us: int) -> Array:
         """Thrusts to give now (m,) [N]."""

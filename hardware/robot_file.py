@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from math import pi, radians, sqrt
@@ -25,7 +25,7 @@ from hardware.plant_parameters import (
     StartParameters,
     SuspensionParameters,
 )
-from hardware.robot_physics import allocation_matrix, faults
+from hardware.robot_physics import allocation_matrix, faults, led_faults
 from hardware.robot_schema import (
     AXES,
     USUAL_PORTS,
@@ -36,10 +36,13 @@ from hardware.robot_schema import (
     Suspension,
     clashes,
 )
+from hardware.twist_schema import TwistRobotSchema, drive_of, twist_clashes
 from pipeline.frames import GRAVITY, Array
 from pipeline.gains import Gains
 from pipeline.robot import Robot
 
+COMMANDS = ("thrusts", "twist")
+"""What robots are told, by `[link] takes`."""
 ROBOTS = Path(__file__).parent / "robots"
 
 
@@ -70,6 +73,8 @@ class LinkParameters:
     """There, or ours if the robot is the one who calls."""
     max_rise: float
     """How much more a thruster may be told than one command before [N]."""
+    takes: str = "thrusts"
+    """One of `COMMANDS`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +97,7 @@ class RobotFile:
 
     robot: Robot
     plant: PlantParameters
+    """Of one that takes a twist: its motion sensors; it has no thrusters, and mass says nothing."""
     start: StartParameters
     gains: Mapping[str, Gains]
     link: LinkParameters
@@ -105,14 +111,20 @@ class RobotFile:
         return replace(self, link=link)
 
 
-def load_robot(name_or_path: str | Path) -> RobotFile:
+def load_robot(name_or_path: str | Path, takes: Sequence[str] = ("thrusts",)) -> RobotFile:
     """The robot called so, or in the file at that path (ending in `.toml`).
+
+    `takes`: which commands the caller knows; whoever does not say so knows thrusts alone.
 
     Raises:
         RobotFileError: names file, key and what is allowed.
     """
     path = robot_path(name_or_path)
-    return robot_of(robot_table(path), str(path))
+    robot_file = robot_of(robot_table(path), str(path))
+    if robot_file.link.takes not in takes:
+        allowed = f"{robot_file.link.takes!r}; here only robots that take {' or '.join(takes)}"
+        raise RobotFileError(str(path), "link.takes", allowed)
+    return robot_file
 
 
 def robot_table(path: Path) -> dict[str, Any]:
@@ -139,14 +151,30 @@ def robot_of(table: Mapping[str, Any], file: str) -> RobotFile:
     Raises:
         RobotFileError: names `file`, key and what is allowed.
     """
+    link = table.get("link")
+    if isinstance(link, Mapping) and link.get("takes") == "twist":
+        return _twist_robot_of(table, file)
     try:
         schema = RobotSchema.model_validate(table)
     except ValidationError as error:
-        raise _explained(file, error) from error
+        raise _explained(file, error, RobotSchema) from error
     for key, reason in clashes(schema):
         raise RobotFileError(file, key, reason)
     robot_file = _converted(schema)
     for key, reason in faults(robot_file.robot, robot_file.plant):
+        raise RobotFileError(file, key, reason)
+    return robot_file
+
+
+def _twist_robot_of(table: Mapping[str, Any], file: str) -> RobotFile:
+    try:
+        schema = TwistRobotSchema.model_validate(table)
+    except ValidationError as error:
+        raise _explained(file, error, TwistRobotSchema) from error
+    for key, reason in twist_clashes(schema):
+        raise RobotFileError(file, key, reason)
+    robot_file = _converted_twist(schema)
+    for key, reason in led_faults(robot_file.robot.leds_in_b):
         raise RobotFileError(file, key, reason)
     return robot_file
 
@@ -174,14 +202,16 @@ def _named(wrong: str, known: list[str]) -> str:
     return f"{', '.join(known)} or a path ending in .toml{hint}"
 
 
-def _explained(file: str, error: ValidationError) -> RobotFileError:
+def _explained(
+    file: str, error: ValidationError, schema: type[RobotSchema] | type[TwistRobotSchema]
+) -> RobotFileError:
     """The first fault; a misspelt key comes before the one that is then missing."""
     faults = error.errors()
     fault = next((f for f in faults if f["type"] == "extra_forbidden"), faults[0])
     where = fault["loc"]
     key, reason = ".".join(map(str, where)), str(fault["msg"])
     if fault["type"] in ("extra_forbidden", "missing"):
-        known = _keys_at(where[:-1])
+        known = _keys_at(schema, where[:-1])
         close = get_close_matches(str(where[-1]), known, n=1)
         hint = f"; did you mean {close[0]!r}?" if close and fault["type"] != "missing" else ""
         kind = "missing" if fault["type"] == "missing" else "unknown key"
@@ -191,9 +221,9 @@ def _explained(file: str, error: ValidationError) -> RobotFileError:
     return RobotFileError(file, key, reason)
 
 
-def _keys_at(where: tuple[int | str, ...]) -> list[str]:
+def _keys_at(schema: type[BaseModel], where: tuple[int | str, ...]) -> list[str]:
     """Keys of the section at a place of the file."""
-    section: Any = RobotSchema
+    section: Any = schema
     for step in where:
         if isinstance(section, type) and issubclass(section, BaseModel):
             section = section.model_fields[str(step)].annotation
@@ -202,6 +232,49 @@ def _keys_at(where: tuple[int | str, ...]) -> list[str]:
         if isinstance(section, UnionType):  # X | None
             section = get_args(section)[0]
     return list(section.model_fields)
+
+
+def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
+    link, start, drive = schema.link, schema.start, drive_of(schema.twist)
+    nowhere = np.zeros((0, 3))
+    plant = PlantParameters(
+        mass=0.0,
+        inertia=np.zeros(3),
+        suspension=None,
+        stand=None,
+        air_damping=0.0,
+        air_damping_rotation=0.0,
+        thruster_positions_in_b=nowhere,
+        thruster_directions_in_b=nowhere,
+        thruster_torques=np.zeros(0),
+        f_max=0.0,
+        lag=drive.lag_s,
+        delay=drive.delay_s,
+        imu=_imu(schema.body_imu),
+    )
+    robot = Robot(
+        name=schema.name,
+        leds_in_b=np.array([led.position_in_body_m for led in schema.leds]),
+        A=np.zeros((6, 0)),
+        f_min=0.0,
+        f_max=0.0,
+        mass=plant.mass,
+        inertia=plant.inertia,
+        axes=np.array([axis in schema.axes for axis in AXES]),
+        hangs=False,
+        ramp_s=drive.stop_s,
+        blinks=schema.blinks,
+        twist=drive,
+    )
+    port = link.port or USUAL_PORTS[link.kind]
+    return RobotFile(
+        robot,
+        plant,
+        StartParameters(start.distance_m, start.above_m, start.lift_m),
+        {},
+        LinkParameters(link.kind, link.stopped_by or "", link.host, port, 0.0, link.takes),
+        keeps_attitude_in_ramp=False,
+    )
 
 
 def _converted(schema: RobotSchema) -> RobotFile:

@@ -52,7 +52,7 @@ def faults(robot: Robot, plant: PlantParameters) -> Iterator[tuple[str, str]]:
     yield from _thruster_faults(plant)
     yield from _axes_faults(robot)
     yield from _wrench_faults(robot, plant)
-    yield from _led_faults(robot.leds_in_b)
+    yield from led_faults(robot.leds_in_b)
 
 
 def _suspension_faults(suspension: SuspensionParameters, mass: float) -> Iterator[tuple[str, str]]:
@@ -135,7 +135,8 @@ def positive_null_vector(A: Array) -> Array | None:
     return ones + excess if residual < 1e-4 else None
 
 
-def _led_faults(leds_in_b: Array) -> Iterator[tuple[str, str]]:
+def led_faults(leds_in_b: Array) -> Iterator[tuple[str, str]]:
+    """Faults of LEDs (n, 3) [m]: (key of the robot file, what would be allowed)."""
     distances = np.linalg.norm(leds_in_b, axis=1)
     if (distances > LARGEST_ROBOT_M).any():
         yield (

@@ -140,6 +140,8 @@ class LinkSection(Section):
 
     kind: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")] = "udp"
     """`udp` is our own link, `rpit` RPIt's; others by the entry points `lightleash.followers`."""
+    takes: Literal["thrusts"] = "thrusts"
+    """What the robot is told; files of those that take a `twist` have `twist_schema.py`."""
     stopped_by: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     """Who or what stops the robot when it hears nothing, if its link does not see to that."""
     host: Annotated[str, Field(min_length=1, max_length=253)]

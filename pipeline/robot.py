@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import pi
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,63 @@ from pipeline.frames import GRAVITY, Array
 
 ONE_AXIS = 1e-3
 """Forces that share an axis but for this are all along it."""
+
+
+@dataclass(frozen=True, slots=True)
+class TwistDrive:
+    """How a robot that takes a twist, velocity and angular rate of its body, may be driven."""
+
+    speed: float
+    """Largest [m/s]."""
+    acceleration: float
+    """[m/s²], braking included."""
+    rate: float
+    """Largest angular one [rad/s]."""
+    angular_acceleration: float
+    """[rad/s²]."""
+    position_gain: float
+    """Speed per distance to where it should be [1/s]."""
+    attitude_gain: float
+    """Angular rate per angle to where it should be [1/s]."""
+    lag_s: float
+    """From a twist to the body's motion: time constant ..."""
+    delay_s: float
+    """... and from a command to its beginning [s]."""
+
+    @property
+    def stop_s(self) -> float:
+        """From its largest twist to none [s]."""
+        return max(self.speed / self.acceleration, self.rate / self.angular_acceleration)
+
+    def phase_margin(self, gain: float) -> float:
+        """Of the loop gain / s · lag · delay [rad], which crosses over at about `gain` [1/s]."""
+        return 0.5 * pi - gain * (self.lag_s + self.delay_s)
+
+    def within(self, twist_in_b: Array) -> Array:
+        """The twist (6,) in b of the same directions that is no larger than is allowed."""
+        v, omega = _halves(twist_in_b)
+        return np.concatenate((_shortened(v, self.speed), _shortened(omega, self.rate)))
+
+    def toward(self, before: Array, wanted: Array, seconds: float) -> Array:
+        """From the twist `before` (6,) in b to the one wanted, as far as `seconds` allow."""
+        most = self.acceleration * seconds, self.angular_acceleration * seconds
+        v, omega = _halves(wanted - before)
+        change = np.concatenate((_shortened(v, most[0]), _shortened(omega, most[1])))
+        return wanted.copy() if (change == wanted - before).all() else before + change
+
+    def exceeds(self, twist_in_b: Array, rounding: float = 1.0) -> bool:
+        """Whether a twist (6,) is larger than is allowed by more than a factor of rounding."""
+        v, omega = (float(np.linalg.norm(half)) for half in _halves(twist_in_b))
+        return v > self.speed * rounding or omega > self.rate * rounding
+
+
+def _halves(twist: Array) -> tuple[Array, Array]:
+    return twist[:3], twist[3:]
+
+
+def _shortened(v: Array, limit: float) -> Array:
+    length = float(np.linalg.norm(v))
+    return v if length <= limit else limit / length * v
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +105,9 @@ class Robot:
     """Of a thruster, first order ..."""
     thrust_delay_s: float = 0.015
     """... and from a command to its beginning [s]."""
+    twist: TwistDrive | None = None
+    """Of a robot that takes a twist: it has no thrusters (m = 0), and who drives it carries it, so
+    that mass and inertia count for nothing."""
 
     @property
     def blinking_leds(self) -> int:
@@ -56,7 +117,8 @@ class Robot:
     @property
     def weight_to_carry(self) -> float:
         """What its thrusters must carry [N]; neither cable nor floor does."""
-        return self.mass * GRAVITY if self.axes[2] and not self.hangs else 0.0
+        carries = self.axes[2] and not self.hangs and self.twist is None
+        return self.mass * GRAVITY if carries else 0.0
 
     @property
     def needs_tilt(self) -> bool:

@@ -40,6 +40,9 @@ class BodyImu:
     """Gyroscope (3,) [rad/s]."""
     a_m_bf_in_b: Array
     """Accelerometer (3,) [m/s²]: specific force, +9.8 up at rest."""
+    twist_m_bf_in_b: Array | None = None
+    """(6,) velocity and angular rate in f as the robot itself measures them [m/s, rad/s], of one
+    that takes a twist."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

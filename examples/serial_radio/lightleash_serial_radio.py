@@ -2,7 +2,7 @@
 
 import time
 
-from hardware.follower import BodySample, FollowerError, ThrustCommand
+from hardware.follower import BodySample, FollowerError, RobotCommand
 from hardware.link.control_end import ControlEnd
 from hardware.link.registry import LinkKind
 from hardware.link.serial_line import SerialLine
@@ -30,7 +30,7 @@ class SerialRadio:
         samples = [self._end.receive(frame, now) for frame in frames if frame]
         return [sample for sample in samples if sample is not None]
 
-    def send(self, command: ThrustCommand) -> None:
+    def send(self, command: RobotCommand) -> None:
         self._check_open()
         data = self._end.command(command, time.monotonic())
         for byte, escaped in ESCAPES:
@@ -39,7 +39,7 @@ class SerialRadio:
 
     def stop(self) -> None:
         for _ in range(0 if self._closed else 5):  # nobody hears whether it has come
-            self.send(ThrustCommand.zero(self.thrusters))
+            self.send(self._end.zero())
 
     def close(self) -> None:
         if not self._closed:
@@ -51,4 +51,4 @@ class SerialRadio:
             raise FollowerError("the link is closed", "an open one")
 
 
-KIND = LinkKind(SerialRadio, stops_in_silence=True, keyed=True)
+KIND = LinkKind(SerialRadio, stops_in_silence=True, keyed=True, takes=("thrusts", "twist"))

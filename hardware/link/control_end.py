@@ -17,8 +17,11 @@ from hardware.follower import (
     BlinkOrder,
     BodySample,
     FollowerState,
+    RobotCommand,
     ThrustCommand,
+    TwistCommand,
     check_command,
+    check_twist,
 )
 from hardware.link.blink_datagram import BlinkDatagram, encode_blink
 from hardware.link.datagram import (
@@ -32,7 +35,9 @@ from hardware.link.datagram import (
     is_later,
 )
 from hardware.robot_file import RobotFile
+from pipeline.config import PERIOD_S
 from pipeline.frames import Array
+from pipeline.robot import TwistDrive
 
 SENT_KEPT = 256
 """Commands remembered: 1.3 s."""
@@ -44,7 +49,7 @@ def random_u64() -> int:
 
 
 class ControlEnd:
-    """Turns thrusts into datagrams and datagrams into samples. Times are [s], monotonic."""
+    """Turns commands into datagrams and datagrams into samples. Times are [s], monotonic."""
 
     def __init__(
         self,
@@ -54,21 +59,24 @@ class ControlEnd:
         epoch: int,
         key: bytes,
         challenges: Callable[[], int] = random_u64,
+        twist: TwistDrive | None = None,
     ) -> None:
         """Begin with a robot: thrusters give up to `f_max`, rise by `max_rise` per command [N].
 
+        One that takes a `twist` has no thrusters.
         `epoch` must be later than that of every control process the robot has followed.
         """
         self.thrusters, self.epoch = thrusters, epoch
         self._f_max, self._max_rise = f_max, max_rise
         self._key, self._new_challenge = key, challenges
         self._counter = 0
-        self._last = np.zeros(thrusters)
+        self._twist = twist
+        self._last = self._zero()
         self._sent_at = [0.0] * SENT_KEPT
         self._challenges = [0] * SENT_KEPT
         self._newest: SampleDatagram | None = None
         self.limited = 0
-        """Commands that rose faster than the robot allows and were slowed down."""
+        """Commands that rose or changed faster than the robot allows and were slowed down."""
         self.dropped = 0
         """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
 
@@ -83,9 +91,9 @@ class ControlEnd:
         """Control end for the robot of a robot file."""
         robot = robot_file.robot
         max_rise = robot_file.link.max_rise
-        return cls(robot.A.shape[1], robot.f_max, max_rise, epoch, key, challenges)
+        return cls(robot.A.shape[1], robot.f_max, max_rise, epoch, key, challenges, robot.twist)
 
-    def command(self, command: ThrustCommand, now: float) -> bytes:
+    def command(self, command: RobotCommand, now: float) -> bytes:
         """The datagram for `command`.
 
         It echoes the newest sample its sender can have known: a late command can't seem fresh.
@@ -95,17 +103,21 @@ class ControlEnd:
         """
         return encode_command(self.next_command(command, now), self._key)
 
-    def next_command(self, command: ThrustCommand, now: float) -> CommandDatagram:
+    def next_command(self, command: RobotCommand, now: float) -> CommandDatagram:
         """The same, for a link that writes it in bytes of its own.
 
         Raises:
             FollowerError: a command no robot may be told.
         """
-        check_command(command, self.thrusters, self._f_max)
+        if self._twist is None:
+            check_command(command, self.thrusters, self._f_max)
+        else:
+            check_twist(command, self._twist)
         if not command.armed and self._newest and self._is_outdated(self._newest):
             self._renew(self._newest)
         self._counter = (self._counter + 1) % U32
-        self._last = self._slowed(command.thrusts)
+        self._last = self._slowed(command)
+        values = tuple(self._last.tolist())
         challenge = self._new_challenge()
         self._sent_at[self._counter % SENT_KEPT] = now
         self._challenges[self._counter % SENT_KEPT] = challenge
@@ -115,9 +127,14 @@ class ControlEnd:
             nonce=self._newest.nonce if self._newest else 0,
             challenge=challenge,
             armed=command.armed,
-            thrusts=tuple(self._last.tolist()),
+            thrusts=() if self._twist else values,
             stop=command.stop,
+            twist_in_b=values if self._twist else (),
         )
+
+    def zero(self) -> RobotCommand:
+        """Nothing, disarmed, of the kind that the robot takes."""
+        return TwistCommand.zero() if self._twist else ThrustCommand.zero(self.thrusters)
 
     def blink(self, order: BlinkOrder) -> bytes:
         """The datagram for `order`; it is no command, and counts as none."""
@@ -135,7 +152,10 @@ class ControlEnd:
 
     def believe(self, sample: SampleDatagram, now: float) -> BodySample | None:
         """The same of what a link has read in bytes of its own."""
-        if len(sample.thrusts) != self.thrusters or not self._is_believed(sample):
+        ours = len(sample.thrusts) == self.thrusters and bool(sample.twist_in_b) == bool(
+            self._twist
+        )
+        if not ours or not self._is_believed(sample):
             self.dropped += 1
             return None
         self._newest = sample
@@ -148,6 +168,7 @@ class ControlEnd:
             boot_id=sample.boot_id,
             refusal=sample.refusal,
             round_trip_s=self._round_trip(sample, now),
+            twist_in_b=np.array(sample.twist_in_b) if sample.twist_in_b else None,
         )
 
     def _is_believed(self, sample: SampleDatagram) -> bool:
@@ -164,12 +185,23 @@ class ControlEnd:
     def _renew(self, robot: SampleDatagram) -> None:
         self.epoch = robot.epoch + 1
         self._counter = 0
-        self._last = np.zeros(self.thrusters)
+        self._last = self._zero()
 
-    def _slowed(self, thrusts: Array) -> Array:
-        """`thrusts`, none rising faster than the robot takes: late is better than refused."""
-        slowed: Array = np.minimum(thrusts, self._last + self._max_rise)
-        self.limited += int(bool((slowed < thrusts).any()))
+    def _zero(self) -> Array:
+        return np.zeros(6) if self._twist else np.zeros(self.thrusters)
+
+    def _slowed(self, command: RobotCommand) -> Array:
+        """What is commanded, no faster than the robot takes: late is better than refused."""
+        if isinstance(command, ThrustCommand):
+            thrusts = command.thrusts
+            slowed: Array = np.minimum(thrusts, self._last + self._max_rise)
+            self.limited += int(bool((slowed < thrusts).any()))
+            return slowed
+        wanted = command.twist_in_b
+        if self._twist is None or not wanted.any():  # zero is never late
+            return wanted
+        slowed = self._twist.toward(self._last, wanted, PERIOD_S)
+        self.limited += int(bool((slowed != wanted).any()))
         return slowed
 
     def _round_trip(self, sample: SampleDatagram, now: float) -> float | None:

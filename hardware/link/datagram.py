@@ -36,6 +36,11 @@ Sample, robot → control (92 + 4 m bytes), pushed at the robot's own rate:
 | 76       | m × f32  | thrusts [N]                                                               |
 | 76 + 4 m | 16 bytes | HMAC-SHA-256 of all bytes before, truncated                               |
 
+A robot that takes a twist has datagrams of the same fields with magics `LLtc` and `LLts`, m = 6,
+and in place of the thrusts its twist: velocity [m/s] and angular rate [rad/s] of the body in f, in
+axes of b; commanded in a command, measured in a sample. `deploy/watchdog/` does not know them and
+refuses them as malformed.
+
 Both directions have the same key (`link_key.py`), one per robot; the magic under the MAC tells them
 apart, so that neither end believes its own words thrown back. What a robot must do with commands is
 in `robot_end.py`, and in C in `deploy/watchdog/`; what control believes is in `control_end.py`.
@@ -54,12 +59,15 @@ from pipeline.frames import Triple
 
 VERSION = 2  # of these datagrams
 COMMAND_MAGIC, SAMPLE_MAGIC = b"LLcm", b"LLsm"
+TWIST_COMMAND_MAGIC, TWIST_SAMPLE_MAGIC = b"LLtc", b"LLts"
+TWIST_VALUES = 6
 MAX_THRUSTERS = 16  # of any robot
 COMMAND_OVERHEAD, SAMPLE_OVERHEAD = 36 + MAC_BYTES, 76 + MAC_BYTES  # bytes
 """Bytes beside the thrusts."""
 MAX_BYTES = SAMPLE_OVERHEAD + 4 * MAX_THRUSTERS
 ARMED, STOP = 1, 2
 """Bits of a command's flags."""
+Values = tuple[float, ...]
 U32, U64 = 1 << 32, 1 << 64
 """Where counters and epochs go round."""
 
@@ -87,9 +95,21 @@ class CommandDatagram:
     challenge: int
     armed: bool
     thrusts: tuple[float, ...]
-    """[N]; may be anything a float can be."""
+    """[N]; may be anything a float can be. None in a command of a twist."""
     stop: bool = False
     """Somebody pressed STOP."""
+    twist_in_b: tuple[float, ...] = ()
+    """(6,) [m/s, rad/s], or none."""
+
+    @property
+    def is_twist(self) -> bool:
+        """It commands a twist, not thrusts."""
+        return bool(self.twist_in_b)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """What is commanded: thrusts or a twist."""
+        return self.twist_in_b or self.thrusts
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +129,9 @@ class SampleDatagram:
     omega_in_b: Triple
     a_in_b: Triple
     thrusts: tuple[float, ...]
+    """[N]; none of a robot that takes a twist ..."""
+    twist_in_b: tuple[float, ...] = ()
+    """... which says here how it moves (6,) [m/s, rad/s]."""
 
 
 @cache
@@ -123,28 +146,28 @@ def _sample_layout(thrusters: int) -> struct.Struct:
 
 def encode_command(command: CommandDatagram, key: bytes) -> bytes:
     """Encode a command."""
-    thrusters = len(command.thrusts)
-    body = _command_layout(thrusters).pack(
-        COMMAND_MAGIC,
+    values = command.values
+    body = _command_layout(len(values)).pack(
+        TWIST_COMMAND_MAGIC if command.is_twist else COMMAND_MAGIC,
         VERSION,
-        thrusters,
+        len(values),
         ARMED * command.armed | STOP * command.stop,
         command.epoch,
         command.nonce,
         command.challenge,
         command.counter,
-        *command.thrusts,
+        *values,
     )
     return body + mac(key, body)
 
 
 def encode_sample(sample: SampleDatagram, key: bytes) -> bytes:
     """Encode a sample."""
-    thrusters = len(sample.thrusts)
-    body = _sample_layout(thrusters).pack(
-        SAMPLE_MAGIC,
+    values = sample.twist_in_b or sample.thrusts
+    body = _sample_layout(len(values)).pack(
+        TWIST_SAMPLE_MAGIC if sample.twist_in_b else SAMPLE_MAGIC,
         VERSION,
-        thrusters,
+        len(values),
         sample.state,
         sample.refusal,
         sample.t_us,
@@ -156,7 +179,7 @@ def encode_sample(sample: SampleDatagram, key: bytes) -> bytes:
         sample.accepted,
         *sample.omega_in_b,
         *sample.a_in_b,
-        *sample.thrusts,
+        *values,
     )
     return body + mac(key, body)
 
@@ -167,13 +190,14 @@ def decode_command(data: bytes, key: bytes) -> CommandDatagram:
     Raises:
         LinkError: not a command of this version, not made with the key, or with unknown flags.
     """
-    thrusters = _checked(data, key, COMMAND_MAGIC, COMMAND_OVERHEAD)
-    fields = _command_layout(thrusters).unpack(data[:-MAC_BYTES])
+    is_twist, count = _checked(data, key, (COMMAND_MAGIC, TWIST_COMMAND_MAGIC), COMMAND_OVERHEAD)
+    fields = _command_layout(count).unpack(data[:-MAC_BYTES])
     flags, epoch, nonce, challenge, counter = fields[3:8]
     if flags & ~(ARMED | STOP):
         raise LinkError("command.flags", "bits 0 and 1")
     armed, stop = bool(flags & ARMED), bool(flags & STOP)
-    return CommandDatagram(epoch, counter, nonce, challenge, armed, fields[8:], stop)
+    thrusts, twist_in_b = _told_apart(fields[8:], is_twist)
+    return CommandDatagram(epoch, counter, nonce, challenge, armed, thrusts, stop, twist_in_b)
 
 
 def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
@@ -183,8 +207,8 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         LinkError: not a sample of this version, not made with the key, or with a value that
             can't be.
     """
-    thrusters = _checked(data, key, SAMPLE_MAGIC, SAMPLE_OVERHEAD)
-    fields = _sample_layout(thrusters).unpack(data[:-MAC_BYTES])
+    is_twist, count = _checked(data, key, (SAMPLE_MAGIC, TWIST_SAMPLE_MAGIC), SAMPLE_OVERHEAD)
+    fields = _sample_layout(count).unpack(data[:-MAC_BYTES])
     state, refusal, t_us, nonce, challenge, epoch, boot_id, counter, accepted = fields[3:12]
     values = fields[12:]
     if state >= len(FollowerState) or refusal >= len(Refusal):
@@ -193,6 +217,7 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         raise LinkError("sample.time", "0 to 2^60 µs")
     if not all(map(isfinite, values)):
         raise LinkError("sample.gyroscope, accelerometer, thrusts", "finite numbers")
+    thrusts, twist_in_b = _told_apart(values[6:], is_twist)
     return SampleDatagram(
         state=FollowerState(state),
         refusal=Refusal(refusal),
@@ -205,24 +230,38 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         accepted=accepted,
         omega_in_b=values[0:3],
         a_in_b=values[3:6],
-        thrusts=values[6:],
+        thrusts=thrusts,
+        twist_in_b=twist_in_b,
     )
 
 
-def _checked(data: bytes, key: bytes, magic: bytes, overhead: int) -> int:
-    """Count of thrusters of an authentic datagram; `overhead` is its size without thrusts."""
+def _told_apart(values: Values, is_twist: bool) -> tuple[Values, Values]:
+    """(Thrusts, twist), one of them none."""
+    return ((), values) if is_twist else (values, ())
+
+
+def _checked(
+    data: bytes, key: bytes, magics: tuple[bytes, bytes], overhead: int
+) -> tuple[bool, int]:
+    """(Whether it is of a twist, how many values) of an authentic datagram.
+
+    `magics` are those for thrusts and for a twist; `overhead` is its size without its values.
+    """
     if not overhead < len(data) <= MAX_BYTES:
         raise LinkError("size", f"{overhead + 4} to {overhead + 4 * MAX_THRUSTERS} bytes")
-    if data[:4] != magic:
-        raise LinkError("magic", repr(magic))
+    if data[:4] not in magics:
+        raise LinkError("magic", " or ".join(map(repr, magics)))
     if data[4] != VERSION:
         raise LinkError("version", f"{VERSION}")
     thrusters = data[5]
     if not 1 <= thrusters <= MAX_THRUSTERS or len(data) != overhead + 4 * thrusters:
         raise LinkError("thrusters", f"1 to {MAX_THRUSTERS}, agreeing with the size")
+    is_twist = data[:4] == magics[1]
+    if is_twist and thrusters != TWIST_VALUES:
+        raise LinkError("values", f"{TWIST_VALUES} of a twist")
     if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
         raise LinkError("mac", "made with the robot's key")
-    return thrusters
+    return is_twist, thrusters
 
 
 def is_later(a: int, b: int) -> bool:

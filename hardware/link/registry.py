@@ -14,7 +14,7 @@ from importlib.metadata import EntryPoint, entry_points
 from hardware.follower import Follower, FollowerError
 from hardware.link import udp
 from hardware.link.rpit import rpit_follower
-from hardware.robot_file import RobotFile
+from hardware.robot_file import COMMANDS, RobotFile
 
 GROUP = "lightleash.followers"
 SIMULATED = "udp"
@@ -34,10 +34,12 @@ class LinkKind:
     """The far end goes to zero by itself when it hears nothing, like `robot_end.py`."""
     keyed: bool
     """Both ends share a key of `lightleash robot key`."""
+    takes: tuple[str, ...] = ("thrusts",)
+    """Which of `robot_file.COMMANDS` it can carry."""
 
 
 OWN = {
-    "udp": LinkKind(udp.connect, stops_in_silence=True, keyed=True),
+    "udp": LinkKind(udp.connect, stops_in_silence=True, keyed=True, takes=COMMANDS),
     "rpit": LinkKind(rpit_follower.connect, stops_in_silence=False, keyed=False),
 }
 
@@ -57,6 +59,20 @@ def link_kind(name: str) -> LinkKind:
     close = get_close_matches(name, known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""
     raise FollowerError(f"link.kind = {name!r}", f"one of {', '.join(known)}{hint}")
+
+
+def connect(robot_file: RobotFile, key: bytes, epoch: int) -> Follower:
+    """Link to the robot of a robot file, by the kind that it names.
+
+    Raises:
+        FollowerError: no such kind, one that can't carry what the robot takes, or no such robot.
+    """
+    link = robot_file.link
+    kind = link_kind(link.kind)
+    if link.takes not in kind.takes:
+        what = f"link.takes = {link.takes!r} by a link of kind {link.kind!r}"
+        raise FollowerError(what, f"{' or '.join(kind.takes)} by this one")
+    return kind.connect(robot_file, key, epoch)
 
 
 def _loaded(point: EntryPoint) -> LinkKind:

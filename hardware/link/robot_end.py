@@ -12,6 +12,8 @@ This is the reference for a real robot's firmware; `deploy/watchdog/` is the sam
    larger than the rise allowed (`given_thrusts.py`). Then there is no way back: only zero thrust
    of the epoch or STOP cuts the ramp short, nothing else that arrives changes it. Who gives no
    thrust has nothing to ramp: COAST lasts those 400 ms.
+   A robot that takes a twist reads *twist* for thrust: within its speeds, changing no faster than
+   its accelerations, and in silence braked by them from 60 ms on (`given_twist.py`).
 3. After that, and after a start: no thrust until zero thrust of a *later* epoch has been taken for
    500 ms without a gap of 60 ms. So a control process begins with zero, and one that was frozen
    or replaced never comes back. Zero of a later epoch is taken in every state, since the newest
@@ -51,6 +53,7 @@ import numpy as np
 from hardware.attitude_keeper import AttitudeGains, AttitudeKeeper
 from hardware.follower import FollowerState, Refusal
 from hardware.given_thrusts import GivenThrusts
+from hardware.given_twist import GivenTwist
 from hardware.link.datagram import (
     U32,
     CommandDatagram,
@@ -63,6 +66,7 @@ from hardware.link.datagram import (
 from hardware.robot_file import RobotFile
 from pipeline.config import HoldConfig
 from pipeline.frames import Array, Triple
+from pipeline.robot import TwistDrive
 
 Peer = tuple[str, int]
 """Address and port."""
@@ -77,8 +81,6 @@ MAX_SAMPLE_S = 0.05
 """More than that between two samples is a hole, not a motion."""
 FORGET_PEER_US = 5_000_000
 """Nobody is sent samples who was not heard for this long."""
-ROUNDING = 1.0 + 1e-6
-"""Thrusts travel as float32."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,8 @@ class LinkLimits:
     """Of the counter of thrust: it may have risen with each of them."""
     attitude: AttitudeGains | None = None
     """Of a robot that flies and keeps upright by itself."""
+    twist: TwistDrive | None = None
+    """Of a robot that takes a twist, and no thrusts."""
 
     @classmethod
     def of(cls, robot_file: RobotFile) -> LinkLimits:
@@ -114,7 +118,14 @@ class LinkLimits:
             attitude=AttitudeGains.of(robot, HoldConfig())
             if robot_file.keeps_attitude_in_ramp
             else None,
+            twist=robot.twist,
         )
+
+    def given(self, keeper: AttitudeKeeper | None) -> GivenThrusts | GivenTwist:
+        """What keeps and fades the commands of such a robot."""
+        if self.twist is not None:
+            return GivenTwist(self.twist)
+        return GivenThrusts(self.thrusters, self.f_max, self.max_rise, self.ramp_us, keeper)
 
 
 class RobotEnd:
@@ -132,7 +143,7 @@ class RobotEnd:
         self._taken_us = self._shaken_us = self._handshake_us = self._heard_us = 0
         attitude = limits.attitude
         self._keeper = AttitudeKeeper(attitude) if attitude is not None else None
-        self._given = GivenThrusts(limits.thrusters, limits.max_rise, limits.ramp_us, self._keeper)
+        self._given = limits.given(self._keeper)
         self._sampled_us = 0
         self._nonces: deque[tuple[int, int]] = deque(maxlen=NONCES_KEPT)
         self._samples = 0
@@ -175,7 +186,7 @@ class RobotEnd:
         return epoch == self._newest[0] and age_us is not None and age_us <= self._limits.max_age_us
 
     def setpoint(self, now_us: int) -> Array:
-        """Thrusts (m,) [N] the thrusters are to give now."""
+        """Thrusts (m,) [N] or twist (6,) [m/s, rad/s] that the robot is to give now."""
         self._advance(now_us)
         return self._given.at(now_us)
 
@@ -185,9 +196,12 @@ class RobotEnd:
         self._candidate = 0
 
     def sample(
-        self, now_us: int, nonce: int, omega_in_b: Triple, a_in_b: Triple, thrusts: Array
+        self, now_us: int, nonce: int, omega_in_b: Triple, a_in_b: Triple, given: Array
     ) -> bytes:
-        """The next datagram for `recipients`; `nonce` is random and not 0."""
+        """The next datagram for `recipients`; `nonce` is random and not 0.
+
+        `given` are the thrusts (m,) that are set, or the twist (6,) in b that is measured.
+        """
         self._advance(now_us)
         if self._keeper is not None:
             h = max(0.0, min(MAX_SAMPLE_S, 1e-6 * (now_us - self._sampled_us)))
@@ -209,7 +223,8 @@ class RobotEnd:
                 accepted=self._candidate_counter if self._candidate else self._counter,
                 omega_in_b=omega_in_b,
                 a_in_b=a_in_b,
-                thrusts=tuple(thrusts.tolist()),
+                thrusts=() if self._limits.twist else tuple(given.tolist()),
+                twist_in_b=tuple(given.tolist()) if self._limits.twist else (),
             ),
             self._key,
         )
@@ -272,11 +287,11 @@ class RobotEnd:
             return Refusal.NONCE
         if age_us > limits.max_age_us:
             return Refusal.STALE
-        if not all(map(isfinite, command.thrusts)):
+        if not all(map(isfinite, command.values)):
             return Refusal.NOT_FINITE
         if self._is_later_zero(command):
             return Refusal.NONE
-        return self._judge_thrusts(command, now_us)
+        return self._judge_values(command, now_us)
 
     def _age_us(self, nonce: int, now_us: int) -> int | None:
         """Since the sample with this nonce was sent; None: none was, lately."""
@@ -285,12 +300,12 @@ class RobotEnd:
     def _is_later_zero(self, command: CommandDatagram) -> bool:
         """Rule 3: who is newer than who flies now and who is in his handshake."""
         newer = command.epoch > max(self._epoch, self._candidate)
-        return newer and not any(command.thrusts)
+        return newer and not any(command.values)
 
-    def _judge_thrusts(self, command: CommandDatagram, now_us: int) -> Refusal:
+    def _judge_values(self, command: CommandDatagram, now_us: int) -> Refusal:
         limits, refusing = self._limits, self.state == FollowerState.REFUSING
-        thrusts = np.array(command.thrusts)
-        meant = bool(thrusts.any())
+        values = np.array(command.values)
+        meant = bool(values.any())
         shaking = command.epoch == self._candidate != 0
         if meant and (shaking or (refusing and command.epoch > self._epoch)):
             return Refusal.ZERO_FIRST
@@ -300,12 +315,11 @@ class RobotEnd:
         ahead = (command.counter - before) % U32
         if not is_later(command.counter, before) or (meant and ahead > limits.max_jump):
             return Refusal.COUNTER
-        beyond = bool((thrusts < 0.0).any() or (thrusts > limits.f_max * ROUNDING).any())
-        if beyond or (meant and (command.stop or not command.armed)):
+        if self._given.is_beyond(values) or (meant and (command.stop or not command.armed)):
             return Refusal.LIMITS
         if meant and self.state == FollowerState.RAMP and not self._may_come_back(now_us):
             return Refusal.SILENT
-        if bool((thrusts > (self._given.commanded + ahead * limits.max_rise) * ROUNDING).any()):
+        if self._given.is_too_steep(values, ahead):
             return Refusal.RISE
         return Refusal.NONE
 
@@ -314,13 +328,13 @@ class RobotEnd:
         if command.epoch != self._epoch:
             self._shake_hands(command, now_us)
             return
-        thrusts = np.array(command.thrusts)
-        running = bool(thrusts.any())
+        values = np.array(command.values)
+        running = bool(values.any())
         self._taken_us, self._counter = now_us, command.counter
         if self.state == FollowerState.RAMP and not running:
             self._refuse()
         else:
-            self._given.follow(thrusts, now_us)
+            self._given.follow(values, now_us)
             self.state = FollowerState.RUNNING if running else FollowerState.IDLE
             self.refusal = Refusal.NONE
 
@@ -342,7 +356,7 @@ class RobotEnd:
 
     def _obey_zero(self, command: CommandDatagram, newest: bool) -> None:
         """Rule 4: zero without a fresh nonce, which is not taken otherwise."""
-        if any(command.thrusts) or self.state == FollowerState.REFUSING:
+        if any(command.values) or self.state == FollowerState.REFUSING:
             return
         if command.epoch > self._epoch:
             if command.stop and newest:

@@ -20,7 +20,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from hardware.follower import BlinkOrder, BodySample, FollowerError, ThrustCommand
+from hardware.follower import BlinkOrder, BodySample, FollowerError, RobotCommand
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import MAX_BYTES
 from hardware.robot_file import RobotFile
@@ -76,15 +76,15 @@ class UdpFollower:
         samples = (self._end.receive(data, self._clock()) for data in self._arrived())
         return [sample for sample in samples if sample is not None]
 
-    def send(self, command: ThrustCommand) -> None:
+    def send(self, command: RobotCommand) -> None:
         """See `Follower`."""
         self._check_open()
         self._send(command)
 
     def stop(self) -> None:
-        """Zero thrust, several times."""
+        """Zero, several times."""
         for _ in range(0 if self._closed else STOP_REPEATS):
-            self._send(ThrustCommand.zero(self.thrusters))
+            self._send(self._end.zero())
 
     def close(self) -> None:
         """Close. See `Follower`."""
@@ -100,7 +100,7 @@ class UdpFollower:
         self._check_open()
         self._post(self._end.blink(order))
 
-    def _send(self, command: ThrustCommand) -> None:
+    def _send(self, command: RobotCommand) -> None:
         self._post(self._end.command(command, self._clock()))
 
     def _post(self, data: bytes) -> None:

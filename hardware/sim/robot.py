@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from hardware.link.control_end import random_u64
 from hardware.link.link_key import LinkKeyError, take_key
 from hardware.link.robot_server import RobotServer, arrived, be_punctual, bound
-from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from hardware.robot_file import COMMANDS, RobotFile, RobotFileError, load_robot
 from hardware.sim.simulated import SimulatedRobot
 from hardware.sim.truth import ahead_of, encode_truth
 
@@ -63,8 +63,8 @@ class RobotProcess:
         poses = [(start + 1e-6 * t_us, wxyz, p) for t_us, wxyz, p in self._robot.history]
         if poses and ahead_s > 0.0:
             t = poses[-1][0]
-            poses += [(t + dt, wxyz, p) for dt, wxyz, p in self._robot.plant.ahead(ahead_s)]
-        answer = encode_truth(request, poses, self._robot.plant.thrusts, self._robot.dark)
+            poses += [(t + dt, wxyz, p) for dt, wxyz, p in self._robot.body.ahead(ahead_s)]
+        answer = encode_truth(request, poses, self._robot.body.thrusts, self._robot.dark)
         with contextlib.suppress(OSError):
             truth.sendto(answer, sender)
 
@@ -93,7 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run until SIGTERM or SIGINT."""
     arguments = _arguments(argv)
     try:
-        robot_file = load_robot(arguments.robot)
+        robot_file = load_robot(arguments.robot, takes=COMMANDS)
         port = robot_file.link.port if arguments.port is None else arguments.port
         robot = _robot(robot_file, arguments.seed, take_key(os.environ))
         process = RobotProcess(robot, (arguments.listen, port), arguments.truth_port)

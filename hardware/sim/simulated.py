@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -13,10 +14,45 @@ from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import Plant, PlantOptions
+from hardware.sim.plant.twist_plant import TwistPlant
 from pipeline.frames import Array, triple
 
 HISTORY = 50
 """Poses remembered: 0.25 s."""
+
+
+class SimulatedBody(Protocol):
+    """The truth of a simulated robot, whatever it takes."""
+
+    @property
+    def p_bf_in_f(self) -> Array:
+        """(3,) [m]."""
+
+    @property
+    def R_fb(self) -> Array:
+        """(3, 3)."""
+
+    @property
+    def wxyz_fb(self) -> Array:
+        """(4,)."""
+
+    @property
+    def thrusts(self) -> Array:
+        """(m,) [N]."""
+
+    @property
+    def given(self) -> Array:
+        """What the robot reports of itself: thrusts (m,) [N] or its twist (6,) in b."""
+
+    def step(self, command: Array, dt: float = 0.005, /) -> None:
+        """Go on by `dt` [s] with a command."""
+
+    def ahead(self, seconds: float, every: float = 0.005) -> list[tuple[float, Array, Array]]:
+        """Where it goes within `seconds`: rows (in how long [s], wxyz_fb, p_bf_in_f [m])."""
+
+    def imu(self) -> tuple[Array, Array]:
+        """What its motion sensors read."""
+
 
 Nonces = Callable[[], int]
 
@@ -41,7 +77,12 @@ class SimulatedRobot:
     ) -> None:
         """Hanging or standing at rest, refusing thrust."""
         robot = robot_file.robot
-        self.plant = Plant(robot_file.plant, np.random.default_rng(seed), options)
+        rng = np.random.default_rng(seed)
+        self.body: SimulatedBody = (
+            TwistPlant(robot.twist, robot_file.plant.imu, rng, options)
+            if robot.twist is not None
+            else Plant(robot_file.plant, rng, options)
+        )
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self._blink = BlinkEnd(key) if robot.blinks else None
         self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
@@ -49,7 +90,13 @@ class SimulatedRobot:
         self.dark: deque[int] = deque(maxlen=HISTORY)
         """The LED that was dark then, −1: none."""
         self._nonces, self._boot_id = nonces, boot_id
-        self._setpoint = np.zeros(robot.A.shape[1])
+        self._setpoint = self.end.setpoint(0)
+
+    @property
+    def plant(self) -> Plant:
+        """The body of a robot with thrusters, and the place for disturbances."""
+        assert isinstance(self.body, Plant)
+        return self.body
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
         """A datagram has come from `peer`."""
@@ -58,11 +105,11 @@ class SimulatedRobot:
 
     def tick(self, now_us: int) -> bytes:
         """Move on to `now_us`, one tick after the last; gives the sample to be sent."""
-        self.plant.step(self._setpoint, 1e-6 * TICK_US)
+        self.body.step(self._setpoint, 1e-6 * TICK_US)
         self._setpoint = self.end.setpoint(now_us)
-        self.history.append((now_us, self.plant.wxyz_fb, self.plant.p_bf_in_f))
+        self.history.append((now_us, self.body.wxyz_fb, self.body.p_bf_in_f))
         self.dark.append(NO_LED if self._blink is None else self._blink.dark(now_us))
-        return self._sample(now_us, self.plant.thrusts)
+        return self._sample(now_us, self.body.given)
 
     def restart(self, robot_file: RobotFile, key: bytes) -> None:
         """Start anew, refusing thrust; the body goes on as it was."""
@@ -71,11 +118,11 @@ class SimulatedRobot:
         self._blink = BlinkEnd(key) if robot_file.robot.blinks else None
 
     def shut_down(self, now_us: int) -> bytes:
-        """Thrusters off; gives the last sample."""
+        """Zero, at once; gives the last sample."""
         self.end.halt()
         self._setpoint = np.zeros_like(self._setpoint)
         return self._sample(now_us, self._setpoint)
 
-    def _sample(self, now_us: int, thrusts: Array) -> bytes:
-        omega, a = self.plant.imu()
-        return self.end.sample(now_us, self._nonces(), triple(omega), triple(a), thrusts)
+    def _sample(self, now_us: int, given: Array) -> bytes:
+        omega, a = self.body.imu()
+        return self.end.sample(now_us, self._nonces(), triple(omega), triple(a), given)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from hardware.follower import BlinkOrder, BodySample, FollowerError, FollowerState, ThrustCommand
+from hardware.follower import BlinkOrder, BodySample, FollowerError, FollowerState, RobotCommand
 from hardware.link.blink_end import NO_LED
 from hardware.link.control_end import ControlEnd
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import Plant, PlantOptions
-from hardware.sim.simulated import SimulatedRobot, seeded_nonces
+from hardware.sim.simulated import SimulatedBody, SimulatedRobot, seeded_nonces
 
 HERE = ("lockstep", 0)
 KEY = bytes(16)
@@ -51,8 +51,13 @@ class VirtualTimeFollower:
 
     @property
     def plant(self) -> Plant:
-        """The truth, and the place for disturbances."""
+        """The truth, and the place for disturbances, of a robot with thrusters."""
         return self._robot.plant
+
+    @property
+    def body(self) -> SimulatedBody:
+        """The truth of any robot."""
+        return self._robot.body
 
     @property
     def epoch(self) -> int:
@@ -98,7 +103,7 @@ class VirtualTimeFollower:
         samples = (self._end.receive(data, self.t) for data in arrived)
         return [sample for sample in samples if sample is not None]
 
-    def send(self, command: ThrustCommand) -> None:
+    def send(self, command: RobotCommand) -> None:
         """See `Follower`."""
         self._check_open()
         self._send(command)
@@ -109,9 +114,9 @@ class VirtualTimeFollower:
         self._post(self._end.blink(order))
 
     def stop(self) -> None:
-        """Zero thrust."""
+        """Zero."""
         if not self._closed:
-            self._send(ThrustCommand.zero(self.thrusters))
+            self._send(self._end.zero())
 
     def close(self) -> None:
         """Close. See `Follower`."""
@@ -121,7 +126,7 @@ class VirtualTimeFollower:
         if self._closed:
             raise FollowerError("the link is closed", "an open one")
 
-    def _send(self, command: ThrustCommand) -> None:
+    def _send(self, command: RobotCommand) -> None:
         self._post(self._end.command(command, self.t))
 
     def _post(self, data: bytes) -> None:

@@ -26,7 +26,7 @@ NOWHERE = (
 
 def _in_flight() -> None:
     """Kernels of many signatures, by what calls them; importing it all compiles nothing by then."""
-    from hardware.robot_file import ROBOTS, load_robot
+    from hardware.robot_file import COMMANDS, ROBOTS, load_robot
     from hardware.sim.reference_trajectory import ReferenceTrajectory
     from pipeline.config import TeleopConfig
     from pipeline.estimation import estimators
@@ -37,7 +37,7 @@ def _in_flight() -> None:
     estimators.warm_up()
     ReferenceTrajectory.warm_up()
     for path in ROBOTS.glob("*.toml"):  # six axes and fewer share out their thrust differently
-        Controller(load_robot(path).robot, TeleopConfig())
+        Controller(load_robot(path, takes=COMMANDS).robot, TeleopConfig())
 
 
 def compile_kernels() -> None:

@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, Writer
 from hardware.camera_file import CAMERAS, CameraFileError, load_camera
 from hardware.led_file import COUNTS, load_leds
 from hardware.led_layout.file import load_layout
-from hardware.robot_file import ROBOTS, RobotFileError, load_robot
+from hardware.robot_file import COMMANDS, ROBOTS, RobotFileError, load_robot
 from server.export.decoded import DecodedRecording
 from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Codec, Picture, Pong, Record, Touch
@@ -63,12 +63,18 @@ def robot_seeds():
 
 @target("robot_file", robot_seeds, (RobotFileError,), max_bytes=16_384, mutants=300)
 def robot_file(data: bytes) -> None:
-    made = load_robot(file_of("robot.toml", data))
+    made = load_robot(file_of("robot.toml", data), takes=COMMANDS)
     assert np.isfinite(made.robot.A).all()
     assert made.robot.A.shape[0] == 6
     assert np.isfinite(made.robot.leds_in_b).all()
-    assert 0.0 <= made.robot.f_min < made.robot.f_max
     assert 0.0 < made.robot.ramp_s < 60.0
+    drive = made.robot.twist
+    if drive is not None:
+        assert made.robot.A.shape[1] == 0
+        assert 0.0 < drive.stop_s <= 0.11 * (1.0 + 1e-9)
+        assert drive.phase_margin(max(drive.position_gain, drive.attitude_gain)) > 0.5
+        return
+    assert 0.0 <= made.robot.f_min < made.robot.f_max
     assert made.gains
 
 

@@ -1,6 +1,7 @@
 """The robot's link: datagrams and both ends, with its key: fuzzed is what lies behind the MAC."""
 
 import struct
+from dataclasses import replace
 from math import isfinite
 
 import numpy as np
@@ -12,6 +13,8 @@ from hardware.link.datagram import (
     COMMAND_MAGIC,
     MAX_THRUSTERS,
     SAMPLE_MAGIC,
+    TWIST_COMMAND_MAGIC,
+    TWIST_SAMPLE_MAGIC,
     CommandDatagram,
     LinkError,
     SampleDatagram,
@@ -44,6 +47,8 @@ def command_seeds():
     for thrusts in ((1.0,), (0.0, 0.5), (0.1,) * MAX_THRUSTERS, (float("nan"), float("inf"))):
         command = CommandDatagram(5, 7, 11, 13, True, thrusts, stop=thrusts[0] == 0.0)
         yield encode_command(command, KEY)[:-MAC_BYTES]
+    twist = CommandDatagram(5, 7, 11, 13, True, (), twist_in_b=(0.1, -0.2, 0.3, 0.0, 0.5, 1.0))
+    yield encode_command(twist, KEY)[:-MAC_BYTES]
 
 
 def has_nan(thrusts) -> bool:
@@ -59,10 +64,12 @@ def command(data: bytes) -> None:
     except LinkError:
         pass
     decoded = decode_command(sealed(data), KEY)
-    assert 1 <= len(decoded.thrusts) <= MAX_THRUSTERS
+    assert 1 <= len(decoded.values) <= MAX_THRUSTERS
     again = encode_command(decoded, KEY)
-    assert again[: len(data)] == data or has_nan(decoded.thrusts)  # a NaN may come out quiet
-    assert data[:4] == COMMAND_MAGIC
+    assert again[: len(data)] == data or has_nan(decoded.values)  # a NaN may come out quiet
+    assert data[:4] == (TWIST_COMMAND_MAGIC if decoded.is_twist else COMMAND_MAGIC)
+    assert len(decoded.twist_in_b) == 6 * decoded.is_twist
+    assert bool(decoded.thrusts) != decoded.is_twist
 
 
 def sample_seeds():
@@ -72,16 +79,21 @@ def sample_seeds():
             (1.0, 2.0),
         )  # fmt: skip
         yield encode_sample(sample, KEY)[:-MAC_BYTES]
+        twist = replace(sample, thrusts=(), twist_in_b=(0.1, -0.2, 0.3, 0.0, 0.5, 1.0))
+        yield encode_sample(twist, KEY)[:-MAC_BYTES]
 
 
 @target("sample", sample_seeds, (LinkError,), max_bytes=180, mutants=4000)
 def sample(data: bytes) -> None:
     """The same for samples, whose numbers are all finite."""
     decoded = decode_sample(sealed(data), KEY)
-    assert all(map(isfinite, (*decoded.omega_in_b, *decoded.a_in_b, *decoded.thrusts)))
+    values = decoded.twist_in_b or decoded.thrusts
+    assert all(map(isfinite, (*decoded.omega_in_b, *decoded.a_in_b, *values)))
     assert 0 <= decoded.t_us < 1 << 60
     assert encode_sample(decoded, KEY)[: len(data)] == data
-    assert data[:4] == SAMPLE_MAGIC
+    assert data[:4] == (TWIST_SAMPLE_MAGIC if decoded.twist_in_b else SAMPLE_MAGIC)
+    assert len(decoded.twist_in_b) in (0, 6)
+    assert bool(decoded.thrusts) != bool(decoded.twist_in_b)
 
 
 def con_seeds():

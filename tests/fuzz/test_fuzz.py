@@ -75,7 +75,7 @@ def test_the_robots_seeds_fly_so_that_its_laws_say_something():
 
 
 def test_thrust_that_nobody_asked_for_is_found(monkeypatch):
-    monkeypatch.setattr(RobotEnd, "_judge_thrusts", lambda *_: Refusal.NONE)
+    monkeypatch.setattr(RobotEnd, "_judge_values", lambda *_: Refusal.NONE)
     with pytest.raises(AssertionError, match="robot_end does not bear"):
         mutate(TARGETS["robot_end"])
 

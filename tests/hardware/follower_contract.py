@@ -1,4 +1,7 @@
-"""What every follower must do: inherit `FollowerContract` and give it a rig."""
+"""What every follower must do: inherit `FollowerContract` and give it a rig.
+
+One whose robot takes a twist inherits `TwistFollowerContract` of `twist_follower_contract.py`.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,16 @@ from typing import Protocol
 import numpy as np
 import pytest
 
-from hardware.follower import BodySample, Follower, FollowerError, FollowerState, ThrustCommand
+from hardware.follower import (
+    BodySample,
+    Follower,
+    FollowerError,
+    FollowerState,
+    RobotCommand,
+    ThrustCommand,
+    TwistCommand,
+)
+from pipeline.frames import Array
 
 
 class Rig(Protocol):
@@ -21,23 +33,33 @@ class Rig(Protocol):
     def cut_link(self) -> None: ...
 
 
-def exchange(follower: Follower, command: ThrustCommand) -> list[BodySample]:
+def exchange(follower: Follower, command: RobotCommand) -> list[BodySample]:
     """Send, then take what has come."""
     follower.send(command)
     return follower.receive()
 
 
 class FollowerContract:
+    deaf = FollowerState.RAMP
+    """Of a robot that has taken nothing for 0.4 s, after thrust."""
+
     @pytest.fixture
     def rig(self) -> Rig:
         raise NotImplementedError
 
     @staticmethod
-    def fly(rig: Rig, thrust: float, duration: float) -> list[BodySample]:
-        thrusts = np.full(rig.follower.thrusters, thrust)
+    def command(rig: Rig, level: float) -> RobotCommand:
+        return ThrustCommand(np.full(rig.follower.thrusters, level), armed=level > 0.0)
+
+    @staticmethod
+    def given(sample: BodySample) -> Array:
+        return sample.thrusts
+
+    @classmethod
+    def fly(cls, rig: Rig, level: float, duration: float) -> list[BodySample]:
         samples: list[BodySample] = []
         for _ in range(round(duration / 0.005)):
-            samples += exchange(rig.follower, ThrustCommand(thrusts, armed=thrust > 0.0))
+            samples += exchange(rig.follower, cls.command(rig, level))
             rig.advance(0.005)
         return samples
 
@@ -53,13 +75,13 @@ class FollowerContract:
     def test_refuses_thrust_that_did_not_begin_with_zero(self, rig: Rig) -> None:
         samples = self.fly(rig, 1.0, 1.0)
         assert {s.state for s in samples} == {FollowerState.REFUSING}
-        assert max(s.thrusts.max() for s in samples) == 0.0
+        assert max(self.given(s).max() for s in samples) == 0.0
 
     def test_follows_thrust_and_says_so(self, rig: Rig) -> None:
         self.ready(rig)
         samples = self.fly(rig, 1.0, 0.5)
         assert samples[-1].state == FollowerState.RUNNING
-        assert samples[-1].thrusts == pytest.approx(1.0, abs=1e-3)
+        assert self.given(samples[-1]) == pytest.approx(1.0, abs=1e-3)
 
     def test_samples_come_in_order_of_the_robots_clock_with_a_round_trip(self, rig: Rig) -> None:
         self.ready(rig)
@@ -78,7 +100,7 @@ class FollowerContract:
         rig.advance(0.010)
         samples = self.fly(rig, 0.0, 0.3)
         assert samples[-1].state == FollowerState.IDLE
-        assert samples[-1].thrusts.max() < 1e-2
+        assert self.given(samples[-1]).max() < 1e-2
 
     def test_silence_ramps_to_zero_then_refuses_until_a_new_handshake(self, rig: Rig) -> None:
         self.ready(rig)
@@ -86,10 +108,10 @@ class FollowerContract:
         rig.advance(0.450)
         ramp = self.fly(rig, 2.0, 0.3)
         assert ramp[-1].state == FollowerState.RAMP
-        assert 1.0 < ramp[-1].thrusts.max() < 2.0
+        assert 1.0 < self.given(ramp[-1]).max() < 2.0
         refused = self.fly(rig, 2.0, 2.5)
         assert refused[-1].state == FollowerState.REFUSING
-        assert refused[-1].thrusts.max() < 1e-2
+        assert self.given(refused[-1]).max() < 1e-2
         self.ready(rig)
 
     def test_a_silence_of_a_tenth_of_a_second_is_coasted_through(self, rig: Rig) -> None:
@@ -99,17 +121,17 @@ class FollowerContract:
         samples = self.fly(rig, 2.0, 0.3)
         assert FollowerState.COAST in {s.state for s in samples}
         assert samples[-1].state == FollowerState.RUNNING
-        assert min(s.thrusts.min() for s in samples) > 1.8
+        assert min(self.given(s).min() for s in samples) > 1.8
 
     def test_a_command_made_of_old_samples_is_not_taken(self, rig: Rig) -> None:
         self.ready(rig)
         self.fly(rig, 1.0, 0.2)
         for _ in range(80):
-            rig.follower.send(ThrustCommand(np.full(rig.follower.thrusters, 1.0), armed=True))
+            rig.follower.send(self.command(rig, 1.0))
             rig.advance(0.005)
         rig.follower.receive()  # a line whose buffer is full keeps the oldest
         rig.advance(0.005)
-        assert rig.follower.receive()[-1].state == FollowerState.RAMP
+        assert rig.follower.receive()[-1].state == self.deaf
 
     def test_a_lost_link_is_no_error_but_silence(self, rig: Rig) -> None:
         self.ready(rig)
@@ -130,11 +152,15 @@ class FollowerContract:
         with pytest.raises(FollowerError, match="armed"):
             rig.follower.send(ThrustCommand(np.ones(rig.follower.thrusters), armed=False))
 
+    def test_refuses_what_another_kind_of_robot_takes(self, rig: Rig) -> None:
+        with pytest.raises(FollowerError, match="takes nothing else"):
+            rig.follower.send(TwistCommand(np.full(6, 0.01), armed=True))
+
     def test_a_closed_one_sends_nothing_and_closes_again(self, rig: Rig) -> None:
         rig.follower.close()
         rig.follower.close()
         rig.follower.stop()
         with pytest.raises(FollowerError, match="closed"):
-            rig.follower.send(ThrustCommand.zero(rig.follower.thrusters))
+            rig.follower.send(self.command(rig, 0.0))
         with pytest.raises(FollowerError, match="closed"):
             rig.follower.receive()

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from hardware.link.robot_end import LinkLimits
-from hardware.robot_file import ROBOTS, RobotFileError, load_robot, robot_of, robot_table
+from hardware.robot_file import (
+    COMMANDS,
+    ROBOTS,
+    RobotFileError,
+    load_robot,
+    robot_of,
+    robot_path,
+    robot_table,
+)
 from hardware.robot_physics import positive_null_vector
 from pipeline import gains as sets
 from pipeline.frames import GRAVITY
@@ -77,7 +85,7 @@ def test_its_leds_are_on_the_cameras_side_at_arms_length_and_not_in_a_plane():
     assert np.linalg.svd(leds - leds.mean(axis=0), compute_uv=False)[-1] > 0.1
 
 
-@pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground"])
+@pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground", "twister"])
 def test_every_number_says_what_it_rests_on(robot):
     text = (ROBOTS / f"{robot}.toml").read_text(encoding="utf-8")
     for line in text[: text.index("[body_imu]")].splitlines():
@@ -257,8 +265,10 @@ def test_a_missing_file_is_named(tmp_path):
 
 def test_all_robots_in_the_folder_load():
     for path in Path(ROBOTS).glob("*.toml"):
-        robot_file = load_robot(path.stem)
+        robot_file = load_robot(path.stem, takes=COMMANDS)
         assert robot_file.robot.name == path.stem
+        if robot_file.robot.twist is not None:
+            continue
         assert robot_file.robot.hangs == (robot_file.plant.suspension is not None)
         assert robot_file.robot.hangs != (robot_file.plant.stand is not None)
 
@@ -276,3 +286,31 @@ def test_a_robot_blinks_only_if_its_file_says_so():
     assert load_robot("ames").robot.blinking_leds == 0
     assert not robot_of({k: v for k, v in table.items() if k != "blinks"}, "x").robot.blinks
     assert robot_of(table | {"blinks": True}, "x").robot.blinking_leds == 5
+
+
+def test_a_robot_that_takes_a_twist_is_refused_where_only_thrusts_are_known():
+    with pytest.raises(RobotFileError, match=r"link\.takes: 'twist'; here only .* thrusts"):
+        load_robot("twister")
+    drive = load_robot("twister", takes=COMMANDS).robot.twist
+    assert (drive.speed, drive.rate) == (0.5, pytest.approx(np.pi / 2))
+
+
+TWIST_MISTAKES = {
+    "brakes too late": ("acceleration_m_s2 = 5.0", "acceleration_m_s2 = 4.0", "4.55 or more"),
+    "turns too long": ("deg_s2 = 1000.0", "deg_s2 = 800.0", "818 or more"),
+    "would swing": ("lag_s = 0.03", "lag_s = 0.3", "smaller: .* swing"),
+    "misspelt": ("speed_m_s", "sped_m_s", "did you mean 'speed_m_s'"),
+    "thrusters": ("[twist] ", "[thrusters]\n[twist] ", "unknown key; allowed here: .*twist"),
+    "no numbers": ("speed_m_s = 0.5", "speed_m_s = nan", "finite"),
+    "LEDs in one place": ("[-0.089, 0.053, 0.140]", "[-0.012, -0.084, -0.117]", "from the others"),
+}
+
+
+@pytest.mark.parametrize("mistake", TWIST_MISTAKES)
+def test_a_mistake_of_a_robot_that_takes_a_twist_is_named(tmp_path, mistake):
+    old, new, allowed = TWIST_MISTAKES[mistake]
+    text = robot_path("twister").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(RobotFileError, match=allowed):
+        load_robot(tmp_path / "changed.toml", takes=COMMANDS)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import secrets
 
-from hardware.follower import BodySample, ThrustCommand
+from hardware.follower import BodySample, RobotCommand
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import LinkError, SampleDatagram
 from hardware.link.robot_end import Peer
@@ -88,7 +88,7 @@ class GroundEnd:
         """Packets that were not the robot's, damaged, repeated, overtaken or of before we spoke."""
         return self._dropped + self._end.dropped
 
-    def command(self, command: ThrustCommand, now: float) -> bytes:
+    def command(self, command: RobotCommand, now: float) -> bytes:
         """The mes for `command`.
 
         Raises:

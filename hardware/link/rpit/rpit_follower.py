@@ -20,7 +20,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from hardware.follower import BodySample, FollowerError, ThrustCommand
+from hardware.follower import BodySample, FollowerError, RobotCommand, ThrustCommand
 from hardware.link.control_end import ControlEnd
 from hardware.link.robot_end import Peer
 from hardware.link.robot_server import bound
@@ -89,7 +89,7 @@ class RpitFollower:
             samples += [sample] if sample is not None else []
         return samples
 
-    def send(self, command: ThrustCommand) -> None:
+    def send(self, command: RobotCommand) -> None:
         """See `Follower`."""
         self._check_open()
         self._send(command)
@@ -108,7 +108,7 @@ class RpitFollower:
         if self._closed:
             raise FollowerError("the link is closed", "an open one")
 
-    def _send(self, command: ThrustCommand) -> None:
+    def _send(self, command: RobotCommand) -> None:
         data = self._end.command(command, self._clock())
         try:
             if self._end.peer is None:

@@ -56,7 +56,7 @@ class Plant:
         self._model.dof_damping[:3] = parameters.air_damping
         self._model.dof_damping[3:6] = parameters.air_damping_rotation
         self._data = mujoco.MjData(self._model)
-        self._imu = _Imu(parameters.imu, rng, options)
+        self._imu = BodyImuErrors(parameters.imu, rng, options)
         self._touch = ContactForceSensor(self._model, self._data) if options.obstacle else None
         thrusters = len(parameters.thruster_torques)
         self._delay_ms = round(1e3 * parameters.delay)
@@ -204,6 +204,11 @@ class Plant:
         return np.array(self._data.act)
 
     @property
+    def given(self) -> Array:
+        """What it reports of itself: its thrusts."""
+        return self.thrusts
+
+    @property
     def cable_length(self) -> float:
         """Anchor to hook [m]; of robots that hang."""
         return float(self._data.ten_length[0])
@@ -235,12 +240,13 @@ class Plant:
         return self._imu.read(self._data.sensordata[:3], self._data.sensordata[3:6])
 
 
-class _Imu:
+class BodyImuErrors:
     """Errors of the body's motion sensors."""
 
     def __init__(
         self, parameters: BodyImuParameters, rng: np.random.Generator, options: PlantOptions
     ) -> None:
+        """Biases are drawn once."""
         bandwidth = sqrt(0.5 * options.imu_rate_hz) if options.imu_noise else 0.0
         self._sigma = bandwidth * np.repeat((parameters.gyro_noise, parameters.acc_noise), 3)
         bias = rng.standard_normal(6) * np.repeat((parameters.gyro_bias, parameters.acc_bias), 3)

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hardware.follower import FollowerState, Refusal
+from hardware.follower import ROUNDING, FollowerState, Refusal
 from hardware.link.datagram import CommandDatagram, decode_sample, encode_command
-from hardware.link.robot_end import ROUNDING, LinkLimits, RobotEnd
+from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
 
 LIMITS = LinkLimits(thrusters=2, f_max=3.0, max_rise=1.0, ramp_us=2_000_000)

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardware.follower import FollowerState, Refusal
+from hardware.follower import ROUNDING, FollowerState, Refusal
 from hardware.link.datagram import CommandDatagram, encode_command
 from hardware.link.link_key import LinkKeyError, mac, read_key
-from hardware.link.robot_end import ROUNDING, LinkLimits, RobotEnd
+from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
 from tests.hardware.link.test_robot_end import ABOVE, LARGEST
 from tests.hardware.test_attitude_keeper import asymmetric, turned
@@ -431,3 +431,14 @@ def test_the_recorded_commands_are_read_and_no_byte_of_them_may_differ(library, 
         robot = CRobotEnd(library, limits, 77, key)
         why = robot.receive(bytes(sent), None, 1_000_000)
         assert (why == Refusal.MALFORMED) == (at is not None)
+
+
+def test_a_twist_is_no_command_for_it(library):
+    both = Both(library, LIMITS)
+    both.shake_hands()
+    twist = CommandDatagram(5, both.counter + 1, both.nonce, 1, True, (), False, (0.1,) * 6)
+    python, c = both.ends
+    assert c.receive(encode_command(twist, KEY), None, both.now_us) == Refusal.MALFORMED
+    assert python.receive(encode_command(twist, KEY), None, both.now_us) == Refusal.THRUSTERS
+    assert not c.setpoint(both.now_us).any()
+    assert not python.setpoint(both.now_us).any()

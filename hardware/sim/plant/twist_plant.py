@@ -1,0 +1,104 @@
+"""A simulated robot that follows a twist: its own limits, delay and lag, whatever it is told.
+
+The twist told is held within speeds and accelerations of the robot's file, delayed, and followed by
+two equal lags behind each other, which never overshoot. World axes f as in `plant.py`: the start
+is R_fb = I, p_bf_in_f = 0, at rest. Whatever carries it is strong enough: there are no forces.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import exp as exponential
+
+import numpy as np
+
+from hardware.plant_parameters import BodyImuParameters
+from hardware.sim.plant.model import STEP_MS
+from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
+from pipeline.frames import GRAVITY, Array, cross, exp, wxyz_from_R
+from pipeline.robot import TwistDrive
+
+UP_IN_F = np.array([0.0, 0.0, GRAVITY])
+
+
+class TwistPlant:
+    """A robot. Deterministic for a seed of `rng`; nothing in it knows the time of day."""
+
+    def __init__(
+        self,
+        drive: TwistDrive,
+        imu: BodyImuParameters,
+        rng: np.random.Generator,
+        options: PlantOptions | None = None,
+    ) -> None:
+        """At rest."""
+        self._drive = drive
+        self._imu = BodyImuErrors(imu, rng, options or PlantOptions())
+        h = 1e-3 * STEP_MS
+        self._h, self._share = h, 1.0 - exponential(-h / (0.5 * drive.lag_s))
+        self._delay_ms, self._now_ms = round(1e3 * drive.delay_s), 0
+        self._on_their_way: deque[tuple[int, Array]] = deque()
+        self._told = self._allowed = self._halfway = np.zeros(6)
+        self.twist_in_b: Array = np.zeros(6)
+        """Velocity and angular rate in f, in b (6,) [m/s, rad/s]."""
+        self.twist_rate_in_b: Array = np.zeros(6)
+        """Its derivative as numbers in b (6,) [m/s², rad/s²]."""
+        self.R_fb: Array = np.eye(3)
+        """Attitude (3, 3)."""
+        self.p_bf_in_f: Array = np.zeros(3)
+        """Origin of b (3,) [m]."""
+
+    def step(self, twist_in_b: Array, dt: float = 0.005) -> None:
+        """Go on by `dt` [s], whole milliseconds, with a new command (6,) [m/s, rad/s]."""
+        self._on_their_way.append((self._now_ms + self._delay_ms, np.array(twist_in_b)))
+        for _ in range(round(1e3 * dt / STEP_MS)):
+            while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
+                self._told = self._drive.within(self._on_their_way.popleft()[1])
+            self._move()
+            self._now_ms += STEP_MS
+
+    def _move(self) -> None:
+        h, share = self._h, self._share
+        self._allowed = self._drive.toward(self._allowed, self._told, h)
+        self._halfway = self._halfway + share * (self._allowed - self._halfway)
+        before = self.twist_in_b
+        self.twist_in_b = before + share * (self._halfway - before)
+        self.twist_rate_in_b = (self.twist_in_b - before) / h
+        mean = 0.5 * (before + self.twist_in_b)
+        self.p_bf_in_f = self.p_bf_in_f + h * (self.R_fb @ mean[:3])
+        self.R_fb = self.R_fb @ exp(h * mean[3:])
+
+    def ahead(self, seconds: float, every: float = 0.005) -> list[tuple[float, Array, Array]]:
+        """Where it goes within `seconds` at its present twist; the robot itself doesn't move.
+
+        Rows (in how long [s], wxyz_fb (4,), p_bf_in_f (3,) [m]), `every` so often.
+        """
+        v_in_b, omega_in_b = self.twist_in_b[:3], self.twist_in_b[3:]
+        rows = []
+        for k in range(1, round(seconds / every) + 1):
+            t = k * every
+            half = self.R_fb @ exp(0.5 * t * omega_in_b)
+            p_bf_in_f = self.p_bf_in_f + t * (half @ v_in_b)
+            rows.append((t, np.array(wxyz_from_R(self.R_fb @ exp(t * omega_in_b))), p_bf_in_f))
+        return rows
+
+    @property
+    def wxyz_fb(self) -> Array:
+        """Attitude as a unit quaternion (4,)."""
+        return np.array(wxyz_from_R(self.R_fb))
+
+    @property
+    def given(self) -> Array:
+        """What it reports of itself: its twist (6,)."""
+        return self.twist_in_b
+
+    @property
+    def thrusts(self) -> Array:
+        """(0,): it has no thrusters."""
+        return np.zeros(0)
+
+    def imu(self) -> tuple[Array, Array]:
+        """What the body's sensors read: (ω (3,) [rad/s], specific force (3,) [m/s²]) in b."""
+        v_in_b, omega_in_b = self.twist_in_b[:3], self.twist_in_b[3:]
+        a_in_b = self.twist_rate_in_b[:3] + cross(omega_in_b, v_in_b)
+        return self._imu.read(omega_in_b, a_in_b + self.R_fb.T @ UP_IN_F)

@@ -1,0 +1,99 @@
+"""Schema of files of robots that take a twist: what the others' says of thrusters is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import radians
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hardware.robot_schema import (
+    AXES,
+    USUAL_PORTS,
+    Axis,
+    BodyImuSection,
+    LedSection,
+    Section,
+    Start,
+)
+from pipeline.control.twist_margins import LEAST_PHASE_RAD
+from pipeline.robot import TwistDrive
+
+LONGEST_STOP_S = 0.11
+"""A robot in silence brakes from 60 ms on, and has been told to stand still within 0.17 s."""
+
+
+class TwistSection(Section):
+    """[twist]: how the robot follows a velocity and an angular rate."""
+
+    speed_m_s: Annotated[float, Field(gt=0.0, le=2.0)]
+    acceleration_m_s2: Annotated[float, Field(gt=0.0, le=50.0)]
+    """Braking included."""
+    rate_deg_s: Annotated[float, Field(gt=0.0, le=360.0)]
+    angular_acceleration_deg_s2: Annotated[float, Field(gt=0.0, le=10_000.0)]
+    lag_s: Annotated[float, Field(gt=0.0, le=0.5)]
+    """Time constant of its own controller."""
+    delay_s: Annotated[float, Field(ge=0.0, le=0.5)]
+    position_gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)]
+    """Speed per distance to where it should be."""
+    attitude_gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)]
+
+
+class TwistLinkSection(Section):
+    """[link] of a robot that takes a twist."""
+
+    kind: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")] = "udp"
+    takes: Literal["twist"]
+    stopped_by: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    host: Annotated[str, Field(min_length=1, max_length=253)]
+    port: Annotated[int, Field(ge=1, le=65535)] | None = None
+
+
+class TwistRobotSchema(Section):
+    """The file."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]{1,32}$")]
+    axes: Annotated[
+        list[Axis], Field(min_length=1, max_length=6, default_factory=lambda: list(AXES))
+    ]
+    """Controlled, in the body's axes; along and about the others it is told zero."""
+    blinks: bool = False
+    start: Start = Start()
+    twist: TwistSection
+    body_imu: BodyImuSection
+    leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
+    link: TwistLinkSection
+
+
+def drive_of(section: TwistSection) -> TwistDrive:
+    """The section in SI."""
+    return TwistDrive(
+        speed=section.speed_m_s,
+        acceleration=section.acceleration_m_s2,
+        rate=radians(section.rate_deg_s),
+        angular_acceleration=radians(section.angular_acceleration_deg_s2),
+        position_gain=section.position_gain_per_s,
+        attitude_gain=section.attitude_gain_per_s,
+        lag_s=section.lag_s,
+        delay_s=section.delay_s,
+    )
+
+
+def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
+    """Keys that contradict each other: (key, what would be allowed)."""
+    if robot.link.port is None and robot.link.kind not in USUAL_PORTS:
+        yield "link.port", f"missing: a link of kind {robot.link.kind!r} has no usual one"
+    if len(set(robot.axes)) < len(robot.axes):
+        yield "axes", "each word once"
+    drive = drive_of(robot.twist)
+    if drive.speed > LONGEST_STOP_S * drive.acceleration:
+        least = drive.speed / LONGEST_STOP_S
+        yield "twist.acceleration_m_s2", f"{least:.2f} or more: it must stop in {LONGEST_STOP_S} s"
+    if drive.rate > LONGEST_STOP_S * drive.angular_acceleration:
+        least = robot.twist.rate_deg_s / LONGEST_STOP_S
+        key = "twist.angular_acceleration_deg_s2"
+        yield key, f"{least:.0f} or more: it must stop in {LONGEST_STOP_S} s"
+    for key in ("position_gain_per_s", "attitude_gain_per_s"):
+        if drive.phase_margin(getattr(robot.twist, key)) < LEAST_PHASE_RAD:
+            yield f"twist.{key}", "smaller: with this delay and lag it would swing"

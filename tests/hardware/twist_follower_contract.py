@@ -1,0 +1,101 @@
+"""What every follower of a robot that takes a twist must do, beside what all must.
+
+A level of 1 is 0.1 m/s and 0.1 rad/s along and about x; its robot is `twister`, or as quick.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hardware.follower import (
+    BodySample,
+    FollowerError,
+    FollowerState,
+    RobotCommand,
+    ThrustCommand,
+    TwistCommand,
+)
+from pipeline.frames import Array
+from tests.hardware.follower_contract import FollowerContract, Rig
+
+LEVEL = 0.1 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+SILENT_S = 0.17
+"""After the last command the robot is told to stand still."""
+SETTLE_S = 0.15
+"""Of its own delay and lag, until it does."""
+
+
+class TwistFollowerContract(FollowerContract):
+    deaf = FollowerState.REFUSING
+
+    @staticmethod
+    def command(rig: Rig, level: float) -> RobotCommand:
+        return TwistCommand(level * LEVEL, armed=level > 0.0)
+
+    @staticmethod
+    def given(sample: BodySample) -> Array:
+        assert sample.twist_in_b is not None
+        assert sample.thrusts.shape == (0,)
+        assert sample.twist_in_b[[1, 2, 4, 5]] == pytest.approx(0.0, abs=1e-9)
+        return sample.twist_in_b[[0, 3]] / 0.1
+
+    def test_silence_brakes_to_zero_in_time_then_refuses_until_a_new_handshake(
+        self, rig: Rig
+    ) -> None:
+        self.ready(rig)
+        self.fly(rig, 4.0, 0.5)
+        rig.follower.receive()
+        rig.advance(SILENT_S + SETTLE_S)
+        silent = rig.follower.receive()
+        assert self.given(silent[8]).min() > 3.5
+        assert self.given(silent[-1]).max() < 0.2
+        rig.advance(0.2)
+        assert rig.follower.receive()[-1].state == FollowerState.REFUSING
+        assert self.given(self.fly(rig, 2.0, 0.5)[-1]).max() < 1e-6
+        self.ready(rig)
+
+    test_silence_ramps_to_zero_then_refuses_until_a_new_handshake = None
+
+    def test_a_silence_of_a_tenth_of_a_second_is_coasted_through(self, rig: Rig) -> None:
+        self.ready(rig)
+        self.fly(rig, 2.0, 0.3)
+        rig.advance(0.100)
+        samples = self.fly(rig, 2.0, 0.4)
+        assert FollowerState.COAST in {s.state for s in samples}
+        assert samples[-1].state == FollowerState.RUNNING
+        assert self.given(samples[-1]) == pytest.approx(2.0, abs=0.01)
+
+    def test_stop_is_zero_at_once(self, rig: Rig) -> None:
+        self.ready(rig)
+        self.fly(rig, 4.0, 0.5)
+        rig.follower.stop()
+        rig.advance(0.010)
+        samples = self.fly(rig, 0.0, 0.3)
+        assert samples[-1].state == FollowerState.IDLE
+        assert self.given(samples[-1]).max() < 1e-2
+
+    def test_a_jump_is_followed_within_its_accelerations(self, rig: Rig) -> None:
+        self.ready(rig)
+        rig.follower.send(self.command(rig, 4.0))
+        rig.advance(0.005)
+        speeds = 0.1 * np.array([self.given(s)[0] for s in self.fly(rig, 4.0, 0.5)])
+        assert np.diff(speeds).max() < 5.0 * 0.005 * 1.01
+        assert speeds[-1] == pytest.approx(0.4, abs=1e-3)
+
+    @pytest.mark.parametrize("thrust", [-6.0, np.nan, np.inf, 1e3])
+    def test_refuses_to_send_what_no_robot_may_be_told(self, rig: Rig, thrust: float) -> None:
+        with pytest.raises(FollowerError):
+            rig.follower.send(TwistCommand(np.full(6, 0.1 * thrust), armed=True))
+
+    def test_refuses_wrong_shapes_and_thrust_without_arming(self, rig: Rig) -> None:
+        with pytest.raises(FollowerError, match="shape"):
+            rig.follower.send(TwistCommand(np.zeros(3), armed=True))
+        with pytest.raises(FollowerError, match="armed"):
+            rig.follower.send(TwistCommand(LEVEL, armed=False))
+        with pytest.raises(FollowerError, match="armed"):
+            rig.follower.send(TwistCommand(LEVEL, armed=True, stop=True))
+
+    def test_refuses_what_another_kind_of_robot_takes(self, rig: Rig) -> None:
+        with pytest.raises(FollowerError, match="takes nothing else"):
+            rig.follower.send(ThrustCommand(np.zeros(8), armed=False))
