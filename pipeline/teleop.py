@@ -1,4 +1,4 @@
-"""The paper's Fig. 4 on one screen: `Teleop.step` from measurements to thrusts."""
+"""The paper's Fig. 4 on one screen: `Teleop.step` from measurements to thrusts or a twist."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pipeline.control.leash import Leashed
 from pipeline.control.pid import PoseError, Reference, pose_error
 from pipeline.control.thrust_acting import ThrustActing
 from pipeline.control.tracking import Situation
+from pipeline.control.twist_acting import TwistActing
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.estimation.attitude import Attitude
 from pipeline.estimation.estimators import make_estimator
@@ -64,7 +65,7 @@ class Inputs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Output:
-    """Thrusts for the robot, and everything worth seeing on the way to them."""
+    """Thrusts or a twist for the robot, and everything worth seeing on the way to them."""
 
     t: float
     thrusts: Array
@@ -91,6 +92,8 @@ class Output:
     ages: Ages
     thrusters: tuple[str, ...] = ()
     """Those that don't give what they are told, in words."""
+    twist_in_b: Array | None = None
+    """(6,) [m/s, rad/s], of a robot that takes a twist."""
 
 
 class Teleop:
@@ -103,10 +106,13 @@ class Teleop:
         self._config, self._robot = config, robot
         self._h, self._t_step, self._stood_still = period, np.nan, False
         self._limits = failsafe.FailsafeTimers.of(
-            config.failsafe, robot.ramp_s, robot.hangs, bridges=config.estimator != "none"
+            config.failsafe,
+            robot.ramp_s,
+            hangs=robot.hangs or robot.twist is not None,  # at zero it stays by itself
+            bridges=config.estimator != "none",
         )
         self._virtual_camera = VirtualCamera(config.virtual_camera)
-        self._acting: Acting = ThrustActing(robot, config)
+        self._acting = acting_of(robot, config)
         self._failsafe = failsafe.Failsafe()
         self._operator = TouchState(-np.inf, held=False, press=0)
         self._half_field: tuple[float, float] | None = None
@@ -192,6 +198,7 @@ class Teleop:
             at_limit=leashed is not None and leashed.at_limit,
             ages=ages,
             thrusters=self._acting.weak_thrusters,
+            twist_in_b=acted.twist_in_b,
         )
 
     def _moment(self, t: float) -> Moment:
@@ -202,6 +209,7 @@ class Teleop:
             self._body,
             self._is_deaf(t),
             self._h,
+            t - min(self._operator.t, self._t_phone, self._body.t),
         )
 
     def _pass_time(self, t: float) -> int:
@@ -354,7 +362,7 @@ class Teleop:
             # by a share, or with turns that count for nothing, a gap is like a new press
             if before != Mode.COAST or self._led_to is None or not self._leading.is_plain:
                 self._led_to = self._reference
-            self._acting.start(known, from_rest=before == Mode.ARMED)
+            self._acting.start(known, before == Mode.ARMED)
             return known, self._error(known)
         self._acting.change_mode(before, mode, known, leashed)
         if mode != Mode.COAST:
@@ -375,3 +383,10 @@ class Teleop:
         if reference is None or led_to is None or reference is led_to:
             return
         self._reference = resumption.toward(self._config.resumption, reference, led_to, self._h)
+
+
+def acting_of(robot: Robot, config: TeleopConfig) -> Acting:
+    """What moves a robot, by what it takes."""
+    if robot.twist is None:
+        return ThrustActing(robot, config)
+    return TwistActing(robot, robot.twist, config.failsafe.silent)

@@ -1,7 +1,7 @@
 """What moves a robot, behind one interface: by its thrusts, or by a set-point that it takes.
 
 `Teleop` decides where the robot shall be and whether to fly at all; who stands behind `Acting`
-decides what the robot is told for that: `thrust_acting.py`.
+decides what the robot is told for that. `thrust_acting.py` and `twist_acting.py` are the two.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ class Moment:
     """The robot's turns since the last period are unknown."""
     h: float
     """Since the last period [s]."""
+    silence_s: float
+    """Age of the oldest news of operator, phone and robot [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,16 +74,16 @@ class Acting(Protocol):
     def coast_error(self, view: VirtualView) -> PoseError | None:
         """In a gap: what is missing to where the robot stays; None if it stays by itself."""
 
-    def led(self, error: PoseError, view: VirtualView, leading: Leading) -> PoseError:
+    def led(self, error: PoseError, view: VirtualView, leading: Leading, /) -> PoseError:
         """The error to where `leading` has the robot."""
 
-    def leashed(self, error: PoseError, view: VirtualView, reference: Reference) -> Leashed:
+    def leashed(self, error: PoseError, view: VirtualView, reference: Reference, /) -> Leashed:
         """The error to where the robot can be held."""
 
     def start_place(self) -> None:
         """A press: from here its way counts."""
 
-    def start(self, known: Situation, from_rest: bool) -> None:
+    def start(self, known: Situation, from_rest: bool, /) -> None:
         """Begin to track, without a jump."""
 
     def change_mode(
@@ -90,6 +92,6 @@ class Acting(Protocol):
         """Go from `before` to a `mode` that is not TRACK, without a jump."""
 
     def act(
-        self, known: Situation | None, leashed: Leashed | None, now: Moment, share: float
+        self, known: Situation | None, leashed: Leashed | None, now: Moment, share: float, /
     ) -> Acted:
         """What the robot is told now: `share` of it, 0 to 1, may reach the robot."""

@@ -7,7 +7,7 @@ from math import inf
 
 import numpy as np
 
-from hardware.follower import ThrustCommand
+from hardware.follower import RobotCommand, ThrustCommand, TwistCommand
 from hardware.link.robot_end import SILENCE_US
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array, triple, wxyz_from_R
@@ -98,7 +98,7 @@ class Controller:
         robot_reason: str,
         robot_gap: str = "",
         robot_left_s: float = inf,
-    ) -> tuple[ThrustCommand, Output]:
+    ) -> tuple[RobotCommand, Output]:
         """One control period.
 
         Args:
@@ -137,6 +137,8 @@ class Controller:
         if body:
             self._body_age.add(now - body[-1].t)
         stop = output.failsafe.mode == Mode.STOPPED
+        if output.twist_in_b is not None:
+            return TwistCommand(output.twist_in_b, output.armed, stop), output
         return ThrustCommand(output.thrusts, output.armed, stop), output
 
     def _sort(

@@ -19,12 +19,13 @@ import msgspec
 import numpy as np
 
 from hardware.dynamics import dynamics_of
-from hardware.follower import Follower, ThrustCommand
+from hardware.follower import Follower, RobotCommand, zero_command
 from hardware.link.link_key import LinkKeyError, take_key
-from hardware.link.registry import SIMULATED, link_kind
-from hardware.robot_file import RobotFile, load_robot
+from hardware.link.registry import SIMULATED, connect, link_kind
+from hardware.robot_file import COMMANDS, RobotFile, load_robot
 from pipeline.config import PERIOD_S, EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
+from pipeline.control.twist_margins import twist_refusal
 from pipeline.estimation.estimators import warm_up
 from server.common import clock
 from server.common.clock import unix_ms
@@ -98,6 +99,8 @@ def teleop_config(
     Raises:
         SystemExit: no such gain set; says which there are.
     """
+    if robot_file.robot.twist is not None:  # its gains stand in its drive
+        return replace(TeleopConfig(), virtual_camera=virtual_camera, estimator=estimator)
     if gains not in robot_file.gains:
         raise SystemExit(f"gains: {gains!r} is not one of {', '.join(robot_file.gains)}")
     return replace(
@@ -111,6 +114,8 @@ def teleop_config(
 def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate:
     """Why not to arm with pictures and body samples of an age, by the margins of the loop."""
     robot, plant = robot_file.robot, robot_file.plant
+    if robot.twist is not None:
+        return partial(twist_refusal, robot.twist)
     guard = LatencyGuard(
         dynamics_of(robot, plant), robot.axes | robot.wrench_axes, robot_file.gains, config
     )
@@ -151,7 +156,7 @@ def run(options: ControlOptions) -> None:
     ramp, upright if it flies: zeros would let it fall.
     """
     kind = None if options.real else SIMULATED
-    robot_file = load_robot(options.robot).reached(options.host, options.port, kind)
+    robot_file = load_robot(options.robot, takes=COMMANDS).reached(options.host, options.port, kind)
     key = _key()
     config = teleop_config(
         robot_file, options.gains, options.virtual_camera.config(), options.estimator
@@ -165,14 +170,15 @@ def run(options: ControlOptions) -> None:
         too_late(robot_file, options.gains, config),
     )
     epoch = next_epoch(options.epochs, unix_ms())
-    follower = link_kind(robot_file.link.kind).connect(robot_file, key, epoch)
+    follower = connect(robot_file, key, epoch)
     endpoint = control_end(options.runtime)
     stopping: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda n, _frame: stopping.append(n))
     try:
         link = RobotLink(follower, robot_file.robot.blinking_leds)
-        _loop(controller, follower, link, endpoint, granted, stopping)
+        zero = zero_command(robot_file.robot)
+        _loop(controller, follower, link, endpoint, granted, stopping, zero)
     finally:
         follower.close()
         endpoint.close()
@@ -185,11 +191,12 @@ def _loop(
     endpoint: Endpoint,
     granted: str,
     stopping: list[int],
+    command: RobotCommand,
 ) -> None:
-    """Tick until told to stop; who gives no thrust then says so to the end."""
+    """Tick until told to stop; who gives nothing then says so to the end. `command`: zero."""
     schedule = realtime.Schedule(PERIOD_S)
     lateness: dict[str, float] = {}
-    cpu_ms, command = np.zeros(LATENESS_EVERY), ThrustCommand.zero(follower.thrusters)
+    cpu_ms = np.zeros(LATENESS_EVERY)
     while not stopping:
         now = schedule.wait()
         cpu = clock.thread_cpu()

@@ -36,7 +36,8 @@ class BodyClock:
         t_robot = sample.t_us * 1e-6
         self._excess[self._count % len(self._excess)] = t_received - t_robot
         self._count += 1
-        return BodyImu(t_robot + float(self._excess.min()), sample.omega_in_b, sample.a_in_b)
+        t = t_robot + float(self._excess.min())
+        return BodyImu(t, sample.omega_in_b, sample.a_in_b, sample.twist_in_b)
 
     def robot_us(self, t: float) -> int | None:
         """What the robot's clock shows at `t` [s] of ours [µs]; None before any sample."""

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from hardware.link.link_key import LinkKeyError, new_key, read_key, write_key
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from server.common.settings import state_directory
 
 HELP = "Make the key that a real robot and its control process share."
@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         RobotFileError: no such robot.
         LinkKeyError: it has a key, or the key can't be written.
     """
-    name = load_robot(arguments.robot).robot.name
+    name = load_robot(arguments.robot, takes=COMMANDS).robot.name
     file = key_file(arguments.state, name)
     write_key(file, new_key(), force=arguments.force)
     print(f"The key of the robot {name!r} is in {file}, for its owner alone.\n{ADVICE}")

@@ -179,8 +179,8 @@ class VirtualTimeSimulation:
 
     def truth(self) -> tuple[Pose, Pose]:
         """Poses of camera and body in f."""
-        plant = self.follower.plant
-        return self._script.phone.hand.pose(self.t), (plant.R_fb, plant.p_bf_in_f)
+        body = self.follower.body
+        return self._script.phone.hand.pose(self.t), (body.R_fb, body.p_bf_in_f)
 
     def run(self, seconds: float) -> TrackingTrace:
         """Fly until `seconds`, or until tracking ends."""
@@ -197,8 +197,8 @@ class VirtualTimeSimulation:
         t_before = self.t
         self.follower.advance(PERIOD_S)
         self._ticks += 1
-        plant = self.follower.plant
-        self._poses.append((self.t, plant.wxyz_fb, plant.p_bf_in_f))
+        robot = self.follower.body
+        self._poses.append((self.t, robot.wxyz_fb, robot.p_bf_in_f))
         self._dark.append(self.follower.dark)
         self._hear_phone(t_before)
         self._hear_small_talk()

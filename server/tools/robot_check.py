@@ -17,11 +17,14 @@ from hardware.follower import FollowerError
 from hardware.led_layout.margins import margins
 from hardware.led_layout.viewpoints import looks_about
 from hardware.link.registry import link_kind
-from hardware.robot_file import RobotFile, load_robot
+from hardware.link.robot_end import SILENCE_US
+from hardware.robot_file import COMMANDS, RobotFile, load_robot
 from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
 from pipeline.control.margins import Loop, Sensing, axis_margins
+from pipeline.control.twist_margins import LEAST_PHASE_RAD, phase_left
 from pipeline.gains import Gains
+from pipeline.robot import TwistDrive
 from server.common.settings import state_directory
 from server.control.process import never_stops, never_upright
 from server.process.robot_key import key_file
@@ -63,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         RobotFileError: the file can't be used; names the key and what is allowed.
     """
-    robot_file = load_robot(arguments.robot)
+    robot_file = load_robot(arguments.robot, takes=COMMANDS)
     found = list(findings(robot_file, arguments.state))
     if arguments.json:
         print(json.dumps([asdict(one) for one in found], indent=1, ensure_ascii=False))
@@ -78,10 +81,30 @@ def run(arguments: argparse.Namespace) -> int:
 
 def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     """All of them, the robot's body first, then its LEDs, its link at the end."""
-    yield from _thrust(robot_file)
-    yield from _gains(robot_file)
+    if robot_file.robot.twist is not None:
+        yield from _twist(robot_file.robot.twist)
+    else:
+        yield from _thrust(robot_file)
+        yield from _gains(robot_file)
     yield _leds(robot_file)
     yield from _link(robot_file, state)
+
+
+def _twist(drive: TwistDrive) -> Iterator[RobotFinding]:
+    """How a robot that takes a twist moves, stops, and what its gains bear."""
+    change = f"{drive.acceleration:.1f} m/s² and {degrees(drive.angular_acceleration):.0f}°/s²"
+    said = f"{drive.speed:.2f} m/s and {degrees(drive.rate):.0f}°/s at most, by {change}"
+    yield RobotFinding("twist", True, said)
+    told_s = 1e-6 * SILENCE_US + drive.stop_s
+    follows_s = drive.delay_s + drive.lag_s
+    said = f"told zero {told_s:.2f} s after the last command, its lag of {follows_s:.2f} s beyond"
+    yield RobotFinding("stops", True, said)
+    phase = phase_left(drive, USUAL_LATENCY_S, BODY_AGE_S)
+    delay_s = phase / max(drive.position_gain, drive.attitude_gain)
+    usual = f"with pictures {1e3 * USUAL_LATENCY_S:.0f} ms old"
+    said = f"margins {1e3 * delay_s:.0f} ms, {degrees(phase):.0f}° {usual}"
+    ok = phase >= LEAST_PHASE_RAD
+    yield RobotFinding("gains", ok, said + ("" if ok else ": too little to lead it"))
 
 
 def _thrust(robot_file: RobotFile) -> Iterator[RobotFinding]:
@@ -164,7 +187,9 @@ def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     except FollowerError as error:
         yield RobotFinding("link", False, str(error))
         return
-    yield RobotFinding("link", True, f"{link.kind} to {link.host}, port {link.port}")
+    where = f"{link.kind} to {link.host}, port {link.port}: {link.takes}"
+    lacks = "" if link.takes in kind.takes else f"; it carries {' or '.join(kind.takes)} alone"
+    yield RobotFinding("link", not lacks, where + lacks)
     falls = never_upright(robot_file) or never_stops(robot_file)
     stops = "the robot stops by itself" if kind.stops_in_silence else f"stops: {link.stopped_by}"
     yield RobotFinding("in silence", not falls, falls or stops)

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from hardware.follower import ThrustCommand
+from hardware.follower import RobotCommand
 from hardware.robot_file import load_robot
 from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraMode
 from pipeline.frames import GRAVITY
@@ -67,7 +67,7 @@ class Rig:
         extra: Sequence[Input] = (),
         robot_reason: str = "",
         robot_gap: str = "",
-    ) -> list[tuple[ThrustCommand, Output]]:
+    ) -> list[tuple[RobotCommand, Output]]:
         """`extra` comes in the first tick."""
         out = []
         for step in range(round(seconds / 0.005)):

@@ -78,3 +78,23 @@ def test_a_robot_that_flies_has_what_is_left_beside_its_weight():
     z = authority(robot, dynamics_of(robot, quadrotor.plant))[2]
     assert z.up == pytest.approx(robot.A[2].sum() * robot.f_max - robot.weight_to_carry, rel=1e-6)
     assert z.down == pytest.approx(robot.weight_to_carry, rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("old", "new", "against"),
+    [
+        ("position_gain_per_s = 5.0", "position_gain_per_s = 5.0", set()),
+        ("position_gain_per_s = 5.0", "position_gain_per_s = 9.0", {"gains"}),
+        ('takes = "twist"', 'takes = "twist"\nkind = "rpit"', {"link", "in silence"}),
+    ],
+)
+def test_a_robot_that_takes_a_twist_is_judged_by_what_it_has(old, new, against, capsys, tmp_path):
+    text = robot_path("twister").read_text()
+    assert old in text
+    (tmp_path / "changed.toml").write_text(text.replace(old, new))
+    code, found = findings(capsys, tmp_path / "changed.toml", tmp_path)
+    assert {what for what, one in found.items() if not one["ok"]} == against
+    assert code == bool(against)
+    assert "told zero 0.16 s after the last command" in found["stops"]["said"]
+    assert "0.50 m/s and 90°/s at most" in found["twist"]["said"]
