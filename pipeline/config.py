@@ -228,6 +228,10 @@ class ResumptionConfig:
     max_offset_m: float = 0.4
     """Farther away it would move where nobody expects it any more: HOLD."""
     max_offset_rad: float = 0.5
+    settled_m: float = 0.008
+    """Standard deviation of the place up to which following begins without a picture taken since
+    the gap was noticed: what it mends then is as much as `max_speed_m_s` goes from one to the next.
+    Mended beyond, the robot would be sent after it at once."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -311,6 +311,7 @@ class Teleop:
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
             or self._astray(known)
             or self._blocked(leashed),
+            is_settled=self._is_settled(known, ages),
             refusals=(*inputs.refusals, *map(MEND.format, self._acting.weak_thrusters)),
             requests=inputs.requests,
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
@@ -334,6 +335,13 @@ class Teleop:
             return ""  # it will be led on from where it is
         near = resumption.is_near(self._config.resumption, self._led_to, known.relative)
         return "" if near else "Too far from where it was led."
+
+    def _is_settled(self, known: Situation | None, ages: Ages) -> bool:
+        if self._failsafe.mode != Mode.COAST or known is None:
+            return True
+        gap_s = 1e-3 * self._failsafe.mode_ms
+        sigma_p = known.relative.sigma_p
+        return resumption.is_settled(self._config.resumption, sigma_p, ages.pose, gap_s)
 
     def _blocked(self, leashed: Leashed | None) -> str:
         """Why it must not go on by a share: its place is wrong, and it would bounce."""

@@ -9,7 +9,7 @@
 | ARMED | DISARMED | disarm, fault, doubt, silence longer than a gap, idle for too long |
 | TRACK | COAST | no news from phone or robot, or control stood still |
 | TRACK | HOLD | the finger has left, another press, the camera or the estimate is lost |
-| COAST | TRACK | all fresh for a moment, and the same press still held |
+| COAST | TRACK | all fresh for a moment, the place settled, and the same press still held |
 | COAST | HOLD | the finger has left, another press, or too long for a gap and a picture |
 | HOLD | TRACK | another press, all good for the recovery time |
 | TRACK, COAST, HOLD | RAMP | fault, disarm, no word or no picture for too long |
@@ -78,6 +78,8 @@ class FailsafeInputs:
     requests: Requests = NO_REQUESTS
     robot_left_ms: int = FOREVER_MS
     """Until the robot ramps down by itself, if it goes on as it is."""
+    is_settled: bool = True
+    """After a gap: no picture is due that will mend the robot's place by far."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -361,7 +363,10 @@ def _coast(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Fai
     let_go = _let_go(now, inputs)
     if let_go is not None:
         return let_go
-    if now.good_ms >= limits.fresh:
+    # what a picture mends while it follows the robot is sent after: one that is due is waited for,
+    # for no longer than it may take
+    due_ms = 0 if inputs.is_settled else limits.pose_arm
+    if now.good_ms >= limits.fresh + due_ms:
         return _enter(now, Mode.TRACK, "Following the phone.")
     # all may speak again while the place is unsure, until a picture taken since has come
     waits_ms = 0 if silence(inputs, limits) else limits.pose_arm

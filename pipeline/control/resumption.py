@@ -21,6 +21,18 @@ def is_near(config: ResumptionConfig, led_to: Reference, relative: RelativeState
     )
 
 
+def is_settled(config: ResumptionConfig, sigma_p: float, picture_s: float, gap_s: float) -> bool:
+    """Whether no picture is due that will mend the robot's place by more than a release moves it.
+
+    Args:
+        config: How far that is.
+        sigma_p: Standard deviation of the place [m].
+        picture_s: Since the newest believed picture was taken [s].
+        gap_s: Since the gap was noticed [s].
+    """
+    return sigma_p <= config.settled_m or picture_s < gap_s
+
+
 def toward(
     config: ResumptionConfig, reference: Reference, led_to: Reference, h: float
 ) -> Reference:

@@ -146,6 +146,17 @@ def test_after_a_gap_it_waits_for_a_picture_for_no_longer_than_one_may_take() ->
     assert run(waited, replace(HELD, robot_ms=151), 5).mode == Mode.HOLD
 
 
+def test_after_a_gap_a_picture_that_is_due_is_waited_for_as_long_as_it_may_take() -> None:
+    moved = replace(HELD, is_settled=False)
+    back = run(tracking(), replace(HELD, operator_ms=1_000), LIMITS.gap - LIMITS.silent)
+    waited = run(back, moved, LIMITS.fresh + LIMITS.pose_arm - 5)
+    assert waited.mode == Mode.COAST
+    assert failsafe.step(waited, moved, 5, LIMITS).mode == Mode.TRACK
+    at_once = run(back, HELD, LIMITS.fresh)
+    assert at_once.mode == Mode.TRACK
+    assert run(at_once, moved, 1_000).mode == Mode.TRACK  # while it follows, pictures are late
+
+
 def test_a_gap_that_becomes_a_hold_is_named_after_who_is_silent_now() -> None:
     state = run(tracking(), replace(HELD, operator_ms=151), 500)
     assert (state.mode, state.reason) == (Mode.COAST, "No word from the phone.")

@@ -88,6 +88,7 @@ def inputs() -> list[FailsafeInputs]:
     told += [(age, fine, wish) for age in (silent, gone, robot) for wish in wishes]
     told += [(well, one, wish) for one in complaints for wish in wishes]
     coasts = [FailsafeInputs(True, 1, *well, "deaf", robot_left_ms=left) for left in (0, D)]
+    coasts += [FailsafeInputs(True, 1, *well, is_settled=False)]
     return coasts + [
         FailsafeInputs(held, press, *age, *complaint, wish)
         for held, press in product((False, True), range(2))
@@ -170,7 +171,7 @@ def check(before: Failsafe, told: FailsafeInputs, now: Failsafe, limits: Failsaf
         if before.mode in (Mode.ARMED, Mode.HOLD):
             assert before.good_ms + D >= limits.recover_short
         if before.mode == Mode.COAST:
-            assert now.good_ms >= limits.fresh
+            assert now.good_ms >= limits.fresh + (0 if told.is_settled else limits.pose_arm)
     if now.mode == Mode.ARMED:
         assert not told.fault
         assert not told.doubt

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.config import ResumptionConfig
 from pipeline.control.pid import Reference
-from pipeline.control.resumption import is_near, toward
+from pipeline.control.resumption import is_near, is_settled, toward
 from pipeline.frames import exp, log
 from tests.pipeline.control.relative import relative_at
 
@@ -50,3 +50,20 @@ def test_too_far_or_turned_too_far_it_is_not_near(factor: float, near: bool) -> 
     here = relative_at(PLACE, np.eye(3))
     assert is_near(CONFIG, LED_TO, replace(here, p_bc_in_c=PLACE + aside)) == near
     assert is_near(CONFIG, LED_TO, replace(here, R_cb=turn)) == near
+
+
+@pytest.mark.parametrize(
+    ("sigma_p", "picture_s", "settled"),
+    [(0.002, 0.5, True), (0.02, 0.5, False), (0.02, 0.2, True)],
+    ids=["sure", "unsure", "seen since"],
+)
+def test_settled_is_what_is_sure_or_was_seen_since(
+    sigma_p: float, picture_s: float, settled: bool
+) -> None:
+    assert is_settled(CONFIG, sigma_p, picture_s, gap_s=0.3) == settled
+
+
+def test_what_may_be_mended_at_once_is_no_more_than_a_release_moves_from_picture_to_picture() -> (
+    None
+):
+    assert CONFIG.settled_m <= CONFIG.max_speed_m_s / 30.0

@@ -215,3 +215,12 @@ def test_a_robot_that_hangs_stays_where_it_is_through_a_gap_of_tcp() -> None:
     flight = flight_of(fly(ames, config, case, seed=2, seconds=8.0))
     assert flight.resumed >= 1
     assert flight.drift_mm < 40.0
+
+
+def test_after_a_gap_of_webrtc_the_robot_is_not_sent_after_what_a_picture_mends() -> None:
+    """0.245 m/s where it follows again without the first one since."""
+    ames = load_robot("ames")
+    config = teleop_config(ames, "phone", VirtualCameraConfig())
+    flight = flight_of(fly(ames, config, Case("phone", "webrtc", 0.16, 5.0), seed=2, seconds=8.0))
+    assert flight.resumed >= 1
+    assert flight.release_m_s < 0.15
