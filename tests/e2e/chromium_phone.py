@@ -72,7 +72,7 @@ class ChromiumPhone(PlayedPhone):
         self.page.add_init_script(CANVAS)
         self._channel = Channel(context, self.page)
         self._touches = False
-        self._sensors = FedSensors(Channel(context, self.page), self._felt)
+        self._sensors = FedSensors(Channel(context, self.page), self._felt, self._still)
 
     def close(self) -> None:
         """Give the sockets back."""

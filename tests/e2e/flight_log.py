@@ -20,10 +20,19 @@ from tests.e2e.witness import Hole
 
 AT_REST = ("DISARMED", "STOPPED", "LOST")
 GAP_S = FailsafeConfig().gap
-BORNE_S = {"machine": 0.06, "slow": 0.0, "stolen": 0.1, "others": GAP_S, "server": GAP_S}
+BORNE_S = {
+    "machine": 0.06,
+    "slow": 0.0,
+    "stolen": 0.1,
+    "others": GAP_S,
+    "server": GAP_S,
+    "sensors": 0.1,
+    "lights": 0.0,
+}
 """So long a silent robot link and a silent phone are borne; a machine that is slow by control's own
 rule is not, nor one whose host took a fifth of a processor in half a second. Of the server only
-what it waited for a processor counts."""
+what it waited for a processor counts. A phone whose sensors stand still for longer than a tremor's
+period while its hand moves on, or whose camera does at all, is none."""
 CAUSE_S = 1.0
 """Between a hole and what it led to."""
 SHOWN_S = 0.05
@@ -31,6 +40,8 @@ WAITED = "armed_stall_waited_ms"
 MOST_FLIGHTS = 4
 """Tried for one that is wanted, on a machine that is proven to have been away each time."""
 KEPT = ("mode", "reason", "server")
+TOLD = ("streams", "estimate", "camera")
+"""What a status says of what the robot's place was made from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +156,7 @@ class Flight:
                 mode = said.mode
         if self.said:
             lines.append(f"  the server's pauses: {self.said[-1].server}")
+        lines += [f"  {what}: {self.status[what]}" for what in TOLD if what in self.status]
         shown = [hole for hole in (*self.holes, *self.starved) if hole.s >= SHOWN_S]
         lines += [
             f"  {hole.t - began:6.1f} s {hole.where} away for {1e3 * hole.s:.0f} ms"

@@ -6,7 +6,7 @@ import json
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from tests.e2e.witness import Hole, Witness
 
 STEP_S = 0.01
 """The hand is told so often, to the page where that manages."""
-AHEAD_S = np.array((0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.12, 0.16, 0.2))
+AHEAD_S = 1e-3 * np.array((0, 10, 20, 30, 40, 60, 80, 100, 120, 150, 180, 210, 250, 300, 350, 400))
 """When the lights are told from now on: a page that is told late still shows where the hand is."""
 RECENT_S = 0.02
 """The robot's last motion, which is taken to go on."""
@@ -92,6 +92,8 @@ class PlayedPhone(ABC):
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
         self._witness = Witness()
+        self._still: list[Hole] = []
+        """When what is played stood still, as no phone's hardware does."""
         ReferenceTrajectory.warm_up()
 
     @property
@@ -130,14 +132,18 @@ class PlayedPhone(ABC):
             Hole("page", self._page_epoch() + 1e-3 * end, 1e-3 * length)
             for end, length in self.evaluate("pageHoles.splice(0)")
         ]
-        return [*self._witness.holes(since), *(hole for hole in page if hole.t >= since)]
+        own = (*page, *self._still)
+        return [*self._witness.holes(since), *(hole for hole in own if hole.t >= since)]
 
     def step(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Show what the camera would see now; gives the poses of hand and body."""
         time.sleep(max(0.0, self._stepped + STEP_S - time.monotonic()))
         truth = self._truth.latest()
+        told_until = self._stepped + AHEAD_S[-1]
         self._stepped = time.monotonic()
         self._show(self._shown(truth))
+        if (late_s := time.monotonic() - told_until) > 0.0:
+            self._still.append(Hole("lights", time.monotonic(), late_s))
         t = float(truth.t[-1])
         return self._hand.pose(t), truth.at(t)
 
@@ -160,18 +166,16 @@ class PlayedPhone(ABC):
         t = float(truth.t[-1])
         times = (1e3 * (t - self._page_epoch() + AHEAD_S)).tolist()
         bodies = _onwards(truth)
-        spots = [
-            self._spots(self._hand.pose(t + ahead), body)
-            for ahead, body in zip(AHEAD_S, bodies, strict=True)
-        ]
+        hands = [self._hand.pose(t + ahead) for ahead in AHEAD_S]
+        spots = self._spots(hands, bodies).round(4).tolist()
         return f"tellSpots({json.dumps(times)}, {json.dumps(spots)})"
 
-    def _spots(self, hand: Pose, body: Pose) -> list[list[float]]:
-        """(u, v, radius) [px] of each LED."""
-        q = (body[1] - hand[1] + self._leds_in_b @ body[0].T) @ hand[0]
+    def _spots(self, hands: Sequence[Pose], bodies: Sequence[Pose]) -> np.ndarray:
+        """(n, LEDs, 3) u, v, radius [px] of each LED, for each pair of poses."""
+        poses = zip(hands, bodies, strict=True)
+        q = np.concatenate([(b[1] - h[1] + self._leds_in_b @ b[0].T) @ h[0] for h, b in poses])
         radius = CAMERA.K[0, 0] * 0.008 / q[:, :1]
-        spots: list[list[float]] = np.hstack((CAMERA.pixels(q), radius)).round(4).tolist()
-        return spots
+        return np.hstack((CAMERA.pixels(q), radius)).reshape(len(hands), -1, 3)
 
     def _page_epoch(self) -> float:
         """When the page's clock began [s]; from the quickest of some questions."""

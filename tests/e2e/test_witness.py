@@ -80,6 +80,12 @@ def test_a_flight_is_excused_by_a_hole_longer_than_is_borne_where_it_ended() -> 
     assert not flight("RAMP", Hole("page", 4.8, 2.0)).excuse  # it may be the page's own doing
 
 
+def test_a_phone_whose_hardware_stood_still_is_an_excuse() -> None:
+    assert flight("RAMP", Hole("sensors", 4.8, 0.12)).excuse
+    assert not flight("RAMP", Hole("sensors", 4.8, 0.08)).excuse
+    assert flight("RAMP", Hole("lights", 4.8, 0.01)).excuse
+
+
 def test_a_server_that_was_given_no_processor_is_an_excuse_and_one_at_work_is_not() -> None:
     flown = flight("RAMP")
     for n in range(49, 101):

@@ -44,8 +44,9 @@ class Hole:
     """A while in which something did not run."""
 
     where: str
-    """`machine`, `others`, `page`; `slow` for a while in which `machine` had many; `stolen`: in so
-    much of the `OVER_S` before its end the host took the processor away that it took most from."""
+    """`machine`, `others`, `page`; `sensors` and `lights` of a played phone; `slow` for a while in
+    which `machine` had many; `stolen`: in so much of the `OVER_S` before its end the host took the
+    processor away that it took most from."""
     t: float
     """Its end [s, monotonic]."""
     s: float
