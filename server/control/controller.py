@@ -17,7 +17,7 @@ from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState, Visi
 from pipeline.teleop import Inputs, Output, Teleop
 from server.common.runtime_parameters import RuntimeParameters, Tune, turned
 from server.control.gap_log import GapLog
-from server.control.ipc import ControlStatus
+from server.control.ipc import BodyRow, ControlStatus
 from server.control.ipc_estimate import EstimateFields, finite
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.control.tick_rate import TickRate
@@ -81,7 +81,8 @@ class Controller:
         silent_s = config.failsafe.silent
         self._gaps = GapLog({"phone": silent_s, "robot": STOOD_STILL_S, "server": STOOD_STILL_S})
         self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
-        self._body_samples: list[tuple[float, float, float, float, float, float, float]] = []
+        self._body_samples: list[BodyRow] = []
+        self._body_twists: list[BodyRow] = []
         self._fuse_ms = 0.0
 
     def expected(self, output: Output) -> Prediction | None:
@@ -114,6 +115,8 @@ class Controller:
             self._body_samples.append(
                 (sample.t, *triple(sample.omega_m_bf_in_b), *triple(sample.a_m_bf_in_b))
             )
+            if (twist := sample.twist_m_bf_in_b) is not None:
+                self._body_twists.append((sample.t, *triple(twist[:3]), *triple(twist[3:])))
         stall_s = now - self._t_tick
         output = self.teleop.step(
             Inputs(
@@ -202,12 +205,14 @@ class Controller:
         step_ms: float,
         dropped: int,
     ) -> ControlStatus:
-        """Status for supervisors, and the body's samples since the last one."""
+        """Status for supervisors, and what the body's sensors said since the last one."""
         relative, view = output.relative, output.view
         reference, error = output.reference, output.error
         estimator = self.teleop.estimator
         health = estimator.health
         samples, self._body_samples = self._body_samples, []
+        twists, self._body_twists = self._body_twists, []
+        twist_in_b = output.twist_in_b
         return ControlStatus(
             t=output.t,
             epoch=epoch,
@@ -251,6 +256,10 @@ class Controller:
             lead=Lead.of(output.leading),
             next_lead=Lead.of(self.teleop.next_leading),
             thrusters_weak=list(output.thrusters),
+            twist_in_b=None
+            if twist_in_b is None
+            else (*triple(twist_in_b[:3]), *triple(twist_in_b[3:])),
+            body_twists=twists,
         )
 
 

@@ -23,6 +23,8 @@ from server.protocol.lead_messages import Lead
 
 MAX_DATAGRAM = 16_384
 """Bytes that are read of one."""
+BodyRow = tuple[float, float, float, float, float, float, float]
+"""A time [s] and two vectors in b."""
 
 
 class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
@@ -59,7 +61,7 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Of the pictures' stamps, if the filter knows: taken at the stamp plus this [s]."""
     thrusts: list[float]
     saturated: bool
-    body_samples: list[tuple[float, float, float, float, float, float, float]]
+    body_samples: list[BodyRow]
     """Body IMU since the last status, for recordings: t, ω in b, specific force in b."""
     poses_fused: int
     poses_dropped: int
@@ -90,6 +92,10 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """... and from the next one on."""
     thrusters_weak: list[str] = []
     """Each that does not give what it is told, in words."""
+    twist_in_b: tuple[float, float, float, float, float, float] | None = None
+    """Told to a robot that takes a twist, which has no thrusts: v, ω in b [m/s, rad/s]."""
+    body_twists: list[BodyRow] = []
+    """What such a robot measures, of each of `body_samples`: t, v, ω in b."""
 
 
 def expected_of(status: ControlStatus) -> Prediction | None:

@@ -225,6 +225,12 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Who is paired, in the order they came."""
     leading: LeadingStatus | None = None
     """None before the control process has told of it."""
+    takes: Literal["thrusts", "twist"] = "thrusts"
+    """What the robot is told: by its thrusters, or a velocity that it follows by itself."""
+    told_mm_s: float | None = None
+    """The speed that a robot is told that takes a twist ..."""
+    told_deg_s: float | None = None
+    """... and how fast to turn."""
 
 
 FromPage = Hello | Command | Tune | Lead | PathChoice | Calibrate | Log | ScreenSize | ClockAsk

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from math import acos, degrees, isfinite
+from math import acos, degrees, hypot, isfinite
 from typing import Literal, Protocol, cast
 
 from pipeline.control.leading import knows_its_place
@@ -56,6 +56,7 @@ def build(manager: StatusSource) -> Status:
     refusals = [f"{silence}."] if control is None or silence else control.refusals
     detection = phone.detection if phone is not None else None
     found = detection is not None and detection.pose is not None
+    told_mm_s, told_deg_s = _told(None if silence else control)
     return Status(
         mode=mode,
         reason=f"{silence}; the robot stops by its own watchdog."
@@ -100,6 +101,9 @@ def build(manager: StatusSource) -> Status:
         server=manager.pauses.figures(),
         people=manager.people.present(),
         leading=_leading(manager.robot, control),
+        takes="thrusts" if manager.robot.twist is None else "twist",
+        told_mm_s=told_mm_s,
+        told_deg_s=told_deg_s,
     )
 
 
@@ -120,6 +124,14 @@ def _silence(control: ControlStatus | None, age: float) -> str:
 
 def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | None:
     return None if value is None or not isfinite(value) else round(scale * value, digits)
+
+
+def _told(control: ControlStatus | None) -> tuple[float | None, float | None]:
+    """How fast a robot that takes a twist is told to move [mm/s] and to turn [°/s]."""
+    if control is None or control.twist_in_b is None:
+        return None, None
+    x, y, z, *turn = control.twist_in_b
+    return _rounded(hypot(x, y, z), 1, 1e3), _rounded(hypot(*turn), 1, degrees(1.0))
 
 
 def _virtual_camera(control: ControlStatus | None) -> VirtualCameraStatus | None:

@@ -25,7 +25,8 @@ def status(mode):
         **{name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")},
         **{name: [] for name in ("refusals", "messages", "warnings", "thrusters_weak", "people")},
     }
-    return Status(**fields | numbers | texts | flags | tables | {"mode": mode})
+    words = {"mode": mode, "takes": "thrusts"}
+    return Status(**fields | numbers | texts | flags | tables | words)
 
 
 def picture(sequence):

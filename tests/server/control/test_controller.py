@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hardware.follower import RobotCommand
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraMode
 from pipeline.frames import GRAVITY
 from pipeline.signals import BodyImu, Mode, PhoneImu, TouchState, VisionMeasurement
@@ -450,6 +450,18 @@ def test_a_status_tells_everything_once_and_survives_the_link():
     assert status.error_m is not None
     assert status.poses_fused > 0
     assert 40.0 < status.fuse_ms < 80.0
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
+
+
+def test_a_status_of_a_robot_that_takes_a_twist_has_what_it_is_told_and_what_it_measures():
+    controller = Controller(load_robot("twister", takes=COMMANDS).robot, TeleopConfig())
+    measured = (0.1, 0.0, 0.0, 0.0, 0.0, -0.2)
+    body = [BodyImu(0.005 * k, STILL, UP, np.array(measured)) for k in range(4)]
+    _, output = controller.tick(0.02, [], body, "")
+    status = controller.status(output, 1, "", {}, 0.0, 0)
+    assert (status.thrusts, status.twist_in_b) == ([], (0.0,) * 6)
+    assert status.body_twists == [(0.005 * k, *measured) for k in range(4)]
+    assert controller.status(output, 1, "", {}, 0.0, 0).body_twists == []
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
 
 

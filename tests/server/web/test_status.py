@@ -7,6 +7,7 @@ from math import cos, inf, nan, radians, sin
 import msgspec
 import pytest
 
+from hardware.robot_file import COMMANDS, load_robot
 from server.common.clock import now
 from server.common.runtime_parameters import RuntimeParameters
 from server.protocol.messages import encode_message
@@ -35,9 +36,11 @@ def test_before_control_has_spoken_it_is_lost_and_nothing_is_ready(manager):
 
 
 def test_control_that_falls_silent_is_lost_whatever_it_said_last(manager):
-    tell(manager, t=now() - LOST_S - 0.05, mode=2, reason="Following the phone.", refusals=[])
+    said = {"mode": 2, "reason": "Following the phone.", "refusals": [], "twist_in_b": (0.3,) * 6}
+    tell(manager, t=now() - LOST_S - 0.05, **said)
     shown = status.build(manager)
     assert (shown.mode, shown.ready) == ("LOST", False)
+    assert (shown.told_mm_s, shown.told_deg_s) == (None, None)
     assert "Following" not in shown.reason
 
 
@@ -62,6 +65,15 @@ def test_what_control_says_is_shown_in_the_units_of_screens(manager):
     assert shown.control["missed"] == 3.0
     assert shown.control["p99_ms"] == 0.2
     assert shown.streams["body_imu"].rate_hz == 200.0
+
+
+def test_a_robot_that_takes_a_twist_has_its_speeds_told(manager):
+    tell(manager)
+    assert (status.build(manager).takes, status.build(manager).told_mm_s) == ("thrusts", None)
+    manager.robot = load_robot("twister", takes=COMMANDS).robot
+    tell(manager, thrusts=[], twist_in_b=(0.03, 0.0, -0.04, 0.0, radians(12.0), 0.0))
+    shown = status.build(manager)
+    assert (shown.takes, shown.told_mm_s, shown.told_deg_s) == ("twist", 50.0, 12.0)
 
 
 def test_why_arming_is_refused_is_told(manager):

@@ -244,6 +244,9 @@
  * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a processor for armed_stall_waited_ms; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
  * @property {Person[]} people Who is paired, in the order they came.
  * @property {LeadingStatus | null} leading null before the control process has told of it.
+ * @property {'thrusts' | 'twist'} takes What the robot is told: by its thrusters, or a velocity that it follows by itself.
+ * @property {number | null} told_mm_s The speed that a robot is told that takes a twist ...
+ * @property {number | null} told_deg_s ... and how fast to turn.
  */
 
 /**
