@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from hardware.plant_parameters import PlantParameters, StartParameters
 from pipeline.frames import Array, R_co, R_from_wxyz, wxyz_from_R
-from pipeline.robot import Robot
+from pipeline.robot import Robot, TwistDrive
 from pipeline.signals import Mode
 from server.control.ipc import ControlStatus
 
@@ -33,7 +33,10 @@ STEADY: Colour = (60, 220, 130)
 """The virtual camera and where it wants the robot."""
 BODY: Colour = (225, 228, 235)
 LED: Colour = (255, 214, 60)
-THRUST: Colour = (255, 110, 50)
+COMMAND: Colour = (255, 110, 50)
+"""What the robot is told: thrusts, or a velocity ..."""
+TURN: Colour = (190, 110, 255)
+"""... and how fast to turn."""
 TRAIL: Colour = (90, 200, 255)
 CABLE: Colour = (170, 175, 185)
 STALE: Colour = (85, 88, 94)
@@ -43,8 +46,10 @@ LONG_SIDE_FOV = 1.15
 """Angle of view of a phone's main camera along the longer side of its picture [rad]."""
 ROTOR_RADIUS = 0.085
 FULL_ARROW_M = 0.33
-"""Of a thruster's largest force."""
+"""Of a thruster's largest force, or of the largest speed and angular rate."""
 ARROW_FROM_N = 0.1
+ARROW_FROM = 0.01
+"""Of a speed or angular rate: this share of the largest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,6 +216,8 @@ class Craft:
     """(k, 3) [m]."""
     f_max: float
     """Largest thrust [N]."""
+    drive: TwistDrive | None
+    """Of a robot that takes a twist and has no thrusters."""
 
     @classmethod
     def of(cls, robot: Robot, plant: PlantParameters) -> Craft:
@@ -222,7 +229,7 @@ class Craft:
             heights = suspension.hook_above_com + np.array([0.0, suspension.length])
             cable = heights[None, :, None] * UP
         feet = stand.feet_in_b if stand is not None else None
-        return cls(robot.leds_in_b, positions, directions, cable, feet, robot.f_max)
+        return cls(robot.leds_in_b, positions, directions, cable, feet, robot.f_max, robot.twist)
 
     def airframe(self) -> Mesh:
         """Hub, mast with the hook, arms to thrusters with their motors, legs, rods to the LEDs."""
@@ -237,14 +244,27 @@ class Craft:
             parts.append(prism(p - 0.02 * d, p + 0.02 * d, 0.018, 10))
         return merged([*parts, *(prism(centre, led, 0.004, 5) for led in self.leds)])
 
-    def rotors(self) -> Mesh:
+    def rotors(self) -> list[Mesh]:
         """The discs the propellers sweep."""
         pairs = zip(self.positions, self.directions, strict=True)
-        return merged([prism(p + 0.018 * d, p + 0.022 * d, ROTOR_RADIUS, 24) for p, d in pairs])
+        return [prism(p + 0.018 * d, p + 0.022 * d, ROTOR_RADIUS, 24) for p, d in pairs]
 
-    def arrows(self, thrusts: Array) -> npt.NDArray[np.float32]:
-        """(m, 2, 3) [m]: the force of each thruster [N], from its rotor on; idle is a speck."""
-        shown = np.where(np.abs(thrusts) < ARROW_FROM_N, 1e-4, thrusts)
-        length = FULL_ARROW_M / self.f_max * shown
-        tips = self.positions + length[:, None] * self.directions
-        return np.stack([self.positions, tips], axis=1).astype(np.float32)
+    def idle(self) -> Array:
+        """A command that moves nothing, as `arrows` takes it."""
+        return np.zeros(len(self.positions) if self.drive is None else 6)
+
+    def arrows(self, command: Array) -> npt.NDArray[np.float32]:
+        """(k, 2, 3) [m]: what it is told, in b; idle is a speck.
+
+        Of thrusts (m,) [N] the force of each, from its rotor on; of a twist (6,) [m/s, rad/s] its
+        velocity, and its angular rate along the axis that it turns about, from the body's origin.
+        """
+        if self.drive is None:
+            shown = np.where(np.abs(command) < ARROW_FROM_N, 1e-4, command)
+            starts, ways = self.positions, (shown / self.f_max)[:, None] * self.directions
+        else:
+            shares = command.reshape(2, 3) / np.array([[self.drive.speed], [self.drive.rate]])
+            lengths = np.linalg.norm(shares, axis=1, keepdims=True)
+            starts, ways = np.zeros((2, 3)), np.where(lengths < ARROW_FROM, 1e-4 * UP, shares)
+        tips = starts + FULL_ARROW_M * ways
+        return np.stack([starts, tips], axis=1).astype(np.float32)

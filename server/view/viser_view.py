@@ -23,7 +23,7 @@ from pipeline.robot import Robot
 from server.control.ipc import ControlStatus
 from server.view import scene
 from server.view.private_listening import listening_at
-from server.view.scene import BODY, CABLE, LED, PHONE, STALE, STEADY, THRUST, TRAIL, Colour
+from server.view.scene import BODY, CABLE, COMMAND, LED, PHONE, STALE, STEADY, TRAIL, TURN, Colour
 
 Thumbnail = npt.NDArray[np.uint8]
 Latest = Callable[[], tuple[ControlStatus | None, Thumbnail | None]]
@@ -147,7 +147,7 @@ class Dashboard:
         self._phone.image = thumbnail
 
     def _show_robot(self, status: ControlStatus, view: scene.ViewState) -> None:
-        """Cable, trail and thrusts."""
+        """Cable, trail and command."""
         lines = [node for node in (self._cable, self._trail_lines) if node is not None]
         for node in lines:
             if node.visible != (view.robot is not None):
@@ -158,9 +158,10 @@ class Dashboard:
             self._cable.position = view.robot.position
         if self._trail.add(status.t, view.robot.position):
             self._trail_lines.points = self._trail.segments()
-        thrusts = np.asarray(status.thrusts, dtype=np.float64)
-        if len(thrusts) == len(self._craft.positions) and np.all(np.isfinite(thrusts)):
-            self._thrusts.points = self._craft.arrows(thrusts)
+        told = status.thrusts if self._craft.drive is None else status.twist_in_b or ()
+        command = np.asarray(told, dtype=np.float64)
+        if command.shape == self._craft.idle().shape and np.all(np.isfinite(command)):
+            self._command.points = self._craft.arrows(command)
 
     def _colour(self, is_fresh: bool) -> None:
         """Grey a robot whose pose is old."""
@@ -169,7 +170,7 @@ class Dashboard:
         self._is_fresh = is_fresh
         for handle, colour in self._coloured:
             handle.color = colour if is_fresh else STALE
-        self._thrusts.visible = is_fresh
+        self._command.visible = is_fresh
 
     def _dress(self, floor_z: float) -> None:
         """Dark, with a floor, and nothing but the scene."""
@@ -213,17 +214,19 @@ class Dashboard:
         viewer = self._viser.scene
         self._robot = viewer.add_frame("/f/robot", show_axes=False, visible=False)
         body = self._mesh("/f/robot/body", craft.airframe(), STALE)
-        rotors = self._mesh("/f/robot/rotors", craft.rotors(), STALE)
-        rotors.opacity = 0.35
         self._coloured: list[tuple[viser.MeshHandle | viser.IcosphereHandle, Colour]]
-        self._coloured = [(body, BODY), (rotors, PHONE)]
+        self._coloured = [(body, BODY)]
+        if discs := craft.rotors():
+            rotors = self._mesh("/f/robot/rotors", scene.merged(discs), STALE)
+            rotors.opacity = 0.35
+            self._coloured.append((rotors, PHONE))
         for i, led in enumerate(craft.leds):
             ball = viewer.add_icosphere(f"/f/robot/led{i}", radius=0.026, color=STALE, position=led)
             self._coloured.append((ball, LED))
-        self._thrusts = viewer.add_arrows(
-            "/f/robot/thrusts",
-            craft.arrows(np.zeros(len(craft.positions))),
-            THRUST,
+        self._command = viewer.add_arrows(
+            "/f/robot/command",
+            craft.arrows(craft.idle()),
+            COMMAND if craft.drive is None else np.array([COMMAND, TURN], dtype=np.uint8),
             shaft_radius=0.009,
             head_radius=0.024,
             head_length=0.055,
@@ -249,7 +252,7 @@ class Dashboard:
         """Where the body should be: its ghost."""
         viewer = self._viser.scene
         self._reference = viewer.add_frame("/f/reference", show_axes=False, visible=False)
-        whole = scene.merged([craft.airframe(), craft.rotors()])
+        whole = scene.merged([craft.airframe(), *craft.rotors()])
         self._mesh("/f/reference/body", whole, STEADY).opacity = 0.25
 
     def _mesh(self, name: str, mesh: scene.Mesh, colour: Colour) -> viser.MeshHandle:

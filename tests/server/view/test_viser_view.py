@@ -1,13 +1,14 @@
 """What the 3D view draws, and that drawing it is cheap."""
 
 import time
+from math import radians
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from pipeline.frames import R_co, R_from_rpy, R_from_wxyz, wxyz_from_R
 from pipeline.signals import Mode
 from server.control.ipc import ControlStatus
@@ -17,6 +18,7 @@ from server.view.viser_view import Dashboard
 pytestmark = pytest.mark.slow  # a real viser
 
 AMES, QUADROTOR, GROUND = (load_robot(name) for name in ("ames", "quadrotor", "ground"))
+TWISTER = load_robot("twister", takes=COMMANDS)
 angle = st.floats(-1.2, 1.2)
 attitude = st.builds(lambda *eta: R_from_rpy(np.array(eta)), angle, angle, angle)
 point = st.builds(lambda *p: np.array(p), *[st.floats(-5.0, 5.0)] * 3)
@@ -161,7 +163,7 @@ def test_the_scene_follows_the_status(dashboard):
     assert dashboard._robot.visible
     assert np.allclose(dashboard._robot.position, (2.5, 0.0, 0.0))
     assert dashboard._reference.visible
-    assert dashboard._thrusts.visible
+    assert dashboard._command.visible
     dashboard.show(status(p_bc_in_c=None, mode=Mode.HOLD, pose_age=9.0), None)
     assert not dashboard._robot.visible
     assert not dashboard._trail_lines.visible
@@ -173,8 +175,23 @@ def test_a_robot_without_a_cable_is_shown_with_its_thrusts(tmp_path):
     dashboard = Dashboard(QUADROTOR.robot, QUADROTOR.plant, QUADROTOR.start, tmp_path / "view.sock")
     dashboard.show(status(thrusts=[2.0, 3.0, 4.0, 5.0]), None)
     assert dashboard._robot.visible
-    assert dashboard._thrusts.points.shape == (4, 2, 3)
-    assert np.ptp(dashboard._thrusts.points[:, :, 2], axis=1).max() == pytest.approx(0.33 * 5 / 7)
+    assert dashboard._command.points.shape == (4, 2, 3)
+    assert np.ptp(dashboard._command.points[:, :, 2], axis=1).max() == pytest.approx(0.33 * 5 / 7)
+    dashboard.stop()
+
+
+def test_a_robot_that_takes_a_twist_is_shown_with_the_motion_it_is_told(tmp_path):
+    dashboard = Dashboard(TWISTER.robot, TWISTER.plant, TWISTER.start, tmp_path / "view.sock")
+    told = (0.0, 0.25, 0.0, 0.0, 0.0, radians(-90.0))
+    dashboard.show(status(thrusts=[], twist_in_b=told), None)
+    tips = scene.FULL_ARROW_M * np.array([[0.0, 0.5, 0.0], [0.0, 0.0, -1.0]])
+    shown = np.stack([np.zeros((2, 3)), tips], axis=1)
+    assert dashboard._command.points == pytest.approx(shown)
+    for unknown in (None, (float("nan"),) * 6):
+        dashboard.show(status(thrusts=[], twist_in_b=unknown), None)
+        assert dashboard._command.points == pytest.approx(shown)
+    dashboard.show(status(thrusts=[], twist_in_b=(0.0,) * 6), None)
+    assert np.ptp(dashboard._command.points, axis=1).max() < 1e-3
     dashboard.stop()
 
 
@@ -184,7 +201,7 @@ def test_a_robot_without_news_is_grey(dashboard):
     assert tuple(body.color) == scene.BODY
     dashboard.show(None, None)
     assert tuple(body.color) == scene.STALE
-    assert not dashboard._thrusts.visible
+    assert not dashboard._command.visible
     dashboard.show(status(), None)
     assert tuple(body.color) == scene.BODY
 
@@ -196,10 +213,10 @@ def test_a_portrait_picture_makes_a_portrait_frustum(dashboard):
 
 def test_thrusts_of_another_robot_are_not_drawn(dashboard):
     dashboard.show(status(), None)
-    before = dashboard._thrusts.points
+    before = dashboard._command.points
     dashboard.show(status(thrusts=[1.0, 2.0]), None)
     dashboard.show(status(thrusts=[float("nan")] * 8), None)
-    assert np.array_equal(dashboard._thrusts.points, before)
+    assert np.array_equal(dashboard._command.points, before)
 
 
 def test_an_update_is_cheap(dashboard):
