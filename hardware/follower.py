@@ -64,7 +64,7 @@ class Refusal(IntEnum):
 
 EXPLANATIONS: dict[Refusal, str] = {
     Refusal.NONE: "",
-    Refusal.STARTED: "The robot has just started: it waits for zero thrust.",
+    Refusal.STARTED: "The robot has just started: it waits to be told zero.",
     Refusal.SILENT: "The robot heard no valid command in time and went to zero by itself.",
     Refusal.MALFORMED: "The robot received something that is no command.",
     Refusal.THRUSTERS: "The command is for another number of thrusters: is it another robot?",
@@ -72,11 +72,11 @@ EXPLANATIONS: dict[Refusal, str] = {
     Refusal.STALE: "Commands reach the robot too late.",
     Refusal.EPOCH: "The command is of another control process than the robot follows.",
     Refusal.COUNTER: "The command is old, repeated or far ahead.",
-    Refusal.NOT_FINITE: "A thrust is not a number.",
-    Refusal.LIMITS: "A thrust is outside the robot's limits.",
-    Refusal.RISE: "A thrust rises faster than the robot allows.",
-    Refusal.ZERO_FIRST: "A new control process must begin with zero thrust.",
-    Refusal.HANDSHAKE: "The robot is still making sure that thrust is zero.",
+    Refusal.NOT_FINITE: "A command is not a number.",
+    Refusal.LIMITS: "A command is beyond the robot's limits.",
+    Refusal.RISE: "A command changes faster than the robot allows.",
+    Refusal.ZERO_FIRST: "A new control process must begin with zero.",
+    Refusal.HANDSHAKE: "The robot is still making sure that it is told zero.",
 }
 """For the person who can mend it."""
 

@@ -5,7 +5,7 @@
 /** @import {Status} from '../wire/protocol_types.js' */
 
 import { Elements, write } from './elements.js';
-import { MODE_WORDS } from '../ui/mode_words.js';
+import { modeWords, rampWords } from '../ui/mode_words.js';
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
@@ -61,12 +61,12 @@ export class BoardView extends Elements {
   /** @param {Board} board */
   head(board) {
     const mode = shownMode(board);
-    const [name, meaning] = MODE_WORDS[mode];
+    const [name, meaning] = modeWords(mode, board.status);
     this.find('status').dataset.mode = mode;
     this.text('mode', name);
     this.text('meaning', meaning);
     const left = board.heard ? board.status?.until_ramp_ms ?? null : null;
-    this.text('left', left === null ? '' : `Thrust fades in ${Math.ceil(left / 1000)} s`);
+    this.text('left', rampWords(left === null ? null : Math.ceil(left / 1000), board.status));
     this.text('reason', board.heard ? board.status?.reason ?? '' : '');
     this.text('robot', board.status?.robot ?? '–');
     for (const [what, can] of Object.entries(wishes(board))) {
@@ -159,7 +159,7 @@ export class BoardView extends Elements {
   latency(stages) {
     const total = Object.values(stages).reduce((sum, ms) => sum + ms, 0);
     const end = scaleEnd(total);
-    this.text('total', total > 0 ? `${Math.round(total)} ms from light to thrust` : 'no picture yet');
+    this.text('total', total > 0 ? `${Math.round(total)} ms light to command` : 'no picture yet');
     this.text('scale', `${Math.round(end)} ms`);
     Object.entries(stages).forEach(([name, ms], i) => {
       const part = this.row('stack', name, 'i', () => []);
@@ -175,12 +175,15 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  control({ realtime, control, server }) {
+  control({ realtime, control, server, takes, told_mm_s: speed, told_deg_s: rate }) {
     this.text('realtime', realtime || '–');
     this.figure('control', 'p50', number(control.p50_ms, 2), 'ms');
     this.figure('control', 'p99', number(control.p99_ms, 2), 'ms');
     this.figure('control', 'p99.9', number(control.p999_ms, 2), 'ms');
     this.figure('control', 'Missed', number(control.missed), '');
     this.figure('control', 'Server pause', number(server.stall_ms, 0), 'ms');
+    if (takes !== 'twist') return;
+    this.figure('control', 'Told to move', number(speed, 0), 'mm/s');
+    this.figure('control', 'Told to turn', number(rate, 1), '°/s');
   }
 }

@@ -4,7 +4,7 @@
 /** @import {ShownMode} from './session_types.js' */
 
 /** @type {Record<ShownMode, [string, string]>} */
-export const MODE_WORDS = {
+const MODE_WORDS = {
   DISARMED: ['DISARMED', 'Thrusters are off'],
   ARMED: ['ARMED', 'Ready to move'],
   TRACK: ['TRACK', 'The robot follows you'],
@@ -16,6 +16,30 @@ export const MODE_WORDS = {
   NO_LINK: ['NO LINK', 'Connecting…'],
   NO_WORD: ['NO WORD', 'The server is silent'],
 };
+
+/** Of a robot that follows a velocity by itself: its drives stay on. @type {Partial<Record<ShownMode, string>>} */
+const TWIST_MEANINGS = { DISARMED: 'Told to stand still', RAMP: 'It comes to rest', STOPPED: 'Told to stand still' };
+
+/**
+ * What a mode is called, and what it means for the robot that there is.
+ * @param {ShownMode} mode
+ * @param {Status | null} status
+ * @returns {[string, string]}
+ */
+export function modeWords(mode, status) {
+  const [name, meaning] = MODE_WORDS[mode];
+  return [name, (status?.takes === 'twist' && TWIST_MEANINGS[mode]) || meaning];
+}
+
+/**
+ * What comes when a gap lasts too long.
+ * @param {number | null} seconds
+ * @param {Status | null} status
+ */
+export function rampWords(seconds, status) {
+  if (seconds === null) return '';
+  return `${status?.takes === 'twist' ? 'Disarms' : 'Thrust fades'} in ${seconds} s`;
+}
 
 /** On whose side a silence was. @type {Record<string, string>} */
 export const SIDES = { phone: 'phone', robot: 'robot', server: 'computer' };

@@ -306,7 +306,7 @@ export function shownMode(state) {
 }
 
 /**
- * What is left until the thrust fades, if it counts down.
+ * What is left until RAMP, if it counts down.
  * @param {State} state
  * @returns {{ seconds: number, share: number } | null} Whole seconds, and the share of what there was.
  */

@@ -5,7 +5,7 @@
 /** @import {Calibrate} from '../wire/protocol_types.js' */
 /** @import {PathWish} from '../video/video_paths.js' */
 
-import { MODE_WORDS, gapWords } from './mode_words.js';
+import { gapWords, modeWords, rampWords } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
 import { leadWords } from './leading_choice.js';
@@ -134,7 +134,7 @@ export class View {
    */
   operating(state, advice) {
     const mode = shownMode(state);
-    const [name, meaning] = MODE_WORDS[mode];
+    const [name, meaning] = modeWords(mode, state.status);
     this.data('status', 'mode', mode);
     this.text('mode', name);
     this.text('meaning', meaning);
@@ -168,7 +168,7 @@ export class View {
     this.list('warnings', state.standby ? [] : known, MOST_WARNINGS);
   }
 
-  /** @param {{ seconds: number, share: number } | null} left Until the thrust fades. */
+  /** @param {{ seconds: number, share: number } | null} left Until RAMP. */
   countdown(left) {
     this.show('left', left !== null);
     if (left === null) return;
@@ -207,7 +207,8 @@ export class View {
       this.text('hold-hint', '');
       return;
     }
-    const { look, title, hint } = holdWords(state.held, mode, goesOn(state), untilRamp(state)?.seconds ?? null);
+    const ramps = rampWords(untilRamp(state)?.seconds ?? null, state.status);
+    const { look, title, hint } = holdWords(state.held, mode, goesOn(state), ramps);
     this.data('hold', 'look', look);
     this.find('hold').setAttribute('aria-pressed', String(state.held));
     this.text('hold-title', title);
@@ -294,19 +295,18 @@ function ownReason(state, mode) {
  * @param {boolean} held
  * @param {ShownMode} mode
  * @param {boolean} goesOn It follows again without another press.
- * @param {number | null} seconds Until the thrust fades.
+ * @param {string} ramps When RAMP comes, in words.
  * @returns {{ look: 'idle' | 'ready' | 'moving' | 'waiting' | 'again', title: string, hint: string }}
  */
-export function holdWords(held, mode, goesOn = false, seconds = null) {
-  const fades = seconds === null ? '' : `Thrust fades in ${seconds} s`;
+export function holdWords(held, mode, goesOn = false, ramps = '') {
   if (held && mode === 'TRACK') return { look: 'moving', title: 'Moving', hint: 'Let go to keep still' };
   if (mode === 'COAST') return held ? { look: 'waiting', title: 'Keep holding', hint: 'It goes on by itself' }
-    : { look: 'ready', title: 'Hold to move', hint: fades };
+    : { look: 'ready', title: 'Hold to move', hint: ramps };
   if (held && mode === 'HOLD' && goesOn) return { look: 'waiting', title: 'Keep holding', hint: 'It follows in a moment' };
-  if (held && mode === 'HOLD') return { look: 'again', title: 'Let go and press again', hint: fades };
-  if (held && mode === 'RAMP') return { look: 'waiting', title: 'Let go', hint: 'Thrust fades; arm again after it' };
+  if (held && mode === 'HOLD') return { look: 'again', title: 'Let go and press again', hint: ramps };
+  if (held && mode === 'RAMP') return { look: 'waiting', title: 'Let go', hint: 'Arm again after it' };
   if (held) return { look: 'waiting', title: 'Held', hint: 'The robot does not follow yet' };
-  if (mode === 'ARMED' || mode === 'HOLD') return { look: 'ready', title: 'Hold to move', hint: fades };
+  if (mode === 'ARMED' || mode === 'HOLD') return { look: 'ready', title: 'Hold to move', hint: ramps };
   if (mode === 'TRACK') return { look: 'ready', title: 'Hold to move', hint: 'Released' };
   const hint = mode === 'DISARMED' ? 'Arm first' : '';
   return { look: 'idle', title: 'Hold to move', hint };

@@ -7,6 +7,7 @@ import { Problem } from '../../src/wire/problems.js';
 import { endWords } from '../../src/wire/stop.js';
 import { FREE_MS, standbyWords } from '../../src/ui/standby.js';
 import { cardOf, mayGive } from '../../src/ui/handover_card.js';
+import { modeWords, rampWords } from '../../src/ui/mode_words.js';
 import { holdWords } from '../../src/ui/view.js';
 import { statusOf } from '../fakes.js';
 
@@ -221,7 +222,8 @@ test('who holds is told truly whether to wait or to press again', () => {
   /** @param {...Event} more */
   const words = (...more) => {
     const { state } = after(...UP, status({ mode: 'TRACK' }), { type: 'press' }, ...more);
-    return holdWords(state.held, shownMode(state), goesOn(state), untilRamp(state)?.seconds ?? null);
+    const ramps = rampWords(untilRamp(state)?.seconds ?? null, state.status);
+    return holdWords(state.held, shownMode(state), goesOn(state), ramps);
   };
   const coast = words(status({ mode: 'COAST', resumes: true, until_ramp_ms: 840 }));
   assert.deepEqual([coast.title, coast.hint], ['Keep holding', 'It goes on by itself']);
@@ -234,6 +236,18 @@ test('who holds is told truly whether to wait or to press again', () => {
   const latched = words(status({ mode: 'HOLD', resumes: true, until_ramp_ms: 900 }));
   assert.equal(latched.hint, 'It follows in a moment');
   assert.equal(words(status({ mode: 'RAMP' })).title, 'Let go');
+});
+
+test('of a robot without thrusters nothing is said of thrust', () => {
+  const [thrusts, twist] = [statusOf(), statusOf({ takes: 'twist' })];
+  assert.deepEqual(modeWords('STOPPED', thrusts), ['STOPPED', 'Thrust is off']);
+  assert.deepEqual(modeWords('STOPPED', twist), ['STOPPED', 'Told to stand still']);
+  /** @type {import('../../src/ui/session_types.js').ShownMode[]} */
+  const modes = ['DISARMED', 'ARMED', 'TRACK', 'COAST', 'HOLD', 'RAMP', 'STOPPED', 'LOST', 'NO_LINK', 'NO_WORD'];
+  for (const mode of modes) assert.doesNotMatch(modeWords(mode, twist).join(' '), /thrust/i);
+  assert.deepEqual(modeWords('TRACK', twist), modeWords('TRACK', null));
+  assert.deepEqual([rampWords(2, thrusts), rampWords(2, twist)], ['Thrust fades in 2 s', 'Disarms in 2 s']);
+  assert.equal(rampWords(null, twist), '');
 });
 
 test('the ring empties from the most that was left, through COAST and HOLD, and is full again the next time', () => {
