@@ -47,7 +47,7 @@ TABLES: Final = {
     ),
     "episodes": ("end_s", "episode", "task", "keep"),
 }
-"""Columns beside `t_s` and `utc`; states end with a `thrust_…_n` for each thruster."""
+"""Columns beside `t_s` and `utc`; states end with what the robot was told, as `command_names`."""
 FILES = {ROBOT_KEY: "robot.toml", CAMERA_KEY: "camera.yaml"}
 
 
@@ -65,7 +65,8 @@ def write(decoded: DecodedRecording, episodes: Sequence[Episode], folder: Path) 
         for name, columns in TABLES.items():
             file = stack.enter_context((folder / f"{name}.csv").open("w", newline=""))
             tables[name] = csv.writer(file, lineterminator="\n")
-            tables[name].writerow(("t_s", "utc", *columns, *_thrusters(name, decoded)))
+            told = decoded.command_names if name == "states" else ()
+            tables[name].writerow(("t_s", "utc", *columns, *told))
 
         def add(name: str, t: float, cells: Sequence[object]) -> None:
             tables[name].writerow((f"{t:.6f}", decoded.utc(t), *map(_cell, cells)))
@@ -80,11 +81,6 @@ def write(decoded: DecodedRecording, episodes: Sequence[Episode], folder: Path) 
         if text := decoded.recording.metadata.get(key):
             (folder / name).write_text(text)
     return ", ".join(f"{count} {name}" for name, count in counts.items())
-
-
-def _thrusters(table: str, decoded: DecodedRecording) -> list[str]:
-    count = decoded.robot.robot.A.shape[1] if table == "states" else 0
-    return [f"thrust_{k}_n" for k in range(count)]
 
 
 def _row(item: Item) -> tuple[str, float, Sequence[object]]:
@@ -120,7 +116,7 @@ def _state(state: RecordedState) -> Sequence[object]:
         *(state.reference_R_wxyz or nothing4),
         *(state.error_m, state.error_rad, state.time_offset, state.time_offset_sigma),
         state.saturated,
-        *state.thrusts,
+        *state.command,
     )
 
 

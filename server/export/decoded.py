@@ -7,7 +7,7 @@ the estimator know of the stamp's delay.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -22,6 +22,7 @@ from pipeline.camera.lens import Camera
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Triple
 from pipeline.signals import BodyImu, Mode, PhoneImu
+from server.control.ipc import BodyRow
 from server.control.ipc_estimate import EstimateFields
 from server.phone.image_format import ImageFormat
 from server.phone.ingest import ARRIVAL_S, phone_imu
@@ -42,6 +43,11 @@ from server.replay.setting import recorded_camera, recorded_robot
 
 Quaternion = tuple[float, float, float, float]
 """w, x, y, z."""
+TWIST_NAMES = (
+    *("told_vx_m_s", "told_vy_m_s", "told_vz_m_s"),
+    *("told_wx_rad_s", "told_wy_rad_s", "told_wz_rad_s"),
+)
+"""Of a twist told, velocity and angular rate in the body's axes."""
 ALARMING = (Mode.COAST, Mode.RAMP, Mode.STOPPED)
 UNTOLD_OFFSET_S = RelativeConfig().initial_offset
 """Standard deviation of a stamp's delay before the estimator has found it."""
@@ -103,13 +109,19 @@ class RecordedState(msgspec.Struct, frozen=True):
     time_offset: float | None = None
     thrusts: list[float] = []
     saturated: bool = False
-    body_samples: list[tuple[float, float, float, float, float, float, float]] = []
+    twist_in_b: tuple[float, float, float, float, float, float] | None = None
+    body_samples: list[BodyRow] = []
     estimate: EstimateFields | None = None
 
     @property
     def mode_name(self) -> str:
         """As pages show it."""
         return Mode(self.mode).name if self.mode in Mode.__members__.values() else str(self.mode)
+
+    @property
+    def command(self) -> Sequence[float]:
+        """Thrusts [N], or v and ω in b [m/s, rad/s]; as `DecodedRecording.command_names` has it."""
+        return self.thrusts if self.twist_in_b is None else self.twist_in_b
 
     @property
     def time_offset_sigma(self) -> float | None:
@@ -138,6 +150,14 @@ class DecodedRecording:
     def unix_ns(self, t: float) -> int:
         """Calendar's time at `t` [ns since 1970]; with 0 as 1970 if the record doesn't know it."""
         return max(0, round(1e9 * t) + (self.zero_ns or 0))
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Of each number of a state's command, with its unit."""
+        robot = self.robot.robot
+        if robot.twist is not None:
+            return TWIST_NAMES
+        return tuple(f"thrust_{k}_n" for k in range(robot.A.shape[1]))
 
     def utc(self, t: float) -> str:
         """The same for people, ISO 8601; empty if the record doesn't know the day."""

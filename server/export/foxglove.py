@@ -203,7 +203,7 @@ class _Film:
                 pose_covariance=covariance(state).ravel().tolist(),
             )
             self._put("/robot/odometry", t, odometry)
-        u = state.u_bf_in_c
+        u, told = state.u_bf_in_c, state.twist_in_b
         self._put(
             "/robot/state",
             t,
@@ -231,6 +231,8 @@ class _Film:
                 error_rad=state.error_rad,
                 thrusts_n=state.thrusts,
                 saturated=state.saturated,
+                velocity_in_body_m_s=_vector(told[:3]) if told is not None else None,
+                angular_velocity_in_body_rad_s=_vector(told[3:]) if told is not None else None,
             ),
         )
 

@@ -4,7 +4,7 @@
 |---|---|
 | observation.images.phone | the picture |
 | observation.state | body in the phone's axes, its velocity, the phone's attitude, of that moment |
-| action | thrusts [N] that control told the robot at its first tick from then on |
+| action | what control told the robot at its first tick from then on: thrusts, or a twist |
 | capture_time_s, capture_sigma_s | when it was taken, since 1970, and how well that is known |
 | acting_time_s | when that tick was |
 
@@ -85,7 +85,7 @@ class _Shot:
     sigma_s: float
     state: Array
     t_acted: float
-    thrusts: Array
+    command: Array
 
 
 class _Ticks:
@@ -101,7 +101,7 @@ class _Ticks:
             signs = np.sign(np.einsum("ij,ij->i", q[1:], q[:-1]))
             q[1:] *= np.cumprod(np.where(signs < 0.0, -1.0, 1.0))[:, None]
         self._t_acted = np.array([state.t for state in states])
-        self._thrusts = [np.array(state.thrusts) for state in states]
+        self._commands = [np.array(state.command) for state in states]
 
     def state(self, t: float) -> Array | None:
         """(14,) at `t` [s], between two ticks; None: nobody knew."""
@@ -116,11 +116,11 @@ class _Ticks:
         return state
 
     def action(self, t: float) -> tuple[float, Array] | None:
-        """When [s], and thrusts [N], of the first tick from `t` [s] on; None: there was none."""
+        """When [s], and what was told, at the first tick from `t` [s] on; None: there was none."""
         k = int(np.searchsorted(self._t_acted, t))
         if k == len(self._t_acted) or self._t_acted[k] - t > GAP_S:
             return None
-        return float(self._t_acted[k]), self._thrusts[k]
+        return float(self._t_acted[k]), self._commands[k]
 
 
 def _row(state: RecordedState) -> list[float] | None:
@@ -169,10 +169,9 @@ class _Dataset:
         self._episodes = [episodes[k] for k in sorted({shot.episode for shot in shots})]
         """Those that have rows."""
         self._tasks = list(dict.fromkeys(one.task or UNNAMED for one in self._episodes))
-        thrusters = tuple(f"thrust_{k}_n" for k in range(len(shots[0].thrusts)))
         self._features = {
             "observation.state": Feature("float32", STATE),
-            "action": Feature("float32", thrusters),
+            "action": Feature("float32", decoded.command_names),
             "capture_time_s": Feature("float64", ()),
             "capture_sigma_s": Feature("float64", ()),
             "acting_time_s": Feature("float64", ()),
@@ -189,7 +188,7 @@ class _Dataset:
         tasks = [self._tasks.index(one.task or UNNAMED) for one in self._episodes]
         return {
             "observation.state": np.array([shot.state for shot in shots]),
-            "action": np.array([shot.thrusts for shot in shots]),
+            "action": np.array([shot.command for shot in shots]),
             "capture_time_s": np.array([1e-9 * unix(shot.t) for shot in shots]),
             "capture_sigma_s": np.array([shot.sigma_s for shot in shots]),
             "acting_time_s": np.array([1e-9 * unix(shot.t_acted) for shot in shots]),

@@ -11,6 +11,7 @@
 | /robot/pose | geometry_msgs/PoseWithCovarianceStamped: base_link in phone | tick |
 | /robot/velocity | geometry_msgs/Vector3Stamped: in space, in the axes of phone | tick |
 | /robot/thrusters | sensor_msgs/JointState: effort [N] | tick |
+| /robot/twist | geometry_msgs/TwistStamped: told, of a robot that takes one | tick |
 | /robot/mode | std_msgs/String | its change |
 | /rosout | rcl_interfaces/Log | event |
 | /episodes | std_msgs/String: JSON with begin_s, end_s (since 1970), task, keep | press |
@@ -252,11 +253,24 @@ class _Bag:
             velocity, kind = self._vector(state.u_bf_in_c), "geometry_msgs/msg/Vector3Stamped"
             header = self._header(t, PHONE)
             self._put("/robot/velocity", t, kind, header=header, vector=velocity)
+        self._command(state)
+
+    def _command(self, state: RecordedState) -> None:
+        header = self._header(state.t, BODY)
+        if (told := state.twist_in_b) is not None:
+            twist = self._make(
+                "geometry_msgs/msg/Twist",
+                linear=self._vector(told[:3]),
+                angular=self._vector(told[3:]),
+            )
+            kind = "geometry_msgs/msg/TwistStamped"
+            self._put("/robot/twist", state.t, kind, header=header, twist=twist)
+            return
         self._put(
             "/robot/thrusters",
-            t,
+            state.t,
             "sensor_msgs/msg/JointState",
-            header=self._header(t, BODY),
+            header=header,
             name=[f"thruster_{k}" for k in range(len(state.thrusts))],
             position=np.zeros(0),
             velocity=np.zeros(0),

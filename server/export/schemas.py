@@ -45,7 +45,8 @@ OWN: Final = {
     ),
     "Command": (
         "Timestamp timestamp, string mode, Pose reference_in_virtual, double error_m,"
-        "double error_rad, repeated double thrusts_n, bool saturated"
+        "double error_rad, repeated double thrusts_n, bool saturated,"
+        "Vector3 velocity_in_body_m_s, Vector3 angular_velocity_in_body_rad_s"
     ),
     "Touch": "Timestamp timestamp, bool held, bool visible, uint32 press",
 }

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from hardware.camera_file import CAMERAS, CameraFileError
-from hardware.robot_file import RobotFile, RobotFileError, load_robot
+from hardware.robot_file import COMMANDS, RobotFile, RobotFileError, load_robot
 from pipeline.camera.lens import Camera
+from pipeline.frames import Array
 from pipeline.signals import BodyImu
 from server.phone.image_format import ImageFormat
 from server.protocol.wire import WireError, decode
@@ -33,7 +34,7 @@ def recorded_robot(recording: Recording) -> RobotFile:
         with tempfile.TemporaryDirectory() as name:
             path = Path(name) / "robot.toml"
             path.write_text(text)
-            return load_robot(path)
+            return load_robot(path, takes=COMMANDS)
     except RobotFileError as error:
         raise _unusable(recording, error) from error
 
@@ -69,7 +70,7 @@ def first_shape(recording: Recording) -> ImageFormat:
 
 
 def body_samples(recording: Recording) -> list[BodyImu]:
-    """The robot's motion samples out of the recorded statuses, in the order of time.
+    """The robot's samples out of the recorded statuses, in the order of time.
 
     Raises:
         RecordingError: a status can't be read.
@@ -77,13 +78,19 @@ def body_samples(recording: Recording) -> list[BodyImu]:
     samples: list[BodyImu] = []
     for entry in recording.entries(STATUS):
         try:
-            rows = np.array(json.loads(entry.data)["body_samples"], dtype=np.float64)
-            rows = rows.reshape(-1, 7)
+            status = json.loads(entry.data)
+            rows = _body_rows(status["body_samples"])
+            twists = {row[0]: row[1:] for row in _body_rows(status.get("body_twists", []))}
         except (ValueError, LookupError, TypeError) as error:
             what = f"holds a status that can't be read: {error}"
             raise RecordingError(recording.path, what, "record anew") from error
-        samples += [BodyImu(float(row[0]), row[1:4], row[4:7]) for row in rows]
+        samples += [BodyImu(float(r[0]), r[1:4], r[4:7], twists.get(r[0])) for r in rows]
     return sorted(samples, key=lambda sample: sample.t)
+
+
+def _body_rows(listed: object) -> Array:
+    """(n, 7): a time [s] and two vectors in b."""
+    return np.array(listed, dtype=np.float64).reshape(-1, 7)
 
 
 def _unusable(recording: Recording, error: ValueError) -> RecordingError:

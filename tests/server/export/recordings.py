@@ -1,21 +1,31 @@
 """Recordings to export: the virtual phone's on a known day, and small ones of other codecs."""
 
+import json
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from hardware.codec import Encoder
+from hardware.robot_file import ROBOTS
 from server.protocol.wire import encode
 from server.protocol.wire_records import Codec, Motion, Picture, Record, Touch
 from server.recording.reader import read
-from server.recording.writer import UNIX_ZERO_KEY, Recorder, finish_file, start_file
+from server.recording.writer import (
+    ROBOT_KEY,
+    STATUS,
+    UNIX_ZERO_KEY,
+    Recorder,
+    finish_file,
+    start_file,
+)
 
 DATA = Path(__file__).parents[2] / "data"
 FLIGHT, CHROMIUM = DATA / "virtual_phone.mcap", DATA / "chromium.mcap"
 ZERO_NS = 1_790_000_000_123_456_789
 """2026-09-21."""
 SIZE = 320, 240
+TWIST_IN_B = (0.03, 0.0, -0.04, 0.0, 0.0, 0.5)
 
 
 def on_a_known_day(folder, source=FLIGHT, change=lambda entry: entry.data, **metadata):
@@ -30,6 +40,21 @@ def on_a_known_day(folder, source=FLIGHT, change=lambda entry: entry.data, **met
             writer.add_message(channels[entry.topic], ns, change(entry), ns)
         finish_file(writer, file)
     return path
+
+
+def told_a_twist(folder):
+    """The same flight, as if its robot took a twist: it is told this one, and measures it."""
+
+    def change(entry):
+        if entry.topic != STATUS:
+            return entry.data
+        status = json.loads(entry.data)
+        measured = [[t, *TWIST_IN_B] for t, *_ in status["body_samples"]]
+        status |= {"thrusts": [], "twist_in_b": TWIST_IN_B, "body_twists": measured}
+        return json.dumps(status).encode()
+
+    twister = (ROBOTS / "twister.toml").read_text()
+    return on_a_known_day(folder, change=change, **{ROBOT_KEY: twister})
 
 
 def spot(k):

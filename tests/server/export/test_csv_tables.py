@@ -6,7 +6,14 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from server.export.command import main
-from tests.server.export.recordings import FLIGHT, ZERO_NS, film, on_a_known_day
+from tests.server.export.recordings import (
+    FLIGHT,
+    TWIST_IN_B,
+    ZERO_NS,
+    film,
+    on_a_known_day,
+    told_a_twist,
+)
 
 ZERO = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=ZERO_NS // 1000)
 
@@ -51,6 +58,15 @@ def test_numbers_are_bare_and_what_nobody_knew_is_empty(flight):
     ]
     assert float(last["thrust_0_n"]) != 0.0
     assert float(flight["phone_imu"][0]["az_m_s2"]) == pytest.approx(9.8, abs=1.0)
+
+
+def test_of_a_robot_that_takes_a_twist_the_states_end_with_what_it_was_told(tmp_path):
+    states = tables(told_a_twist(tmp_path), tmp_path / "out")["states"]
+    assert list(states[0])[-6:] == [
+        "told_vx_m_s", "told_vy_m_s", "told_vz_m_s",
+        "told_wx_rad_s", "told_wy_rad_s", "told_wz_rad_s",
+    ]  # fmt: skip
+    assert tuple(float(cell) for cell in list(states[-1].values())[-6:]) == TWIST_IN_B
 
 
 def test_without_a_day_the_calendar_is_empty(tmp_path):

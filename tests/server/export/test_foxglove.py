@@ -11,10 +11,12 @@ from server.export.command import main
 from tests.server.export.recordings import (
     CHROMIUM,
     FLIGHT,
+    TWIST_IN_B,
     ZERO_NS,
     film,
     on_a_known_day,
     spot_at,
+    told_a_twist,
 )
 
 
@@ -111,6 +113,16 @@ def test_the_robots_leds_are_where_its_poses_say(flight):
         seen = np.argwhere(lumas[k] > 150)[:, ::-1]
         errors += [np.linalg.norm(seen - pixel, axis=1).min() for pixel in pixels[:, 0]]
     assert np.median(errors) < 3.0
+
+
+def test_a_command_has_thrusts_or_a_twist(flight, tmp_path):
+    thrusts = flight.topics["/robot/command"][-1]
+    assert len(thrusts.thrusts_n) == 8
+    assert not thrusts.HasField("velocity_in_body_m_s")
+    twist = Export(told_a_twist(tmp_path), tmp_path).topics["/robot/command"][-1]
+    assert len(twist.thrusts_n) == 0
+    told = (*vector(twist.velocity_in_body_m_s), *vector(twist.angular_velocity_in_body_rad_s))
+    assert told == TWIST_IN_B
 
 
 def vector(v):

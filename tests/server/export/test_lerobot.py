@@ -17,7 +17,14 @@ from pipeline.frames import R_co, R_from_wxyz
 from server.export.command import main
 from server.protocol.wire import decode, encode
 from server.protocol.wire_records import Touch
-from tests.server.export.recordings import FLIGHT, ZERO_NS, film, on_a_known_day
+from tests.server.export.recordings import (
+    FLIGHT,
+    TWIST_IN_B,
+    ZERO_NS,
+    film,
+    on_a_known_day,
+    told_a_twist,
+)
 
 RELEASED_S, DISCARDED = (3.0, 4.2), 1
 """The finger leaves for 50 ms at each of these times."""
@@ -160,6 +167,17 @@ def test_features_are_described_and_their_statistics_are_theirs(flight):
     assert np.shape(colours["mean"]) == (3, 1, 1)
     mean = np.mean([picture.mean() for picture in flight.pictures]) / 255.0
     assert np.mean(colours["mean"]) == pytest.approx(mean, abs=0.02)
+
+
+@pytest.mark.slow
+def test_of_a_robot_that_takes_a_twist_that_is_the_action(tmp_path):
+    words = ["--to", "lerobot", "--out", str(tmp_path)]
+    assert main([str(told_a_twist(tmp_path)), *words]) == 0
+    dataset = Dataset(tmp_path / "virtual_phone.lerobot")
+    assert dataset.info["features"]["action"]["names"][0] == "told_vx_m_s"
+    assert {tuple(row["action"]) for row in dataset.rows} == {
+        tuple(np.float32(TWIST_IN_B).tolist())
+    }
 
 
 def test_a_recording_without_an_episode_is_named(tmp_path, capsys):

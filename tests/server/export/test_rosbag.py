@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from server.export.command import main
-from tests.server.export.recordings import ZERO_NS, film, on_a_known_day
+from tests.server.export.recordings import TWIST_IN_B, ZERO_NS, film, on_a_known_day, told_a_twist
 
 
 def bag(source, folder, *arguments):
@@ -99,6 +99,16 @@ def test_camera_modes_log_thrusts_and_episode_are_there(flight):
     assert episode["begin_s"] == pytest.approx(1e-9 * t)
     assert 1.0 < episode["end_s"] - episode["begin_s"] < 5.0
     assert "ames" in flight[1]["robot_file"]
+
+
+def test_a_twist_told_is_a_twist_in_the_bodys_axes(tmp_path):
+    topics, _ = bag(told_a_twist(tmp_path), tmp_path)
+    assert "/robot/thrusters" not in topics
+    assert len(topics["/robot/twist"]) == 275
+    for t, told in topics["/robot/twist"]:
+        assert (t, told.header.frame_id) == (stamp_ns(told.header.stamp), "base_link")
+        v, omega = told.twist.linear, told.twist.angular
+        assert (v.x, v.y, v.z, omega.x, omega.y, omega.z) == TWIST_IN_B
 
 
 def test_what_is_no_h264_becomes_a_compressed_image_and_plain_mcap_reads_the_bag(tmp_path):

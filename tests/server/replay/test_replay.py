@@ -21,7 +21,9 @@ from server.replay import command
 from server.replay.command import Replay, play
 from server.replay.dates import timed
 from server.replay.offline import Offline, run_offline
+from server.replay.setting import body_samples, recorded_robot
 from server.replay.table import COLUMNS
+from tests.server.export.recordings import TWIST_IN_B, told_a_twist
 from tests.server.page_server import WELCOME, PageServer, status
 
 FLIGHT = Path(__file__).parents[2] / "data" / "virtual_phone.mcap"
@@ -134,6 +136,16 @@ def test_offline_estimates_are_those_of_the_flight(flight, offline_rows):
     assert len(errors) > 30
     assert np.median(errors) < 0.003
     assert np.max(errors) < 0.02
+
+
+def test_a_robot_that_takes_a_twist_is_replayed_with_what_it_measured(flight, tmp_path):
+    recording = read(told_a_twist(tmp_path))
+    assert recorded_robot(recording).robot.twist is not None
+    samples = body_samples(recording)
+    assert len(samples) == len(body_samples(flight))
+    assert {tuple(sample.twist_m_bf_in_b) for sample in samples} == {TWIST_IN_B}
+    assert body_samples(flight)[0].twist_m_bf_in_b is None
+    assert next(Offline(recording).rows())["found"] == "1"
 
 
 class Unanswered(Recording):
