@@ -18,7 +18,7 @@ import msgspec
 from hardware.follower import FollowerError
 from hardware.link.link_key import KEY_VARIABLE, LinkKeyError, new_key
 from hardware.link.registry import link_kind
-from hardware.robot_file import RobotFileError, load_robot
+from hardware.robot_file import COMMANDS, RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
 from server.common.child import PROMPT_NICENESS, Child, die_with, watched
@@ -141,9 +141,9 @@ def children_of(
         LinkKeyError: a real robot without a key.
         FollowerError: nobody here knows the kind of its link.
     """
-    robot_file = load_robot(settings.robot)
+    robot_file = load_robot(settings.robot, takes=COMMANDS)
     name = robot_file.robot.name
-    if settings.gains not in robot_file.gains:
+    if robot_file.robot.twist is None and settings.gains not in robot_file.gains:
         raise RobotFileError(settings.robot, "gains", f"one of {', '.join(robot_file.gains)}")
     link = robot_file.link
     host, port = settings.robot_host or link.host, settings.robot_port or link.port

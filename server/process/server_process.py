@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hardware.camera_file import CAMERAS
-from hardware.robot_file import ROBOTS, load_robot
+from hardware.robot_file import COMMANDS, ROBOTS, load_robot
 from pipeline.vision.visual_front_end import warm_up
 from server.calibration.camera_yaml import PROFILES
 from server.common.runtime import (
@@ -148,7 +148,7 @@ def _manager(
     folder = private_directory(private_directory(settings.state) / "recordings")
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
-    robot = load_robot(settings.robot).robot
+    robot = load_robot(settings.robot, takes=COMMANDS).robot
     profiles = private_directory(settings.state / PROFILES)
     cameras = [*settings.cameras, profiles, CAMERAS]
     screen = Screen(given.truth_port, robot.leds_in_b) if given.truth_port else None
@@ -158,7 +158,7 @@ def _manager(
 
 
 def _dashboard(settings: Settings, manager: SessionManager, view: Path) -> Dashboard:
-    robot_file = load_robot(settings.robot)
+    robot_file = load_robot(settings.robot, takes=COMMANDS)
     dashboard = Dashboard(robot_file.robot, robot_file.plant, robot_file.start, view)
     dashboard.start(lambda: (manager.status, manager.last_thumbnail))
     return dashboard

@@ -15,7 +15,7 @@ import numpy as np
 from hardware.camera_file import find_camera
 from hardware.codec import Encoder
 from hardware.follower import FollowerError
-from hardware.robot_file import RobotFile, load_robot
+from hardware.robot_file import COMMANDS, RobotFile, load_robot
 from hardware.sim.camera_faults import CameraFault
 from hardware.sim.hand import HANDS, REST_S, make_hand
 from hardware.sim.phone import PhoneOptions, VirtualPhone
@@ -177,7 +177,7 @@ def _client_of(arguments: argparse.Namespace) -> MakeClient:
 async def _play(arguments: argparse.Namespace) -> LivePhone:
     access = access_of(arguments)
     port = access.truth_port if arguments.truth_port is None else arguments.truth_port
-    robot_file = load_robot(arguments.robot or access.robot)
+    robot_file = load_robot(arguments.robot or access.robot, takes=COMMANDS)
     script = make_script(arguments, robot_file, port)
     live = LivePhone(access, script, port, robot_file.robot.axes, _client_of(arguments))
     for number in (signal.SIGINT, signal.SIGTERM):
