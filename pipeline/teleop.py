@@ -309,8 +309,8 @@ class Teleop:
             or self._acting.fault,
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
-            or self._astray(known)
-            or self._blocked(leashed),
+            or self._astray(known),
+            block=self._blocked(leashed),
             is_settled=self._is_settled(known, ages),
             refusals=(*inputs.refusals, *map(MEND.format, self._acting.weak_thrusters)),
             requests=inputs.requests,

@@ -6,9 +6,9 @@
 | STOPPED | DISARMED | reset, with the button free |
 | DISARMED | ARMED | arm, and nothing speaks against it |
 | ARMED | TRACK | a press, all good for the recovery time |
-| ARMED | DISARMED | disarm, fault, doubt, silence longer than a gap, idle for too long |
-| TRACK | COAST | no news from phone or robot, or control stood still |
-| TRACK | HOLD | the finger has left, another press, the camera or the estimate is lost |
+| ARMED | DISARMED | disarm, fault, camera lost, silence or doubt longer than a gap, or idle |
+| TRACK | COAST | no news from phone or robot, control stood still, or the estimate is in doubt |
+| TRACK | HOLD | the finger has left, another press, the camera has lost the robot, a touch |
 | COAST | TRACK | all fresh for a moment, the place settled, and the same press still held |
 | COAST | HOLD | the finger has left, another press, or too long for a gap and a picture |
 | HOLD | TRACK | another press, all good for the recovery time |
@@ -72,7 +72,9 @@ class FailsafeInputs:
     fault: str = ""
     """Not healthy: why. Ends a flight."""
     doubt: str = ""
-    """Not sure enough to track: why. Holds a flight."""
+    """Not sure enough to track: why. As short as a gap it is borne, longer it holds a flight."""
+    block: str = ""
+    """In the way: what. Holds a flight at once."""
     refusals: tuple[str, ...] = ()
     """What else speaks against arming."""
     requests: Requests = NO_REQUESTS
@@ -164,11 +166,16 @@ def silence(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
     return ""
 
 
-def uncertainty(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
-    """Why the robot's place is not sure enough to track; empty if it is."""
-    if inputs.pose_ms > limits.pose_hold:
+def hindrance(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
+    """Why a flight holds at once: it must not go on by itself; empty if it may."""
+    if inputs.pose_ms > limits.pose_hold:  # longer than any gap
         return "The camera has lost the robot."
-    return inputs.doubt
+    return inputs.block
+
+
+def uncertainty(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
+    """Why the robot can't be led on from where it seems to be; empty if it can."""
+    return hindrance(inputs, limits) or inputs.doubt
 
 
 def staleness(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
@@ -294,7 +301,8 @@ def _ramp(now: Failsafe, limits: FailsafeTimers) -> Failsafe:
 
 def _armed(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:
     lost = silence(inputs, limits) if _is_lost(inputs, limits.gap) else ""
-    wrong = inputs.fault or lost or uncertainty(inputs, limits)
+    doubt = inputs.doubt if now.bad_ms > limits.gap else ""
+    wrong = inputs.fault or lost or hindrance(inputs, limits) or doubt
     if wrong:
         return _enter(now, Mode.DISARMED, wrong)
     if inputs.requests.disarm:
@@ -352,11 +360,11 @@ def _track(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Fai
     let_go = _let_go(now, inputs)
     if let_go is not None:
         return let_go
-    gap = silence(inputs, limits)
-    if gap:
-        return _enter(now, Mode.COAST, gap)
-    unsure = uncertainty(inputs, limits)
-    return _enter(now, Mode.HOLD, unsure) if unsure else now
+    gap, hindered = silence(inputs, limits), hindrance(inputs, limits)
+    if hindered and not gap:
+        return _enter(now, Mode.HOLD, hindered)
+    gap = gap or inputs.doubt
+    return _enter(now, Mode.COAST, gap) if gap else now
 
 
 def _coast(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Failsafe:

@@ -192,7 +192,7 @@ HAZARDS: Final = (
         "22",
         "The robot's motion sensors lie",
         "pictures against them",
-        "HOLD when the estimate doubts itself; a lie that it bears is flown with",
+        "COAST when the estimate doubts itself, then HOLD; a lie that it bears is flown with",
     ),
     Hazard(
         "23",

@@ -75,7 +75,13 @@ def test_arming_is_refused_with_every_reason_in_words() -> None:
         ({"pose_ms": 2_500}, 5, Mode.TRACK),
         ({"pose_ms": 2_501}, 5, Mode.HOLD),
         ({"pose_ms": 4_000}, 5, Mode.HOLD),
-        ({"doubt": "unsure"}, 5, Mode.HOLD),
+        ({"doubt": "unsure"}, 5, Mode.COAST),
+        ({"doubt": "unsure"}, 1_200, Mode.COAST),
+        ({"doubt": "unsure"}, 1_220, Mode.HOLD),
+        ({"doubt": "unsure", "held": False}, 5, Mode.HOLD),
+        ({"block": "a wall"}, 5, Mode.HOLD),
+        ({"block": "a wall", "operator_ms": 151}, 5, Mode.COAST),
+        ({"doubt": "unsure", "pose_ms": 2_501}, 5, Mode.HOLD),
         ({"fault": "spins"}, 5, Mode.RAMP),
         ({"requests": DISARM}, 5, Mode.RAMP),
         ({"requests": STOP}, 5, Mode.STOPPED),
@@ -110,6 +116,17 @@ def test_after_a_gap_it_follows_again_by_itself_once_all_was_fresh_for_a_moment(
     assert failsafe.ceiling(state, LIMITS) == 1.0
     assert run(state, HELD, LIMITS.fresh - 5).mode == Mode.COAST
     assert run(state, HELD, LIMITS.fresh).mode == Mode.TRACK
+
+
+def test_a_doubt_as_short_as_a_gap_is_borne_like_one_and_a_longer_one_holds_in_its_words() -> None:
+    """One second of pictures with stamps off ended flights: nobody pressed anew in time."""
+    state = run(tracking(), replace(HELD, doubt="unsure"), 1_000)
+    assert (state.mode, state.reason) == (Mode.COAST, "unsure")
+    assert run(state, HELD, LIMITS.fresh - 5).mode == Mode.COAST
+    assert run(state, HELD, LIMITS.fresh).mode == Mode.TRACK
+    state = run(state, replace(HELD, doubt="unsure"), 500)
+    assert (state.mode, state.reason) == (Mode.HOLD, "unsure")
+    assert run(state, HELD, 1_000).mode == Mode.HOLD
 
 
 @pytest.mark.parametrize("change", [{"held": False}, {"press": 2}])
@@ -180,7 +197,17 @@ def test_a_press_that_comes_too_early_counts_when_the_recovery_time_has_passed(
 def test_what_is_armed_bears_a_gap_but_nothing_longer() -> None:
     assert run(armed(), replace(GOOD, operator_ms=1_000), 500).mode == Mode.ARMED
     assert run(armed(), replace(GOOD, operator_ms=1_001), 5).mode == Mode.DISARMED
-    assert run(armed(), replace(GOOD, doubt="unsure"), 5).mode == Mode.DISARMED
+    doubtful = replace(GOOD, doubt="unsure")
+    assert run(armed(), doubtful, 1_000).mode == Mode.ARMED
+    assert run(armed(), doubtful, 1_005).mode == Mode.DISARMED
+    assert run(armed(), replace(GOOD, pose_ms=2_501), 5).mode == Mode.DISARMED
+
+
+def test_a_press_in_a_doubt_counts_when_that_is_over() -> None:
+    pressed = run(armed(), replace(HELD, doubt="unsure"), 500)
+    assert pressed.mode == Mode.ARMED
+    assert run(pressed, HELD, LIMITS.recover_short - 5).mode == Mode.ARMED
+    assert run(pressed, HELD, LIMITS.recover_short).mode == Mode.TRACK
 
 
 def test_what_is_armed_is_disarmed_by_request_or_when_idle_for_as_long_as_is_allowed() -> None:

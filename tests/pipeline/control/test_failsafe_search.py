@@ -26,8 +26,8 @@ from pipeline.control.failsafe import (
 )
 from pipeline.signals import Mode, Requests
 
-Said = tuple[str, str, str, tuple[str, ...]]
-"""Gap, fault, doubt, refusals."""
+Said = tuple[str, str, str, str, tuple[str, ...]]
+"""Gap, fault, doubt, block, refusals."""
 D = 10
 """Step [ms]."""
 LIMITS = FailsafeTimers(
@@ -74,9 +74,13 @@ def inputs() -> list[FailsafeInputs]:
     ages += [(0, p, 0, 0) for p in (D + 1, 2 * D, 2 * D + 1, 3 * D, 3 * D + 1)]
     ages += [(0, 0, i, 0) for i in (D + 1, 3 * D, 3 * D + 1)]
     ages += [(0, 0, 0, r) for r in (D + 1, 3 * D)]
-    fine: Said = ("", "", "", ())
-    complaints: list[Said] = [("stood still", "", "", ()), ("", "spins", "", ())]
-    complaints += [("", "", "unsure", ()), ("", "", "", ("no",))]
+    fine: Said = ("", "", "", "", ())
+    complaints: list[Said] = [("stood still", "", "", "", ()), ("", "spins", "", "", ())]
+    complaints += [
+        ("", "", "unsure", "", ()),
+        ("", "", "", "a wall", ()),
+        ("", "", "", "", ("no",)),
+    ]
     arm, stop = Requests(arm=True), Requests(stop=True)
     wishes = [arm, Requests(disarm=True), Requests(reset=True), stop]
     wishes += [Requests(arm=True, disarm=True), Requests(stop=True, reset=True)]
@@ -164,7 +168,11 @@ def check(before: Failsafe, told: FailsafeInputs, now: Failsafe, limits: Failsaf
     if before.mode == Mode.STOPPED and now.mode != Mode.STOPPED:
         assert wish.reset
         assert not told.held or gone
-    bad = bool(told.fault or told.doubt) or is_silent(told) or told.pose_ms > limits.pose_hold
+    bad = (
+        bool(told.fault or told.doubt or told.block)
+        or is_silent(told)
+        or told.pose_ms > limits.pose_hold
+    )
     if now.mode == Mode.TRACK:
         assert told.held
         assert not bad
@@ -174,7 +182,9 @@ def check(before: Failsafe, told: FailsafeInputs, now: Failsafe, limits: Failsaf
             assert now.good_ms >= limits.fresh + (0 if told.is_settled else limits.pose_arm)
     if now.mode == Mode.ARMED:
         assert not told.fault
-        assert not told.doubt
+        assert told.pose_ms <= limits.pose_hold
+        assert not told.block
+        assert not told.doubt or now.bad_ms <= limits.gap
         if before.mode == Mode.DISARMED:
             assert wish.arm
             assert not wish.disarm

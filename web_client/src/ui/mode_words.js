@@ -8,7 +8,7 @@ const MODE_WORDS = {
   DISARMED: ['DISARMED', 'Thrusters are off'],
   ARMED: ['ARMED', 'Ready to move'],
   TRACK: ['TRACK', 'The robot follows you'],
-  COAST: ['COAST', 'Waiting for the network…'],
+  COAST: ['COAST', 'Keeping still for a moment'],
   HOLD: ['HOLD', 'The robot keeps still'],
   RAMP: ['RAMP', 'Thrust fades to zero'],
   STOPPED: ['STOPPED', 'Thrust is off'],
