@@ -7,6 +7,8 @@
 const ROLES = { viewer: 'watches', operator: 'may lead', supervisor: 'supervises' };
 /** Between the two taps that shut somebody out [ms]. */
 const SURE_MS = 4000;
+/** A finger that is down for longer was lifted elsewhere [ms]. */
+const PRESS_MS = 2000;
 
 export class PeopleCard {
   /**
@@ -27,6 +29,15 @@ export class PeopleCard {
     this.shown = '';
     /** Whom the next tap would shut out, and until when. */
     this.doomed = { id: '', untilMs: -Infinity };
+    /** A finger is on the card, until then at most. */
+    this.pressedUntilMs = -Infinity;
+    for (const list of [this.asking, this.people]) {
+      list.addEventListener('pointerdown', () => { this.pressedUntilMs = now() + PRESS_MS; });
+    }
+    // the click comes after it, before anything else does
+    for (const lifted of ['pointerup', 'pointercancel']) {
+      document.addEventListener(lifted, () => { this.pressedUntilMs = -Infinity; });
+    }
   }
 
   /**
@@ -34,6 +45,8 @@ export class PeopleCard {
    * @param {boolean} may Whether this page may decide.
    */
   render(people, may) {
+    // who is pressed while he is replaced is not clicked: what is new is shown once the finger is off
+    if (this.now() < this.pressedUntilMs) return;
     const doomed = this.now() < this.doomed.untilMs ? this.doomed.id : '';
     const rows = people.map(({ since_s: sinceS, ...rest }) => ({ ...rest, minutes: Math.floor(sinceS / 60) }));
     const shown = JSON.stringify([rows, may, doomed]);

@@ -48,7 +48,10 @@ let deeds;
 let now = 0;
 /** @type {PeopleCard} */
 let card;
+/** @type {Record<string, () => void>} */
+const lifted = {};
 const document = /** @type {any} */ ({
+  addEventListener: (/** @type {string} */ type, /** @type {() => void} */ listener) => { lifted[type] = listener; },
   getElementById: (/** @type {string} */ id) => (elements[id] ??= new Element(id)),
   createElement: (/** @type {string} */ tag) => new Element(tag),
 });
@@ -81,6 +84,24 @@ test('who asks to lead is shown with the letters to compare, and let in with exa
   press('asking', 'Deny');
   assert.deepEqual(deeds, ['confirm a1 KBWX', 'deny a1 KBWX']);
   assert.equal(elements['people']?.children.length, 0);
+});
+
+test('what is under a finger is not replaced until it is lifted, or has been down for too long to be', () => {
+  card.render([person({ connected: false })], true);
+  const [button] = elements['people']?.buttons ?? [];
+  const isThere = () => elements['people']?.buttons.includes(/** @type {Element} */ (button));
+  elements['people']?.listeners['pointerdown']?.();
+  card.render([person({ leads: true })], true);
+  assert.ok(isThere(), 'a click on it would be lost');
+  lifted['pointerup']?.();
+  card.render([person({ leads: true })], true);
+  assert.ok(!isThere());
+  elements['people']?.listeners['pointerdown']?.();
+  card.render([person({ connected: false })], true);
+  assert.match(elements['people']?.words ?? '', /leads/);
+  now = 2000;
+  card.render([person({ connected: false })], true);
+  assert.match(elements['people']?.words ?? '', /away/);
 });
 
 test('nobody is shut out by one tap', () => {
