@@ -173,6 +173,7 @@ def test_a_second_one_in_the_same_place_is_refused_and_the_first_goes_on(server:
     assert status(server)["mode"] == "DISARMED"
 
 
+@pytest.mark.flight
 @pytest.mark.parametrize(
     ("path", "words"), [("webrtc", "WebRTC, H264"), ("websocket", "websocket")]
 )
@@ -182,8 +183,8 @@ def test_a_virtual_phone_leads_the_robot_by_either_path(
     with flight(server, "--path", path) as phone:
         until(lambda: str(status(server)["video_path"]).startswith(words), 5.0, words)
         time.sleep(4.0)
-        said = status(server)
-        streams = said["streams"]
+        assert phone.poll() is None, "it left, and said why"
+        streams = status(server)["streams"]
         assert isinstance(streams, dict)
         assert streams["phone_imu"]["rate_hz"] > 30.0
         assert streams["pose"]["rate_hz"] > 5.0
