@@ -62,6 +62,8 @@ class PairingSettings(BaseModel):
     )
 
 
+GAINS = "phone"
+"""The gain set that is taken unless another is named."""
 TURN_LIVES_S = 12 * 3600.0
 """A relay asks for the credential again while it relays: longer than anybody flies."""
 TURN_URL = r"^(turns?:[^\s?]{1,200}(\?transport=(udp|tcp))?)?$"
@@ -161,7 +163,7 @@ class Settings(BaseSettings):
     )
 
     robot: str = Field("ames", description="name or path of a robot file")
-    gains: str = Field("phone", description="a gain set of the robot file")
+    gains: str = Field(GAINS, description="a gain set of the robot file")
     estimator: EstimatorName = Field(
         "relative", description="of the robot's pose; paper and none are for comparison"
     )

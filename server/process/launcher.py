@@ -23,7 +23,7 @@ from server.common import clock
 from server.common.access import PhoneClientError
 from server.common.child import PROMPT_NICENESS, Child, die_with, watched
 from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
-from server.common.settings import Settings
+from server.common.settings import GAINS, Settings
 from server.process.invite import invite, print_code
 from server.process.robot_key import epoch_file, key_of
 
@@ -143,7 +143,10 @@ def children_of(
     """
     robot_file = load_robot(settings.robot, takes=COMMANDS)
     name = robot_file.robot.name
-    if robot_file.robot.twist is None and settings.gains not in robot_file.gains:
+    if robot_file.robot.twist is not None:
+        if settings.gains != GAINS:
+            raise RobotFileError(settings.robot, "gains", "none: it takes a twist, by [twist]")
+    elif settings.gains not in robot_file.gains:
         raise RobotFileError(settings.robot, "gains", f"one of {', '.join(robot_file.gains)}")
     link = robot_file.link
     host, port = settings.robot_host or link.host, settings.robot_port or link.port

@@ -104,6 +104,8 @@ def test_no_such_robot_or_gains_are_refused_by_name(tmp_path, sockets):
         children_of(load(["--robot", "nobody"]), [], tmp_path, sockets)
     with pytest.raises(RobotFileError, match="phone"):
         children_of(load(["--gains", "none"]), [], tmp_path, sockets)
+    with pytest.raises(RobotFileError, match="none: it takes a twist"):
+        children_of(load(["--robot", "twister", "--gains", "table_2"]), [], tmp_path, sockets)
 
 
 def fake(name, log):
