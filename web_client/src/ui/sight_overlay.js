@@ -75,7 +75,9 @@ export function shapesOf({ width, height, found, robot, goal, toward, distance_m
   if (toward !== null) shapes.push(arrowOf(toward, width, height));
   else if (distance !== null && robotAt.length > 0) {
     const x = robotAt.reduce((sum, [at]) => sum + at, 0) / robotAt.length;
-    const y = Math.max(...robotAt.map(([, at]) => at)) + 4 * size;
+    const ys = robotAt.map(([, at]) => at);
+    const above = Math.min(...ys) - 2 * size; // below are the page's buttons
+    const y = above > 3 * size ? above : Math.max(...ys) + 4 * size;
     shapes.push({ name: 'text', class: 'distance', x, y, 'font-size': 3 * size, text: `${distance.toFixed(1)} m` });
   }
   return shapes;

@@ -22,7 +22,12 @@ test('lights, robot, goal and distance lie where they are in the picture', () =>
   const label = shapes.at(-1);
   assert.equal(label?.text, '2.4 m');
   assert.equal(label?.['x'], 480);
-  assert.ok(Number(label?.['y']) > 540);
+  assert.ok(Number(label?.['y']) < 360 - 20, 'below are the buttons');
+});
+
+test('the distance stands below a robot that has no room above it', () => {
+  const label = shapesOf({ ...SIGHT, robot: [0.25, 0.1, 0.5, 0.3] }).at(-1);
+  assert.ok(Number(label?.['y']) > 0.3 * 720 + 60);
 });
 
 test('nothing known is nothing drawn', () => {
