@@ -9,6 +9,7 @@ ever is frozen, which means never visited again, and the old generation is colle
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import gc
 from collections.abc import Callable, Iterator
 
@@ -56,7 +57,10 @@ class Garbage:
         self.longest_s, self.count = 0.0, 0
 
     def settle(self) -> None:
-        """Collect everything and freeze what is left; takes long, so do it while nobody flies."""
+        """Collect everything, give free memory back and freeze what is left.
+
+        Takes long, so do it while nobody flies.
+        """
         if self._former is None:
             self._former = gc.get_threshold()
             gc.set_threshold(*self._former[:2], NEVER)
@@ -64,6 +68,7 @@ class Garbage:
         gc.unfreeze()
         gc.collect()
         gc.freeze()
+        _give_back()
         self._frozen_lately, self._most_old = 0, MOST_NEW
 
     def tick(self, idle: bool) -> None:
@@ -93,6 +98,16 @@ class Garbage:
         elif self.counts:
             self.longest_s = max(self.longest_s, self._cpu() - self._began)
             self.count += info["generation"] == 2
+
+
+def _give_back() -> None:
+    """Let the system have the memory that is free, where the C library can (malloc_trim(3), glibc).
+
+    By itself it keeps all that lies below what is still in use: decoders, ciphers and codecs of one
+    flight after another leave holes among what lives on, and the process would grow by them.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _old() -> int:

@@ -8,6 +8,8 @@ import subprocess
 import sys
 import weakref
 
+import pytest
+
 from server.diagnostics.garbage import IDLE_TICKS, Garbage, held
 
 FLIGHT = """
@@ -133,3 +135,28 @@ def test_a_program_that_measures_holds_all_collections() -> None:
         assert gc.get_freeze_count() > 0
     assert gc.isenabled()
     assert gc.get_freeze_count() == 0
+
+
+GIVEN_BACK = """
+import time
+from pathlib import Path
+from server.diagnostics.garbage import Garbage
+
+def resident_mb():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
+
+garbage = Garbage(time.thread_time)
+garbage.settle()
+flight = [b"x" * 100_000 for _ in range(1_000)]  # by malloc, each below what it maps
+lasting = flight[-1]
+del flight
+full = resident_mb()
+garbage.settle()
+print(full - resident_mb())
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="glibc's")
+def test_free_memory_below_what_lives_on_goes_back_to_the_system() -> None:
+    done = subprocess.run([sys.executable, "-c", GIVEN_BACK], check=True, capture_output=True)
+    assert float(done.stdout) > 80.0
