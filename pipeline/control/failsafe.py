@@ -10,7 +10,7 @@
 | TRACK | COAST | no news from phone or robot, control stood still, or the estimate is in doubt |
 | TRACK | HOLD | the finger has left, another press, the camera has lost the robot, a touch |
 | COAST | TRACK | all fresh for a moment, the place settled, and the same press still held |
-| COAST | HOLD | the finger has left, another press, or too long for a gap and a picture |
+| COAST | HOLD | the finger has left, another press, camera lost, too long for a gap and a picture |
 | HOLD | TRACK | another press, all good for the recovery time |
 | TRACK, COAST, HOLD | RAMP | fault, disarm, no word or no picture for too long |
 | HOLD | RAMP | held for as long as is allowed |
@@ -377,8 +377,10 @@ def _coast(now: Failsafe, inputs: FailsafeInputs, limits: FailsafeTimers) -> Fai
     if now.good_ms >= limits.fresh + due_ms:
         return _enter(now, Mode.TRACK, "Following the phone.")
     # all may speak again while the place is unsure, until a picture taken since has come
-    waits_ms = 0 if silence(inputs, limits) else limits.pose_arm
-    if now.mode_ms >= limits.coast + waits_ms:
+    is_silent = bool(silence(inputs, limits))
+    waits_ms = 0 if is_silent else limits.pose_arm
+    hindered = not is_silent and hindrance(inputs, limits)
+    if hindered or now.mode_ms >= limits.coast + waits_ms:
         reason = staleness(inputs, limits) or now.reason
         return replace(_enter(now, Mode.HOLD, reason), mode_ms=now.mode_ms)
     return now

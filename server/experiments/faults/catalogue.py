@@ -10,6 +10,7 @@ from hardware.sim.camera_faults import CameraFault
 from server.experiments.faults import happenings as h
 from server.experiments.faults import tampering
 from server.experiments.faults.fault import Event, Fault, Happening
+from server.phone.ingest import UNHEARD_S
 
 COAST_S: Final = 0.17
 RAMP_S: Final = 1.1
@@ -36,6 +37,13 @@ def gone(name: str, hazard: str, happens: Happening) -> Fault:
     """No news of the phone for good: it coasts, ramps, and never follows again."""
     by: Times = {"COAST": COAST_S, "RAMP": RAMP_S, "zero": RAMP_S + RAMPED_S}
     return Fault(name, hazard, happens, "zero", by, RAMP_S + RAMPED_S + AFTER_S, ("TRACK",))
+
+
+def unheard(name: str, hazard: str, happens: Happening) -> Fault:
+    """The phone is heard well and hears nothing: that is believed by its own clock for a second."""
+    ramp_s = RAMP_S + UNHEARD_S
+    by: Times = {"COAST": COAST_S + UNHEARD_S, "RAMP": ramp_s, "zero": ramp_s + RAMPED_S}
+    return Fault(name, hazard, happens, "zero", by, ramp_s + RAMPED_S + AFTER_S, ("TRACK",))
 
 
 def borne(name: str, hazard: str, happens: Happening, by: Times | None = None) -> Fault:
@@ -87,7 +95,7 @@ PHONE: Final = (
     borne("phone is gone for 0.8 s", "18", h.dark(0.8), {"COAST": COAST_S, "TRACK": 0.8 + BACK_S}),
     gone("phone is gone for 3 s", "18", h.dark(3.0)),
     gone("page frozen for 3 s, then all at once", "17", h.selective(h.FROM_PHONE, 3.0, holds=True)),
-    gone("page hears nothing", "18", h.selective(("ping",), FOR_EVER)),
+    unheard("page hears nothing", "18", h.selective(("ping",), FOR_EVER)),
     gone("signs of life stop", "17", h.selective(h.SIGNS, FOR_EVER)),
     gone("one touch again and again", "20", h.tampered_with_memory(tampering.stale_touch)),
     gone("motion sensors silent", "9", h.selective(("motion",), FOR_EVER)),

@@ -129,6 +129,13 @@ def test_a_doubt_as_short_as_a_gap_is_borne_like_one_and_a_longer_one_holds_in_i
     assert run(state, HELD, 1_000).mode == Mode.HOLD
 
 
+def test_a_doubt_that_a_lost_camera_leads_to_holds_when_the_camera_is_lost() -> None:
+    state = run(tracking(), replace(HELD, doubt="unsure", pose_ms=2_000), 500)
+    assert state.mode == Mode.COAST
+    state = run(state, replace(HELD, doubt="unsure", pose_ms=2_501), 5)
+    assert (state.mode, state.reason) == (Mode.HOLD, "The camera has lost the robot.")
+
+
 @pytest.mark.parametrize("change", [{"held": False}, {"press": 2}])
 def test_a_finger_that_left_during_a_gap_holds_with_the_first_word(
     change: dict[str, object],
