@@ -56,7 +56,7 @@ def build(manager: StatusSource) -> Status:
     refusals = [f"{silence}."] if control is None or silence else control.refusals
     detection = phone.detection if phone is not None else None
     found = detection is not None and detection.pose is not None
-    told_mm_s, told_deg_s = _told(None if silence else control)
+    told_mm_s, told_deg_s = _commanded(None if silence else control)
     return Status(
         mode=mode,
         reason=f"{silence}; the robot stops by its own watchdog."
@@ -126,7 +126,7 @@ def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | No
     return None if value is None or not isfinite(value) else round(scale * value, digits)
 
 
-def _told(control: ControlStatus | None) -> tuple[float | None, float | None]:
+def _commanded(control: ControlStatus | None) -> tuple[float | None, float | None]:
     """How fast a robot that takes a twist is told to move [mm/s] and to turn [°/s]."""
     if control is None or control.twist_in_b is None:
         return None, None

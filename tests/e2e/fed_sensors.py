@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -12,21 +10,12 @@ import numpy as np
 from websockets.exceptions import ConnectionClosed
 
 from tests.e2e.chromium_channel import SENSORS, Channel, feeling, reading
-from tests.e2e.witness import NOTED_S, Hole
+from tests.e2e.witness import NOTED_S, Hole, be_first
 
 PERIOD_S = 0.01
 """Chromium reads its sensors 60 times a second."""
 PRIORITY = 40
 """Below those of robot and control; it needs next to nothing."""
-
-
-def _be_first() -> None:
-    """Let the calling thread wait for nobody else's work, where that is permitted.
-
-    A phone's own hardware does not wait for the server's processor.
-    """
-    with contextlib.suppress(PermissionError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 
 
 class FedSensors:
@@ -52,7 +41,7 @@ class FedSensors:
         self._thread.start()
 
     def _feed(self) -> None:
-        _be_first()
+        be_first(PRIORITY)  # a phone's own hardware does not wait for the server's processor
         due = time.monotonic()
         while not self._ends.wait(due - time.monotonic()):
             now = time.monotonic()

@@ -155,6 +155,12 @@ def _say(holes: Iterable[Hole]) -> None:
         print(f"{hole.where} {hole.t:.4f} {hole.s:.4f}", flush=True)
 
 
+def be_first(priority: int) -> None:
+    """Run the calling thread before all that has no such priority, where that is permitted."""
+    with contextlib.suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+
+
 def _ticks() -> Iterator[tuple[float, float]]:
     before = time.monotonic()
     while True:
@@ -169,8 +175,7 @@ def main() -> None:
     gc.disable()
     where = sys.argv[1]
     if where == "machine":
-        with contextlib.suppress(PermissionError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        be_first(PRIORITY)
         threading.Thread(target=_look, daemon=True).start()
     threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
     print("ticking", flush=True)

@@ -33,17 +33,14 @@ FOR_EVER: Final = h.FOR_EVER_S
 Times = Mapping[Event, float]
 
 
-def gone(name: str, hazard: str, happens: Happening) -> Fault:
-    """No news of the phone for good: it coasts, ramps, and never follows again."""
-    by: Times = {"COAST": COAST_S, "RAMP": RAMP_S, "zero": RAMP_S + RAMPED_S}
-    return Fault(name, hazard, happens, "zero", by, RAMP_S + RAMPED_S + AFTER_S, ("TRACK",))
+def gone(name: str, hazard: str, happens: Happening, believed_s: float = 0.0) -> Fault:
+    """No news of the phone for good: it coasts, ramps, and never follows again.
 
-
-def unheard(name: str, hazard: str, happens: Happening) -> Fault:
-    """The phone is heard well and hears nothing: that is believed by its own clock for a second."""
-    ramp_s = RAMP_S + UNHEARD_S
-    by: Times = {"COAST": COAST_S + UNHEARD_S, "RAMP": ramp_s, "zero": ramp_s + RAMPED_S}
-    return Fault(name, hazard, happens, "zero", by, ramp_s + RAMPED_S + AFTER_S, ("TRACK",))
+    For `believed_s` it is believed by its own clock, while it is heard and hears nothing.
+    """
+    ramp_s = believed_s + RAMP_S
+    by: Times = {"COAST": believed_s + COAST_S, "RAMP": ramp_s, "zero": ramp_s + RAMPED_S}
+    return ends(name, hazard, happens, by)
 
 
 def borne(name: str, hazard: str, happens: Happening, by: Times | None = None) -> Fault:
@@ -95,7 +92,7 @@ PHONE: Final = (
     borne("phone is gone for 0.8 s", "18", h.dark(0.8), {"COAST": COAST_S, "TRACK": 0.8 + BACK_S}),
     gone("phone is gone for 3 s", "18", h.dark(3.0)),
     gone("page frozen for 3 s, then all at once", "17", h.selective(h.FROM_PHONE, 3.0, holds=True)),
-    unheard("page hears nothing", "18", h.selective(("ping",), FOR_EVER)),
+    gone("page hears nothing", "18", h.selective(("ping",), FOR_EVER), UNHEARD_S),
     gone("signs of life stop", "17", h.selective(h.SIGNS, FOR_EVER)),
     gone("one touch again and again", "20", h.tampered_with_memory(tampering.stale_touch)),
     gone("motion sensors silent", "9", h.selective(("motion",), FOR_EVER)),
