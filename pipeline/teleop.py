@@ -173,7 +173,7 @@ class Teleop:
         before = self._failsafe.mode
         self._failsafe = failsafe.step(self._failsafe, judged, dt_ms, self._limits)
         if self._failsafe.mode != before:
-            known, wished = self._change_mode(before, known, leashed)
+            known, wished = self._change_mode(before, known, leashed, bool(judged.doubt))
             leashed = self._leashed(known, wished)
         # last, what was given: feed-forward takes it off the next period's specific force
         share = failsafe.ceiling(self._failsafe, self._limits)
@@ -353,7 +353,7 @@ class Teleop:
         return "It touches something at the end of its reach." if is_held else ""
 
     def _change_mode(
-        self, before: Mode, known: Situation | None, leashed: Leashed | None
+        self, before: Mode, known: Situation | None, leashed: Leashed | None, in_doubt: bool
     ) -> tuple[Situation | None, PoseError | None]:
         """Bumpless: tracking starts where the robot is, holding starts from what tracking did."""
         mode = self._failsafe.mode
@@ -372,7 +372,7 @@ class Teleop:
                 self._led_to = self._reference
             self._acting.start(known, before == Mode.ARMED)
             return known, self._error(known)
-        self._acting.change_mode(before, mode, known, leashed)
+        self._acting.change_mode(before, mode, known, None if in_doubt else leashed)
         if mode != Mode.COAST:
             self._reference = self._led_to = None
         return known, None

@@ -89,7 +89,10 @@ class Acting(Protocol):
     def change_mode(
         self, before: Mode, mode: Mode, known: Situation | None, leashed: Leashed | None
     ) -> None:
-        """Go from `before` to a `mode` that is not TRACK, without a jump."""
+        """Go from `before` to a `mode` that is not TRACK, without a jump.
+
+        `leashed`: the error to where it should be; None if nobody knows, or in doubt of it.
+        """
 
     def act(
         self, known: Situation | None, leashed: Leashed | None, now: Moment, share: float, /

@@ -31,7 +31,8 @@ class ThrustActing:
         self._thrusts = np.zeros(robot.A.shape[1])
         self._station = StationKeeping(config.station, config.gains, robot)
         # what stands on the floor brakes and stays by itself
-        self._keeps_station = robot.hangs or robot.weight_to_carry > 0.0
+        self._can_stay = robot.hangs or robot.weight_to_carry > 0.0
+        self._stays, self._hangs = self._can_stay, robot.hangs
         self._place = SuspendedPlace(robot, config.feedforward.thrust_lag_s)
         self._leash = leash_of(robot, config.leash)
         self._force_in_b = self._given_in_b = np.zeros(3)
@@ -84,7 +85,7 @@ class ThrustActing:
 
     def coast_error(self, view: VirtualView) -> PoseError | None:
         """What is missing to the station that it keeps."""
-        return self._station.error(view) if self._keeps_station else None
+        return self._station.error(view) if self._stays else None
 
     def led(self, error: PoseError, view: VirtualView, leading: Leading) -> PoseError:
         """The error to where `leading` has the robot."""
@@ -119,15 +120,18 @@ class ThrustActing:
             R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
             constant_in_f = self._tracking.constant_force_in_f
             self._hold.start(self._force_in_b, R_fb, u_in_f, constant_in_f)
-            if leashed is not None:
-                offset_in_f = known.view.R_fv @ leashed.error.e_p_in_v
-                # what the suspension pulls there; the integral is without the feed-forward's part
-                stays_in_f = self._place.force_to_stay_in_f(offset_in_f)
-                self._station.start(
-                    offset_in_f, stays_in_f if self._place.is_known else constant_in_f
-                )
+            # in doubt where it should be it stays where it is; and integrated acceleration, whose
+            # attitude is in doubt as well, is no place for one that its suspension carries
+            in_doubt, is_known = leashed is None, self._place.is_known
+            self._stays = self._can_stay and not (in_doubt and self._hangs and not is_known)
+            offset_in_f = (
+                np.zeros(3) if leashed is None else known.view.R_fv @ leashed.error.e_p_in_v
+            )
+            # what the suspension pulls there; the integral is without the feed-forward's part
+            stays_in_f = self._place.force_to_stay_in_f(offset_in_f)
+            self._station.start(offset_in_f, stays_in_f if is_known else constant_in_f)
         # after a gap the velocity is the station's, which dead reckoning has kept
-        if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._keeps_station:
+        if before == Mode.COAST and mode in (Mode.HOLD, Mode.RAMP) and self._stays:
             self._hold.start(
                 self._force_in_b,
                 self._hold.R_fb,
@@ -165,7 +169,7 @@ class ThrustActing:
             self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, now.h)
         elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
             wrench_in_b = self._hold.wrench(omega_m_bf_in_b, now.h)
-            if mode == Mode.COAST and self._keeps_station:
+            if mode == Mode.COAST and self._stays:
                 wrench_in_b[:3] = self._station.force_in_b(self._hold.R_fb)
             R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
         else:
