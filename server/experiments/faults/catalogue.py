@@ -83,6 +83,9 @@ def stops(name: str, at: float = 0.0, before: Happening | None = None) -> Fault:
 LOST: Final[Times] = {"COAST": COAST_S, "RAMP": RAMP_S}
 RAMPING: Final[Times] = {"RAMP": RAMP_S}
 BLIND: Final[Times] = {"HOLD": 2.7, "RAMP": BLIND_S, "zero": BLIND_S + RAMPED_S}
+UNTURNED_S: Final = 0.35
+"""A picture that comes again is news until something has turned unevenly: a hand does by then."""
+FROZEN: Final[Times] = {event: by + UNTURNED_S for event, by in BLIND.items()}
 LET_GO: Final[Times] = {"HOLD": 0.06, "RAMP": HELD_S, "zero": HELD_S + RAMPED_S}
 
 PHONE: Final = (
@@ -119,7 +122,7 @@ PICTURES: Final = (
         "pictures frozen",
         "3",
         h.tampered_with_memory(lambda: tampering.pictures(tampering.frozen())),
-        BLIND,
+        FROZEN,
     ),
     borne(
         "pictures shown four times",
