@@ -27,17 +27,24 @@ class Hold:
         self._hangs, self._mass, self._weight = robot.hangs, robot.mass, robot.weight_to_carry
         self._lasting_force_in_f = np.array([0.0, 0.0, robot.weight_to_carry])
         self._fading_force_in_f = np.zeros(3)
-        self._gyro_bias_in_b = np.zeros(3)
+        self._gyro_bias_in_b = self._accelerometer_bias_in_b = np.zeros(3)
         self.R_fb: Array = np.eye(3)
         """Attitude, carried on by the gyroscope."""
         self._R_fb_held = np.eye(3)
 
-    def learn(self, gyro_bias_in_b: Array, h: float) -> None:
-        """While tracking: what the gyroscope is wrong by (3,) [rad/s], smoothed here."""
+    def learn(self, gyro_bias_in_b: Array, accelerometer_bias_in_b: Array, h: float) -> None:
+        """While tracking: what both are wrong by (3,) [rad/s], (3,) [m/s²], smoothed here."""
         share = h / (h + self._config.learn_s)
         self._gyro_bias_in_b = self._gyro_bias_in_b + share * (
             gyro_bias_in_b - self._gyro_bias_in_b
         )
+        self._accelerometer_bias_in_b = self._accelerometer_bias_in_b + share * (
+            accelerometer_bias_in_b - self._accelerometer_bias_in_b
+        )
+
+    def specific_force_in_b(self, a_m_bf_in_b: Array) -> Array:
+        """Specific force (3,) [m/s²] of a sample, by the bias that was learnt while tracking."""
+        return a_m_bf_in_b - self._accelerometer_bias_in_b
 
     def start(
         self, force_in_b: Array, R_fb: Array, v_bf_in_f: Array, learnt_force_in_f: Array

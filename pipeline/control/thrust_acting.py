@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from pipeline.config import TeleopConfig
+from pipeline.control import low_pass
 from pipeline.control.acting import Acted, Moment
 from pipeline.control.actuation import Actuation
 from pipeline.control.hold import Hold
@@ -19,6 +22,9 @@ from pipeline.frames import Array
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Mode, VirtualView
 
+MEAN_S: Final = 0.5
+"""Of the force that a doubt begins with: the estimate was right for most of it."""
+
 
 class ThrustActing:
     """An `Acting` whose last step is the allocation of a wrench."""
@@ -32,10 +38,10 @@ class ThrustActing:
         self._station = StationKeeping(config.station, config.gains, robot)
         # what stands on the floor brakes and stays by itself
         self._can_stay = robot.hangs or robot.weight_to_carry > 0.0
-        self._stays, self._hangs = self._can_stay, robot.hangs
+        self._stays, self._hangs, self._in_doubt = self._can_stay, robot.hangs, False
         self._place = SuspendedPlace(robot, config.feedforward.thrust_lag_s)
         self._leash = leash_of(robot, config.leash)
-        self._force_in_b = self._given_in_b = np.zeros(3)
+        self._force_in_b = self._given_in_b = self._mean_force_in_f = np.zeros(3)
 
     @property
     def weak_thrusters(self) -> tuple[str, ...]:
@@ -53,6 +59,11 @@ class ThrustActing:
     def is_pushed(self) -> bool:
         """Something that neither thrusters nor suspension explain pushes it."""
         return self._place.is_pushed
+
+    @property
+    def _is_astray(self) -> bool:
+        """In doubt and without a place of its own, though it hangs: it can't stay there."""
+        return self._in_doubt and self._hangs and not self._place.is_known
 
     def push(self, wrench_in_b: Array) -> None:
         """From now on the thrusters also give this (6,) [N, N m], and control does not know."""
@@ -75,9 +86,10 @@ class ThrustActing:
         if now.is_deaf:
             self._station.reset()
             self._hold.R_fb = R_fb
-        if now.mode == Mode.COAST:
-            R_fb = self._hold.R_fb
         f_bf_in_b, place, x_before_in_f = known.relative.f_bf_in_b, self._place, self._place.x_in_f
+        if now.mode == Mode.COAST:  # nothing of an estimate that may be in doubt, biases neither
+            R_fb = self._hold.R_fb
+            f_bf_in_b = self._hold.specific_force_in_b(now.body.a_m_bf_in_b)
         place.propagate(f_bf_in_b, R_fb, self._given_in_b, now.h)
         suspended = (place.x_in_f - x_before_in_f, place.v_in_f)
         is_known = place.is_known and not now.is_deaf
@@ -119,11 +131,13 @@ class ThrustActing:
         if before == Mode.TRACK and known is not None:
             R_fb, u_in_f = known.view.R_fv @ known.view.R_vb, known.R_fc @ known.relative.u_bf_in_c
             constant_in_f = self._tracking.constant_force_in_f
-            self._hold.start(self._force_in_b, R_fb, u_in_f, constant_in_f)
             # in doubt where it should be it stays where it is; and integrated acceleration, whose
             # attitude is in doubt as well, is no place for one that its suspension carries
-            in_doubt, is_known = leashed is None, self._place.is_known
-            self._stays = self._can_stay and not (in_doubt and self._hangs and not is_known)
+            self._in_doubt, is_known = leashed is None, self._place.is_known
+            self._stays = self._can_stay and not self._is_astray
+            # what an estimate in doubt has asked for last is nothing to begin with
+            force_in_b = R_fb.T @ self._mean_force_in_f if self._in_doubt else self._force_in_b
+            self._hold.start(force_in_b, R_fb, u_in_f, constant_in_f)
             offset_in_f = (
                 np.zeros(3) if leashed is None else known.view.R_fv @ leashed.error.e_p_in_v
             )
@@ -166,9 +180,12 @@ class ThrustActing:
             wrench_in_b = self._tracking.wrench(  # Eq. (20)
                 known, reference, leashed.error, now.h, shares_in_f
             )
-            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, now.h)
+            felt_in_b = now.body.a_m_bf_in_b - known.relative.f_bf_in_b
+            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, felt_in_b, now.h)
         elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
             wrench_in_b = self._hold.wrench(omega_m_bf_in_b, now.h)
+            # what is no place any more does not become one again: where it went meanwhile is lost
+            self._stays = self._stays and not self._is_astray
             if mode == Mode.COAST and self._stays:
                 wrench_in_b[:3] = self._station.force_in_b(self._hold.R_fb)
             R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
@@ -176,6 +193,10 @@ class ThrustActing:
             return Acted(np.zeros_like(self._thrusts), saturated=False)
         given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
         self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
+        news = low_pass.share(now.h / MEAN_S)
+        self._mean_force_in_f = self._mean_force_in_f + news * (
+            R_fb @ self._force_in_b - self._mean_force_in_f
+        )
         if mode == Mode.TRACK and leashed is not None and known is not None:
             self._tracking.learn(leashed.error, known.view, given.missing_in_b, now.h)
         if not np.isfinite(given.thrusts).all():

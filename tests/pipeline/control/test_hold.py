@@ -97,8 +97,19 @@ def test_a_gyroscopes_bias_learnt_while_tracking_does_not_turn_it() -> None:
         np.random.default_rng(1),
     )
     for _ in range(round(6.0 * CONFIG.learn_s / H)):
-        hold.learn(bias + rng.normal(0.0, 0.01, 3), H)
+        hold.learn(bias + rng.normal(0.0, 0.01, 3), STILL, H)
     hold.start(np.zeros(3), np.eye(3), STILL, STILL)
     for _ in range(600):
         hold.wrench(bias, H)
     assert np.abs(log(hold.R_fb)).max() < 0.1 * 3.0 * 0.01
+
+
+def test_an_accelerometers_bias_is_learnt_while_tracking_and_slowly() -> None:
+    hold, bias = Hold(CONFIG, QUADROTOR), np.array([0.1, -0.2, 0.15])
+    for _ in range(round(6.0 * CONFIG.learn_s / H)):
+        hold.learn(STILL, bias, H)
+    felt = hold.specific_force_in_b(bias)
+    assert np.abs(felt).max() < 0.01
+    for _ in range(round(0.1 / H)):  # an estimate that has begun to lie
+        hold.learn(STILL, bias + 5.0, H)
+    assert np.abs(hold.specific_force_in_b(bias) - felt).max() < 0.3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ from pipeline.control.pid import PoseError, Reference
 from pipeline.control.place import SETTLED_S
 from pipeline.control.thrust_acting import ThrustActing
 from pipeline.control.tracking import Situation
-from pipeline.frames import GRAVITY
+from pipeline.frames import GRAVITY, Array
 from pipeline.signals import BodyImu, Mode, RelativeState, VirtualView
 
 H, STILL, AHEAD = 0.005, np.zeros(3), np.array([1.5, 0.0, 0.0])
@@ -31,8 +33,8 @@ OFF = np.array([0.1, -0.05, 0.02])
 ERROR = Leashed(PoseError(OFF, STILL, STILL, STILL))
 
 
-def moment(mode: Mode) -> Moment:
-    return Moment(mode, Reference(AHEAD, np.eye(3)), PLAIN, BODY, False, H, 0.0)
+def moment(mode: Mode, body: BodyImu = BODY) -> Moment:
+    return Moment(mode, Reference(AHEAD, np.eye(3)), PLAIN, body, False, H, 0.0)
 
 
 def coasting(robot: str, known_for_s: float, leashed: Leashed | None) -> ThrustActing:
@@ -41,12 +43,13 @@ def coasting(robot: str, known_for_s: float, leashed: Leashed | None) -> ThrustA
     for _ in range(round(known_for_s / H)):
         acting.observe(KNOWN, moment(Mode.ARMED))
     acting.start(KNOWN, True)
-    acting.act(KNOWN, ERROR, moment(Mode.TRACK), 1.0)
+    for _ in range(200):
+        acting.act(KNOWN, ERROR, moment(Mode.TRACK), 1.0)
     acting.change_mode(Mode.TRACK, Mode.COAST, KNOWN, leashed)
     return acting
 
 
-def wanted_in_v(acting: ThrustActing) -> np.ndarray:
+def wanted_in_v(acting: ThrustActing) -> Array:
     error = acting.coast_error(KNOWN.view)
     assert error is not None
     return error.e_p_in_v
@@ -73,3 +76,39 @@ def test_one_that_hangs_stays_through_a_gap_though_it_does_not_know_its_place() 
 
 def test_one_that_flies_has_no_place_and_stays_in_doubt_all_the_same() -> None:
     assert wanted_in_v(coasting("quadrotor", 1.0, None)) == pytest.approx(STILL)
+
+
+def test_biases_that_a_doubtful_estimate_takes_for_better_move_nobody_in_a_gap() -> None:
+    relative = replace(KNOWN.relative, f_bf_in_b=np.array([0.0, 0.0, GRAVITY + 5.0]))
+    wanted = []
+    for known in (KNOWN, replace(KNOWN, relative=relative)):
+        acting = coasting("ames", SETTLED_S + 1.0, None)
+        for _ in range(round(1.0 / H)):
+            acting.observe(known, moment(Mode.COAST))
+        wanted.append(wanted_in_v(acting))
+    np.testing.assert_array_equal(*wanted)
+
+
+def test_a_place_that_is_lost_in_doubt_is_lost_until_it_follows_again() -> None:
+    acting = coasting("ames", SETTLED_S + 1.0, None)
+    turned = replace(BODY, a_m_bf_in_b=-BODY.a_m_bf_in_b)
+    for body, seconds in ((turned, 0.2), (BODY, 2.0 * SETTLED_S)):
+        for _ in range(round(seconds / H)):
+            acting.observe(KNOWN, moment(Mode.COAST, body))
+            acting.act(KNOWN, None, moment(Mode.COAST, body), 1.0)
+        assert acting.coast_error(KNOWN.view) is None
+    acting.change_mode(Mode.TRACK, Mode.COAST, KNOWN, ERROR)
+    assert acting.coast_error(KNOWN.view) is not None
+
+
+def test_a_doubt_begins_with_what_was_given_of_late_and_not_with_the_last_lie() -> None:
+    acting = ThrustActing(load_robot("ames").robot, TeleopConfig())
+    acting.start(KNOWN, True)
+    for _ in range(round(2.0 / H)):
+        honest = acting.act(KNOWN, ERROR, moment(Mode.TRACK), 1.0).thrusts
+    lie = Leashed(PoseError(-20.0 * OFF, STILL, STILL, STILL))
+    for _ in range(4):
+        lied = acting.act(KNOWN, lie, moment(Mode.TRACK), 1.0).thrusts
+    acting.change_mode(Mode.TRACK, Mode.COAST, KNOWN, None)
+    doubted = acting.act(KNOWN, None, moment(Mode.COAST), 1.0).thrusts
+    assert np.linalg.norm(doubted - honest) < 0.25 * np.linalg.norm(lied - honest)
