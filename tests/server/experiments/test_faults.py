@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,14 @@ MADE_UP = Fault(
 def test_each_bound_is_missed_by_what_breaks_it(spoilt: dict[str, object]) -> None:
     assert misses(MADE_UP, outcome()) == []
     assert len(misses(MADE_UP, outcome(**spoilt))) == 1
+
+
+def test_a_ramp_in_time_misses_no_hold_and_a_hold_no_ramp() -> None:
+    holds = replace(MADE_UP, by={"HOLD": 2.0, "zero": 4.0})
+    assert misses(holds, outcome()) == []
+    assert len(misses(holds, outcome(first={"RAMP": 2.1, "zero": 3.0}))) == 1
+    ramps = replace(MADE_UP, by={"RAMP": 2.0, "zero": 4.0})
+    assert len(misses(ramps, outcome(first={"HOLD": 1.0, "zero": 3.0}))) == 1
 
 
 def test_who_is_to_fly_on_must_follow_at_the_end() -> None:
