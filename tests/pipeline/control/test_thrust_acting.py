@@ -92,11 +92,12 @@ def test_biases_that_a_doubtful_estimate_takes_for_better_move_nobody_in_a_gap()
 def test_a_place_that_is_lost_in_doubt_is_lost_until_it_follows_again() -> None:
     acting = coasting("ames", SETTLED_S + 1.0, None)
     turned = replace(BODY, a_m_bf_in_b=-BODY.a_m_bf_in_b)
-    for body, seconds in ((turned, 0.2), (BODY, 2.0 * SETTLED_S)):
+    for body, seconds in ((turned, 0.2), (BODY, 6.0 * SETTLED_S)):
         for _ in range(round(seconds / H)):
             acting.observe(KNOWN, moment(Mode.COAST, body))
             acting.act(KNOWN, None, moment(Mode.COAST, body), 1.0)
         assert acting.coast_error(KNOWN.view) is None
+    assert acting._place.is_known  # again, but where it went meanwhile is not
     acting.change_mode(Mode.TRACK, Mode.COAST, KNOWN, ERROR)
     assert acting.coast_error(KNOWN.view) is not None
 
