@@ -18,6 +18,7 @@ from tests.e2e.chromium_phone import ChromiumPhone, browser
 from tests.e2e.flight_log import Flight, FlightLog, to_its_end
 from tests.e2e.played_phone import CAMERA, HD_CAMERA, PlayedPhone
 from tests.e2e.serving import DEVICE, Serving, serving
+from tests.machine import slowness
 
 LANDSCAPE = {
     "viewport": {"width": 915, "height": 412},
@@ -93,7 +94,7 @@ def flight(
         except TimeoutError as error:
             never = str(error)
         status = server.request("GET", "/api/status")
-    return Flight(seconds, distances, status, log.said, phone.holes(began), never, taps)
+    return Flight(seconds, distances, status, log.said, phone.holes(began), never, taps, slowness())
 
 
 def flown(
@@ -102,7 +103,7 @@ def flown(
     seconds: float,
     meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
 ) -> Flight:
-    """A flight that reached its end: the first one, or the machine's absence is proven.
+    """A flight that reached its end: the first one, or the machine's absence or weakness is proven.
 
     Raises:
         AssertionError: it did not, and the machine was there; or it was away too often.

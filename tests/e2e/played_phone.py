@@ -19,6 +19,7 @@ from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd, exp, log
 from tests.e2e.page_scripts import BE_CAMERA, TICKER
 from tests.e2e.witness import Hole, Witness
+from tests.machine import slowness
 
 STEP_S = 0.01
 """The hand is told so often, to the page where that manages."""
@@ -92,6 +93,7 @@ class PlayedPhone(ABC):
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
         self._witness = Witness()
+        self._patience = slowness()
         self._still: list[Hole] = []
         """When what is played stood still, as no phone's hardware does."""
         ReferenceTrajectory.warm_up()
@@ -196,12 +198,12 @@ class PlayedPhone(ABC):
             self.step()
 
     def play_until(self, condition: str, seconds: float) -> None:
-        """Play until a JavaScript expression is true.
+        """Play until a JavaScript expression is true; a slow machine is given longer.
 
         Raises:
             TimeoutError: it never was.
         """
-        end = time.monotonic() + seconds
+        end = time.monotonic() + seconds * self._patience
         while time.monotonic() < end:
             self.step()
             if self.evaluate(condition):

@@ -24,6 +24,7 @@ from tests.e2e.flight_log import Flight, FlightLog, to_its_end
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import ANSWER_S, ZERO_N, mode, status, thrust, until
 from tests.e2e.witness import Witness
+from tests.machine import slowness
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 RECORDING = Path(__file__).parents[1] / "data" / "chromium.mcap"
@@ -147,7 +148,7 @@ def flight(server: Serving, supervisor: Supervisor, witness: Witness) -> Flight:
         supervisor.request("stop")
         until(lambda: thrust(truth) < ZERO_N, DONE_S, "no thrust")
         until(lambda: mode(server) == "STOPPED", DONE_S, "STOPPED")
-    return Flight(MOVED_S, [], said, log.said, witness.holes(began), never)
+    return Flight(MOVED_S, [], said, log.said, witness.holes(began), never, slowness=slowness())
 
 
 def test_a_recorded_browser_moves_the_robot_which_a_supervisor_resets_arms_and_stops(
