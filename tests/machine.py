@@ -4,6 +4,8 @@ A flight in real time, its browser, pictures, server and robot share two process
 the same work in twice the time, pictures come later and the robot follows later: of the code, that
 says nothing. What is measured is CPU time of work that never changes, so that neither who waits for
 a processor nor what the project itself costs counts: code that became slow is not excused by this.
+
+    python -m tests.machine    # how many tests in real time this machine runs beside each other
 """
 
 from __future__ import annotations
@@ -36,3 +38,7 @@ def slowness() -> float:
         _work()
         took.append(time.thread_time() - began)
     return max(1.0, median(took) / REFERENCE_S)
+
+
+if __name__ == "__main__":
+    print(1 if slowness() >= WEAK else 2)
