@@ -94,7 +94,8 @@ kernels pytest real robots pages quiet fast-server fast-others: export PYTHONDON
 
 # First flights, whose phones and robots share the machine with nobody: what runs beside them, and be
 # it only when nobody else wants to, makes a virtual machine's processors wait. Then what else is real,
-# two at a time, one on a weak machine, and what no clock hurries takes the half that those leave, for they wait.
+# two at a time, one on a weak machine, and what no clock hurries takes the half that those leave, for
+# they wait.
 pytest: dev
 	$(BIN)/pytest -m flight $(ARGS)$(MAYBE_NONE); flown=$$?; \
 	$(MAKE) --jobs=2 --keep-going --output-sync real quiet && exit $$flown

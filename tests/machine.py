@@ -1,9 +1,8 @@
 """How slow this machine's processor is, beside that on which real flights' bounds were measured.
 
-A flight in real time, its browser, pictures, server and robot share two processors. Where these do
-the same work in twice the time, pictures come later and the robot follows later: of the code, that
-says nothing. What is measured is CPU time of work that never changes, so that neither who waits for
-a processor nor what the project itself costs counts: code that became slow is not excused by this.
+A flight in real time, its browser, pictures, server and robot share two processors, which suffice
+for less where the same work takes longer. CPU time is measured, of work that never changes: who
+waits for a processor does not count, nor what the project itself costs. No bound follows from it.
 
     python -m tests.machine    # how many tests in real time this machine runs beside each other
 """
@@ -17,10 +16,11 @@ import numpy as np
 
 STEPS = 4_000
 REFERENCE_S = 0.0077
-"""Where `tick` of docs/bench/estimation.md took 68 µs and plain numpy 1122 µs."""
+"""Inferred, not measured there: it took 15-25 ms where the plain numpy of `bench_relative` took
+2.7-3.3 ms of CPU, and that took 1.122 ms where docs/bench/estimation.md was made."""
 TRIES = 9
 WEAK = 2.0
-"""From here on a flight's end says nothing: all that shares two processors would need four."""
+"""From here on two tests in real time starve each other: a page beside a robot did at 2.7."""
 
 
 def _work() -> None:

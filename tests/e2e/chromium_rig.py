@@ -103,7 +103,7 @@ def flown(
     seconds: float,
     meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
 ) -> Flight:
-    """A flight that reached its end: the first one, or the machine's absence or weakness is proven.
+    """A flight that reached its end: the first one, or the machine's absence is proven.
 
     Raises:
         AssertionError: it did not, and the machine was there; or it was away too often.

@@ -19,7 +19,6 @@ from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd, exp, log
 from tests.e2e.page_scripts import BE_CAMERA, TICKER
 from tests.e2e.witness import Hole, Witness
-from tests.machine import slowness
 
 STEP_S = 0.01
 """The hand is told so often, to the page where that manages."""
@@ -93,7 +92,6 @@ class PlayedPhone(ABC):
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
         self._witness = Witness()
-        self._patience = slowness()
         self._still: list[Hole] = []
         """When what is played stood still, as no phone's hardware does."""
         ReferenceTrajectory.warm_up()
@@ -198,12 +196,12 @@ class PlayedPhone(ABC):
             self.step()
 
     def play_until(self, condition: str, seconds: float) -> None:
-        """Play until a JavaScript expression is true; a slow machine is given longer.
+        """Play until a JavaScript expression is true.
 
         Raises:
             TimeoutError: it never was.
         """
-        end = time.monotonic() + seconds * self._patience
+        end = time.monotonic() + seconds
         while time.monotonic() < end:
             self.step()
             if self.evaluate(condition):

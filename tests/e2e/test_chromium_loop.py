@@ -38,16 +38,16 @@ def test_the_robot_follows_by_each_way_does_not_jump_when_it_is_changed_and_stop
             wishes.append((begin, partial(phone.choose, "#path-wish", wish)))
             wishes.append((end - 0.1, partial(look, wish)))
         flight = flown(phone, server, starts[-1], wishes)
-        assert phone.rms_mm(flight.distances, LEARNT_S) <= 40.0 * flight.slowness
+        assert phone.rms_mm(flight.distances, LEARNT_S) <= 40.0
         steady = max(d for t, d in flight.distances if LEARNT_S <= t < STEADY_S)
         for wish, (begin, end) in zip(CHANGES, pairwise(starts), strict=True):
             assert came[wish].startswith(WAYS[wish])
             changed = max(d for t, d in flight.distances if begin <= t < end)
-            assert changed <= 1.5 * steady + 0.03 * flight.slowness, wish
+            assert changed <= 1.5 * steady + 0.03, wish
         streams = flight.status["streams"]
         assert isinstance(streams, dict)
-        assert streams["phone_imu"]["rate_hz"] >= 25.0 / flight.slowness  # 60 on a quiet machine
-        assert streams["video"]["rate_hz"] >= 10.0 / flight.slowness  # 30 on a quiet machine
+        assert streams["phone_imu"]["rate_hz"] >= 25.0  # 60 on a quiet machine
+        assert streams["video"]["rate_hz"] >= 10.0  # 30 on a quiet machine
         phone.page.tap("#stop")
         phone.play_until("document.body.innerText.includes('STOPPED')", 3.0)
         assert not [text for text in refused if "Content Security Policy" in text]
