@@ -231,7 +231,7 @@ async function comeBack() {
     const words = await camera.revive();
     if (words === '') return;
     phone.log(`camera again: ${words}`);
-    if (camera.track !== null) await rtc.pictures.replaceTrack(camera.track);
+    if (camera.track !== null) await paths.filmAnew(camera.track);
   } catch (error) {
     notice(`The camera does not come back: ${problemOf(error).message}`);
   }

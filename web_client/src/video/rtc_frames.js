@@ -154,8 +154,9 @@ export class RtcPictures {
     this.tell({ type: 'attitude', orientation });
   }
 
-  /** @param {MediaStreamTrack} track The camera was opened anew. */
+  /** @param {MediaStreamTrack} track The camera was opened anew: by its clock nothing is known yet. */
   async replaceTrack(track) {
+    this.isFlowing = false;
     this.tell({ type: 'origin', timeOrigin: this.surroundings.performance.timeOrigin });
     await this.sender?.replaceTrack(track);
   }

@@ -1,7 +1,8 @@
 /**
  * Which picture of the camera is this encoded frame? Browsers do not say. The frame bears RTP's time stamp,
  * whose clock began anywhere but runs beside the camera's to a millisecond: how far it is ahead is found by
- * laying the frames' stamps over the captures', as a key over a lock.
+ * laying the frames' stamps over the captures', as a key over a lock. A few frames fit in many places, and a starved
+ * page tells late of its captures: until it has told of enough frames' for certain, no frame has a date.
  */
 
 /** @import {ScreenAngle} from '../wire/protocol.js' */
@@ -21,15 +22,13 @@ const KEPT_CAPTURES = 128;
 const KEPT_FRAMES = 40;
 /** A starved page tells late of its captures: frames that left so long ago have theirs for certain [µs]. */
 const HINDSIGHT_US = 300_000;
-const ENOUGH = 5;
+const ENOUGH = 8;
 /** A capture so long before is not the one that comes out [µs]. */
 const OLD_US = 200_000;
 /** A capture further from where it should be is another picture's, its own was skipped [µs]. */
 const FAR_US = 5000;
 /** Where cameras are too regular to tell, the quicker encoder is believed: a period costs half a ms. */
 const DELAY_COST = 0.015;
-/** Between a capture and its way out of a quick encoder, where nothing is known of captures [µs]. */
-const USUAL_US = 10_000;
 
 export class CaptureMatcher {
   constructor() {
@@ -39,6 +38,7 @@ export class CaptureMatcher {
     this.frames = [];
     /** How far RTP's clock is ahead of the camera's [µs]. @type {number | null} */
     this.aheadUs = null;
+    this.isSure = false;
     /** @type {number | null} */
     this.lastStamp = null;
     this.ticks = 0;
@@ -60,19 +60,18 @@ export class CaptureMatcher {
   }
 
   /**
-   * When an encoded frame was taken, on the page's clock, and how the screen stood.
+   * When an encoded frame was taken, on the page's clock, and how the screen stood; null: not known for certain.
    * @param {number} rtpTimestamp
    * @param {number} nowUs On the page's clock.
-   * @returns {Pick<Capture, 'captureUs' | 'screenAngle'>}
+   * @returns {Pick<Capture, 'captureUs' | 'screenAngle'> | null}
    */
   match(rtpTimestamp, nowUs) {
     const stampUs = this.unwrapped(rtpTimestamp) / RTP_PER_US;
     this.frames.push({ stampUs, outUs: nowUs });
     if (this.frames.length > KEPT_FRAMES) this.frames.shift();
     this.aheadUs = this.ahead(nowUs);
-    const found = this.aheadUs === null
-      ? { captureUs: nowUs - USUAL_US, screenAngle: this.screenAngle }
-      : this.taken(stampUs - this.aheadUs);
+    if (this.aheadUs === null || !this.isSure) return null;
+    const found = this.taken(stampUs - this.aheadUs);
     const captureUs = Math.max(found.captureUs - this.foundLateUs, this.lastUs + 1);
     this.lastUs = captureUs;
     return { captureUs, screenAngle: found.screenAngle };
@@ -93,6 +92,7 @@ export class CaptureMatcher {
    */
   ahead(nowUs) {
     const old = this.frames.filter(({ outUs }) => outUs <= nowUs - HINDSIGHT_US);
+    this.isSure ||= old.length >= ENOUGH;
     const frames = old.length >= ENOUGH ? old : this.frames;
     const last = frames.at(-1);
     if (last === undefined) return null;

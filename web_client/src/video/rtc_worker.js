@@ -1,4 +1,4 @@
-/** Worker between encoder and network: lets each encoded picture carry its record. */
+/** Worker between encoder and network: each encoded picture carries its record, or goes no further. */
 
 /** @import {Quaternion} from '../wire/protocol.js' */
 /** @import {Capture} from './rtc_matcher.js' */
@@ -51,12 +51,17 @@ function shrunkBy({ width, height }) {
   return width === undefined || height === undefined || full.width === 0 ? 0 : quartersOf({ width, height }, full);
 }
 
-/** @param {{ data: ArrayBuffer, timestamp: number, getMetadata(): { rtpTimestamp?: number } }} frame */
+/**
+ * Whether the frame goes on: not while nobody knows when it was taken.
+ * @param {{ data: ArrayBuffer, timestamp: number, getMetadata(): { rtpTimestamp?: number } }} frame
+ */
 function send(frame) {
   const nowUs = 1000 * (performance.timeOrigin - pageOrigin + performance.now());
   const metadata = frame.getMetadata();
   const rtpTimestamp = metadata.rtpTimestamp ?? frame.timestamp;
-  const { captureUs, screenAngle } = matcher.match(rtpTimestamp, nowUs);
+  const found = matcher.match(rtpTimestamp, nowUs);
+  if (found === null) return false;
+  const { captureUs, screenAngle } = found;
   sequence = (sequence + 1) >>> 0;
   /** @type {FromWorker} */
   const told = { bytes: frame.data.byteLength, pair: null };
@@ -66,14 +71,14 @@ function send(frame) {
     told.pair = { rtpTimestamp, captureUs };
   }
   worker.postMessage(told);
+  return true;
 }
 
 /** @param {{ readable: ReadableStream, writable: WritableStream }} streams Of the encoder and of the network. */
 function join({ readable, writable }) {
   const records = new TransformStream({
     transform(frame, controller) {
-      if (frame.data.byteLength > 0) send(frame);
-      controller.enqueue(frame);
+      if (frame.data.byteLength === 0 || send(frame)) controller.enqueue(frame);
     },
   });
   void readable.pipeThrough(records).pipeTo(writable).catch(() => {}); // the connection was closed

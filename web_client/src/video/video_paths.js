@@ -111,6 +111,14 @@ export class VideoPaths {
     else frame.close();
   }
 
+  /** @param {MediaStreamTrack} track The camera was opened anew: pictures go by websocket until its clock is known. */
+  async filmAnew(track) {
+    const { rtc, video } = this.surroundings;
+    video.requestKey();
+    this.fastTries.succeeded(); // as much time as a new one has until its first picture
+    await rtc.pictures.replaceTrack(track);
+  }
+
   /**
    * What the screen shows of it.
    * @param {number} now [ms]

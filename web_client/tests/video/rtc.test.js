@@ -245,6 +245,16 @@ test('pictures flow when the first one has left the encoder', async () => {
   assert.equal(rtc.isFlowing, false);
 });
 
+test('pictures of a camera that was opened anew do not flow before one of its own has left', async () => {
+  await opened();
+  worker.onmessage({ data: { bytes: 9, pair: null } });
+  const anew = /** @type {any} */ ({ kind: 'video' });
+  await rtc.pictures.replaceTrack(anew);
+  assert.deepEqual([rtc.isFlowing, FakeConnection.newest.sender.track, told.at(-1)?.type], [false, anew, 'origin']);
+  worker.onmessage({ data: { bytes: 9, pair: null } });
+  assert.equal(rtc.isFlowing, true);
+});
+
 test('a browser of streams instead of transforms hands them to the worker', async () => {
   rtc.pictures.surroundings.ScriptTransform = undefined;
   rtc.pictures.surroundings.hasStreams = true;

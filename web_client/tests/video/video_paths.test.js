@@ -79,6 +79,20 @@ test('pictures go by websocket until the fast path is open, and then by that alo
   assert.equal(paths.name, 'WebRTC');
 });
 
+test('a camera that was opened anew goes by websocket, with a key, until its clock is known', async () => {
+  paths.begin(WELCOME);
+  await settled();
+  rtc.pictures.replaceTrack = async () => { rtc.isFlowing = false; };
+  time.advance(2 * FIRST_PICTURE_MS);
+  rtc.heardMs = time.ms;
+  log = [];
+  await paths.filmAnew(/** @type {any} */ ({}));
+  paths.offer(frame());
+  assert.deepEqual(log, ['key', 'captured', 'offered']);
+  paths.look(null);
+  assert.equal(rtc.isOpen, true, 'it has as long as a new one until its first picture');
+});
+
 test('a fast path that ends gives way with a key picture, and is tried again later and later', async () => {
   paths.begin(WELCOME);
   await settled();
