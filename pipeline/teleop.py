@@ -18,6 +18,7 @@ from pipeline.control.thrust_acting import ThrustActing
 from pipeline.control.tracking import Situation
 from pipeline.control.twist_acting import TwistActing
 from pipeline.control.virtual_camera import VirtualCamera
+from pipeline.estimation.accelerometer_check import AccelerometerCheck
 from pipeline.estimation.attitude import Attitude
 from pipeline.estimation.estimators import make_estimator
 from pipeline.estimation.frozen_imu import FrozenImu
@@ -118,6 +119,7 @@ class Teleop:
         self._half_field: tuple[float, float] | None = None
         self._t_seen = self._t_phone = -np.inf
         self._body, self._frozen_imu = BodyImu(-np.inf, np.zeros(3), np.zeros(3)), FrozenImu()
+        self._accelerometers = {PhoneImu: AccelerometerCheck(), BodyImu: AccelerometerCheck()}
         self._repeated = RepeatedPicture()
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
@@ -229,11 +231,13 @@ class Teleop:
         for phone in inputs.phone_imu:
             self.attitude.add(phone)
             self._repeated.add_imu(phone)
+            self._accelerometers[PhoneImu].add(phone.t, phone.omega_m_cf_in_c, phone.a_m_cf_in_c)
             self.estimator.add_phone_imu(phone)
             self._t_phone = max(self._t_phone, phone.t)
         for body in inputs.body_imu:
             self.estimator.add_body_imu(body)
             self._repeated.add_imu(body)
+            self._accelerometers[BodyImu].add(body.t, body.omega_m_bf_in_b, body.a_m_bf_in_b)
             self._body = body
             self._frozen_imu.add(body)
         for seen in inputs.seen:
@@ -309,6 +313,7 @@ class Teleop:
             or self._acting.fault,
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
+            or self._jumped()
             or self._astray(known),
             block=self._blocked(leashed),
             is_settled=self._is_settled(known, ages),
@@ -326,6 +331,14 @@ class Teleop:
             if flies and self._frozen_imu.is_frozen
             else ""
         )
+
+    def _jumped(self) -> str:
+        """Whose accelerometer lies, in words; empty if none."""
+        if self._accelerometers[BodyImu].has_jumped:
+            return "The robot's accelerometer jumps: it feels gravity elsewhere than before."
+        if self._accelerometers[PhoneImu].has_jumped:
+            return "The phone falls or is shaken, or its accelerometer jumps."
+        return ""
 
     def _astray(self, known: Situation | None) -> str:
         """Why it must not follow again by itself after a gap; empty if it may."""

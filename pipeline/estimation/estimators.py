@@ -8,6 +8,7 @@ from typing import get_args
 import numpy as np
 
 from pipeline.config import EstimatorName, TeleopConfig
+from pipeline.estimation.accelerometer_check import AccelerometerCheck
 from pipeline.estimation.estimator import Estimator
 from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimation.paper_ekf import PaperEkf
@@ -40,3 +41,6 @@ def warm_up() -> None:
             pose = RelativePose(t, p, np.eye(3), 1e-4 * np.eye(6), 0.0, 4)
             estimator.add_seen(VisionMeasurement(t, rays, pose), t)
         estimator.state(0.05)
+    check = AccelerometerCheck()
+    for t in (0.0, 0.01):
+        check.add(t, still, up)

@@ -86,6 +86,12 @@ BLIND: Final[Times] = {"HOLD": 2.7, "RAMP": BLIND_S, "zero": BLIND_S + RAMPED_S}
 UNTURNED_S: Final = 0.35
 """A picture that comes again is news until something has turned unevenly: a hand does by then."""
 FROZEN: Final[Times] = {event: by + UNTURNED_S for event, by in BLIND.items()}
+JUMPED: Final[Times] = {
+    "COAST": COAST_S,
+    "HOLD": COAST_S + 1.21,
+    "RAMP": HELD_S,
+    "zero": HELD_S + RAMPED_S,
+}
 LET_GO: Final[Times] = {"HOLD": 0.06, "RAMP": HELD_S, "zero": HELD_S + RAMPED_S}
 
 PHONE: Final = (
@@ -110,7 +116,7 @@ PHONE: Final = (
         h.tampered_with_memory(lambda: tampering.motion(tampering.stuck())),
     ),
     open_ended("motion sensors' axes turned", "10", motion(tampering.turned_axes)),
-    open_ended("accelerations turned round", "10", motion(tampering.turned_sign)),
+    ends("accelerations turned round", "10", motion(tampering.turned_sign), JUMPED),
     open_ended("phone's clock an hour ahead", "12", h.clock(3600.0)),
     open_ended("phone's clock back by 10 s", "12", h.clock(-10.0)),
 )
@@ -215,7 +221,7 @@ BODY: Final = (
     open_ended("body's rates are no numbers", "27", h.body_imu("nan")),
     ramps("body's sensors stuck", "22", h.body_imu("stuck"), 0.12),
     open_ended("body's gyroscope 6°/s off", "22", h.body_imu("biased")),
-    open_ended("body's accelerations turned round", "22", h.body_imu("turned")),
+    ends("body's accelerations turned round", "22", h.body_imu("turned"), JUMPED),
     open_ended("a thruster dead", "29", h.thruster(0.0)),
     open_ended("a thruster at half", "29", h.thruster(0.5)),
     borne("pushed with 4 N for 0.3 s", "31", h.pushed(4.0, 0.3)),

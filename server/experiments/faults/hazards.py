@@ -111,9 +111,13 @@ HAZARDS: Final = (
     Hazard(
         "10",
         "The phone's motion sensors lie",
-        "gravity test at the start; pictures against gyroscope",
-        "no arming; in flight the filter trusts them less, or HOLD",
-        ("server/phone/test_sensor_check.py::test_the_sign_of_ios_is_refused_and_named",),
+        "gravity test at the start; in flight gravity that jumps; pictures against gyroscope",
+        "no arming; in flight COAST, then HOLD, named, if gravity jumps, and if the phone falls; "
+        "else the filter trusts them less, or HOLD",
+        (
+            "server/phone/test_sensor_check.py::test_the_sign_of_ios_is_refused_and_named",
+            "pipeline/estimation/test_accelerometer_check.py",
+        ),
     ),
     Hazard(
         "11",
@@ -191,8 +195,10 @@ HAZARDS: Final = (
     Hazard(
         "22",
         "The robot's motion sensors lie",
-        "pictures against them",
-        "COAST when the estimate doubts itself, then HOLD; a lie that it bears is flown with",
+        "pictures against them; gravity that jumps",
+        "COAST when the estimate doubts itself or gravity jumps, then HOLD; a lie that it bears is "
+        "flown with",
+        ("pipeline/estimation/test_accelerometer_check.py",),
     ),
     Hazard(
         "23",
