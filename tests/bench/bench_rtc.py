@@ -31,7 +31,7 @@ from playwright.sync_api import BrowserContext, Page
 from server.common.settings import VideoSettings
 from server.common.text import table
 from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
-from tests.e2e.chromium_channel import SENSORS, Channel, feeling, reading
+from tests.e2e.chromium_channel import SENSORS, Channel, address, feeling, reading
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.clock_canvas import clock_canvas
@@ -105,7 +105,7 @@ class Sensors:
     """Motion sensors that sway, fed at 100 Hz."""
 
     def __init__(self, context: BrowserContext, page: Page) -> None:
-        self._channel = Channel(context, page)
+        self._channel = Channel(address(context, page))
         self._channel.orders(*map(feeling, SENSORS))
 
     def sway(self, seconds: float) -> None:

@@ -33,13 +33,17 @@ def _port(context: BrowserContext) -> int:
     return int((Path(profile) / "DevToolsActivePort").read_text().split()[0])
 
 
-class Channel:
-    """To one page, through all its addresses."""
+def address(context: BrowserContext, page: Page) -> str:
+    """Of a page, through all that it shows."""
+    target = context.new_cdp_session(page).send("Target.getTargetInfo")["targetInfo"]
+    return f"ws://127.0.0.1:{_port(context)}/devtools/page/{target['targetId']}"
 
-    def __init__(self, context: BrowserContext, page: Page) -> None:
+
+class Channel:
+    """To one page."""
+
+    def __init__(self, url: str) -> None:
         """Opens it; what is ordered lasts as long as it is open."""
-        target = context.new_cdp_session(page).send("Target.getTargetInfo")["targetInfo"]
-        url = f"ws://127.0.0.1:{_port(context)}/devtools/page/{target['targetId']}"
         self._socket, self._count = connect(url, max_size=None, compression=None), 0
 
     def orders(self, *orders: Order) -> list[dict[str, Any]]:

@@ -11,9 +11,10 @@ import numpy as np
 from playwright.sync_api import BrowserContext, Page, sync_playwright
 
 from hardware.sim.hand import Hand
-from tests.e2e.chromium_channel import Channel, evaluation, value_of
+from tests.e2e.chromium_channel import Channel, address, evaluation, value_of
 from tests.e2e.fed_sensors import FedSensors
 from tests.e2e.played_phone import CANVAS, PlayedPhone
+from tests.e2e.witness import Hole
 
 FLAGS = [
     "--no-sandbox",
@@ -70,15 +71,20 @@ class ChromiumPhone(PlayedPhone):
         super().__init__(hand, leds_in_b, truth_port, 90.0)  # a phone emulated in landscape
         self.page: Page = context.new_page()
         self.page.add_init_script(CANVAS)
-        self._channel = Channel(context, self.page)
-        self._touches = False
-        self._sensors = FedSensors(Channel(context, self.page), self._felt, self._still)
+        url = address(context, self.page)
+        self._channel, self._touches = Channel(url), False
+        self._sensors = FedSensors(url, self._felt)
 
     def close(self) -> None:
         """Give the sockets back."""
         super().close()
         self._sensors.close()
         self._channel.close()
+
+    def holes(self, since: float) -> list[Hole]:
+        """Of the machine and of the page, after a time [s, monotonic]."""
+        self._still += self._sensors.stood_still()
+        return super().holes(since)
 
     @property
     def address(self) -> str:

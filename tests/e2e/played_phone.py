@@ -7,6 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -79,6 +80,28 @@ CANVAS = CANVAS.replace("WIDTH", str(CAMERA.width)).replace("HEIGHT", str(CAMERA
 CANVAS = CANVAS.replace("BE_CAMERA", BE_CAMERA) + TICKER
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Felt:
+    """What the sensors of a phone in a hand feel."""
+
+    hand: Hand
+    R_dc: np.ndarray
+
+    def __call__(self, t: float) -> dict[str, np.ndarray]:
+        """At `t` [s], in d: force with and without gravity, turn rate.
+
+        By the names of the Generic Sensor API, each (3,) [m/s², m/s², rad/s].
+        """
+        force_in_d = self.R_dc @ self.hand.specific_force_in_c(t)
+        up_in_d = self.R_dc @ self.hand.pose(t)[0][2] * GRAVITY
+        omega_in_d = self.R_dc @ self.hand.omega_in_c(t)
+        return {
+            "accelerometer": force_in_d,
+            "gyroscope": omega_in_d,
+            "linear-acceleration": force_in_d - up_in_d,
+        }
+
+
 class PlayedPhone(ABC):
     """Plays a hand into a page: moves the picture and the sensors together."""
 
@@ -88,7 +111,7 @@ class PlayedPhone(ABC):
         """`leds_in_b` (n, 3) [m]; the page's `screen.orientation.angle` [°]."""
         self._hand, self._leds_in_b = hand, leds_in_b
         self._truth = TruthClient(truth_port, timeout=1.0)
-        self._R_dc = R_cd(screen_angle_deg).T
+        self._felt = Felt(hand, R_cd(screen_angle_deg).T)
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
         self._witness = Witness()
@@ -146,20 +169,6 @@ class PlayedPhone(ABC):
             self._still.append(Hole("lights", time.monotonic(), late_s))
         t = float(truth.t[-1])
         return self._hand.pose(t), truth.at(t)
-
-    def _felt(self, t: float) -> dict[str, np.ndarray]:
-        """What the sensors feel at `t` [s], in d: force with and without gravity, turn rate.
-
-        By the names of the Generic Sensor API, each (3,) [m/s², m/s², rad/s].
-        """
-        force_in_d = self._R_dc @ self._hand.specific_force_in_c(t)
-        up_in_d = self._R_dc @ self._hand.pose(t)[0][2] * GRAVITY
-        omega_in_d = self._R_dc @ self._hand.omega_in_c(t)
-        return {
-            "accelerometer": force_in_d,
-            "gyroscope": omega_in_d,
-            "linear-acceleration": force_in_d - up_in_d,
-        }
 
     def _shown(self, truth: Truth) -> str:
         """The expression that paints the lights from now on."""
