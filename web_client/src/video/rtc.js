@@ -41,6 +41,7 @@ export class RtcPath {
     /** @type {RTCDataChannel | null} */
     this.channel = null;
     this.pictures = new RtcPictures({ ...surroundings, onPair: (pair) => this.stamp(pair) });
+    /** Of this connection. */
     this.heardMs = -Infinity;
     this.wasOpen = false;
     this.stamps = 0;
@@ -93,6 +94,7 @@ export class RtcPath {
   close() {
     const { connection } = this;
     this.connection = this.channel = null;
+    this.heardMs = -Infinity;
     this.wasOpen = false;
     connection?.close();
     this.pictures.close();
@@ -132,7 +134,6 @@ export class RtcPath {
         channel.onmessage = ({ data }) => this.take(data);
         channel.onclose = () => end('the server has hung up');
         channel.onopen = () => {
-          this.heardMs = this.surroundings.performance.now();
           this.wasOpen = true;
           resolve();
         };

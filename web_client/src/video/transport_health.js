@@ -55,7 +55,7 @@ export class Complaints {
    * @param {number | null} ageMs Of the pictures, as the server says.
    */
   ofFast(now, rtc, sinceMs, ageMs) {
-    if (now - rtc.heardMs > SILENT_MS) return 'silent';
+    if (now - Math.max(rtc.heardMs, sinceMs) > SILENT_MS) return 'silent';
     if (!rtc.isFlowing) return now - sinceMs > FIRST_PICTURE_MS ? 'no picture' : '';
     return this.old.isStale(now, ageMs) ? `pictures are ${ageMs} ms old` : '';
   }

@@ -173,8 +173,9 @@ test('the worker is told when pictures were taken, how the phone is turned, and 
   ]);
 });
 
-test('what is heard is handed on, and a channel that falls silent is not relied upon', async () => {
+test('what is heard is handed on, and a channel never heard, or that falls silent, is not relied upon', async () => {
   await opened();
+  assert.equal(rtc.isHeard, false, 'it is open, which says nothing of the server’s end');
   time.ms = 100;
   channel.onmessage({ data: pingOf(1n, 2) });
   assert.deepEqual(log, ['record 129']);
@@ -182,6 +183,9 @@ test('what is heard is handed on, and a channel that falls silent is not relied 
   assert.equal(rtc.isHeard, true);
   time.ms += 1;
   assert.equal(rtc.isHeard, false);
+  channel.onmessage({ data: pingOf(2n, 2) });
+  await opened();
+  assert.equal(rtc.isHeard, false, 'what another connection heard is none of its');
 });
 
 test('a record that can’t leave at once is dropped', async () => {

@@ -174,6 +174,18 @@ test('until the first picture flows the websocket goes on; without any the fast 
   assert.equal(rtc.isOpen, false);
 });
 
+test('a fast path that is never heard has as long from its beginning as one that falls silent', async () => {
+  paths.begin(WELCOME);
+  await settled();
+  rtc.heardMs = -Infinity;
+  time.advance(SILENT_MS);
+  paths.look(null);
+  assert.equal(rtc.isOpen, true);
+  time.advance(1);
+  paths.look(null);
+  assert.equal(rtc.isOpen, false);
+});
+
 test('an encoder that is too slow gives way to JPEG, and is tried again later', async () => {
   rtc.pictures.haveRecords = false;
   paths.begin(WELCOME);
