@@ -20,6 +20,10 @@ from server.security.tls import Certificate
 
 HEAD_S = 5.0
 """A request's head must be whole within this."""
+PONG_S = 20.0
+"""A websocket that answers no ping for so long has gone. Where packets are lost TCP resends for
+seconds, while a phone is well heard by its data channel; nobody waits for one that has gone: it may
+be taken over from after 2 s (`LEASE_S`)."""
 
 
 class Patience(H11Protocol):
@@ -162,7 +166,7 @@ def _config(app: ASGIApp, tls: Certificate | None) -> uvicorn.Config:
         ws_max_size=MAX_RECORD_BYTES + 1024,
         ws_per_message_deflate=False,
         ws_ping_interval=5.0,
-        ws_ping_timeout=5.0,
+        ws_ping_timeout=PONG_S,
         lifespan="off",
         log_config=None,
         access_log=False,
