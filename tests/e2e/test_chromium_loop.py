@@ -43,7 +43,7 @@ def test_the_robot_follows_by_each_way_does_not_jump_when_it_is_changed_and_stop
         for wish, (begin, end) in zip(CHANGES, pairwise(starts), strict=True):
             assert came[wish].startswith(WAYS[wish])
             changed = max(d for t, d in flight.distances if begin <= t < end)
-            assert changed <= 1.5 * steady + 0.03, wish
+            assert changed <= 1.5 * steady + 0.03, f"{wish}: {flight.account()}"
         streams = flight.status["streams"]
         assert isinstance(streams, dict)
         assert streams["phone_imu"]["rate_hz"] >= 25.0  # 60 on a quiet machine
