@@ -46,7 +46,7 @@ class AccelerometerCheck:
             return
         # into an array of its own: one kernel, whatever memory the samples come in
         self._sample[0], self._sample[1] = omega, specific_force
-        carry_on(self._means, self._sample, dt, t - self._t_begun, self._scratch)
+        update_means(self._means, self._sample, dt, t - self._t_begun, self._scratch)
 
     @property
     def has_jumped(self) -> bool:
@@ -57,7 +57,7 @@ class AccelerometerCheck:
 
 
 @kernel
-def carry_on(means: Array, sample: Array, dt: float, felt_s: float, w: Array) -> None:
+def update_means(means: Array, sample: Array, dt: float, felt_s: float, w: Array) -> None:
     """Turn the means (2, 3) with the body and add a sample; at first they are those of all.
 
     Args:

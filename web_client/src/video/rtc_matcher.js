@@ -70,7 +70,7 @@ export class CaptureMatcher {
     this.frames.push({ stampUs, outUs: nowUs });
     if (this.frames.length > KEPT_FRAMES) this.frames.shift();
     this.aheadUs = this.ahead(nowUs);
-    if (this.aheadUs === null || !this.isSure) return null;
+    if (this.aheadUs === null) return null;
     const found = this.taken(stampUs - this.aheadUs);
     const captureUs = Math.max(found.captureUs - this.foundLateUs, this.lastUs + 1);
     this.lastUs = captureUs;
@@ -87,12 +87,13 @@ export class CaptureMatcher {
   }
 
   /**
-   * How far RTP's clock is ahead of the camera's: of all that is possible, what fits best.
+   * How far RTP's clock is ahead of the camera's: of all that is possible, what fits best; null: not known yet.
    * @param {number} nowUs
    */
   ahead(nowUs) {
     const old = this.frames.filter(({ outUs }) => outUs <= nowUs - HINDSIGHT_US);
     this.isSure ||= old.length >= ENOUGH;
+    if (!this.isSure) return null;
     const frames = old.length >= ENOUGH ? old : this.frames;
     const last = frames.at(-1);
     if (last === undefined) return null;
