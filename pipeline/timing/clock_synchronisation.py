@@ -13,6 +13,8 @@ from collections import deque
 from math import inf, isfinite
 from typing import Final
 
+import numpy as np
+
 from pipeline.timing.clock_line import MAX_DRIFT, ClockLine, OffsetBound, TightestBounds, fit
 
 WINDOW_S: Final = 60.0
@@ -52,13 +54,16 @@ class ClockSynchronisation:
         """Take an answer: asked and answered on our clock [s], stamped `t_remote` on theirs [s]."""
         if not (isfinite(t_asked + t_remote + t_answered) and t_asked <= t_answered):
             return
-        jump = self._contradiction(t_asked, t_remote, t_answered)
-        if jump == 0.0:
+        line = self._line
+        if line is None or not _contradicts(line, t_asked, t_remote, t_answered):
             self._contradictions.clear()
             self._take(t_asked, t_remote, t_answered)
             return
         self._contradictions.append((t_asked, t_remote, t_answered))
         if len(self._contradictions) >= CONTRADICTIONS:
+            # all of them bound it: the last alone may have waited for long, one way
+            lower, upper = np.array([_off(line, *one) for one in self._contradictions]).T
+            jump = 0.5 * (lower.max() + upper.min())
             self._restart(f"The phone's clock jumped by {jump:+.2f} s.")
 
     @property
@@ -117,15 +122,6 @@ class ClockSynchronisation:
         if self._line is None:
             raise ValueError("no answer yet")
         return self._line
-
-    def _contradiction(self, t_asked: float, t_remote: float, t_answered: float) -> float:
-        """By how much the clock jumped if this answer is true [s]; 0: it agrees."""
-        if self._line is None:
-            return 0.0
-        error = self._line.error + MAX_DRIFT * (t_answered - self._line.t) + TOLERANCE_S
-        above = t_remote - t_answered - self._line.at(t_answered)
-        below = t_remote - t_asked - self._line.at(t_asked)
-        return 0.5 * (above + below) if above > error or below < -error else 0.0
 
     def _restart(self, reason: str) -> None:
         answers, self._contradictions = self._contradictions, []
@@ -218,6 +214,21 @@ class ClockMapping:
     def local(self, t_remote: float) -> float:
         """Our time at `t_remote` [s]."""
         return _interpolated(self._remote, self._t, t_remote, 1.0 / (1.0 + self._drift))
+
+
+def _off(
+    line: ClockLine, t_asked: float, t_remote: float, t_answered: float
+) -> tuple[float, float]:
+    """Least and most by which the remote clock is ahead of `line`, if this answer is true [s]."""
+    least = t_remote - t_answered - line.at(t_answered)
+    return least, t_remote - t_asked - line.at(t_asked)
+
+
+def _contradicts(line: ClockLine, t_asked: float, t_remote: float, t_answered: float) -> bool:
+    """Whether `line` can't be right if this answer is."""
+    error = line.error + MAX_DRIFT * (t_answered - line.t) + TOLERANCE_S
+    least, most = _off(line, t_asked, t_remote, t_answered)
+    return least > error or most < -error
 
 
 def _interpolated(x: list[float], y: list[float], at: float, slope: float) -> float:
