@@ -18,12 +18,10 @@ from pipeline.control.thrust_acting import ThrustActing
 from pipeline.control.tracking import Situation
 from pipeline.control.twist_acting import TwistActing
 from pipeline.control.virtual_camera import VirtualCamera
-from pipeline.estimation.accelerometer_check import AccelerometerCheck
 from pipeline.estimation.attitude import Attitude
 from pipeline.estimation.estimators import make_estimator
-from pipeline.estimation.frozen_imu import FrozenImu
 from pipeline.estimation.gyro_bridge import GyroBridge
-from pipeline.estimation.repeated_picture import RepeatedPicture
+from pipeline.estimation.sensor_monitor import SensorMonitor
 from pipeline.frames import Array
 from pipeline.robot import Robot
 from pipeline.signals import (
@@ -118,9 +116,8 @@ class Teleop:
         self._operator = TouchState(-np.inf, held=False, press=0)
         self._half_field: tuple[float, float] | None = None
         self._t_seen = self._t_phone = -np.inf
-        self._body, self._frozen_imu = BodyImu(-np.inf, np.zeros(3), np.zeros(3)), FrozenImu()
-        self._accelerometers = {PhoneImu: AccelerometerCheck(), BodyImu: AccelerometerCheck()}
-        self._repeated = RepeatedPicture()
+        self._body = BodyImu(-np.inf, np.zeros(3), np.zeros(3))
+        self._monitor = SensorMonitor()
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
         self._leading = self.next_leading = PLAIN
@@ -149,8 +146,7 @@ class Teleop:
         dt_ms = self._pass_time(inputs.t)
         # news before the state: a late image is fused when it was taken, then predicted to now
         self._fuse(inputs)
-        flies = self._failsafe.mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
-        obeyed = flies and not inputs.gap and not self._is_deaf(inputs.t)
+        obeyed = self._flies and not inputs.gap and not self._is_deaf(inputs.t)
         self._acting.watch(obeyed, self._body, self._h)
         relative = self.estimator.state(inputs.t)  # Eq. (5)-(13)
         R_fc = self._R_fc_now(relative)
@@ -203,6 +199,10 @@ class Teleop:
             twist_in_b=acted.twist_in_b,
         )
 
+    @property
+    def _flies(self) -> bool:
+        return self._failsafe.mode in failsafe.FLYING
+
     def _moment(self, t: float) -> Moment:
         return Moment(
             self._failsafe.mode,
@@ -230,19 +230,16 @@ class Teleop:
         """Hand each measurement to the estimators; whatever its age, it has its own time."""
         for phone in inputs.phone_imu:
             self.attitude.add(phone)
-            self._repeated.add_imu(phone)
-            self._accelerometers[PhoneImu].add(phone.t, phone.omega_m_cf_in_c, phone.a_m_cf_in_c)
             self.estimator.add_phone_imu(phone)
+            self._monitor.add_phone_imu(phone)
             self._t_phone = max(self._t_phone, phone.t)
         for body in inputs.body_imu:
             self.estimator.add_body_imu(body)
-            self._repeated.add_imu(body)
-            self._accelerometers[BodyImu].add(body.t, body.omega_m_bf_in_b, body.a_m_bf_in_b)
+            self._monitor.add_body_imu(body)
             self._body = body
-            self._frozen_imu.add(body)
         for seen in inputs.seen:
             self._half_field = seen.half_field
-            if self._repeated.comes_again(seen):
+            if self._monitor.comes_again(seen):
                 continue
             if self.estimator.add_seen(seen, inputs.t):
                 self._t_seen = max(self._t_seen, seen.t)
@@ -309,11 +306,11 @@ class Teleop:
             press=self._operator.press,
             fault=inputs.fault
             or flight_envelope.fault(limits, is_tracking, known, error)
-            or self._sensor_fault()
+            or (self._monitor.frozen if self._flies else "")
             or self._acting.fault,
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
-            or self._jumped()
+            or self._monitor.jumped
             or self._astray(known),
             block=self._blocked(leashed),
             is_settled=self._is_settled(known, ages),
@@ -322,23 +319,6 @@ class Teleop:
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
             **ages.in_ms(),
         )
-
-    def _sensor_fault(self) -> str:
-        """Words if the robot's IMU is frozen in flight; at rest a noiseless one repeats itself."""
-        flies = self._failsafe.mode in (Mode.TRACK, Mode.COAST, Mode.HOLD)
-        return (
-            "The robot's motion sensors stand still."
-            if flies and self._frozen_imu.is_frozen
-            else ""
-        )
-
-    def _jumped(self) -> str:
-        """Whose accelerometer lies, in words; empty if none."""
-        if self._accelerometers[BodyImu].has_jumped:
-            return "The robot's accelerometer jumps: it feels gravity elsewhere than before."
-        if self._accelerometers[PhoneImu].has_jumped:
-            return "The phone falls or is shaken, or its accelerometer jumps."
-        return ""
 
     def _astray(self, known: Situation | None) -> str:
         """Why it must not follow again by itself after a gap; empty if it may."""
