@@ -238,7 +238,7 @@ class TouchState:
 
 @dataclass(frozen=True, slots=True)
 class Requests:
-    """Wishes of people, each true for one tick."""
+    """Requests of people, each true for one tick."""
 
     arm: bool = False
     disarm: bool = False

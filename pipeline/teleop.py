@@ -156,8 +156,8 @@ class Teleop:
         # the reference moves before its error is taken: else a period of the way back is missing
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
-        wished = self._error(known)  # Eq. (14)-(19)
-        leashed = self._leashed(known, wished)
+        error = self._error(known)  # Eq. (14)-(19)
+        leashed = self._leashed(known, error)
         ages = Ages(
             inputs.t - self._operator.t,
             inputs.t - self._t_seen,
@@ -167,16 +167,16 @@ class Teleop:
         # the machine decides by this period's error, the leash left aside: a robot far from where
         # it is led ends the flight all the same. The mode holds for these thrusts already: whoever
         # lets go gets no thrust of tracking any more
-        judged = self._judge(inputs, known, wished, leashed, ages)
+        judged = self._judge(inputs, known, error, leashed, ages)
         before = self._failsafe.mode
         self._failsafe = failsafe.step(self._failsafe, judged, dt_ms, self._limits)
         if self._failsafe.mode != before:
-            known, wished = self._change_mode(before, known, leashed, bool(judged.doubt))
-            leashed = self._leashed(known, wished)
+            known, error = self._change_mode(before, known, leashed, bool(judged.doubt))
+            leashed = self._leashed(known, error)
         # last, what was given: feed-forward takes it off the next period's specific force
         share = failsafe.ceiling(self._failsafe, self._limits)
         acted = self._acting.act(known, leashed, self._moment(inputs.t), share)
-        self._aim = self._aim_now(known, wished)
+        self._aim = self._aim_now(known, error)
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
         return Output(
             t=inputs.t,
@@ -352,7 +352,7 @@ class Teleop:
         mode = self._failsafe.mode
         if mode == Mode.TRACK and known is not None:
             # v = c first, then a view from there, then the reference: the error begins at zero, and
-            # the lag that the virtual camera had before is no wish of the operator's
+            # the lag that the virtual camera had before is no request of the operator's
             self._reference = None
             if before != Mode.COAST:
                 self._leading = self.next_leading

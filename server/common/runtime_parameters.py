@@ -68,9 +68,9 @@ class Tune(msgspec.Struct, tag="tune", forbid_unknown_fields=True, frozen=True):
     guard: bool | None = None
 
 
-def turned(config: VirtualCameraConfig, wish: Tune) -> VirtualCameraConfig:
-    """`config` with the parameters of `wish` set, all else as it is."""
-    wanted = msgspec.structs.asdict(wish)
+def turned(config: VirtualCameraConfig, tune: Tune) -> VirtualCameraConfig:
+    """`config` with the parameters of `tune` set, all else as it is."""
+    wanted = msgspec.structs.asdict(tune)
     hz = wanted.pop("cutoff_hz")
     changes = {name: value for name, value in wanted.items() if value is not None}
     if hz is not None:

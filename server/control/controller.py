@@ -110,7 +110,7 @@ class Controller:
             robot_gap: Why it does not follow for the moment. Ends no flight, while it is short.
             robot_left_s: Until it ramps down by itself, if it goes on as it is [s].
         """
-        phone, seen, operator, wishes = self._sort(messages, now)
+        phone, seen, operator, requests = self._sort(messages, now)
         for sample in body:
             self._body_samples.append(
                 (sample.t, *triple(sample.omega_m_bf_in_b), *triple(sample.a_m_bf_in_b))
@@ -125,7 +125,7 @@ class Controller:
                 body_imu=tuple(body),
                 seen=tuple(seen),
                 operator=operator,
-                requests=wishes,
+                requests=requests,
                 refusals=self._why_not(now, robot_reason),
                 fault=self._out_of_time(stall_s) or (robot_reason if self._armed else ""),
                 gap=_stood_still(stall_s, STOOD_STILL_S) or robot_gap,
@@ -150,7 +150,7 @@ class Controller:
         phone: list[PhoneImu] = []
         seen: list[VisionMeasurement] = []
         operator: TouchState | None = None
-        wishes: set[str] = set()
+        requested: set[str] = set()
         for message in messages:
             match message:
                 case PhoneImu():
@@ -160,7 +160,7 @@ class Controller:
                 case TouchState():
                     operator = message
                 case RequestInput():
-                    wishes.add(message.what)
+                    requested.add(message.what)
                 case ReadyInput():
                     self._refusals, self._t_ready = tuple(message.refusals), now
                 case Tune():
@@ -169,7 +169,7 @@ class Controller:
                 case Lead():
                     self.teleop.lead(message.leading)
         known = Requests.__slots__
-        return phone, seen, operator, Requests(**{w: True for w in wishes if w in known})
+        return phone, seen, operator, Requests(**{one: True for one in requested if one in known})
 
     def _why_not(self, now: float, robot_reason: str) -> tuple[str, ...]:
         if now - self._t_ready > SERVER_SILENT_S:

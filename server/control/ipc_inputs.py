@@ -29,7 +29,7 @@ KINDS: dict[str, np.dtype[Any]] = {dtype.kind: dtype for dtype in (FLOAT, INDEX)
 
 
 class RequestInput(msgspec.Struct, tag="request", array_like=True, frozen=True):
-    """A wish of a person, already checked for its role."""
+    """A request of a person, already checked for its role."""
 
     what: str
 

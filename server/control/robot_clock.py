@@ -94,10 +94,10 @@ class RobotLink:
 
     def pass_on(self, messages: Iterable[Input], now: float) -> None:
         """Tell the robot to go on blinking, if it can and one of the server's messages says so."""
-        wishes = [message for message in messages if isinstance(message, BlinkInput)]
-        if not wishes or self._book is None or not isinstance(self._follower, Blinking):
+        requests = [message for message in messages if isinstance(message, BlinkInput)]
+        if not requests or self._book is None or not isinstance(self._follower, Blinking):
             return
-        code, begin_us = wishes[-1], self._clock.robot_us(wishes[-1].t_begin)
+        code, begin_us = requests[-1], self._clock.robot_us(requests[-1].t_begin)
         lasts_ms = round(1e3 * (now - code.t_begin + LINGER_S))
         if begin_us is not None and begin_us >= 0 and 0 < lasts_ms <= LASTS_MS:
             dark = tuple(self._book[code.number].tolist())

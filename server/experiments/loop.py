@@ -105,14 +105,14 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     )
 
 
-def hidden(wishes: Sequence[Sequence[str]], leds: int) -> tuple[Hidden, ...]:
-    """`--hide FROM_S TO_S [LED ...]` of each wish.
+def hidden(options: Sequence[Sequence[str]], leds: int) -> tuple[Hidden, ...]:
+    """`--hide FROM_S TO_S [LED ...]` of each option.
 
     Raises:
         SystemExit: not such numbers; says what is allowed.
     """
     try:
-        spans = [(float(a), float(b), tuple(map(int, named))) for a, b, *named in wishes]
+        spans = [(float(a), float(b), tuple(map(int, named))) for a, b, *named in options]
     except ValueError as error:
         raise SystemExit(f"--hide: {error}; allowed: FROM_S TO_S [LED ...]") from error
     if any(led not in range(leds) for _, _, named in spans for led in named):

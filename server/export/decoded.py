@@ -211,7 +211,7 @@ class _Decoding:
                         yield from self._phone(record, t, entry.t)
                 case "phone/messages":
                     with suppress(WireError):
-                        yield from self._wish(entry)
+                        yield from self._message(entry)
                 case "server/messages":
                     yield from self._logged(entry)
                 case _:
@@ -240,7 +240,7 @@ class _Decoding:
             return 0.0, hypot(clock, UNTOLD_OFFSET_S)
         return state.time_offset, hypot(clock, state.time_offset_sigma)
 
-    def _wish(self, entry: Entry) -> Iterator[Item]:
+    def _message(self, entry: Entry) -> Iterator[Item]:
         match decode_message(entry.data):
             case Hello(device=device):
                 self._greet()

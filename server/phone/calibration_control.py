@@ -23,15 +23,17 @@ class CalibrationControl:
         self._phone = ""
         self._sent = Calibration("off")
 
-    def request(self, phone: PhoneSession, wish: Calibrate, control: ControlStatus | None) -> None:
+    def request(
+        self, phone: PhoneSession, message: Calibrate, control: ControlStatus | None
+    ) -> None:
         """The phone begins to calibrate its camera, or leaves it.
 
         Raises:
             WireError: not now.
         """
-        if wish.what == "start" and not _is_calm(control):
+        if message.what == "start" and not _is_calm(control):
             raise WireError("order", "calibrate.what", "while the robot is disarmed")
-        phone.calibrate(wish)
+        phone.calibrate(message)
 
     def send(self, phone: PhoneSession | None, control: ControlStatus | None) -> None:
         """Send what is news; nobody calibrates while a robot is led."""

@@ -35,7 +35,7 @@ class FramePipeline(FrameDecoder):
         self.camera, self._clock = camera, clock
         self.front_end = VisualFrontEnd(camera, robot.leds_in_b, gates, clock, blinks=robot.blinks)
         self._blink = BlinkChoice() if robot.blinks else None
-        self.wish: BlinkInput | None = None
+        self.blink_request: BlinkInput | None = None
         """What the robot is to be told to blink, by the newest picture."""
 
     def see(self, frames: Sequence[EncodedFrame]) -> Detection | None:
@@ -51,7 +51,7 @@ class FramePipeline(FrameDecoder):
         decoded = self._clock()
         detection = self.front_end.process(picture)
         if self._blink is not None:
-            self.wish = self._blink.look(detection, frames[-1].t_received)
+            self.blink_request = self._blink.look(detection, frames[-1].t_received)
             self.front_end.blinks(self._blink.code)
         if detection.offset is None and frames[-1].picture.by_arrival:
             detection = replace(detection, offset=StampOffset(0.0, ARRIVAL_S))

@@ -199,8 +199,8 @@ class PhoneSession:
 
     def _on_detection(self, eye: FramePipeline, detection: Detection, frame: EncodedFrame) -> None:
         """In the vision thread: hand on what was seen, and what the robot is to blink."""
-        if eye.wish is not None:
-            self._to_control(eye.wish)
+        if eye.blink_request is not None:
+            self._to_control(eye.blink_request)
         self._sighted(eye.camera, detection, frame)
 
     def _sighted(self, camera: Camera, detection: Detection, frame: EncodedFrame) -> None:
@@ -260,18 +260,18 @@ class PhoneSession:
             why.append(self.vision.front_end.complaint)
         return why
 
-    def calibrate(self, wish: Calibrate) -> None:
+    def calibrate(self, request: Calibrate) -> None:
         """Begin to calibrate the camera that films now, or leave that and look again.
 
         Raises:
             WireError: there is no picture yet.
         """
-        if wish.what == "start" and (self._shape is None or self._profiles is None):
+        if request.what == "start" and (self._shape is None or self._profiles is None):
             raise WireError("order", "calibrate.what", "when pictures come")
-        if wish.what == "start" and self._shape is not None and self._shape.shrunk:
+        if request.what == "start" and self._shape is not None and self._shape.shrunk:
             raise WireError("order", "calibrate.what", "when pictures have the camera's own size")
         self.close()
-        if wish.what == "start" and self._shape is not None:
+        if request.what == "start" and self._shape is not None:
             self._calibrate(self._shape)
         else:
             # the next picture opens eyes, with what may have been stored, or says what is wrong

@@ -1,4 +1,4 @@
-"""How old a person's wish is when it arrives: a link that was away must not carry out an old one.
+"""How old a request is when it arrives: a link that was away must not carry out an old one.
 
 What a page says can lie in buffers for minutes and come when somebody else flies. The page says how
 long ago its holder asked, by its own clock, and what the server's clock says, as far as it has

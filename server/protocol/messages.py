@@ -46,7 +46,7 @@ class Hello(msgspec.Struct, tag="hello", forbid_unknown_fields=True, frozen=True
 
 
 class Command(msgspec.Struct, tag="command", forbid_unknown_fields=True, frozen=True):
-    """Page → server: a wish of a person; the control process decides.
+    """Page → server: a request of a person; the control process decides.
 
     `key_frame` travels server → page: the next FRAME must be decodable alone.
     """

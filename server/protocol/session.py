@@ -119,8 +119,8 @@ class Session:
 
     def _message(self, text: str, now: float) -> FromPage:
         message = decode_message(text)
-        wished = message.what if isinstance(message, Command) else ""
-        if not self._messages.take(now) and wished != "stop":
+        command = message.what if isinstance(message, Command) else ""
+        if not self._messages.take(now) and command != "stop":
             raise WireError("rate", "message", f"{MESSAGES_HZ:g} a second")
         if isinstance(message, Hello):
             return self._greeted(message)
@@ -128,9 +128,9 @@ class Session:
             raise WireError("order", "message", "hello first")
         if not isinstance(message, MESSAGES[self.role]):
             raise WireError("role", "message.type", f"not as {self.role}")
-        if self._looks_only and wished != "stop":
+        if self._looks_only and command != "stop":
             raise WireError("role", "message.type", "STOP: all else takes a supervisor")
-        if wished == "reset" and self.role != "supervisor":
+        if command == "reset" and self.role != "supervisor":
             raise WireError("role", "command.what", "arm, disarm or stop: a supervisor resets")
         return message
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 import msgspec
 
-PathWish = Literal["auto", "WebRTC", "WebSocket", "JPEG"]
+RequestedPath = Literal["auto", "WebRTC", "WebSocket", "JPEG"]
 
 
 class PathChoice(msgspec.Struct, tag="path", forbid_unknown_fields=True, frozen=True):
@@ -16,7 +16,7 @@ class PathChoice(msgspec.Struct, tag="path", forbid_unknown_fields=True, frozen=
     stands, when welcomed and at each choice; `status` shows that to all.
     """
 
-    wish: PathWish
+    wish: RequestedPath
     """`auto`: the best that works."""
     by: Literal["", "operator", "supervisor"] = ""
     """Who chose last; "": nobody yet. The server itself says who, of a supervisor's choice."""

@@ -78,7 +78,7 @@ class Played:
 
 
 async def play(recording: Recording, access: Access, speed: float) -> Played:
-    """Push the phone's stream over the real websockets; its wishes (arm, ...) are not repeated.
+    """Push the phone's stream over the real websockets; its requests (arm, ...) are not repeated.
 
     Raises:
         RecordingError: the file is damaged.

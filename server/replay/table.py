@@ -8,7 +8,7 @@
 | found, leds, reprojection_px | was the robot found, on how many LEDs, RMS residual |
 | x_m, y_m, z_m, qw, qx, qy, qz, sigma_m | pose of the body in camera axes, measured in it |
 | fused_x_m … fused_qz, fused_sigma_m | the filter's estimate at the next control period |
-| mode | of the failsafe machine, with the recorded button and wishes |
+| mode | of the failsafe machine, with the recorded button and requests |
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ MAX_NAME = 40  # letters
 
 
 class PairingError(Exception):
-    """A link or a wish that can't be taken; says which field and what is allowed."""
+    """A link or a request that can't be taken; says which field and what is allowed."""
 
     def __init__(self, field: str, allowed: str) -> None:
         """Refuse in words for the person who can mend it."""

@@ -189,7 +189,7 @@ class VirtualTimeSimulation:
         return self.trace
 
     def request(self, what: str) -> None:
-        """A supervisor's wish."""
+        """A supervisor's request."""
         self._inbox.append(RequestInput(what))
 
     def advance(self) -> Output:
@@ -221,9 +221,9 @@ class VirtualTimeSimulation:
         self.follower.send(command)
         self._link.pass_on(inbox, self.t)
         self._feel(*felt)
-        wish = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
-        if wish is not None:
-            self._inbox.append(RequestInput(wish.what))
+        request = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
+        if request is not None:
+            self._inbox.append(RequestInput(request.what))
         return output
 
     def _robot_at(self, t: float) -> tuple[Array, Array]:
@@ -308,8 +308,8 @@ class VirtualTimeSimulation:
         if not frames:
             return
         detection = self._frame_pipeline.see(frames)
-        if self._frame_pipeline.wish is not None:
-            self._inbox.append(self._frame_pipeline.wish)
+        if self._frame_pipeline.blink_request is not None:
+            self._inbox.append(self._frame_pipeline.blink_request)
         self.trace.pictures += 1
         self.trace.leds.append(len(detection.rays) if detection is not None else 0)
         self._tell(detection.seen(self._frame_pipeline.camera) if detection is not None else None)

@@ -39,7 +39,7 @@ class PhoneClient:
         on_ping: Callable[[int, int], Record],
         on_status: Callable[[Status], Command | None],
     ) -> None:
-        """`on_ping(nonce, server time [µs])` gives the PONG; `on_status` may give a wish."""
+        """`on_ping(nonce, server time [µs])` gives the PONG; `on_status` may give a request."""
         self._access = access
         self._on_ping, self._on_status = on_ping, on_status
         self._sockets: list[ClientConnection] = []
@@ -122,7 +122,7 @@ class PhoneClient:
             raise PhoneClientError(f"{self._access.url}: {error}") from error
 
     async def request(self, command: Command) -> None:
-        """Send a wish."""
+        """Send a request."""
         await self._sockets[0].send(encode_message(command))
 
     async def run(self) -> None:

@@ -35,7 +35,7 @@ class Manners:
     hold_s: float = 1.0
     """A press that changed nothing is given up after this, and soon made anew."""
     pause_s: float = 1.0
-    """Before a press after HOLD, and between wishes to arm."""
+    """Before a press after HOLD, and between requests to arm."""
     again: bool = True
     """After HOLD press again, after DISARMED arm again; else once is enough."""
 
@@ -54,7 +54,7 @@ class VirtualOperator:
         """Set it to let go and press no more."""
 
     def see(self, mode: str, ready: bool, t: float) -> Command | None:
-        """Read the status shown at `t` [s]; gives the wish it leads to, if any."""
+        """Read the status shown at `t` [s]; gives the request it leads to, if any."""
         if mode != self.mode:
             self._flights += mode == "TRACK"
             self.mode, self._since = mode, t

@@ -133,7 +133,7 @@ class SessionManager:
         self.recordings.message("server", encode_message(deed), now())
 
     def request(self, command: Command, who: Member) -> None:
-        """A person's wish, already checked for its role."""
+        """A person's request, already checked for its role."""
         if command.what == "key_frame":
             return
         lacks = self.status.refusals if command.what == "arm" and self.status is not None else ()
@@ -141,40 +141,40 @@ class SessionManager:
         self.log_event(said := f"{who.name}: {command.what}", of=said)
         self._ask(RequestInput(command.what), INSISTS * (command.what in ("stop", "disarm")))
 
-    def tune(self, wish: Tune) -> None:
+    def tune(self, request: Tune) -> None:
         """Send a supervisor's runtime parameters of the virtual camera to control."""
-        knobs = {name: value for name, value in asdict(wish).items() if value is not None}
+        knobs = {name: value for name, value in asdict(request).items() if value is not None}
         if not knobs:
             return
         told = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
-        if self._control.send(wish):
+        if self._control.send(request):
             self.log_event(f"supervisor: {told}", of="virtual camera")
         else:
             self.log_event(f"{told} did not reach the control process: try again.")
 
-    def lead(self, wish: Lead, who: Member) -> None:
+    def lead(self, request: Lead, who: Member) -> None:
         """Send control how the next press is to lead.
 
         Raises:
             WireError: this robot can't be led so.
         """
-        if not suits(wish.leading, self.robot):
-            field = "scale" if wish.scale != 1.0 else "axes"
+        if not suits(request.leading, self.robot):
+            field = "scale" if request.scale != 1.0 else "axes"
             allowed = "1" if field == "scale" else "all or shift"
             raise WireError("value", f"lead.{field}", f"{allowed}: this robot hangs from nothing")
-        told = f"from the next press: {wish.scale:g} times as far, {wish.axes}"
-        if self._control.send(wish):
+        told = f"from the next press: {request.scale:g} times as far, {request.axes}"
+        if self._control.send(request):
             self.people.note("leading", who, told)
             self.log_event(f"{who.name}: {told}", of="leading")
         else:
             self.log_event(f"{told} did not reach the control process: try again.")
 
-    def calibrate(self, wish: Calibrate) -> None:
+    def calibrate(self, request: Calibrate) -> None:
         """Let the operator's phone begin its camera's calibration, or leave it."""
         if (phone := self.phone) is not None:
-            self._calibration.request(phone, wish, self.status)
+            self._calibration.request(phone, request, self.status)
             self.log_event(
-                f"{phone.device}: calibration, {wish.what}", of=f"{phone.device}: calibration"
+                f"{phone.device}: calibration, {request.what}", of=f"{phone.device}: calibration"
             )
 
     def _ask(self, request: RequestInput, insists: int) -> None:

@@ -141,7 +141,7 @@ class PageServer:
         await self._serve(socket, "supervisor")
 
     async def screen(self, socket: WebSocket) -> None:
-        """`/ws/screen`: shows a simulated robot's light; may wish for nothing."""
+        """`/ws/screen`: shows a simulated robot's light; may request nothing."""
         await self._serve(socket, "screen")
 
     async def _serve(self, socket: WebSocket, role: str) -> None:

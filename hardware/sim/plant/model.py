@@ -14,7 +14,7 @@ FOOT_RADIUS_M = 0.005
 
 
 def mjcf(parameters: PlantParameters, obstacle: Obstacle | None = None, scenery: str = "") -> str:
-    """The robot as a MuJoCo model, with something before it to touch if wished.
+    """The robot as a MuJoCo model, with something before it to touch if requested.
 
     `scenery` stands in the world, in MuJoCo's words.
     """

@@ -130,12 +130,12 @@ class NetworkTestbed:
             lateness,
         )
 
-    def _connect(self, wish: bytes) -> None:
+    def _connect(self, request: bytes) -> None:
         assert self._phone.stdin is not None
-        self._phone.stdin.write(wish)
+        self._phone.stdin.write(request)
         said = _line(self._phone, READY_S)
         if said != b"ready":
-            raise RunError(f"{wish.decode().strip()}: {said.decode()}")
+            raise RunError(f"{request.decode().strip()}: {said.decode()}")
 
     def _play(self, scenario: Scenario, begin: float, end: float) -> list[float]:
         """Let time pass, with the scenario's faults; gives when each was over [s]."""

@@ -48,13 +48,13 @@ EXPERIMENTS: Final[dict[str, tuple[Measure, VirtualCameraMode]]] = {
     disturbance.NAME: (disturbance.measure, "selective"),
     comparison.NAME: (comparison.measure, "selective"),
 }
-"""Each with the virtual camera that ours has in it unless another is wished."""
+"""Each with the virtual camera that ours has in it unless another is requested."""
 
 
 @experiment("paper")
 def run(arguments: argparse.Namespace) -> ExperimentReport:
     """Fly each table; what the paper says must hold with its own sensors."""
-    wishes, leader = wishes_of(arguments), leader_of(arguments)
+    request, leader = request_of(arguments), leader_of(arguments)
     robot_file = load_robot(arguments.robot)
     check_gains(robot_file, arguments.robot, arguments.gains)
     setup = ExperimentSetup(
@@ -62,11 +62,11 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
     )
     print(published.SOURCE)
     print(assumptions.lines(assumptions.of(setup)))
-    adds = bool(wishes) or leader.name != PAPER.name
+    adds = bool(request) or leader.name != PAPER.name
     outcomes = []
     for name in arguments.only or EXPERIMENTS:
         measure, vci = EXPERIMENTS[name]
-        outcome = measure(setup, [ours(leader, wishes, vci)] if adds else [])
+        outcome = measure(setup, [ours(leader, request, vci)] if adds else [])
         outcomes.append(outcome)
         print(f"\n{outcome.text()}", flush=True)
     told = assumptions.json(assumptions.of(setup))
@@ -95,7 +95,7 @@ def leader_of(arguments: argparse.Namespace) -> Leader:
     return phone(arguments.fps, (1e-3 * low, 1e-3 * high), arguments.pictures)
 
 
-def wishes_of(arguments: argparse.Namespace) -> VariantRequest:
+def request_of(arguments: argparse.Namespace) -> VariantRequest:
     """What was asked for."""
     return VariantRequest(
         arguments.estimator,

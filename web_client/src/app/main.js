@@ -26,7 +26,7 @@ import { StopPost } from '../wire/stop.js';
 import { joinPaths } from './join_paths.js';
 import { VideoSender } from '../video/video.js';
 import { View } from '../ui/view.js';
-import { INITIAL, reduce, touchOf, wish } from '../ui/session.js';
+import { INITIAL, reduce, requestOf, touchOf } from '../ui/session.js';
 
 const TICK_MS = 33;
 const STOP_TICK_MS = 50;
@@ -72,8 +72,8 @@ const view = new View(document, window, {
   onRelease: () => dispatch({ type: 'release' }),
   onStop: () => dispatch({ type: 'stop', now: clock.now() }),
   onCalibrate: (what) => dispatch({ type: 'calibrate', what }),
-  onPath: (wished) => choosePath(wished, 'operator'),
-  onWish: () => dispatch({ type: 'ask', what: wish(state).what, now: clock.now() }),
+  onPath: (requested) => choosePath(requested, 'operator'),
+  onRequest: () => dispatch({ type: 'ask', what: requestOf(state).what, now: clock.now() }),
   onSound: () => {
     feedback.unlock();
     feedback.sound = !feedback.sound;
@@ -206,7 +206,7 @@ function perform(effect) {
 async function welcomed(welcome) {
   try {
     const words = await camera.settle(welcome);
-    identity.video = await video.prepare(welcome, paths.wish === 'JPEG');
+    identity.video = await video.prepare(welcome, paths.requested === 'JPEG');
     phone.log(`${identity.device}: ${words}, ${identity.video}`);
     pace.begin(welcome.frame_rate_hz);
     paths.begin(welcome);
@@ -216,13 +216,13 @@ async function welcomed(welcome) {
 }
 
 /**
- * @param {PathChoice['wish']} wish
+ * @param {PathChoice['wish']} requested
  * @param {'operator' | 'supervisor'} by
  */
-function choosePath(wish, by) {
-  paths.choose(wish, by);
-  view.path(wish, by);
-  if (by === 'supervisor') notice(`Pictures by ${wish === 'auto' ? 'the best way' : wish}: chosen by the supervisor`);
+function choosePath(requested, by) {
+  paths.choose(requested, by);
+  view.path(requested, by);
+  if (by === 'supervisor') notice(`Pictures by ${requested === 'auto' ? 'the best way' : requested}: chosen by the supervisor`);
 }
 
 async function comeBack() {

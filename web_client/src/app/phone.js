@@ -1,4 +1,4 @@
-/** The phone's two links and what travels on them: who we are, motion, touch, pictures, wishes. */
+/** The phone's two links and what travels on them: who we are, motion, touch, pictures, requests. */
 
 /** @import {Calibrate, Command, Hello, PathChoice, Sight, ToPage, Welcome} from '../wire/protocol_types.js' */
 /** @import {Motion, Received, Touch} from '../wire/protocol.js' */

@@ -52,7 +52,7 @@ const link = new Link(socketUrl('ws/supervisor', document.baseURI), {
 }, links);
 
 const view = new BoardView(document, {
-  onWish: (what) => void link.sendMessage(commandOf(what, 0, serverTime)),
+  onRequest: (what) => void link.sendMessage(commandOf(what, 0, serverTime)),
   onStop: () => {
     dispatch({ type: 'stop', now: clock.now() });
     sendStop();

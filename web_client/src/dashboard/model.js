@@ -182,10 +182,10 @@ export function shownMode(board) {
 }
 
 /**
- * Which wishes make sense now.
+ * Which requests make sense now.
  * @param {Board} board
  */
-export function wishes(board) {
+export function requests(board) {
   const mode = shownMode(board);
   return {
     arm: mode === 'DISARMED' && board.status?.ready === true,

@@ -14,10 +14,10 @@ export class PathSelect extends Elements {
   constructor(document, send, now) {
     super(document);
     this.now = now;
-    this.wishedMs = -Infinity;
+    this.requestedMs = -Infinity;
     this.select = /** @type {HTMLSelectElement} */ (this.find('path-wish'));
     this.select.addEventListener('change', () => {
-      this.wishedMs = now();
+      this.requestedMs = now();
       send({ type: 'path', wish: /** @type {PathChoice['wish']} */ (this.select.value), by: 'supervisor' });
     });
   }
@@ -26,8 +26,8 @@ export class PathSelect extends Elements {
   take(choice) {
     const { select } = this;
     select.disabled = choice === null;
-    const wish = choice?.wish ?? 'auto';
-    if (wish === select.value) this.wishedMs = -Infinity;
-    else if (choice === null || this.now() - this.wishedMs > PATIENCE_MS) select.value = wish;
+    const requested = choice?.wish ?? 'auto';
+    if (requested === select.value) this.requestedMs = -Infinity;
+    else if (choice === null || this.now() - this.requestedMs > PATIENCE_MS) select.value = requested;
   }
 }

@@ -1,4 +1,4 @@
-/** The virtual camera's knobs: what a slider's place means, and what is shown while a wish is on its way. */
+/** The virtual camera's knobs: what a slider's place means, and what is shown while a request is on its way. */
 
 /** @import {RuntimeParameters, Tune, VirtualCameraStatus} from '../wire/protocol_types.js' */
 
@@ -13,7 +13,7 @@ const FASTEST_M_S = 5;
 const LIMIT_STEP = 0.1;
 /** Of a knob that is still being turned, only the last value is sent [ms]. */
 const SETTLE_MS = 200;
-/** A wish that did not come true by then is forgotten, and what stands is shown again [ms]. */
+/** A request that did not come true by then is forgotten, and what stands is shown again [ms]. */
 export const PATIENCE_MS = 1500;
 
 const NOTHING = { cutoff_hz: null, mode: null, adaptive_beta: null, max_speed_m_s: null, guard: null };
@@ -58,8 +58,8 @@ export function words(knobs) {
   };
 }
 
-/** Wishes under way: shown in place of what stands, until they stand or patience ends. */
-export class Wishes {
+/** Requests under way: shown in place of what stands, until they stand or patience ends. */
+export class PendingTunes {
   constructor() {
     /** @type {Map<string, { value: unknown, atMs: number, sent: boolean }>} */
     this.pending = new Map();
@@ -79,14 +79,14 @@ export class Wishes {
    * @returns {Tune | null}
    */
   due(now) {
-    const settled = [...this.pending].filter(([, wish]) => !wish.sent && now - wish.atMs >= SETTLE_MS);
+    const settled = [...this.pending].filter(([, tune]) => !tune.sent && now - tune.atMs >= SETTLE_MS);
     if (settled.length === 0) return null;
-    for (const [, wish] of settled) Object.assign(wish, { sent: true, atMs: now });
+    for (const [, tune] of settled) Object.assign(tune, { sent: true, atMs: now });
     return { ...NOTHING, ...Object.fromEntries(settled.map(([name, { value }]) => [name, value])), type: 'tune' };
   }
 
   /**
-   * The knobs to show, and those wishes forgotten that came true or never will.
+   * The knobs to show, and those requests forgotten that came true or never will.
    * @param {RuntimeParameters} standing
    * @param {number} now [ms]
    * @returns {RuntimeParameters}
@@ -112,7 +112,7 @@ export class KnobPanel extends Elements {
     super(document);
     this.send = send;
     this.now = now;
-    this.wishes = new Wishes();
+    this.tunes = new PendingTunes();
     /** @type {RuntimeParameters | null} */
     this.standing = null;
     this.listen('knob-mode', (input) => ({ mode: /** @type {RuntimeParameters['mode']} */ (input.value) }));
@@ -128,7 +128,7 @@ export class KnobPanel extends Elements {
    */
   listen(id, changeOf) {
     this.input(id).addEventListener('input', () => {
-      this.wishes.turn(changeOf(this.input(id)), this.now());
+      this.tunes.turn(changeOf(this.input(id)), this.now());
       this.render();
     });
   }
@@ -148,14 +148,14 @@ export class KnobPanel extends Elements {
 
   /** Sends what has settled; call it now and then. */
   tick() {
-    const tune = this.wishes.due(this.now());
+    const tune = this.tunes.due(this.now());
     if (tune !== null) this.send(tune);
   }
 
   render() {
     /** @type {HTMLFieldSetElement} */ (this.find('knobs')).disabled = this.standing === null;
     if (this.standing === null) return;
-    const knobs = this.wishes.over(this.standing, this.now());
+    const knobs = this.tunes.over(this.standing, this.now());
     const { cutoff, adaptive, limit } = words(knobs);
     this.place('knob-mode', knobs.mode);
     this.place('knob-cutoff', String(placeOfHz(knobs.cutoff_hz)), cutoff);

@@ -9,10 +9,10 @@ import { modeWords, rampWords } from '../ui/mode_words.js';
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
-import { REMEMBERED, shownMode, wishes } from './model.js';
+import { REMEMBERED, requests, shownMode } from './model.js';
 
-/** @typedef {{ onWish: (what: 'arm' | 'disarm' | 'reset') => void, onStop: () => void, onVirtual: () => void,
- *   onRecord: () => void, onCode: () => void, onReload: () => void }} Wishes */
+/** @typedef {{ onRequest: (what: 'arm' | 'disarm' | 'reset') => void, onStop: () => void, onVirtual: () => void,
+ *   onRecord: () => void, onCode: () => void, onReload: () => void }} Requests */
 
 const ERROR_COLOUR = '#7cc4ff';
 const SIGMA_COLOUR = '#fbbf24';
@@ -20,12 +20,12 @@ const SIGMA_COLOUR = '#fbbf24';
 export class BoardView extends Elements {
   /**
    * @param {Document} document
-   * @param {Wishes} handlers
+   * @param {Requests} handlers
    */
   constructor(document, handlers) {
     super(document);
     for (const what of /** @type {const} */ (['arm', 'disarm', 'reset'])) {
-      this.find(what).addEventListener('click', () => handlers.onWish(what));
+      this.find(what).addEventListener('click', () => handlers.onRequest(what));
     }
     for (const type of ['pointerdown', 'click']) {
       for (const id of ['stop', 'last-stop-button']) this.find(id).addEventListener(type, handlers.onStop);
@@ -69,7 +69,7 @@ export class BoardView extends Elements {
     this.text('left', rampWords(left === null ? null : Math.ceil(left / 1000), board.status));
     this.text('reason', board.heard ? board.status?.reason ?? '' : '');
     this.text('robot', board.status?.robot ?? '–');
-    for (const [what, can] of Object.entries(wishes(board))) {
+    for (const [what, can] of Object.entries(requests(board))) {
       /** @type {HTMLButtonElement} */ (this.find(what)).disabled = !can;
     }
     this.show('last-stop', board.known);

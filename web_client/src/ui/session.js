@@ -338,7 +338,7 @@ export function touchOf(state) {
  * @param {State} state
  * @returns {{ what: 'arm' | 'disarm', enabled: boolean }}
  */
-export function wish(state) {
+export function requestOf(state) {
   const mode = shownMode(state);
   if (state.standby) return { what: 'arm', enabled: false };
   if (mode === 'ARMED' || mode === 'TRACK' || mode === 'COAST' || mode === 'HOLD') return { what: 'disarm', enabled: true };

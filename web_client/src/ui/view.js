@@ -3,7 +3,7 @@
 /** @import {State, ShownMode} from './session_types.js' */
 /** @import {Advice} from '../wire/problems.js' */
 /** @import {Calibrate} from '../wire/protocol_types.js' */
-/** @import {PathWish} from '../video/video_paths.js' */
+/** @import {RequestedPath} from '../video/video_paths.js' */
 
 import { gapWords, modeWords, rampWords } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
@@ -11,22 +11,22 @@ import { attachHold } from './hold_button.js';
 import { leadWords } from './leading_choice.js';
 import { standbyWords } from './standby.js';
 import { endWords, stopWords } from '../wire/stop.js';
-import { goesOn, shownMode, untilRamp, wish } from './session.js';
+import { goesOn, requestOf, shownMode, untilRamp } from './session.js';
 
-const WISH_WORDS = { arm: 'Arm', disarm: 'Disarm' };
+const REQUEST_WORDS = { arm: 'Arm', disarm: 'Disarm' };
 const MOST_REFUSALS = 4;
 const MOST_WARNINGS = 2;
 
 /**
- * @typedef {object} Wishes
+ * @typedef {object} Requests
  * @property {() => void} onStart
  * @property {() => void} onReload
  * @property {() => void} onPress
  * @property {() => void} onRelease
  * @property {() => void} onStop
- * @property {() => void} onWish
+ * @property {() => void} onRequest
  * @property {(what: Calibrate['what']) => void} onCalibrate
- * @property {(wished: PathWish) => void} onPath
+ * @property {(requested: RequestedPath) => void} onPath
  * @property {() => void} onSound
  * @property {(() => void) | null} onFull Null where the page can't fill the screen.
  */
@@ -35,9 +35,9 @@ export class View {
   /**
    * @param {Document} document
    * @param {Window} window
-   * @param {Wishes} wishes
+   * @param {Requests} requests
    */
-  constructor(document, window, wishes) {
+  constructor(document, window, requests) {
     /** @param {string} id */
     const find = (id) => {
       const element = document.getElementById(id);
@@ -47,23 +47,23 @@ export class View {
     this.find = find;
     this.document = document;
     this.start = /** @type {HTMLButtonElement} */ (find('start'));
-    this.wish = /** @type {HTMLButtonElement} */ (find('wish'));
+    this.requestButton = /** @type {HTMLButtonElement} */ (find('wish'));
     this.video = /** @type {HTMLVideoElement} */ (find('preview'));
-    this.start.addEventListener('click', wishes.onStart);
-    find('reload').addEventListener('click', wishes.onReload);
-    this.wish.addEventListener('click', wishes.onWish);
-    find('sound').addEventListener('click', wishes.onSound);
+    this.start.addEventListener('click', requests.onStart);
+    find('reload').addEventListener('click', requests.onReload);
+    this.requestButton.addEventListener('click', requests.onRequest);
+    find('sound').addEventListener('click', requests.onSound);
     for (const type of ['pointerdown', 'click']) {
-      for (const id of ['stop', 'last-stop-button']) find(id).addEventListener(type, wishes.onStop);
+      for (const id of ['stop', 'last-stop-button']) find(id).addEventListener(type, requests.onStop);
     }
     const path = /** @type {HTMLSelectElement} */ (find('path-wish'));
-    path.addEventListener('change', () => wishes.onPath(/** @type {PathWish} */ (path.value)));
-    const { onFull } = wishes;
+    path.addEventListener('change', () => requests.onPath(/** @type {RequestedPath} */ (path.value)));
+    const { onFull } = requests;
     find('full').hidden = onFull === null;
     if (onFull !== null) find('full').addEventListener('click', onFull);
-    attachHold(find('hold'), { window, document }, wishes);
+    attachHold(find('hold'), { window, document }, requests);
     this.text('host', window.location.host);
-    this.calibration = new CalibrationView(document, find, window.location.origin, wishes.onCalibrate);
+    this.calibration = new CalibrationView(document, find, window.location.origin, requests.onCalibrate);
   }
 
   /** @param {MediaStream} stream */
@@ -77,9 +77,9 @@ export class View {
     this.find('sound').setAttribute('aria-pressed', String(on));
   }
 
-  /** @param {PathWish} wish @param {string} by */
-  path(wish, by) {
-    /** @type {HTMLSelectElement} */ (this.find('path-wish')).value = wish;
+  /** @param {RequestedPath} requested @param {string} by */
+  path(requested, by) {
+    /** @type {HTMLSelectElement} */ (this.find('path-wish')).value = requested;
     this.text('path-by', by === 'supervisor' ? 'By supervisor' : 'Path');
   }
 
@@ -142,10 +142,10 @@ export class View {
     this.countdown(untilRamp(state));
     this.notice(state);
     this.health(state);
-    const { what, enabled } = wish(state);
-    this.text('wish', WISH_WORDS[what]);
+    const { what, enabled } = requestOf(state);
+    this.text('wish', REQUEST_WORDS[what]);
     this.data('wish', 'what', what);
-    this.wish.disabled = !enabled;
+    this.requestButton.disabled = !enabled;
     this.find('stop').classList.toggle('asked', state.stopping);
     this.hold(state, mode);
     const calm = mode === 'DISARMED' || mode === 'STOPPED';

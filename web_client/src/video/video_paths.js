@@ -11,7 +11,7 @@ import { RtcRefused } from './rtc.js';
 import { Retry } from './retry.js';
 
 /** @typedef {'WebRTC' | 'WebSocket' | 'JPEG' | '–'} PathName */
-/** What a person wants. @typedef {PathChoice['wish']} PathWish */
+/** What a person wants. @typedef {PathChoice['wish']} RequestedPath */
 
 /**
  * @typedef {object} Surroundings
@@ -32,9 +32,9 @@ export class VideoPaths {
     this.surroundings = surroundings;
     /** @type {Welcome | null} */
     this.welcome = null;
-    /** @type {PathWish} */
-    this.wish = 'auto';
-    /** Whose wish. @type {PathChoice['by']} */
+    /** @type {RequestedPath} */
+    this.requested = 'auto';
+    /** Whose request. @type {PathChoice['by']} */
     this.by = '';
     this.isConnecting = false;
     this.fastTries = new Retry(surroundings);
@@ -62,7 +62,7 @@ export class VideoPaths {
   }
 
   tell() {
-    this.surroundings.tell({ type: 'path', wish: this.wish, by: this.by });
+    this.surroundings.tell({ type: 'path', wish: this.requested, by: this.by });
   }
 
   /** The server has gone. */
@@ -75,19 +75,19 @@ export class VideoPaths {
 
   /**
    * The last one to choose is obeyed.
-   * @param {PathWish} wish
+   * @param {RequestedPath} requested
    * @param {PathChoice['by']} by
    */
-  choose(wish, by) {
+  choose(requested, by) {
     const { rtc, video } = this.surroundings;
     const { welcome } = this;
-    Object.assign(this, { wish, by });
+    Object.assign(this, { requested, by });
     if (welcome === null) return;
     this.tell();
     this.fastTries.reset();
     this.encoderTries.reset();
-    if (wish === 'WebSocket' || wish === 'JPEG') rtc.close();
-    if ((wish === 'JPEG') !== (video.encoder?.name === 'JPEG')) void video.prepare(welcome, wish === 'JPEG');
+    if (requested === 'WebSocket' || requested === 'JPEG') rtc.close();
+    if ((requested === 'JPEG') !== (video.encoder?.name === 'JPEG')) void video.prepare(welcome, requested === 'JPEG');
     else video.requestKey();
     this.seek();
   }
@@ -95,8 +95,8 @@ export class VideoPaths {
   /** Connects, if the fast path is wanted and not there. */
   seek() {
     const { rtc, say } = this.surroundings;
-    if (this.wish === 'WebSocket' || this.wish === 'JPEG' || rtc.isOpen) return;
-    if (rtc.isAble && (this.wish === 'WebRTC' || rtc.pictures.haveRecords)) void this.connect();
+    if (this.requested === 'WebSocket' || this.requested === 'JPEG' || rtc.isOpen) return;
+    if (rtc.isAble && (this.requested === 'WebRTC' || rtc.pictures.haveRecords)) void this.connect();
     else say('no WebRTC with records in this browser: pictures go by websocket');
   }
 
@@ -158,7 +158,7 @@ export class VideoPaths {
       if (why === '') return;
       rtc.close();
       this.lost(why);
-    } else if (this.wish === 'auto' && this.complaints.ofEncoder(now, video.encodeMs) && this.name === 'WebSocket') {
+    } else if (this.requested === 'auto' && this.complaints.ofEncoder(now, video.encodeMs) && this.name === 'WebSocket') {
       this.complaints.slow.reset();
       void this.encodeLess();
     }
@@ -189,7 +189,7 @@ export class VideoPaths {
   /** @param {string} why The fast path has ended: the websocket takes over, with a key; later, another try. */
   lost(why) {
     const { video, say } = this.surroundings;
-    if (this.welcome === null || this.wish === 'WebSocket' || this.wish === 'JPEG') return;
+    if (this.welcome === null || this.requested === 'WebSocket' || this.requested === 'JPEG') return;
     video.requestKey();
     say(`WebRTC: ${why}; pictures go by websocket`);
     this.fastTries.failed(() => void this.connect());
@@ -204,7 +204,7 @@ export class VideoPaths {
     await video.prepare(welcome, true);
     this.encoderTries.failed(() => {
       this.encoderTries.succeeded();
-      if (welcome === this.welcome && this.wish === 'auto') void video.prepare(welcome);
+      if (welcome === this.welcome && this.requested === 'auto') void video.prepare(welcome);
     });
   }
 }

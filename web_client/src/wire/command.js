@@ -1,8 +1,8 @@
-/** What a person asks for, and how long ago: a link that was away must not carry out an old wish. */
+/** What a person asks for, and how long ago: a link that was away must not carry out an old request. */
 
 /** @import {Command} from './protocol_types.js' */
 
-/** An unanswered wish is given up: whoever flies later is somebody else [ms]. */
+/** An unanswered request is given up: whoever flies later is somebody else [ms]. */
 export const GIVE_UP_MS = 3000;
 /** A device that sleeps stops the page's clock; the wall's goes on [ms]. */
 const SLEPT_MS = 1000;

@@ -1,4 +1,4 @@
-/** Who is this page to the server? Exchanges the key of a link for a cookie, and POSTs wishes. */
+/** Who is this page to the server? Exchanges the key of a link for a cookie, and POSTs requests. */
 
 import { Problem } from './problems.js';
 

@@ -16,7 +16,7 @@
  */
 
 /**
- * Page → server: a wish of a person; the control process decides. `key_frame` travels server → page: the next FRAME must be decodable alone.
+ * Page → server: a request of a person; the control process decides. `key_frame` travels server → page: the next FRAME must be decodable alone.
  * @typedef {object} Command
  * @property {'command'} type
  * @property {'arm' | 'disarm' | 'stop' | 'reset' | 'key_frame'} what

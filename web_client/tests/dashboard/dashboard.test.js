@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from '../../src/dashboard/format.js';
-import { EMPTY, REMEMBERED, reduce, shownMode, wishes } from '../../src/dashboard/model.js';
+import { EMPTY, REMEMBERED, reduce, requests, shownMode } from '../../src/dashboard/model.js';
 import { INVITE_LIFE_MS, PhoneCard } from '../../src/dashboard/phone_card.js';
 import { Problem } from '../../src/wire/problems.js';
 import { niceEnd } from '../../src/dashboard/sparkline.js';
@@ -59,10 +59,10 @@ test('the history keeps the last 200 samples', () => {
 });
 
 test('wishes follow the mode', () => {
-  assert.deepEqual(wishes(after({ type: 'welcomed' }, status({ ready: true }))), { arm: true, disarm: false, reset: false });
-  assert.deepEqual(wishes(after({ type: 'welcomed' }, status({ mode: 'HOLD' }))), { arm: false, disarm: true, reset: false });
-  assert.deepEqual(wishes(after({ type: 'welcomed' }, status({ mode: 'STOPPED' }))), { arm: false, disarm: false, reset: true });
-  assert.deepEqual(wishes(after(status({ ready: true }))), { arm: false, disarm: false, reset: false });
+  assert.deepEqual(requests(after({ type: 'welcomed' }, status({ ready: true }))), { arm: true, disarm: false, reset: false });
+  assert.deepEqual(requests(after({ type: 'welcomed' }, status({ mode: 'HOLD' }))), { arm: false, disarm: true, reset: false });
+  assert.deepEqual(requests(after({ type: 'welcomed' }, status({ mode: 'STOPPED' }))), { arm: false, disarm: false, reset: true });
+  assert.deepEqual(requests(after(status({ ready: true }))), { arm: false, disarm: false, reset: false });
 });
 
 test('a fatal refusal blocks the page, another passes by', () => {

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { KnobPanel, PATIENCE_MS, Wishes, hzOf, limitOf, placeOfHz, placeOfLimit, words } from '../../src/dashboard/runtime_parameters.js';
+import { KnobPanel, PATIENCE_MS, PendingTunes, hzOf, limitOf, placeOfHz, placeOfLimit, words } from '../../src/dashboard/runtime_parameters.js';
 
 /** @import {RuntimeParameters, Tune} from '../../src/wire/protocol_types.js' */
 
@@ -32,7 +32,7 @@ test('knobs are said with their units', () => {
 });
 
 test('of a knob being turned only the last value is sent, alone', () => {
-  const wishes = new Wishes();
+  const wishes = new PendingTunes();
   for (let t = 0; t < 1000; t += 50) {
     wishes.turn({ cutoff_hz: 0.3 + t / 1000 }, t);
     assert.equal(wishes.due(t), null);
@@ -44,7 +44,7 @@ test('of a knob being turned only the last value is sent, alone', () => {
 });
 
 test('a wish is shown until it stands, or until it is clear that it will not', () => {
-  const wishes = new Wishes();
+  const wishes = new PendingTunes();
   wishes.turn({ mode: 'off' }, 0);
   assert.equal(wishes.over(STANDING, 100).mode, 'off');
   wishes.due(200);

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { INITIAL, STATUS_LIFE_MS, goesOn, reduce, shownMode, touchOf, untilRamp, wish } from '../../src/ui/session.js';
+import { INITIAL, STATUS_LIFE_MS, goesOn, reduce, requestOf, shownMode, touchOf, untilRamp } from '../../src/ui/session.js';
 import { gapWords } from '../../src/ui/mode_words.js';
 import { Problem } from '../../src/wire/problems.js';
 import { endWords } from '../../src/wire/stop.js';
@@ -176,18 +176,18 @@ test('a change of mode is felt once', () => {
 
 test('arming is offered when the server is ready and nobody holds', () => {
   const ready = status({ ready: true });
-  assert.deepEqual(wish(after(...UP).state), { what: 'arm', enabled: false });
-  assert.deepEqual(wish(after(...UP, ready).state), { what: 'arm', enabled: true });
-  assert.deepEqual(wish(after(...UP, ready, { type: 'press' }).state), { what: 'arm', enabled: false });
-  assert.deepEqual(wish(after(...UP, ready, { type: 'tick', now: 9e9 }).state), { what: 'arm', enabled: false });
+  assert.deepEqual(requestOf(after(...UP).state), { what: 'arm', enabled: false });
+  assert.deepEqual(requestOf(after(...UP, ready).state), { what: 'arm', enabled: true });
+  assert.deepEqual(requestOf(after(...UP, ready, { type: 'press' }).state), { what: 'arm', enabled: false });
+  assert.deepEqual(requestOf(after(...UP, ready, { type: 'tick', now: 9e9 }).state), { what: 'arm', enabled: false });
 });
 
 test('what is armed can be disarmed; what is stopped waits for a supervisor', () => {
   for (const mode of /** @type {const} */ (['ARMED', 'TRACK', 'HOLD'])) {
-    assert.deepEqual(wish(after(...UP, status({ mode })).state), { what: 'disarm', enabled: true });
+    assert.deepEqual(requestOf(after(...UP, status({ mode })).state), { what: 'disarm', enabled: true });
   }
   const stopped = status({ mode: 'STOPPED' });
-  assert.deepEqual(wish(after(...UP, stopped).state), { what: 'arm', enabled: false });
+  assert.deepEqual(requestOf(after(...UP, stopped).state), { what: 'arm', enabled: false });
 });
 
 test('a refusal is a passing remark, a fatal one ends or explains', () => {
@@ -290,7 +290,7 @@ const ASIDE = [{ type: 'start' }, { type: 'started' },
 test('a phone that does not lead shows the robot’s true mode, may STOP, and neither arms nor holds', () => {
   const aside = after(...ASIDE, status({ mode: 'ARMED', ready: true, people: [person('Anna', { leads: true }), person('me')] }), { type: 'press' });
   assert.equal(shownMode(aside.state), 'ARMED');
-  assert.deepEqual([wish(aside.state).enabled, aside.state.held, standbyWords(aside.state).slice(0, 11)], [false, false, 'Anna leads.']);
+  assert.deepEqual([requestOf(aside.state).enabled, aside.state.held, standbyWords(aside.state).slice(0, 11)], [false, false, 'Anna leads.']);
   assert.deepEqual(after(...ASIDE, { type: 'stop', now: 0 }).kinds, ['command', 'post_stop', 'touch']);
 });
 

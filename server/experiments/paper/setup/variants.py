@@ -61,19 +61,19 @@ class VariantRequest:
         return self != VariantRequest()
 
 
-def ours(leader: Leader, wishes: VariantRequest, vci: VirtualCameraMode = "off") -> Variant:
-    """This project's way: relative filter and feed-forward, unless wished otherwise.
+def ours(leader: Leader, request: VariantRequest, vci: VirtualCameraMode = "off") -> Variant:
+    """This project's way: relative filter and feed-forward, unless requested otherwise.
 
-    `vci` is that of the experiment, if none is wished.
+    `vci` is that of the experiment, if none is requested.
     """
-    hz = wishes.cutoff_hz
+    hz = request.cutoff_hz
     return Variant(
         name="ours",
-        estimator=wishes.estimator or "relative",
-        gains=wishes.gains or leader.gains,
-        vci=wishes.vci or vci,
+        estimator=request.estimator or "relative",
+        gains=request.gains or leader.gains,
+        vci=request.vci or vci,
         vci_taus=PAPER_TAUS if hz is None else time_constants(hz),
-        feedforward=wishes.feedforward is not False,
+        feedforward=request.feedforward is not False,
         allocation="torque_first",
     )
 
@@ -104,13 +104,13 @@ def config_of(robot_file: RobotFile, variant: Variant, leader: Leader) -> Teleop
     )
 
 
-def check_gains(robot_file: RobotFile, name: str, wished: str | None = None) -> None:
+def check_gains(robot_file: RobotFile, name: str, requested: str | None = None) -> None:
     """Whether the robot has what is to be flown.
 
     Raises:
         RefusedError: it lacks a set; says which there are.
     """
-    needed = {WITHOUT_EKF.gains, WITH_EKF.gains, *([wished] if wished else [])}
+    needed = {WITHOUT_EKF.gains, WITH_EKF.gains, *([requested] if requested else [])}
     for gains in sorted(needed - set(robot_file.gains)):
         has = ", ".join(robot_file.gains)
         raise RefusedError(f"{name}: gains: {gains!r} is not one of its sets: {has}")
