@@ -7,8 +7,9 @@ whose spectrum is that of gusts and hands, by feedback alone:
 
     J² = (1/π) ∫ |P(jω) / (1 + L(jω))|² · 2 ω₀ / (ω² + ω₀²) dω,   P = 1 / (m s² + c s + k)
 
-Margins hold with and without feed-forward, whose felt pull is another loop. Beside gain, phase and
-delay, L keeps off −1, about as far as a loop that has both margins just so (`MarginGoals.modulus`).
+Margins hold with and without feed-forward, whose measured pull is another loop. Beside gain, phase
+and delay, L keeps off −1, about as far as a loop that has both margins just so
+(`MarginGoals.modulus`).
 """
 
 from __future__ import annotations

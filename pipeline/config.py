@@ -91,7 +91,7 @@ class MarginsConfig:
     frame_s: float = 1.0 / 30.0
     """Between pictures."""
     unfelt: float = 0.2
-    """Share of its own motion that the robot's IMU may feel wrongly, and only the camera mends."""
+    """Share of its own motion that the robot's IMU may get wrong, and only the camera mends."""
     correction_p: float = 10.0
     """How fast a filter believes the camera's place [rad/s]: 5 in depth, 14 to the sides."""
     correction_R: float = 1.3

@@ -201,8 +201,8 @@ class GravityTestConfig:
     """Share of the evidence on the gyroscope's axes that stays when more comes."""
     rate_evidence: float = 16.0
     """Log of the odds beyond which a way to arrange them is impossible."""
-    rate_felt_rad: float = 0.1
-    """How far hands that accelerate tilt what is felt of gravity."""
+    rate_gravity_rad: float = 0.1
+    """How far hands that accelerate tilt what is measured of gravity."""
     rate_seen_rad: float = 0.02
     """Of turns seen in pictures: attitude, and ..."""
     rate_seen_share: float = 0.2

@@ -1,4 +1,4 @@
-"""What an IMU felt, in the order of its times, however the samples arrived."""
+"""What an IMU measured, in the order of its times, however the samples arrived."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class ImuStream:
         return True
 
     def at(self, t: float) -> Array:
-        """What was felt at `t` [s] (6,): between the samples around it, or the nearest.
+        """What was measured at `t` [s] (6,): between the samples around it, or the nearest.
 
         Raises:
             IndexError: there is no sample.

@@ -66,7 +66,7 @@ class Acting(Protocol):
         """From now on the thrusters also give this (6,) [N, N m]: a disturbance."""
 
     def watch(self, obeyed: bool, body: BodyImu, h: float) -> None:
-        """Whether the robot `obeyed` since the last period, and what it felt."""
+        """Whether the robot `obeyed` since the last period, and what its IMU measured."""
 
     def observe(self, known: Situation, now: Moment) -> None:
         """Carry on what is learnt and where the robot is, whatever is done."""

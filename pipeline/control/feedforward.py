@@ -6,9 +6,9 @@ The reference is rigid in v, so the phone's accelerometer and gyroscope tell how
     F = m a_r − F_pull,   τ = J ω̇_v
 
 F_pull is what else pulls at the body (suspension, air, a push) and has changed since the start:
-what its accelerometer feels, less what its thrusters give. Without it a suspended robot is better
-off without feed-forward: below the pendulum's frequency (the AMES's is 0.43 Hz, a hand's 0.3 Hz)
-the cable wants more force than the mass, and with the opposite sign.
+what its accelerometer measures, less what its thrusters give. Without it a suspended robot is
+better off without feed-forward: below the pendulum's frequency (the AMES's is 0.43 Hz, a hand's
+0.3 Hz) the cable wants more force than the mass, and with the opposite sign.
 
 a_r is band-passed: at the low end go the accelerometer's bias and the error of the vertical, at the
 high end its rounding and the hand's tremor. F_pull is low-passed.
@@ -66,8 +66,10 @@ class FeedForward:
         self._thrust_in_f = thrust + low_pass.share(h / self._config.thrust_lag_s) * (
             R_fb @ force_in_b - thrust
         )
-        felt = self._m * (R_fb @ f_bf_in_b + G_IN_F) - self._thrust_in_f
-        self._pull_in_f = pull + low_pass.share(2.0 * pi * self._config.pull_hz * h) * (felt - pull)
+        measured = self._m * (R_fb @ f_bf_in_b + G_IN_F) - self._thrust_in_f
+        self._pull_in_f = pull + low_pass.share(2.0 * pi * self._config.pull_hz * h) * (
+            measured - pull
+        )
 
     def wrench(
         self,

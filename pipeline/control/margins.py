@@ -1,7 +1,7 @@
 """How much delay, gain and phase the control loop can lose before it goes unstable, axis by axis.
 
 Open loop at the thrusts' command, by frequency response: thruster delay and lag, the 200 Hz hold,
-the axis' mass, damping and stiffness, PID on a measurement M(s), and feed-forward's felt pull.
+the axis' mass, damping and stiffness, PID on a measurement M(s), and feed-forward's measured pull.
 
 M(s) by estimator, T the picture's age when it arrives, F the time between pictures, t the age of
 the body's IMU:
@@ -10,8 +10,8 @@ the body's IMU:
     paper, relative  e^{-st} (1 − ε H) + ε H e^{-sT} hold_F(s)
 
 A picture is fused when it was taken and the IMUs are replayed since, so the robot's own motion
-comes through as fresh as its IMU, at any T. Assumed: a share ε of it is felt wrongly (scale, lever
-arm, alignment), and that is mended by the late camera with the filter's bandwidth, H(s).
+comes through as fresh as its IMU, at any T. Assumed: a share ε of it is measured wrongly (scale,
+lever arm, alignment), and that is mended by the late camera with the filter's bandwidth, H(s).
 """
 
 from __future__ import annotations
@@ -97,7 +97,8 @@ class Loop:
         control = (gains.Kp[axis] + Ki / S) * held + gains.Kd[axis] * S * rated
         poles = int(Ki > 0.0)
         if self.feedforward is not None and axis < 3:
-            control, poles = self._feeling(axis, control, sensing, self.feedforward), poles + 1
+            control = self._with_feedforward(axis, control, sensing, self.feedforward)
+            poles += 1
         d = self.dynamics
         m, k = float(d.inertia[axis]), float(d.stiffness[axis])
         c = max(float(d.damping[axis]), LEAST_DAMPING * 2.0 * sqrt(k * m))
@@ -112,9 +113,9 @@ class Loop:
         if sensing.estimator == "none":
             rated: Complex = seen * _hold(frame) / (1.0 + self.no_filter.tau * S)
             return seen, rated
-        felt: Complex = np.exp(-S * sensing.body_age)
+        imu: Complex = np.exp(-S * sensing.body_age)
         share = self.config.unfelt * self._correction(axis)
-        known: Complex = felt * (1.0 - share) + share * seen
+        known: Complex = imu * (1.0 - share) + share * seen
         return known, known
 
     def _correction(self, axis: int) -> Complex:
@@ -137,7 +138,7 @@ class Loop:
         turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn]))
         return np.asarray(Kp * turned / (1.0 + (Kp + Kd * S) * known * turned))
 
-    def _feeling(
+    def _with_feedforward(
         self, axis: int, control: Complex, sensing: Sensing, config: FeedForwardConfig
     ) -> Complex:
         """Control with the pull balanced that accelerometer and thrust model tell apart."""

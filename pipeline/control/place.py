@@ -2,7 +2,7 @@
 
 Pictures tell of the robot relative to the phone, and two motion sensors integrated twice drift by
 decimetres in seconds. But what a robot hangs from pulls it back to its rest by K x, and that pull
-is known, with that of its damping D: what the accelerometer feels, less what the thrusters give,
+is known, with that of its damping D: what the accelerometer measures, less what the thrusters give,
 
     y = x + K⁻¹ D v = K⁻¹ (R_fb F − m (R_fb f_b + g)).
 
@@ -26,7 +26,7 @@ from pipeline.frames import Array
 from pipeline.robot import Robot
 
 REST_S: float = 5.0
-"""How fast is learnt what is felt at rest, thrusters off [s]: two swings of the AMES."""
+"""How fast is learnt what is measured at rest, thrusters off [s]: two swings of the AMES."""
 POLES: float = 3.0
 """ω [1/s]: the pendulum's own is 2.7. Faster, thrusters' lag and damping count for motion; slower,
 an error of the vertical, which the accelerometer takes for a / ω²."""

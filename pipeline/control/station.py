@@ -30,7 +30,7 @@ class StationKeeping:
         """At rest."""
         self._config, self._axes = config, robot.axes[:3]
         self._Kp, self._Kd = self._axes * gains.Kp[:3], self._axes * gains.Kd[:3]
-        self._a_slow_in_f, self._felt_s = np.zeros(3), 0.0
+        self._a_slow_in_f, self._averaged_s = np.zeros(3), 0.0
         self._integrated_in_f: Array = np.zeros(3)  # high-passed: what is known without anybody
         self.v_in_f: Array = np.zeros(3)
         """Velocity of the body [m/s]."""
@@ -50,8 +50,8 @@ class StationKeeping:
         """
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         # a mean at first: an offset must not count as speed until the high pass has forgotten it
-        self._felt_s += h
-        share = max(low_pass.share(h / self._config.bias_s), h / self._felt_s)
+        self._averaged_s += h
+        share = max(low_pass.share(h / self._config.bias_s), h / self._averaged_s)
         self._a_slow_in_f = self._a_slow_in_f + share * (a_in_f - self._a_slow_in_f)
         v_in_f = self._integrated_in_f + h * (a_in_f - self._a_slow_in_f)
         self._integrated_in_f = v_in_f * exponential(-h / self._config.rest_s)

@@ -180,8 +180,8 @@ class ThrustActing:
             wrench_in_b = self._tracking.wrench(  # Eq. (20)
                 known, reference, leashed.error, now.h, shares_in_f
             )
-            felt_in_b = now.body.a_m_bf_in_b - known.relative.f_bf_in_b
-            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, felt_in_b, now.h)
+            accelerometer_bias_in_b = now.body.a_m_bf_in_b - known.relative.f_bf_in_b
+            self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, accelerometer_bias_in_b, now.h)
         elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
             wrench_in_b = self._hold.wrench(omega_m_bf_in_b, now.h)
             # what is no place any more does not become one again: where it went meanwhile is lost

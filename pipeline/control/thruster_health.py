@@ -1,12 +1,12 @@
-"""Which thruster does not give what it is told, by what the body feels.
+"""Which thruster does not give what it is told, by what the body's IMU measures.
 
-The robot's accelerometer and gyroscope feel the wrench that acts on it (gravity apart); commands,
-lag and delay say what its thrusters give. What is left over, suspension, air, a hand, a wall, is
-compared between now and half a second before: a thruster that fails adds a change along its own
-column of A in proportion to its thrust, force and torque together, and hardly anything else does.
-So for each thruster, and each of two times of failing (a moment ago, long ago), a likelihood ratio
-against "all as usual", where *usual* contains changes of what else pulls, thrusters that give 15 %
-more or less than told, lags and bodies that are not as told. A change that no single thruster
+The robot's accelerometer and gyroscope measure the wrench that acts on it (gravity apart);
+commands, lag and delay say what its thrusters give. What is left over, suspension, air, a hand, a
+wall, is compared between now and half a second before: a thruster that fails adds a change along
+its own column of A in proportion to its thrust, force and torque together, and hardly anything else
+does. So for each thruster, and each of two times of failing (a moment ago, long ago), a likelihood
+ratio against "all as usual", where *usual* contains changes of what else pulls, thrusters that give
+15 % more or less than told, lags and bodies that are not as told. A change that no single thruster
 explains, a push or a contact, names none: a wrong name is worse than none.
 
 Willsky and Jones 1976 (generalised likelihood ratio), over windows in place of a recursion.
@@ -58,7 +58,7 @@ DEAD: Final = 0.3
 ASIDE: Final = 0.10
 """6°: from a missing torque to that of the thruster."""
 TORQUE: Final = slice(10, 13)
-"""Columns of the rows: sum of the felt torque less the thrusters' own."""
+"""Columns of the rows: sum of the measured torque less the thrusters' own."""
 
 
 class ThrusterHealth:
@@ -96,7 +96,7 @@ class ThrusterHealth:
         self.start()
 
     def start(self) -> None:
-        """What was felt so far does not count: the robot did not obey, or was not free."""
+        """What was measured so far does not count: the robot did not obey, or was not free."""
         self._filled = self._k = self._same = 0
         self._suspect: int | None = None
         self._rows[:] = 0.0

@@ -1,4 +1,4 @@
-"""One period of `thruster_health`, compiled: which single thruster explains what is felt?"""
+"""One period of `thruster_health`, compiled: which single thruster explains what is measured?"""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pipeline.so3_kernels import kernel
 def put_row(
     rows: Array, k: int, A: Array, inertia: Array, omega: Array, f: Array, u: Array, h: float
 ) -> None:
-    """Row k of (n, 16 + 2 m), after row k − 1: what has been felt and predicted until now.
+    """Row k of (n, 16 + 2 m), after row k − 1: what has been measured and predicted until now.
 
-    Sums since the beginning of h [s]; of the felt wrench, of the same less the thrusters', (6,)
+    Sums since the beginning of h [s]; of the measured wrench, of the same less the thrusters', (6,)
     each [N s, N m s]; of thrusts (m,) [N s]; then the thrusts of now (m,) [N], and the sum of the
     gyroscopic torque (3,) [N m s].
 
@@ -82,9 +82,9 @@ def judge(
     h_now, h_before = now[0] - since[0], until[0] - begin[0]
     S, apart = np.zeros((6, 6)), np.empty(6)
     for i in range(6):
-        felt = (now[1 + i] - since[1 + i]) / h_now - (until[1 + i] - begin[1 + i]) / h_before
+        measured = (now[1 + i] - since[1 + i]) / h_now - (until[1 + i] - begin[1 + i]) / h_before
         apart[i] = (now[7 + i] - since[7 + i]) / h_now - (until[7 + i] - begin[7 + i]) / h_before
-        S[i, i] = usual[i] + (errors[2] * felt) ** 2
+        S[i, i] = usual[i] + (errors[2] * measured) ** 2
     thrust, change = np.empty(m), np.empty(m)
     for j in range(m):
         thrust[j] = (now[13 + j] - since[13 + j]) / h_now

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.estimation.sanity import is_felt
+from pipeline.estimation.sanity import is_imu_sample
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel, put_exp, turn
 
@@ -29,7 +29,7 @@ class AccelerometerCheck:
     """One IMU's; feed it each sample."""
 
     def __init__(self) -> None:
-        """Nothing felt."""
+        """No samples yet."""
         self._means: Array = np.zeros((2, 3))
         self._sample, self._scratch = np.empty((2, 3)), np.empty((4, 3))
         self._t = self._t_begun = -np.inf
@@ -37,7 +37,7 @@ class AccelerometerCheck:
     def add(self, t: float, omega: Array, specific_force: Array) -> None:
         """Take a sample of `t` [s]: `omega` (3,) [rad/s], `specific_force` (3,) [m/s²]."""
         dt = t - self._t
-        if dt <= 0.0 or not is_felt(t, omega, specific_force):
+        if dt <= 0.0 or not is_imu_sample(t, omega, specific_force):
             return
         self._t = t
         if dt > GAP_S:
@@ -50,27 +50,27 @@ class AccelerometerCheck:
 
     @property
     def has_jumped(self) -> bool:
-        """Whether gravity is felt elsewhere than before."""
+        """Whether gravity is measured elsewhere than before."""
         off = self._means[0] - self._means[1]
         is_known = self._t - self._t_begun > KNOWN_S
         return is_known and float(off @ off) > MOST * MOST
 
 
 @kernel
-def update_means(means: Array, sample: Array, dt: float, felt_s: float, w: Array) -> None:
+def update_means(means: Array, sample: Array, dt: float, elapsed_s: float, w: Array) -> None:
     """Turn the means (2, 3) with the body and add a sample; at first they are those of all.
 
     Args:
         means: (2, 3) over `MEANS_S` [m/s²].
         sample: (2, 3) rate [rad/s] and specific force [m/s²].
         dt: Since the last one [s].
-        felt_s: Since the first one [s].
+        elapsed_s: Since the first one [s].
         w: (4, 3) scratch memory.
     """
     omega, force = sample[0], sample[1]
     put_exp(-dt * omega[0], -dt * omega[1], -dt * omega[2], w[:3])
     for k in range(2):
-        share = max(dt / (dt + MEANS_S[k]), dt / (dt + felt_s))
+        share = max(dt / (dt + MEANS_S[k]), dt / (dt + elapsed_s))
         turn(w[:3], means[k], w[3])
         for i in range(3):
             means[k, i] = w[3, i] + share * (force[i] - w[3, i])

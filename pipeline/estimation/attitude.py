@@ -17,7 +17,7 @@ from pipeline.signals import PhoneImu
 
 GAIN = 0.15
 """Pull towards the accelerometer's vertical [1/s]: slow, for hands accelerate all ways. At first
-it is faster: one over the time since the start, the mean of all that was felt."""
+it is faster: one over the time since the start, the mean of all that was measured."""
 BIAS_GAIN = 0.01
 """[1/s²]."""
 HAND_VARIANCE = 0.005
@@ -27,7 +27,7 @@ SAMPLE_S = 0.02
 """What one sample of the accelerometer counts for after a gap."""
 LOST_S = 3.0
 """Longer without samples: what was integrated is worth nothing, start anew. Over a gap shorter than
-that, what the gyroscope would have felt is inferred from both ends."""
+that, what the gyroscope would have measured is inferred from both ends."""
 HAND_RATE, HAND_RATE_S = 0.5, 0.2
 """A hand's angular rate, one axis [rad/s], and its correlation time."""
 

@@ -13,7 +13,7 @@ FREE_FALL = 1.0
 
 
 class GravityDirection:
-    """Low-passed direction of the specific force, turned with the body that feels it."""
+    """Low-passed direction of the specific force, turned with the body."""
 
     def __init__(self) -> None:
         """Unknown before the first sample."""
@@ -27,10 +27,10 @@ class GravityDirection:
         norm = float(np.sqrt(specific_force @ specific_force))
         if norm < FREE_FALL:
             return
-        felt = specific_force / norm
+        measured = specific_force / norm
         if self.up is None or not 0.0 < dt < TIME_S:
-            self.up = felt
+            self.up = measured
             return
         turned = self.up - dt * cross(omega, self.up)
-        mixed = turned + dt / TIME_S * (felt - turned)
+        mixed = turned + dt / TIME_S * (measured - turned)
         self.up = mixed / float(np.sqrt(mixed @ mixed))

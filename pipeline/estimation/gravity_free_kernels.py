@@ -7,13 +7,13 @@ from pipeline.so3_kernels import kernel, multiply, put_exp, put_right_jacobian, 
 
 
 @kernel
-def step(x: Array, R: Array, felt: Array, h: float, w: Array, f: Array, g: Array) -> None:
+def step(x: Array, R: Array, inputs: Array, h: float, w: Array, f: Array, g: Array) -> None:
     """Carry x, R by `h`; f (9, 9) and g (9, 12) become ∂(δp, θ, δu)⁺ by before and by inputs.
 
-    `felt` (12,) are the inputs, biases removed; w (12, 3, 3) is scratch memory.
+    `inputs` (12,) are ω_b, f_b, ω_c, f_c, biases removed; w (12, 3, 3) is scratch memory.
     """
     E, B, EE, BB, RB, ERB, J, K, M = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8]
-    k, c, b = 0.5 * h, felt[6:9], felt[0:3]
+    k, c, b = 0.5 * h, inputs[6:9], inputs[0:3]
     put_exp(-k * c[0], -k * c[1], -k * c[2], E)
     put_exp(k * b[0], k * b[1], k * b[2], B)
     multiply(E, E, EE)
@@ -21,14 +21,14 @@ def step(x: Array, R: Array, felt: Array, h: float, w: Array, f: Array, g: Array
     multiply(R, B, RB)
     multiply(E, RB, ERB)
     a, y, Ey, force = w[9, 0], w[9, 1], w[9, 2], w[10, 0]
-    turn(RB, felt[3:6], force)
+    turn(RB, inputs[3:6], force)
     turn(E, force, a)
     for i in range(3):
-        a[i] -= felt[9 + i]
+        a[i] -= inputs[9 + i]
         y[i] = x[i] + h * x[3 + i]
     f[:], g[:] = 0.0, 0.0
     # by θ, and by f_b: R⁺ = EE R BB; a = E R B f_b − f_c
-    times_skew(ERB, felt[3:6], M)
+    times_skew(ERB, inputs[3:6], M)
     for i in range(3):
         for j in range(3):
             f[i, j] = f[6 + i, 6 + j] = EE[i, j]

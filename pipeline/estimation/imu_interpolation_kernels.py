@@ -1,4 +1,4 @@
-"""What an IMU felt at any time: between its samples, beyond them, and how sure that is."""
+"""What an IMU measured at any time: between its samples, beyond them, and how sure that is."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ APART = 0.25
 """Share of the time between two samples that their neighbours must be from them: a curve through
 nearer ones follows their noise or their stamps' rounding, not the motion."""
 EXCESS, EXCESS_S = 0.25, 0.1
-"""By this share of full scale, and for so long, more is felt than is said: a hand that shakes."""
+"""By this share of full scale, and for so long, there is more than is said: a hand that shakes."""
 
 
 @kernel

@@ -65,10 +65,10 @@ class RateAxes:
             return
         self._span.append((t, omega, force / size))
         if len(self._span) == SPAN:
-            self._feel()
+            self._compare_gravity()
             self._span = []
 
-    def _feel(self) -> None:
+    def _compare_gravity(self) -> None:
         """How far each way is from explaining the change of gravity's direction."""
         t, omega, up = (np.array(column) for column in zip(*self._span, strict=True))
         change = up[-ENDS:].mean(axis=0) - up[:ENDS].mean(axis=0)
@@ -77,7 +77,7 @@ class RateAxes:
         crosses = np.array([skew(direction) for direction in up[inner]])
         by_way = np.einsum("kij,kl,k->ijl", crosses, omega[inner], np.gradient(t)[inner])
         explained = np.einsum("ijl,mjl->mi", by_way, WAYS)
-        self._weigh(change - explained, self._config.rate_felt_rad)
+        self._weigh(change - explained, self._config.rate_gravity_rad)
 
     def see(self, turn: Array, gyro_turn: Array) -> None:
         """Take a turn (3,) [rad] as pictures saw it, and the sum of the rates meanwhile [rad]."""
@@ -92,6 +92,6 @@ class RateAxes:
 
     @property
     def possible(self) -> Array:
-        """Ways (n, 3, 3) that may be the right one by what was felt and seen; simplest first."""
+        """Ways (n, 3, 3) that may be the right one by gravity and pictures; simplest first."""
         possible: Array = WAYS[self._odds >= -self._config.rate_evidence]
         return possible

@@ -18,14 +18,14 @@ TOUCHED = np.array([0, 1, 2, 3, 4, 5, OFFSET])
 
 @kernel
 def _expect(
-    x: Array, R: Array, felt: Array, led: Array, ahead: float, expected: Array, H: Array
+    x: Array, R: Array, inputs: Array, led: Array, ahead: float, expected: Array, H: Array
 ) -> bool:
     """Tangents (2,) of an LED `ahead` seconds later, H (2, 7) by `TOUCHED`; False: not in front."""
-    arm, w = R @ led, felt[6:9]
+    arm, w = R @ led, inputs[6:9]
     q0, q1, q2 = x[0] + arm[0], x[1] + arm[1], x[2] + arm[2]
     if not q0 > NEAREST_M:
         return False
-    b = felt[0:3]
+    b = inputs[0:3]
     by_body = R @ np.array(
         [
             b[1] * led[2] - b[2] * led[1],
@@ -99,7 +99,7 @@ def fuse_rays(
     x: Array,
     R: Array,
     P: Array,
-    felt: Array,
+    inputs: Array,
     leds_in_b: Array,
     ahead: Array,
     tangents: Array,
@@ -121,7 +121,7 @@ def fuse_rays(
     m = len(use)
     H, miss, expected = np.zeros((m, 2, 7)), np.zeros((m, 2)), np.zeros(2)
     for i in range(m):
-        if not _expect(x, R, felt, leds_in_b[i], ahead[i], expected, H[i]):
+        if not _expect(x, R, inputs, leds_in_b[i], ahead[i], expected, H[i]):
             use[i] = 0
             continue
         miss[i] = tangents[i] - expected
@@ -180,7 +180,7 @@ def is_sound(x: Array, R: Array, P: Array) -> bool:
 def misfit(
     x: Array,
     R: Array,
-    felt: Array,
+    inputs: Array,
     leds_in_b: Array,
     ahead: Array,
     tangents: Array,
@@ -194,7 +194,7 @@ def misfit(
     H, expected, miss = np.empty((2, 7)), np.empty(2), np.empty(2)
     A = np.zeros((7, 7))  # of the normal equations, last row and column the misses
     for i in range(len(use)):
-        if use[i] != 1 or not _expect(x, R, felt, leds_in_b[i], ahead[i], expected, H):
+        if use[i] != 1 or not _expect(x, R, inputs, leds_in_b[i], ahead[i], expected, H):
             continue
         miss[:] = tangents[i] - expected
         a = sqrt(covariances[i, 0, 0])

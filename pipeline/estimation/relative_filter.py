@@ -26,7 +26,7 @@ from pipeline.estimation.relative_start import (
     is_better_start,
 )
 from pipeline.estimation.relative_track import RelativeTrack
-from pipeline.estimation.sanity import is_believable, is_felt
+from pipeline.estimation.sanity import is_believable, is_imu_sample
 from pipeline.estimation.spot_noise import SpotNoise
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, log
@@ -89,7 +89,7 @@ class RelativeFilter:
         self._remember(self._track.body, sample.t, rate, force)
 
     def _remember(self, stream: ImuStream, t: float, rate: Array, force: Array) -> None:
-        if not is_felt(t, rate, force) or t > self._now + MAX_SLEEP_S:
+        if not is_imu_sample(t, rate, force) or t > self._now + MAX_SLEEP_S:
             self.samples_invalid += 1
         elif self._started and t <= self._track.base.t:
             self.samples_late += 1

@@ -109,10 +109,10 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         if freedoms <= 0:
             return 0.0, 0
         ahead = rays.t + (here.x[X_OFFSET] - here.t)
-        leds, felt = self._leds_in_b[rays.led], self._inputs(here)
+        leds, inputs = self._leds_in_b[rays.led], self._inputs(here)
         tangents = np.array(rays.tangents, dtype=np.float64, order="C")
         C = np.array(rays.covariances, dtype=np.float64, order="C")
-        return float(misfit(here.x, here.R, felt, leds, ahead, tangents, C, use)), freedoms
+        return float(misfit(here.x, here.R, inputs, leds, ahead, tangents, C, use)), freedoms
 
     def in_picture(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """P (6, 6) of the pose in a picture stamped for the time of `here`: that is doubted too.
@@ -126,8 +126,10 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
 
     def passing(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """(6,) how the pose passes there: ṗ in c [m/s], the attitude's rate in b [rad/s]."""
-        felt, p = self._inputs(here), here.x[0:3]
-        return np.concatenate((here.x[3:6] - cross(felt[6:9], p), felt[0:3] - here.R.T @ felt[6:9]))
+        inputs, p = self._inputs(here), here.x[0:3]
+        return np.concatenate(
+            (here.x[3:6] - cross(inputs[6:9], p), inputs[0:3] - here.R.T @ inputs[6:9])
+        )
 
     def inputs_now(self) -> Array:
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""

@@ -17,7 +17,7 @@ class RepeatedPicture:
         self._turning = UnevenTurning()
 
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
-        """Feel phone or robot turn."""
+        """Take a sample of phone or robot."""
         self._turning.add_imu(sample)
 
     def comes_again(self, seen: VisionMeasurement) -> bool:
@@ -26,7 +26,7 @@ class RepeatedPicture:
         Where nothing does it is news: an encoder has nothing to draw anew.
         """
         if self._rays is not None and _alike(self._rays, seen.rays):
-            return self._turning.is_felt
+            return self._turning.is_detected
         self._rays = seen.rays
         self._turning.begin()
         return False

@@ -19,7 +19,7 @@ MEMORY_S = 0.5
 
 OUTLYING = 4.0
 """Times what is expected: more than this no sample teaches, a knock is not noise."""
-MOST, MOST_FELT = 2e3, 1e6
+MOST, MOST_MOTION = 2e3, 1e6
 """Times the variance a sensor should have: of noise, beyond which it is broken, and of motion."""
 
 
@@ -68,7 +68,7 @@ def hear(
                 square += e * e
             square *= scale / 3.0
             before = squares[sensor, lag - 1]
-            square = min(square, OUTLYING * max(before, usual[sensor]), MOST_FELT * usual[sensor])
+            square = min(square, OUTLYING * max(before, usual[sensor]), MOST_MOTION * usual[sensor])
             squares[sensor, lag - 1] += (1.0 - keep) * (square - squares[sensor, lag - 1])
     period = (t - times[RING - 1]) / (RING - 1)
     for sensor in range(2):

@@ -23,7 +23,7 @@ def are_modest(*values: Array) -> bool:
     return all(bool((np.abs(value) <= LARGEST).all()) for value in values)
 
 
-def is_felt(t: float, rate: Array, force: Array) -> bool:
+def is_imu_sample(t: float, rate: Array, force: Array) -> bool:
     """Whether an IMU can have said that: (3,) [rad/s] and (3,) [m/s²] at time `t` [s]."""
     if rate.shape != (3,) or force.shape != (3,) or not are_finite(t, rate, force):
         return False

@@ -62,7 +62,7 @@ class SensorValidation:
         self._config = config
         self._rates = RateAxes(config)
         self._body = ImuStream()
-        self._felt: deque[tuple[float, Array]] = deque(maxlen=SUMS)
+        self._gyro_sums: deque[tuple[float, Array]] = deque(maxlen=SUMS)
         self._omega = np.zeros(3)
         self._screen_angle_deg = 0
         self._restart()
@@ -89,11 +89,11 @@ class SensorValidation:
             self._size_passed = self._enough and self._size_fault() == ""
 
     def _sum_up(self, t: float, omega: Array) -> None:
-        t_last, turned = self._felt[-1] if self._felt else (t, np.zeros(3))
+        t_last, turned = self._gyro_sums[-1] if self._gyro_sums else (t, np.zeros(3))
         if t - t_last > MAX_GAP_S:
-            self._felt.clear()
+            self._gyro_sums.clear()
             self._last_pose = None
-        self._felt.append((t, turned + 0.5 * (t - t_last) * (self._omega + omega)))
+        self._gyro_sums.append((t, turned + 0.5 * (t - t_last) * (self._omega + omega)))
         self._omega = omega
 
     def add_body(self, t: float, omega_bf_in_b: Array) -> None:
@@ -115,7 +115,7 @@ class SensorValidation:
             self._up_passed = max(float(tilts[0]) for tilts in newest) < self._config.max_tilt_rad
 
     def _compare_turns(self, t: float, R_cb: Array) -> None:
-        """The phone's turn since an earlier picture, as seen and as felt."""
+        """The phone's turn since an earlier picture, as seen and as its gyroscope measured it."""
         span, last = self._config.rate_span_s, self._last_pose
         if last is not None and 0.0 <= t - last[0] < span:
             return
@@ -123,13 +123,17 @@ class SensorValidation:
         if last is None or not 0.0 < t - last[0] < 2.0 * span or not self._covers(last[0], t):
             return
         turn_in_c = log(last[1] @ self._body.turn(last[0], t) @ R_cb.T)
-        times = np.array([time for time, _ in self._felt])
-        sums = np.array([turned for _, turned in self._felt])
-        felt = [float(np.diff(np.interp((last[0], t), times, column))[0]) for column in sums.T]
-        self._rates.see(R_cd(self._screen_angle_deg).T @ turn_in_c, np.array(felt))
+        times = np.array([time for time, _ in self._gyro_sums])
+        sums = np.array([turned for _, turned in self._gyro_sums])
+        gyro_turn = [float(np.diff(np.interp((last[0], t), times, column))[0]) for column in sums.T]
+        self._rates.see(R_cd(self._screen_angle_deg).T @ turn_in_c, np.array(gyro_turn))
 
     def _covers(self, t_from: float, t_to: float) -> bool:
-        phone = bool(self._felt) and self._felt[0][0] <= t_from and t_to <= self._felt[-1][0]
+        phone = (
+            bool(self._gyro_sums)
+            and self._gyro_sums[0][0] <= t_from
+            and t_to <= self._gyro_sums[-1][0]
+        )
         return phone and self._body.oldest <= t_from and t_to <= self._body.newest
 
     @property

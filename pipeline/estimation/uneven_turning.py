@@ -52,7 +52,7 @@ class UnevenTurning:
     """Of phone and robot: lately, and since something was first seen."""
 
     def __init__(self) -> None:
-        """Nothing felt."""
+        """No samples yet."""
         self._sides: dict[type, MeanRates] = {PhoneImu: MeanRates(), BodyImu: MeanRates()}
         self._since: dict[type, int] = {}
         self._was_uneven = False
@@ -71,6 +71,6 @@ class UnevenTurning:
         self._was_uneven = False
 
     @property
-    def is_felt(self) -> bool:
+    def is_detected(self) -> bool:
         """Whether either side turns unevenly, or did since `begin`."""
         return self._was_uneven or any(side.are_uneven() for side in self._sides.values())

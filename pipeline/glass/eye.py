@@ -30,7 +30,7 @@ VERTICAL_PICTURES = 10
 """So many tell the glass's vertical well enough to begin ..."""
 REMEMBERED_PICTURES = 300
 """... and over so many it is learnt: ten seconds."""
-FELT_S = 0.1
+AVERAGED_S = 0.1
 """Over which the phone's accelerometer is averaged."""
 OLD_S = 0.15
 """An eye that rests on no picture newer than this is nobody's."""
@@ -69,7 +69,7 @@ class EyeTracker:
     def __init__(self, glass: Glass) -> None:
         """Nothing is known of the phone."""
         self._filter = RelativeFilter(AT_REST, glass.fiducials())
-        self._felt: deque[PhoneImu] = deque(maxlen=64)
+        self._samples: deque[PhoneImu] = deque(maxlen=64)
         self._up_in_g, self._pictures = np.zeros(3), 0
 
     @property
@@ -81,8 +81,8 @@ class EyeTracker:
         return up
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
-        """Take a motion sample: at that time the glass felt gravity alone."""
-        self._felt.append(sample)
+        """Take a motion sample: a sensor of the glass would measure gravity alone."""
+        self._samples.append(sample)
         self._filter.add_phone_imu(sample)
         up = self.up_in_g
         if up is not None:
@@ -90,12 +90,12 @@ class EyeTracker:
 
     def add_seen(self, seen: VisionMeasurement, now: float) -> None:
         """Take what a picture says of the glass, at `now` [s]."""
-        near = [s.a_m_cf_in_c for s in self._felt if abs(s.t - seen.t) < FELT_S]
+        near = [s.a_m_cf_in_c for s in self._samples if abs(s.t - seen.t) < AVERAGED_S]
         if seen.pose is not None and near:
             self._pictures += 1
             share = 1.0 / min(self._pictures, REMEMBERED_PICTURES)
-            felt_in_g = seen.pose.R_cb.T @ np.mean(near, axis=0)
-            self._up_in_g += share * (felt_in_g - self._up_in_g)
+            specific_force_in_g = seen.pose.R_cb.T @ np.mean(near, axis=0)
+            self._up_in_g += share * (specific_force_in_g - self._up_in_g)
         self._filter.add_seen(seen, now)
 
     def at(self, now: float) -> Eye | None:

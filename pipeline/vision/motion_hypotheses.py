@@ -1,4 +1,4 @@
-"""Candidates, which all look like the robot, held against what both motion sensors feel.
+"""Candidates, which all look like the robot, held against what both motion sensors measure.
 
 LEDs of another robot of the same kind fit as well as our own: no residual tells them apart, but
 their motion does. Some models of each candidate's motion predict every picture: *ours* moves as
@@ -33,7 +33,7 @@ FREE: Final = tuple(
     replace(OURS, sigma_omega_b=omega, sigma_f_b=force)
     for omega, force in ((0.05, 0.5), (0.5, 3.0))
 )
-"""Of a robot of which nothing is felt: rates [rad/s] and forces [m/s²] of one that hovers or flies,
+"""Of a robot without motion sensor: rates [rad/s] and forces [m/s²] of one that hovers or flies,
 white."""
 SETTLED_S: Final = 0.1
 """Pictures and samples come in order: nothing older is made anew."""
@@ -119,7 +119,7 @@ class RobotCandidate:
         self._reader: BlinkReader | None = None
         self._leds_in_b, self._last = leds_in_b, view
         self._models: list[MotionHypothesis] = []
-        """Ours, then still and free; none before anything was felt."""
+        """Ours, then still and free; none before there are samples."""
         self._evidence = 0.0
         self.is_far = False
         """It was seen where ours can't be."""
@@ -175,6 +175,6 @@ class RobotCandidate:
         return self._last is view
 
 
-def are_felt(imus: ImuStreams, t: float) -> bool:
+def both_cover(imus: ImuStreams, t: float) -> bool:
     """Whether both sensors' samples reach the time `t` [s]."""
     return all(stream.between(t - MAX_GAP_S, t) is not None for stream in imus.both)

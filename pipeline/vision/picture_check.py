@@ -2,9 +2,10 @@
 
 A stabiliser shifts the picture, a zoom, another lens or a focus that breathes scales it, a camera
 that hangs shows an old one: and LEDs still fit each other, so no residual tells. But phone and
-robot feel how they turn and accelerate. The relative filter's own model carries the robot's place
-on from `LAG_S` ago without the pictures since; what is seen beside it by more than both doubts
-bear, χ² with three degrees of freedom, is a lie of the camera, and seen so in the first pictures.
+robot measure how they turn and accelerate. The relative filter's own model carries the robot's
+place on from `LAG_S` ago without the pictures since; what is seen beside it by more than both
+doubts bear, χ² with three degrees of freedom, is a lie of the camera, and seen so in the first
+pictures.
 
 * What is a little beside is believed less: its covariance takes in how far it is. If that happens
   too often across the line of sight, the phone's samples are worse than they should be, and
@@ -310,10 +311,10 @@ def _is_deaf(stream: ImuStream, t: float) -> bool:
     """Whether samples lately are missing or misdated, or are clipped: shaken beyond the range."""
     since, until = np.searchsorted(stream.times, (t - LAG_S, t))
     since = max(since - 1, 0)
-    felt, apart = stream.values[since:until], np.diff(stream.times[since:until])
+    values, apart = stream.values[since:until], np.diff(stream.times[since:until])
     if len(apart) == 0:
         return True
-    is_clipped = ((np.diff(felt, axis=0) == 0.0) & (np.abs(felt[1:]) > EXTREME)).any()
+    is_clipped = ((np.diff(values, axis=0) == 0.0) & (np.abs(values[1:]) > EXTREME)).any()
     is_misdated = apart.min() < LEAST_APART * np.median(apart)
     return bool(is_clipped or is_misdated or apart.max() > GAP_S)
 

@@ -47,7 +47,7 @@ class RepeatedFrames:
         """What people may mend, though each picture is looked at only once; or empty."""
 
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
-        """Feel phone or robot turn."""
+        """Take a sample of phone or robot."""
         self._turning.add_imu(sample)
 
     def comes_again(self, frame: Frame) -> bool:
@@ -61,7 +61,7 @@ class RepeatedFrames:
             self._turning.begin()
         self._recent.append(again)
         stands = frame.t - self._t_new >= STANDS_S
-        turns = again and self._turning.is_felt
+        turns = again and self._turning.is_detected
         self.complaint = STANDS if stands and turns else ""
         self.remark = SLOW if turns and sum(self._recent) >= MOST else ""
         return turns

@@ -14,7 +14,7 @@ from pipeline.vision.motion_hypotheses import (
     DECISIVE,
     CandidateView,
     RobotCandidate,
-    are_felt,
+    both_cover,
 )
 
 REMEMBERED_S: Final = 10.0
@@ -87,7 +87,7 @@ class RobotIdentity:
         return None if ours is None else next(k for k, x in enumerate(views) if ours.is_at(x))
 
     def _can_tell(self, t: float, up_in_c: Array | None) -> bool:
-        return up_in_c is not None and self._imus is not None and are_felt(self._imus, t)
+        return up_in_c is not None and self._imus is not None and both_cover(self._imus, t)
 
     def _again(self, view: CandidateView) -> RobotCandidate | None:
         """What was seen before, if this is it."""

@@ -187,9 +187,9 @@ class _Work:
         found = fit(film, Guess(shared, R, p, value), held, with_rates=False)
         t = np.array([view.t for view in views])
         R, p = found.guess.R_og, found.guess.p_go_in_o
-        return self._felt(t, R, rates(t, R, p, found.pose_sigma))
+        return self._with_gyro(t, R, rates(t, R, p, found.pose_sigma))
 
-    def _felt(self, t: Array, R_og: Array, seen: Rates) -> Rates:
+    def _with_gyro(self, t: Array, R_og: Array, seen: Rates) -> Rates:
         """The turn rates by the gyroscope, where there is one."""
         if self._gyro is None:
             return seen

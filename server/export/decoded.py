@@ -270,8 +270,8 @@ class _Decoding:
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
             what = f"holds a status that can't be read: {error}"
             raise RecordingError(self._decoded.recording.path, what, "record anew") from error
-        for t, *felt in state.body_samples:
-            yield BodyImu(t, np.array(felt[:3]), np.array(felt[3:]))
+        for t, *values in state.body_samples:
+            yield BodyImu(t, np.array(values[:3]), np.array(values[3:]))
         if self._state is None or self._state.mode != state.mode:
             text, alarms = f"{state.mode_name}: {state.reason}", state.mode in ALARMING
             yield LogLine(state.t, "control", text, alarms)

@@ -114,8 +114,8 @@ class ScreenSimulation(VirtualTimeSimulation):
         places: Array = lights.places[i] + (k - i) * (lights.places[i + 1] - lights.places[i])
         return places
 
-    def _feel(self, *samples: PhoneImu | BodyImu) -> None:
-        super()._feel(*samples)
+    def _add_imu(self, *samples: PhoneImu | BodyImu) -> None:
+        super()._add_imu(*samples)
         for sample in samples:
             if isinstance(sample, PhoneImu):
                 self.robot_of_light.add_phone_imu(sample)

@@ -212,15 +212,15 @@ class VirtualTimeSimulation:
     def _control(self) -> Output:
         """What the control process does in a tick, and what its status leads to."""
         inbox, self._inbox = list(filter(is_believable, self.tamper(self._inbox))), []
-        felt = self._link.receive(self.t)
+        samples = self._link.receive(self.t)
         command, output = self.controller.tick(
-            self.t, inbox, felt, self._link.reason, self._link.gap, self._link.left_s
+            self.t, inbox, samples, self._link.reason, self._link.gap, self._link.left_s
         )
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._frame_pipeline.front_end.add_prediction(self.controller.expected(output))
         self.follower.send(command)
         self._link.pass_on(inbox, self.t)
-        self._feel(*felt)
+        self._add_imu(*samples)
         request = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)
         if request is not None:
             self._inbox.append(RequestInput(request.what))
@@ -293,7 +293,7 @@ class VirtualTimeSimulation:
             return
         match signal:
             case PhoneImu() as sample:
-                self._feel(sample)
+                self._add_imu(sample)
                 self._inbox.append(sample)
             case TouchState() as operator:
                 self._inbox.append(operator)
@@ -341,7 +341,7 @@ class VirtualTimeSimulation:
             self.trace.poses += seen.pose is not None
             self._inbox.append(seen)
 
-    def _feel(self, *samples: PhoneImu | BodyImu) -> None:
+    def _add_imu(self, *samples: PhoneImu | BodyImu) -> None:
         """Motion samples, for whoever looks."""
         for sample in samples if self.checks_rays else ():
             self._frame_pipeline.front_end.check.add_imu(sample)

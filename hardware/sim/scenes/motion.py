@@ -157,10 +157,10 @@ class SimulatedImu:
         return readings
 
     def _reading(self, t: float) -> tuple[float, Array]:
-        felt = np.concatenate((self._mover.omega_in_c(t), self._mover.specific_force_in_c(t)))
-        felt = felt + self._bias + self._sigma * self._rng.standard_normal(6)
+        measured = np.concatenate((self._mover.omega_in_c(t), self._mover.specific_force_in_c(t)))
+        measured = measured + self._bias + self._sigma * self._rng.standard_normal(6)
         step = np.where(self._step > 0.0, self._step, 1.0)
-        return t, np.where(self._step > 0.0, np.round(felt / step) * step, felt)
+        return t, np.where(self._step > 0.0, np.round(measured / step) * step, measured)
 
 
 class Sensors:

@@ -82,14 +82,14 @@ def readings(world: World) -> list[Reading]:
 
 def phone_by_state(world: World, i: Indices) -> Array:
     """Jacobian (n, 6, N) of the phone's (ω, f)."""
-    H = _felt_by_motion(world.hand[:, i], world.f_c[i]) @ _hand_by_state(world)
+    H = _imu_by_motion(world.hand[:, i], world.f_c[i]) @ _hand_by_state(world)
     H[:, :, PHONE_BIASES] = np.eye(6)
     return H
 
 
 def body_by_state(world: World, i: Indices) -> Array:
     """Jacobian (n, 6, N) of the robot's (ω, f)."""
-    own = _felt_by_motion(world.robot[:, i], world.f_b[i] @ world.R_mean.T)
+    own = _imu_by_motion(world.robot[:, i], world.f_b[i] @ world.R_mean.T)
     H = np.kron(np.eye(2), world.R_mean.T) @ own @ _robot_by_state(world)
     H[:, :, BODY_BIASES] = np.eye(6)
     return H
@@ -116,7 +116,7 @@ def tangents_by_state(world: World, i: Indices) -> Array:
     return np.stack(rows, axis=1)
 
 
-def _felt_by_motion(motion: Array, force: Array) -> Array:
+def _imu_by_motion(motion: Array, force: Array) -> Array:
     """(n, 6, 18) of (ω, f) in own axes by value, rate and acceleration of a motion (3, n, 6)."""
     eta, rates = motion[0, :, 3:], motion[1, :, 3:]
     (sr, sp, _), (cr, cp, _) = np.sin(eta.T), np.cos(eta.T)

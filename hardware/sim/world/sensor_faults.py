@@ -37,16 +37,16 @@ class ImuFault:
     """Probability that a sample comes twice, `TWIN_S` apart and with noise of its own."""
 
     def added(self, rng: np.random.Generator, t: Array) -> tuple[Array, Array]:
-        """What is felt besides at `t` (n,) [s], with no noise: (n, 3) [rad/s], (n, 3) [m/s²]."""
-        felt = []
+        """What it adds at `t` (n,) [s], with no noise: (n, 3) [rad/s], (n, 3) [m/s²]."""
+        errors = []
         during = ((t >= self.start) & (t < self.stop)).astype(np.float64)
         for step, tone in zip(self.step, self.tone, strict=True):
             wave = np.sin(2.0 * np.pi * (self.tone_hz * t + rng.uniform()))
             along = during[:, None] * step * _axis(rng) + (during * tone * wave)[:, None] * _axis(
                 rng
             )
-            felt.append(along)
-        return felt[0], felt[1]
+            errors.append(along)
+        return errors[0], errors[1]
 
     def silent(self, t: Array) -> npt.NDArray[np.bool_]:
         """Whether samples at `t` (n,) [s] are missing."""

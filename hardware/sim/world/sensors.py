@@ -76,7 +76,7 @@ def phone_samples(world: World) -> list[Event]:
 
 
 def _held(world: World, i: Indices) -> Indices:
-    """When (n,) on the grid was felt what is read at `i` (n,)."""
+    """When (n,) on the grid was measured what is read at `i` (n,)."""
     shortest, longest = world.setup.held
     if longest == 0.0:
         return i

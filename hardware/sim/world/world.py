@@ -99,8 +99,8 @@ class WorldOptions:
     stamp_jitter: float = 0.0
     """σ of the stamps of the phone's IMU."""
     held: tuple[float, float] = (0.0, 0.0)
-    """Shortest and longest time for which the phone's sensors say what they felt at its begin: a
-    browser that is kept from work reads them late, and stamps what it read."""
+    """Shortest and longest time for which the phone's sensors say what they measured at its begin:
+    a browser that is kept from work reads them late, and stamps what it read."""
     held_since: float = 0.0
     """... from this time on."""
     lost: float = 0.0

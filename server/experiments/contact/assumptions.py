@@ -28,8 +28,8 @@ def of(
     plant: PlantParameters, leader: Leader, scenes: Sequence[ContactScene], seeds: int
 ) -> list[Assumption]:
     """Assumptions of the experiment as it is set up."""
-    felt = sensors(leader) if leader == PAPER else phone_sensors(leader)
-    return [*_touching(plant, scenes), *_judging(plant, seeds), *felt, *plant_parts(plant)]
+    sensing = sensors(leader) if leader == PAPER else phone_sensors(leader)
+    return [*_touching(plant, scenes), *_judging(plant, seeds), *sensing, *plant_parts(plant)]
 
 
 def _touching(plant: PlantParameters, scenes: Sequence[ContactScene]) -> Iterator[Assumption]:

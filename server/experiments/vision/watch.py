@@ -91,7 +91,7 @@ class ChannelRun:
     def see(self, k: int, shot: RenderedFrame) -> None:
         """The film's next shot, picture `k`."""
         if self.channel.imu:
-            self._feel(shot)
+            self._add_imu(shot)
         frame = self._wire.carry(shot.t, shot.luma)
         record = self.record
         record.frames += 1
@@ -109,7 +109,7 @@ class ChannelRun:
         self._judge(k, shot, detection)
         self._see_afresh(k, shot, frame)
 
-    def _feel(self, shot: RenderedFrame) -> None:
+    def _add_imu(self, shot: RenderedFrame) -> None:
         for front_end in (self._front_end, self._fresh):
             if front_end is not None:
                 front_end.add_imu(*shot.phone, *shot.body)

@@ -86,7 +86,7 @@ class Locator:
             started = thread_cpu()
 
     def _located(self, shot: MediaFrame, read_s: float) -> Located:
-        self._feel(shot.t)
+        self._add_imu(shot.t)
         if shot.luma is None:
             return Located(shot, None, read_s, self.front_end.prior(shot.t))
         self._check_size(shot.name, shot.luma.shape)
@@ -94,8 +94,8 @@ class Locator:
         detection = self.front_end.process(frame)
         return Located(shot, detection, read_s, detection.prior)
 
-    def _feel(self, t: float) -> None:
-        """All that was felt up to a little after `t` [s]: the frames' clock may differ by that."""
+    def _add_imu(self, t: float) -> None:
+        """All samples up to a little after `t` [s]: the frames' clock may differ by that."""
         for row in self._camera_samples.until(t + AHEAD_S):
             self.front_end.add_imu(PhoneImu(float(row[0]), row[1:4], row[4:]))
         for row in self._body_samples.until(t + AHEAD_S):
