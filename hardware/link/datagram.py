@@ -196,7 +196,7 @@ def decode_command(data: bytes, key: bytes) -> CommandDatagram:
     if flags & ~(ARMED | STOP):
         raise LinkError("command.flags", "bits 0 and 1")
     armed, stop = bool(flags & ARMED), bool(flags & STOP)
-    thrusts, twist_in_b = _told_apart(fields[8:], is_twist)
+    thrusts, twist_in_b = _thrusts_or_twist(fields[8:], is_twist)
     return CommandDatagram(epoch, counter, nonce, challenge, armed, thrusts, stop, twist_in_b)
 
 
@@ -217,7 +217,7 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         raise LinkError("sample.time", "0 to 2^60 µs")
     if not all(map(isfinite, values)):
         raise LinkError("sample.gyroscope, accelerometer, thrusts", "finite numbers")
-    thrusts, twist_in_b = _told_apart(values[6:], is_twist)
+    thrusts, twist_in_b = _thrusts_or_twist(values[6:], is_twist)
     return SampleDatagram(
         state=FollowerState(state),
         refusal=Refusal(refusal),
@@ -235,7 +235,7 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
     )
 
 
-def _told_apart(values: Values, is_twist: bool) -> tuple[Values, Values]:
+def _thrusts_or_twist(values: Values, is_twist: bool) -> tuple[Values, Values]:
     """(Thrusts, twist), one of them none."""
     return ((), values) if is_twist else (values, ())
 

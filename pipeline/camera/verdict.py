@@ -44,10 +44,10 @@ TILTED = (
 )
 
 
-def verdict(facts: CameraFacts, told: str) -> str:
+def verdict(facts: CameraFacts, previous: str) -> str:
     """What is surely wrong, in words for who holds the phone; "" if nothing.
 
-    `told` is what was said last: it takes more to begin than to go on.
+    `previous` is what was said last: it takes more to begin than to go on.
     """
     larger = "larger" if facts.focal > 0.0 else "smaller"
     focal = (ZOOMED if abs(facts.focal) > ZOOM else OFF).format(
@@ -60,8 +60,8 @@ def verdict(facts: CameraFacts, told: str) -> str:
         (TILTED.format(angle=degrees(angle)), angle, float(facts.tilt_sigma.max()), TILT),
     )
     for words, value, sigma, allowed in found:
-        is_told = bool(told) and told[:ALIKE] == words[:ALIKE]
-        sure, share = (UNSURE, 0.8) if is_told else (SURE, 1.0)
+        is_repeated = bool(previous) and previous[:ALIKE] == words[:ALIKE]
+        sure, share = (UNSURE, 0.8) if is_repeated else (SURE, 1.0)
         if abs(value) > max(allowed * share, sure * sigma):
             return words
     return ""

@@ -85,7 +85,7 @@ class Loop:
     no_filter: NoFilterConfig
     feedforward: FeedForwardConfig | None = None
     """None: off."""
-    told_inertia: Array | None = None
+    nominal_inertia: Array | None = None
     """(6,) what feed-forward takes for the body's mass [kg]; None: what it is."""
 
     def open_loop(self, axis: int, sensing: Sensing) -> tuple[Complex, int]:
@@ -146,8 +146,8 @@ class Loop:
         modelled = 1.0 / (1.0 + config.thrust_lag_s * S)
         if self.dynamics.needs_tilt and axis in TILT_AXIS:
             modelled = self._actuator(axis, sensing)  # it knows where the thrust points
-        told = self.dynamics.inertia if self.told_inertia is None else self.told_inertia
-        force = told[axis] * S * S * np.exp(-S * sensing.body_age)
+        inertia = self.dynamics.inertia if self.nominal_inertia is None else self.nominal_inertia
+        force = inertia[axis] * S * S * np.exp(-S * sensing.body_age)
         return np.asarray((control + passed * force) / (1.0 - passed * modelled))
 
 

@@ -48,8 +48,8 @@ def is_robust(worst: AxisMargins) -> bool:
 
 
 def _bodies(loop: Loop) -> Iterator[Loop]:
-    told = loop.dynamics
+    nominal = loop.dynamics
     for mass, lag, unfelt in product(MASSES, LAGS, (0.0, loop.config.unfelt)):
-        dynamics = replace(told, inertia=mass * told.inertia, lag=lag * told.lag)
+        dynamics = replace(nominal, inertia=mass * nominal.inertia, lag=lag * nominal.lag)
         config = replace(loop.config, unfelt=unfelt)
-        yield replace(loop, dynamics=dynamics, config=config, told_inertia=told.inertia)
+        yield replace(loop, dynamics=dynamics, config=config, nominal_inertia=nominal.inertia)

@@ -74,7 +74,7 @@ class ThrusterHealth:
         self._usual = usual**2
         self._rows = np.zeros((NOW + PAUSE + BEFORE + 1, 16 + 2 * thrusters))
         self._thrusts = np.zeros(thrusters)
-        self._can_tell = bool(robot.wrench_axes[3:5].all())
+        self._is_observable = bool(robot.wrench_axes[3:5].all())
         """Of one that a floor keeps from tilting no torque tells a push from a failure."""
         self._on_their_way: deque[Array] = deque()
         self._ratios, self._lost = np.zeros(thrusters), np.zeros(thrusters)
@@ -119,7 +119,7 @@ class ThrusterHealth:
         self._omega[:], self._f[:] = body.omega_m_bf_in_b, body.a_m_bf_in_b
         self._put(float(h))
         self._filled += 1
-        if self._filled < len(self._rows) or self._filled % EVERY or not self._can_tell:
+        if self._filled < len(self._rows) or self._filled % EVERY or not self._is_observable:
             return False
         return self._found(judge(*self._asked()))
 

@@ -59,7 +59,7 @@ class TwistActing:
     def __init__(self, robot: Robot, drive: TwistDrive, silent_s: float) -> None:
         """For one robot, at rest; without news for `silent_s` [s] nothing moves."""
         self._axes, self._drive, self._silent_s = robot.axes, drive, silent_s
-        self._told_in_b = np.zeros(6)
+        self._commanded_in_b = np.zeros(6)
         self._once_in_f = self._twice_in_f = np.zeros(3)
 
     def push(self, wrench_in_b: Array) -> None:
@@ -99,8 +99,8 @@ class TwistActing:
     ) -> Acted:
         """The twist of the mode, within its bounds."""
         if now.mode in (Mode.DISARMED, Mode.ARMED, Mode.STOPPED):
-            self._told_in_b = np.zeros(6)
-            return Acted(NO_FORCES, saturated=False, twist_in_b=self._told_in_b)
+            self._commanded_in_b = np.zeros(6)
+            return Acted(NO_FORCES, saturated=False, twist_in_b=self._commanded_in_b)
         wanted_in_b = STILL
         if now.mode == Mode.TRACK and known is not None and leashed is not None:
             wanted_in_b = self._wanted(known, leashed.error, now)
@@ -108,9 +108,9 @@ class TwistActing:
                 wanted_in_b = STILL
                 self.start(known, False)
         allowed_in_b = self._fresh(now.silence_s) * self._drive.within(wanted_in_b)
-        self._told_in_b = self._drive.toward(self._told_in_b, allowed_in_b, now.h)
-        is_short = bool((wanted_in_b - self._told_in_b).any())
-        return Acted(NO_FORCES, is_short, self._told_in_b)
+        self._commanded_in_b = self._drive.toward(self._commanded_in_b, allowed_in_b, now.h)
+        is_short = bool((wanted_in_b - self._commanded_in_b).any())
+        return Acted(NO_FORCES, is_short, self._commanded_in_b)
 
     def _fresh(self, silence_s: float) -> float:
         """Share of the twist that news so old are good for."""

@@ -71,11 +71,11 @@ class BiasSteps:
         if not 0.0 < surprise < BEYOND:
             return NOWHERE
         shift = (cross @ solved[:, 12]).reshape(4, 3) * min(1.0, sqrt(SHARE / surprise))
-        told = _by_sensor(cross @ solved[:, :12])
-        after = _by_sensor(P[BIASES:OFFSET, BIASES:OFFSET]) - told
+        reduction = _by_sensor(cross @ solved[:, :12])
+        after = _by_sensor(P[BIASES:OFFSET, BIASES:OFFSET]) - reduction
         self._shift = keep * self._shift + shift
-        self._variance = keep * keep * self._variance + told
-        self._learnt = keep * self._learnt + told
+        self._variance = keep * keep * self._variance + reduction
+        self._learnt = keep * self._learnt + reduction
         chi2 = (self._shift * _solve(self._variance, self._shift)).sum(axis=1) / 3.0
         if not chi2.max() > SURPRISING:
             return NOWHERE
@@ -90,7 +90,7 @@ class BiasSteps:
         return by
 
     def _moved(self, k: int, P: Array) -> float:
-        """How far the bias P (3, 3) is off: of that each picture corrected the share told P⁻¹."""
+        """How far the bias P (3, 3) is off; each picture corrected the share reduction P⁻¹."""
         known = np.linalg.solve(P, self._shift[k])
         information = np.linalg.solve(P, np.linalg.solve(P, self._learnt[k]).T)
         off = np.linalg.solve(information + np.eye(3) / self._most[k] ** 2, known)

@@ -42,7 +42,7 @@ SIGN_OR_TURN = (
 )
 TURNED = (
     "The picture is turned by {by}° against the motion sensors: the screen's angle is told as"
-    " {told}°, it is {true}°. Switch on auto-rotation, turn the phone to the side and back."
+    " {reported}°, it is {true}°. Switch on auto-rotation, turn the phone to the side and back."
 )
 TILTED = (
     "Gravity is {by:.0f}° off between picture and motion sensors: the accelerometer's axes are"
@@ -191,9 +191,9 @@ class SensorValidation:
             return SIGN_OR_TURN
         if best == NEGATED:
             return SIGN
-        told = self._screen_angle_deg
+        reported = self._screen_angle_deg
         by = min(90 * best, 360 - 90 * best)
-        return TURNED.format(by=by, told=told, true=(told - 90 * best) % 360)
+        return TURNED.format(by=by, reported=reported, true=(reported - 90 * best) % 360)
 
 
 def _angles(up_in_c: Array, up_by_picture: Array) -> Array:

@@ -24,7 +24,7 @@ PathAhead = Callable[[float], Sequence[tuple[float, Array, Array]]]
 """Where the robot goes within so long [s], oldest first: (t [s], wxyz_fb, p_bf_in_f [m])."""
 STEP_S = 0.01
 """Between the places of a light that are told at once."""
-TOLD_S = 0.06
+HORIZON_S = 0.06
 """So far beyond the display lag: the way to the page, and a frame of the glass."""
 NEAREST_M = 0.30
 FARTHEST_WIDTHS = 2.5
@@ -123,9 +123,9 @@ class RobotOfLight:
     def _shown(self, eye: Eye, up_in_g: Array, now: float, robot: PathAhead) -> Lights:
         assert self.lag is not None
         start, hanging = now + self.lag.value, Hanging.of(up_in_g, self._leds_in_b)
-        path = robot(max(self.lag.value, 0.0) + TOLD_S)
+        path = robot(max(self.lag.value, 0.0) + HORIZON_S)
         times, wxyz, p = (np.array(part) for part in zip(*path, strict=True))
-        places = np.empty((round(TOLD_S / STEP_S) + 1, len(self._leds_in_b), 2))
+        places = np.empty((round(HORIZON_S / STEP_S) + 1, len(self._leds_in_b), 2))
         for k in range(len(places)):
             t = start + k * STEP_S
             i = int(np.abs(times - t).argmin())  # of a path with a step of a few milliseconds

@@ -216,8 +216,8 @@ class Initialisation:
         weak.R_cb, weak.pictures = one.R_cb, weak.pictures + 1
         before = np.array([weak.seen[led] for led in now])
         unshown_px = UNSHOWN_PX + 2.0 * np.sqrt(one.squared_px / one.leds)
-        told = max(0.0, np.log(SHOWN * _reshaped(before, at) / unshown_px))
-        log_false_alarms = one.log_false_alarms - (2 * one.leds - 6) * told
+        evidence = max(0.0, np.log(SHOWN * _reshaped(before, at) / unshown_px))
+        log_false_alarms = one.log_false_alarms - (2 * one.leds - 6) * evidence
         return one if weak.pictures >= CONFIRMED and log_false_alarms < enough else None
 
 

@@ -79,14 +79,14 @@ class RobotIdentity:
                 self._candidates.append(candidate)
             candidate.is_far = bool(reach) and (candidate.is_far or k not in near)
             candidate.read(view, self.code)
-            candidate.see(view, self._imus if self._can_tell(t, up_in_c) else None, up_in_c)
+            candidate.see(view, self._imus if self._is_observable(t, up_in_c) else None, up_in_c)
         ours = self._proven(t)
         if ours is None:
             lone = READING if self._blinks and not reach else ELSEWHERE
             self.reason = TWO if len(self._candidates) > 1 else lone
         return None if ours is None else next(k for k, x in enumerate(views) if ours.is_at(x))
 
-    def _can_tell(self, t: float, up_in_c: Array | None) -> bool:
+    def _is_observable(self, t: float, up_in_c: Array | None) -> bool:
         return up_in_c is not None and self._imus is not None and both_cover(self._imus, t)
 
     def _again(self, view: CandidateView) -> RobotCandidate | None:

@@ -13,11 +13,11 @@ NOTHING: Final = Markup()
 
 def element(name: str, /, *inside: str, **attributes: str) -> Markup:
     """An element; `class_` is the attribute class, `aria_label` is aria-label."""
-    told = NOTHING.join(
+    rendered = NOTHING.join(
         Markup(' {}="{}"').format(key.rstrip("_").replace("_", "-"), value)
         for key, value in attributes.items()
     )
-    begin = Markup("<{}{}>").format(name, told)
+    begin = Markup("<{}{}>").format(name, rendered)
     return begin if name in VOID else Markup("{}{}</{}>").format(begin, joined(inside), name)
 
 

@@ -14,7 +14,7 @@ def health(front_end: VisualFrontEnd) -> CameraHealth:
         front_end.exposure.exposure_s,
         front_end.exposure.hint,
     )
-    told = CameraHealth(
+    report = CameraHealth(
         complaint=front_end.complaint or front_end.repeats.remark,
         hint=hint.value,
         advice=ADVICE[hint],
@@ -23,14 +23,14 @@ def health(front_end: VisualFrontEnd) -> CameraHealth:
         readout_learnt=front_end.readout.is_learnt,
     )
     if facts is None:
-        return told
+        return report
     return CameraHealth(
-        complaint=told.complaint,
-        hint=told.hint,
-        advice=told.advice,
-        exposure_ms=told.exposure_ms,
-        readout_ms=told.readout_ms,
-        readout_learnt=told.readout_learnt,
+        complaint=report.complaint,
+        hint=report.hint,
+        advice=report.advice,
+        exposure_ms=report.exposure_ms,
+        readout_ms=report.readout_ms,
+        readout_learnt=report.readout_learnt,
         readout_sigma_ms=round(1e3 * facts.readout_sigma_s, 2),
         time_offset_ms=round(1e3 * facts.offset_s, 2),
         time_offset_sigma_ms=round(1e3 * facts.offset_sigma_s, 2),

@@ -37,52 +37,55 @@ def lines(report: LinkReport) -> list[str]:
     """What to expect, and on whose side."""
     if report.grade == "unknown":
         return []
-    told = [f"The robot would follow {100.0 * report.follows:.1f} % of the time.", *_waits(report)]
+    sentences = [
+        f"The robot would follow {100.0 * report.follows:.1f} % of the time.",
+        *_waits(report),
+    ]
     if report.rtt_ms is not None:
         slow = f", 1 in 20 takes over {report.rtt_p95_ms:.0f} ms" if report.rtt_p95_ms else ""
-        told.append(f"Round trip {report.rtt_ms:.0f} ms{slow}.")
+        sentences.append(f"Round trip {report.rtt_ms:.0f} ms{slow}.")
     if report.picture_age_ms is None:
-        told.append("No pictures came.")
+        sentences.append("No pictures came.")
     else:
-        told.append(
+        sentences.append(
             f"Pictures: {report.picture_hz:.0f} a second, {report.picture_age_ms:.0f} ms old, "
             f"longest wait {1e-3 * (report.picture_gap_ms or 0.0):.2f} s."
         )
-    told.append(
+    sentences.append(
         f"Motion samples: {report.motion_hz:.0f} a second."
         if report.motion_hz
         else "No motion samples came."
     )
-    return told
+    return sentences
 
 
 def _waits(report: LinkReport) -> list[str]:
     longest = f"the longest silence was {1e-3 * report.longest_ms:.2f} s"
     if report.waits + report.ends == 0:
         return [f"It would not have to wait; {longest}."]
-    told = []
+    sentences = []
     if report.waits:
         minutely = report.waits * 60.0 / report.seconds
         often = f"{minutely:.0f} times" if minutely >= 1.5 else "once"
-        told.append(f"It would wait for news about {often} a minute; {longest}.")
+        sentences.append(f"It would wait for news about {often} a minute; {longest}.")
     if report.waits and report.follows < MOSTLY:
-        told = [f"It would mostly wait for news; {longest}."]
+        sentences = [f"It would mostly wait for news; {longest}."]
     if report.ends:
         one = "silence" if report.ends == 1 else "silences"
-        told.append(f"{report.ends} {one} would have ended a flight; {longest}.")
+        sentences.append(f"{report.ends} {one} would have ended a flight; {longest}.")
     whose = [f"{n} by {SIDES[side]}" for side, n in report.sides.items() if n]
-    return [*told, f"Caused: {', '.join(whose)}."]
+    return [*sentences, f"Caused: {', '.join(whose)}."]
 
 
 def advice(report: LinkReport) -> list[str]:
     """What to do, the most useful first."""
     if report.grade == "unknown":
         return ["Open the page on the phone, tap Start, keep it in front, and check again."]
-    told: list[str] = []
+    steps: list[str] = []
     spread = (report.rtt_p95_ms or 0.0) - (report.rtt_ms or 0.0)
     slow = (report.rtt_ms or 0.0) > SLOW_MS
     if report.sides["link"] or slow or spread > SPREAD_MS:
-        told += [
+        steps += [
             "Use a 5 GHz Wi-Fi that nobody else uses, near its access point, or let the phone's "
             "own hotspot be the network.",
             "Surest is a USB cable. Android: run “adb reverse tcp:8080 tcp:8080” on the computer, "
@@ -91,13 +94,13 @@ def advice(report: LinkReport) -> list[str]:
             "scans off: they put its radio to sleep.",
         ]
     if report.sides["phone"]:
-        told.append("Close other apps and tabs on the phone, and let it cool down.")
+        steps.append("Close other apps and tabs on the phone, and let it cool down.")
     if report.sides["server"]:
-        told.append("Close other programs on the server's computer; a laptop wants its charger.")
+        steps.append("Close other programs on the server's computer; a laptop wants its charger.")
     if report.picture_hz < FEW_PICTURES_HZ or (report.picture_gap_ms or 0.0) > LONG_WAIT_MS:
-        told.append("Few pictures, or long waits for one: try another path or more light.")
+        steps.append("Few pictures, or long waits for one: try another path or more light.")
     elif (report.picture_age_ms or 0.0) > LATE_PICTURES_MS:
-        told.append("The pictures are old: try another path for them.")
+        steps.append("The pictures are old: try another path for them.")
     if report.motion_hz < FEW_MOTION_HZ:
-        told.append("Few motion samples: allow motion sensors, and leave power saving.")
-    return told
+        steps.append("Few motion samples: allow motion sensors, and leave power saving.")
+    return steps

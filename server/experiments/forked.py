@@ -38,9 +38,9 @@ def forked(work: Callable[[], Result]) -> Result:
             os._exit(code)
     os.close(writer)
     with os.fdopen(reader, "rb") as pipe:
-        told = pipe.read()
+        pickled = pipe.read()
     _, status = os.waitpid(child, 0)
     if status != 0:
         raise ForkError(f"a copy of the flight ended with {status}")
-    result: Result = pickle.loads(told)
+    result: Result = pickle.loads(pickled)
     return result

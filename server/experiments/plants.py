@@ -151,16 +151,16 @@ def fly_plant(setting: Setting, seconds: float, seed: int) -> PlantRow:
     """Fly the plant of a seed, and the known one by the same hand."""
     plant = drawn(setting.robot_file.plant, np.random.default_rng((seed, 17)))
     flights = setting.flight(seed), setting.flight(seed, plant)
-    told, real = (
+    nominal, real = (
         result_of(simulation.run(seconds), simulation.scene, 0.0) for simulation in flights
     )
     return PlantRow(
         seed=seed,
         mass_kg=plant.parameters.mass,
         lag_ms=1e3 * plant.parameters.lag,
-        known_mm=told.rms_mm,
+        known_mm=nominal.rms_mm,
         rms_mm=real.rms_mm,
-        ratio=real.rms_mm / told.rms_mm,
+        ratio=real.rms_mm / nominal.rms_mm,
         rms_deg=real.rms_deg,
         chatter_n=real.chatter_n,
         ended=real.ended,
@@ -177,8 +177,8 @@ def fly_thruster(setting: Setting, seed: int, failing: tuple[int, float]) -> Thr
     words: dict[str, float] = {}
     trace = simulation.trace
     while simulation.t < FAILS_AT_S + AFTER_S + JUDGED_S and not trace.left:
-        for told in simulation.advance().thrusters:
-            words.setdefault(told, simulation.t - FAILS_AT_S)
+        for warning in simulation.advance().thrusters:
+            words.setdefault(warning, simulation.t - FAILS_AT_S)
     right = f"Thruster {thruster + 1} "
     judged = np.array(trace.t) >= FAILS_AT_S + AFTER_S
     off_mm = 1e3 * np.linalg.norm(rows_of(trace.error_in_f)[judged], axis=1)

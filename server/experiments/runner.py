@@ -50,8 +50,8 @@ class ExperimentReport:
         if self.holds and isinstance(figures, dict):
             figures["holds"] = dict(self.holds)
         file = folder / f"{name}.json"
-        told = json.dumps(figures, indent=1, ensure_ascii=False, allow_nan=False)
-        file.write_text(told, encoding="utf-8")
+        text = json.dumps(figures, indent=1, ensure_ascii=False, allow_nan=False)
+        file.write_text(text, encoding="utf-8")
         return [file, *(self.draw(folder) if self.draw is not None else ())]
 
 

@@ -65,8 +65,8 @@ def write(decoded: DecodedRecording, episodes: Sequence[Episode], folder: Path) 
         for name, columns in TABLES.items():
             file = stack.enter_context((folder / f"{name}.csv").open("w", newline=""))
             tables[name] = csv.writer(file, lineterminator="\n")
-            told = decoded.command_names if name == "states" else ()
-            tables[name].writerow(("t_s", "utc", *columns, *told))
+            commands = decoded.command_names if name == "states" else ()
+            tables[name].writerow(("t_s", "utc", *columns, *commands))
 
         def add(name: str, t: float, cells: Sequence[object]) -> None:
             tables[name].writerow((f"{t:.6f}", decoded.utc(t), *map(_cell, cells)))

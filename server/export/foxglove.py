@@ -203,7 +203,7 @@ class _Film:
                 pose_covariance=covariance(state).ravel().tolist(),
             )
             self._put("/robot/odometry", t, odometry)
-        u, told = state.u_bf_in_c, state.twist_in_b
+        u, twist = state.u_bf_in_c, state.twist_in_b
         self._put(
             "/robot/state",
             t,
@@ -231,8 +231,8 @@ class _Film:
                 error_rad=state.error_rad,
                 thrusts_n=state.thrusts,
                 saturated=state.saturated,
-                velocity_in_body_m_s=_vector(told[:3]) if told is not None else None,
-                angular_velocity_in_body_rad_s=_vector(told[3:]) if told is not None else None,
+                velocity_in_body_m_s=_vector(twist[:3]) if twist is not None else None,
+                angular_velocity_in_body_rad_s=_vector(twist[3:]) if twist is not None else None,
             ),
         )
 
@@ -247,7 +247,7 @@ class _Film:
         )
 
     def _episode(self, episode: Episode) -> Event:
-        told = {
+        metadata = {
             "episode": str(episode.number),
             "task": episode.task,
             "keep": str(episode.keep).lower(),
@@ -255,7 +255,7 @@ class _Film:
         return Event(
             start_time=self._stamp(episode.t_begin),
             end_time=self._stamp(episode.t_end),
-            metadata=[KeyValuePair(key=key, value=value) for key, value in told.items()],
+            metadata=[KeyValuePair(key=key, value=value) for key, value in metadata.items()],
         )
 
 

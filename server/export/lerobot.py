@@ -202,13 +202,13 @@ class _Dataset:
     def write(self, folder: Path) -> None:
         rows = [self._episode(k) for k in range(len(self._episodes))]
         stats = {name: stats_of(column) for name, column in self._columns.items()}
-        told = {name: feature.info for name, feature in self._features.items()}
+        features = {name: feature.info for name, feature in self._features.items()}
         counts = {"episodes": len(rows), "frames": self._film.count, "tasks": len(self._tasks)}
         info = info_of(
             self._decoded.robot.robot.name,
             self._film.fps,
             counts,
-            {CAMERA: self._film.info, **told},
+            {CAMERA: self._film.info, **features},
         )
         write_data(folder, self._features, self._columns)
         write_episodes(folder, rows)

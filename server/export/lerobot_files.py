@@ -121,10 +121,10 @@ class FilmWriter:
 
     def stats(self) -> Stats:
         """Of its colours, each channel by itself, from 0 to 1."""
-        told = stats_of(np.concatenate(self._samples))
+        stats = stats_of(np.concatenate(self._samples))
         shaped = {
             name: np.reshape(value, (3, 1, 1)).tolist()
-            for name, value in told.items()
+            for name, value in stats.items()
             if name != "count"
         }
         return shaped | {"count": [len(self._samples)]}
@@ -153,9 +153,9 @@ class FilmWriter:
 def stats_of(column: Array) -> Stats:
     """Of a column (n,) or (n, k)."""
     rows = np.asarray(column, dtype=np.float64).reshape(len(column), -1)
-    told = {"min": rows.min(0), "max": rows.max(0), "mean": rows.mean(0), "std": rows.std(0)}
-    told |= {name: np.quantile(rows, q, axis=0) for name, q in QUANTILES.items()}
-    return {name: value.tolist() for name, value in told.items()} | {"count": [len(rows)]}
+    stats = {"min": rows.min(0), "max": rows.max(0), "mean": rows.mean(0), "std": rows.std(0)}
+    stats |= {name: np.quantile(rows, q, axis=0) for name, q in QUANTILES.items()}
+    return {name: value.tolist() for name, value in stats.items()} | {"count": [len(rows)]}
 
 
 def write_data(folder: Path, features: Mapping[str, Feature], columns: Mapping[str, Array]) -> None:
@@ -173,7 +173,7 @@ def write_tasks(folder: Path, tasks: Sequence[str]) -> None:
     """Write the tasks: a table of pandas, whose index they are."""
     text = {"pandas_type": "unicode", "numpy_type": "object", "metadata": None}
     number = {"pandas_type": "int64", "numpy_type": "int64", "metadata": None}
-    told = {
+    metadata = {
         "index_columns": ["task"],
         "column_indexes": [{"name": None, "field_name": None, **text}],
         "columns": [
@@ -186,14 +186,15 @@ def write_tasks(folder: Path, tasks: Sequence[str]) -> None:
     numbers = pa.array(range(len(tasks)), pa.int64())
     table = pa.table({"task_index": numbers, "task": pa.array(tasks, pa.string())})
     _write(
-        table.replace_schema_metadata({"pandas": json.dumps(told)}), folder / "meta/tasks.parquet"
+        table.replace_schema_metadata({"pandas": json.dumps(metadata)}),
+        folder / "meta/tasks.parquet",
     )
 
 
-def write_json(path: Path, told: Mapping[str, Any]) -> None:
+def write_json(path: Path, description: Mapping[str, Any]) -> None:
     """Write a description."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(told, indent=4, ensure_ascii=False), encoding="utf-8")
+    path.write_text(json.dumps(description, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 def info_of(

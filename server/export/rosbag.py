@@ -95,14 +95,14 @@ class _Bag:
         ]
         self._transforms("/tf_static", t, [FILMED, *fixed])
         for episode in episodes:
-            told = {
+            description = {
                 "episode": episode.number,
                 "begin_s": 1e-9 * self._decoded.unix_ns(episode.t_begin),
                 "end_s": 1e-9 * self._decoded.unix_ns(episode.t_end),
                 "task": episode.task,
                 "keep": episode.keep,
             }
-            text = msgspec.json.encode(told).decode()
+            text = msgspec.json.encode(description).decode()
             self._put("/episodes", episode.t_begin, "std_msgs/msg/String", data=text)
 
     def put(self, item: Item) -> None:
@@ -222,8 +222,8 @@ class _Bag:
 
     def _log(self, t: float, source: str, text: str, level: int) -> None:
         nowhere = {"file": "", "function": "", "line": 0}
-        told = {"stamp": self._stamp(t), "level": level, "name": source, "msg": text}
-        self._put("/rosout", t, "rcl_interfaces/msg/Log", **told, **nowhere)
+        message = {"stamp": self._stamp(t), "level": level, "name": source, "msg": text}
+        self._put("/rosout", t, "rcl_interfaces/msg/Log", **message, **nowhere)
 
     def _transforms(self, topic: str, t: float, known: Sequence[FramePlace]) -> None:
         transforms = [
@@ -257,11 +257,11 @@ class _Bag:
 
     def _command(self, state: RecordedState) -> None:
         header = self._header(state.t, BODY)
-        if (told := state.twist_in_b) is not None:
+        if (commanded := state.twist_in_b) is not None:
             twist = self._make(
                 "geometry_msgs/msg/Twist",
-                linear=self._vector(told[:3]),
-                angular=self._vector(told[3:]),
+                linear=self._vector(commanded[:3]),
+                angular=self._vector(commanded[3:]),
             )
             kind = "geometry_msgs/msg/TwistStamped"
             self._put("/robot/twist", state.t, kind, header=header, twist=twist)

@@ -34,7 +34,7 @@ FILMED: Final = FramePlace(PHONE, OPTICAL, HERE, wxyz_from_R(R_co))
 
 def places(state: RecordedState) -> list[FramePlace]:
     """Those that are known; of phone and virtual camera in space the directions alone are."""
-    told = (
+    candidates = (
         (INERTIAL, PHONE, HERE, state.R_fc_wxyz),
         (INERTIAL, VIRTUAL, HERE, state.R_fv_wxyz),
         (PHONE, BODY, state.p_bc_in_c, state.R_cb_wxyz),
@@ -42,7 +42,7 @@ def places(state: RecordedState) -> list[FramePlace]:
     )
     return [
         FramePlace(parent, child, p, wxyz)
-        for parent, child, p, wxyz in told
+        for parent, child, p, wxyz in candidates
         if p is not None and wxyz is not None
     ]
 

@@ -43,10 +43,10 @@ class CalibrationControl:
             phone.calibrate(Calibrate("stop"))
         if phone.id != self._phone:
             self._phone, self._sent = phone.id, Calibration("off")
-        told = phone.calibration()
-        if told != self._sent:
-            self._sent = told
-            self._push(encode_message(told))
+        message = phone.calibration()
+        if message != self._sent:
+            self._sent = message
+            self._push(encode_message(message))
 
 
 def _is_calm(control: ControlStatus | None) -> bool:

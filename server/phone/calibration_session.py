@@ -93,7 +93,7 @@ class CalibrationSession(FrameThread):
             if luma is not None:
                 self._guide.add(frame.t, look(luma, frame.t, self._board, self._detector))
         if luma is None:
-            self._tell(self._on_key_wanted)
+            self._call_if_running(self._on_key_wanted)
             return
         if self._guide.enough:
             self._shown = self._filming("solving")
@@ -103,7 +103,7 @@ class CalibrationSession(FrameThread):
 
     def _solve(self, solving: Solving) -> None:
         """Solve, in the thread; who was stopped meanwhile solves nothing."""
-        self._tell(lambda: setattr(self, "_solving", solving))
+        self._call_if_running(lambda: setattr(self, "_solving", solving))
         if self._solving is not solving:
             solving.stop()
 

@@ -77,7 +77,7 @@ class FrameThread(ABC):
         """Whether it was stopped."""
         return not self._running
 
-    def _tell(self, callback: Callable[[], object]) -> None:
+    def _call_if_running(self, callback: Callable[[], object]) -> None:
         """Call, unless the thread was stopped meanwhile."""
         with self._condition:
             if self._running:
@@ -101,7 +101,7 @@ class FrameThread(ABC):
             self._has_gap = False
         if not frames:
             return
-        self._tell(lambda: self._on_taken(frames[-1].sequence))
+        self._call_if_running(lambda: self._on_taken(frames[-1].sequence))
         self.dropped += len(frames) - 1
         self._look(frames, has_gap)
 

@@ -60,9 +60,9 @@ class VisionThread(FrameThread):
             self._frame_pipeline.needs_key = True
         detection = self._frame_pipeline.see(frames)
         if detection is None:
-            self._tell(self._on_key_wanted)
+            self._call_if_running(self._on_key_wanted)
             return
-        self._tell(lambda: self._on_detection(detection, frames[-1]))
+        self._call_if_running(lambda: self._on_detection(detection, frames[-1]))
         if detection.comes_again:
             return
         luma = self._frame_pipeline.luma

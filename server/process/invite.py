@@ -46,8 +46,8 @@ def invite(run: Mapping[str, object], role: Role) -> Invitation:
     direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with direct.open(request, timeout=TIMEOUT_S) as response:
-            told = json.loads(response.read())
-        return Invitation(str(told["url"]), str(told["here"]), float(told["lives_s"]))
+            answer = json.loads(response.read())
+        return Invitation(str(answer["url"]), str(answer["here"]), float(answer["lives_s"]))
     except (OSError, ValueError, LookupError) as error:
         raise PhoneClientError(f"{run['http_url']} gives no link: {error}") from error
 

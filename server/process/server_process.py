@@ -104,7 +104,7 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     if settings.record:
         manager.start_recording()
     run = json.dumps(_run(settings, given, base, doors))
-    telling = asyncio.create_task(_tell_when_ready(manager, warming, given.runtime / RUN_FILE, run))
+    reporting = asyncio.create_task(_report_ready(manager, warming, given.runtime / RUN_FILE, run))
     try:
         listeners = [
             (listener(guarded, tls, admission, trust), given.https),
@@ -112,7 +112,7 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
         ]
         await _until_signalled(manager, listeners)
     finally:
-        telling.cancel()
+        reporting.cancel()
         await signalling.close()
         (given.runtime / RUN_FILE).unlink(missing_ok=True)
         api.phone.stop()
@@ -127,7 +127,7 @@ def http_url(given: LaunchContext) -> str:
     return f"http://127.0.0.1:{given.http.getsockname()[1]}"
 
 
-async def _tell_when_ready(
+async def _report_ready(
     manager: SessionManager, warming: threading.Thread, run_file: Path, run: str
 ) -> None:
     """The run file says that a robot can be led: the control process compiles for a while first.

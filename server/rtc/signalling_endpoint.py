@@ -19,7 +19,7 @@ from server.rtc.answer import MAX_BYTES
 from server.rtc.link import RtcLink
 from server.security.least_role import RefusedRequest, operator
 from server.web.session_manager import SessionManager
-from server.web.typed_routes import ApiRoute, Asked, Told
+from server.web.typed_routes import ApiRoute, Asked, Reply
 
 log = logging.getLogger("lightleash")
 
@@ -67,7 +67,7 @@ class SignallingEndpoint:
             self._gone(self._link)
         await asyncio.gather(*self._closing, return_exceptions=True)
 
-    async def _ask(self, ask: Asked[Ask]) -> Told[Offer]:
+    async def _ask(self, ask: Asked[Ask]) -> Reply[Offer]:
         """Offer a connection to the phone that leads."""
         phone = self._manager.phone
         if not self._settings.enabled:
@@ -88,7 +88,7 @@ class SignallingEndpoint:
             raise RefusedRequest(403, "session", NOT_LEADING)
         return Offer(link.id, sdp, self._settings.ice_servers(1e-3 * unix_ms()))
 
-    async def _answer(self, request: Request, answer: Asked[Answer]) -> Told[Connecting]:
+    async def _answer(self, request: Request, answer: Asked[Answer]) -> Reply[Connecting]:
         """Take the page's answer to the newest offer."""
         link = self._link
         if link is None or link.id != answer.id:

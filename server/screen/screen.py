@@ -79,13 +79,13 @@ class Screen:
     def add_imu(self, sample: PhoneImu) -> None:
         """The phone has moved."""
         if self._thread is not None:
-            self._thread.tell(sample)
+            self._thread.add(sample)
 
     def add_detection(self, camera: Camera, luma: Image, detection: Detection) -> None:
         """The phone has seen something; in the vision thread."""
         thread = self._thread
         if thread is not None:
-            thread.tell(thread.look(camera, luma, detection))
+            thread.add(thread.look(camera, luma, detection))
 
     def _end(self) -> None:
         if self._thread is not None:
@@ -120,7 +120,7 @@ class LightsThread:
         """Give the socket back; who starts the thread need not."""
         self._truth.close()
 
-    def tell(self, news: PhoneImu | GlassLook) -> None:
+    def add(self, news: PhoneImu | GlassLook) -> None:
         """Motion, or a look at the glass; any thread may say it."""
         self._news.append(news)
 

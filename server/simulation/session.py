@@ -129,8 +129,8 @@ def prepared(session: SweepSession) -> SimulationSetup:
     """
     settings = dict(session.settings)
     robot_file = _robot(session.robot, settings)
-    told = {key.partition(".")[2]: value for key, value in settings.items() if _is(key, "scene")}
-    wanted = {**USUAL, **told}
+    given = {key.partition(".")[2]: value for key, value in settings.items() if _is(key, "scene")}
+    wanted = {**USUAL, **given}
     mean_s = 1e-3 * wanted["latency_ms"]
     half_s = min(0.5e-3 * wanted["jitter_ms"], mean_s)
     scene = SimulationOptions(
@@ -197,5 +197,5 @@ def _with(config: T, path: list[str], value: Value) -> T:
     """Copy of a dataclass with a number deep in it changed."""
     name, *deeper = path
     part = getattr(config, name)
-    told = _with(part, deeper, value) if deeper else value
-    return replace(config, **{name: told})  # type: ignore[type-var]
+    changed = _with(part, deeper, value) if deeper else value
+    return replace(config, **{name: changed})  # type: ignore[type-var]

@@ -312,7 +312,7 @@ class VirtualTimeSimulation:
             self._inbox.append(self._frame_pipeline.blink_request)
         self.trace.pictures += 1
         self.trace.leds.append(len(detection.rays) if detection is not None else 0)
-        self._tell(detection.seen(self._frame_pipeline.camera) if detection is not None else None)
+        self._send(detection.seen(self._frame_pipeline.camera) if detection is not None else None)
         if detection is not None:
             self._look_further(detection)
 
@@ -334,9 +334,9 @@ class VirtualTimeSimulation:
     def _held(self, seen: VisionMeasurement | None) -> None:
         if seen is not None and self.checks_rays:
             seen = self._frame_pipeline.front_end.check.believed(seen)
-        self._tell(seen)
+        self._send(seen)
 
-    def _tell(self, seen: VisionMeasurement | None) -> None:
+    def _send(self, seen: VisionMeasurement | None) -> None:
         if seen is not None:
             self.trace.poses += seen.pose is not None
             self._inbox.append(seen)

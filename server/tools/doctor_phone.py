@@ -19,17 +19,17 @@ TIMEOUT_S = 5.0
 EXIT_CODES = {"good": 0, "fair": 0, "poor": 1, "unknown": 1}
 
 
-def examine(access: Access, seconds: float, tell: Callable[[str], None]) -> int:
-    """Listen for `seconds`, `tell` the verdict; 0 if somebody may fly with it.
+def examine(access: Access, seconds: float, emit: Callable[[str], None]) -> int:
+    """Listen for `seconds`, `emit` the verdict; 0 if somebody may fly with it.
 
     Raises:
         PhoneClientError: no server there, or nobody leads.
     """
     ask(access, KEPT_S)  # says at once if there is no phone
-    tell(f"Listening to the phone's link for {seconds:g} s: hold the phone as you will in flight.")
+    emit(f"Listening to the phone's link for {seconds:g} s: hold the phone as you will in flight.")
     time.sleep(seconds)
     report = ask(access, seconds)
-    tell(text_of(report))
+    emit(text_of(report))
     return EXIT_CODES[report.grade]
 
 
@@ -64,11 +64,11 @@ def _why(body: bytes) -> str:
 def text_of(report: LinkReport) -> str:
     """Text for a terminal."""
     gaps = ", ".join(f"> {ms} ms: {count}" for ms, count in report.gaps.items())
-    told = [
+    lines = [
         report.title,
         *(f"  {line}" for line in report.lines),
         f"  Silences in {report.seconds:g} s: {gaps}; {100.0 * report.lost:.1f} % of PINGs "
         "were answered late or not at all.",
         *(f"  → {step}" for step in report.advice),
     ]
-    return "\n".join(told)
+    return "\n".join(lines)

@@ -95,9 +95,9 @@ def _twist(drive: TwistDrive) -> Iterator[RobotFinding]:
     change = f"{drive.acceleration:.1f} m/s² and {degrees(drive.angular_acceleration):.0f}°/s²"
     said = f"{drive.speed:.2f} m/s and {degrees(drive.rate):.0f}°/s at most, by {change}"
     yield RobotFinding("twist", True, said)
-    told_s = 1e-6 * SILENCE_US + drive.stop_s
+    zeroed_s = 1e-6 * SILENCE_US + drive.stop_s
     follows_s = drive.delay_s + drive.lag_s
-    said = f"told zero {told_s:.2f} s after the last command, its lag of {follows_s:.2f} s beyond"
+    said = f"told zero {zeroed_s:.2f} s after the last command, its lag of {follows_s:.2f} s beyond"
     yield RobotFinding("stops", True, said)
     phase = phase_left(drive, USUAL_LATENCY_S, BODY_AGE_S)
     delay_s = phase / max(drive.position_gain, drive.attitude_gain)

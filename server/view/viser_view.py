@@ -158,8 +158,8 @@ class Dashboard:
             self._cable.position = view.robot.position
         if self._trail.add(status.t, view.robot.position):
             self._trail_lines.points = self._trail.segments()
-        told = status.thrusts if self._craft.drive is None else status.twist_in_b or ()
-        command = np.asarray(told, dtype=np.float64)
+        commanded = status.thrusts if self._craft.drive is None else status.twist_in_b or ()
+        command = np.asarray(commanded, dtype=np.float64)
         if command.shape == self._craft.idle().shape and np.all(np.isfinite(command)):
             self._command.points = self._craft.arrows(command)
 

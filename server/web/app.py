@@ -40,7 +40,7 @@ from server.web.metrics import exposition
 from server.web.replies import HANDLERS
 from server.web.session_manager import SessionManager
 from server.web.status import ModeName, mode_of
-from server.web.typed_routes import ApiRoute, Asked, Told
+from server.web.typed_routes import ApiRoute, Asked, Reply
 from server.web.websocket import PageServer
 
 CLIENT = Path(__file__).resolve().parents[2] / "web_client"
@@ -123,7 +123,7 @@ class Api:
             ApiRoute(recording, self._start_recording, methods=post, status_code=202),
             ApiRoute(recording, self._stop_recording, methods=["DELETE"]),
             ApiRoute(
-                "/api/status", self._status, dependencies=watches, response_model=Told[Status]
+                "/api/status", self._status, dependencies=watches, response_model=Reply[Status]
             ),
             ApiRoute("/api/link", self._link, dependencies=watches),
             ApiRoute("/metrics", self._metrics, dependencies=watches),
@@ -132,7 +132,7 @@ class Api:
             Route("/healthz", self._health),
         ]
 
-    async def _stop(self, by: Stopper, asked: Asked[Command | None] = None) -> Told[StopAnswer]:
+    async def _stop(self, by: Stopper, asked: Asked[Command | None] = None) -> Reply[StopAnswer]:
         """STOP, which says how old it is if it has a body."""
         stop = asked or Command("stop")
         if stop.what != "stop":
@@ -140,19 +140,19 @@ class Api:
         self._manager.request(refuse_old(stop, now()), by)
         return StopAnswer(mode_of(self._manager, now())[0])
 
-    async def _start_virtual_phone(self, by: Supervisor) -> Told[PhoneAnswer]:
+    async def _start_virtual_phone(self, by: Supervisor) -> Reply[PhoneAnswer]:
         """Start it, unless it runs."""
         self._manager.people.note("virtual phone", by, "start")
         self.phone.start()
         return PhoneAnswer(self.phone.running)
 
-    async def _stop_virtual_phone(self, by: Supervisor) -> Told[PhoneAnswer]:
+    async def _stop_virtual_phone(self, by: Supervisor) -> Reply[PhoneAnswer]:
         """Ask it to leave."""
         self._manager.people.note("virtual phone", by, "stop")
         self.phone.stop()
         return PhoneAnswer(self.phone.running)
 
-    async def _start_recording(self, by: Supervisor) -> Told[RecordingAnswer]:
+    async def _start_recording(self, by: Supervisor) -> Reply[RecordingAnswer]:
         """Record, unless a recording runs."""
         self._manager.people.note("recording", by, "start")
         try:
@@ -162,7 +162,7 @@ class Api:
         self._manager.log_event(f"Recording {name}.")
         return RecordingAnswer(name)
 
-    async def _stop_recording(self, by: Supervisor) -> Told[RecordedAnswer]:
+    async def _stop_recording(self, by: Supervisor) -> Reply[RecordedAnswer]:
         """End the recording that runs."""
         self._manager.people.note("recording", by, "stop")
         path = self._manager.recordings.stop()
@@ -175,7 +175,7 @@ class Api:
 
     async def _link(
         self, seconds: Annotated[float, Query(gt=0.0, le=KEPT_S, allow_inf_nan=False)] = KEPT_S
-    ) -> Told[LinkReport]:
+    ) -> Reply[LinkReport]:
         """How it will be to fly with the operator's link, by its last `seconds`."""
         phone = self._manager.phone
         if phone is None:

@@ -63,47 +63,47 @@ class _Totals(Collector):
         for name, stream in self.status.streams.items():
             dropped.add_metric([name], stream.dropped)
         yield dropped
-        if (told := self.status.estimate) is not None:
+        if (estimate := self.status.estimate) is not None:
             pictures = CounterMetricFamily(
                 "lightleash_estimate_pictures", "late ones are dropped ones", labels=["fate"]
             )
             for fate in ("fused", "dropped", "late"):
-                pictures.add_metric([fate], getattr(told, fate))
+                pictures.add_metric([fate], getattr(estimate, fate))
             yield pictures
 
 
-def _estimate(told: Estimate, status: Status, registry: CollectorRegistry) -> None:
+def _estimate(estimate: Estimate, status: Status, registry: CollectorRegistry) -> None:
     """What the estimator says of itself; what it doesn't know is left out."""
     complains = Gauge(
         "lightleash_estimator_complains", "1: don't fly on it", ["estimator"], registry=registry
     )
-    complains.labels(told.name).set(told.complaint != "")
-    for name, words, value, unit in _estimate_figures(told, status):
+    complains.labels(estimate.name).set(estimate.complaint != "")
+    for name, words, value, unit in _estimate_figures(estimate, status):
         if value is not None:
             Gauge(f"lightleash_estimate_{name}", words, registry=registry).set(unit * value)
     bias = Gauge(
         "lightleash_estimate_bias", "[rad/s] or [m/s²]", ["sensor", "axis"], registry=registry
     )
     for sensor, values, unit in (
-        ("body_gyroscope", told.bias_body_deg_s, radians(1.0)),
-        ("body_accelerometer", told.bias_body_m_s2, 1.0),
-        ("phone_gyroscope", told.bias_phone_deg_s, radians(1.0)),
-        ("phone_accelerometer", told.bias_phone_m_s2, 1.0),
+        ("body_gyroscope", estimate.bias_body_deg_s, radians(1.0)),
+        ("body_accelerometer", estimate.bias_body_m_s2, 1.0),
+        ("phone_gyroscope", estimate.bias_phone_deg_s, radians(1.0)),
+        ("phone_accelerometer", estimate.bias_phone_m_s2, 1.0),
     ):
         for axis, value in zip("xyz", values or (), strict=False):
             bias.labels(sensor, axis).set(unit * value)
 
 
 def _estimate_figures(
-    told: Estimate, status: Status
+    estimate: Estimate, status: Status
 ) -> Iterable[tuple[str, str, float | None, float]]:
     """(name, words, value, its unit in SI) of each figure without labels."""
     return (
-        ("nis", "innovation squared per degree of freedom; 1 is honest", told.nis, 1.0),
-        ("age_seconds", "of the last fused picture", told.age_ms, 1e-3),
-        ("leds_rejected", "single LEDs beyond their gate", told.leds_rejected, 1.0),
-        ("time_offset_seconds", "of the pictures' stamps", told.time_offset_ms, 1e-3),
-        ("time_offset_sigma_seconds", "its sigma", told.time_offset_sigma_ms, 1e-3),
+        ("nis", "innovation squared per degree of freedom; 1 is honest", estimate.nis, 1.0),
+        ("age_seconds", "of the last fused picture", estimate.age_ms, 1e-3),
+        ("leds_rejected", "single LEDs beyond their gate", estimate.leds_rejected, 1.0),
+        ("time_offset_seconds", "of the pictures' stamps", estimate.time_offset_ms, 1e-3),
+        ("time_offset_sigma_seconds", "its sigma", estimate.time_offset_sigma_ms, 1e-3),
         ("sigma_metres", "of the position", status.sigma_mm, 1e-3),
-        ("sigma_radians", "of the attitude", told.sigma_deg, radians(1.0)),
+        ("sigma_radians", "of the attitude", estimate.sigma_deg, radians(1.0)),
     )

@@ -19,7 +19,7 @@ from server.security.pairings import LINK_S, Member, PairingError, State
 from server.security.security import PAIR_TRIES, Doors, cookie_name
 from server.web.people import LOCAL
 from server.web.session_manager import SessionManager
-from server.web.typed_routes import ApiRoute, Asked, Told
+from server.web.typed_routes import ApiRoute, Asked, Reply
 
 Short = Annotated[str, Meta(max_length=64)]
 
@@ -97,7 +97,7 @@ class PeopleApi:
         """All routes of pairing."""
         post = ["POST"]
         return [
-            ApiRoute("/api/pair", self._pair, methods=post, response_model=Told[PairAnswer]),
+            ApiRoute("/api/pair", self._pair, methods=post, response_model=Reply[PairAnswer]),
             ApiRoute("/api/whoami", self._who_am_i),
             ApiRoute("/api/invite", self._invite, methods=post),
             ApiRoute("/api/people/confirm", self._confirm, methods=post),
@@ -117,7 +117,7 @@ class PeopleApi:
         try:
             role, must_wait = doors.pairings.opens(asked.token, doors.clock())
             if not asked.replace and former is not None and _loses(former, role, must_wait):
-                return _told_of_less(former, role, must_wait)
+                return _role_conflict(former, role, must_wait)
             member, cookie = doors.pairings.pair(asked.token, asked.name, address, doors.clock())
         except PairingError as error:
             doors.tried(address)
@@ -140,11 +140,11 @@ class PeopleApi:
         former = self._doors.pairings.of_cookie(value, self._doors.clock()) if value else None
         return former if former is not None and former.state in ("waiting", "in") else None
 
-    async def _who_am_i(self, by: Known) -> Told[PairAnswer]:
+    async def _who_am_i(self, by: Known) -> Reply[PairAnswer]:
         """As what a page is paired."""
         return PairAnswer.of(by)
 
-    async def _invite(self, asked: Asked[InviteRequest], by: Supervisor) -> Told[InviteAnswer]:
+    async def _invite(self, asked: Asked[InviteRequest], by: Supervisor) -> Reply[InviteAnswer]:
         """Make a link, and its QR code."""
         if asked.role == "supervisor" and not by.id.startswith(LOCAL):
             allowed = "viewer, operator; lightleash invite makes the other one"
@@ -157,7 +157,7 @@ class PeopleApi:
         here = f"{self._here}{page}#k={key}" if self._here else url
         return InviteAnswer(url, here, _code(url))
 
-    async def _confirm(self, asked: Asked[PersonRequest], by: Supervisor) -> Told[PersonAnswer]:
+    async def _confirm(self, asked: Asked[PersonRequest], by: Supervisor) -> Reply[PersonAnswer]:
         """Let in who waits, by the letters on both screens."""
         member = self._doors.pairings.confirm(asked.id, asked.code)
         self._doors.save()
@@ -165,7 +165,7 @@ class PeopleApi:
         self._manager.log_event(f"{by.name} let {member.name} in.")
         return PersonAnswer(member.name)
 
-    async def _deny(self, asked: Asked[PersonRequest], by: Supervisor) -> Told[PersonAnswer]:
+    async def _deny(self, asked: Asked[PersonRequest], by: Supervisor) -> Reply[PersonAnswer]:
         """Turn away who waits."""
         member = self._doors.pairings.deny(asked.id, "A supervisor did not let it in.")
         self._doors.save()
@@ -173,7 +173,7 @@ class PeopleApi:
         self._manager.log_event(f"{by.name} did not let {member.name} in.")
         return PersonAnswer(member.name)
 
-    async def _revoke(self, asked: Asked[PersonRequest], by: Supervisor) -> Told[PersonAnswer]:
+    async def _revoke(self, asked: Asked[PersonRequest], by: Supervisor) -> Reply[PersonAnswer]:
         """Shut out who is in."""
         if asked.id.startswith(LOCAL):
             allowed = "a paired page; end the program on its computer instead"
@@ -181,12 +181,12 @@ class PeopleApi:
         why = "A supervisor has ended this pairing."
         return PersonAnswer((await self._manager.handover.shut_out(asked.id, why, by)).name)
 
-    async def _lead(self, asked: Asked[PersonRequest], by: Operator) -> Told[LeadAnswer]:
+    async def _lead(self, asked: Asked[PersonRequest], by: Operator) -> Reply[LeadAnswer]:
         """Hand the lead on."""
         self._manager.handover.give(asked.id, by, self._doors.clock())
         return LeadAnswer(asked.id)
 
-    async def _keep(self, asked: Asked[PersonRequest], by: Operator) -> Told[LeadAnswer]:
+    async def _keep(self, asked: Asked[PersonRequest], by: Operator) -> Reply[LeadAnswer]:
         """Keep the lead, or leave it to whom it was not given."""
         self._manager.handover.keep(asked.id, by, self._doors.clock())
         return LeadAnswer("")
@@ -199,7 +199,7 @@ def _loses(former: Member, role: Role, waits: bool) -> bool:
     )
 
 
-def _told_of_less(former: Member, role: Role, waits: bool) -> Response:
+def _role_conflict(former: Member, role: Role, waits: bool) -> Response:
     body = {
         "code": "paired",
         "field": "replace",

@@ -146,11 +146,11 @@ class SessionManager:
         knobs = {name: value for name, value in asdict(request).items() if value is not None}
         if not knobs:
             return
-        told = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
+        text = "virtual camera: " + ", ".join(f"{name} {value}" for name, value in knobs.items())
         if self._control.send(request):
-            self.log_event(f"supervisor: {told}", of="virtual camera")
+            self.log_event(f"supervisor: {text}", of="virtual camera")
         else:
-            self.log_event(f"{told} did not reach the control process: try again.")
+            self.log_event(f"{text} did not reach the control process: try again.")
 
     def lead(self, request: Lead, who: Member) -> None:
         """Send control how the next press is to lead.
@@ -162,12 +162,12 @@ class SessionManager:
             field = "scale" if request.scale != 1.0 else "axes"
             allowed = "1" if field == "scale" else "all or shift"
             raise WireError("value", f"lead.{field}", f"{allowed}: this robot hangs from nothing")
-        told = f"from the next press: {request.scale:g} times as far, {request.axes}"
+        text = f"from the next press: {request.scale:g} times as far, {request.axes}"
         if self._control.send(request):
-            self.people.note("leading", who, told)
-            self.log_event(f"{who.name}: {told}", of="leading")
+            self.people.note("leading", who, text)
+            self.log_event(f"{who.name}: {text}", of="leading")
         else:
-            self.log_event(f"{told} did not reach the control process: try again.")
+            self.log_event(f"{text} did not reach the control process: try again.")
 
     def calibrate(self, request: Calibrate) -> None:
         """Let the operator's phone begin its camera's calibration, or leave it."""

@@ -56,7 +56,7 @@ def build(manager: StatusSource) -> Status:
     refusals = [f"{silence}."] if control is None or silence else control.refusals
     detection = phone.detection if phone is not None else None
     found = detection is not None and detection.pose is not None
-    told_mm_s, told_deg_s = _commanded(None if silence else control)
+    commanded_mm_s, commanded_deg_s = _commanded(None if silence else control)
     return Status(
         mode=mode,
         reason=f"{silence}; the robot stops by its own watchdog."
@@ -102,8 +102,8 @@ def build(manager: StatusSource) -> Status:
         people=manager.people.present(),
         leading=_leading(manager.robot, control),
         takes="thrusts" if manager.robot.twist is None else "twist",
-        told_mm_s=told_mm_s,
-        told_deg_s=told_deg_s,
+        told_mm_s=commanded_mm_s,
+        told_deg_s=commanded_deg_s,
     )
 
 
@@ -160,23 +160,23 @@ def _leading(robot: Robot, control: ControlStatus | None) -> LeadingStatus | Non
 def _estimate(control: ControlStatus | None) -> Estimate | None:
     if control is None or control.estimate is None:
         return None
-    told, deg = control.estimate, degrees(1.0)
+    estimate, deg = control.estimate, degrees(1.0)
     return Estimate(
-        name=told.name,
-        complaint=told.complaint,
-        nis=_rounded(told.nis, 2),
-        age_ms=_rounded(told.age, 1, 1e3),
+        name=estimate.name,
+        complaint=estimate.complaint,
+        nis=_rounded(estimate.nis, 2),
+        age_ms=_rounded(estimate.age, 1, 1e3),
         fused=control.poses_fused,
         dropped=control.poses_dropped,
-        late=told.late,
-        leds_rejected=told.leds_rejected,
+        late=estimate.late,
+        leds_rejected=estimate.leds_rejected,
         time_offset_ms=_rounded(control.time_offset, 2, 1e3),
-        time_offset_sigma_ms=_rounded(told.time_offset_sigma, 2, 1e3),
+        time_offset_sigma_ms=_rounded(estimate.time_offset_sigma, 2, 1e3),
         sigma_deg=_rounded(control.sigma_theta, 2, deg),
-        bias_body_deg_s=_each(told.bias_omega_b, 2, deg),
-        bias_body_m_s2=_each(told.bias_a_b, 3),
-        bias_phone_deg_s=_each(told.bias_omega_c, 2, deg),
-        bias_phone_m_s2=_each(told.bias_a_c, 3),
+        bias_body_deg_s=_each(estimate.bias_omega_b, 2, deg),
+        bias_body_m_s2=_each(estimate.bias_a_b, 3),
+        bias_phone_deg_s=_each(estimate.bias_omega_c, 2, deg),
+        bias_phone_m_s2=_each(estimate.bias_a_c, 3),
     )
 
 

@@ -110,7 +110,7 @@ class ByMsgspec:
 
 Asked = Annotated[Kind, ByMsgspec(), Body()]
 """The body of a request."""
-Told = Annotated[Kind, ByMsgspec()]
+Reply = Annotated[Kind, ByMsgspec()]
 """The body of an answer."""
 
 

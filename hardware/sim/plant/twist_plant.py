@@ -38,7 +38,7 @@ class TwistPlant:
         self._h, self._share = h, 1.0 - exponential(-h / (0.5 * drive.lag_s))
         self._delay_ms, self._now_ms = round(1e3 * drive.delay_s), 0
         self._on_their_way: deque[tuple[int, Array]] = deque()
-        self._told = self._allowed = self._halfway = np.zeros(6)
+        self._commanded = self._allowed = self._halfway = np.zeros(6)
         self.twist_in_b: Array = np.zeros(6)
         """Velocity and angular rate in f, in b (6,) [m/s, rad/s]."""
         self.twist_rate_in_b: Array = np.zeros(6)
@@ -53,13 +53,13 @@ class TwistPlant:
         self._on_their_way.append((self._now_ms + self._delay_ms, np.array(twist_in_b)))
         for _ in range(round(1e3 * dt / STEP_MS)):
             while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
-                self._told = self._drive.within(self._on_their_way.popleft()[1])
+                self._commanded = self._drive.within(self._on_their_way.popleft()[1])
             self._move()
             self._now_ms += STEP_MS
 
     def _move(self) -> None:
         h, share = self._h, self._share
-        self._allowed = self._drive.toward(self._allowed, self._told, h)
+        self._allowed = self._drive.toward(self._allowed, self._commanded, h)
         self._halfway = self._halfway + share * (self._allowed - self._halfway)
         before = self.twist_in_b
         self.twist_in_b = before + share * (self._halfway - before)

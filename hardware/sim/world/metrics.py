@@ -103,9 +103,9 @@ def judge_offset(
     """What is told from `start` [s] on, against the true `offsets` [s]; NaN if nothing is."""
     errors, wrong = [], 0
     for track, offset in zip(tracks, offsets, strict=True):
-        told = _reported(track, start, inf)[:, 2:] - (offset, 0.0)
-        errors.append(told[:, 0])
-        wrong += bool(len(told) and abs(told[-1, 0]) > max(2e-3, 5.0 * told[-1, 1]))
+        reported = _reported(track, start, inf)[:, 2:] - (offset, 0.0)
+        errors.append(reported[:, 0])
+        wrong += bool(len(reported) and abs(reported[-1, 0]) > max(2e-3, 5.0 * reported[-1, 1]))
     e = np.concatenate(errors)
     known = e[np.isfinite(e)]
     if not len(known):
@@ -116,8 +116,8 @@ def judge_offset(
 
 def _reported(track: EstimatorRun, start: float, stop: float) -> Array:
     t = track.health[:, 0]
-    told: Array = track.health[(t >= start) & (t < stop)]
-    return told
+    reported: Array = track.health[(t >= start) & (t < stop)]
+    return reported
 
 
 def _stack(errors: Sequence[Errors]) -> Array:

@@ -65,10 +65,10 @@ def phone_samples(world: World) -> list[Event]:
     stamps = world.phone_stamps(world.t[i]) + setup.stamp_jitter * rng.normal(size=len(i))
     read = _held(world, i)
     true_values = (world.omega_c[read], world.f_c[read])
-    told = _measured(rng, world, true_values, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
+    measured = _measured(rng, world, true_values, i, setup.phone_fault, PHONE_BIAS, PHONE_NOISE)
     omega, f = (
         np.clip(np.rint(v / step) * step, -most, most)
-        for v, step, most in zip(told, PHONE_STEP, PHONE_RANGE, strict=True)
+        for v, step, most in zip(measured, PHONE_STEP, PHONE_RANGE, strict=True)
     )
     rows = zip(world.phone.arrival.tolist(), stamps.tolist(), omega, f, strict=True)
     samples: list[Event] = [(arrival, PhoneImu(t, w, g)) for arrival, t, w, g in rows]
@@ -105,9 +105,9 @@ def pictures(world: World) -> list[Event]:
     wrong = rng.uniform(-OUTLIER_PX, OUTLIER_PX, noise_px.shape)
     true = tangents(world, i)
     noise_px = _stuck(FOCAL_PX * true, noise_px, world.setup.stick_px)
-    told = true + np.where(world.false[..., None], wrong, noise_px) / FOCAL_PX
+    measured = true + np.where(world.false[..., None], wrong, noise_px) / FOCAL_PX
     poses = _poses(world, stamps, noise_px)
-    rows = zip(world.pictures.arrival.tolist(), stamps.tolist(), told, poses, strict=True)
+    rows = zip(world.pictures.arrival.tolist(), stamps.tolist(), measured, poses, strict=True)
     return [
         (arrival, VisionMeasurement(t, _rays(t, place, visible), pose))
         for (arrival, t, place, pose), visible in zip(rows, world.visible, strict=True)
@@ -224,8 +224,8 @@ def _twins(rng: np.random.Generator, samples: list[Event], probability: float) -
     for arrival, sample in samples:
         if isinstance(sample, PhoneImu) and rng.uniform() < probability:
             omega, f = (
-                told + step * rng.integers(-1, 2, 3)
-                for told, step in zip(
+                value + step * rng.integers(-1, 2, 3)
+                for value, step in zip(
                     (sample.omega_m_cf_in_c, sample.a_m_cf_in_c), PHONE_STEP, strict=True
                 )
             )

@@ -46,8 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"lightleash experiments all: {error}", file=sys.stderr)
         return REFUSED
     except KeyboardInterrupt:
-        told = "interrupted: the same command goes on from here"
-        print(f"{BLANK if sys.stderr.isatty() else ''}{told}", file=sys.stderr)
+        message = "interrupted: the same command goes on from here"
+        print(f"{BLANK if sys.stderr.isatty() else ''}{message}", file=sys.stderr)
         return INTERRUPTED
 
 

@@ -123,11 +123,11 @@ def _of_object(value: dict[str, Any], title: str) -> Iterator[Block]:
     """Its title stands above the first thing of it; further ones are called as their keys."""
     said = value.get("title")
     titles = chain([said if isinstance(said, str) else title], repeat(None))
-    told = {key: one for key, one in value.items() if key not in UNSAID}
-    long = {k: one for k, one in told.items() if isinstance(one, list) and not _is_short(one)}
-    inner = {key: one for key, one in told.items() if isinstance(one, dict) and one}
+    fields = {key: one for key, one in value.items() if key not in UNSAID}
+    long = {k: one for k, one in fields.items() if isinstance(one, list) and not _is_short(one)}
+    inner = {key: one for key, one in fields.items() if isinstance(one, dict) and one}
     truths = {key: one for key, one in inner.items() if _is_truths(one)}
-    single = {key: one for key, one in told.items() if key not in long and key not in inner}
+    single = {key: one for key, one in fields.items() if key not in long and key not in inner}
     for key, one in long.items():
         yield from blocks(one, _first(titles, titled(key)))
     for key, truth in truths.items():
@@ -157,7 +157,9 @@ def _is_short(values: list[Any]) -> bool:
 def table(title: str, rows: Sequence[Mapping[str, Any]]) -> Table:
     """A column for each key that says something; the paper's figure, ours and the ratio adjoin."""
     shown = [_with_ratio(row) for row in rows[:MOST_ROWS]]
-    keys = [key for key in dict.fromkeys(key for row in shown for key in row) if _tells(shown, key)]
+    keys = [
+        key for key in dict.fromkeys(key for row in shown for key in row) if _has_values(shown, key)
+    ]
     columns = [_column([row.get(key) for row in shown]) for key in keys]
     titles = [titled(key) for key in keys]
     if "ratio" in keys:
@@ -180,7 +182,7 @@ def _with_ratio(row: Mapping[str, Any]) -> dict[str, Any]:
     return head | three | moved
 
 
-def _tells(rows: Sequence[Mapping[str, Any]], key: str) -> bool:
+def _has_values(rows: Sequence[Mapping[str, Any]], key: str) -> bool:
     """Whether any row has something to show there."""
     return any(_plain(row.get(key)) not in ("", "–") for row in rows)
 

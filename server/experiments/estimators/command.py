@@ -116,16 +116,16 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
         return 1
     rows = [row_of(name, metrics.judge(runs, start), limit) for name, runs in tracks.items()]
     rows += [limit] if limit is not None else []
-    told = [column for column in COLUMNS if any(_tells(row, column[0]) for row in rows)]
+    columns = [column for column in COLUMNS if any(_has_value(row, column[0]) for row in rows)]
     shown: dict[str, EstimatorRun] = {name: runs[0] for name, runs in tracks.items()}
     return ExperimentReport(
         rows,
-        f"{text.table(told, rows)}\n{LEGEND if limit is not None else RECORDED}",
+        f"{text.table(columns, rows)}\n{LEGEND if limit is not None else RECORDED}",
         draw=lambda folder: (draw(shown, folder / "estimators.png"),),
     )
 
 
-def _tells(row: EstimatorRow, name: str) -> bool:
+def _has_value(row: EstimatorRow, name: str) -> bool:
     value = getattr(row, name)
     return isinstance(value, str) or bool(np.isfinite(value))
 

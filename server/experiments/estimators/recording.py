@@ -78,8 +78,8 @@ def _track(tape: EstimatorInputs, estimator: Estimator, t_first: float) -> Estim
     for now, state in play(estimator, tape.events, tape.times, _nobody):
         if state is not None:
             predicted.append((now, state, estimator.covariance))
-        told = estimator.health
-        health.append((now - t_first, told.nis, told.time_offset, told.time_offset_sigma))
+        report = estimator.health
+        health.append((now - t_first, report.nis, report.time_offset, report.time_offset_sigma))
     offset = health[-1][2] if np.isfinite(health[-1][2]) else 0.0
     errors = _compare(predicted, tape.poses, offset, t_first)
     unknown = np.full((len(errors.t), 3), nan)

@@ -46,12 +46,12 @@ class Minute:
 def minutes() -> tuple[Minute, ...]:
     """All minutes, typical ones first."""
     found = []
-    for name, told in json.loads(FILE.read_text(encoding="utf-8")).items():
-        for which, minute in told["minutes"].items():
+    for name, trace in json.loads(FILE.read_text(encoding="utf-8")).items():
+        for which, minute in trace["minutes"].items():
             up = _segments(minute["up"])
             down = _segments(minute["down"]) if "down" in minute else up
             label = name if which == "typical" else f"{name}, {which}"
-            found.append(Minute(label, told["kind"], told["what"], which == "typical", up, down))
+            found.append(Minute(label, trace["kind"], trace["what"], which == "typical", up, down))
     return tuple(sorted(found, key=lambda minute: not minute.is_typical))
 
 

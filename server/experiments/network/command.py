@@ -164,11 +164,11 @@ def _seconds(text: str) -> float:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    told = "; ".join(f"{one.name}: {one.description}" for one in SCENARIOS.values()).replace(
-        "%", "%%"
-    )
+    descriptions = "; ".join(
+        f"{one.name}: {one.description}" for one in SCENARIOS.values()
+    ).replace("%", "%%")
     parser.add_argument(
-        "--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), help=told
+        "--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), help=descriptions
     )
     parser.add_argument("--paths", nargs="+", choices=CLIENTS, default=list(CLIENTS))
     parser.add_argument("--seconds", type=_seconds, default=30.0, help="of each scenario and path")

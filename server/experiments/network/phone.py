@@ -69,7 +69,7 @@ async def play(access: Access, path: str, seed: int) -> LivePhone:
     signal.signal(signal.SIGUSR1, lambda *_: loop.call_soon_threadsafe(live.leave))
     is_ready = False
 
-    def tell(live: LivePhone) -> None:
+    def report_ready(live: LivePhone) -> None:
         nonlocal is_ready
         if not is_ready and live.sent >= WARM_PICTURES:
             is_ready = True
@@ -77,7 +77,7 @@ async def play(access: Access, path: str, seed: int) -> LivePhone:
             sys.stdout.flush()
 
     try:
-        await live.run(LONGEST_S, tell)
+        await live.run(LONGEST_S, report_ready)
     finally:
         signal.signal(signal.SIGUSR1, signal.SIG_IGN)
     return live

@@ -112,7 +112,7 @@ class NetworkTestbed:
         time.sleep(TRAILING_S)
         link.shape(CLEAN, CLEAN)
         self._phone.send_signal(signal.SIGUSR1)
-        told: dict[str, object] = msgspec.json.decode(_line(self._phone, END_S))
+        report: dict[str, object] = msgspec.json.decode(_line(self._phone, END_S))
         self._server.send_signal(signal.SIGUSR1)
         heard = msgspec.json.decode(_line(self._server, END_S), type=ArrivalLog)
         return Run(
@@ -124,8 +124,8 @@ class NetworkTestbed:
             fault_ends,
             heard.video_path,
             heard.undecodable,
-            int(str(told.get("skipped", 0))),
-            str(told.get("error", "")),
+            int(str(report.get("skipped", 0))),
+            str(report.get("error", "")),
             counts,
             lateness,
         )

@@ -86,7 +86,7 @@ class NotingSessionManager(SessionManager):
         self.heard.partings += 1
         super().disconnect_phone(phone)
 
-    def tell_heard(self) -> None:
+    def send_heard(self) -> None:
         """Send all that was noted, and begin anew."""
         if self.phone is not None:
             self._look_back(self.phone)
@@ -118,7 +118,7 @@ async def serve(host: str, folder: Path) -> None:
         stop, loop = asyncio.Event(), asyncio.get_running_loop()
         loop.add_reader(control.fileno(), control.inputs)
         loop.add_signal_handler(signal.SIGTERM, stop.set)
-        loop.add_signal_handler(signal.SIGUSR1, manager.tell_heard)
+        loop.add_signal_handler(signal.SIGUSR1, manager.send_heard)
         server = listener(app, None, admission)
         tasks = [
             asyncio.create_task(server.serve(sockets=[bound])),

@@ -69,9 +69,9 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
         outcome = measure(setup, [ours(leader, request, vci)] if adds else [])
         outcomes.append(outcome)
         print(f"\n{outcome.text()}", flush=True)
-    told = assumptions.json(assumptions.of(setup))
+    assumed = assumptions.json(assumptions.of(setup))
     return ExperimentReport(
-        {"source": published.SOURCE, "assumptions": told}
+        {"source": published.SOURCE, "assumptions": assumed}
         | {outcome.name: outcome.json() for outcome in outcomes},
         is_good=leader.name != PAPER.name or all(all(one.holds.values()) for one in outcomes),
         draw=lambda folder: [path for outcome in outcomes for path in outcome.draw(folder)],

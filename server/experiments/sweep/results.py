@@ -54,15 +54,15 @@ class SweepResults:
                 )
             return {}
         try:
-            told: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-            before, _ = dict(told["sweep"]), dict(told["versions"])
+            stored: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            before, _ = dict(stored["sweep"]), dict(stored["versions"])
         except (ValueError, KeyError, TypeError) as error:
             raise SweepError(str(path), "is no sweep's; allowed: a new --out") from error
         for key, now in json.loads(json.dumps(self._identity)).items():
             if before.get(key) != now:
                 change = f"was {_short(before.get(key))} when this was begun, now {_short(now)}"
                 raise SweepError(str(self._folder), f"{key} {change}; allowed: a new --out")
-        return told
+        return stored
 
     def _made_with(
         self, before: Mapping[str, Any], mix: bool
@@ -128,7 +128,7 @@ class SweepResults:
 
     def write(self, command: Sequence[str], hands: str) -> None:
         """JSON and CSV of what is done so far."""
-        told = {
+        contents = {
             "sweep": self._identity,
             "command": list(command),
             "flown_by": hands,
@@ -140,7 +140,7 @@ class SweepResults:
             "summary": self._summary(),
         }
         path = self._folder / "sweep.json"
-        path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(contents, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         with (self._folder / "results.csv").open("w", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows(self._rows())
 

@@ -81,7 +81,7 @@ def _row(key: str, value: str, outcomes: list[SessionOutcome]) -> SweepRow:
 
 def table(sweep: Sweep, done: Mapping[int, SessionOutcome]) -> str:
     """Table as printed, with the best combination below."""
-    told = text.table(COLUMNS, rows(sweep, done))
+    printed = text.table(COLUMNS, rows(sweep, done))
     points: dict[int, list[SessionOutcome]] = {}
     for index, outcome in done.items():
         points.setdefault(index // len(sweep.seeds), []).append(outcome)
@@ -91,7 +91,7 @@ def table(sweep: Sweep, done: Mapping[int, SessionOutcome]) -> str:
         if all(map(went_well, outcomes))
     }
     if not sweep.varied or not whole:
-        return told
+        return printed
     best = min(whole, key=lambda point: whole[point])
     settings = ", ".join(f"{key} {worded(value)}" for key, value in sweep.points[best])
-    return f"{told}\nbest: {settings}: median {whole[best]:.2f} mm"
+    return f"{printed}\nbest: {settings}: median {whole[best]:.2f} mm"

@@ -49,13 +49,13 @@ def learn(seed: int) -> LearningFigures:
     film = RenderedVideo(LEARNING, seed, HD, round(LEARN_S * RATE_HZ))
     rng = np.random.default_rng(seed)
     true_s = film.camera.readout_s
-    told_s = true_s * float(rng.choice(READOUT_ERROR))
+    nominal_s = true_s * float(rng.choice(READOUT_ERROR))
     offset_s = float(rng.uniform(-OFFSET_S, OFFSET_S))
-    camera = replace(film.camera, readout_s=told_s)
+    camera = replace(film.camera, readout_s=nominal_s)
     front_end = VisualFrontEnd(camera, film.leds_in_b, GatesConfig())
     for shot in film:
         front_end.add_imu(*shot.phone, *shot.body)
         front_end.process(Frame(shot.t - offset_s, shot.luma))
     return LearningFigures(
-        seed, true_s, told_s, front_end.readout.in_use_s, offset_s, front_end.offset_s
+        seed, true_s, nominal_s, front_end.readout.in_use_s, offset_s, front_end.offset_s
     )

@@ -85,9 +85,9 @@ def lied(fault: CameraFault, seed: int, channel: str) -> LyingFilm:
         if frame is None:
             continue
         pose = eyes.process(frame).pose
-        told = eyes.complaint or eyes.repeats.remark
-        if told and not words:
-            words, named_s = told, shot.t - begin
+        complaint = eyes.complaint or eyes.repeats.remark
+        if complaint and not words:
+            words, named_s = complaint, shot.t - begin
         if pose is not None and shot.t > START_S + SETTLED_S:
             error, P = error_of(pose, shot)[:3], pose.covariance[:3, :3]
             nees = float(error @ np.linalg.solve(P, error)) / 3.0

@@ -31,9 +31,9 @@ class PlainTracker:
 
     def look(self, shot: RenderedFrame) -> RelativePose | None:
         """The pose in a shot's picture."""
-        told = self._last or (shot.p_bc_in_c, shot.R_cb)
+        prior = self._last or (shot.p_bc_in_c, shot.R_cb)
         begin = thread_cpu()
-        pose = self._pose(shot, *told)
+        pose = self._pose(shot, *prior)
         self.took_s = thread_cpu() - begin
         self._last = (pose.p_bc_in_c, pose.R_cb) if pose is not None else None
         return pose

@@ -96,8 +96,8 @@ def _right(rows: list[VisionRow]) -> Iterator[GoalVerdict]:
     if shares:
         worst = min(shares, key=lambda s: shares[s])
         row = min((r for r in with_imu if r.solvable), key=lambda r: r.found_percent)
-        told = f"{worst} {shares[worst]:.1f} %; worst row {_name(row)} {row.found_percent:.1f} %"
-        yield GoalVerdict("no scenario under 95 %", shares[worst] >= 95.0, told)
+        found = f"{worst} {shares[worst]:.1f} %; worst row {_name(row)} {row.found_percent:.1f} %"
+        yield GoalVerdict("no scenario under 95 %", shares[worst] >= 95.0, found)
     covered = [row for row in with_imu if row.scene == "one_covered"]
     yield _share("tracks with any 4 of 5 LEDs", covered, 95.0)
     started = [row.fresh_percent for row in covered if row.fresh_percent == row.fresh_percent]
@@ -117,12 +117,12 @@ def _honest(pools: list[VisionRow]) -> Iterator[GoalVerdict]:
             outside = [row for row in of if not NEES[0] <= row.nees <= NEES[1]]
             low, high = min(row.nees for row in of), max(row.nees for row in of)
             names = ", ".join(f"{row.scene} {row.channel} {row.nees:.2f}" for row in outside[:9])
-            told = f"{low:.2f} to {high:.2f}; {len(outside)} of {len(of)} outside {names}"
-            yield GoalVerdict(f"NEES/6 median in 0.5 to 1.8 {goal}", not outside, told)
+            found = f"{low:.2f} to {high:.2f}; {len(outside)} of {len(of)} outside {names}"
+            yield GoalVerdict(f"NEES/6 median in 0.5 to 1.8 {goal}", not outside, found)
             beyond = [row for row in of if not row.nees_p95 <= NEES_P95]
             names = ", ".join(f"{r.scene} {r.channel} {r.nees_p95:.1f}" for r in beyond[:9])
-            told = f"{len(beyond)} of {len(of)} beyond {names}"
-            yield GoalVerdict(f"NEES/6 p95 ≤ {NEES_P95:g} {goal}", not beyond, told)
+            found = f"{len(beyond)} of {len(of)} beyond {names}"
+            yield GoalVerdict(f"NEES/6 p95 ≤ {NEES_P95:g} {goal}", not beyond, found)
 
 
 def _precise(rows: list[VisionRow]) -> Iterator[GoalVerdict]:
@@ -153,13 +153,13 @@ def _exact(rows: list[VisionRow]) -> Iterator[GoalVerdict]:
         limited = " / ".join(f"{x:g}" for x in limits)
         goal = f"{scene}, 720p, 2.5 m ≤ {limited} (mm lateral / mm depth / °)"
         met = all(x <= limit for x, limit in zip(seen, limits, strict=True))
-        told = " / ".join(f"{x:.3f}" for x in seen) + f", {row.to_bound:.1f} × the bound"
-        yield GoalVerdict(goal, met, told)
+        found = " / ".join(f"{x:.3f}" for x in seen) + f", {row.to_bound:.1f} × the bound"
+        yield GoalVerdict(goal, met, found)
         if coded is not None:
             ratios = [b / a for a, b in zip(seen, _medians(coded), strict=True)]
-            told = " / ".join(f"{ratio:.2f}" for ratio in ratios)
+            found = " / ".join(f"{ratio:.2f}" for ratio in ratios)
             yield GoalVerdict(
-                f"{scene} through H.264 2 Mbit/s ≤ 1.5 × raw", max(ratios) <= 1.5, told
+                f"{scene} through H.264 2 Mbit/s ≤ 1.5 × raw", max(ratios) <= 1.5, found
             )
 
 

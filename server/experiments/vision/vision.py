@@ -138,8 +138,8 @@ def _report(
 ) -> int:
     print(text([one for one in rows if one.frames]))
     floors = {one.height: f"{1e3 * one.pass_ms:.0f} µs" for one in rows if one.pass_ms > 0.0}
-    told = ", ".join(f"{height} rows {floor}" for height, floor in floors.items())
-    print(f"\none pass over a picture: {told}\n")
+    durations = ", ".join(f"{height} rows {floor}" for height, floor in floors.items())
+    print(f"\none pass over a picture: {durations}\n")
     judged = verdicts(rows, pools) + verdicts_on_learning(learnt)
     print("\n".join(map(str, judged)))
     if out is not None:

@@ -117,7 +117,7 @@ def _calibrate(arguments: argparse.Namespace, board: Board) -> int:
         print(f"picture: {arguments.report}")
     if verdict.level == "refused":
         return _refuse(verdict)
-    _tell(verdict)
+    _print_verdict(verdict)
     text = yaml_of(found, verdict, name, arguments.screen_angle, today())
     for path in _places(arguments, found.size):
         store(path, text)
@@ -134,11 +134,11 @@ def _places(arguments: argparse.Namespace, size: tuple[int, int]) -> list[Path]:
 
 
 def _refuse(verdict: Verdict) -> int:
-    _tell(verdict)
+    _print_verdict(verdict)
     return 1
 
 
-def _tell(verdict: Verdict) -> None:
+def _print_verdict(verdict: Verdict) -> None:
     print(f"\nVerdict: {verdict.level}.")
     for reason in verdict.reasons:
         print(f"  - {reason}")

@@ -29,12 +29,12 @@ POOR, REFUSED = 1, 2
 def text_of(lines: Sequence[CheckLine]) -> str:
     """A line each, and below it what to do."""
     wide = max(len(line.what) for line in lines)
-    told: list[str] = []
+    rows: list[str] = []
     for line in lines:
-        told.append(f"{line.grade:<7}  {line.what:<{wide}}  {line.value}")
+        rows.append(f"{line.grade:<7}  {line.what:<{wide}}  {line.value}")
         if line.advice:
-            told.append(f"{'':<7}  {'':<{wide}}  → {line.advice}")
-    return "\n".join(told)
+            rows.append(f"{'':<7}  {'':<{wide}}  → {line.advice}")
+    return "\n".join(rows)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -52,8 +52,8 @@ def main(argv: list[str] | None = None) -> int:
         if arguments.html is not None:
             arguments.html.write_text(str(page(found, lines)), encoding="utf-8")
         if arguments.json is not None:
-            told = plain(to_builtins({"grade": grade, "lines": lines, "figures": found}))
-            text = json.dumps(told, indent=1, ensure_ascii=False, allow_nan=False)
+            report = plain(to_builtins({"grade": grade, "lines": lines, "figures": found}))
+            text = json.dumps(report, indent=1, ensure_ascii=False, allow_nan=False)
             arguments.json.write_text(text, encoding="utf-8")
     except (RecordingError, OSError) as error:
         print(f"lightleash check: {error}", file=sys.stderr)

@@ -54,8 +54,8 @@ def _run(given: argparse.Namespace) -> None:
     frames = open_film(given.frames, given.fps)
     for file, table in zip(files, (motion.camera, motion.body), strict=True):
         _check_clock(file, table, frames)
-    told = len(frames.notes)
-    _tell([*frames.notes, *_missing(motion, leds_in_b)])
+    printed = len(frames.notes)
+    _print_notes([*frames.notes, *_missing(motion, leds_in_b)])
     _warm_up()
     locator = Locator(camera, leds_in_b, motion)
     history = _work(locator, leds_in_b, frames, outputs)
@@ -63,13 +63,13 @@ def _run(given: argparse.Namespace) -> None:
     for line in camera_lines(camera, locator.front_end):
         print(line)
     print(f"\nwritten: {', '.join(str(path) for path in outputs.values())}")
-    _tell([*frames.notes[told:], *_doubts(history, files)])
+    _print_notes([*frames.notes[printed:], *_doubts(history, files)])
 
 
 def _warm_up() -> None:
     """Who waits for a compiler is told so."""
     words = ["compiling the pipeline; that happens once and takes about a minute"]
-    timer = Timer(COMPILING_S, _tell, (words,))
+    timer = Timer(COMPILING_S, _print_notes, (words,))
     timer.start()
     try:
         warm_up()
@@ -162,7 +162,7 @@ def _doubts(history: History, files: Sequence[Path | None]) -> list[str]:
     return [*gaps, *history.gravity.words(*(str(file) for file in files))]
 
 
-def _tell(notes: Sequence[str]) -> None:
+def _print_notes(notes: Sequence[str]) -> None:
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
 

@@ -57,14 +57,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash tune`; 1: nothing was found or it doesn't fly, 2: it can't be done."""
     arguments = parse(argv)
     try:
-        told = _tuned(arguments)
+        text = _tuned(arguments)
     except (TuneError, RobotFileError, GainsTextError, OSError) as error:
         print(f"lightleash tune: {error}", file=sys.stderr)
         return 2
     except (TuningError, TuningFlightError) as error:
         print(f"lightleash tune: {error}", file=sys.stderr)
         return 1
-    print(told)
+    print(text)
     return 0
 
 
@@ -160,16 +160,16 @@ def _flies(table: dict[str, Any], sets: Mapping[str, Gains], arguments: argparse
     }
     good = True
     for what, scene in FLIGHTS.items():
-        told = []
+        results = []
         for name in sets:
             figures = list(_flown(table, name, scene, arguments))
             ended = next((one.ended for one in figures if one.ended), "")
             rms = float(np.sqrt(np.mean([one.rms_mm**2 for one in figures])))
             chatter = float(np.mean([one.chatter_n for one in figures]))
             went = f"ended: {ended}" if ended else f"{rms:.2f} mm, chatter {chatter:.3f} N"
-            told.append(f"{name} {went}")
+            results.append(f"{name} {went}")
             good = not ended
-        print(f"tracking RMS, {what}: {'; '.join(told)}", flush=True)
+        print(f"tracking RMS, {what}: {'; '.join(results)}", flush=True)
         if not good:
             return False
     return True

@@ -56,7 +56,7 @@ def test_both_assumptions_on_what_is_felt_count_whichever_the_settings_take() ->
 def test_a_body_that_is_heavier_than_told_pulls_where_it_is_not_pulled() -> None:
     loop = shipped(FeedForwardConfig())
     heavy = replace(loop, dynamics=replace(loop.dynamics, inertia=1.3 * loop.dynamics.inertia))
-    believed = replace(heavy, told_inertia=loop.dynamics.inertia)
+    believed = replace(heavy, nominal_inertia=loop.dynamics.inertia)
     told, known = (one.open_loop(X, LATE)[0] for one in (believed, heavy))
     slow = np.argmin(np.abs(OMEGA - 3.0))
     assert abs(told[slow] / known[slow] - 1.0) > 0.05

@@ -68,12 +68,12 @@ def filmed(thread, seconds, lag_s, since=0.0):
     pixels, still = CAMERA.pixels(AWAY + GLASS.fiducials()), np.zeros(3)
     for k in range(int(60 * seconds)):
         t = since + k / 60.0
-        thread.tell(PhoneImu(t, still, np.array([0.0, 0.0, GRAVITY])))
+        thread.add(PhoneImu(t, still, np.array([0.0, 0.0, GRAVITY])))
         if k % 2 == 0:
             seen = glass_seen(CAMERA, GLASS, np.arange(16), pixels, t)
             right = SWEEP_SHARE * GLASS.width_m * float(swept(np.array(t - lag_s)))
             light = AWAY + on_glass(np.array([[right, 0.0]]))
-            thread.tell(GlassLook(seen, light))
+            thread.add(GlassLook(seen, light))
         lights = thread.step(t + 0.01)
     return lights
 
@@ -116,7 +116,7 @@ def test_a_robot_larger_than_the_screen_is_not_shown_on_it(make):
 
 def test_why_there_is_no_glass_is_told_for_a_while(make):
     thread = make()
-    thread.tell(GlassLook(None, np.zeros((0, 3)), "The picture is mirrored."))
+    thread.add(GlassLook(None, np.zeros((0, 3)), "The picture is mirrored."))
     assert thread.step(1.0).why == thread.why == "The picture is mirrored."
     assert "four corners" in thread.step(5.0).why
 

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.frames import Array, R_between, R_co
 from server.tools.survey.reconstruction.errors import SurveyError
 
-TOLD = 1.5
+DISTINCT = 1.5
 """A design whose second best naming fits hardly worse than this does not tell the LEDs apart."""
 
 UNLIKE = 0.3
@@ -58,7 +58,7 @@ def matched(points: Array, design: Array) -> tuple[int, ...]:
             f" {100.0 * np.sqrt(left[best] / total_b):.0f} % of its size at the least: another"
             " robot, or mirrored pictures, as of a front camera?"
         )
-    if left[second] < TOLD**2 * max(float(left[best]), 1e-6 * total_b):
+    if left[second] < DISTINCT**2 * max(float(left[best]), 1e-6 * total_b):
         raise SurveyError(
             "--design: its LEDs can be matched to those of the film in two ways that fit about"
             " equally; see lightleash robot leds"
