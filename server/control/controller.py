@@ -27,6 +27,8 @@ SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
 STOOD_STILL_S = 1e-6 * SILENCE_US
 """Between two ticks: the robot has heard nothing for so long, and coasts."""
+TIME_DECIMALS, THRUST_DECIMALS = 6, 4
+"""Of commands in recordings: 1 µs, 0.1 mN. All digits of a float would be three times as long."""
 
 
 TooLate = Callable[[float, float], str]
@@ -83,6 +85,7 @@ class Controller:
         self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
         self._body_samples: list[BodyRow] = []
         self._body_twists: list[BodyRow] = []
+        self._commands: list[tuple[float, ...]] = []
         self._fuse_ms = 0.0
 
     def expected(self, output: Output) -> Prediction | None:
@@ -142,6 +145,8 @@ class Controller:
         stop = output.failsafe.mode == Mode.STOPPED
         if output.twist_in_b is not None:
             return TwistCommand(output.twist_in_b, output.armed, stop), output
+        thrusts = np.round(output.thrusts, THRUST_DECIMALS).tolist()
+        self._commands.append((round(now, TIME_DECIMALS), *thrusts))
         return ThrustCommand(output.thrusts, output.armed, stop), output
 
     def _sort(
@@ -212,6 +217,7 @@ class Controller:
         health = estimator.health
         samples, self._body_samples = self._body_samples, []
         twists, self._body_twists = self._body_twists, []
+        commands, self._commands = self._commands, []
         twist_in_b = output.twist_in_b
         return ControlStatus(
             t=output.t,
@@ -260,6 +266,7 @@ class Controller:
             if twist_in_b is None
             else (*triple(twist_in_b[:3]), *triple(twist_in_b[3:])),
             body_twists=twists,
+            commands=commands,
         )
 
 

@@ -96,6 +96,8 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Told to a robot that takes a twist, which has no thrusts: v, ω in b [m/s, rad/s]."""
     body_twists: list[BodyRow] = []
     """What such a robot measures, of each of `body_samples`: t, v, ω in b."""
+    commands: list[tuple[float, ...]] = []
+    """Thrusts commanded since the last status, for recordings: each time t, then `thrusts`."""
 
 
 def expected_of(status: ControlStatus) -> Prediction | None:

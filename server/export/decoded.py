@@ -111,6 +111,7 @@ class RecordedState(msgspec.Struct, frozen=True):
     saturated: bool = False
     twist_in_b: tuple[float, float, float, float, float, float] | None = None
     body_samples: list[BodyRow] = []
+    commands: list[tuple[float, ...]] = []
     estimate: EstimateFields | None = None
 
     @property

@@ -56,6 +56,7 @@ def control_status(**changes: object) -> ControlStatus:
         "saturated": False,
         "body_samples": [],
         "body_twists": [],
+        "commands": [],
         "realtime": "SCHED_FIFO 50",
         "lateness_ms": {"p50": 0.1, "p99": 0.2, "p999": 0.4, "max": 1.0, "missed": 3.0},
         "fuse_ms": 90.0,
