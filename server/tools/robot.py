@@ -1,4 +1,4 @@
-"""`lightleash robot WHAT`: examine a robot's file, make its key, run its own computer."""
+"""`lightleash robot WHAT`: examine a robot's file or flights, make its key, run its computer."""
 
 from __future__ import annotations
 
@@ -9,18 +9,28 @@ from hardware.follower import FollowerError
 from hardware.led_layout.viewpoints import LedLayoutError
 from hardware.link.link_key import LinkKeyError
 from hardware.robot_file import RobotFileError
+from hardware.robot_text import RobotTextError
+from hardware.system_identification.fit import IdentificationError
 from server.common.options import Parser
 from server.process import robot_key
+from server.recording.writer import RecordingError
 from server.tools import onboard, robot_check
+from server.tools.identify import command as identify
 from server.tools.led_layout import command as leds
 from server.tools.led_layout.files import OutError
 
-KINDS = {"check": robot_check, "leds": leds, "key": robot_key, "onboard": onboard}
+KINDS = {
+    "check": robot_check,
+    "leds": leds,
+    "identify": identify,
+    "key": robot_key,
+    "onboard": onboard,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash robot`."""
-    words = "Examine a robot file, make a key, run the robot's own computer."
+    words = "Examine a robot's file or flights, make a key, run the robot's own computer."
     parser = Parser(prog="lightleash robot", description=words)
     kinds = parser.add_subparsers(required=True, metavar="WHAT", dest="name")
     for name, kind in KINDS.items():
@@ -36,6 +46,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         OutError,
         LinkKeyError,
         FollowerError,
+        IdentificationError,
+        RecordingError,
+        RobotTextError,
         OSError,
     ) as error:
         print(f"lightleash robot {arguments.name}: {error}", file=sys.stderr)

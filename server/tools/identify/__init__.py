@@ -1,0 +1,1 @@
+"""`lightleash robot identify`: a robot's numbers, by flights that were recorded."""
