@@ -49,8 +49,11 @@ def identify(known: PlantParameters, flights: Sequence[FlightRecord]) -> Identif
     """Find the plant around `known` that explains `flights` best.
 
     Raises:
-        IdentificationError: they are too short, or explain nothing.
+        IdentificationError: they are too short, or of a robot with other thrusters.
     """
+    thrusters = len(known.thruster_torques)
+    if other := {record.commands.shape[1] for record in flights} - {thrusters}:
+        raise IdentificationError(f"commands for {max(other)} thrusters: the file has {thrusters}")
     usable = [SampledFlight.of(record) for record in flights if record.seconds >= LEAST_S]
     if not usable:
         longest = max((record.seconds for record in flights), default=0.0)
@@ -60,7 +63,7 @@ def identify(known: PlantParameters, flights: Sequence[FlightRecord]) -> Identif
         )
     models = [PlantModel(known, flight) for flight in usable]
     start = SpecificPlant.of(known, LINK_S)
-    thrusters, scales, noise = len(start.thrust), start.scales, NOISE
+    scales, noise = start.scales, NOISE
     found = start.packed / scales
 
     def residuals(scaled: Array) -> Array:
@@ -77,7 +80,7 @@ def identify(known: PlantParameters, flights: Sequence[FlightRecord]) -> Identif
         )
         found, left = solved.x, residuals(solved.x)
         noise = np.maximum(left.std(axis=0), 1e-9)
-    variance = np.vstack([model.measured for model in models]).var(axis=0)
+    variance = np.maximum(np.vstack([model.measured for model in models]).var(axis=0), 1e-12)
     own = np.square([model.noise(known.imu) for model in models]).mean(axis=0)
     return IdentifiedPlant(
         SpecificPlant.unpacked(found * scales, thrusters),

@@ -41,7 +41,9 @@ def _stretches(states: Iterable[State]) -> Iterator[list[State]]:
 
 
 def _follows(before: State, state: State) -> bool:
-    """Whether nothing is missing between two statuses."""
+    """Whether nothing is missing between two statuses of one robot."""
+    if len(state.thrusts) != len(before.thrusts):
+        return False
     if not state.body_samples:
         return True  # its samples come with the next one, if they come
     times = [before.body_samples[-1][0], *(row[0] for row in state.body_samples)]
@@ -73,4 +75,5 @@ def _attitude(state: State) -> Array:
 
 def _commands(state: State) -> list[tuple[float, ...]]:
     """All since the status before; of older recordings the last one alone."""
-    return state.commands or [(state.t, *state.thrusts)]
+    whole = [row for row in state.commands if len(row) == 1 + len(state.thrusts)]
+    return whole or [(state.t, *state.thrusts)]

@@ -83,3 +83,9 @@ def test_short_flights_are_refused_in_words():
         identify(KNOWN, [shaken(KNOWN, seconds=8.0)])
     with pytest.raises(IdentificationError, match="lasted 0 s"):
         identify(KNOWN, [])
+
+
+def test_commands_for_another_robot_are_refused_in_words():
+    quadrotor = load_robot("quadrotor").plant
+    with pytest.raises(IdentificationError, match="for 8 thrusters: the file has 4"):
+        identify(quadrotor, [shaken(KNOWN, seconds=2.0)])

@@ -69,3 +69,9 @@ def _without_samples(state):
 
 def test_what_is_too_short_is_not_looked_at():
     assert not list(flights_of(statuses(40)))
+
+
+def test_a_robot_with_other_thrusters_is_another_flight():
+    quadrotor = statuses(80, 12.0, thrusts=[0.5] * 4, commands=False)
+    eight, four = flights_of([*statuses(100), *quadrotor])
+    assert (eight.commands.shape[1], four.commands.shape[1]) == (8, 4)
