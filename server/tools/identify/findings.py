@@ -31,6 +31,8 @@ LEAST_EXPLAINED, MOST_NOISE = 0.7, 0.2
 moved it. Of an axis that hardly moved nothing is said."""
 LEAST_THRUST: Final = 0.1
 """Of what the others give on average: less, and a thruster is none, or another one."""
+MOST_WRONG: Final = 2
+"""Thrusters that fail at once; more, and one that is not known makes the others look wrong."""
 AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
@@ -182,8 +184,10 @@ def objections(identified: IdentifiedPlant) -> list[str]:
         for axis, share, noise in by_axis
         if share < LEAST_EXPLAINED and noise < MOST_NOISE
     ]
-    if not unexplained:
+    if not unexplained and len(wrong) <= MOST_WRONG:
         return [f"{one}: it fails, or is not the one that the file says" for one in wrong]
+    if not unexplained:
+        return [f"{len(wrong)} thrusters look wrong: some are not where the file says, or reversed"]
     hint = f" (it looks as if {', '.join(wrong)})" if wrong else ""
     return [
         f"thrusters explain too little of how it moved: {', '.join(unexplained)}. It touched"

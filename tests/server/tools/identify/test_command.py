@@ -134,6 +134,11 @@ def test_a_thruster_that_is_none_is_named(share, words):
     assert objections(found()) == []
 
 
+def test_many_wrong_thrusters_are_one_that_is_not_known():
+    (said,) = objections(found(shares=np.array((1.0, -0.5, 0.0, -0.4, 1.1, 0.9, 1.0, 1.0))))
+    assert said.startswith("3 thrusters look wrong")
+
+
 def test_what_thrusters_dont_explain_is_said_by_axis():
     one = found()
     one.explained[[0, 5]] = 0.31, -0.2
