@@ -157,6 +157,8 @@ class VisionMeasurement:
     """Tangents of half the field of view, to the side and up."""
     offset: StampOffset | None = None
     """Coarse time offset of the stamps, once it is known."""
+    lie: str = ""
+    """Why none of the camera's pictures is believed now, nor quite what they said before."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -115,6 +115,7 @@ class Teleop:
         self._failsafe = failsafe.Failsafe()
         self._operator = TouchState(-np.inf, held=False, press=0)
         self._half_field: tuple[float, float] | None = None
+        self._lie = ""
         self._t_seen = self._t_phone = -np.inf
         self._body = BodyImu(-np.inf, np.zeros(3), np.zeros(3))
         self._monitor = SensorMonitor()
@@ -238,7 +239,7 @@ class Teleop:
             self._monitor.add_body_imu(body)
             self._body = body
         for seen in inputs.seen:
-            self._half_field = seen.half_field
+            self._half_field, self._lie = seen.half_field, seen.lie
             if self._monitor.comes_again(seen):
                 continue
             if self.estimator.add_seen(seen, inputs.t):
@@ -311,6 +312,7 @@ class Teleop:
             gap=inputs.gap,
             doubt=flight_envelope.doubt(limits, known, self.estimator.complaint)
             or self._monitor.jumped
+            or self._lie
             or self._astray(known),
             block=self._blocked(leashed),
             is_settled=self._is_settled(known, ages),

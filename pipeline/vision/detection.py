@@ -48,9 +48,12 @@ class Detection:
     """What was known before."""
     comes_again: bool = False
     """The picture is the one before: it was not looked at."""
+    lie: str = ""
+    """Why no picture of this camera is believed now."""
 
     def seen(self, camera: Camera) -> VisionMeasurement | None:
         """Vision measurement for a filter; None if it says nothing of the robot."""
-        if self.pose is None and len(self.rays) == 0:
+        if self.pose is None and len(self.rays) == 0 and not self.lie:
             return None
-        return VisionMeasurement(self.t, self.rays, self.pose, camera.half_field, self.offset)
+        half_field = camera.half_field
+        return VisionMeasurement(self.t, self.rays, self.pose, half_field, self.offset, self.lie)

@@ -143,7 +143,7 @@ class PictureCheck:
         """The same with what is believed of it: nothing, or all, as sure as one may be."""
         judged, pose, rays = self.judge(seen), seen.pose, seen.rays
         if not judged.is_believed:
-            return replace(seen, pose=None, rays=NO_RAYS)
+            return replace(seen, pose=None, rays=NO_RAYS, lie=self.complaint)
         if pose is not None:
             for off in judged.beside:
                 pose, rays = widened(pose, rays, self._leds_in_b, off)

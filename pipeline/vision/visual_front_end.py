@@ -197,7 +197,9 @@ class VisualFrontEnd:
             return detection
         believed = self.check.believed(seen)
         reason = detection.reason if believed.pose is not None or pose is None else ELSEWHERE
-        return replace(detection, pose=believed.pose, rays=believed.rays, reason=reason)
+        return replace(
+            detection, pose=believed.pose, rays=believed.rays, reason=reason, lie=believed.lie
+        )
 
     def _without_gravity(self, frame: Frame) -> RelativePose | None:
         """The pose of a picture from nothing else, now and then: the search is long."""

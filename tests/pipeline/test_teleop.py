@@ -13,6 +13,7 @@ from pipeline.config import EnvelopeConfig, TeleopConfig
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState
 from pipeline.teleop import Inputs, Output, Teleop
+from pipeline.vision.rays import NO_RAYS
 from tests.pipeline.seeing import quiver, seen_at
 
 ROBOT = load_robot("ames").robot
@@ -33,14 +34,17 @@ def run(
     body_a: np.ndarray = UP,
     R_cb: np.ndarray = LEVEL,
     gyro: Callable[[float], np.ndarray] = quiver,
+    lie: str = "",
 ) -> list[Output]:
-    """Everything at rest, seen perfectly, 50 ms late."""
+    """Everything at rest, seen perfectly, 50 ms late; or a camera that is known to lie."""
     outputs = []
     for k in range(round(start / 0.005), round((start + seconds) / 0.005)):
         t = 0.005 * k
         phone = (PhoneImu(t - 0.02, STILL, UP),) if k % 3 == 0 else ()
         seen = t - 0.05
         picture = seen_at(seen, position(seen), R_cb, COVARIANCE)
+        if lie:
+            picture = replace(picture, pose=None, rays=NO_RAYS, lie=lie)
         outputs.append(
             teleop.step(
                 Inputs(
@@ -155,3 +159,16 @@ def test_a_flight_ends_when_the_robots_motion_sensors_stand_still(gyro: np.ndarr
     assert [o.failsafe.mode for o in frozen if o.t < 1.89] == 18 * [Mode.TRACK]
     assert frozen[-1].failsafe.mode == Mode.RAMP
     assert frozen[-1].failsafe.reason == "The robot's motion sensors stand still."
+
+
+def test_a_camera_that_is_found_out_is_followed_no_further() -> None:
+    """What it taught before is in the estimate, and no covariance knows how wrong that is."""
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    assert run(teleop, 1.5, 0.5, held=True)[-1].failsafe.mode == Mode.TRACK
+    doubted = run(teleop, 2.0, 0.3, held=True, lie="It zooms.")
+    first = next(k for k, o in enumerate(doubted) if o.failsafe.mode != Mode.TRACK)
+    assert first <= 6, "with the first picture that says so"
+    assert doubted[-1].failsafe.mode == Mode.COAST
+    assert doubted[-1].failsafe.reason == "It zooms."
+    assert run(teleop, 2.3, 0.5, held=True)[-1].failsafe.mode == Mode.TRACK

@@ -77,6 +77,16 @@ def test_a_stabiliser_is_named_though_it_steadied_the_picture_from_the_beginning
         assert not any(believed for t, believed, *_ in rows if t >= named)
 
 
+def test_who_is_named_says_so_with_each_picture_and_who_is_not_says_nothing() -> None:
+    check, _ = checked(world(), lying(world(), "zoom", ONSET_S))
+    *_, last = looks(world(), Faults())
+    seen = check.believed(measured(replace(last, t=last.t + 0.01), None))
+    assert (seen.lie, len(seen.rays)) == (check.complaint, 0)
+    assert seen.lie
+    honest, _ = checked(world(), looks(world(), Faults()))
+    assert honest.believed(measured(replace(last, t=last.t + 0.01), None)).lie == ""
+
+
 def test_a_busy_browser_is_no_stabiliser() -> None:
     pictures, refused, named = judged("a browser becomes busy", 30, 12.0)
     assert named == {}
