@@ -26,16 +26,17 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
-from playwright.sync_api import BrowserContext, Page
+from playwright.sync_api import BrowserContext
 
 from server.common.settings import VideoSettings
 from server.common.text import table
 from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
-from tests.e2e.chromium_channel import SENSORS, Channel, address, feeling, reading
+from tests.e2e.chromium_channel import SENSORS, address
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.clock_canvas import clock_canvas
 from tests.e2e.conftest import find_chromium
+from tests.e2e.fed_sensors import FedSensors
 from tests.e2e.page_scripts import KEEP_CONNECTIONS, LACKING, NO_H264
 
 SCRIPTS: dict[str, tuple[str, ...]] = {
@@ -101,25 +102,11 @@ def receiving(result: Path) -> Iterator[dict[str, object]]:
             process.wait(20.0)
 
 
-class Sensors:
-    """Motion sensors that sway, fed at 100 Hz."""
-
-    def __init__(self, context: BrowserContext, page: Page) -> None:
-        self._channel = Channel(address(context, page))
-        self._channel.orders(*map(feeling, SENSORS))
-
-    def sway(self, seconds: float) -> None:
-        """Play for so long."""
-        end = time.monotonic() + seconds
-        while (t := time.monotonic()) < end:
-            turn = 0.3 * sin(2.0 * pi * t)
-            felt = (np.array((0.5 * turn, turn, z)) for z in (9.81 + turn, turn, turn))
-            self._channel.orders(*map(reading, SENSORS, felt))
-            time.sleep(0.01)
-
-    def close(self) -> None:
-        """They read nothing any more."""
-        self._channel.close()
+def swaying(t: float) -> dict[str, np.ndarray]:
+    """Each motion sensor's reading (3,) of a phone that sways, at a time [s]."""
+    turn = 0.3 * sin(2.0 * pi * t)
+    felt = (np.array((0.5 * turn, turn, z)) for z in (9.81 + turn, turn, turn))
+    return dict(zip(SENSORS, felt, strict=True))
 
 
 def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
@@ -127,10 +114,10 @@ def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
         page = context.new_page()
         for script in (clock_canvas(1280), KEEP_CONNECTIONS, *SCRIPTS[way]):
             page.add_init_script(script)
-        sensors = Sensors(context, page)
+        sensors = FedSensors(address(context, page), swaying)
         operator, supervisor = told["tokens"]
         page.goto(f"http://127.0.0.1:{told['port']}/#k={operator}")
-        sensors.sway(1.0)
+        time.sleep(1.0)
         epoch = float(page.evaluate("performance.timeOrigin")) * 1e-3
         epoch += time.monotonic() - time.time()
         tapped = time.monotonic()
@@ -138,11 +125,11 @@ def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
             page.evaluate(STOCK, [supervisor, VideoSettings().bitrate_bps])
         else:
             page.tap("#start")
-        sensors.sway(SETTLED_S)
+        time.sleep(SETTLED_S)
         before, t_before = page.evaluate(BYTES_SENT), time.monotonic()
-        sensors.sway(1.0)
+        time.sleep(1.0)
         sent = 8.0 * (page.evaluate(BYTES_SENT) - before) / (time.monotonic() - t_before)
-        sensors.sway(seconds)
+        time.sleep(seconds)
         sensors.close()
         page.close()
     return judged(way, json.loads(result.read_text()), epoch, tapped, seconds, sent)
