@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 SECTION: Final = re.compile(r"^\[([^\[\]]+)\]", re.MULTILINE)
 Value = float | list[float]
@@ -30,7 +30,8 @@ def with_numbers(text: str, numbers: Mapping[str, Value], comments: Mapping[str,
         written = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise RobotTextError(f"a number is not on a line of its own: {error}") from error
-    _verify(wanted, written)
+    if wanted != written:  # however unusually the file is written, nothing else may change
+        raise RobotTextError("the file's sections are no [section] tables; write them so")
     return text
 
 
@@ -40,10 +41,10 @@ def _replaced(text: str, key: str, value: str, comment: str) -> str:
     if section in begins:
         following = SECTION.search(text, begins[section])
         end = following.start() if following else len(text)
-        line = re.compile(rf"^({name}\s*=\s*)[^#\r\n]*?([ \t]*)(#[^\r\n]*)?(\r?)$", re.MULTILINE)
+        line = re.compile(rf"^({name}\s*=\s*)[^#\r\n]*(?:#[^\r\n]*)?(\r?)$", re.MULTILINE)
         found = line.search(text, begins[section], end)
         if found is not None:
-            new = f"{found.group(1)}{value}  # {comment}{found.group(4)}"
+            new = f"{found.group(1)}{value}  # {comment}{found.group(2)}"
             return text[: found.start()] + new + text[found.end() :]
     raise RobotTextError(f"{key}: not on a line of its own in the file")
 
@@ -52,9 +53,3 @@ def _written(value: Value) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(repr, value)) + "]"
     return repr(value)
-
-
-def _verify(wanted: dict[str, Any], written: dict[str, Any]) -> None:
-    """Verify that nothing else has changed, however unusually the file is written."""
-    if wanted != written:
-        raise RobotTextError("the file's sections are no [section] tables; write them so")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -70,7 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         text = with_numbers(text, *file_numbers(robot_file.plant, numbers))
         robot_of(tomllib.loads(text), str(out))  # nothing is written that can't be loaded
         out.write_text(text, encoding="utf-8", newline="")
-        print(f"written: {out}; before you fly it: lightleash robot check {out}")
+        where = sys.stderr if arguments.json else sys.stdout  # JSON stands alone
+        print(f"written: {out}; before you fly it: lightleash robot check {out}", file=where)
     return int(bool(against))
 
 

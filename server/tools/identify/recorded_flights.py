@@ -20,24 +20,24 @@ State = ControlStatus | RecordedState
 
 
 def flights_of(states: Iterable[State]) -> Iterator[FlightRecord]:
-    """Each stretch of flight without a gap that says enough to look at."""
-    for stretch in _stretches(states):
-        if len(stretch) >= LEAST_STATUSES:
-            yield _record(stretch)
+    """Each segment of flight without a gap that says enough to look at."""
+    for segment in _segments(states):
+        if len(segment) >= LEAST_STATUSES:
+            yield _record(segment)
 
 
-def _stretches(states: Iterable[State]) -> Iterator[list[State]]:
+def _segments(states: Iterable[State]) -> Iterator[list[State]]:
     """Statuses that follow each other, all of them in flight and with an attitude."""
-    stretch: list[State] = []
+    segment: list[State] = []
     for state in states:
         flies = state.mode in FLYING and state.R_cb_wxyz is not None and state.R_fc_wxyz is not None
-        follows = not stretch or _follows(stretch[-1], state)
-        if stretch and not (flies and follows):
-            yield stretch
-            stretch = []
+        follows = not segment or _follows(segment[-1], state)
+        if segment and not (flies and follows):
+            yield segment
+            segment = []
         if flies and state.body_samples:
-            stretch.append(state)
-    yield stretch
+            segment.append(state)
+    yield segment
 
 
 def _follows(before: State, state: State) -> bool:
@@ -50,18 +50,18 @@ def _follows(before: State, state: State) -> bool:
     return state.t - before.t <= GAP_S and bool((np.diff(times) <= GAP_S).all())
 
 
-def _record(stretch: list[State]) -> FlightRecord:
-    imu = np.array([row for state in stretch for row in state.body_samples])
+def _record(segment: list[State]) -> FlightRecord:
+    imu = np.array([row for state in segment for row in state.body_samples])
     imu = imu[np.unique(imu[:, 0], return_index=True)[1]]
-    commands = np.array([row for state in stretch for row in _commands(state)])
+    commands = np.array([row for state in segment for row in _commands(state)])
     return FlightRecord(
         commands[:, 0],
         commands[:, 1:],
         imu[:, 0],
         imu[:, 1:4],
         imu[:, 4:7],
-        np.array([state.t for state in stretch]),
-        np.array([_attitude(state) for state in stretch]),
+        np.array([state.t for state in segment]),
+        np.array([_attitude(state) for state in segment]),
     )
 
 
