@@ -51,9 +51,12 @@ def is_far(off: Array, p: Array, turned: float, rate: float) -> bool:
     return across > allowed or abs(along) > ALONG
 
 
-def named(refused: Sequence[VisionMeasurement], off: Array, p: Array) -> CameraLie:
-    """The lie of pictures in a row, the last one `off` (3,) beside p (3,) [m]."""
-    if _stands(refused):
+def named(shown: Sequence[VisionMeasurement], off: Array, p: Array) -> CameraLie:
+    """The lie of pictures in a row, the last one `off` (3,) beside p (3,) [m].
+
+    The first of them was still believed: one that stands shows it again.
+    """
+    if _stands(shown):
         return CameraLie(STANDS)
     across, along = _parts(off, p)
     if across / ACROSS_RAD > abs(along) / ALONG:
@@ -68,13 +71,13 @@ def scaled(scale: float) -> str:
     return SCALED.format(percent=100.0 * abs(exp(scale) - 1.0), larger=larger)
 
 
-def _stands(refused: Sequence[VisionMeasurement]) -> bool:
+def _stands(shown: Sequence[VisionMeasurement]) -> bool:
     """All show what the first one shows."""
-    first = refused[0].rays
+    first = shown[0].rays
     return all(
         np.array_equal(one.rays.led, first.led)
         and float(np.abs(one.rays.tangents - first.tangents).max(initial=0.0)) < STILL
-        for one in refused
+        for one in shown
     )
 
 

@@ -13,7 +13,8 @@ pictures.
 * What alone is beside where the picture before predicted it, however far, is dated badly, as a busy
   browser does it now and then: it is believed less, and moves what is predicted next less.
 * What is far beside is not believed. After `NAMED_S` the lie is named, and the camera is on trial:
-  nothing is believed until `TRIAL_S` have passed without another one, and a zoom is taken back.
+  nothing is believed until it was right for `TRIAL_S` in which one that stands still had been
+  refused, and a zoom is taken back. Where nothing moves, time acquits nobody.
 * What is steadied is named as well, be it ever so little beside (`steadied_picture`).
 
 Nothing is judged without fresh samples of both sides, or before the pictures' time is known.
@@ -68,6 +69,7 @@ AMISS_CHI2, SHIFTED_CHI2 = 12.0, 20.0
 """Of the last of them, from before all pictures that may have misled the next: once in 140 by
 chance; and of one that is shifted, as samples that have just become worse shift it as well."""
 TRIAL_S: Final = 1.5
+"""In the right so long, by pictures between which enough moved to show that they are."""
 FLOOR_RAD: Final = 2e-4
 """How far an LED may be from where picture and robot file have it, beside noise: 0.2 px."""
 UNGATED: Final = 1e9
@@ -120,7 +122,10 @@ class PictureCheck:
         self._was_beside = False
         """The picture before was beside its place."""
         self._t_begun = -np.inf
-        self._refused: list[VisionMeasurement] = []
+        self._right_s = 0.0
+        """So long pictures were right since that could have been wrong."""
+        self._shown: list[VisionMeasurement] = []
+        """The last that was not refused, and those since."""
         self._surprise, self._off2 = 1.0, np.zeros(3)
         """Lately: χ²/3, and by how much it was missed (3,) [m²]."""
         self._scale = 0.0
@@ -176,10 +181,10 @@ class PictureCheck:
             return self._refuse(seen, misses)
         if is_known and self._jumps.is_steadied:
             return self._name(seen, CameraLie(SHIFTED))
-        self._refused.clear()
+        self._shown = [seen]
+        self._acquit(misses[0])
         if not np.isfinite(track.fuse(near, self._inflated(seen, pose, misses[1]), len(seen.rays))):
             self._begin(seen)
-        self._acquit(seen.t)
         self._noise.add_innovation(max(miss.chi2 for miss in misses))
         self._surprise += LATELY * (misses[0].chi2 / 3.0 - self._surprise)
         self._off2 += LATELY * (np.square(misses[0].off) - self._off2)
@@ -207,10 +212,9 @@ class PictureCheck:
 
     def _missed(self, pose: RelativePose, predicted: Checkpoint[VisionMeasurement]) -> Missed:
         """Where it is seen from where it was predicted."""
-        off = pose.p_bc_in_c - predicted.x[0:3]
         P: Array = self._track.in_picture(predicted)[:3, :3]
         S = self._stretch * P + pose.covariance[:3, :3]
-        return Missed(off, S, float(off @ np.linalg.solve(S, off)), predicted)
+        return _beside(pose.p_bc_in_c, S, predicted)
 
     def _match_noise(self, pose: RelativePose, near: Missed) -> None:
         """Learn how well the phone's samples predict, from one picture to the next."""
@@ -246,7 +250,8 @@ class PictureCheck:
             self._learnt = base.x[X_BIASES:].copy(), base.P[BIASES:, BIASES:].copy()
         known = seen.offset is not None or self._learnt is not None
         self._knows = known and can_start(seen, self._config) and self._hears(seen.t)
-        self._refused.clear()
+        self._shown = [seen]
+        self._right_s = 0.0
         if self._knows:
             self._track.begin(first_checkpoint(seen, self._learnt, np.inf, self._config))
             self._t_begun = seen.t
@@ -266,10 +271,10 @@ class PictureCheck:
 
     def _refuse(self, seen: VisionMeasurement, misses: tuple[Missed, Missed]) -> Judged:
         """Believe nothing of it; `misses` from before all pictures that may mislead, and since."""
-        refused, far = self._refused, misses[0]
-        refused.append(seen)
+        self._shown.append(seen)
+        refused, far = self._shown[1:], misses[0]
         off = max((miss.off for miss in misses), key=_square)
-        lie = named(refused, off, far.predicted.x[0:3])
+        lie = named(self._shown, off, far.predicted.x[0:3])
         least = self._noise.chi2 * (SHIFTED_CHI2 if lie.words == SHIFTED else AMISS_CHI2)
         is_lie = far.chi2 > least and seen.t - refused[0].t >= NAMED_S
         if len(refused) < NAMED_PICTURES or not is_lie:
@@ -285,11 +290,22 @@ class PictureCheck:
         self.t_named = seen.t
         return REFUSED
 
-    def _acquit(self, t: float) -> None:
-        """End the trial of a camera that told the truth for long enough."""
-        is_over = t - self._t_begun > TRIAL_S
-        if self.complaint and is_over and abs(self._scale) < RETURNED:
+    def _acquit(self, far: Missed) -> None:
+        """End the trial of a camera that was right for long enough.
+
+        So it was in this picture if the base's, shown again, would have been amiss.
+        """
+        shown_again = _beside(self._track.base.x[0:3], far.S, far.predicted)
+        if self._is_amiss(shown_again):
+            self._right_s += far.predicted.t - self._track.newest.t
+        if self.complaint and self._right_s > TRIAL_S and abs(self._scale) < RETURNED:
             self.complaint = ""
+
+
+def _beside(p: Array, S: Array, predicted: Checkpoint[VisionMeasurement]) -> Missed:
+    """A place p (3,) [m] as known as S (3, 3), from where it was predicted."""
+    off = p - predicted.x[0:3]
+    return Missed(off, S, float(off @ np.linalg.solve(S, off)), predicted)
 
 
 def _lately(stream: ImuStream, t: float) -> Array:

@@ -17,6 +17,7 @@ from tests.pipeline.faulty_camera import FOCAL, NOISE_PX, Faults, looks, solved
 LATE = 6
 """Pictures that are held back."""
 BREATH, BREATH_HZ = 0.02, 0.5
+SHIFT = 0.02
 LIES = {
     "zoom": Faults(zoom=1.08),
     "lens": Faults(zoom=0.55),
@@ -39,6 +40,8 @@ def lying(world, lie, onset, seed=0):
         case "frozen":  # and encoded anew: not to the last bit
             noise = np.random.default_rng((seed, 5)).normal(0.0, 0.02 / FOCAL, (len(since), 5, 2))
             told = _solved(since, [since[0].tangents + n for n in noise], [since[0]] * len(since))
+        case "shifted":
+            told = _solved(since, [one.tangents + SHIFT for one in since], since)
         case "late":
             told = [replace(honest[k + j - LATE], t=one.t) for j, one in enumerate(since)]
         case _:

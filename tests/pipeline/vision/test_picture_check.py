@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
+from pipeline.vision.camera_lies import SHIFTED
 from pipeline.vision.picture_check import TRIAL_S, PictureCheck
 from pipeline.vision.repeated_frames import STANDS
 from tests.pipeline.faulty_camera import Faults, looks
@@ -18,6 +19,8 @@ from tests.pipeline.lying_camera import checked, lying, measured, seen_as
 NAMED_S = 0.3
 STEADIED_S = 2.6
 ONSET_S = 2.5
+UNTELLING_S = 0.75
+"""In which too little moves, or too little is known of it, to show that a camera is right."""
 MOVING = (0.03, float(np.deg2rad(1.0)))
 
 
@@ -114,11 +117,35 @@ def test_a_zoom_that_is_taken_back_is_forgiven_after_its_trial_and_no_other() ->
     check, rows = checked(long, seen_as(honest, back))
     assert check.complaint == ""
     assert not any(believed for t, believed, *_ in rows if 2.5 <= t < 3.5 + TRIAL_S)
-    assert all(believed for t, believed, *_ in rows if t > 3.5 + TRIAL_S + 0.5)
+    assert all(believed for t, believed, *_ in rows if t > 3.5 + TRIAL_S + UNTELLING_S)
     check, rows = checked(long, lying(long, "zoom", 2.5))
     assert "8 % larger" in check.complaint
     check.measured(0.0, 0.001)
     assert not any(believed for t, believed, *_ in rows if t > 2.5)
+
+
+STILL = WorldOptions(duration=7.0, hand_sigma=(0.0, 0.0), tremor=0.0, robot_sigma=(0.0, 0.0))
+
+
+@pytest.mark.parametrize("seed", [2, 3, 7])
+def test_a_picture_that_stands_is_never_believed_again(seed: int) -> None:
+    long = world(seed, 7.0)
+    _, rows = checked(long, lying(long, "frozen", ONSET_S))
+    named = next(t for t, *_, complaint in rows if complaint)
+    assert not any(believed for t, believed, *_ in rows if t >= named)
+
+
+def test_where_nothing_moves_time_acquits_nobody() -> None:
+    unmoved = World(STILL)
+    check, rows = checked(unmoved, lying(unmoved, "shifted", ONSET_S))
+    assert check.complaint == SHIFTED
+    assert not any(believed for t, believed, *_ in rows if t >= check.t_named)
+
+
+def test_a_lens_that_was_switched_before_a_robot_at_rest_is_no_standing_picture() -> None:
+    unmoved = World(STILL)
+    check, _ = checked(unmoved, lying(unmoved, "lens", ONSET_S))
+    assert "smaller" in check.complaint
 
 
 def test_without_motion_samples_nothing_is_judged() -> None:
