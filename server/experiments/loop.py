@@ -15,8 +15,8 @@ from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
 from server.common import clock, text
-from server.common.drawing import panels, save
 from server.control.process import teleop_config
+from server.experiments.drawing import panels, save
 from server.experiments.runner import ExperimentReport, experiment
 from server.simulation.figures import TrackingFigures, result_of, rows_of
 from server.simulation.trace import TrackingTrace

@@ -26,7 +26,7 @@ from pipeline.control.robust_margins import (
     worst_margins,
 )
 from server.common import text
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 from server.experiments.runner import ExperimentReport, experiment
 
 ESTIMATORS = ("relative", "paper", "none")

@@ -21,10 +21,10 @@ from hardware.plant_parameters import PlantParameters
 from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from server.common import processes
 from server.common.ranges import number, whole
 from server.common.text import Column, flights
 from server.control.process import teleop_config
+from server.experiments import processes
 from server.experiments.runner import ExperimentReport, experiment
 from server.simulation.figures import result_of, rms, rows_of
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation

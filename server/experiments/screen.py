@@ -19,11 +19,11 @@ import numpy as np
 
 from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import PERIOD_S, TeleopConfig
-from server.common import processes
-from server.common.drawing import panels, save
 from server.common.ranges import number, whole
 from server.common.text import Column, dashed, flights
 from server.control.process import teleop_config
+from server.experiments import processes
+from server.experiments.drawing import panels, save
 from server.experiments.runner import ExperimentReport, experiment
 from server.simulation.figures import SETTLE_S, result_of, rms
 from server.simulation.screen import FRAMES_HZ, Display, ScreenSimulation

@@ -30,11 +30,11 @@ from hardware.robot_file import ROBOTS, RobotFile, load_robot, robot_of
 from hardware.robot_text import with_numbers
 from hardware.system_identification.fit import IdentificationError, IdentifiedPlant, identify
 from pipeline.config import TeleopConfig
-from server.common import processes
 from server.common.options import Parser
 from server.common.text import table
 from server.control.ipc import ControlStatus
 from server.control.process import STATUS_EVERY, teleop_config
+from server.experiments import processes
 from server.experiments.plants import Setting, UntoldPlant, drawn
 from server.simulation.figures import result_of
 from server.tools.identify.findings import file_numbers, found_numbers, objections

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from server.common.drawing import save
 from server.experiments.contact.flight import ContactTrace
 from server.experiments.contact.measure import ContactRow, smooth
 from server.experiments.contact.setting import BAND_N, GO_S, STAY_S
+from server.experiments.drawing import save
 from server.experiments.paper.picture import TIME, lettered
 
 

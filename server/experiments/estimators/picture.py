@@ -9,7 +9,7 @@ import numpy as np
 
 from hardware.sim.world.evaluator import EstimatorRun
 from pipeline.frames import Array
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 
 
 def draw(tracks: Mapping[str, EstimatorRun], path: Path) -> Path:

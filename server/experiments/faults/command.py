@@ -12,10 +12,10 @@ from typing import Final
 
 from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
-from server.common import processes
 from server.common.ranges import whole
 from server.common.text import Column, dashed
 from server.control.process import teleop_config
+from server.experiments import processes
 from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.fault import Fault, FaultOutcome, suffer

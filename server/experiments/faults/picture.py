@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 from server.experiments.faults.measure import EVENTS, FaultRow
 
 MARKS = {"COAST": ("o", "C7"), "HOLD": ("s", "C1"), "RAMP": ("v", "C3"), "robot": ("d", "C4")}

@@ -11,10 +11,10 @@ from typing import Final
 
 from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
-from server.common import processes
 from server.common.ranges import number, whole
 from server.common.text import Column, dashed
 from server.control.process import teleop_config
+from server.experiments import processes
 from server.experiments.gaps import picture, vanish
 from server.experiments.gaps.flight import Case, FlightLog, fly
 from server.experiments.gaps.goals import goals

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.signals import Mode
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 from server.experiments.gaps.flight import FlightLog
 from server.experiments.gaps.goals import EXCURSION_MM, FOLLOWS_PCT
 from server.experiments.gaps.measure import GapRow, spans

@@ -12,7 +12,7 @@ import numpy as np
 from hardware.robot_file import RobotFile
 from pipeline.config import TeleopConfig
 from pipeline.signals import Mode
-from server.common import processes
+from server.experiments import processes
 from server.experiments.forked import forked
 from server.experiments.gaps.flight import GapFlight
 from server.experiments.gaps.schedule import GapSchedule, WebRtcLine

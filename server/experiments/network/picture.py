@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 from server.experiments.network.figures import Times
 from server.experiments.network.run import Run
 

@@ -9,8 +9,8 @@ from typing import Final, Protocol, get_args
 
 from hardware.robot_file import load_robot
 from pipeline.config import EstimatorName, VirtualCameraMode
-from server.common import processes
 from server.common.ranges import number, whole
+from server.experiments import processes
 from server.experiments.paper import comparison, disturbance, table_1, table_3, table_4
 from server.experiments.paper.setup import assumptions, published
 from server.experiments.paper.setup.measure import ExperimentSetup

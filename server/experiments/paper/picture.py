@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from hardware.sim.hand import STEP_M
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.flight import ExperimentTrace
 from server.experiments.paper.setup.task import PEOPLE, Attempt

@@ -10,9 +10,9 @@ from contextlib import closing
 from pathlib import Path
 
 from server.common.clock import now
-from server.common.processes import cores
 from server.common.progress import progress_bar
 from server.common.ranges import whole
+from server.experiments.processes import cores
 from server.experiments.sweep import picture, summary
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.results import SweepResults

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 from server.experiments.sweep.summary import by_value, went_well, worded
 from server.experiments.sweep.sweep_file import Sweep
 from server.simulation.session import SessionOutcome

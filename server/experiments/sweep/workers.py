@@ -12,8 +12,8 @@ from itertools import islice
 from typing import TYPE_CHECKING, Final
 
 import server
-from server.common import processes
-from server.common.processes import AHEAD
+from server.experiments import processes
+from server.experiments.processes import AHEAD
 from server.experiments.sweep import provenance
 from server.experiments.sweep.errors import SweepError
 from server.simulation.session import SessionOutcome, SweepSession, fly

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.frames import Array
-from server.common.drawing import panels, save
+from server.experiments.drawing import panels, save
 
 SHOWN_HZ = (0.1, 50.0)
 SHOWN_DECADES = 11.0  # of power

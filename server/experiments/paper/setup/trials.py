@@ -10,7 +10,7 @@ import numpy as np
 
 from hardware.robot_file import RobotFile
 from pipeline.config import TeleopConfig
-from server.common import processes
+from server.experiments import processes
 from server.experiments.paper.setup import published
 from server.experiments.paper.setup.measure import ExperimentSetup
 from server.experiments.paper.setup.task import PEOPLE, Attempt, attempt
