@@ -32,7 +32,6 @@ from server.recording.control import Recordings
 from server.recording.reader import recover_all
 from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
 from server.rtc.signalling_endpoint import SignallingEndpoint
-from server.screen.screen import Screen
 from server.security.admission import Admission
 from server.security.audit import Audit
 from server.security.least_role import roles_of
@@ -41,6 +40,7 @@ from server.security.places import limits_for
 from server.security.request_guard import Guard
 from server.security.security import Doors
 from server.security.tls import Certificate, certificate, own_addresses, own_names
+from server.view.screen import Screen
 from server.view.viser_proxy import routes as view_routes
 from server.view.viser_view import Dashboard
 from server.web.app import Api, make_app

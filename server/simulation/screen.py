@@ -20,8 +20,8 @@ from pipeline.glass.window import Glass
 from pipeline.signals import BodyImu, Image, PhoneImu
 from pipeline.teleop import Output
 from pipeline.vision.detection import Detection
-from server.phone.glass_watch import GlassWatch
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
+from server.view.glass_watch import GlassWatch
 
 INCHES_24 = Glass(0.53, 0.30)
 FRAMES_HZ = 60.0

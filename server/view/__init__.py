@@ -1,1 +1,1 @@
-"""The 3D view: viser at a unix socket, behind a proxy."""
+"""What is shown of a robot: the 3D view (viser behind a proxy), and a robot of light."""

@@ -18,9 +18,9 @@ from pipeline.glass.display_lag import SWEEP_SHARE, swept
 from pipeline.glass.fiducials import glass_seen
 from pipeline.glass.window import CELLS, MARKER_IDS, TILE_SHARE, Glass, on_glass
 from pipeline.signals import PhoneImu
-from server.phone.glass_watch import GlassLook
 from server.protocol.screen_messages import ScreenSize
-from server.screen.screen import LightsThread, Screen
+from server.view.glass_watch import GlassLook
+from server.view.screen import LightsThread, Screen
 
 LEDS_IN_B = load_robot("screen").robot.leds_in_b
 GLASS = Glass(0.53, 0.30)

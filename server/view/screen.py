@@ -19,9 +19,9 @@ from pipeline.glass.robot_of_light import STEP_S, Lights, RobotOfLight
 from pipeline.signals import Image, PhoneImu
 from pipeline.vision.detection import Detection
 from server.common.clock import now
-from server.phone.glass_watch import GlassLook, GlassWatch
 from server.phone.screen_door import Show
 from server.protocol.screen_messages import ScreenLights, ScreenSize
+from server.view.glass_watch import GlassLook, GlassWatch
 
 log = logging.getLogger("lightleash")
 

@@ -1,1 +1,0 @@
-"""The screen that shows a robot of light."""
