@@ -21,9 +21,9 @@ from server.protocol.messages import (
     decode_from_server,
     encode_message,
 )
-from server.protocol.touches import Touches
 from server.protocol.wire import VERSION, WireError, decode, encode
 from server.protocol.wire_records import Credit, Picture, Ping, Record, Touch
+from server.virtual_phone.touches import Touches
 
 MAX_IN_FLIGHT = 3
 """Pictures sent and not yet taken by the server."""

@@ -10,12 +10,12 @@ import pytest
 from hardware.codec import Decoder
 from pipeline.signals import PhoneImu, TouchState
 from server.common.clock import now
-from server.protocol.touches import NEWEST_TOUCH_US
 from server.protocol.wire import decode
 from server.protocol.wire_records import Motion, Picture, Touch
 from server.recording.reader import read
 from server.rtc.receiving import metadata_trailer
 from server.rtc.receiving.metadata_trailer import split
+from server.virtual_phone.touches import NEWEST_TOUCH_US
 from tests.server.house import eventually
 from tests.server.rtc.rtc_house import ATTITUDES, FRAME_S, rtc_house_in
 

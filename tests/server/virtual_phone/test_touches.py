@@ -1,7 +1,7 @@
 """TOUCHes that are said again are newer to the server, not to the finger."""
 
-from server.protocol.touches import NEWEST_TOUCH_US, Touches
 from server.protocol.wire_records import Record, Touch
+from server.virtual_phone.touches import NEWEST_TOUCH_US, Touches
 
 HELD = Touch(True, True, 4, 11)
 
