@@ -24,7 +24,7 @@ from pipeline.frames import Triple
 from pipeline.signals import BodyImu, Mode, PhoneImu
 from server.control.ipc import BodyRow
 from server.control.ipc_estimate import EstimateFields
-from server.phone.image_format import ImageFormat
+from server.media.image_format import ImageFormat
 from server.phone.ingest import ARRIVAL_S, phone_imu
 from server.protocol.messages import Command, Hello, Log, Status, decode_message
 from server.protocol.people_messages import Deed

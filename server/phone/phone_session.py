@@ -24,9 +24,9 @@ from server.control.ipc_inputs import Input
 from server.diagnostics.link_log import LinkLog
 from server.diagnostics.meter import Meter
 from server.media.decoding import MakeDecoder
+from server.media.image_format import ImageFormat
 from server.phone.calibration_session import CalibrationSession
 from server.phone.frame_pipeline import FramePipeline
-from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
 from server.phone.screen_door import ScreenDoor
 from server.phone.sensor_check import SensorCheck

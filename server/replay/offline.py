@@ -17,8 +17,8 @@ from pipeline.teleop import Output
 from pipeline.vision.detection import Detection
 from server.control.controller import Controller
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
+from server.media.image_format import ImageFormat
 from server.phone.frame_pipeline import FramePipeline
-from server.phone.image_format import ImageFormat
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.lead_messages import Lead
 from server.protocol.messages import Command, Hello, decode_message

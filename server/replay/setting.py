@@ -14,7 +14,7 @@ from hardware.robot_file import COMMANDS, RobotFile, RobotFileError, load_robot
 from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from pipeline.signals import BodyImu
-from server.phone.image_format import ImageFormat
+from server.media.image_format import ImageFormat
 from server.protocol.wire import WireError, decode
 from server.protocol.wire_records import Picture
 from server.recording.reader import Recording, device_of
