@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
@@ -32,6 +33,8 @@ UNIT = re.compile(
     r"_(S|MS|US|NS|HZ|BPS|PX|PX2|M|MM|CM|RAD|DEG|KG|N|G|M_S|M_S2|RAD_S|DEG_S|PPM|PERCENT|BYTES|BITS"
     r"|KB|MB|DAYS)$|^(G|MIN|MAX)$"
 )
+ROOMS, FILES = 20, 14
+"""Of the server, and of each of them: what can still be known by heart."""
 NUMERIC = (
     ast.Constant | ast.UnaryOp | ast.BinOp | ast.Tuple | ast.List | ast.Name | ast.Attribute
     | ast.operator | ast.unaryop | ast.expr_context
@@ -108,6 +111,21 @@ def is_text(node: ast.stmt | None) -> bool:
         and isinstance(node.value, ast.Constant)
         and isinstance(node.value.value, str)
     )
+
+
+def rooms() -> dict[str, int]:
+    """Modules in each folder of the server's."""
+    return Counter(
+        path.rpartition("/")[0]
+        for path, _ in modules()
+        if path.startswith("server/") and not path.endswith("/__init__.py")
+    )
+
+
+def test_the_server_has_few_rooms_and_none_is_full() -> None:
+    found = rooms()
+    assert len({room.split("/")[1] for room in found if "/" in room}) <= ROOMS
+    assert {room: files for room, files in found.items() if files > FILES} == {}
 
 
 def test_nobody_but_the_clock_reads_a_clock() -> None:
