@@ -46,12 +46,15 @@ class CTarget:
 
 
 class _Constants:
+    """In each module of tests that has them; another one's tests take its neighbour's fixture."""
+
     def __init__(self, constants: Mapping[str, object]) -> None:
         self._constants = constants
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        for item in items:
-            assert isinstance(item, pytest.Function)
-            for name, value in self._constants.items():
-                assert hasattr(item.module, name), name
-                setattr(item.module, name, value)
+        modules = {item.module for item in items if isinstance(item, pytest.Function)}
+        for name, value in self._constants.items():
+            having = [module for module in modules if hasattr(module, name)]
+            assert having, name
+            for module in having:
+                setattr(module, name, value)
