@@ -1,9 +1,10 @@
 """Compiled: where a spot of light is to a hundredth of a pixel, and how sure that is.
 
-A centroid in about linear light of what rises above a share of the spot's contrast: behind an LED
-there is an arm on one side and a room on the other, but the brighter part hardly knows. The less
-even the ground, the higher the share; no pixel comes or goes all at once. The scatter follows from
-that of each pixel and from the ground's relief.
+A centroid in about linear light of what rises above a share of the spot's contrast, over the ground
+that each pixel would show without it: behind an LED there is an arm on one side and a room on the
+other, and what the ring around it shows of both goes on underneath. What stays hidden there hardly
+moves the brighter part: the less even the ground, the higher the share; no pixel comes or goes all
+at once. The scatter follows from that of each pixel and from the ground's relief.
 """
 
 from __future__ import annotations
@@ -15,7 +16,17 @@ import numpy as np
 from pipeline.frames import Array
 from pipeline.signals import Image
 from pipeline.so3_kernels import kernel
-from pipeline.spots.ground_kernels import Box, border, noise_of, put_ring, relief_of
+from pipeline.spots.ground_kernels import (
+    ARMS,
+    LEVEL,
+    Box,
+    arms_of,
+    border,
+    ground_at,
+    noise_of,
+    put_ring,
+    relief_of,
+)
 
 U, V, BRIGHTNESS, AREA, CONTRAST, UU, UV, VV, NOISE = range(9)
 C_UU, C_UV, C_VV, S_UU, S_UV, S_VV = range(9, 15)
@@ -32,7 +43,7 @@ MOST_ABOVE, BY_RELIEF = 0.35, 9.0
 most, and how many times the ground's RMS."""
 SIZE_SHARE = 0.13
 """Share of a spot's contrast in light above which a pixel is one of its area: 0.4 of it in grey."""
-MOST_OFF = 0.4
+MOST_OFF = 0.6
 """Share of the contrast by which a ring's pixel counts at most: beyond, it is another light."""
 LEAST_SURE_PX = 1.5
 """Of a place, its standard deviation: the top of a wide glow is no spot."""
@@ -44,7 +55,7 @@ that it leaves to the pixel beside, which alone tells where in a pixel an edge i
 the fourth root of the area: by the root of the edge's length."""
 STEEPEST = 0.97
 """Share of the light that one step takes: more cannot be told from rounding."""
-RELIEF_SHARE = 0.4
+RELIEF_SHARE = 0.5
 """Of what a ground as uneven as the ring displaces at most: its parts lie on many sides."""
 DIM, MOST_DIM = 80.0, 4.0
 """Grey levels; with less contrast a codec's steps matter more."""
@@ -80,11 +91,13 @@ def _gather(
     extent: Box,
     mark: int,
     seen: Image,
-    floor: float,
-    least: float,
+    ring: Box,
+    arms: Array,
+    peak: float,
+    share: float,
     sums: Array,
 ) -> None:
-    """The sums over a spot's pixels above a floor, counted from `least` light on.
+    """The sums over a spot's pixels that are more than a share LED, of a `peak` light; less ground.
 
     Places are from the middle of its extent.
     """
@@ -94,8 +107,13 @@ def _gather(
     for r in range(max(extent[1] - GROWN, 0), min(extent[3] + GROWN, rows) + 1):
         for c in range(max(extent[0] - GROWN, 0), min(extent[2] + GROWN, columns) + 1):
             grey = luma[box[1] + r, box[0] + c]
-            slope, weight = slope_of[grey], light[grey] - floor
-            if weight <= 0.0 or not is_near(seen, mark, r, c, extent):
+            if not light[grey] > arms[LEVEL] or not is_near(seen, mark, r, c, extent):
+                continue
+            ground = ground_at(luma, light, ring, arms, box[0] + c, box[1] + r)
+            scale = (peak - arms[LEVEL]) / (peak - ground)  # an LED covers what is behind it
+            floor = ground + share * (peak - ground)
+            slope, weight = scale * slope_of[grey], scale * (light[grey] - floor)
+            if weight <= 0.0:
                 continue
             du, dv = box[0] + c - u0, box[1] + r - v0
             sums[WEIGHT] += weight
@@ -104,11 +122,11 @@ def _gather(
             sums[SUU] += weight * du * du
             sums[SUV] += weight * du * dv
             sums[SVV] += weight * dv * dv
-            if light[grey] > least:
+            if light[grey] - ground > SIZE_SHARE * (peak - ground):
                 sums[COUNT] += 1.0
             for y, x in ((r - 1, c), (r + 1, c), (r, c - 1), (r, c + 1)):
                 if 0 <= y <= rows and 0 <= x <= columns:
-                    beside = max(light[luma[box[1] + y, box[0] + x]] - floor, 0.0)
+                    beside = scale * max(light[luma[box[1] + y, box[0] + x]] - floor, 0.0)
                     sums[STEP] = max(sums[STEP], weight - beside)
             if slope == 0.0:
                 continue
@@ -185,9 +203,9 @@ def centre(
     grain = noise * slope_of[min(int(middle) + DARKEST, 255)]
     relief2 = relief_of(light, work, n, level, MOST_OFF * rise, grain)
     share = min(BY_RELIEF * sqrt(relief2) / rise, MOST_ABOVE)
-    sums = np.empty(SUMS)
-    floor, least = level + share * rise, level + SIZE_SHARE * rise
-    _gather(luma, light, slope_of, box, extent, mark, seen, floor, least, sums)
+    arms, sums = np.empty(ARMS), np.empty(SUMS)
+    arms_of(luma, light, ring, level, MOST_OFF * rise, arms)
+    _gather(luma, light, slope_of, box, extent, mark, seen, ring, arms, peak, share, sums)
     whole = sums[WEIGHT]
     if not whole > 0.0:
         return False
@@ -199,5 +217,5 @@ def centre(
     spot[UV] = sums[SUV] / whole - du * dv
     if not spot[UU] * spot[VV] - spot[UV] * spot[UV] > 1e-6:
         return False
-    _doubt(spot, sums, peak - floor, relief2, coded_px)
+    _doubt(spot, sums, (1.0 - share) * rise, relief2, coded_px)
     return bool(spot[C_UU] + spot[C_VV] < LEAST_SURE_PX**2)
