@@ -1,55 +1,127 @@
-"""Numbers of a robot file, written into its text: order, other comments and all else stay."""
+"""Changes to a robot file's text: comments, order, line ends and all else stay."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
-SECTION: Final = re.compile(r"^\[([^\[\]]+)\]", re.MULTILINE)
+import tomlkit
+from tomlkit.items import Item, Table, Whitespace
+
+from pipeline.gains import Gains
+
+NAME: Final = re.compile(r"[a-z0-9_-]{1,32}")
 Value = float | list[float]
 
 
 class RobotTextError(ValueError):
-    """A number that can't be written there; says which."""
+    """A change that can't be made there.
+
+    Attributes:
+        field: Which.
+        allowed: What is wrong, or what would be allowed.
+    """
+
+    def __init__(self, field: str, allowed: str) -> None:
+        super().__init__(f"{field}: {allowed}")
+        self.field, self.allowed = field, allowed
 
 
 def with_numbers(text: str, numbers: Mapping[str, Value], comments: Mapping[str, str]) -> str:
     """The text of a robot file with other `numbers` by key, `section.name`; each has a comment.
 
     Raises:
-        RobotTextError: a key is not there, or not on a line of its own.
+        RobotTextError: a key is not there.
     """
-    wanted = tomllib.loads(text)
+    document, wanted = tomlkit.parse(text), tomllib.loads(text)
     for key, value in numbers.items():
         section, name = key.split(".")
-        text = _replaced(text, key, _written(value), comments[key])
-        wanted.get(section, {})[name] = value
+        if name not in wanted.get(section, {}):
+            raise RobotTextError(key, "not in the file")
+        wanted[section][name] = value
+        document[section][name] = _item(value, comments[key])
+    return _verified(document, wanted, ", ".join(numbers))
+
+
+def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool = False) -> str:
+    """The text of a robot file with another gain set, said in one line to be `comment`.
+
+    Its lines end as the first one does.
+
+    Raises:
+        RobotTextError: a name that none can have, or a set there is (unless `overwrite`).
+    """
+    field, wanted = f"gains.{name}", tomllib.loads(text)
+    if not NAME.fullmatch(name):
+        raise RobotTextError(field, "allowed: up to 32 of a-z, 0-9, _ and -")
+    sets = wanted.setdefault("gains", {})
+    if name in sets and not overwrite:
+        others = ", ".join(sets)
+        raise RobotTextError(field, f"is there already; allowed: --replace, or none of {others}")
+    rows = {"Kp": gains.Kp.tolist(), "Ki": gains.Ki.tolist(), "Kd": gains.Kd.tolist()}
+    line_end = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
+    document = tomlkit.parse(text if text.endswith("\n") or not text else text + line_end)
+    there = document.get("gains", tomlkit.table())
+    if not isinstance(there, Table):
+        raise RobotTextError(field, "gains are in no [gains.NAME] tables one after the other")
+    if name in sets:
+        _fill(there[name], rows, comment, line_end)
+    else:
+        _add(document, name, _fill(tomlkit.table(), rows, comment, line_end), line_end)
+    sets[name] = rows
+    return _verified(document, wanted, field)
+
+
+def _item(value: Value, comment: str) -> Item:
+    item = tomlkit.item(value)
+    if comment:
+        item.comment(comment)
+        item.trivia.comment_ws = "  "
+    return item
+
+
+def _fill(table: Table, rows: Mapping[str, list[float]], comment: str, line_end: str) -> Table:
+    """A gain set with these rows alone, in a table that may have others."""
+    table.comment(comment)
+    table.trivia.comment_ws, table.trivia.trail = "  ", line_end
+    for key in set(table) - set(rows):
+        del table[key]
+    for key, row in rows.items():
+        item = tomlkit.item(row)
+        item.trivia.trail = line_end
+        table[key] = item
+    return table
+
+
+def _add(document: tomlkit.TOMLDocument, name: str, table: Table, line_end: str) -> None:
+    """Put a gain set behind the last one; what is said between that and the next table stays so."""
+    blank = (None, Whitespace(line_end))
+    if "gains" not in document:
+        gains = tomlkit.table(is_super_table=True)
+        gains.append(name, table)
+        document.append("gains", gains)
+        return
+    gains = document["gains"]
+    before = gains[list(gains)[-1]].value.body
+    last = max((k for k, (key, _) in enumerate(before) if key is not None), default=-1)
+    between, before[last + 1 :] = before[last + 1 :], [blank]
+    gains.append(name, table)
+    table.value.body.extend(between)
+
+
+def _verified(document: tomlkit.TOMLDocument, wanted: dict[str, Any], field: str) -> str:
+    """The text, which says what is `wanted`, however unusually the file is written.
+
+    Raises:
+        RobotTextError: it doesn't.
+    """
+    text = tomlkit.dumps(document)
     try:
-        written = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise RobotTextError(f"a number is not on a line of its own: {error}") from error
-    if wanted != written:  # however unusually the file is written, nothing else may change
-        raise RobotTextError("the file's sections are no [section] tables; write them so")
+        is_good = tomllib.loads(text) == wanted
+    except tomllib.TOMLDecodeError:
+        is_good = False
+    if not is_good:
+        raise RobotTextError(field, "can't be written there; allowed: [section] tables")
     return text
-
-
-def _replaced(text: str, key: str, value: str, comment: str) -> str:
-    section, name = key.split(".")
-    begins = {found.group(1).strip(): found.end() for found in SECTION.finditer(text)}
-    if section in begins:
-        following = SECTION.search(text, begins[section])
-        end = following.start() if following else len(text)
-        line = re.compile(rf"^({name}\s*=\s*)[^#\r\n]*(?:#[^\r\n]*)?(\r?)$", re.MULTILINE)
-        found = line.search(text, begins[section], end)
-        if found is not None:
-            new = f"{found.group(1)}{value}  # {comment}{found.group(2)}"
-            return text[: found.start()] + new + text[found.end() :]
-    raise RobotTextError(f"{key}: not on a line of its own in the file")
-
-
-def _written(value: Value) -> str:
-    if isinstance(value, list):
-        return "[" + ", ".join(map(repr, value)) + "]"
-    return repr(value)

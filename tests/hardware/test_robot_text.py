@@ -1,13 +1,15 @@
-"""Numbers go into a robot file's text; everything else stays as it is, to the letter."""
+"""Numbers and gain sets go into a robot file's text; all else stays as it is, to the letter."""
 
 from __future__ import annotations
 
 import tomllib
 
+import numpy as np
 import pytest
 
-from hardware.robot_file import ROBOTS, robot_of, robot_table
-from hardware.robot_text import RobotTextError, with_numbers
+from hardware.robot_file import ROBOTS, load_robot, robot_of, robot_table
+from hardware.robot_text import RobotTextError, with_gains, with_numbers
+from pipeline.gains import Gains
 
 NUMBERS = {
     "body.mass_kg": 3.117,
@@ -64,23 +66,102 @@ def test_lines_end_as_they_did():
     "text",
     [
         "[body]\ninertia_kg_m2 = [1.0, 1.0, 1.0]\n",
-        "body = { mass_kg = 1.0 }\n",
         "[other]\nmass_kg = 1.0\n[body]\n",
         "[body]\n# mass_kg = 1.0\n",
+        '[body]\nnote = """\nmass_kg = 1.0\n"""\n',
     ],
 )
-def test_a_number_that_is_not_on_a_line_of_its_own_is_named(text):
-    with pytest.raises(RobotTextError, match=r"body\.mass_kg: not on a line"):
+def test_a_number_that_the_file_has_not_is_named(text):
+    with pytest.raises(RobotTextError, match=r"body\.mass_kg: not in the file"):
         with_numbers(text, {"body.mass_kg": 2.0}, {"body.mass_kg": ""})
 
 
-def test_a_number_that_is_written_over_several_lines_is_left_alone():
-    text = "[body]\ninertia_kg_m2 = [\n  1.0, 1.0, 1.0,\n]\n"
-    with pytest.raises(RobotTextError, match="line of its own"):
-        with_numbers(text, {"body.inertia_kg_m2": [2.0] * 3}, {"body.inertia_kg_m2": ""})
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("body = { mass_kg = 1.0 } # mine\n", "body = { mass_kg = 2.0 } # mine\n"),
+        ("body.mass_kg = 1.0\n[x]\n", "body.mass_kg = 2.0  # new\n[x]\n"),
+        ("[body]\nmass_kg = 1.0", "[body]\nmass_kg = 2.0  # new"),
+        (
+            '[body]\nnote = """\nmass_kg = 1.0\n"""\nmass_kg = 1.0\n',
+            '[body]\nnote = """\nmass_kg = 1.0\n"""\nmass_kg = 2.0  # new\n',
+        ),
+    ],
+)
+def test_however_a_file_is_written_its_number_is_found(text, written):
+    assert with_numbers(text, {"body.mass_kg": 2.0}, {"body.mass_kg": "new"}) == written
 
 
-def test_a_line_within_a_text_is_no_number_of_the_file():
-    text = '[body]\nnote = """\nmass_kg = 1.0\n"""\nmass_kg = 1.0\n'
-    with pytest.raises(RobotTextError):
-        with_numbers(text, {"body.mass_kg": 2.0}, {"body.mass_kg": ""})
+def test_a_number_over_several_lines_becomes_one():
+    text = "[body]\ninertia_kg_m2 = [\n  1.0, 1.0, 1.0,\n]\nmass_kg = 1.0\n"
+    written = with_numbers(text, {"body.inertia_kg_m2": [2.0] * 3}, {"body.inertia_kg_m2": "new"})
+    assert written == "[body]\ninertia_kg_m2 = [2.0, 2.0, 2.0]  # new\nmass_kg = 1.0\n"
+
+
+GAINS = Gains(np.arange(6.0), np.arange(6.0) + 0.5, np.full(6, 0.125))
+ROBOT_FILES = [path for path in sorted(ROBOTS.glob("*.toml")) if "gains" in robot_table(path)]
+
+
+@pytest.mark.parametrize("path", ROBOT_FILES, ids=lambda path: path.stem)
+def test_a_new_set_stands_behind_the_others_and_nothing_else_changes(path, tmp_path):
+    text = path.read_text(encoding="utf-8")
+    written = with_gains(text, "late", GAINS, "for tests")
+    added = [line for line in written.splitlines() if line not in text.splitlines()]
+    assert added[0] == "[gains.late]  # for tests"
+    assert len(added) == 4
+    start = written.index("[gains.late]")
+    end = written.index("0.125]\n", start) + len("0.125]\n")
+    assert written[: start - 1] + written[end:] == text
+    (tmp_path / "mine.toml").write_text(written, encoding="utf-8")
+    robot_file = load_robot(tmp_path / "mine.toml")
+    np.testing.assert_array_equal(robot_file.gains["late"].Ki, GAINS.Ki)
+    assert list(robot_file.gains)[-1] == "late"
+
+
+@pytest.mark.parametrize("last", ["\r\n", ""])
+def test_lines_of_a_set_end_as_the_first_one_does(last):
+    text = "# mine\r\n[gains.a]\r\nKp = [1.0]\r\n\r\n[x]\r\ny = 1" + last
+    for name in ("a", "late"):
+        written = with_gains(text, name, GAINS, "for tests", overwrite=True)
+        assert written.count("\r\n") == written.count("\n") == written.count("\r")
+        plain = with_gains(text.replace("\r", ""), name, GAINS, "for tests", overwrite=True)
+        assert written.replace("\r", "") == plain
+
+
+def test_a_set_is_overwritten_only_if_told_to():
+    text = ROBOT_FILES[0].read_text(encoding="utf-8")
+    once = with_gains(text, "late", GAINS, "first")
+    with pytest.raises(RobotTextError, match=r"gains\.late: is there already; allowed: --replace"):
+        with_gains(once, "late", GAINS, "second")
+    other = Gains(GAINS.Kd, GAINS.Kp, GAINS.Ki)
+    twice = with_gains(once, "late", other, "second", overwrite=True)
+    assert twice == with_gains(text, "late", other, "second")
+
+
+def test_a_set_in_the_middle_is_replaced_where_it_stands():
+    before, after = "[gains.a]\nKp = [1.0]\n\n# about b\n", "\n# end\n[x]\ny = 1\n"
+    text = f"{before}[gains.b]  # old\nKp = [\n  2.0,\n]\nKi = [3.0]\nKd = [4.0]  # N\n{after}"
+    written = with_gains(text, "b", GAINS, "new", overwrite=True)
+    assert written.startswith(f"{before}[gains.b]  # new\nKp = [0.0, 1.0,")
+    assert written.endswith(f"0.125]  # N\n{after}")
+
+
+@pytest.mark.parametrize("name", ["", "Late", "a b", "a.b", "x" * 33])
+def test_a_name_that_none_can_have_is_refused(name):
+    with pytest.raises(RobotTextError, match="allowed: up to 32"):
+        with_gains("", name, GAINS, "")
+
+
+def test_a_first_set_goes_to_the_end():
+    written = with_gains("[x]\ny = 1\n", "a", GAINS, "new")
+    assert written.startswith("[x]\ny = 1\n\n[gains.a]  # new\nKp = [0.0, 1.0,")
+
+
+@pytest.mark.parametrize(
+    "text", ["gains = { a = { Kp = [1.0] } }\n", "[gains.a]\nKp = [1.0]\n[x]\n[gains.b]\n"]
+)
+@pytest.mark.parametrize("name", ["a", "late"])
+def test_a_file_written_unusually_is_refused_rather_than_spoilt(text, name):
+    tomllib.loads(text)
+    with pytest.raises(RobotTextError, match=r"no \[gains\.NAME\] tables"):
+        with_gains(text, name, GAINS, "", overwrite=True)

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     out: Path | None = arguments.out
     if out is not None and (out.suffix != ".toml" or out.exists()):
-        raise RobotTextError(f"--out: {out}: allowed: a new path ending in .toml")
+        raise RobotTextError("--out", f"{out}: allowed: a new path ending in .toml")
     recordings = [DecodedRecording(read(path)) for path in arguments.recordings]
     robot_file = load_robot(arguments.robot) if arguments.robot else recordings[0].robot
     if robot_file.robot.twist is not None:

@@ -18,7 +18,6 @@ import numpy as np
 
 from hardware.dynamics import dynamics_of
 from hardware.gain_tuning import MarginGoals, TuningError, tuned
-from hardware.gains_text import GainsTextError, with_gains
 from hardware.robot_file import (
     ROBOTS,
     RobotFile,
@@ -27,6 +26,7 @@ from hardware.robot_file import (
     robot_path,
     robot_table,
 )
+from hardware.robot_text import RobotTextError, with_gains
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.margins import Loop, Sensing
 from pipeline.gains import Gains
@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse(argv)
     try:
         text = _tuned(arguments)
-    except (TuneError, RobotFileError, GainsTextError, OSError) as error:
+    except (TuneError, RobotFileError, RobotTextError, OSError) as error:
         print(f"lightleash tune: {error}", file=sys.stderr)
         return 2
     except (TuningError, TuningFlightError) as error:
