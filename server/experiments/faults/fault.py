@@ -161,9 +161,9 @@ def _first(one: FaultOutcome, event: Event) -> float:
 def misses(fault: Fault, one: FaultOutcome) -> list[str]:
     """Which of its goals an outcome misses, in words."""
     missed = [
-        f"{event} {one.first.get(event, float('inf')):.3f} s > {limit:g}"
+        f"{event} {at:.3f} s > {limit:g}"
         for event, limit in fault.by.items()
-        if not _first(one, event) <= limit
+        if not (at := _first(one, event)) <= limit
     ]
     missed += [
         f"{event} at {one.first[event]:.3f} s" for event in fault.never if event in one.first

@@ -70,7 +70,8 @@ def test_each_bound_is_missed_by_what_breaks_it(spoilt: dict[str, object]) -> No
 def test_a_ramp_in_time_misses_no_hold_and_a_hold_no_ramp() -> None:
     holds = replace(MADE_UP, by={"HOLD": 2.0, "zero": 4.0})
     assert misses(holds, outcome()) == []
-    assert len(misses(holds, outcome(first={"RAMP": 2.1, "zero": 3.0}))) == 1
+    late = misses(holds, outcome(first={"RAMP": 2.1, "zero": 3.0}))
+    assert late == ["HOLD 2.100 s > 2"]
     ramps = replace(MADE_UP, by={"RAMP": 2.0, "zero": 4.0})
     assert len(misses(ramps, outcome(first={"HOLD": 1.0, "zero": 3.0}))) == 1
 
