@@ -1,6 +1,7 @@
 """A plant's numbers come out of its flights, and what did not move it tells nothing."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,10 +24,16 @@ def true_of(parameters, gains):
     return replace(plant, thrust=plant.thrust * gains)
 
 
+@cache
+def identified(*seeds):
+    """From a flight of each seed."""
+    return identify(KNOWN, [shaken(REAL, GAINS, seed=seed) for seed in seeds])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_what_a_robot_is_comes_out_of_how_it_moves(seed):
-    found = identify(KNOWN, [shaken(REAL, GAINS, seed=seed)])
+    found = identified(seed)
     true = true_of(REAL, GAINS)
     np.testing.assert_allclose(found.plant.thrust, true.thrust, rtol=0.015)
     np.testing.assert_allclose(found.plant.inertia, true.inertia, rtol=0.015)
@@ -40,16 +47,15 @@ def test_what_a_robot_is_comes_out_of_how_it_moves(seed):
 
 @pytest.mark.slow
 def test_two_flights_tell_more_than_one():
-    flights = [shaken(REAL, GAINS, seconds=20.0, seed=seed) for seed in (3, 4)]
-    one, both = identify(KNOWN, flights[:1]), identify(KNOWN, flights)
+    one, both = identified(1), identified(1, 2)
     assert both.seconds == pytest.approx(2.0 * one.seconds, rel=0.01)
     assert np.trace(both.covariance[:8, :8]) < np.trace(one.covariance[:8, :8])
 
 
 @pytest.mark.slow
 def test_a_moment_about_which_nothing_turned_is_uncertain():
-    still = identify(KNOWN, [shaken(REAL, seed=5, axes=(0, 1, 2))])
-    turned = identify(KNOWN, [shaken(REAL, seed=5)])
+    still = identify(KNOWN, [shaken(REAL, GAINS, seed=1, axes=(0, 1, 2))])
+    turned = identified(1)
     yaw = len(GAINS) + 4
     assert still.covariance[yaw, yaw] > 9.0 * turned.covariance[yaw, yaw]
 
