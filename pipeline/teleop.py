@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
+from typing import Final
 
 import numpy as np
 
@@ -37,6 +38,9 @@ from pipeline.signals import (
 
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-4, 0.060
 """What filters and integrals go on by in a step; whoever is longer away than that stood still."""
+VERTICAL_S: Final = 0.5
+"""By news of phone and pictures that are younger the vertical is known: gyroscopes keep it so
+long to some tenths of a degree."""
 MEND = "{} Mend it, then press STOP and Reset."
 """Why arming is refused, behind what is known of a thruster."""
 
@@ -213,6 +217,7 @@ class Teleop:
             self._is_deaf(t),
             self._h,
             t - min(self._operator.t, self._t_phone, self._body.t),
+            t - min(self._t_phone, self._t_seen) < VERTICAL_S,
         )
 
     def _pass_time(self, t: float) -> int:

@@ -33,6 +33,8 @@ class Moment:
     """Since the last period [s]."""
     silence_s: float
     """Age of the oldest news of operator, phone and robot [s]."""
+    knows_vertical: bool
+    """Phone and pictures say where down is; else the robot's gyroscope alone, which drifts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

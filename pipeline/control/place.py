@@ -96,7 +96,9 @@ class SuspendedPlace:
         """From here on its displacement is counted."""
         self._p_start_in_f = self._p_in_f
 
-    def propagate(self, f_bf_in_b: Array, R_fb: Array, force_in_b: Array, h: float) -> None:
+    def propagate(
+        self, f_bf_in_b: Array, R_fb: Array, force_in_b: Array, h: float, knows_vertical: bool
+    ) -> None:
         """Carry place and velocity on.
 
         Args:
@@ -104,12 +106,16 @@ class SuspendedPlace:
             R_fb: Attitude of the body.
             force_in_b: Of the thrusters last commanded (3,) [N].
             h: Since the last call [s].
+            knows_vertical: Whether the attitude does not drift: by 1° a rest is 2 cm off, and
+                stays so for a whole flight.
         """
         given = low_pass.share(h / self._lag_s)
         self._thrust_in_f = self._thrust_in_f + given * (R_fb @ force_in_b - self._thrust_in_f)
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         pulled_in_f = self._softness_in_f * (self._thrust_in_f - self._m * a_in_f)
-        if not force_in_b.any():
+        if not knows_vertical:
+            self._rested_s = 0.0  # what was learnt then is forgotten with the first that is right
+        elif not force_in_b.any():
             self._rested_s += h
             share = max(low_pass.share(h / REST_S), h / self._rested_s)
             self._rest_in_f = self._rest_in_f + share * (pulled_in_f - self._rest_in_f)

@@ -90,7 +90,7 @@ class ThrustActing:
         if now.mode == Mode.COAST:  # nothing of an estimate that may be in doubt, biases neither
             R_fb = self._hold.R_fb
             f_bf_in_b = self._hold.specific_force_in_b(now.body.a_m_bf_in_b)
-        place.propagate(f_bf_in_b, R_fb, self._given_in_b, now.h)
+        place.propagate(f_bf_in_b, R_fb, self._given_in_b, now.h, now.knows_vertical)
         suspended = (place.x_in_f - x_before_in_f, place.v_in_f)
         is_known = place.is_known and not now.is_deaf
         self._station.propagate(f_bf_in_b, R_fb, now.h, suspended if is_known else None)

@@ -164,7 +164,11 @@ HAZARDS: Final = (
         "A gap in the phone's link: roaming, scan, loss",
         "as 16",
         "COAST, and follows again by itself on the same press; as 16 after 1 s",
-        ("server/experiments/test_gaps.py::test_it_flies_writes_and_draws",),
+        (
+            "server/experiments/test_gaps.py::test_it_flies_writes_and_draws",
+            "scenarios/test_phone_returns.py::"
+            "test_it_stays_in_a_gap_though_its_phone_was_away_before",
+        ),
     ),
     Hazard(
         "19",

@@ -42,7 +42,8 @@ class Swing:
         self.v = self.v + H * a
         self.x = self.x + H * self.v
         f_bf_in_b = self._R_fb.T @ (a + UP) + self._bias
-        self.place.propagate(f_bf_in_b, self._R_fb, self._R_fb.T @ force_in_f, H)
+        force_in_b = self._R_fb.T @ force_in_f
+        self.place.propagate(f_bf_in_b, self._R_fb, force_in_b, H, True)
 
 
 BIAS, R_FB = np.array([0.3, -0.2, 0.1]), exp(np.array([0.05, -0.1, 0.7]))
@@ -96,7 +97,7 @@ def test_each_start_counts_from_there() -> None:
 def test_a_robot_that_nothing_pulls_back_is_said_to_stay() -> None:
     place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)), LAG_S)
     for _ in range(2000):
-        place.propagate(UP + BIAS, np.eye(3), np.ones(3), H)
+        place.propagate(UP + BIAS, np.eye(3), np.ones(3), H, True)
     assert np.abs(place.x_in_f).max() < 0.2
 
 
@@ -107,7 +108,7 @@ def test_a_knock_is_told_from_thrust_and_swing() -> None:
         assert k * H < 8.0 or not swing.place.is_pushed
     for _ in range(10):
         knock = R_FB.T @ np.array([-10.0 / ROBOT.mass, 0.0, 0.0])
-        swing.place.propagate(R_FB.T @ UP + BIAS + knock, R_FB, np.zeros(3), H)
+        swing.place.propagate(R_FB.T @ UP + BIAS + knock, R_FB, np.zeros(3), H, True)
     assert swing.place.is_pushed
 
 
@@ -149,7 +150,7 @@ def test_whoever_touches_it_is_no_motion_until_that_is_forgotten(
 def test_a_robot_that_stands_is_never_known_by_what_pulls_it_back() -> None:
     place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)), LAG_S)
     for _ in range(2000):
-        place.propagate(UP, np.eye(3), np.zeros(3), H)
+        place.propagate(UP, np.eye(3), np.zeros(3), H, True)
     assert not place.is_known
 
 
@@ -177,3 +178,19 @@ def test_it_stays_by_the_force_it_names_though_thrusters_give_less(gain: float) 
     for _ in range(round(12.0 / H)):
         swing.step(force_in_f)
     np.testing.assert_allclose(swing.x, due_in_f, atol=0.006)
+
+
+@pytest.mark.parametrize("again_s", [0.5, 3.0])
+def test_what_a_drifting_vertical_says_of_its_rest_is_not_learnt(again_s: float) -> None:
+    """Six degrees off, as after ten seconds without a phone; then it is right again."""
+    swing = Swing(BIAS, R_FB)
+    for _ in range(round(4.0 / H)):
+        swing.step(np.zeros(3))
+    for _ in range(round(10.0 / H)):
+        R_fb, f_bf_in_b = exp(np.array([0.1, 0.0, 0.0])) @ R_FB, R_FB.T @ UP + BIAS
+        swing.place.propagate(f_bf_in_b, R_fb, np.zeros(3), H, False)
+    for _ in range(round(again_s / H)):
+        swing.step(np.zeros(3))
+    for _ in range(round(2.0 / H)):
+        swing.step(np.array([2.0, 0.0, 0.0]))
+    np.testing.assert_allclose(swing.place.from_rest_in_f, swing.x, atol=0.005)

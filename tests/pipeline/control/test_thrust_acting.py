@@ -34,7 +34,7 @@ ERROR = Leashed(PoseError(OFF, STILL, STILL, STILL))
 
 
 def moment(mode: Mode, body: BodyImu = BODY) -> Moment:
-    return Moment(mode, Reference(AHEAD, np.eye(3)), PLAIN, body, False, H, 0.0)
+    return Moment(mode, Reference(AHEAD, np.eye(3)), PLAIN, body, False, H, 0.0, True)
 
 
 def coasting(robot: str, known_for_s: float, leashed: Leashed | None) -> ThrustActing:

@@ -38,7 +38,7 @@ def error(e_p_in_v=STILL, e_p_rate_in_v=STILL, e_eta_in_b=STILL):
 def moment(mode=Mode.TRACK, twist_in_b=None, silence_s=0.05):
     body = BodyImu(0.0, STILL, STILL, np.zeros(6) if twist_in_b is None else twist_in_b)
     reference = Reference(np.array([1.5, 0.0, 0.0]), R_VB)
-    return Moment(mode, reference, PLAIN, body, False, PERIOD_S, silence_s)
+    return Moment(mode, reference, PLAIN, body, False, PERIOD_S, silence_s, True)
 
 
 def settled(leashed, now, situation=None, acting=None, periods=300):
