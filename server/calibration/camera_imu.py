@@ -13,10 +13,11 @@ import numpy.typing as npt
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import least_squares
 
+from hardware.camera_file import TIME_OFFSETS_S
 from pipeline.frames import Array, R_co, exp, log
 
 NEAR_S = 0.11
-OFFSETS_S = np.arange(-0.5, 0.5, 0.005)
+OFFSETS_S = np.arange(*TIME_OFFSETS_S, 0.005)
 FEWEST_STEPS = 30
 FEWEST_SAMPLES = 20
 SLOWEST = 0.15
@@ -122,6 +123,8 @@ def align(t: Array, R_og: Array, gyro: GyroSpline) -> CameraImu:
         x_scale=np.array([0.01, 0.01, 0.01, 0.005, 0.01, 0.01, 0.01]),
     )
     x = found.x
+    if not TIME_OFFSETS_S[0] <= x[3] <= TIME_OFFSETS_S[1]:  # no camera's file may say so
+        raise ImuError("imu: film and motion samples do not fit each other: swing the camera more")
     R_ci = exp(x[:3]) @ start[0]
     left = _residuals(x, start[0], steps, gyro)
     middle = 0.5 * (steps.begin + steps.end)

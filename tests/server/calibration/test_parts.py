@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hardware.camera_file import TIME_OFFSETS_S
 from pipeline.frames import exp
 from server.calibration.board import Board, BoardError, Detector, parse
 from server.calibration.camera_imu import GyroSpline, ImuError, align, gyro_of
@@ -184,3 +185,18 @@ def test_too_little_motion_for_the_sensors_is_told_with_what_to_do():
         align(t, np.tile(np.eye(3), (90, 1, 1)), still)
     with pytest.raises(ImuError, match="start both together"):
         align(t + 500.0, np.tile(np.eye(3), (90, 1, 1)), still)
+
+
+@pytest.mark.parametrize("late_s", [0.49, 0.53])
+def test_a_delay_that_no_camera_file_may_hold_is_refused_in_words(late_s):
+    """The nearest one that is tried is half a second, and the fit goes on from there."""
+    w, t, fine = (1.1, 1.7, 2.3), np.arange(0.0, 12.0, 1.0 / 30.0), np.arange(-2.0, 14.0, 0.005)
+    R_og = [np.eye(3)]
+    for turn in np.diff(0.5 * np.sin(np.outer(t, w)), axis=0):
+        R_og.append(exp(-turn) @ R_og[-1])
+    gyro = GyroSpline(fine + late_s, 0.5 * np.array(w) * np.cos(np.outer(fine, w)))
+    if late_s < TIME_OFFSETS_S[1]:
+        assert align(t, np.array(R_og), gyro).time_offset_s == pytest.approx(late_s, abs=0.003)
+        return
+    with pytest.raises(ImuError, match="do not fit each other"):
+        align(t, np.array(R_og), gyro)
