@@ -113,9 +113,7 @@ class SuspendedPlace:
         self._thrust_in_f = self._thrust_in_f + given * (R_fb @ force_in_b - self._thrust_in_f)
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         pulled_in_f = self._softness_in_f * (self._thrust_in_f - self._m * a_in_f)
-        if not knows_vertical:
-            self._rested_s = 0.0  # what was learnt then is forgotten with the first that is right
-        elif not force_in_b.any():
+        if knows_vertical and not force_in_b.any():
             self._rested_s += h
             share = max(low_pass.share(h / REST_S), h / self._rested_s)
             self._rest_in_f = self._rest_in_f + share * (pulled_in_f - self._rest_in_f)
