@@ -295,10 +295,12 @@ class PictureCheck:
 
         So it was in this picture if the base's, shown again, would have been amiss.
         """
+        if not self.complaint:
+            return
         shown_again = _beside(self._track.base.x[0:3], far.S, far.predicted)
         if self._is_amiss(shown_again):
             self._right_s += far.predicted.t - self._track.newest.t
-        if self.complaint and self._right_s > TRIAL_S and abs(self._scale) < RETURNED:
+        if self._right_s > TRIAL_S and abs(self._scale) < RETURNED:
             self.complaint = ""
 
 
