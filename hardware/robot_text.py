@@ -63,13 +63,18 @@ def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool
     rows = {"Kp": gains.Kp.tolist(), "Ki": gains.Ki.tolist(), "Kd": gains.Kd.tolist()}
     line_end = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
     document = tomlkit.parse(text if text.endswith("\n") or not text else text + line_end)
-    there = document.get("gains", tomlkit.table())
+    there = document.get("gains", tomlkit.table(is_super_table=True))
     if not isinstance(there, Table):
         raise RobotTextError(field, "gains are in no [gains.NAME] tables one after the other")
     if name in sets:
         _fill(there[name], rows, comment, line_end)
     else:
-        _add(document, name, _fill(tomlkit.table(), rows, comment, line_end), line_end)
+        table = _fill(tomlkit.table(), rows, comment, line_end)
+        if sets:
+            _add(there, name, table, line_end)
+        else:
+            there.append(name, table)
+            document["gains"] = there
     sets[name] = rows
     return _verified(document, wanted, field)
 
@@ -95,18 +100,11 @@ def _fill(table: Table, rows: Mapping[str, list[float]], comment: str, line_end:
     return table
 
 
-def _add(document: tomlkit.TOMLDocument, name: str, table: Table, line_end: str) -> None:
+def _add(gains: Table, name: str, table: Table, line_end: str) -> None:
     """Put a gain set behind the last one; what is said between that and the next table stays so."""
-    blank = (None, Whitespace(line_end))
-    if "gains" not in document:
-        gains = tomlkit.table(is_super_table=True)
-        gains.append(name, table)
-        document.append("gains", gains)
-        return
-    gains = document["gains"]
     before = gains[list(gains)[-1]].value.body
     last = max((k for k, (key, _) in enumerate(before) if key is not None), default=-1)
-    between, before[last + 1 :] = before[last + 1 :], [blank]
+    between, before[last + 1 :] = before[last + 1 :], [(None, Whitespace(line_end))]
     gains.append(name, table)
     table.value.body.extend(between)
 
