@@ -22,6 +22,8 @@ FEWEST_STEPS = 30
 FEWEST_SAMPLES = 20
 SLOWEST = 0.15
 """Turns must be faster than this (RMS) to tell anything [rad/s]."""
+MOST_LEFT = 0.5
+"""Of the pictures' turns, by median, unexplained: else the gyroscope felt another motion."""
 ENOUGH_BLOCKS = 14
 BLOCK_S = 0.5
 """Errors further apart are independent."""
@@ -123,10 +125,11 @@ def align(t: Array, R_og: Array, gyro: GyroSpline) -> CameraImu:
         x_scale=np.array([0.01, 0.01, 0.01, 0.005, 0.01, 0.01, 0.01]),
     )
     x = found.x
-    if not TIME_OFFSETS_S[0] <= x[3] <= TIME_OFFSETS_S[1]:  # no camera's file may say so
-        raise ImuError("imu: film and motion samples do not fit each other: swing the camera more")
     R_ci = exp(x[:3]) @ start[0]
     left = _residuals(x, start[0], steps, gyro)
+    is_allowed = TIME_OFFSETS_S[0] <= x[3] <= TIME_OFFSETS_S[1]  # in a camera's file
+    if not is_allowed or _typical(left) > MOST_LEFT * _typical(steps.turned_in_c):
+        raise ImuError("imu: film and motion samples do not fit each other: swing the camera more")
     middle = 0.5 * (steps.begin + steps.end)
     return CameraImu(
         R_ci=R_ci,
@@ -169,6 +172,11 @@ def _residuals(x: Array, R_ci: Array, steps: _Steps, gyro: GyroSpline) -> Array:
     gyro_rate = (angles - x[4:] * steps.dt[:, None]) @ (exp(x[:3]) @ R_ci).T
     left: Array = steps.turned_in_c - gyro_rate
     return left
+
+
+def _typical(turns: Array) -> float:
+    """Median size of turns (n, 3): a cut in the film is one of many."""
+    return float(np.median(np.sqrt((turns * turns).sum(axis=1))))
 
 
 def _sigma(J: Array, left: Array, t: Array) -> Array:

@@ -187,16 +187,36 @@ def test_too_little_motion_for_the_sensors_is_told_with_what_to_do():
         align(t + 500.0, np.tile(np.eye(3), (90, 1, 1)), still)
 
 
+SWINGS = (1.1, 1.7, 2.3)
+
+
+def turning(late_s, felt=SWINGS):
+    """A camera that turns about three axes [rad/s], and a gyroscope that feels `felt`."""
+    t, fine = np.arange(0.0, 12.0, 1.0 / 30.0), np.arange(-2.0, 14.0, 0.005)
+    R_og = [np.eye(3)]
+    for turn in np.diff(0.5 * np.sin(np.outer(t, SWINGS)), axis=0):
+        R_og.append(exp(-turn) @ R_og[-1])
+    rate = 0.5 * np.array(felt) * np.cos(np.outer(fine, felt))
+    return t, np.array(R_og), GyroSpline(fine + late_s, rate)
+
+
 @pytest.mark.parametrize("late_s", [0.49, 0.53])
 def test_a_delay_that_no_camera_file_may_hold_is_refused_in_words(late_s):
     """The nearest one that is tried is half a second, and the fit goes on from there."""
-    w, t, fine = (1.1, 1.7, 2.3), np.arange(0.0, 12.0, 1.0 / 30.0), np.arange(-2.0, 14.0, 0.005)
-    R_og = [np.eye(3)]
-    for turn in np.diff(0.5 * np.sin(np.outer(t, w)), axis=0):
-        R_og.append(exp(-turn) @ R_og[-1])
-    gyro = GyroSpline(fine + late_s, 0.5 * np.array(w) * np.cos(np.outer(fine, w)))
     if late_s < TIME_OFFSETS_S[1]:
-        assert align(t, np.array(R_og), gyro).time_offset_s == pytest.approx(late_s, abs=0.003)
+        assert align(*turning(late_s)).time_offset_s == pytest.approx(late_s, abs=0.003)
         return
     with pytest.raises(ImuError, match="do not fit each other"):
-        align(t, np.array(R_og), gyro)
+        align(*turning(late_s))
+
+
+@pytest.mark.parametrize("felt", [(0.7, 1.2, 3.1), (1.1, 1.7, 4.3), (1.1, 1.7, 0.0)])
+def test_a_gyroscope_that_felt_another_motion_is_refused(felt):
+    with pytest.raises(ImuError, match="do not fit each other"):
+        align(*turning(0.03, felt))
+
+
+def test_a_cut_in_the_film_does_not_move_the_delay():
+    t, R_og, gyro = turning(0.03)
+    R_og[180:] = R_og[180:] @ exp(np.array([1.0, 0.5, -1.0]))
+    assert align(t, R_og, gyro).time_offset_s == pytest.approx(0.03, abs=0.001)
