@@ -1,10 +1,12 @@
 """`python -m tests.fuzz [TARGET ...] --seconds 60 | --runs N`: coverage-guided, by atheris."""
 
 import argparse
+import math
 import re
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +22,9 @@ MISSING = (
 ONE_INPUT_S = 60
 """More real time than that for one input is a finding, whoever else is busy here."""
 MOST_MEMORY_MB = 2048
+ROUND = 100_000
+"""Executions of one process: atheris 3.0 keeps the result of each comparison for ever, which of
+NumPy's arrays is 150 bytes (`control_end`: 10 kB an execution)."""
 ROOM_S = 120
 """To import everything, and for the last input."""
 
@@ -29,47 +34,76 @@ class Outcome:
     """What became of one target."""
 
     name: str
-    executions: int
-    calls: int
+    executions: int = 0
+    calls: int = 0
     """Of the parser: of an input that is a sequence one for each piece."""
-    per_second: int
-    edges: int
-    finding: str
+    took_s: float = 0.0
+    edges: int = 0
+    finding: str = ""
     """What was raised and where its input is; empty: nothing."""
+
+    def then(self, more: "Outcome") -> "Outcome":
+        """With what a further process did."""
+        return Outcome(
+            self.name,
+            self.executions + more.executions,
+            self.calls + more.calls,
+            self.took_s + more.took_s,
+            max(self.edges, more.edges),
+            more.finding,
+        )
+
+    @property
+    def per_second(self) -> int:
+        """Executions, with the time that its processes needed to start."""
+        return round(self.executions / max(self.took_s, 1e-3))
 
 
 def fuzz(name: str, seconds: int, runs: int, out: Path) -> Outcome:
-    """Run one target in a process of its own."""
+    """Run one target for so long, or so often, in one process after the other with one corpus."""
     out.mkdir(parents=True, exist_ok=True)
-    options = [
-        f"-max_total_time={seconds}",
-        f"-runs={runs or -1}",
-        f"-timeout={ONE_INPUT_S}",
-        f"-rss_limit_mb={MOST_MEMORY_MB}",
-        f"-artifact_prefix={out / name}-",
-        "-print_final_stats=1",
-        "-verbosity=1",
-    ]
+    end, total = time.monotonic() + seconds, Outcome(name)
     with tempfile.TemporaryDirectory() as folder:
         corpus = Path(folder, name)
         corpus.mkdir()
-        command = [sys.executable, "-m", "tests.fuzz.child", name, *options, str(corpus)]
-        done = subprocess.run(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            timeout=seconds + ROOM_S if seconds else None,
-        )
-        calls = corpus.with_suffix(CALLS)
-        counted = int.from_bytes(calls.read_bytes(), sys.byteorder) if calls.exists() else 0
+        while not total.finding:
+            left_s = math.ceil(end - time.monotonic()) if seconds else 0
+            left = min(ROUND, runs - total.executions) if runs else ROUND
+            if left <= 0 or (seconds and left_s <= 0):
+                break
+            total = total.then(_round(name, left_s, left, out / name, corpus))
+    return total
+
+
+def _round(name: str, seconds: int, runs: int, artifact: Path, corpus: Path) -> Outcome:
+    """One process; what it found worth keeping it adds to the corpus."""
+    options = [
+        f"-max_total_time={seconds}",
+        f"-runs={runs}",
+        f"-timeout={ONE_INPUT_S}",
+        f"-rss_limit_mb={MOST_MEMORY_MB}",
+        f"-artifact_prefix={artifact}-",
+        "-print_final_stats=1",
+        "-verbosity=1",
+    ]
+    command = [sys.executable, "-m", "tests.fuzz.child", name, *options, str(corpus)]
+    started = time.monotonic()
+    done = subprocess.run(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=seconds + ROOM_S if seconds else None,
+    )
+    calls = corpus.with_suffix(CALLS)
     said = done.stdout.decode(errors="replace")
+    executions = _last(r"stat::number_of_executed_units:\s*(\d+)", said)
     return Outcome(
         name,
-        _last(r"stat::number_of_executed_units:\s*(\d+)", said),
-        counted,
-        _last(r"stat::average_exec_per_sec:\s*(\d+)", said),
+        executions,
+        int.from_bytes(calls.read_bytes(), sys.byteorder) if calls.exists() else 0,
+        time.monotonic() - started,
         _last(r"\bcov: (\d+)", said),
-        _finding(said) if done.returncode else "",
+        _finding(said) if done.returncode or not executions else "",
     )
 
 

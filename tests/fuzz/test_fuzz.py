@@ -11,6 +11,7 @@ import pytest
 from hardware.follower import FollowerState, Refusal
 from hardware.link.robot_end import RobotEnd
 from server.protocol import wire
+from tests.fuzz import __main__ as command
 from tests.fuzz.link_targets import RobotRig
 from tests.fuzz.mutate import mutants
 from tests.fuzz.planted import PLANTED
@@ -18,6 +19,7 @@ from tests.fuzz.sequence import pieces
 from tests.fuzz.target import FOUND
 from tests.fuzz.targets import TARGETS
 
+one_round = command._round
 ROOT = Path(__file__).parents[2]
 SEED = 13
 
@@ -32,8 +34,8 @@ def mutate(target, count=None):
 
 
 def fuzz(*arguments, cwd):
-    command = [sys.executable, "-m", "tests.fuzz", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300)
+    words = [sys.executable, "-m", "tests.fuzz", *arguments]
+    return subprocess.run(words, cwd=cwd, capture_output=True, text=True, timeout=300)
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -133,6 +135,20 @@ def test_the_command_tells_executions_and_edges_of_a_sound_target(tmp_path):
     assert calls == executions
     assert int(row[3]) > 5
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(find_spec("atheris") is None, reason="atheris is not installed")
+@pytest.mark.long
+@pytest.mark.slow
+def test_what_several_processes_did_is_told_as_one(monkeypatch, tmp_path):
+    monkeypatch.setattr(command, "ROUND", 1_000)
+    started = []
+    monkeypatch.setattr(command, "_round", lambda *a: started.append(a[2]) or one_round(*a))
+    done = command.fuzz("trailer", 0, 2_500, tmp_path)
+    assert not done.finding
+    assert started[:2] == [1_000, 1_000]
+    assert done.calls == done.executions >= 2_500
+    assert command.fuzz("no such one", 0, 2_500, tmp_path).finding.startswith("did not run")
 
 
 def test_an_unknown_target_is_named_with_those_that_there_are():
