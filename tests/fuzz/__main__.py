@@ -1,6 +1,7 @@
 """`python -m tests.fuzz [TARGET ...] --seconds 60 | --runs N`: coverage-guided, by atheris."""
 
 import argparse
+import contextlib
 import math
 import re
 import subprocess
@@ -60,18 +61,23 @@ class Outcome:
 
 
 def fuzz(name: str, seconds: int, runs: int, out: Path) -> Outcome:
-    """Run one target for so long, or so often, in one process after the other with one corpus."""
+    """Run one target for so long, or so often, in one process after the other with one corpus.
+
+    Ctrl-C ends it with what came of it until then.
+    """
     out.mkdir(parents=True, exist_ok=True)
     end, total = time.monotonic() + seconds, Outcome(name)
     with tempfile.TemporaryDirectory() as folder:
         corpus = Path(folder, name)
         corpus.mkdir()
-        while not total.finding:
-            left_s = math.ceil(end - time.monotonic()) if seconds else 0
-            left = min(ROUND, runs - total.executions) if runs else ROUND
-            if left <= 0 or (seconds and left_s <= 0):
-                break
-            total = total.then(_round(name, left_s, left, out / name, corpus))
+        with contextlib.suppress(KeyboardInterrupt):
+            while not total.finding:
+                left_s = math.ceil(end - time.monotonic()) if seconds else 0
+                left = min(ROUND, runs - total.executions) if runs else ROUND
+                if left <= 0 or (seconds and left_s <= 0):
+                    break
+                total = total.then(_round(name, left_s, left, out / name, corpus))
+                print(f"{name}: {total.executions:,} executions", file=sys.stderr, flush=True)
     return total
 
 

@@ -151,6 +151,18 @@ def test_what_several_processes_did_is_told_as_one(monkeypatch, tmp_path):
     assert command.fuzz("no such one", 0, 2_500, tmp_path).finding.startswith("did not run")
 
 
+def test_an_interruption_leaves_what_was_done(monkeypatch, tmp_path, capsys):
+    def one_round(name, *_):
+        if "200,000" in capsys.readouterr().err:
+            raise KeyboardInterrupt
+        return command.Outcome(name, 100_000, 300_000, 2.0, 7)
+
+    monkeypatch.setattr(command, "_round", one_round)
+    done = command.fuzz("trailer", 0, 10_000_000, tmp_path)
+    assert (done.executions, done.calls, done.edges) == (200_000, 600_000, 7)
+    assert done.per_second == 50_000
+
+
 def test_an_unknown_target_is_named_with_those_that_there_are():
     out = fuzz("recrods", cwd=ROOT)
     assert out.returncode == 2
