@@ -181,6 +181,24 @@ export function shownMode(board) {
   return board.status.mode;
 }
 
+const ARMED = ['ARMED', 'TRACK', 'COAST', 'HOLD'];
+
+/**
+ * What the card about arming says; of a robot that is armed, what would keep it from it says nothing.
+ * @param {Pick<Status, 'mode' | 'ready' | 'refusals'>} status
+ */
+export function beforeArming({ mode, ready, refusals }) {
+  const waiting = mode === 'DISARMED', fine = refusals.length === 0;
+  const armed = [...ARMED, 'RAMP'].includes(mode);
+  return {
+    title: armed ? 'While armed' : 'Before arming',
+    badge: !waiting ? mode.toLowerCase() : ready ? 'ready' : `${refusals.length} to mend`,
+    tone: !waiting ? '' : ready ? 'good' : 'bad',
+    lines: armed ? [] : fine ? ['Nothing is in the way'] : refusals,
+    fine,
+  };
+}
+
 /**
  * Which requests make sense now.
  * @param {Board} board
@@ -189,7 +207,7 @@ export function requests(board) {
   const mode = shownMode(board);
   return {
     arm: mode === 'DISARMED' && board.status?.ready === true,
-    disarm: ['ARMED', 'TRACK', 'COAST', 'HOLD'].includes(mode),
+    disarm: ARMED.includes(mode),
     reset: mode === 'STOPPED',
   };
 }

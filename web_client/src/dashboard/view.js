@@ -9,7 +9,7 @@ import { modeWords, rampWords } from '../ui/mode_words.js';
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
-import { REMEMBERED, requests, shownMode } from './model.js';
+import { REMEMBERED, beforeArming, requests, shownMode } from './model.js';
 
 /** @typedef {{ onRequest: (what: 'arm' | 'disarm' | 'reset') => void, onStop: () => void, onVirtual: () => void,
  *   onRecord: () => void, onCode: () => void, onReload: () => void }} Requests */
@@ -82,14 +82,15 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  arming({ ready, refusals, mode, warnings, thrusters_weak: weak }) {
-    const waiting = mode === 'DISARMED';
-    this.text('ready', !waiting ? mode.toLowerCase() : ready ? 'ready' : `${refusals.length} to mend`);
-    this.find('ready').className = `badge ${waiting ? (ready ? 'good' : 'bad') : ''}`;
-    const fine = refusals.length === 0;
-    this.list('refusals', fine ? ['Nothing is in the way'] : refusals);
-    this.list('warnings', waiting ? warnings : [...weak, ...warnings]);
+  arming(status) {
+    const { title, badge, tone, lines, fine } = beforeArming(status);
+    this.text('arming-title', title);
+    this.text('ready', badge);
+    this.find('ready').className = `badge ${tone}`;
+    this.list('refusals', lines);
     this.find('refusals').firstElementChild?.classList.toggle('fine', fine);
+    const { mode, thrusters_weak: weak, warnings } = status;
+    this.list('warnings', mode === 'DISARMED' ? warnings : [...weak, ...warnings]);
   }
 
   /** @param {Status} status */
@@ -100,7 +101,7 @@ export class BoardView extends Elements {
     this.text('operator', operator || 'none');
     this.find('operator').title = operator;
     this.text('crowd', `phones ${phones} · supervisors ${supervisors}`);
-    this.text('recording', recording || 'not recording');
+    this.text('recording', recording);
     this.text('record', recording ? 'Stop recording' : 'Record');
     this.find('record').classList.toggle('on', recording !== '');
   }

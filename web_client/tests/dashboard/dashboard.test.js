@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from '../../src/dashboard/format.js';
-import { EMPTY, REMEMBERED, reduce, requests, shownMode } from '../../src/dashboard/model.js';
+import { EMPTY, REMEMBERED, beforeArming, reduce, requests, shownMode } from '../../src/dashboard/model.js';
 import { INVITE_LIFE_MS, PhoneCard } from '../../src/dashboard/phone_card.js';
 import { Problem } from '../../src/wire/problems.js';
 import { niceEnd } from '../../src/dashboard/sparkline.js';
@@ -63,6 +63,18 @@ test('wishes follow the mode', () => {
   assert.deepEqual(requests(after({ type: 'welcomed' }, status({ mode: 'HOLD' }))), { arm: false, disarm: true, reset: false });
   assert.deepEqual(requests(after({ type: 'welcomed' }, status({ mode: 'STOPPED' }))), { arm: false, disarm: false, reset: true });
   assert.deepEqual(requests(after(status({ ready: true }))), { arm: false, disarm: false, reset: false });
+});
+
+test('what is in the way of arming is told while it is not armed', () => {
+  const refusals = ['No phone is connected'];
+  const told = beforeArming(statusOf({ refusals }));
+  assert.deepEqual(told, { title: 'Before arming', badge: '1 to mend', tone: 'bad', lines: refusals, fine: false });
+  assert.deepEqual(beforeArming(statusOf({ ready: true })).lines, ['Nothing is in the way']);
+  assert.deepEqual(beforeArming(statusOf({ mode: 'STOPPED', refusals })).lines, refusals);
+  for (const mode of /** @type {const} */ (['ARMED', 'TRACK', 'COAST', 'HOLD', 'RAMP'])) {
+    const { title, badge, lines } = beforeArming(statusOf({ mode, refusals: ['Already armed.'] }));
+    assert.deepEqual([title, badge, lines], ['While armed', mode.toLowerCase(), []]);
+  }
 });
 
 test('a fatal refusal blocks the page, another passes by', () => {
