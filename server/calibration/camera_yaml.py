@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from hardware.camera_file import direction_of, slug
+from hardware.camera_file import direction_of, load_camera, slug
 from pipeline.frames import Array
 from server.calibration.lens import matrix
 from server.calibration.solve import CalibrationSolution
@@ -114,8 +114,16 @@ def profile_path(folder: Path, name: str, size: tuple[int, int], angle: int | No
 
 
 def store(path: Path, text: str) -> None:
-    """Write a file so that whoever reads it finds the old one or the new one, whole."""
+    """Write a file so that whoever reads it finds the old one or the new one, whole and readable.
+
+    Raises:
+        CameraFileError: it could not be read again; nothing is written.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     fresh = path.with_name(path.name + ".part")
-    fresh.write_text(text, encoding="utf-8")
-    fresh.replace(path)
+    try:
+        fresh.write_text(text, encoding="utf-8")
+        load_camera(fresh)  # what a fit found may be more than any camera's file may say
+        fresh.replace(path)
+    finally:
+        fresh.unlink(missing_ok=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hardware.camera_file import CameraFileError
 from hardware.codec import Decoder
 from pipeline.signals import PhoneImu
 from server.calibration.board import Board, Detector
@@ -30,6 +31,12 @@ MOST_SAMPLES = 20_000
 """Of motion: more than a minute at 200 Hz."""
 SHOWN_PER_CELL = 3  # views, by the page's shades of grey
 FAILED = Verdict("refused", ["The calibration failed: look at the server's log."])
+
+
+def unreadable(error: CameraFileError) -> Verdict:
+    """The verdict on a calibration whose own file could not be read again."""
+    reason = f"What was found is no camera: {error.key}: {error.allowed}."
+    return Verdict("refused", [reason], ["Film again, with larger and quicker turns."])
 
 
 class CalibrationSession(FrameThread):
@@ -152,15 +159,18 @@ class CalibrationSession(FrameThread):
             self._solving.stop()
 
     def _finished(self, outcome: CalibrationOutcome) -> Calibration:
-        verdict = outcome.verdict
-        if outcome.text:
+        verdict, done = outcome.verdict, outcome.text != ""
+        if done:
             angle = self.screen_angle_deg
             path = profile_path(self._folder, self._device, self.size, angle)
-            store(path, outcome.text)
-            self.stored = path
+            try:
+                store(path, outcome.text)
+                self.stored = path
+            except CameraFileError as error:
+                verdict, done = unreadable(error), False
         return Calibration(
-            phase="done" if outcome.text else "refused",
-            hint="Calibrated." if outcome.text else "Not good enough yet.",
+            phase="done" if done else "refused",
+            hint="Calibrated." if done else "Not good enough yet.",
             progress=1.0,
             verdict=verdict.level,
             figures=outcome.figures,

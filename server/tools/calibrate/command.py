@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.camera_file import direction_of
+from hardware.camera_file import CameraFileError, direction_of
 from pipeline.frames import Array
 from server.calibration.board import DICTIONARIES, Board, BoardError, parse
 from server.calibration.camera_imu import ImuError, gyro_of
@@ -94,7 +94,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.store and not arguments.name:
             parser.error("--store needs --name")
         return _calibrate(arguments, board)
-    except (BoardError, FilmError, ImuError, InputError, OSError) as error:
+    except (BoardError, CameraFileError, FilmError, ImuError, InputError, OSError) as error:
         print(f"lightleash calibrate: {error}", file=sys.stderr)
         return 2
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.camera_file import find_camera_file, load_camera
+from hardware.camera_file import CameraFileError, find_camera_file, load_camera
 from pipeline.camera.lens import COLUMNS, ROWS
 from pipeline.frames import exp, log
 from server.calibration.camera_imu import gyro_of
@@ -80,6 +80,16 @@ def test_the_file_is_a_camera_file(found, tmp_path):
     assert camera.extrinsics.R_ci == pytest.approx(found.imu.R_ci, abs=1e-6)
     assert camera.extrinsics.time_offset_s == pytest.approx(found.imu.time_offset_s, abs=1e-6)
     assert find_camera_file(name, 1280, 720, [tmp_path], 90)[0] == path
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_file_that_could_not_be_read_again_leaves_the_one_before(found, tmp_path):
+    path, text = tmp_path / "phone.yaml", yaml_of(found, judge(found), "phone", 0, "2026-01-01")
+    store(path, text)
+    late = replace(found, imu=replace(found.imu, time_offset_s=0.7))
+    with pytest.raises(CameraFileError, match="time_offset_s"):
+        store(path, yaml_of(late, judge(late), "phone", 0, "2026-01-01"))
+    assert path.read_text(encoding="utf-8") == text
     assert [one.name for one in tmp_path.iterdir()] == [path.name]
 
 

@@ -10,6 +10,8 @@ import pytest
 
 from hardware.camera_file import CAMERAS, load_camera
 from pipeline.signals import Mode
+from server.calibration.job import CalibrationOutcome
+from server.calibration.verdict import Verdict
 from server.phone.calibration_control import CalibrationControl
 from server.phone.calibration_session import CalibrationSession
 from server.phone.ingest import EncodedFrame
@@ -111,6 +113,20 @@ def test_a_solver_that_dies_is_a_refusal_and_leaves_nothing(tmp_path):
         wizard._solving._process.join(10.0)
         assert wizard.state().phase == "refused"
         assert list(tmp_path.iterdir()) == []
+    finally:
+        wizard.stop()
+
+
+def test_a_profile_that_could_not_be_read_again_is_a_refusal_in_words(tmp_path):
+    wizard = CalibrationSession("a phone", (1280, 720, 90), tmp_path, lambda _n: None, lambda: None)
+    text = (CAMERAS / "virtual_phone.yaml").read_text()
+    try:
+        told = wizard._finished(CalibrationOutcome(Verdict(), text.replace("1280", "-1280"), []))
+        assert (told.phase, told.verdict) == ("refused", "refused")
+        assert "image_width" in told.reasons[0]
+        assert list(tmp_path.iterdir()) == []
+        assert wizard.stored is None
+        assert wizard._finished(CalibrationOutcome(Verdict(), text, [])).phase == "done"
     finally:
         wizard.stop()
 
