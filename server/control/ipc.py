@@ -25,6 +25,8 @@ MAX_DATAGRAM = 16_384
 """Bytes that are read of one."""
 BodyRow = tuple[float, float, float, float, float, float, float]
 """A time [s] and two vectors in b."""
+OFF_UNIT = 1e-3
+"""By so much the square of an attitude's quaternion is off one at most: rounding is much less."""
 
 
 class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
@@ -100,6 +102,12 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Thrusts commanded since the last status, for recordings: each time t, then `thrusts`."""
 
 
+def _has_attitudes(status: ControlStatus) -> bool:
+    """Whether all attitudes it tells are some."""
+    told = (status.R_cb_wxyz, status.R_fc_wxyz, status.R_fv_wxyz, status.reference_R_wxyz)
+    return all(q is None or abs(sum(x * x for x in q) - 1.0) < OFF_UNIT for q in told)
+
+
 def expected_of(status: ControlStatus) -> Prediction | None:
     """Where control's filter says that the robot is, for vision; None if it doesn't."""
     p, R_wxyz, u = status.p_bc_in_c, status.R_cb_wxyz, status.u_bf_in_c
@@ -169,13 +177,15 @@ class Endpoint:
         return inputs
 
     def statuses(self, limit: int = 64) -> list[ControlStatus]:
-        """What has arrived from the control process, oldest first."""
+        """What has arrived from the control process, oldest first; as `inputs` counts the rest."""
         statuses: list[ControlStatus] = []
         for datagram in self._datagrams(limit):
-            try:
-                statuses.append(_status_decoder.decode(datagram))
-            except (ValueError, RecursionError):
-                self.dropped += 1
+            with contextlib.suppress(ValueError, RecursionError):
+                status = _status_decoder.decode(datagram)
+                if _has_attitudes(status):
+                    statuses.append(status)
+                    continue
+            self.dropped += 1
         return statuses
 
     def close(self) -> None:

@@ -73,4 +73,5 @@ def statuses(data: bytes) -> None:
     assert len(heard) + SERVER.dropped - dropped == 1
     for status in heard:
         assert isinstance(status, ControlStatus)
-        expected_of(status)
+        expected = expected_of(status)
+        assert expected is None or np.linalg.det(expected.R_cb) > 0.99

@@ -173,6 +173,16 @@ def test_leds_that_no_robot_has_are_refused(ends, leds):
     assert control.dropped == 1
 
 
+@pytest.mark.parametrize("named", ["R_cb_wxyz", "R_fc_wxyz", "R_fv_wxyz", "reference_R_wxyz"])
+@pytest.mark.parametrize("q", [(0.0,) * 4, (1e-300, 0.0, 0.0, 0.0), (nan,) * 4, (1.0, 1.0, 0, 0)])
+def test_a_status_whose_attitude_is_none_is_counted(ends, named, q):
+    server, control = ends
+    control.send(control_status(**{named: q}))
+    control.send(known := control_status(**{named: (0.0, 0.6, -0.8, 0.0)}))
+    assert server.statuses() == [known]
+    assert server.dropped == 1
+
+
 @given(st.binary(max_size=300))
 def test_garbage_is_counted_and_costs_nothing_else(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("link")
