@@ -48,7 +48,7 @@ def _lines(sdp: str) -> list[str]:
     lines = [line for line in sdp.replace("\r\n", "\n").split("\n") if line]
     if len(lines) > MAX_LINES or any(len(line) > MAX_LINE for line in lines):
         raise WireError("size", "sdp", f"{MAX_LINES} lines of {MAX_LINE} characters")
-    if lines[0] != "v=0":
+    if lines[:1] != ["v=0"]:
         raise WireError("type", "sdp", "a session description, beginning with v=0")
     return lines
 

@@ -106,6 +106,7 @@ def test_every_line_that_is_said_of_a_codec_stays_one_line():
 LINE = "a=candidate:1 1 udp 2130706431 {} 5000 typ host"
 HOSTILE = {
     "nothing": (lambda sdp: "", "size"),
+    "ends of lines alone": (lambda sdp: "\r\n\n", "type"),
     "a book": (lambda sdp: sdp + "a=x\r\n" * MAX_BYTES, "size"),
     "a long line": (lambda sdp: sdp + "a=" + "x" * 2000, "size"),
     "many lines": (lambda sdp: sdp + "a=b\r\n" * 500, "size"),
