@@ -64,7 +64,8 @@ class RobotProcess:
         if poses and ahead_s > 0.0:
             t = poses[-1][0]
             poses += [(t + dt, wxyz, p) for dt, wxyz, p in self._robot.body.ahead(ahead_s)]
-        answer = encode_truth(request, poses, self._robot.body.thrusts, self._robot.dark)
+        state, dark = self._robot.end.state, self._robot.dark
+        answer = encode_truth(request, poses, self._robot.body.thrusts, state, dark)
         with contextlib.suppress(OSError):
             truth.sendto(answer, sender)
 

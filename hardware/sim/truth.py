@@ -7,13 +7,14 @@ ahead [s], 0 to 0.2, it goes with the last commands held. Answer, little-endian:
 |--------|---------|------------------------------------------------------------------|
 | 0      | 8 bytes | those of the request                                             |
 | 8      | 4 bytes | magic `LLtr`                                                     |
-| 12     | u8      | version, 2                                                       |
+| 12     | u8      | version, 3                                                       |
 | 13     | u8      | m, thrusters                                                     |
 | 14     | u16     | n, poses, at most 50 (0.25 s at 200 Hz), and up to 40 ahead      |
 | 16     | n × 64  | 8 × f64, oldest first: CLOCK_MONOTONIC of this machine [s],      |
 |        |         | attitude wxyz_fb, position of the centre of mass p_bf_in_f [m]   |
 | …      | n × i8  | the LED that was dark then, −1: none                             |
 | …      | m × f32 | thrusts of the last one [N]                                      |
+| …      | u8      | state of the robot's end, `FollowerState`                        |
 """
 
 from __future__ import annotations
@@ -27,15 +28,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hardware.follower import FollowerError
+from hardware.follower import FollowerError, FollowerState
 from pipeline.frames import Array, R_from_wxyz, exp, log
 
 REQUEST_BYTES = 8
 AHEAD = struct.Struct("<f")
 MAX_AHEAD_S = 0.2
-MAGIC, VERSION = b"LLtr", 2
+MAGIC, VERSION = b"LLtr", 3
 HEAD = struct.Struct("<8s4sBBH")
 MAX_BYTES = 8_192
+STATES = frozenset(FollowerState)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,6 +54,8 @@ class Truth:
     """(m,) at the last of them [N]."""
     dark: npt.NDArray[np.int8]
     """(n,) the LED that was dark, −1: none."""
+    state: FollowerState
+    """Of the robot's end, now."""
 
     def at(self, t: float) -> tuple[Array, Array]:
         """(R_fb (3, 3), p_bf_in_f (3,)) at `t` [s], between its two ticks; at either end that's."""
@@ -84,6 +88,7 @@ def encode_truth(
     request: bytes,
     poses: Sequence[tuple[float, Array, Array]],
     thrusts: Array,
+    state: FollowerState,
     dark: Collection[int] = (),
 ) -> bytes:
     """The answer to `request`; `poses` are (t [s], wxyz_fb, p_bf_in_f [m]), oldest first.
@@ -93,7 +98,7 @@ def encode_truth(
     head = HEAD.pack(request[:REQUEST_BYTES], MAGIC, VERSION, len(thrusts), len(poses))
     rows = b"".join(struct.pack("<8d", t, *wxyz, *p) for t, wxyz, p in poses)
     leds = (*dark, *(len(poses) - len(dark)) * (-1,))
-    return head + rows + struct.pack(f"<{len(leds)}b{len(thrusts)}f", *leds, *thrusts)
+    return head + rows + struct.pack(f"<{len(leds)}b{len(thrusts)}fB", *leds, *thrusts, state)
 
 
 def decode_truth(data: bytes, request: bytes) -> Truth | None:
@@ -103,12 +108,13 @@ def decode_truth(data: bytes, request: bytes) -> Truth | None:
     echoed, magic, version, thrusters, n = HEAD.unpack_from(data)
     if (echoed, magic, version) != (request, MAGIC, VERSION) or n == 0:
         return None
-    if len(data) != HEAD.size + 65 * n + 4 * thrusters:
+    if len(data) != HEAD.size + 65 * n + 4 * thrusters + 1 or data[-1] not in STATES:
         return None
     rows = np.frombuffer(data, "<f8", 8 * n, HEAD.size).reshape(n, 8).astype(np.float64)
     dark = np.frombuffer(data, np.int8, n, HEAD.size + 64 * n)
     thrusts = np.frombuffer(data, "<f4", thrusters, HEAD.size + 65 * n).astype(np.float64)
-    return Truth(rows[:, 0], rows[:, 1:5], rows[:, 5:8], thrusts, dark)
+    state = FollowerState(data[-1])
+    return Truth(rows[:, 0], rows[:, 1:5], rows[:, 5:8], thrusts, dark, state)
 
 
 class TruthClient:

@@ -22,6 +22,7 @@ from server.experiments.faults.fault import Fault, FaultOutcome, suffer
 from server.experiments.faults.live import LiveOutcome
 from server.experiments.faults.measure import (
     FaultRow,
+    live_goals,
     live_times,
     row_of,
     times_of,
@@ -118,19 +119,20 @@ def run_live(arguments: argparse.Namespace) -> ExperimentReport:
     for one in live.fly(arguments.robot, arguments.gains, arguments.live, faults):
         outcomes.append(one)
         print(text_of(one), flush=True)
-    thrust = sum(one.after_zero for one in outcomes)
+    thrust, times = sum(one.after_zero for one in outcomes), live_times(faults, outcomes)
     holds = {
         f"live: {thrust} samples with thrust after zero, in {len(outcomes)} faults": thrust == 0,
         "live: each in time": not any(one.missed for one in outcomes),
+        **live_goals(faults, times),
     }
-    times = live_times(outcomes)
     return ExperimentReport({"rows": outcomes, "times": times}, dashed(TIMES, times), holds)
 
 
 def text_of(one: LiveOutcome) -> str:
     """A line."""
     return (
-        f"{one.fault:<24} falls after {one.falls_s:5.2f} s, zero after {one.zero_s:5.2f} s, "
+        f"{one.fault:<24} coasts after {one.coasts_s:6.3f} s, ramps {one.ramps_s:6.3f} s, "
+        f"falls {one.falls_s:5.2f} s, zero {one.zero_s:5.2f} s, "
         f"{one.after_zero} samples after, {one.excursion_mm:4.0f} mm  {one.missed}"
     )
 

@@ -15,19 +15,31 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import partial
 from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from hardware.follower import FollowerError
+from hardware.follower import FollowerError, FollowerState
 from hardware.sim.truth import TruthClient
+from pipeline.frames import Array
+from pipeline.signals import Mode
 from server.common import clock
 from server.common.child import die_with
 from server.common.runtime import RUN_FILE
-from server.experiments.faults.catalogue import RAMP_S, RAMPED_S, ROBOT_RAMP_S
+from server.experiments.faults.catalogue import (
+    COAST_S,
+    RAMP_S,
+    RAMPED_S,
+    ROBOT_RAMP_S,
+    ROBOT_S,
+)
 from server.experiments.faults.fault import ZERO_N
+from server.recording.reader import read
+from server.recording.writer import STATUS
 from server.virtual_phone import live_loop
 
 MODULES: Final = {
@@ -43,27 +55,54 @@ SLACK_S: Final = 0.3
 TRACK_S: Final = 180.0
 DOWN_S: Final = 30.0
 LOOK_S: Final = 0.005
+ASK_S: Final = 2.0
 Victim = Literal["phone", "server", "control", "robot"]
+
+
+class Stage(IntEnum):
+    """How far whoever is left has come."""
+
+    FOLLOWS = 0
+    COASTS = 1
+    RAMPS = 2
+
+
+Told = tuple[float, Stage]
+"""What somebody said of itself when [s, our clock]."""
+OF_CONTROL: Final = {
+    Mode.COAST: Stage.COASTS,
+    Mode.HOLD: Stage.COASTS,
+    Mode.RAMP: Stage.RAMPS,
+}
+OF_ROBOT: Final = {FollowerState.COAST: Stage.COASTS, FollowerState.RAMP: Stage.RAMPS}
 
 
 @dataclass(frozen=True, slots=True)
 class LiveFault:
-    """What happens to which process, and by when there is no thrust."""
+    """What happens to which process, and by when whoever is left acts."""
 
     name: str
     victim: Victim
     number: signal.Signals
     zero_s: float
+    """Until there is no thrust."""
+    coast_s: float | None = None
+    """Until control coasts, whose phone is silent, or the robot, whose control is; None: unasked,
+    for nobody is left who tells, or it does not come to that."""
+    ramp_s: float | None = None
 
 
+ROBOT_DOWN_S: Final = ROBOT_RAMP_S + RAMPED_S
 LIVE: Final = (
-    LiveFault("phone killed", "phone", signal.SIGKILL, RAMP_S + RAMPED_S),
-    LiveFault("phone stopped", "phone", signal.SIGSTOP, RAMP_S + RAMPED_S),
+    LiveFault("phone killed", "phone", signal.SIGKILL, RAMP_S + RAMPED_S, COAST_S, RAMP_S),
+    LiveFault("phone stopped", "phone", signal.SIGSTOP, RAMP_S + RAMPED_S, COAST_S, RAMP_S),
     LiveFault("server killed", "server", signal.SIGKILL, RAMP_S + RAMPED_S),
     LiveFault("server stopped for 2 s", "server", signal.SIGSTOP, RAMP_S + RAMPED_S),
-    LiveFault("control killed", "control", signal.SIGKILL, ROBOT_RAMP_S + RAMPED_S),
-    LiveFault("control ended", "control", signal.SIGTERM, ROBOT_RAMP_S + RAMPED_S),
-    LiveFault("control stopped for 2 s", "control", signal.SIGSTOP, ROBOT_RAMP_S + RAMPED_S),
+    LiveFault("control killed", "control", signal.SIGKILL, ROBOT_DOWN_S, ROBOT_S, ROBOT_RAMP_S),
+    LiveFault("control ended", "control", signal.SIGTERM, ROBOT_DOWN_S),
+    LiveFault(
+        "control stopped for 2 s", "control", signal.SIGSTOP, ROBOT_DOWN_S, ROBOT_S, ROBOT_RAMP_S
+    ),
     LiveFault("robot killed", "robot", signal.SIGKILL, 0.1),
 )
 STOPPED_S: Final = 2.0
@@ -74,6 +113,9 @@ class LiveOutcome:
     """What followed."""
 
     fault: str
+    coasts_s: float
+    """Until somebody coasts, and ramps; infinite if that was not seen."""
+    ramps_s: float
     falls_s: float
     """Until thrust is below four fifths of what it was, for good."""
     zero_s: float
@@ -95,14 +137,32 @@ class LiveServer:
 
     def mode(self) -> str:
         """Mode by the server's status; "" while it says nothing."""
-        headers = {"Authorization": f"Bearer {self._run['supervisor_token']}"}
-        request = urllib.request.Request(f"{self._run['http_url']}/api/status", headers=headers)
         try:
-            with urllib.request.urlopen(request, timeout=2.0) as answer:
-                status = json.loads(answer.read())  # null as long as control has not spoken
-                return str(status["mode"]) if status is not None else ""
+            status = json.loads(self._answer("GET", "/api/status"))
+            return str(status["mode"]) if status is not None else ""  # control has not spoken yet
         except (OSError, ValueError, KeyError):
             return ""
+
+    @contextlib.contextmanager
+    def recording(self, told: list[Told]) -> Iterator[None]:
+        """Record meanwhile; then `told` has what control said of itself.
+
+        Pages show the last status, ten times a second: too seldom for such times.
+        """
+        self._answer("POST", "/api/recording")
+        yield
+        path = Path(json.loads(self._answer("DELETE", "/api/recording"))["path"])
+        for entry in read(path).entries(STATUS):
+            status = json.loads(entry.data)
+            told.append((status["t"], OF_CONTROL.get(Mode(status["mode"]), Stage.FOLLOWS)))
+        path.unlink()
+
+    def _answer(self, method: str, path: str) -> bytes:
+        headers = {"Authorization": f"Bearer {self._run['supervisor_token']}"}
+        url = f"{self._run['http_url']}{path}"
+        request = urllib.request.Request(url, headers=headers, method=method)
+        with urllib.request.urlopen(request, timeout=ASK_S) as answer:
+            return bytes(answer.read())
 
     def until(self, condition: Callable[[], bool], seconds: float, what: str) -> None:
         """Wait for it.
@@ -135,13 +195,14 @@ class LiveServer:
             phone.wait()
             self.until(lambda: self.mode() == "DISARMED", DOWN_S, "DISARMED")
 
-    def look(self) -> tuple[float, float] | None:
-        """Largest thrust [N] and distance from rest [m]; None if nobody says."""
+    def look(self) -> tuple[float, float, Stage] | None:
+        """Largest thrust [N], distance from rest [m], the robot's stage; None if nobody says."""
         try:
             truth = self.truth.latest()
         except FollowerError:
             return None
-        return float(truth.thrusts.max()), float(np.linalg.norm(truth.p_bf_in_f[-1]))
+        away_m = float(np.linalg.norm(truth.p_bf_in_f[-1]))
+        return float(truth.thrusts.max()), away_m, OF_ROBOT.get(truth.state, Stage.FOLLOWS)
 
 
 def children(launcher: int) -> dict[str, int]:
@@ -179,10 +240,13 @@ def _launchers() -> list[str]:
 
 
 def _suffered(rig: LiveServer, launcher: int, fault: LiveFault, seed: int) -> LiveOutcome:
-    with rig.phone(seed) as phone:
+    told: list[Told] = []
+    recording = rig.recording(told) if fault.victim == "phone" else contextlib.nullcontext()
+    with rig.phone(seed) as phone, recording:
         before = _watch(rig, FLIES_S, dies=False)
         mode = rig.mode()
         pid = phone.pid if fault.victim == "phone" else children(launcher)[fault.victim]
+        t_fault = clock.now()
         os.kill(pid, fault.number)
         if fault.victim != "phone":
             phone.send_signal(signal.SIGSTOP)  # it would arm again
@@ -191,16 +255,16 @@ def _suffered(rig: LiveServer, launcher: int, fault: LiveFault, seed: int) -> Li
         after = _watch(rig, STOPPED_S if wakes else WATCHED_S, dies)
         if wakes:
             os.kill(pid, signal.SIGCONT)
-            rest = _watch(rig, WATCHED_S - STOPPED_S, dies)
-            rest[:, 0] += STOPPED_S
-            after = np.concatenate((after, rest))
-    return outcome_of(fault, before, after, mode)
+            after = np.concatenate((after, _watch(rig, WATCHED_S - STOPPED_S, dies)))
+    before[:, 0] -= t_fault
+    after[:, 0] -= t_fault
+    return outcome_of(fault, before, after, mode, [(t - t_fault, stage) for t, stage in told])
 
 
 def _watch(
     rig: LiveServer, seconds: float, dies: bool
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """(n, 3): time [s], largest thrust [N], distance from rest [m].
+    """(n, 4): time [s, our clock], largest thrust [N], distance from rest [m], the robot's stage.
 
     A robot that `dies` and says nothing has no thrust; from another one nothing was heard, as
     happens on a busy machine, and that is no sample.
@@ -208,13 +272,13 @@ def _watch(
     Raises:
         RuntimeError: it said nothing at all.
     """
-    begin, rows = clock.now(), []
-    while (t := clock.now() - begin) < seconds:
+    end, rows = clock.now() + seconds, list[tuple[float, float, float, Stage]]()
+    while clock.now() < end:
         seen = rig.look()
         if seen is not None:
-            rows.append((t, *seen))
+            rows.append((clock.now(), *seen))
         elif dies:
-            rows.append((t, 0.0, 0.0))
+            rows.append((clock.now(), 0.0, 0.0, Stage.FOLLOWS))
         time.sleep(LOOK_S)
     if not rows:
         raise RuntimeError("the simulated robot did not say where it is")
@@ -226,22 +290,39 @@ def outcome_of(
     before: np.ndarray[tuple[int, int], np.dtype[np.float64]],
     after: np.ndarray[tuple[int, int], np.dtype[np.float64]],
     mode: str = "TRACK",
+    told: Sequence[Told] = (),
 ) -> LiveOutcome:
-    """Judge what was watched before and after a fault that met this mode, rows as of `_watch`."""
-    t, thrust, away = after.T
+    """Judge what was watched before and after a fault that met this mode.
+
+    Rows as of `_watch`, and what control `told`, by the time since the fault.
+    """
+    t, thrust, away, stage = after.T
     usual = float(np.median(before[:, 1]))
     high = np.flatnonzero(thrust >= 0.8 * usual)
     zero = np.flatnonzero(thrust < ZERO_N)
-    zero_s = float(t[zero[0]]) if len(zero) else float("inf")
+    zero_s = _first(t, thrust < ZERO_N)
     again = int(np.sum(thrust[zero[0] :] >= ZERO_N)) if len(zero) else 0
     missed = [f"zero {zero_s:.2f} s"] * (zero_s > fault.zero_s + SLACK_S)
     missed += [f"met {mode or 'no answer'}"] * (mode != "TRACK")
     missed += [f"{again} samples after zero"] * (again > 0)
     return LiveOutcome(
         fault=fault.name,
+        coasts_s=_reached(Stage.COASTS, t, stage, told),
+        ramps_s=_reached(Stage.RAMPS, t, stage, told),
         falls_s=float(t[high[-1]]) if len(high) else 0.0,
         zero_s=zero_s,
         after_zero=again,
         excursion_mm=1e3 * max(0.0, float(away.max() - before[:, 2].max())),
         missed="; ".join(missed),
     )
+
+
+def _reached(stage: Stage, t: Array, of_robot: Array, told: Sequence[Told]) -> float:
+    """When the robot or control had first come so far after the fault; infinite if neither."""
+    of_control = (when for when, so_far in told if when > 0.0 and so_far >= stage)
+    return min(_first(t, of_robot >= stage), next(of_control, float("inf")))
+
+
+def _first(t: Array, holds: npt.NDArray[np.bool_]) -> float:
+    """When it holds first; infinite if never."""
+    return float(t[np.argmax(holds)]) if holds.any() else float("inf")

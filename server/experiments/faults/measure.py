@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from server.experiments.faults.fault import Fault, FaultOutcome, misses
-from server.experiments.faults.live import LiveOutcome
+from server.experiments.faults.live import LiveFault, LiveOutcome
 from server.experiments.gaps.vanish import Vanished
 
 EVENTS = ("COAST", "HOLD", "RAMP", "robot", "zero")
@@ -89,14 +89,31 @@ def vanish_times(vanished: Sequence[Vanished]) -> list[Times]:
     return [_times(name, event, outcomes) for event in ("COAST", "RAMP")]
 
 
-def live_times(outcomes: Sequence[LiveOutcome]) -> list[Times]:
-    """When thrust began to fall for good, and when it was none, by fault."""
+def live_times(faults: Sequence[LiveFault], outcomes: Sequence[LiveOutcome]) -> list[Times]:
+    """When somebody coasted and ramped, where that is asked, thrust fell for good, and was none."""
     found = []
-    for name in dict.fromkeys(one.fault for one in outcomes):
-        some = [one for one in outcomes if one.fault == name]
-        found.append(_quantiles(name, "falls", [one.falls_s for one in some]))
-        found.append(_quantiles(name, "zero", [one.zero_s for one in some]))
+    for fault in faults:
+        some = [one for one in outcomes if one.fault == fault.name]
+        if fault.coast_s is not None:
+            found.append(_quantiles(fault.name, "COAST", [one.coasts_s for one in some]))
+        if fault.ramp_s is not None:
+            found.append(_quantiles(fault.name, "RAMP", [one.ramps_s for one in some]))
+        found.append(_quantiles(fault.name, "falls", [one.falls_s for one in some]))
+        found.append(_quantiles(fault.name, "zero", [one.zero_s for one in some]))
     return found
+
+
+def live_goals(faults: Sequence[LiveFault], times: Sequence[Times]) -> dict[str, bool]:
+    """Whether whoever is left acted in time: of these processes, so without slack."""
+    at = {(one.fault, one.event): one for one in times}
+    held = {}
+    for fault in faults:
+        for event, within_s in (("COAST", fault.coast_s), ("RAMP", fault.ramp_s)):
+            if within_s is not None:
+                n, late_s = at[fault.name, event].n, at[fault.name, event].p99_9
+                found = f"{event} {late_s:.3f} s p99.9 of {n}, within {within_s:g} s"
+                held[f"live: {fault.name}: {found}"] = late_s <= within_s
+    return held
 
 
 def percentile(times: Sequence[float], percent: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,8 +23,8 @@ from server.experiments.faults import hazards, live, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import FaultJob, flown, goals
 from server.experiments.faults.fault import Fault, FaultOutcome, misses
-from server.experiments.faults.live import LIVE, LiveOutcome, outcome_of
-from server.experiments.faults.measure import live_times, row_of, times_of
+from server.experiments.faults.live import LIVE, LiveFault, LiveOutcome, Stage, outcome_of
+from server.experiments.faults.measure import live_goals, live_times, row_of, times_of
 from server.experiments.forked import ForkError, forked
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -98,9 +99,9 @@ class Rig:
     def __init__(self) -> None:
         self.asked = 0
 
-    def look(self) -> tuple[float, float] | None:
+    def look(self) -> tuple[float, float, Stage] | None:
         self.asked += 1
-        return (3.0, 0.01) if self.asked % 2 else None
+        return (3.0, 0.01, Stage.FOLLOWS) if self.asked % 2 else None
 
 
 @pytest.mark.parametrize(("dies", "least"), [(False, 3.0), (True, 0.0)])
@@ -110,11 +111,20 @@ def test_silence_is_no_thrust_only_of_a_robot_that_dies(dies: bool, least: float
     assert thrusts.min() == least
 
 
-def test_live_faults_have_their_times_by_fault() -> None:
+def test_live_faults_have_their_times_and_bounds_by_fault() -> None:
+    of_it = "phone", signal.SIGKILL, 3.0
+    faults = LiveFault("killed", *of_it, 0.17, 1.1), LiveFault("stopped", *of_it)
     falls, zeros = (0.3, 0.35, 0.31), (2.5, 2.6, 2.9)
-    killed = [LiveOutcome("killed", f, z, 0, 30.0, "") for f, z in zip(falls, zeros, strict=True)]
-    stopped = LiveOutcome("stopped", 1.0, float("inf"), 0, 30.0, "zero inf s")
-    rows = {(one.fault, one.event): one for one in live_times([*killed, stopped])}
+    killed = [
+        LiveOutcome("killed", coasts, 1.0, falling, zero, 0, 30.0, "")
+        for coasts, falling, zero in zip((0.12, 0.18, 0.13), falls, zeros, strict=True)
+    ]
+    stopped = LiveOutcome("stopped", 0.1, 0.2, 1.0, float("inf"), 0, 30.0, "zero inf s")
+    times = live_times(faults, [*killed, stopped])
+    rows = {(one.fault, one.event): one for one in times}
+    assert (rows["killed", "COAST"].p50, rows["killed", "RAMP"].p99_9) == (0.13, 1.0)
+    assert ("stopped", "COAST") not in rows
+    assert list(live_goals(faults, times).values()) == [False, True]
     assert (rows["killed", "falls"].n, rows["killed", "falls"].p50) == (3, 0.31)
     assert rows["killed", "zero"].p99_9 == 2.9
     assert rows["stopped", "zero"].p50 == float("inf")
@@ -232,7 +242,8 @@ def test_each_hazard_is_shown_by_a_fault_or_by_a_test_that_exists(hazard: hazard
 
 def watched(thrust_n: list[float], away_m: float = 0.1) -> np.ndarray:
     t = 0.1 * np.arange(len(thrust_n))
-    return np.column_stack((t, thrust_n, np.full(len(t), away_m)))
+    stage = (t >= 0.3).astype(int) + (t >= 1.0)
+    return np.column_stack((t, thrust_n, np.full(len(t), away_m), stage))
 
 
 def test_a_live_fault_is_judged_by_when_thrust_ends_and_that_it_stays_so() -> None:
@@ -242,9 +253,15 @@ def test_a_live_fault_is_judged_by_when_thrust_ends_and_that_it_stays_so() -> No
     assert (down.missed, down.after_zero) == ("", 0)
     assert down.falls_s == pytest.approx(1.4)
     assert down.zero_s == pytest.approx(3.0)
+    assert (down.coasts_s, down.ramps_s) == (pytest.approx(0.3), pytest.approx(1.0))
     assert down.excursion_mm == pytest.approx(20.0)
     back = outcome_of(fault, before, watched([*falling, 1.0]))
     assert (back.after_zero, back.missed) == (1, "1 samples after zero")
     assert "met RAMP" in outcome_of(fault, before, watched(falling), "RAMP").missed
     never = outcome_of(fault, before, watched([2.0] * 60))
     assert "zero inf" in never.missed
+    said = [(-1.0, Stage.RAMPS), (0.12, Stage.FOLLOWS), (0.14, Stage.COASTS), (0.2, Stage.RAMPS)]
+    by_control = outcome_of(fault, before, watched(falling), told=said)
+    assert (by_control.coasts_s, by_control.ramps_s) == (0.14, 0.2)
+    followed = outcome_of(fault, before, watched([2.0, 2.0]))
+    assert (followed.coasts_s, followed.ramps_s) == (float("inf"), float("inf"))

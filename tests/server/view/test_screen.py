@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hardware.follower import FollowerState
 from hardware.robot_file import load_robot
 from hardware.sim.truth import ahead_of, encode_truth
 from pipeline.camera.lens import Camera
@@ -41,7 +42,7 @@ def truth_port():
                 ahead_s = ahead_of(request[0])
                 times = np.arange(0.0, ahead_s + 1e-9, 0.005)
                 poses = [(t, np.array([1.0, 0, 0, 0]), np.zeros(3)) for t in times]
-                robot.sendto(encode_truth(request[0], poses, np.zeros(8)), request[1])
+                robot.sendto(encode_truth(request[0], poses, np.zeros(8), FollowerState.IDLE), request[1])
 
         thread = threading.Thread(target=answer)
         thread.start()
