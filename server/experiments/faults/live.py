@@ -59,7 +59,7 @@ ASK_S: Final = 2.0
 Victim = Literal["phone", "server", "control", "robot"]
 
 
-class Stage(IntEnum):
+class FaultStage(IntEnum):
     """How far whoever is left has come."""
 
     FOLLOWS = 0
@@ -67,14 +67,14 @@ class Stage(IntEnum):
     RAMPS = 2
 
 
-Told = tuple[float, Stage]
+Told = tuple[float, FaultStage]
 """What somebody said of itself when [s, our clock]."""
 OF_CONTROL: Final = {
-    Mode.COAST: Stage.COASTS,
-    Mode.HOLD: Stage.COASTS,
-    Mode.RAMP: Stage.RAMPS,
+    Mode.COAST: FaultStage.COASTS,
+    Mode.HOLD: FaultStage.COASTS,
+    Mode.RAMP: FaultStage.RAMPS,
 }
-OF_ROBOT: Final = {FollowerState.COAST: Stage.COASTS, FollowerState.RAMP: Stage.RAMPS}
+OF_ROBOT: Final = {FollowerState.COAST: FaultStage.COASTS, FollowerState.RAMP: FaultStage.RAMPS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +154,7 @@ class LiveServer:
         path = Path(json.loads(self._answer("DELETE", "/api/recording"))["path"])
         for entry in read(path).entries(STATUS):
             status = json.loads(entry.data)
-            told.append((status["t"], OF_CONTROL.get(Mode(status["mode"]), Stage.FOLLOWS)))
+            told.append((status["t"], OF_CONTROL.get(Mode(status["mode"]), FaultStage.FOLLOWS)))
         path.unlink()
 
     def _answer(self, method: str, path: str) -> bytes:
@@ -195,14 +195,14 @@ class LiveServer:
             phone.wait()
             self.until(lambda: self.mode() == "DISARMED", DOWN_S, "DISARMED")
 
-    def look(self) -> tuple[float, float, Stage] | None:
+    def look(self) -> tuple[float, float, FaultStage] | None:
         """Largest thrust [N], distance from rest [m], the robot's stage; None if nobody says."""
         try:
             truth = self.truth.latest()
         except FollowerError:
             return None
         away_m = float(np.linalg.norm(truth.p_bf_in_f[-1]))
-        return float(truth.thrusts.max()), away_m, OF_ROBOT.get(truth.state, Stage.FOLLOWS)
+        return float(truth.thrusts.max()), away_m, OF_ROBOT.get(truth.state, FaultStage.FOLLOWS)
 
 
 def children(launcher: int) -> dict[str, int]:
@@ -272,13 +272,13 @@ def _watch(
     Raises:
         RuntimeError: it said nothing at all.
     """
-    end, rows = clock.now() + seconds, list[tuple[float, float, float, Stage]]()
+    end, rows = clock.now() + seconds, list[tuple[float, float, float, FaultStage]]()
     while clock.now() < end:
         seen = rig.look()
         if seen is not None:
             rows.append((clock.now(), *seen))
         elif dies:
-            rows.append((clock.now(), 0.0, 0.0, Stage.FOLLOWS))
+            rows.append((clock.now(), 0.0, 0.0, FaultStage.FOLLOWS))
         time.sleep(LOOK_S)
     if not rows:
         raise RuntimeError("the simulated robot did not say where it is")
@@ -307,8 +307,8 @@ def outcome_of(
     missed += [f"{again} samples after zero"] * (again > 0)
     return LiveOutcome(
         fault=fault.name,
-        coasts_s=_reached(Stage.COASTS, t, stage, told),
-        ramps_s=_reached(Stage.RAMPS, t, stage, told),
+        coasts_s=_reached(FaultStage.COASTS, t, stage, told),
+        ramps_s=_reached(FaultStage.RAMPS, t, stage, told),
         falls_s=float(t[high[-1]]) if len(high) else 0.0,
         zero_s=zero_s,
         after_zero=again,
@@ -317,7 +317,7 @@ def outcome_of(
     )
 
 
-def _reached(stage: Stage, t: Array, of_robot: Array, told: Sequence[Told]) -> float:
+def _reached(stage: FaultStage, t: Array, of_robot: Array, told: Sequence[Told]) -> float:
     """When the robot or control had first come so far after the fault; infinite if neither."""
     of_control = (when for when, so_far in told if when > 0.0 and so_far >= stage)
     return min(_first(t, of_robot >= stage), next(of_control, float("inf")))

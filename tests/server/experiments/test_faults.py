@@ -23,7 +23,7 @@ from server.experiments.faults import hazards, live, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import FaultJob, flown, goals
 from server.experiments.faults.fault import Fault, FaultOutcome, misses
-from server.experiments.faults.live import LIVE, LiveFault, LiveOutcome, Stage, outcome_of
+from server.experiments.faults.live import LIVE, LiveFault, LiveOutcome, FaultStage, outcome_of
 from server.experiments.faults.measure import live_goals, live_times, row_of, times_of
 from server.experiments.forked import ForkError, forked
 
@@ -99,9 +99,9 @@ class Rig:
     def __init__(self) -> None:
         self.asked = 0
 
-    def look(self) -> tuple[float, float, Stage] | None:
+    def look(self) -> tuple[float, float, FaultStage] | None:
         self.asked += 1
-        return (3.0, 0.01, Stage.FOLLOWS) if self.asked % 2 else None
+        return (3.0, 0.01, FaultStage.FOLLOWS) if self.asked % 2 else None
 
 
 @pytest.mark.parametrize(("dies", "least"), [(False, 3.0), (True, 0.0)])
@@ -260,7 +260,12 @@ def test_a_live_fault_is_judged_by_when_thrust_ends_and_that_it_stays_so() -> No
     assert "met RAMP" in outcome_of(fault, before, watched(falling), "RAMP").missed
     never = outcome_of(fault, before, watched([2.0] * 60))
     assert "zero inf" in never.missed
-    said = [(-1.0, Stage.RAMPS), (0.12, Stage.FOLLOWS), (0.14, Stage.COASTS), (0.2, Stage.RAMPS)]
+    said = [
+        (-1.0, FaultStage.RAMPS),
+        (0.12, FaultStage.FOLLOWS),
+        (0.14, FaultStage.COASTS),
+        (0.2, FaultStage.RAMPS),
+    ]
     by_control = outcome_of(fault, before, watched(falling), told=said)
     assert (by_control.coasts_s, by_control.ramps_s) == (0.14, 0.2)
     followed = outcome_of(fault, before, watched([2.0, 2.0]))

@@ -42,7 +42,9 @@ def truth_port():
                 ahead_s = ahead_of(request[0])
                 times = np.arange(0.0, ahead_s + 1e-9, 0.005)
                 poses = [(t, np.array([1.0, 0, 0, 0]), np.zeros(3)) for t in times]
-                robot.sendto(encode_truth(request[0], poses, np.zeros(8), FollowerState.IDLE), request[1])
+                robot.sendto(
+                    encode_truth(request[0], poses, np.zeros(8), FollowerState.IDLE), request[1]
+                )
 
         thread = threading.Thread(target=answer)
         thread.start()
