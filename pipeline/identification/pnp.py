@@ -80,7 +80,7 @@ def refine(
     information, residuals = np.empty((6, 6)), np.empty((m, 2))
     still, f = np.zeros((m, 3)), camera.focal_px
     chi2 = pnp_kernels.refine(
-        leds_in_b, normalised, still, weights, f, p, R, information, residuals
+        leds_in_b, normalised, still, weights, np.zeros(m), 0.0, f, p, R, information, residuals
     )
     return PnpSolution(p, R, information, residuals, chi2) if chi2 >= 0.0 else None
 

@@ -36,13 +36,11 @@ def put_shared(
     flat: Array,
     shifts: Array,
     weights: Array,
-    delays: Array,
     f: float,
     used: npt.NDArray[np.int64],
     pose: Array,
     information: Array,
     displacement: Array,
-    sigma_u: float,
     C: Array,
 ) -> None:
     """Covariance C (6, 6) of a pose by errors that LEDs share, which leave no residual to tell.
@@ -52,20 +50,18 @@ def put_shared(
         flat: (k, 2).
         shifts: (k, 3).
         weights: (k, 2, 2).
-        delays: (k,) of each LED's row after the middle one [s].
         f: Focal length [px].
         used: (m,) those that the pose rests on.
         pose: (POSE,).
         information: (6, 6) of the pose.
         displacement: (2, 2) covariance by which all spots are displaced alike [px²].
-        sigma_u: Of the velocity that rows were carried to one time by [m/s].
         C: Written.
     """
     C[:] = 0.0
     L, r, J = information.copy(), np.empty(2), np.empty((2, 6))
     if not cholesky(L, 0.0):
         return
-    R, by_shift, by_speed = np.empty((3, 3)), np.zeros((6, 2)), np.zeros((6, 3))
+    R, by_shift = np.empty((3, 3)), np.zeros((6, 2))
     for i in range(9):
         R[i // 3, i % 3] = pose[3 + i]
     for i in used:
@@ -73,12 +69,8 @@ def put_shared(
             continue
         for j in range(6):
             for a in range(2):
-                g = J[0, j] * weights[i, 0, a] + J[1, j] * weights[i, 1, a]
-                by_shift[j, a] += g
-                for m in range(3):
-                    by_speed[j, m] += g * J[a, m] * delays[i]
+                by_shift[j, a] += J[0, j] * weights[i, 0, a] + J[1, j] * weights[i, 1, a]
     _respond(L, by_shift, displacement, C)
-    _respond(L, by_speed, sigma_u * sigma_u * np.eye(3), C)
 
 
 @numba.njit(numba.boolean(TABLE, numba.float64, TABLE, OUT_2), cache=True, error_model="numpy")

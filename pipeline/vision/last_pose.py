@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
@@ -16,6 +17,15 @@ MAX_STEP_S = 0.5
 """Longer between pictures: the last pose predicts nothing."""
 CONTRADICTION_SIGMAS, CONTRADICTION_M, CONTRADICTION_RAD = 5.0, 0.03, 0.05
 """A believed pose farther than this from where a filter expected it: the filter is wrong."""
+
+BLIND_M_S = 0.3
+"""How fast an LED moves in c if nothing tells."""
+OLD, OLD_BLIND = 0.6, 1.0
+"""Share of what a mean velocity changes by that it is off in the picture at its end, half a period
+on (0.5 where that changes slowly, 0.57 for 7 Hz at 30 fps); without gyroscopes turning is in it."""
+UNSTEADY_M_S, KEPT = 0.1, 0.9
+"""How much a velocity changes from one picture to the next, before that is learnt; what a picture
+leaves of what was learnt."""
 
 MEMORY_RAD, GYRO_RAD_S, BLIND_RAD_S, MEMORY_MOST_RAD = 0.2, 0.03, 1.5, 0.6
 """How far a remembered attitude may be off: at first, growing by the second with and without
@@ -74,6 +84,11 @@ class LastPose:
         """(2, 3) how c and b turned between the last two pictures [rad]; None if unknown."""
         self.u_in_c = np.zeros(3)
         """Velocity in c with the camera's turning taken out, between the last two poses [m/s]."""
+        self._knows_u = False
+        """It is that, not 0 for want of a second pose."""
+        self._change2 = UNSTEADY_M_S**2
+        """Mean square of how much it changes from picture to picture, in each axis across the line
+        of sight [m²/s²]."""
         self.omega_in_b = np.zeros(3)
         """How b turned in c between them [rad/s]; only without gyroscopes, else 0."""
         self._misses = 0
@@ -107,10 +122,14 @@ class LastPose:
     def keep(self, pose: RelativePose, expected: Prediction | None) -> None:
         """`pose` was believed, where a filter had `expected` the robot."""
         last, back = self._pose, exp(self._since_kept)
-        self.u_in_c, self.omega_in_b = np.zeros(3), np.zeros(3)
+        before, knew_u = back.T @ self.u_in_c, self._knows_u
+        self.u_in_c, self.omega_in_b, self._knows_u = np.zeros(3), np.zeros(3), False
         if last is not None and 0.0 < pose.t - last.t < MAX_STEP_S:
             shift = back @ pose.p_bc_in_c - last.p_bc_in_c
-            self.u_in_c = back.T @ shift / (pose.t - last.t)
+            self.u_in_c, self._knows_u = back.T @ shift / (pose.t - last.t), True
+            if knew_u:
+                change = self.u_in_c[1:] - before[1:]
+                self._change2 = KEPT * self._change2 + (1.0 - KEPT) * 0.5 * float(change @ change)
             if self._omega is None:
                 self.omega_in_b = log(last.R_cb.T @ pose.R_cb) / (pose.t - last.t)
         self._pose, self._R_cb, self._misses = pose, pose.R_cb, 0
@@ -118,6 +137,16 @@ class LastPose:
         self._t = self._t_seen = pose.t
         self._sure, self._since_kept = True, np.zeros(3)
         self.contradicts = expected is not None and _contradict(pose, expected)
+
+    @property
+    def sigma_u(self) -> float:
+        """How well `u_in_c` tells the velocity in the next picture, in each axis [m/s].
+
+        It is the mean over the time before: off by about as much as that changes.
+        """
+        if self._pose is None or not self._knows_u:
+            return BLIND_M_S
+        return (OLD if self._omega is not None else OLD_BLIND) * sqrt(self._change2)
 
     def forget(self) -> None:
         """Predict nothing, not even the attitude; the robot may be anywhere."""

@@ -18,6 +18,7 @@ from pipeline.spots.centroid_kernels import AREA, BRIGHTNESS, C_UU, C_UV, C_VV, 
 from pipeline.spots.noise_scale import NoiseScale
 from pipeline.spots.spot_kernels import OF_ONE_WINDOW as MOST_OF_ONE
 from pipeline.spots.spot_kernels import WINDOW
+from pipeline.vision.last_pose import BLIND_M_S
 from pipeline.vision.led_tracker_kernels import identify
 from pipeline.vision.motion_blur import MotionBlur
 from pipeline.vision.predicted_windows_kernels import detect
@@ -40,8 +41,6 @@ CALM_PX, CALM_REACH_PX, CALM_RADII = 3.0, 8.0, 1.7
 
 UNEVEN_PX_S2 = 2000.0
 """Acceleration that gyroscopes do not tell: tremor."""
-BLIND_M_S = 0.3
-"""How fast an LED moves in c if nothing tells."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -207,8 +207,8 @@ def identify(
     )  # fmt: skip
     f = 0.5 * (lens[1] + lens[2])
     left, chi2 = refine_robustly(
-        leds, flat, shifts, weights, f, limits[1], int(limits[2]), used[:m], pose, information,
-        residuals,
+        leds, flat, shifts, weights, delays, limits[3], f, limits[1], int(limits[2]), used[:m],
+        pose, information, residuals,
     )  # fmt: skip
     k, of_named, displacement, common = 0, 0, np.zeros((2, 2)), 0.0
     for i in range(n):
@@ -225,7 +225,6 @@ def identify(
     displacement[0, 0] += common
     displacement[1, 1] += common
     put_shared(
-        leds, flat, shifts, weights, delays, f, used[:k], pose, information, displacement,
-        limits[3], shared,
+        leds, flat, shifts, weights, f, used[:k], pose, information, displacement, shared,
     )  # fmt: skip
     return left, chi2

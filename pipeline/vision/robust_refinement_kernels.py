@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE
+from pipeline.camera.lens_kernels import CUBE, OUT_1, OUT_2, TABLE, VECTOR
 from pipeline.frames import Array
 from pipeline.identification.pnp_kernels import refine
 from pipeline.jit import numba
@@ -36,6 +36,8 @@ def _fit(
     flat: Array,
     shifts: Array,
     weights: Array,
+    delays: Array,
+    sigma_u: float,
     f: float,
     used: npt.NDArray[np.int64],
     n: int,
@@ -47,14 +49,16 @@ def _fit(
     """χ² of the pose by the LEDs in use, one left out unless `but` is −1; NaN if there is none."""
     m = n - 1 if but >= 0 else n
     a, b, c, d = np.empty((m, 3)), np.empty((m, 2)), np.empty((m, 3)), np.empty((m, 2, 2))
+    e = np.empty(m)
     _pick(leds, used, n, but, a)
     _pick(flat, used, n, but, b)
     _pick(shifts, used, n, but, c)
     _pick(weights, used, n, but, d)
+    _pick(delays, used, n, but, e)
     R = np.empty((3, 3))
     for i in range(9):
         R[i // 3, i % 3] = pose[3 + i]
-    chi2 = refine(a, b, c, d, f, pose[:3], R, information, residuals[:m])
+    chi2 = refine(a, b, c, d, e, sigma_u, f, pose[:3], R, information, residuals[:m])
     for i in range(9):
         pose[3 + i] = R[i // 3, i % 3]
     return chi2
@@ -76,6 +80,8 @@ def _worst(
     flat: Array,
     shifts: Array,
     weights: Array,
+    delays: Array,
+    sigma_u: float,
     f: float,
     used: npt.NDArray[np.int64],
     n: int,
@@ -89,7 +95,10 @@ def _worst(
     out, best, second, best_mean = -1, np.inf, np.inf, np.inf
     for k in range(n):
         pose[:] = start
-        without = _fit(leds, flat, shifts, weights, f, used, n, k, pose, information, residuals)
+        without = _fit(
+            leds, flat, shifts, weights, delays, sigma_u, f, used, n,
+            k, pose, information, residuals,
+        )  # fmt: skip
         if without < best:
             second, best, out = best, without, k
             best_mean = _squares(residuals, n - 1)[1]
@@ -107,6 +116,8 @@ def _worst(
         TABLE,
         TABLE,
         CUBE,
+        VECTOR,
+        numba.float64,
         numba.float64,
         numba.float64,
         numba.int64,
@@ -123,6 +134,8 @@ def refine_robustly(
     flat: Array,
     shifts: Array,
     weights: Array,
+    delays: Array,
+    sigma_u: float,
     f: float,
     tolerance_px: float,
     least: int,
@@ -140,6 +153,8 @@ def refine_robustly(
         flat: (k, 2).
         shifts: (k, 3).
         weights: (k, 2, 2).
+        delays: (k,) [s].
+        sigma_u: [m/s].
         f: Focal length [px].
         tolerance_px: Largest residual of an LED.
         least: LEDs below which none is left out.
@@ -153,7 +168,10 @@ def refine_robustly(
         used[i] = i
     while True:
         pose[:] = start
-        chi2 = _fit(leds, flat, shifts, weights, f, used, n, -1, pose, information, residuals)
+        chi2 = _fit(
+            leds, flat, shifts, weights, delays, sigma_u, f, used, n,
+            -1, pose, information, residuals,
+        )  # fmt: skip
         if not chi2 >= 0.0:
             return 0.0, chi2
         largest, mean = _squares(residuals, n)
@@ -161,7 +179,10 @@ def refine_robustly(
         odd = mean > SUSPICIOUS_PX**2 or chi2 > ODD * (2 * n - 6)
         out = -1
         if n > least and (odd or not believable):
-            out = _worst(leds, flat, shifts, weights, f, used, n, start, chi2, mean, not believable)
+            out = _worst(
+                leds, flat, shifts, weights, delays, sigma_u, f, used, n,
+                start, chi2, mean, not believable,
+            )  # fmt: skip
         if out < 0:
             return (float(n), chi2) if believable else (0.0, chi2)
         for i in range(out, n - 1):

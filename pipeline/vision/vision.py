@@ -166,12 +166,15 @@ class Vision:
         omega_c, omega_b, expected = prior.omega_cf_in_c, prior.omega_bf_in_b, prior.expected
         if not predicted:
             return None if omega_c is None else FrameMotion(omega_c, np.zeros(3), np.inf)
-        depth, u_in_c = float(predicted[0][0][0]), self._last.u_in_c
-        if self._places is not None and expected is not None:
-            u_in_c = expected.u_bf_in_c
+        depth = float(predicted[0][0][0])
         if omega_c is None:
-            return FrameMotion(np.zeros(3), u_in_c, depth, self._last.omega_in_b)
-        return FrameMotion(omega_c, u_in_c, depth, np.zeros(3) if omega_b is None else omega_b)
+            omega_c, omega_b = np.zeros(3), self._last.omega_in_b
+        motion = FrameMotion(
+            omega_c, self._last.u_in_c, depth, np.zeros(3) if omega_b is None else omega_b
+        )
+        if self._places is not None and expected is not None:
+            return replace(motion, u_bf_in_c=expected.u_bf_in_c)
+        return replace(motion, sigma_u=self._last.sigma_u)
 
     def _search(
         self, frame: Frame, motion: FrameMotion | None, predicted: list[Place], clock: Clock

@@ -100,7 +100,7 @@ def test_the_renderer_draws_each_led_at_its_rows_time():
 
 
 @pytest.mark.parametrize("knows", [True, False])
-def test_vision_sees_through_the_shutter_if_it_knows_the_motion(knows):
+def test_vision_sees_through_the_shutter_and_without_the_motion_less_often(knows):
     rng = np.random.default_rng(7)
     errors = []
     for _ in range(6):
@@ -117,7 +117,8 @@ def test_vision_sees_through_the_shutter_if_it_knows_the_motion(knows):
             assert not knows
             continue
         errors.append(np.abs(error_of(detection.pose, truth)))
-    assert (np.median(errors, axis=0).max() < 0.01) == knows
+    assert errors
+    assert np.median(errors, axis=0).max() < 0.01
 
 
 def test_rays_stay_as_the_rows_saw_them():

@@ -59,7 +59,9 @@ def test_three_refinements_of_the_same_spots_end_at_the_same_pose() -> None:
         (p_1, R_1), (p_2, R_2), (p_3, R_3) = ((start[0].copy(), start[1].copy()) for _ in range(3))
         still, even = np.zeros((m, 3)), np.tile(np.eye(2), (m, 1, 1))
         information, residuals = np.empty((6, 6)), np.empty((m, 2))
-        chi2 = likelihood.refine(LEDS_IN_B, -seen, still, even, F, p_1, R_1, information, residuals)
+        chi2 = likelihood.refine(
+            LEDS_IN_B, -seen, still, even, np.zeros(m), 0.0, F, p_1, R_1, information, residuals
+        )
         lights = lights_of(seen, np.ones(m))
         total = search.fit(p_2, R_2, LEDS_IN_B, np.arange(m), -1, lights)
         scratch = np.empty(layout.SCRATCH)

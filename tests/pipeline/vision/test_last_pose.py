@@ -8,7 +8,15 @@ import pytest
 from pipeline.frames import exp, log
 from pipeline.prediction import Prediction
 from pipeline.signals import RelativePose
-from pipeline.vision.last_pose import FORGET_MISSES, MEMORY_MOST_RAD, REACHED_S, LastPose
+from pipeline.vision.last_pose import (
+    BLIND_M_S,
+    FORGET_MISSES,
+    MEMORY_MOST_RAD,
+    OLD,
+    REACHED_S,
+    UNSTEADY_M_S,
+    LastPose,
+)
 
 DT = 1.0 / 30.0
 STILL = np.zeros(3)
@@ -151,3 +159,35 @@ def test_who_forgets_or_waits_for_long_excludes_nothing():
     expected = expected_at((2.4, 0.3, 0.1))
     for last in (forgetful, patient, LastPose()):
         assert last.reach(expected) == []
+
+
+def swaying(change_m_s, pictures=60, omega=STILL):
+    """Believed poses whose velocity along y changes by so much, to and fro."""
+    last, y = LastPose(), 0.0
+    for k in range(pictures):
+        y += DT * 0.5 * change_m_s * (-1) ** k
+        last.advance(k * DT, omega, omega)
+        last.keep(pose_at(k * DT, (2.5, y, 0.0)), None)
+    return last
+
+
+def test_how_well_a_velocity_is_known_is_learnt_by_how_it_changes():
+    once = LastPose()
+    assert once.sigma_u == BLIND_M_S
+    once.advance(0.0, STILL, STILL)
+    once.keep(pose_at(0.0, (2.5, 0.0, 0.0)), None)
+    assert once.sigma_u == BLIND_M_S  # one pose tells no velocity
+    once.advance(DT, STILL, STILL)
+    once.keep(pose_at(DT, (2.5, 0.0, 0.0)), None)
+    assert once.sigma_u == pytest.approx(OLD * UNSTEADY_M_S)
+    learnt = swaying(0.2)  # along one of two axes
+    assert learnt.sigma_u == pytest.approx(OLD * 0.2 / np.sqrt(2.0), rel=0.01)
+    assert swaying(0.0).sigma_u < 0.005
+    learnt.miss()
+    assert learnt.sigma_u < BLIND_M_S
+    learnt.forget()
+    assert learnt.sigma_u == BLIND_M_S
+
+
+def test_without_gyroscopes_a_velocity_is_known_less_well_for_turning_is_in_it():
+    assert swaying(0.2, omega=None).sigma_u == pytest.approx(0.2 / np.sqrt(2.0), rel=0.01)

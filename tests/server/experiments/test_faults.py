@@ -23,7 +23,7 @@ from server.experiments.faults import hazards, live, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import FaultJob, flown, goals
 from server.experiments.faults.fault import Fault, FaultOutcome, misses
-from server.experiments.faults.live import LIVE, LiveFault, LiveOutcome, FaultStage, outcome_of
+from server.experiments.faults.live import LIVE, FaultStage, LiveFault, LiveOutcome, outcome_of
 from server.experiments.faults.measure import live_goals, live_times, row_of, times_of
 from server.experiments.forked import ForkError, forked
 
