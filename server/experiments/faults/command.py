@@ -122,7 +122,7 @@ def run_live(arguments: argparse.Namespace) -> ExperimentReport:
     thrust, times = sum(one.after_zero for one in outcomes), live_times(faults, outcomes)
     holds = {
         f"live: {thrust} samples with thrust after zero, in {len(outcomes)} faults": thrust == 0,
-        "live: each in time": not any(one.missed for one in outcomes),
+        "live: each in time and within bounds": not any(one.missed for one in outcomes),
         **live_goals(faults, times),
     }
     return ExperimentReport({"rows": outcomes, "times": times}, dashed(TIMES, times), holds)

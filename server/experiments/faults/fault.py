@@ -15,6 +15,8 @@ from server.experiments.gaps.flight import GapFlight
 ZERO_N: Final = 0.02
 """Less is no thrust."""
 TILT_DEG: Final = 30.0
+FARTHEST_MM: Final = 150.0
+"""Beyond the farthest that a flight would have gone without a fault."""
 QUIET_S: Final = 1.0
 """Without thrust, until no more is waited for."""
 End = Literal["flies", "zero", "any"]
@@ -40,7 +42,7 @@ class Fault:
     watch_s: float = 2.5
     never: tuple[Event, ...] = ()
     """What must not follow."""
-    excursion_mm: float = 150.0
+    excursion_mm: float = FARTHEST_MM
     """Beyond the farthest that the flight would have gone without."""
 
 

@@ -37,7 +37,7 @@ from server.experiments.faults.catalogue import (
     ROBOT_RAMP_S,
     ROBOT_S,
 )
-from server.experiments.faults.fault import ZERO_N
+from server.experiments.faults.fault import FARTHEST_MM, ZERO_N
 from server.recording.reader import read
 from server.recording.writer import STATUS
 from server.virtual_phone import live_loop
@@ -305,6 +305,8 @@ def outcome_of(
     missed = [f"zero {zero_s:.2f} s"] * (zero_s > fault.zero_s + SLACK_S)
     missed += [f"met {mode or 'no answer'}"] * (mode != "TRACK")
     missed += [f"{again} samples after zero"] * (again > 0)
+    farther_mm = 1e3 * max(0.0, float(away.max() - before[:, 2].max()))
+    missed += [f"strays {farther_mm:.0f} mm"] * (farther_mm > FARTHEST_MM)
     return LiveOutcome(
         fault=fault.name,
         coasts_s=_reached(FaultStage.COASTS, t, stage, told),
@@ -312,7 +314,7 @@ def outcome_of(
         falls_s=float(t[high[-1]]) if len(high) else 0.0,
         zero_s=zero_s,
         after_zero=again,
-        excursion_mm=1e3 * max(0.0, float(away.max() - before[:, 2].max())),
+        excursion_mm=farther_mm,
         missed="; ".join(missed),
     )
 

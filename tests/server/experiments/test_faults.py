@@ -22,7 +22,7 @@ from server.experiments import main
 from server.experiments.faults import hazards, live, tampering
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.command import FaultJob, flown, goals
-from server.experiments.faults.fault import Fault, FaultOutcome, misses
+from server.experiments.faults.fault import FARTHEST_MM, Fault, FaultOutcome, misses
 from server.experiments.faults.live import LIVE, FaultStage, LiveFault, LiveOutcome, outcome_of
 from server.experiments.faults.measure import live_goals, live_times, row_of, times_of
 from server.experiments.forked import ForkError, forked
@@ -260,6 +260,8 @@ def test_a_live_fault_is_judged_by_when_thrust_ends_and_that_it_stays_so() -> No
     assert "met RAMP" in outcome_of(fault, before, watched(falling), "RAMP").missed
     never = outcome_of(fault, before, watched([2.0] * 60))
     assert "zero inf" in never.missed
+    far = outcome_of(fault, before, watched(falling, 0.1 + 1e-3 * (FARTHEST_MM + 1.0)))
+    assert far.missed == "strays 151 mm"
     said = [
         (-1.0, FaultStage.RAMPS),
         (0.12, FaultStage.FOLLOWS),
