@@ -54,8 +54,8 @@ class Truth:
     """(m,) at the last of them [N]."""
     dark: npt.NDArray[np.int8]
     """(n,) the LED that was dark, −1: none."""
-    state: FollowerState
-    """Of the robot's end, now."""
+    state: FollowerState | None = None
+    """Of the robot's end, now; None: nobody asked."""
 
     def at(self, t: float) -> tuple[Array, Array]:
         """(R_fb (3, 3), p_bf_in_f (3,)) at `t` [s], between its two ticks; at either end that's."""

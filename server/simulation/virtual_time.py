@@ -236,8 +236,7 @@ class VirtualTimeSimulation:
     def _truth(self) -> Truth:
         times, wxyz, p = zip(*self._poses, strict=True)
         dark = np.array(self._dark, dtype=np.int8)
-        poses = np.array(times), np.array(wxyz), np.array(p)
-        return Truth(*poses, np.zeros(0), dark, self.follower.state)
+        return Truth(np.array(times), np.array(wxyz), np.array(p), np.zeros(0), dark)
 
     def _hear_phone(self, t_before: float) -> None:
         """Sensors and pictures that arrive within this period."""

@@ -74,7 +74,10 @@ OF_CONTROL: Final = {
     Mode.HOLD: FaultStage.COASTS,
     Mode.RAMP: FaultStage.RAMPS,
 }
-OF_ROBOT: Final = {FollowerState.COAST: FaultStage.COASTS, FollowerState.RAMP: FaultStage.RAMPS}
+OF_ROBOT: Final[Mapping[FollowerState | None, FaultStage]] = {
+    FollowerState.COAST: FaultStage.COASTS,
+    FollowerState.RAMP: FaultStage.RAMPS,
+}
 
 
 @dataclass(frozen=True, slots=True)
