@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
+from pipeline.estimation.attitude import LOST_S
 from pipeline.estimation.bias_steps import BiasSteps
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.misdated_picture import MisdatedPictures
@@ -81,7 +82,12 @@ class RelativeFilter:
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
         rate, force = sample.omega_m_cf_in_c, sample.a_m_cf_in_c
+        before = self._track.phone.newest
         self._remember(self._track.phone, sample.t, rate, force)
+        if self._started and self._track.phone.newest - before > LOST_S:
+            # it may be another phone, held elsewhere: its own biases, believed to be the ones from
+            # before, would be made up for by the robot's, for pictures tell but their difference
+            self._give_up()
 
     def add_body_imu(self, sample: BodyImu) -> None:
         """Remember a sample of the robot, in any order; what can't be used is counted."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
+from hardware.sim.hand import make_hand
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
@@ -56,4 +57,37 @@ def test_it_stays_in_a_gap_though_its_phone_was_away_before(seed: int) -> None:
             away_in_f = loop.follower.plant.p_bf_in_f - flight.due_in_f
             strayed.append(float(np.linalg.norm(away_in_f)))
     assert len(strayed) > 100
+    assert max(strayed) < STRAYS_M
+
+
+BETWEEN_S = 8.0
+ANOTHER_RAD_S, ANOTHER_M_S2 = 0.002, 0.05
+"""Standard deviations of another phone's biases."""
+
+
+def test_it_stays_in_the_gaps_of_one_phone_after_another() -> None:
+    """Each by a gyroscope of its own: the robot's must not be taken for what it differs by."""
+    robot_file, rng = load_robot("ames"), np.random.default_rng(2)
+    flight = GapFlight(robot_file, TeleopConfig(gains=robot_file.gains["phone"]), 2)
+    flight.take_off()
+    loop, strayed = flight.loop, []
+    for n in range(5):
+        tracked_s, farthest_m, begin, flies_s = 0.0, 0.0, loop.t, rng.uniform(3.0, 4.0)
+        while tracked_s < flies_s:
+            mode = flight.advance().failsafe.mode
+            tracked_s = tracked_s + 0.005 if mode == Mode.TRACK else 0.0
+            if mode == Mode.TRACK:
+                farthest_m = max(farthest_m, float(np.linalg.norm(loop.follower.body.p_bf_in_f)))
+            assert loop.t < begin + 30.0
+        vanishes = loop.t
+        loop.transit.line = WebRtcLine(GapSchedule(BETWEEN_S, 1e6, vanishes))
+        while loop.t < vanishes + BETWEEN_S - 1.0:
+            flight.advance()
+            away_m = float(np.linalg.norm(loop.follower.body.p_bf_in_f))
+            strayed.append(away_m - farthest_m)
+        loop.phone.hand = make_hand("moving", seed=200 + n, start=robot_file.start, t_start=loop.t)
+        loop.phone._bias_omega = rng.normal(0.0, ANOTHER_RAD_S, 3)
+        loop.phone._bias_a = rng.normal(0.0, ANOTHER_M_S2, 3)
+        while loop.t < vanishes + BETWEEN_S:
+            flight.advance()
     assert max(strayed) < STRAYS_M
