@@ -67,8 +67,8 @@ class FaultStage(IntEnum):
     RAMPS = 2
 
 
-Told = tuple[float, FaultStage]
-"""What somebody said of itself when [s, our clock]."""
+StageSample = tuple[float, FaultStage]
+"""When [s], and how far control had come then."""
 OF_CONTROL: Final = {
     Mode.COAST: FaultStage.COASTS,
     Mode.HOLD: FaultStage.COASTS,
@@ -147,8 +147,8 @@ class LiveServer:
             return ""
 
     @contextlib.contextmanager
-    def recording(self, told: list[Told]) -> Iterator[None]:
-        """Record meanwhile; then `told` has what control said of itself.
+    def recording(self, stages: list[StageSample]) -> Iterator[None]:
+        """Record meanwhile; then `stages` has control's, by its own clock, which is ours.
 
         Pages show the last status, ten times a second: too seldom for such times.
         """
@@ -157,7 +157,7 @@ class LiveServer:
         path = Path(json.loads(self._answer("DELETE", "/api/recording"))["path"])
         for entry in read(path).entries(STATUS):
             status = json.loads(entry.data)
-            told.append((status["t"], OF_CONTROL.get(Mode(status["mode"]), FaultStage.FOLLOWS)))
+            stages.append((status["t"], OF_CONTROL.get(Mode(status["mode"]), FaultStage.FOLLOWS)))
         path.unlink()
 
     def _answer(self, method: str, path: str) -> bytes:
@@ -243,8 +243,8 @@ def _launchers() -> list[str]:
 
 
 def _suffered(rig: LiveServer, launcher: int, fault: LiveFault, seed: int) -> LiveOutcome:
-    told: list[Told] = []
-    recording = rig.recording(told) if fault.victim == "phone" else contextlib.nullcontext()
+    stages: list[StageSample] = []
+    recording = rig.recording(stages) if fault.victim == "phone" else contextlib.nullcontext()
     with rig.phone(seed) as phone, recording:
         before = _watch(rig, FLIES_S, dies=False)
         mode = rig.mode()
@@ -261,7 +261,7 @@ def _suffered(rig: LiveServer, launcher: int, fault: LiveFault, seed: int) -> Li
             after = np.concatenate((after, _watch(rig, WATCHED_S - STOPPED_S, dies)))
     before[:, 0] -= t_fault
     after[:, 0] -= t_fault
-    return outcome_of(fault, before, after, mode, [(t - t_fault, stage) for t, stage in told])
+    return outcome_of(fault, before, after, mode, [(t - t_fault, stage) for t, stage in stages])
 
 
 def _watch(
@@ -293,11 +293,11 @@ def outcome_of(
     before: np.ndarray[tuple[int, int], np.dtype[np.float64]],
     after: np.ndarray[tuple[int, int], np.dtype[np.float64]],
     mode: str = "TRACK",
-    told: Sequence[Told] = (),
+    of_control: Sequence[StageSample] = (),
 ) -> LiveOutcome:
     """Judge what was watched before and after a fault that met this mode.
 
-    Rows as of `_watch`, and what control `told`, by the time since the fault.
+    Rows as of `_watch`, and stages `of_control`, by the time since the fault.
     """
     t, thrust, away, stage = after.T
     usual = float(np.median(before[:, 1]))
@@ -312,8 +312,8 @@ def outcome_of(
     missed += [f"strays {farther_mm:.0f} mm"] * (farther_mm > FARTHEST_MM)
     return LiveOutcome(
         fault=fault.name,
-        coasts_s=_reached(FaultStage.COASTS, t, stage, told),
-        ramps_s=_reached(FaultStage.RAMPS, t, stage, told),
+        coasts_s=_time_to(FaultStage.COASTS, t, stage, of_control),
+        ramps_s=_time_to(FaultStage.RAMPS, t, stage, of_control),
         falls_s=float(t[high[-1]]) if len(high) else 0.0,
         zero_s=zero_s,
         after_zero=again,
@@ -322,10 +322,12 @@ def outcome_of(
     )
 
 
-def _reached(stage: FaultStage, t: Array, of_robot: Array, told: Sequence[Told]) -> float:
+def _time_to(
+    stage: FaultStage, t: Array, of_robot: Array, of_control: Sequence[StageSample]
+) -> float:
     """When the robot or control had first come so far after the fault; infinite if neither."""
-    of_control = (when for when, so_far in told if when > 0.0 and so_far >= stage)
-    return min(_first(t, of_robot >= stage), next(of_control, float("inf")))
+    later = (when for when, so_far in of_control if when > 0.0 and so_far >= stage)
+    return min(_first(t, of_robot >= stage), next(later, float("inf")))
 
 
 def _first(t: Array, holds: npt.NDArray[np.bool_]) -> float:

@@ -268,7 +268,7 @@ def test_a_live_fault_is_judged_by_when_thrust_ends_and_that_it_stays_so() -> No
         (0.14, FaultStage.COASTS),
         (0.2, FaultStage.RAMPS),
     ]
-    by_control = outcome_of(fault, before, watched(falling), told=said)
+    by_control = outcome_of(fault, before, watched(falling), of_control=said)
     assert (by_control.coasts_s, by_control.ramps_s) == (0.14, 0.2)
     followed = outcome_of(fault, before, watched([2.0, 2.0]))
     assert (followed.coasts_s, followed.ramps_s) == (float("inf"), float("inf"))
