@@ -11,7 +11,7 @@ import pytest
 
 from hardware.robot_file import load_robot
 from hardware.sim.hand import make_hand
-from pipeline.config import TeleopConfig
+from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import Mode
 from server.experiments.gaps.flight import GapFlight
@@ -36,6 +36,21 @@ def turning_slowly(flight: GapFlight) -> None:
     plant.imu = imu
 
 
+def from_rest_m(flight: GapFlight) -> float:
+    return float(np.linalg.norm(flight.loop.follower.body.p_bf_in_f))
+
+
+def track(flight: GapFlight, seconds: float, within_s: float) -> float:
+    """Go on until it has tracked for so long without a break; gives how far from rest it went."""
+    end, tracked_s, farthest_m = flight.loop.t + within_s, 0.0, 0.0
+    while tracked_s < seconds:
+        is_tracking = flight.advance().failsafe.mode == Mode.TRACK
+        tracked_s = tracked_s + PERIOD_S if is_tracking else 0.0
+        farthest_m = max(farthest_m, from_rest_m(flight) * is_tracking)
+        assert flight.loop.t < end
+    return farthest_m
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_it_stays_in_a_gap_though_its_phone_was_away_before(seed: int) -> None:
     robot_file = load_robot("ames")
@@ -43,11 +58,7 @@ def test_it_stays_in_a_gap_though_its_phone_was_away_before(seed: int) -> None:
     begin, loop = flight.take_off(), flight.loop
     turning_slowly(flight)
     loop.transit.line = WebRtcLine(GapSchedule(AWAY_S, 1e6, begin))
-    tracked_s = 0.0
-    while tracked_s < FLIES_S:
-        mode = flight.advance().failsafe.mode
-        tracked_s = tracked_s + 0.005 if mode == Mode.TRACK else 0.0
-        assert loop.t < begin + AWAY_S + 15.0
+    track(flight, FLIES_S, within_s=AWAY_S + 15.0)
     vanishes = loop.t
     assert vanishes > begin + AWAY_S + FLIES_S
     loop.transit.line = WebRtcLine(GapSchedule(AWAY_S, 1e6, vanishes))
@@ -72,19 +83,12 @@ def test_it_stays_in_the_gaps_of_one_phone_after_another() -> None:
     flight.take_off()
     loop, strayed = flight.loop, []
     for n in range(5):
-        tracked_s, farthest_m, begin, flies_s = 0.0, 0.0, loop.t, rng.uniform(3.0, 4.0)
-        while tracked_s < flies_s:
-            mode = flight.advance().failsafe.mode
-            tracked_s = tracked_s + 0.005 if mode == Mode.TRACK else 0.0
-            if mode == Mode.TRACK:
-                farthest_m = max(farthest_m, float(np.linalg.norm(loop.follower.body.p_bf_in_f)))
-            assert loop.t < begin + 30.0
+        farthest_m = track(flight, rng.uniform(3.0, 4.0), within_s=30.0)
         vanishes = loop.t
         loop.transit.line = WebRtcLine(GapSchedule(BETWEEN_S, 1e6, vanishes))
         while loop.t < vanishes + BETWEEN_S - 1.0:
             flight.advance()
-            away_m = float(np.linalg.norm(loop.follower.body.p_bf_in_f))
-            strayed.append(away_m - farthest_m)
+            strayed.append(from_rest_m(flight) - farthest_m)
         loop.phone.hand = make_hand("moving", seed=200 + n, start=robot_file.start, t_start=loop.t)
         loop.phone._bias_omega = rng.normal(0.0, ANOTHER_RAD_S, 3)
         loop.phone._bias_a = rng.normal(0.0, ANOTHER_M_S2, 3)
