@@ -10,6 +10,10 @@ from pipeline.camera.lens import Camera, points_of
 from pipeline.frames import Array, skew
 from pipeline.signals import Spots
 
+FILTERED_M_S = 0.02
+"""How well a filter with both motion sensors knows a velocity, in each axis: 9 to 18 mm/s in
+simulated flights, 30 by restless hands."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameMotion:
@@ -23,9 +27,8 @@ class FrameMotion:
     """How far ahead the robot is; infinite if unknown: then only the camera's turning counts."""
     omega_bf_in_b: Array = field(default_factory=lambda: np.zeros(3))
     """(3,) [rad/s]: of no use before the spots have names."""
-    sigma_u: float = 0.02
-    """How well an LED's velocity in c is known by all this, in each axis [m/s]: so well by a filter
-    with both motion sensors, measured in simulated flights (9 to 18 mm/s; restless hands 30)."""
+    sigma_u: float = FILTERED_M_S
+    """How well an LED's velocity in c is known by all this, in each axis [m/s]."""
 
 
 def unrolled(camera: Camera, spots: Spots, motion: FrameMotion | None) -> Spots:

@@ -109,6 +109,8 @@ def _gather(
             h0, h1 = w00 * J[0, j] + w01 * J[1, j], w01 * J[0, j] + w11 * J[1, j]
             for k in range(j + 1):
                 information[j, k] += h0 * J[0, k] + h1 * J[1, k]
+            if delay == 0.0:
+                continue
             for k in range(3):  # a velocity moves p by itself times the delay
                 both = delay * (h0 * J[0, k] + h1 * J[1, k])
                 B[j, k] += both

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.camera.lens import Camera
-from pipeline.camera.rolling_shutter import FrameMotion, unrolled
+from pipeline.camera.rolling_shutter import FILTERED_M_S, FrameMotion, unrolled
 from pipeline.frames import GRAVITY, Array
 from pipeline.identification import pnp
 from pipeline.identification.initialisation import Initialisation
@@ -166,15 +166,13 @@ class Vision:
         omega_c, omega_b, expected = prior.omega_cf_in_c, prior.omega_bf_in_b, prior.expected
         if not predicted:
             return None if omega_c is None else FrameMotion(omega_c, np.zeros(3), np.inf)
-        depth = float(predicted[0][0][0])
+        depth, u_in_c, sigma_u = float(predicted[0][0][0]), self._last.u_in_c, self._last.sigma_u
+        if self._places is not None and expected is not None:
+            u_in_c, sigma_u = expected.u_bf_in_c, FILTERED_M_S
         if omega_c is None:
             omega_c, omega_b = np.zeros(3), self._last.omega_in_b
-        motion = FrameMotion(
-            omega_c, self._last.u_in_c, depth, np.zeros(3) if omega_b is None else omega_b
-        )
-        if self._places is not None and expected is not None:
-            return replace(motion, u_bf_in_c=expected.u_bf_in_c)
-        return replace(motion, sigma_u=self._last.sigma_u)
+        omega_b = np.zeros(3) if omega_b is None else omega_b
+        return FrameMotion(omega_c, u_in_c, depth, omega_b, sigma_u)
 
     def _search(
         self, frame: Frame, motion: FrameMotion | None, predicted: list[Place], clock: Clock
