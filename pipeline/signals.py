@@ -28,6 +28,8 @@ class PhoneImu:
     """Gyroscope (3,) [rad/s]."""
     a_m_cf_in_c: Array
     """Accelerometer (3,) [m/s²]: specific force, +9.8 up at rest."""
+    phone: int = 0
+    """Which phone's: a new number is another phone, with other biases, held elsewhere."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

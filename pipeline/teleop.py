@@ -121,6 +121,8 @@ class Teleop:
         self._half_field: tuple[float, float] | None = None
         self._lie = ""
         self._t_seen = self._t_phone = -np.inf
+        self._phone: int | None = None
+        self._t_met = -np.inf
         self._body = BodyImu(-np.inf, np.zeros(3), np.zeros(3))
         self._monitor = SensorMonitor()
         self._reference: Reference | None = None
@@ -235,6 +237,8 @@ class Teleop:
     def _fuse(self, inputs: Inputs) -> None:
         """Hand each measurement to the estimators; whatever its age, it has its own time."""
         for phone in inputs.phone_imu:
+            if phone.phone != self._phone:
+                self._meet_phone(phone)
             self.attitude.add(phone)
             self.estimator.add_phone_imu(phone)
             self._monitor.add_phone_imu(phone)
@@ -244,6 +248,8 @@ class Teleop:
             self._monitor.add_body_imu(body)
             self._body = body
         for seen in inputs.seen:
+            if seen.t < self._t_met:
+                continue  # by the phone before
             self._half_field, self._lie = seen.half_field, seen.lie
             if self._monitor.comes_again(seen):
                 continue
@@ -251,6 +257,19 @@ class Teleop:
                 self._t_seen = max(self._t_seen, seen.t)
         if inputs.operator is not None:
             self._operator = inputs.operator
+
+    def _meet_phone(self, sample: PhoneImu) -> None:
+        """Forget what was known by the phone before.
+
+        Its biases, taken for this one's, would be made up for by the robot's: pictures tell but the
+        difference of both.
+        """
+        if self._phone is not None:
+            self.estimator.reset()
+            self.attitude.reset()
+            self._monitor.forget_phone()
+            self._t_seen, self._t_met = -np.inf, sample.t
+        self._phone = sample.phone
 
     def _R_fc_now(self, relative: RelativeState | None) -> Array | None:
         """Attitude of the phone, if need be by way of the robot; None before the first sample."""

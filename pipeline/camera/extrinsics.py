@@ -22,7 +22,8 @@ class Extrinsics:
     def in_camera_axes(self, sample: PhoneImu) -> PhoneImu:
         """Turn a sample of the sensors into the camera's axes."""
         R = self.R_ci
-        return PhoneImu(sample.t, R @ sample.omega_m_cf_in_c, R @ sample.a_m_cf_in_c)
+        omega, a = R @ sample.omega_m_cf_in_c, R @ sample.a_m_cf_in_c
+        return PhoneImu(sample.t, omega, a, sample.phone)
 
 
 IDENTITY = Extrinsics()

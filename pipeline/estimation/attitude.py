@@ -73,6 +73,10 @@ class Attitude:
         age = self._t - self._t_start
         return sqrt(HAND_VARIANCE * max(GAIN, 1.0 / max(age, SAMPLE_S)))
 
+    def reset(self) -> None:
+        """Begin again with another phone; the yaw of the one before is kept."""
+        self._is_lost, self._bias = True, np.zeros(3)
+
     def correct(self, R_fc: Array, sigma: float) -> None:
         """Correct by an attitude (3, 3) at the last sample, otherwise known to `sigma` [rad].
 

@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
-from pipeline.estimation.attitude import LOST_S
 from pipeline.estimation.bias_steps import BiasSteps
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.misdated_picture import MisdatedPictures
@@ -54,7 +53,6 @@ class RelativeFilter:
     def __init__(self, config: RelativeConfig, leds_in_b: Array) -> None:
         """Knows nothing until the first picture with a pose and samples of both IMUs near it."""
         self._config, self._leds_in_b = config, leds_in_b
-        self._track = RelativeTrack(config, leds_in_b)
         self._initial = initial_biases(config)
         self.pictures: Counter[Fusion] = Counter()
         """What became of them."""
@@ -64,14 +62,14 @@ class RelativeFilter:
         future."""
         self.failures = 0
         """Times the estimate was thrown away: not finite, or asleep for too long."""
-        self._learnt: Learnt | None = None
         self._now = np.inf
         self.reset()
 
     def reset(self) -> None:
         """Forget everything but the counts."""
+        self._track = RelativeTrack(self._config, self._leds_in_b)
         self._started = False
-        self._learnt = None
+        self._learnt: Learnt | None = None
         self._recent: deque[float] = deque(maxlen=64)
         self._misses, self._t_seen, self._t_start = 0, -np.inf, -np.inf
         self._nis: deque[tuple[float, int]] = deque(maxlen=NIS_PICTURES)
@@ -82,12 +80,7 @@ class RelativeFilter:
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
         rate, force = sample.omega_m_cf_in_c, sample.a_m_cf_in_c
-        before = self._track.phone.newest
         self._remember(self._track.phone, sample.t, rate, force)
-        if self._started and self._track.phone.newest - before > LOST_S:
-            # it may be another phone, held elsewhere: its own biases, believed to be the ones from
-            # before, would be made up for by the robot's, for pictures tell but their difference
-            self._give_up()
 
     def add_body_imu(self, sample: BodyImu) -> None:
         """Remember a sample of the robot, in any order; what can't be used is counted."""

@@ -17,6 +17,10 @@ class SensorMonitor:
         self._of_phone, self._of_body = AccelerometerCheck(), AccelerometerCheck()
         self._repeated = RepeatedPicture()
 
+    def forget_phone(self) -> None:
+        """Another phone measures from now on."""
+        self._of_phone, self._repeated = AccelerometerCheck(), RepeatedPicture()
+
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Take a sample of the phone."""
         self._repeated.add_imu(sample)

@@ -27,10 +27,11 @@ UNHEARD_S = 1.0
 us for longer leads nobody, however well we hear it (`FailsafeConfig.gap`)."""
 
 
-def phone_imu(motion: Motion, t: float) -> PhoneImu:
+def phone_imu(motion: Motion, t: float, phone: int = 0) -> PhoneImu:
     """A reading at `t` [s] in the axes of the camera, as phones are built."""
     R = R_cd(motion.screen_angle_deg)
-    return PhoneImu(t, R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration))
+    omega, a = R @ np.array(motion.rotation_rate), R @ np.array(motion.acceleration)
+    return PhoneImu(t, omega, a, phone)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +53,7 @@ class Ingest:
     def __init__(self, new_nonce: Callable[[], int]) -> None:
         """`new_nonce` gives unpredictable 64-bit numbers (live) or a seeded sequence (tests)."""
         self._new_nonce = new_nonce
-        self._press_base = 0
+        self._phone = 0
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._answered: set[int] = set()
         self._last_motion_t = -np.inf
@@ -69,8 +70,9 @@ class Ingest:
         """The next PING, to be sent at `now` [s]."""
         nonce = self._new_nonce()
         if self._pings == 0:
-            # another phone's first press must not look like this one's: it would not count as new
-            self._press_base = (nonce & 0x7FFFFFFF) << 32
+            # another phone's samples and first press must not look like this one's: its biases
+            # would be believed, and the press would not count as new
+            self._phone = nonce & 0x7FFFFFFF
         self._asked[nonce] = now
         while len(self._asked) > REMEMBERED_NONCES:
             old, _ = self._asked.popitem(last=False)
@@ -115,7 +117,7 @@ class Ingest:
         if asked is None:  # before the first PING reached the page
             return None
         t = self._certain(record, asked, now)
-        return TouchState(t, touch.held and touch.visible, self._press_base + touch.press)
+        return TouchState(t, touch.held and touch.visible, (self._phone << 32) + touch.press)
 
     def _certain(self, record: Record, asked: float, now: float) -> float:
         """Since when a touch is certain to have been made: it answers what was `asked` then.
@@ -133,7 +135,7 @@ class Ingest:
         if t is None or t <= self._last_motion_t:
             return None
         self._last_motion_t = t
-        return self.extrinsics.in_camera_axes(phone_imu(motion, t))
+        return self.extrinsics.in_camera_axes(phone_imu(motion, t, self._phone))
 
     def _dated(self, record: Record, field: str, now: float) -> float | None:
         if not self.clock.ready:

@@ -148,14 +148,11 @@ class VirtualTimeSimulation:
         """What LEDs' rays say is held against the motion sensors, as each picture is."""
         self._script = make_script(robot_file, scene, operator, hand)
         self.phone.hidden = self._hidden_at
-        nonces = np.random.default_rng((scene.seed, 7))
-        self._ingest = Ingest(lambda: int(nonces.integers(1, 2**63)))
-        if scene.knows_clock:
-            self._ingest.clock = KnownClock(self.phone.clock)
+        self._nonces = np.random.default_rng((scene.seed, 7))
         camera = self.phone.camera
         camera = camera if scene.knows_extrinsics else replace(camera, extrinsics=IDENTITY)
-        self._ingest.extrinsics = camera.extrinsics
         self._frame_pipeline = FramePipeline(camera, robot_file.robot, config.gates)
+        self._ingest = self._new_ingest()
         self._vision_model = make_vision_model(robot_file, scene, self._script)
         self._link = RobotLink(self.follower, robot_file.robot.blinking_leds)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
@@ -166,6 +163,18 @@ class VirtualTimeSimulation:
         self._inbox: list[Input] = []
         self._output: Output | None = None
         self._ticks = 0
+
+    def _new_ingest(self) -> Ingest:
+        ingest = Ingest(lambda: int(self._nonces.integers(1, 2**63)))
+        if self.scene.knows_clock:
+            ingest.clock = KnownClock(self.phone.clock)
+        ingest.extrinsics = self._frame_pipeline.camera.extrinsics
+        return ingest
+
+    def change_phone(self) -> None:
+        """Begin another phone's session as the server does: disarmed, its clock unknown."""
+        self._ingest = self._new_ingest()
+        self.request("disarm")
 
     @property
     def t(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
-from pipeline.config import EnvelopeConfig, TeleopConfig
+from pipeline.config import EnvelopeConfig, EstimatorName, TeleopConfig
 from pipeline.frames import GRAVITY, exp
 from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState
 from pipeline.teleop import Inputs, Output, Teleop
@@ -35,12 +35,13 @@ def run(
     R_cb: np.ndarray = LEVEL,
     gyro: Callable[[float], np.ndarray] = quiver,
     lie: str = "",
+    phone: int = 0,
 ) -> list[Output]:
     """Everything at rest, seen perfectly, 50 ms late; or a camera that is known to lie."""
     outputs = []
     for k in range(round(start / 0.005), round((start + seconds) / 0.005)):
         t = 0.005 * k
-        phone = (PhoneImu(t - 0.02, STILL, UP),) if k % 3 == 0 else ()
+        motion = (PhoneImu(t - 0.02, STILL, UP, phone),) if k % 3 == 0 else ()
         seen = t - 0.05
         picture = seen_at(seen, position(seen), R_cb, COVARIANCE)
         if lie:
@@ -49,7 +50,7 @@ def run(
             teleop.step(
                 Inputs(
                     t=t,
-                    phone_imu=phone,
+                    phone_imu=motion,
                     body_imu=(BodyImu(t, gyro(t), body_a),),
                     seen=(picture,) if k % 6 == 0 and seen > 0.0 else (),
                     operator=TouchState(t - 0.01, held, int(held)),
@@ -172,3 +173,18 @@ def test_a_camera_that_is_found_out_is_followed_no_further() -> None:
     assert doubted[-1].failsafe.mode == Mode.COAST
     assert doubted[-1].failsafe.reason == "It zooms."
     assert run(teleop, 2.3, 0.5, held=True)[-1].failsafe.mode == Mode.TRACK
+
+
+@pytest.mark.parametrize("estimator", ["relative", "paper", "none"])
+def test_what_was_known_by_another_phone_is_forgotten(estimator: EstimatorName) -> None:
+    """Its pictures too, which are later than motion; a flight under way coasts and comes down."""
+    teleop = Teleop(ROBOT, replace(TeleopConfig(), estimator=estimator))
+    run(teleop, 0.0, 1.5, arm_at=1.2)
+    assert run(teleop, 1.5, 0.3, held=True)[-1].failsafe.mode == Mode.TRACK
+    met, *others = run(teleop, 1.8, 0.1, held=True, phone=1)
+    assert met.relative is None
+    assert met.failsafe.mode != Mode.TRACK
+    assert met.R_fc == pytest.approx(LEVEL)
+    unknown = [one for one in others if one.relative is None]
+    assert unknown[-1].t == pytest.approx(1.825), "until a picture no older than its samples"
+    assert others[-1].relative is not None

@@ -71,27 +71,33 @@ def test_it_stays_in_a_gap_though_its_phone_was_away_before(seed: int) -> None:
     assert max(strayed) < STRAYS_M
 
 
-BETWEEN_S = 8.0
 ANOTHER_RAD_S, ANOTHER_M_S2 = 0.002, 0.05
 """Standard deviations of another phone's biases."""
+LEARNT_RAD_S = float(np.deg2rad(0.5))
+"""Of the robot's gyroscope, after a flight of three seconds and more."""
 
 
-def test_it_stays_in_the_gaps_of_one_phone_after_another() -> None:
+@pytest.mark.parametrize(("seed", "between_s"), [(3, 2.0), (5, 8.0)])
+def test_it_stays_in_the_gaps_of_one_phone_after_another(seed: int, between_s: float) -> None:
     """Each by a gyroscope of its own: the robot's must not be taken for what it differs by."""
-    robot_file, rng = load_robot("ames"), np.random.default_rng(2)
-    flight = GapFlight(robot_file, TeleopConfig(gains=robot_file.gains["phone"]), 2)
+    robot_file, rng = load_robot("ames"), np.random.default_rng(seed)
+    flight = GapFlight(robot_file, TeleopConfig(gains=robot_file.gains["phone"]), seed)
     flight.take_off()
-    loop, strayed = flight.loop, []
+    loop, strayed, learnt = flight.loop, [], []
     for n in range(5):
         farthest_m = track(flight, rng.uniform(3.0, 4.0), within_s=30.0)
+        bias = loop.controller.teleop.estimator.health.bias_omega_b
+        learnt.append(np.abs(bias - loop.follower.plant._imu._bias[:3]).max())
         vanishes = loop.t
-        loop.transit.line = WebRtcLine(GapSchedule(BETWEEN_S, 1e6, vanishes))
-        while loop.t < vanishes + BETWEEN_S - 1.0:
+        loop.transit.line = WebRtcLine(GapSchedule(between_s, 1e6, vanishes))
+        while loop.t < vanishes + between_s - 1.0:
             flight.advance()
             strayed.append(from_rest_m(flight) - farthest_m)
         loop.phone.hand = make_hand("moving", seed=200 + n, start=robot_file.start, t_start=loop.t)
         loop.phone._bias_omega = rng.normal(0.0, ANOTHER_RAD_S, 3)
         loop.phone._bias_a = rng.normal(0.0, ANOTHER_M_S2, 3)
-        while loop.t < vanishes + BETWEEN_S:
+        loop.change_phone()
+        while loop.t < vanishes + between_s:
             flight.advance()
+    assert max(learnt) < LEARNT_RAD_S
     assert max(strayed) < STRAYS_M

@@ -20,8 +20,8 @@ from server.protocol.wire_records import Codec, Motion, Picture, Ping, Pong, Rec
 OFFSET = 4321.5
 
 
-def counting() -> Ingest:
-    nonces = iter(range(1000, 9000))
+def counting(first: int = 1000) -> Ingest:
+    nonces = iter(range(first, 9000))
     return Ingest(lambda: next(nonces))
 
 
@@ -34,8 +34,8 @@ def pong(ping: Record, t: float) -> Record:
     return Record(1, int((t + OFFSET) * 1e6), Pong(nonce_of(ping), ping.t_us))
 
 
-def synchronised() -> Ingest:
-    ingest = counting()
+def synchronised(first: int = 1000) -> Ingest:
+    ingest = counting(first)
     for k in range(6):
         ping = ingest.ping(0.05 * k)
         assert ingest.record(pong(ping, 0.05 * k + 0.002), 0.05 * k + 0.004) is None
@@ -169,16 +169,20 @@ def test_a_touch_that_was_overtaken_says_nothing() -> None:
     assert ingest.record(Record(9, 1, Touch(True, True, 5, nonce)), 2.3) is not None
 
 
-def test_the_first_press_of_another_phone_is_another_press() -> None:
-    presses = []
-    for first in (1, 2):
-        nonces = iter(range(first, 9000))
-        ingest = Ingest(lambda numbers=nonces: next(numbers))
+def test_the_first_press_and_samples_of_another_phone_are_told_apart() -> None:
+    presses, phones = [], []
+    for first in (1000, 2000):
+        ingest = synchronised(first)
         nonce = nonce_of(ingest.ping(2.0))
         said = ingest.record(Record(1, 1, Touch(True, True, 1, nonce)), 2.0)
         assert isinstance(said, TouchState)
         presses.append(said.press)
+        for t in (1.0, 1.1):
+            sample = ingest.record(Record(1, at(t), FLAT), 2.0)
+            assert isinstance(sample, PhoneImu)
+            phones.append(sample.phone)
     assert presses[0] != presses[1]
+    assert phones[0] == phones[1] != phones[2] == phones[3]
 
 
 def test_a_hidden_page_holds_nothing() -> None:

@@ -182,7 +182,7 @@ def test_a_jump_of_the_magnetometer_moves_nothing():
             attitude.add(rig.heard[-1])
             heard.append(attitude.R_fc)
         assert all(isinstance(one, PhoneImu) for one in rig.heard)
-        return np.array(heard), rig.heard
+        return np.array(heard), [replace(one, phone=0) for one in rig.heard]
 
     smooth, samples = told(0.0)
     jumped, same_samples = told(0.5 * np.pi)
