@@ -9,7 +9,7 @@ at once. The scatter follows from that of each pixel and from the ground's relie
 
 from __future__ import annotations
 
-from math import sqrt
+from math import pi, sqrt
 
 import numpy as np
 
@@ -45,6 +45,9 @@ SIZE_SHARE = 0.13
 """Share of a spot's contrast in light above which a pixel is one of its area: 0.4 of it in grey."""
 MOST_OFF = 0.6
 """Share of the contrast by which a ring's pixel counts at most: beyond, it is another light."""
+MERGED = 0.2
+"""Of a spot's radius, times the share of its light that an arm has which could hardly be parted
+from it: clipped, both are one white, which reaches farther on the arm's side than on the other."""
 LEAST_SURE_PX = 1.5
 """Of a place, its standard deviation: the top of a wide glow is no spot."""
 DARKEST = 3
@@ -170,6 +173,7 @@ def centre(
     box: Box,
     extent: Box,
     mark: int,
+    edge: float,
     seen: Image,
     ring: Box,
     coded_px: float,
@@ -185,6 +189,7 @@ def centre(
         box: The window.
         extent: The box of the spot's members in the window.
         mark: Theirs in `seen`.
+        edge: The light above which they are.
         seen: Of the window.
         ring: Around the members, inside the picture.
         coded_px: What a codec adds to a bright spot's place.
@@ -200,11 +205,12 @@ def centre(
     rise = peak - level
     if not rise > 0.0:
         return False
+    most = max(MOST_OFF * rise, edge - level)  # a ground that was parted from it is another light
     grain = noise * slope_of[min(int(middle) + DARKEST, 255)]
-    relief2 = relief_of(light, work, n, level, MOST_OFF * rise, grain)
+    relief2 = relief_of(light, work, n, level, most, grain)
     share = min(BY_RELIEF * sqrt(relief2) / rise, MOST_ABOVE)
     arms, sums = np.empty(ARMS), np.empty(SUMS)
-    arms_of(luma, light, ring, level, MOST_OFF * rise, arms)
+    arms_of(luma, light, ring, level, most, arms)
     _gather(luma, light, slope_of, box, extent, mark, seen, ring, arms, peak, share, sums)
     whole = sums[WEIGHT]
     if not whole > 0.0:
@@ -218,4 +224,8 @@ def centre(
     if not spot[UU] * spot[VV] - spot[UV] * spot[UV] > 1e-6:
         return False
     _doubt(spot, sums, (1.0 - share) * rise, relief2, coded_px)
+    if most > MOST_OFF * rise:
+        merged = MERGED * MERGED * spot[AREA] / pi * (most / rise) ** 2
+        spot[C_UU] += merged
+        spot[C_VV] += merged
     return bool(spot[C_UU] + spot[C_VV] < LEAST_SURE_PX**2)

@@ -35,6 +35,15 @@ def bright(luma: Image, box: Box, least: int, stack: Pixels) -> int:
 
 
 @kernel
+def forget(seen: Image, mark: int, extent: Box) -> None:
+    """Take back the members of a flood, of which `extent` is the box."""
+    for r in range(extent[1], extent[3] + 1):
+        for c in range(extent[0], extent[2] + 1):
+            if seen[r, c] == mark:
+                seen[r, c] = 0
+
+
+@kernel
 def flood(
     luma: Image,
     box: Box,

@@ -20,7 +20,7 @@ from pipeline.spots.centroid_kernels import (
     V,
     centre,
 )
-from pipeline.spots.flood_kernels import Pixels, bright, brightest, flood
+from pipeline.spots.flood_kernels import Pixels, bright, brightest, flood, forget
 from pipeline.spots.ground_kernels import Box, border, noise_of, put_ring
 
 WINDOW = 21
@@ -31,8 +31,9 @@ SIGMAS, LEAST_GREY = 8.0, 6.0
 """Noises, and grey levels, by which a spot rises above its surround at least."""
 DIMMER = 0.25
 """Of the brightest contrast around: dimmer ones are no LEDs beside one, as those are alike."""
-SHARE = 0.7
-"""Of the contrast: what is above belongs to the spot."""
+SHARES = (0.7, 0.85, 0.95)
+"""Of the contrast: what is above belongs to the spot; above a higher one if there is no end to that
+one: an arm in the sun is nearly as bright as its LED."""
 ROUNDS, OF_ONE_WINDOW = 6, 4
 """Peaks looked at, and spots taken, of one window."""
 SAME_PX = 1.5
@@ -66,6 +67,7 @@ def _spot_at(
     box: Box,
     extent: Box,
     mark: int,
+    threshold: float,
     coded_px: float,
     seen: Image,
     work: Array,
@@ -82,7 +84,8 @@ def _spot_at(
         return False
     ring[0], ring[1] = max(0, ring[0]), max(0, ring[1])
     ring[2], ring[3] = min(width - 1, ring[2]), min(height - 1, ring[3])
-    return centre(luma, light, slope_of, box, extent, mark, seen, ring, coded_px, spot, work)
+    edge = light[int(threshold)]
+    return centre(luma, light, slope_of, box, extent, mark, edge, seen, ring, coded_px, spot, work)
 
 
 @kernel
@@ -125,9 +128,20 @@ def _in_window(
                 peak, pu, pv = int(luma[v, u]), u, v
         if peak < 0:
             break
-        threshold = ground + SHARE * (peak - ground)
-        area = flood(luma, box, pu, pv, threshold, mark, seen, stack, extent)
-        if extent[0] < 1 or extent[1] < 1 or extent[2] > columns - 2 or extent[3] > rows - 2:
+        area, fits, threshold = 0, False, 0.0
+        for share in SHARES:
+            rise = (1.0 - share) * (peak - ground)
+            if share > SHARES[0]:
+                if area == 0 or rise < LEAST_GREY:
+                    break
+                forget(seen, mark, extent)
+            threshold = peak - rise
+            area = flood(luma, box, pu, pv, threshold, mark, seen, stack, extent)
+            fits = extent[0] >= 1 and extent[1] >= 1
+            fits = fits and extent[2] <= columns - 2 and extent[3] <= rows - 2
+            if fits:
+                break
+        if not fits:
             if wide[2] == 0:
                 wide[0] = box[0] + (extent[0] + extent[2]) // 2
                 wide[1] = box[1] + (extent[1] + extent[3]) // 2
@@ -136,7 +150,9 @@ def _in_window(
         if area == 0:
             continue
         spot[CONTRAST] = peak - ground
-        if not _spot_at(luma, light, slope_of, box, extent, mark, limits[4], seen, work, spot):
+        if not _spot_at(
+            luma, light, slope_of, box, extent, mark, threshold, limits[4], seen, work, spot
+        ):
             continue
         if not limits[1] <= spot[AREA] <= limits[2]:
             continue

@@ -11,6 +11,7 @@ from pipeline.spots.centroid_kernels import (
     AREA,
     BY_RELIEF,
     C_UU,
+    C_UV,
     C_VV,
     CONTRAST,
     DARKEST,
@@ -27,7 +28,7 @@ from pipeline.spots.centroid_kernels import (
     V,
 )
 from pipeline.spots.leds import light_of, measured
-from pipeline.spots.spot_kernels import SHARE
+from pipeline.spots.spot_kernels import LEAST_GREY, SHARES
 from pipeline.vision_config import LedsConfig
 
 MIDDLE, HALF = 40, 14
@@ -106,9 +107,13 @@ def readable(luma, half=HALF):
     part = luma[corner : corner + 2 * half + 1, corner : corner + 2 * half + 1]
     ground = middle_of(ring_of(part, 0, 0, 2 * half, 2 * half))
     peak = np.unravel_index(np.argmax(part), part.shape)
-    bright = (part > ground + SHARE * (int(part[peak]) - ground)).astype(np.uint8)
-    labels = cv2.connectedComponents(bright, connectivity=8)[1]
-    members = labels == labels[peak]
+    for share in SHARES:
+        edge = ground + share * (int(part[peak]) - ground)
+        labels = cv2.connectedComponents((part > edge).astype(np.uint8), connectivity=8)[1]
+        members = labels == labels[peak]
+        if not (members[[0, -1]].any() or members[:, [0, -1]].any()):
+            break
+        assert part[peak] - edge >= LEAST_GREY
     grown = cv2.dilate(members.astype(np.uint8), np.ones((2 * GROWN + 1, 2 * GROWN + 1))) > 0
     rows, columns = np.nonzero(members)
     left, right = columns.min() - RING, columns.max() + RING
@@ -120,13 +125,14 @@ def readable(luma, half=HALF):
     noise = max(np.sqrt((calm**2).sum() / 6.0 / max(len(calm), 1)), of_ground.FEWEST_NOISE)
     noise *= 1.0 + max(0.0, 1.0 - 0.5 * middle_of(ring) / noise)
     rise = LIGHT[part[members]].max() - level
-    off = np.minimum(LIGHT[ring.astype(int)] - level, MOST_OFF * rise)
+    most = max(MOST_OFF * rise, LIGHT[int(edge)] - level)
+    off = np.minimum(LIGHT[ring.astype(int)] - level, most)
     relief = np.mean([np.roll(off, k) for k in range(-of_ground.BESIDE, of_ground.BESIDE + 1)], 0)
     grain = noise * SLOPE[int(middle_of(ring)) + DARKEST]
     relief2 = max(0.0, (relief**2).mean() - grain**2 / (2 * of_ground.BESIDE + 1))
     share = min(BY_RELIEF * np.sqrt(relief2) / rise, MOST_ABOVE)
     v, u = np.mgrid[: part.shape[0], : part.shape[1]].astype(float)
-    ground = readable_ground(part, (left, top, right, bottom), level, MOST_OFF * rise)
+    ground = readable_ground(part, (left, top, right, bottom), level, most)
     led = np.where(grown, (LIGHT[part] - ground) / (level + rise - ground), 0.0)
     weight = (led - share).clip(0.0)
     at = np.array([(weight * u).sum(), (weight * v).sum()]) / weight.sum()
@@ -136,7 +142,9 @@ def readable(luma, half=HALF):
     return [*(corner + at), *second, noise, area]
 
 
-@pytest.mark.parametrize("behind", [None, arm(40.0), arm(4.0, 40.0), arm(30.0, angle=2.4)])
+@pytest.mark.parametrize(
+    "behind", [None, arm(40.0), arm(4.0, 40.0), arm(30.0, angle=2.4), arm(200.0)]
+)
 @pytest.mark.parametrize("peak", [120.0, 600.0])
 def test_the_compiled_centroid_is_the_readable_one(behind, peak):
     rng = np.random.default_rng(1)
@@ -162,6 +170,20 @@ def test_a_bright_arm_behind_a_spot_hardly_displaces_it(behind, px):
     for place in ((40.0, 40.0), (40.3, 39.6), (39.8, 40.5)):
         spot = compiled(picture(place=place, behind=behind))
         assert np.hypot(spot[U] - place[0], spot[V] - place[1]) < px
+
+
+@pytest.mark.parametrize("bright", [140.0, 180.0, 220.0])
+@pytest.mark.parametrize("angle", [0.6, -2.0])
+def test_a_spot_on_an_arm_nearly_as_bright_is_found_and_sure_to_its_error(bright, angle):
+    """White paint in the sun: no share of the contrast above the room's parts both."""
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        place = 40.0 + rng.uniform(-0.5, 0.5, 2)
+        spot = compiled(picture(rng, place, behind=arm(bright, angle=angle), noise=1.0))
+        off = spot[[U, V]] - place
+        C = np.array([[spot[C_UU], spot[C_UV]], [spot[C_UV], spot[C_VV]]])
+        assert np.hypot(*off) < 1.6
+        assert off @ np.linalg.solve(C, off) < 13.8  # 99.9 %
 
 
 def test_a_ground_of_two_sides_makes_a_spot_less_sure():

@@ -17,10 +17,10 @@ LEAST_SHARE = 0.8
 """Of the solvable pictures."""
 
 
-def share_found(name, size, has_body):
+def share_found(name, size, has_body, seeds=SEEDS):
     """How many of the solvable pictures told where the robot is; none may tell another place."""
     solvable, found = 0, 0
-    for seed in SEEDS:
+    for seed in seeds:
         film = RenderedVideo(replace(SCENES[name], has_body=has_body), seed, size, FRAMES)
         eyes = VisualFrontEnd(film.camera, film.leds_in_b, GatesConfig())
         for shot in film:
@@ -30,7 +30,7 @@ def share_found(name, size, has_body):
             found += shot.solvable and pose is not None
             if pose is not None:
                 assert np.linalg.norm(pose.p_bc_in_c - shot.p_bc_in_c) < 0.05
-    assert solvable > FRAMES
+    assert solvable > FRAMES // 2
     return found / solvable
 
 
@@ -44,3 +44,10 @@ def test_a_robot_is_found_in_shrunk_pictures(size, has_body):
 @pytest.mark.parametrize("name", ["near_bloom", "distractors", "outdoor"])
 def test_a_robot_is_found_whose_arms_shine_behind_its_leds(name):
     assert share_found(name, HD, True) > LEAST_SHARE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seed"), [("clutter", 549), ("outdoor", 507), ("outdoor", 540)])
+def test_a_robot_is_found_whose_arms_are_as_bright_as_its_leds(name, seed):
+    """Of these not one picture was solved, though people see the robot at once."""
+    assert share_found(name, HD, True, (seed,)) > 0.5
