@@ -61,15 +61,18 @@ USUAL_AREA_PX = 400.0
 Windows = npt.NDArray[np.int64]
 
 
-def find_spots(frame: Frame, config: LedsConfig) -> Spots:
+def find_spots(frame: Frame, config: LedsConfig, beside_lamps: bool = False) -> Spots:
     """Search the whole picture: relief at half resolution, then each bright place in full.
 
-    The likeliest LEDs come first: of much contrast, round and not huge.
+    The likeliest LEDs come first: of much contrast, round and not huge. Four bright lights may be
+    the robot's, which are alike, and what is much dimmer is none then; if they are lamps, LEDs as
+    dim as noise allows are found `beside_lamps`.
     """
     half = cv2.resize(frame.luma, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
     relief = cv2.morphologyEx(half, cv2.MORPH_TOPHAT, GROUND)
     usual = _contrast(frame.full_range, config)
-    places, is_bounded = _places(np.asarray(relief, dtype=np.uint8), RELIEF_SHARE * usual)
+    share = 0.0 if beside_lamps else DIMMER
+    places, is_bounded = _places(np.asarray(relief, dtype=np.uint8), RELIEF_SHARE * usual, share)
     boxes = places.astype(np.int64)
     width, height = boxes[:, RIGHT] - boxes[:, LEFT] + 1, boxes[:, BOTTOM] - boxes[:, TOP] + 1
     windows = np.column_stack(
@@ -80,22 +83,22 @@ def find_spots(frame: Frame, config: LedsConfig) -> Spots:
         )
     )
     table = measured(frame, windows, config)
-    table = table[table[:, CONTRAST] >= min(usual, DIMMER * _fourth(table[:, CONTRAST]))]
+    table = table[table[:, CONTRAST] >= min(usual, share * _fourth(table[:, CONTRAST]))]
     likeness = _likeness(table)
     order = np.argsort(-likeness, kind="stable")
     bounded = is_bounded or len(table) > config.max_spots
     return spots_of(table[order[: config.max_spots]], bounded)
 
 
-def _places(relief: Image, usual: float) -> tuple[Places, bool]:
+def _places(relief: Image, usual: float, share: float) -> tuple[Places, bool]:
     """Places (n, PLACE) of a relief that rise as LEDs do, and whether bright ones were left out.
 
-    Dim ones count where fewer than a pose's LEDs are much brighter. The relief is overwritten.
+    Dim ones count above a `share` of the fourth highest. The relief is overwritten.
     """
     places = np.empty((MAX_PLACES, PLACE), dtype=np.int32)
     rough = float(np.median(relief[::SPARSE, ::SPARSE]))
     n, is_bounded = bright_places(relief, int(usual), places)
-    dim = max(LEAST_RELIEF, ROUGH * rough, DIMMER * _fourth(places[:n, PEAK]))
+    dim = max(LEAST_RELIEF, ROUGH * rough, share * _fourth(places[:n, PEAK]))
     if dim < int(usual) and n < MAX_PLACES:
         n += bright_places(relief, int(dim), places[n:])[0]
     return places[:n], bool(is_bounded)

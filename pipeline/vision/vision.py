@@ -42,6 +42,8 @@ __all__ = ["Detection", "FramePrior", "Vision", "warm_up"]
 Clock = Callable[[], float]
 STAGES = ("detect", "identify", "pose")
 UNTIMED = np.zeros(3)
+IN_VAIN = 3
+"""Searches, after which as many count bright lights for lamps; then for LEDs again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +85,8 @@ class Vision:
         self._tracker = LedTracker(camera, leds_in_b, self._leds, self._identify)
         self._initialisation = Initialisation(camera, leds_in_b, self._identify)
         self._identity = RobotIdentity(leds_in_b, imus, blinks)
+        self._in_vain = 0
+        """Searches since a pose was believed."""
         self._area_px_m2 = 0.0
         """Of the last named spots, times their depth squared: what an LED looks like."""
 
@@ -122,11 +126,13 @@ class Vision:
             rays = rays_of(self.camera, spots, few, t)
             return Detection(t, None, rays, spots, few, reason, bounded=found.bounded)
         self._last.miss()
+        self._in_vain += 1
         excuse = self._excuse(spots)
         return Detection(t, None, NO_RAYS, spots, None, excuse, bounded=found.bounded)
 
     def keep(self, pose: RelativePose) -> None:
         """`pose`, of the last picture, was believed: predict from it."""
+        self._in_vain = 0
         self._last.keep(pose, self._prior.expected)
         self._tilt_bias.learn(self._prior.up_in_c, self._prior.up_in_b, pose.R_cb)
 
@@ -179,7 +185,8 @@ class Vision:
     ) -> tuple[_Found, Array]:
         """Search the whole picture; also how long that took, by stage [s]."""
         started = clock()
-        spots = leds.find_spots(frame, self._leds)
+        beside_lamps = self._in_vain // IN_VAIN % 2 == 1
+        spots = leds.find_spots(frame, self._leds, beside_lamps)
         detected = clock()
         found = self._named(frame.t, spots, motion, predicted)
         return found, np.array([detected - started, clock() - detected, 0.0])

@@ -140,6 +140,18 @@ def test_leds_are_found_in_a_picture_full_of_noise():
     assert nearest_distance(np.array([[250.0, 200.0]]), spots)[0] < 0.2
 
 
+def test_leds_much_dimmer_than_four_lamps_are_found_beside_lamps():
+    lamps = [spot_at(60.0 + 50.0 * k, 40.0, peak=210.0) for k in range(4)]
+    leds_at = np.array([[60.0 + 40.0 * k, 150.0 + 10.0 * k] for k in range(5)])
+    luma = np.max([*lamps, *(spot_at(u, v, peak=30.0) for u, v in leds_at)], axis=0)
+    rng = np.random.default_rng(25)
+    luma = np.clip(np.round(luma + rng.normal(0.0, 2.0, luma.shape)), 0, 255).astype(np.uint8)
+    assert len(find_spots(Frame(0.0, luma), CONFIG)) == 4
+    spots = find_spots(Frame(0.0, luma), CONFIG, beside_lamps=True)
+    assert len(spots) == 9
+    assert nearest_distance(leds_at, spots).max() < 0.2
+
+
 def test_max_spots_keeps_the_brightest():
     rng = np.random.default_rng(22)
     frame = Frame(0.0, picture(truth_at(rng), rng))
