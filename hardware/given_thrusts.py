@@ -8,6 +8,12 @@ from hardware.attitude_keeper import AttitudeKeeper
 from hardware.follower import ROUNDING
 from pipeline.frames import Array
 
+MEAN_OF = 80
+"""Commands after which the mean has forgotten two thirds, 0.4 s: what damps a motion cancels in it,
+what holds a place does not."""
+TO_MEAN_US = 100_000
+"""Of a silence until the mean is given."""
+
 
 class GivenThrusts:
     """Thrusts (m,) [N] of a robot, in and after a silence. Times are [µs]."""
@@ -24,6 +30,8 @@ class GivenThrusts:
         self.commanded = np.zeros(thrusters)
         """By the last command."""
         self._base = np.zeros(thrusters)
+        self._mean, self._averaged = np.zeros(thrusters), 0
+        """Of what was given lately, and of how many since thrust began, if not of more."""
         self._f_max, self._max_rise = f_max, max_rise
         self._ramp_us, self._keeper = ramp_us, keeper
         self._fading_since_us: int | None = None
@@ -47,11 +55,17 @@ class GivenThrusts:
         if self._fading_since_us is None:
             return self._base.copy()
         elapsed_us = max(0, now_us - self._fading_since_us)
-        faded = self._base * max(0.0, 1.0 - elapsed_us / self._ramp_us)
+        last = max(0.0, 1.0 - elapsed_us / TO_MEAN_US)
+        kept = self._mean + last * (self._base - self._mean)
+        faded = kept * max(0.0, 1.0 - elapsed_us / self._ramp_us)
         return faded if self._keeper is None else self._keeper.thrusts(faded)
 
     def fade(self, since_us: int) -> None:
-        """Fall linearly to zero within the ramp's time, a robot that flies upright."""
+        """Fall linearly to zero within the ramp's time, a robot that flies upright.
+
+        From the mean: the last command may be the whole force that was to end a fast motion, and
+        held for long it begins another one.
+        """
         if self._fading_since_us is None:
             self._fading_since_us = since_us
 
@@ -70,9 +84,15 @@ class GivenThrusts:
         self._base = np.clip(thrusts, *near) if self._catching_up else thrusts.copy()
         self._catching_up = self._catching_up and bool((self._base != thrusts).any())
         self.commanded = thrusts
+        if not thrusts.any():
+            self._mean, self._averaged = np.zeros_like(self._mean), 0
+            return
+        self._averaged = min(self._averaged + 1, MEAN_OF)
+        self._mean = self._mean + (self._base - self._mean) / self._averaged
 
     def zero(self) -> None:
         """Give zero thrust at once."""
         self.commanded = np.zeros_like(self.commanded)
-        self._base = np.zeros_like(self._base)
+        self._base, self._mean = np.zeros_like(self._base), np.zeros_like(self._mean)
+        self._averaged = 0
         self._fading_since_us, self._catching_up = None, False

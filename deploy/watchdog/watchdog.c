@@ -88,14 +88,20 @@ static bool gives(const ll_watchdog *w)
     return false;
 }
 
-/* What to give now: faded, and upright if the robot flies. */
+/* What to give now; in silence the mean of what was given lately, faded, and upright if the robot flies:
+ * the last one may be the whole force that was to end a fast motion. */
 static void given(const ll_watchdog *w, int64_t now_us, double *thrusts)
 {
-    double elapsed = (double)(now_us - w->fading_us) / (double)w->limits.ramp_us;
-    double share = w->fading ? fmin(1.0, fmax(0.0, 1.0 - elapsed)) : 1.0;
+    if (!w->fading) {
+        memcpy(thrusts, w->base, w->limits.thrusters * sizeof *thrusts);
+        return;
+    }
+    double elapsed_us = fmax(0.0, (double)(now_us - w->fading_us));
+    double share = fmax(0.0, 1.0 - elapsed_us / (double)w->limits.ramp_us);
+    double last = fmax(0.0, 1.0 - elapsed_us / (double)LL_TO_MEAN_US);
     for (int i = 0; i < w->limits.thrusters; i++)
-        thrusts[i] = share * w->base[i];
-    if (w->fading && w->limits.attitude)
+        thrusts[i] = share * (w->mean[i] + last * (w->base[i] - w->mean[i]));
+    if (w->limits.attitude)
         ll_attitude_thrusts(&w->attitude, w->limits.attitude, w->limits.thrusters,
                             w->limits.f_max, thrusts);
 }
@@ -125,12 +131,17 @@ static void follow(ll_watchdog *w, const command *c, int64_t now_us)
         w->commanded[i] = c->thrusts[i];
     }
     w->catching_up = w->catching_up && !there;
+    w->averaged = c->zero ? 0 : w->averaged < LL_MEAN_OF ? w->averaged + 1 : LL_MEAN_OF;
+    for (int i = 0; i < c->thrusters; i++)
+        w->mean[i] = c->zero ? 0.0 : w->mean[i] + (w->base[i] - w->mean[i]) / w->averaged;
 }
 
 static void to_zero(ll_watchdog *w)
 {
     memset(w->base, 0, sizeof w->base);
     memset(w->commanded, 0, sizeof w->commanded);
+    memset(w->mean, 0, sizeof w->mean);
+    w->averaged = 0;
     w->fading = w->catching_up = false;
 }
 

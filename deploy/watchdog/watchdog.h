@@ -24,6 +24,8 @@
 #define LL_MAX_AGE_US 40000
 #define LL_HANDSHAKE_US 500000
 #define LL_MAX_JUMP 200u
+#define LL_MEAN_OF 80 /* commands until the mean has forgotten two thirds: 0.4 s */
+#define LL_TO_MEAN_US 100000
 
 typedef enum { LL_IDLE, LL_RUNNING, LL_RAMP, LL_REFUSING, LL_COAST } ll_state;
 
@@ -54,6 +56,8 @@ typedef struct {
     int64_t handshake_us, fading_us; /* when they began */
     bool fading, catching_up;
     double commanded[LL_MAX_THRUSTERS], base[LL_MAX_THRUSTERS]; /* last command; given, unfaded */
+    double mean[LL_MAX_THRUSTERS]; /* of what was given lately */
+    int averaged;       /* of how many since thrust began */
     ll_attitude attitude;
     int64_t sampled_us;
     struct { uint64_t nonce; int64_t sent_us; } nonces[LL_NONCES];

@@ -6,8 +6,9 @@ This is the reference for a real robot's firmware; `deploy/watchdog/` is the sam
    finite, within [0, f_max], at most 200 counters ahead and rise no faster than allowed.
    Everything else changes nothing, except by rule 4.
 2. Nothing taken for 60 ms: COAST. Thrust falls linearly, so that it would be zero after one period
-   of the suspension (or the robot file's `ramp_s`); a robot that flies keeps upright by its own
-   gyroscope (`attitude_keeper.py`). 280 ms after the last command taken this is called RAMP; until
+   of the suspension (or the robot file's `ramp_s`), and goes over within 100 ms from the last to a
+   mean that forgets within 0.4 s; a robot that flies keeps upright by its own gyroscope
+   (`attitude_keeper.py`). 280 ms after the last command taken this is called RAMP; until
    400 ms after it, the same epoch's next command is taken, and thrust goes to it by steps no
    larger than the rise allowed (`given_thrusts.py`). Then there is no way back: only zero thrust
    of the epoch or STOP cuts the ramp short, nothing else that arrives changes it. Who gives no

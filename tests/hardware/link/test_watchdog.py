@@ -321,6 +321,21 @@ def test_c_and_python_follow_again_alike_after_a_silence_as_long_as_a_limit(
         both.send(thrust)
 
 
+@pytest.mark.parametrize("commands", [3, 79, 80, 81, 200])
+def test_c_and_python_give_the_same_in_silence_after_any_thrusts(library, commands):
+    """What was given long ago counts in both alike, and in neither after a zero between."""
+    both, rng = Both(library, replace(LIMITS, max_rise=3.0)), np.random.default_rng(commands)
+    both.shake_hands()
+    for _ in range(2):
+        for thrust in rng.uniform(0.1, 2.9, commands):
+            assert both.send(thrust) == Refusal.NONE
+        for silence_us in range(5_000, 380_000, 25_000):
+            python, c = (end.setpoint(both.now_us + silence_us) for end in both.ends)
+            np.testing.assert_allclose(python, c, atol=1e-6)
+        assert both.send(1.0, 390_000) == Refusal.NONE
+        assert both.send(0.0) == Refusal.NONE
+
+
 ZERO = encode_command(CommandDatagram(5, 110, 109, 1, False, (0.0,) * 3), KEY)[:-16]
 
 
