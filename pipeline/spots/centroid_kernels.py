@@ -189,7 +189,7 @@ def centre(
         box: The window.
         extent: The box of the spot's members in the window.
         mark: Theirs in `seen`.
-        edge: The light above which they are.
+        edge: The light above which they are parted from an arm; 0 if there was no need.
         seen: Of the window.
         ring: Around the members, inside the picture.
         coded_px: What a codec adds to a bright spot's place.
@@ -205,7 +205,7 @@ def centre(
     rise = peak - level
     if not rise > 0.0:
         return False
-    most = max(MOST_OFF * rise, edge - level)  # a ground that was parted from it is another light
+    most = max(MOST_OFF * rise, edge - level)  # beyond it is another light, but not such an arm
     grain = noise * slope_of[min(int(middle) + DARKEST, 255)]
     relief2 = relief_of(light, work, n, level, most, grain)
     share = min(BY_RELIEF * sqrt(relief2) / rise, MOST_ABOVE)
@@ -224,7 +224,7 @@ def centre(
     if not spot[UU] * spot[VV] - spot[UV] * spot[UV] > 1e-6:
         return False
     _doubt(spot, sums, (1.0 - share) * rise, relief2, coded_px)
-    if most > MOST_OFF * rise:
+    if edge > 0.0:
         merged = MERGED * MERGED * spot[AREA] / pi * (most / rise) ** 2
         spot[C_UU] += merged
         spot[C_VV] += merged

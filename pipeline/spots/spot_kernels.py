@@ -67,7 +67,7 @@ def _spot_at(
     box: Box,
     extent: Box,
     mark: int,
-    threshold: float,
+    edge: float,
     coded_px: float,
     seen: Image,
     work: Array,
@@ -84,7 +84,6 @@ def _spot_at(
         return False
     ring[0], ring[1] = max(0, ring[0]), max(0, ring[1])
     ring[2], ring[3] = min(width - 1, ring[2]), min(height - 1, ring[3])
-    edge = light[int(threshold)]
     return centre(luma, light, slope_of, box, extent, mark, edge, seen, ring, coded_px, spot, work)
 
 
@@ -128,15 +127,15 @@ def _in_window(
                 peak, pu, pv = int(luma[v, u]), u, v
         if peak < 0:
             break
-        area, fits, threshold = 0, False, 0.0
+        area, fits, edge = 0, False, 0.0
         for share in SHARES:
             rise = (1.0 - share) * (peak - ground)
             if share > SHARES[0]:
                 if area == 0 or rise < LEAST_GREY:
                     break
                 forget(seen, mark, extent)
-            threshold = peak - rise
-            area = flood(luma, box, pu, pv, threshold, mark, seen, stack, extent)
+                edge = light[int(peak - rise)]
+            area = flood(luma, box, pu, pv, peak - rise, mark, seen, stack, extent)
             fits = extent[0] >= 1 and extent[1] >= 1
             fits = fits and extent[2] <= columns - 2 and extent[3] <= rows - 2
             if fits:
@@ -151,7 +150,7 @@ def _in_window(
             continue
         spot[CONTRAST] = peak - ground
         if not _spot_at(
-            luma, light, slope_of, box, extent, mark, threshold, limits[4], seen, work, spot
+            luma, light, slope_of, box, extent, mark, edge, limits[4], seen, work, spot
         ):
             continue
         if not limits[1] <= spot[AREA] <= limits[2]:

@@ -125,7 +125,8 @@ def readable(luma, half=HALF):
     noise = max(np.sqrt((calm**2).sum() / 6.0 / max(len(calm), 1)), of_ground.FEWEST_NOISE)
     noise *= 1.0 + max(0.0, 1.0 - 0.5 * middle_of(ring) / noise)
     rise = LIGHT[part[members]].max() - level
-    most = max(MOST_OFF * rise, LIGHT[int(edge)] - level)
+    is_parted = share > SHARES[0]
+    most = max(MOST_OFF * rise, is_parted * LIGHT[int(edge)] - level)
     off = np.minimum(LIGHT[ring.astype(int)] - level, most)
     relief = np.mean([np.roll(off, k) for k in range(-of_ground.BESIDE, of_ground.BESIDE + 1)], 0)
     grain = noise * SLOPE[int(middle_of(ring)) + DARKEST]
@@ -184,6 +185,15 @@ def test_a_spot_on_an_arm_nearly_as_bright_is_found_and_sure_to_its_error(bright
         C = np.array([[spot[C_UU], spot[C_UV]], [spot[C_UV], spot[C_VV]]])
         assert np.hypot(*off) < 1.6
         assert off @ np.linalg.solve(C, off) < 13.8  # 99.9 %
+
+
+def test_a_large_spot_in_a_bright_room_is_as_sure_as_in_a_dark_one():
+    """No arm is parted from it, though the room is as bright as one."""
+    dark, bright = (
+        compiled(picture(peak=2000.0, sigma=3.5, behind=np.full((81, 81), room)), half=21)
+        for room in (4.0, 120.0)
+    )
+    assert bright[C_UU] + bright[C_VV] < 2.0 * (dark[C_UU] + dark[C_VV])
 
 
 def test_a_ground_of_two_sides_makes_a_spot_less_sure():
