@@ -205,7 +205,7 @@ def centre(
     rise = peak - level
     if not rise > 0.0:
         return False
-    most = max(MOST_OFF * rise, edge - level)  # beyond it is another light, but not such an arm
+    most = max(MOST_OFF * rise, edge - level)  # an arm that was parted from it counts whole
     grain = noise * slope_of[min(int(middle) + DARKEST, 255)]
     relief2 = relief_of(light, work, n, level, most, grain)
     share = min(BY_RELIEF * sqrt(relief2) / rise, MOST_ABOVE)
