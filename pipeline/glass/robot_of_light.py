@@ -89,10 +89,10 @@ class RobotOfLight:
             self._follow(self.lag)
 
     def _measure(self, t: float, places: Array) -> None:
-        """Take where a light sweeps, clear of the fiducials."""
-        free = self.glass.has(places) & (np.abs(places[:, 1]) < 0.5 * self.glass.tile_m)
-        if free.any():
-            self._meter.add_position(t, float(places[free][0, 0]))
+        """Take where a light sweeps, clear of the fiducials: it outshines all on the glass."""
+        shown = places[self.glass.has(places)]
+        if len(shown) and abs(shown[0, 1]) < 0.5 * self.glass.tile_m:
+            self._meter.add_position(t, float(shown[0, 0]))
             self.lag = self._meter.lag()
 
     def _follow(self, lag: DisplayLag) -> None:
