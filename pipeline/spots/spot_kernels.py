@@ -34,6 +34,8 @@ DIMMER = 0.25
 SHARES = (0.7, 0.85, 0.95)
 """Of the contrast: what is above belongs to the spot; above a higher one if there is no end to that
 one: an arm in the sun is nearly as bright as its LED."""
+ENDLESS = -1
+"""In place of a count of pixels: they reach the window's border."""
 ROUNDS, OF_ONE_WINDOW = 6, 4
 """Peaks looked at, and spots taken, of one window."""
 SAME_PX = 1.5
@@ -57,6 +59,39 @@ def _is_new(table: Array, n: int, spot: Array) -> bool:
         if (table[i, U] - spot[U]) ** 2 + (table[i, V] - spot[V]) ** 2 < SAME_PX * SAME_PX:
             return False
     return True
+
+
+@kernel
+def _members(
+    luma: Image,
+    light: Array,
+    box: Box,
+    pu: int,
+    pv: int,
+    ground: float,
+    mark: int,
+    seen: Image,
+    stack: Pixels,
+    extent: Box,
+) -> tuple[int, float]:
+    """Mark a spot about its peak by the lowest share above which it ends inside the window.
+
+    Gives its pixels, 0 as `flood` does, `ENDLESS` if no share parts it; and the light above which
+    it had to be parted from what is around it, 0 if it had not.
+    """
+    peak, area, edge = int(luma[pv, pu]), 0, 0.0
+    for share in SHARES:
+        rise = (1.0 - share) * (peak - ground)
+        if share > SHARES[0]:
+            if area == 0 or rise < LEAST_GREY:
+                break
+            forget(seen, mark, extent)
+            edge = light[int(peak - rise)]
+        area = flood(luma, box, pu, pv, peak - rise, mark, seen, stack, extent)
+        begins = extent[0] >= 1 and extent[1] >= 1
+        if begins and extent[2] < box[2] - box[0] and extent[3] < box[3] - box[1]:
+            return area, edge
+    return ENDLESS, 0.0
 
 
 @kernel
@@ -127,20 +162,8 @@ def _in_window(
                 peak, pu, pv = int(luma[v, u]), u, v
         if peak < 0:
             break
-        area, fits, edge = 0, False, 0.0
-        for share in SHARES:
-            rise = (1.0 - share) * (peak - ground)
-            if share > SHARES[0]:
-                if area == 0 or rise < LEAST_GREY:
-                    break
-                forget(seen, mark, extent)
-                edge = light[int(peak - rise)]
-            area = flood(luma, box, pu, pv, peak - rise, mark, seen, stack, extent)
-            fits = extent[0] >= 1 and extent[1] >= 1
-            fits = fits and extent[2] <= columns - 2 and extent[3] <= rows - 2
-            if fits:
-                break
-        if not fits:
+        area, edge = _members(luma, light, box, pu, pv, ground, mark, seen, stack, extent)
+        if area == ENDLESS:
             if wide[2] == 0:
                 wide[0] = box[0] + (extent[0] + extent[2]) // 2
                 wide[1] = box[1] + (extent[1] + extent[3]) // 2
