@@ -48,6 +48,8 @@ class FeedForward:
         if self._weight_in_f.any():
             self._pull_in_f = self._weight_in_f
         self._pull_at_start_in_f = self._pull_in_f
+        self.carried_in_b = np.zeros(6)
+        """What of the last wrench carries the body along with the hand (6,) [N, N m]."""
         self._omega_v: Array | None = None
         self._omega_rate_v = np.zeros(3)
         self._a_slow_in_f: Array | None = None
@@ -100,9 +102,12 @@ class FeedForward:
         once = once + quick * (a_in_f - slow - once)
         self._a_in_f = once, twice + quick * (once - twice)
         a_r_in_f = self._a_in_f[1] if shares_in_f is None else shares_in_f @ self._a_in_f[1]
-        force_in_f = self._m * a_r_in_f - (self._pull_in_f - self._pull_at_start_in_f)
-        force_in_b = view.R_vb.T @ (view.R_fv.T @ force_in_f)
-        return np.concatenate((force_in_b, self._J * (view.R_vb.T @ self._omega_rate_v)))
+        R_bf = view.R_vb.T @ view.R_fv.T
+        torque_in_b = self._J * (view.R_vb.T @ self._omega_rate_v)
+        self.carried_in_b = np.concatenate((R_bf @ (self._m * a_r_in_f), torque_in_b))
+        wrench_in_b = self.carried_in_b.copy()
+        wrench_in_b[:3] -= R_bf @ (self._pull_in_f - self._pull_at_start_in_f)
+        return wrench_in_b
 
     def _turning(self, omega: Array, p: Array, quick: float, h: float) -> Array:
         """Acceleration of the reference by the turns of v, in v."""
