@@ -66,8 +66,6 @@ class FeedForwardConfig:
     """Of two stages behind each other: keeps out rounding and tremor."""
     pull_hz: float = 1.5
     """How fast a changing pull of the suspension, the air or a hand is felt and balanced."""
-    thrust_lag_s: float = 0.04
-    """From a command to its thrust, the delay included; a guess within a factor of two will do."""
 
 
 @dataclass(frozen=True, slots=True)

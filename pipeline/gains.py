@@ -35,7 +35,7 @@ TABLE_II_WITHOUT_EKF = Gains(  # Table II (b)
     Kd=_row(10.0, 15.0, 15.0, 0.5, 0.5, 1.0),
 )
 PHONE = Gains(  # softer: for pictures 60-120 ms old, see `lightleash experiments loop`
-    Kp=_row(80.0, 80.0, 120.0, 4.0, 4.0, 4.0),
-    Ki=_row(90.0, 90.0, 150.0, 8.0, 8.0, 8.0),
-    Kd=_row(30.0, 30.0, 30.0, 0.9, 0.9, 1.4),
+    Kp=_row(80.0, 80.0, 120.0, 5.0, 5.0, 6.0),
+    Ki=_row(90.0, 90.0, 150.0, 12.0, 12.0, 15.0),
+    Kd=_row(30.0, 30.0, 30.0, 0.7, 0.7, 1.3),
 )

@@ -37,7 +37,7 @@ class FeedForward:
         """At rest, thrusters off."""
         self._m, self._J, self._config = robot.mass, robot.inertia, config
         self._weight_in_f = np.array([0.0, 0.0, -robot.weight_to_carry])
-        self._thrust_in_f, self._pull_in_f = np.zeros(3), np.zeros(3)
+        self._pull_in_f = np.zeros(3)
         self.start()
 
     def start(self) -> None:
@@ -51,27 +51,23 @@ class FeedForward:
         self.carried_in_b = np.zeros(6)
         """What of the last wrench carries the body along with the hand (6,) [N, N m]."""
         self._omega_v: Array | None = None
-        self._omega_rate_v = np.zeros(3)
+        self.omega_rate_v_in_v = np.zeros(3)
+        """Angular acceleration of the reference, at the last wrench (3,) [rad/s²]."""
         self._a_slow_in_f: Array | None = None
         self._a_in_f = np.zeros(3), np.zeros(3)
 
-    def observe(self, f_bf_in_b: Array, R_fb: Array, force_in_b: Array, h: float) -> None:
+    def observe(self, f_bf_in_b: Array, R_fb: Array, thrust_in_f: Array, h: float) -> None:
         """Follow what pulls at the body.
 
         Args:
             f_bf_in_b: Specific force (3,) [m/s²].
             R_fb: Attitude of the body.
-            force_in_b: Of the thrusts last commanded (3,) [N].
+            thrust_in_f: What the thrusters give now (3,) [N].
             h: Since the last call [s].
         """
-        thrust, pull = self._thrust_in_f, self._pull_in_f
-        self._thrust_in_f = thrust + low_pass.share(h / self._config.thrust_lag_s) * (
-            R_fb @ force_in_b - thrust
-        )
-        measured = self._m * (R_fb @ f_bf_in_b + G_IN_F) - self._thrust_in_f
-        self._pull_in_f = pull + low_pass.share(2.0 * pi * self._config.pull_hz * h) * (
-            measured - pull
-        )
+        measured = self._m * (R_fb @ f_bf_in_b + G_IN_F) - thrust_in_f
+        share = low_pass.share(2.0 * pi * self._config.pull_hz * h)
+        self._pull_in_f = self._pull_in_f + share * (measured - self._pull_in_f)
 
     def wrench(
         self,
@@ -103,7 +99,7 @@ class FeedForward:
         self._a_in_f = once, twice + quick * (once - twice)
         a_r_in_f = self._a_in_f[1] if shares_in_f is None else shares_in_f @ self._a_in_f[1]
         R_bf = view.R_vb.T @ view.R_fv.T
-        torque_in_b = self._J * (view.R_vb.T @ self._omega_rate_v)
+        torque_in_b = self._J * (view.R_vb.T @ self.omega_rate_v_in_v)
         self.carried_in_b = np.concatenate((R_bf @ (self._m * a_r_in_f), torque_in_b))
         wrench_in_b = self.carried_in_b.copy()
         wrench_in_b[:3] -= R_bf @ (self._pull_in_f - self._pull_at_start_in_f)
@@ -113,6 +109,6 @@ class FeedForward:
         """Acceleration of the reference by the turns of v, in v."""
         before = omega if self._omega_v is None else self._omega_v
         self._omega_v = omega
-        rate = self._omega_rate_v
-        self._omega_rate_v = rate + quick * ((omega - before) / h - rate)
-        return cross(self._omega_rate_v, p) + cross(omega, cross(omega, p))
+        rate = self.omega_rate_v_in_v
+        self.omega_rate_v_in_v = rate + quick * ((omega - before) / h - rate)
+        return cross(self.omega_rate_v_in_v, p) + cross(omega, cross(omega, p))

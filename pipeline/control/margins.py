@@ -9,6 +9,9 @@ the body's IMU:
     none             P, I: the picture held, e^{-sT} hold_F(s); D: its difference, low-passed
     paper, relative  e^{-st} (1 − ε H) + ε H e^{-sT} hold_F(s)
 
+With feed-forward, control goes by the attitude's error as it will be when it acts
+(`delay_compensation.py`).
+
 A picture is fused when it was taken and the IMUs are replayed since, so the robot's own motion
 comes through as fresh as its IMU, at any T. Assumed: a share ε of it is measured wrongly (scale,
 lever arm, alignment), and that is mended by the late camera with the filter's bandwidth, H(s).
@@ -25,9 +28,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.config import PERIOD_S, EstimatorName, FeedForwardConfig, MarginsConfig
+from pipeline.control.delay_compensation import FELT_HZ
 from pipeline.control.dynamics import Dynamics
 from pipeline.estimator_config import NoFilterConfig
-from pipeline.frames import Array
 from pipeline.gains import Gains
 
 Complex = npt.NDArray[np.complex128]
@@ -85,8 +88,8 @@ class Loop:
     no_filter: NoFilterConfig
     feedforward: FeedForwardConfig | None = None
     """None: off."""
-    nominal_inertia: Array | None = None
-    """(6,) what feed-forward takes for the body's mass [kg]; None: what it is."""
+    nominal: Dynamics | None = None
+    """What control takes body and thrusters for; None: what they are."""
 
     def open_loop(self, axis: int, sensing: Sensing) -> tuple[Complex, int]:
         """L(jω) over `OMEGA`, and how many of its poles are at the origin."""
@@ -96,9 +99,9 @@ class Loop:
         Ki = 0.0 if tilting and axis in TILT_AXIS.values() else float(gains.Ki[axis])
         control = (gains.Kp[axis] + Ki / S) * held + gains.Kd[axis] * S * rated
         poles = int(Ki > 0.0)
-        if self.feedforward is not None and axis < 3:
-            control = self._with_feedforward(axis, control, sensing, self.feedforward)
-            poles += 1
+        if self.feedforward is not None:
+            control = self._looking_ahead(axis, control, rated, sensing, self.feedforward)
+            poles += int(axis < 3)
         d = self.dynamics
         m, k = float(d.inertia[axis]), float(d.stiffness[axis])
         c = max(float(d.damping[axis]), LEAST_DAMPING * 2.0 * sqrt(k * m))
@@ -129,7 +132,7 @@ class Loop:
     def _actuator(self, axis: int, sensing: Sensing) -> Complex:
         """Transfer function from the command of a force or torque to it."""
         d = self.dynamics
-        thrusters: Complex = np.exp(-S * d.delay) / (1.0 + d.lag * S) * _hold(PERIOD_S)
+        thrusters = _thrusters(d)
         if not d.needs_tilt or axis not in TILT_AXIS:
             return thrusters
         turn = TILT_AXIS[axis]
@@ -138,17 +141,34 @@ class Loop:
         turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn]))
         return np.asarray(Kp * turned / (1.0 + (Kp + Kd * S) * known * turned))
 
-    def _with_feedforward(
-        self, axis: int, control: Complex, sensing: Sensing, config: FeedForwardConfig
+    def _looking_ahead(
+        self,
+        axis: int,
+        control: Complex,
+        rated: Complex,
+        sensing: Sensing,
+        config: FeedForwardConfig,
     ) -> Complex:
-        """Control with the pull balanced that accelerometer and thrust model tell apart."""
-        passed = 1.0 / (1.0 + S / (2.0 * pi * config.pull_hz))
-        modelled = 1.0 / (1.0 + config.thrust_lag_s * S)
-        if self.dynamics.needs_tilt and axis in TILT_AXIS:
-            modelled = self._actuator(axis, sensing)  # it knows where the thrust points
-        inertia = self.dynamics.inertia if self.nominal_inertia is None else self.nominal_inertia
-        force = inertia[axis] * S * S * np.exp(-S * sensing.body_age)
-        return np.asarray((control + passed * force) / (1.0 - passed * modelled))
+        """Control that balances what else pulls, or goes by the attitude's error as it will be."""
+        told, by_tilting = self.nominal or self.dynamics, self.dynamics.needs_tilt
+        m, given = float(told.inertia[axis]), _thrusters(told)
+        felt = m * S * S * np.exp(-S * sensing.body_age)
+        if axis < 3:
+            passed = _low_pass(config.pull_hz)
+            if by_tilting and axis in TILT_AXIS:
+                given = self._actuator(axis, sensing)  # it knows where the thrust points
+            return np.asarray((control + passed * felt) / (1.0 - passed * given))
+        if by_tilting and axis in TILT_AXIS.values():
+            return control
+        d, T = told.delay, told.lag
+        Kp, Kd = float(self.gains.Kp[axis]), float(self.gains.Kd[axis])
+        later: Complex = np.exp(S * d)
+        once = (later - 1.0) / S
+        twice = (once - d) / S
+        by_torque = (Kp * (twice + T * once) + Kd * (once + T * later)) / m
+        by_rest = (Kp * d * (0.5 * d + T) + Kd * (d + T)) / m * _low_pass(FELT_HZ)
+        control = control + Kp * (d + T) * S * rated + by_rest * felt
+        return np.asarray(control / (1.0 + given * (by_torque - by_rest)))
 
 
 def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
@@ -195,6 +215,16 @@ def _critical_factors(L: Complex) -> Iterator[float]:
     for i in np.flatnonzero(across):
         share = L.imag[i] / (L.imag[i] - L.imag[i + 1])
         yield float(-1.0 / (L.real[i] + share * (L.real[i + 1] - L.real[i])))
+
+
+def _thrusters(dynamics: Dynamics) -> Complex:
+    """Transfer function from the command of a force or torque to it, of one that never tilts."""
+    late = np.exp(-S * dynamics.delay) / (1.0 + dynamics.lag * S)
+    return np.asarray(late * _hold(PERIOD_S))
+
+
+def _low_pass(hz: float) -> Complex:
+    return np.asarray(1.0 / (1.0 + S / (2.0 * pi * hz)))
 
 
 def _hold(period: float) -> Complex:

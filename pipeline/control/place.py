@@ -43,9 +43,9 @@ IN_TRANSIT = 0.5
 class SuspendedPlace:
     """Call `propagate` every period, and `start` when its displacement is to be zero."""
 
-    def __init__(self, robot: Robot, thrust_lag_s: float) -> None:
-        """At rest; `thrust_lag_s` is from a command to its thrust, the delay included."""
-        self._m, self._lag_s = robot.mass, thrust_lag_s
+    def __init__(self, robot: Robot) -> None:
+        """At rest."""
+        self._m, self._lag_s = robot.mass, robot.thrust_lag_s + robot.thrust_delay_s
         hangs = bool((robot.stiffness_in_f > 0.0).all())
         self._softness_in_f = 1.0 / robot.stiffness_in_f if hangs else np.zeros(3)
         self._lead_s = self._softness_in_f * robot.damping_in_f

@@ -52,4 +52,4 @@ def _bodies(loop: Loop) -> Iterator[Loop]:
     for mass, lag, unfelt in product(MASSES, LAGS, (0.0, loop.config.unfelt)):
         dynamics = replace(nominal, inertia=mass * nominal.inertia, lag=lag * nominal.lag)
         config = replace(loop.config, unfelt=unfelt)
-        yield replace(loop, dynamics=dynamics, config=config, nominal_inertia=nominal.inertia)
+        yield replace(loop, dynamics=dynamics, config=config, nominal=nominal)

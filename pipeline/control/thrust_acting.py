@@ -39,9 +39,10 @@ class ThrustActing:
         # what stands on the floor brakes and stays by itself
         self._can_stay = robot.hangs or robot.weight_to_carry > 0.0
         self._stays, self._hangs, self._in_doubt = self._can_stay, robot.hangs, False
-        self._place = SuspendedPlace(robot, config.feedforward.thrust_lag_s)
+        self._place = SuspendedPlace(robot)
         self._leash = leash_of(robot, config.leash)
-        self._force_in_b = self._given_in_b = self._mean_force_in_f = np.zeros(3)
+        self._force_in_b = self._mean_force_in_f = np.zeros(3)
+        self._told_in_b = np.zeros(6)
 
     @property
     def weak_thrusters(self) -> tuple[str, ...]:
@@ -81,7 +82,7 @@ class ThrustActing:
 
         In a gap by the gyroscope alone: f is put right only after it.
         """
-        self._tracking.observe(known, self._given_in_b, now.h)
+        self._tracking.observe(known, self._told_in_b, now.h)
         R_fb = known.view.R_fv @ known.view.R_vb
         if now.is_deaf:
             self._station.reset()
@@ -90,7 +91,7 @@ class ThrustActing:
         if now.mode == Mode.COAST:  # nothing of an estimate that may be in doubt, biases neither
             R_fb = self._hold.R_fb
             f_bf_in_b = self._hold.specific_force_in_b(now.body.a_m_bf_in_b)
-        place.propagate(f_bf_in_b, R_fb, self._given_in_b, now.h, now.knows_vertical)
+        place.propagate(f_bf_in_b, R_fb, self._told_in_b[:3], now.h, now.knows_vertical)
         suspended = (place.x_in_f - x_before_in_f, place.v_in_f)
         is_known = place.is_known and not now.is_deaf
         self._station.propagate(f_bf_in_b, R_fb, now.h, suspended if is_known else None)
@@ -165,8 +166,7 @@ class ThrustActing:
         """Wrench of the mode, given by the thrusters, under the failsafe's ceiling."""
         acted = self._given(known, leashed, now, share)
         self._thrusts = acted.thrusts
-        push_in_b = self._actuation.push_in_b
-        self._given_in_b = self._actuation.A[:3] @ acted.thrusts - push_in_b[:3]
+        self._told_in_b = self._actuation.A @ acted.thrusts - self._actuation.push_in_b
         return acted
 
     def _given(

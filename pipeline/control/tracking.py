@@ -8,8 +8,10 @@ import numpy as np
 
 from pipeline.config import TeleopConfig
 from pipeline.control.compliance import Compliance
+from pipeline.control.delay_compensation import DelayCompensation
 from pipeline.control.feedforward import G_IN_F, FeedForward
 from pipeline.control.pid import Pid, PoseError, Reference
+from pipeline.control.thruster_model import ThrusterModel
 from pipeline.frames import Array
 from pipeline.robot import Robot
 from pipeline.signals import RelativeState, VirtualView
@@ -33,6 +35,8 @@ class Tracking:
         self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
         self._looks_ahead = config.feedforward.enabled
         self._ahead = FeedForward(robot, config.feedforward)
+        self._thrusters = ThrusterModel(robot)
+        self._compensation = DelayCompensation(robot, self._thrusters)
         self._compliance = Compliance(config.compliance) if config.compliance.enabled else None
         self._cut_in_b = np.zeros(3)
 
@@ -53,10 +57,15 @@ class Tracking:
         if self._compliance is not None:
             self._compliance.start(self._pid.constant_force_in_f)
 
-    def observe(self, now: Situation, given_force_in_b: Array, h: float) -> None:
-        """Every period `h` [s], whatever is done: what else than the thrusters (3,) [N] pulls."""
-        R_fb = now.view.R_fv @ now.view.R_vb
-        self._ahead.observe(now.relative.f_bf_in_b, R_fb, given_force_in_b, h)
+    def observe(self, now: Situation, told_in_b: Array, h: float) -> None:
+        """Every period `h` [s], whatever is done: what else pulls than the thrusters.
+
+        They were `told_in_b` (6,) [N, N m] since the last one.
+        """
+        relative, R_fb = now.relative, now.view.R_fv @ now.view.R_vb
+        self._thrusters.follow(np.concatenate((R_fb @ told_in_b[:3], told_in_b[3:])), h)
+        self._ahead.observe(relative.f_bf_in_b, R_fb, self._thrusters.given[:3], h)
+        self._compensation.observe(relative.omega_bf_in_b, h)
 
     def wrench(
         self,
@@ -70,14 +79,16 @@ class Tracking:
 
         `shares_in_f` (3, 3) of the reference's motion are to be gone; None: all of it.
         """
-        wrench_in_b = self._pid.wrench(error, now.view)
+        ahead_in_b = np.zeros(6)
         if self._looks_ahead:
             ahead_in_b = self._ahead.wrench(
                 now.relative, now.R_fc, now.view, reference.p_rv_in_v, h, shares_in_f
             )
-            wrench_in_b = wrench_in_b + (
-                ahead_in_b if self._robot.needs_tilt else ahead_in_b * self._robot.axes
-            )
+            if not self._robot.needs_tilt:
+                ahead_in_b = ahead_in_b * self._robot.axes
+            omega_rate_in_b = now.view.R_vb.T @ self._ahead.omega_rate_v_in_v
+            error = self._compensation.ahead(error, omega_rate_in_b)
+        wrench_in_b = self._pid.wrench(error, now.view) + ahead_in_b
         if self._compliance is not None:
             return self._softened(self._compliance, wrench_in_b, now, error, h)
         return wrench_in_b

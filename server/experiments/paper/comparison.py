@@ -162,8 +162,10 @@ def _flown(setup: ExperimentSetup, goal: Goal) -> ComparedFigure:
 
 
 def _no_lag(setup: ExperimentSetup) -> ExperimentSetup:
-    plant = replace(setup.robot_file.plant, lag=NO_LAG_S, delay=0.0)
-    return replace(setup, robot_file=replace(setup.robot_file, plant=plant))
+    file: RobotFile = setup.robot_file
+    robot = replace(file.robot, thrust_lag_s=NO_LAG_S, thrust_delay_s=0.0)
+    plant = replace(file.plant, lag=NO_LAG_S, delay=0.0)
+    return replace(setup, robot_file=replace(file, robot=robot, plant=plant))
 
 
 def _twice(setup: ExperimentSetup) -> ExperimentSetup:

@@ -103,9 +103,8 @@ def test_a_growing_pull_is_balanced_and_one_that_was_there_is_not(ames: Robot) -
 
 def test_its_own_thrust_is_no_pull(ames: Robot) -> None:
     ahead, thrust = FeedForward(ames, FeedForwardConfig()), np.array([1.0, 2.0, 3.0])
-    for k in range(400):
-        given = thrust * (1.0 - np.exp(-(k + 1) * H / FeedForwardConfig().thrust_lag_s))
-        ahead.observe(UP + given / ames.mass, EYE, thrust, H)
+    for _ in range(400):
+        ahead.observe(UP + thrust / ames.mass, EYE, thrust, H)
     np.testing.assert_allclose(
         ahead.wrench(relative(UP), EYE, view(), ZERO, H), np.zeros(6), atol=1e-2
     )
@@ -141,7 +140,7 @@ def fly(robot: Robot, stiffness: float, config: FeedForwardConfig | None) -> tup
         felt = (force - stiffness * x - 1.5 * v) / robot.mass + 0.1 * rng.normal()
         if k == 10:
             ahead.start()
-        ahead.observe(UP + felt * along, EYE, given * along, H)
+        ahead.observe(UP + felt * along, EYE, force * along, H)
         if config is not None:
             rounded = 0.1 * round(10.0 * (a_hand + 0.05))
             wrench = wrench + ahead.wrench(relative(UP + rounded * along), EYE, seen, ZERO, H)

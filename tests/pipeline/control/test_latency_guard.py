@@ -51,10 +51,10 @@ def test_without_a_filter_they_are_not_and_the_filter_is_named(ames: LatencyGuar
 def test_late_body_samples_are_refused_and_the_gain_set_that_bears_them_is_named(
     ames: LatencyGuard,
 ) -> None:
-    why = ames.refusal("paper_with_ekf", "relative", 0.09, 0.020)
-    assert "20 ms late" in why
+    why = ames.refusal("paper_with_ekf", "relative", 0.09, 0.040)
+    assert "40 ms late" in why
     assert "Would do: gains 'phone'" in why
-    assert ames.refusal("phone", "relative", 0.09, 0.020) == ""
+    assert ames.refusal("phone", "relative", 0.09, 0.040) == ""
 
 
 def test_when_nothing_would_do_it_says_so(ames: LatencyGuard) -> None:

@@ -28,7 +28,7 @@ class Swing:
         lag_s: float = LAG_S,
         delay_ticks: int = 0,
     ) -> None:
-        self.place = SuspendedPlace(ROBOT, LAG_S)
+        self.place = SuspendedPlace(ROBOT)
         self.x, self.v, self._thrust = np.zeros(3), np.zeros(3), np.zeros(3)
         self._bias, self._R_fb, self._gain, self._lag_s = bias, R_fb, gain, lag_s
         self._commanded = deque([ZERO] * (delay_ticks + 1), maxlen=delay_ticks + 1)
@@ -95,7 +95,7 @@ def test_each_start_counts_from_there() -> None:
 
 
 def test_a_robot_that_nothing_pulls_back_is_said_to_stay() -> None:
-    place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)), LAG_S)
+    place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)))
     for _ in range(2000):
         place.propagate(UP + BIAS, np.eye(3), np.ones(3), H, True)
     assert np.abs(place.x_in_f).max() < 0.2
@@ -148,7 +148,7 @@ def test_whoever_touches_it_is_no_motion_until_that_is_forgotten(
 
 
 def test_a_robot_that_stands_is_never_known_by_what_pulls_it_back() -> None:
-    place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)), LAG_S)
+    place = SuspendedPlace(replace(ROBOT, stiffness_in_f=np.zeros(3)))
     for _ in range(2000):
         place.propagate(UP, np.eye(3), np.zeros(3), H, True)
     assert not place.is_known

@@ -84,11 +84,9 @@ def config_of(robot_file: RobotFile, variant: Variant, leader: Leader) -> Teleop
     Raises:
         KeyError: the robot file has no such gain set.
     """
-    plant = robot_file.plant
     feedforward = FeedForwardConfig(
         enabled=variant.feedforward,
         low_pass_hz=leader.feedforward_low_pass_hz,
-        thrust_lag_s=plant.lag + plant.delay,
     )
     tau_1, tau_2 = variant.vci_taus
     return replace(
