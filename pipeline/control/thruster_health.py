@@ -14,14 +14,13 @@ Willsky and Jones 1976 (generalised likelihood ratio), over windows in place of 
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Final
 
 import numpy as np
 
 from pipeline.config import PERIOD_S
-from pipeline.control import low_pass
 from pipeline.control.thruster_health_kernels import judge, put_row
+from pipeline.control.thruster_model import ThrusterModel
 from pipeline.frames import Array
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu
@@ -73,10 +72,9 @@ class ThrusterHealth:
         usual = robot.f_max * np.repeat((OTHER_FORCE, OTHER_TORQUE * lever), 3)
         self._usual = usual**2
         self._rows = np.zeros((NOW + PAUSE + BEFORE + 1, 16 + 2 * thrusters))
-        self._thrusts = np.zeros(thrusters)
+        self._thrusters = ThrusterModel(robot, thrusters)
         self._is_observable = bool(robot.wrench_axes[3:5].all())
         """Of one that a floor keeps from tilting no torque tells a push from a failure."""
-        self._on_their_way: deque[Array] = deque()
         self._ratios, self._lost = np.zeros(thrusters), np.zeros(thrusters)
         self.gains = np.ones(thrusters)
         """(m,) share of what it is told that each gives: 1, or what was found."""
@@ -109,12 +107,7 @@ class ThrusterHealth:
             body: Its newest sample.
             h: Since the last call [s].
         """
-        self._on_their_way.append(commanded)
-        delay = round(self._robot.thrust_delay_s / PERIOD_S)
-        while len(self._on_their_way) > delay + 1:
-            self._on_their_way.popleft()
-        share = low_pass.share(h / self._robot.thrust_lag_s)
-        self._thrusts = self._thrusts + share * (self._on_their_way[0] - self._thrusts)
+        self._thrusters.follow(commanded, h)
         self._k = (self._k + 1) % len(self._rows)
         self._omega[:], self._f[:] = body.omega_m_bf_in_b, body.a_m_bf_in_b
         self._put(float(h))
@@ -125,7 +118,7 @@ class ThrusterHealth:
 
     def _put(self, h: float) -> None:
         sample = self._omega, self._f
-        put_row(self._rows, self._k, self._A, self._inertia, *sample, self._thrusts, h)
+        put_row(self._rows, self._k, self._A, self._inertia, *sample, self._thrusters.given, h)
 
     def _asked(
         self,

@@ -35,7 +35,7 @@ class Tracking:
         self._pid = Pid(config.gains, robot.axes, robot.weight_to_carry)
         self._looks_ahead = config.feedforward.enabled
         self._ahead = FeedForward(robot, config.feedforward)
-        self._thrusters = ThrusterModel(robot)
+        self._thrusters = ThrusterModel(robot, 6)
         self._compensation = DelayCompensation(robot, self._thrusters)
         self._compliance = Compliance(config.compliance) if config.compliance.enabled else None
         self._cut_in_b = np.zeros(3)

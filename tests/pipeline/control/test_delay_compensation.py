@@ -41,7 +41,7 @@ def grows(axis: int, late: float, mass: float = 1.0, lag: float = 1.0) -> bool:
     Of a body `mass` times as heavy and thrusters `lag` times as slow as control was told.
     """
     plant = dynamics_of(AMES.robot, AMES.plant)
-    thrusters = ThrusterModel(AMES.robot)
+    thrusters = ThrusterModel(AMES.robot, 6)
     compensation = DelayCompensation(AMES.robot, thrusters)
     J, c, k = mass * plant.inertia[axis], plant.damping[axis], plant.stiffness[axis]
     waiting = deque([0.0] * round((late + plant.delay) / FINE))
@@ -93,7 +93,7 @@ def test_it_leaves_half_as_much_again_of_the_phase(axis: int) -> None:
 
 
 def test_of_what_stands_still_against_a_pull_the_error_is_the_error() -> None:
-    thrusters = ThrusterModel(AMES.robot)
+    thrusters = ThrusterModel(AMES.robot, 6)
     compensation = DelayCompensation(AMES.robot, thrusters)
     for _ in range(400):
         thrusters.follow(told(ROLL, 0.3), H)
@@ -104,7 +104,7 @@ def test_of_what_stands_still_against_a_pull_the_error_is_the_error() -> None:
 
 
 def test_a_torque_under_way_is_a_turn_that_will_be() -> None:
-    thrusters = ThrusterModel(AMES.robot)
+    thrusters = ThrusterModel(AMES.robot, 6)
     compensation = DelayCompensation(AMES.robot, thrusters)
     for _ in range(3):
         thrusters.follow(told(ROLL, 0.5), H)
@@ -116,7 +116,7 @@ def test_a_torque_under_way_is_a_turn_that_will_be() -> None:
 
 
 def test_a_reference_that_turns_faster_and_faster_is_gone_along_with() -> None:
-    thrusters = ThrusterModel(AMES.robot)
+    thrusters = ThrusterModel(AMES.robot, 6)
     compensation = DelayCompensation(AMES.robot, thrusters)
     lead = thrusters.delay_s + thrusters.lag_s
     ahead = compensation.ahead(turned(ROLL, 0.0, 0.0), np.array([2.0, 0.0, 0.0]))

@@ -29,7 +29,7 @@ def simulated(times: Array, told: Array, until: float, lag: float, delay: float)
 @pytest.mark.parametrize(("lag", "delay"), [(0.025, 0.015), (0.04, 0.0), (0.015, 0.032)])
 def test_it_gives_what_thrusters_give_and_knows_what_they_will(lag: float, delay: float) -> None:
     rng = np.random.default_rng(3)
-    model = ThrusterModel(replace(AMES, thrust_lag_s=lag, thrust_delay_s=delay))
+    model = ThrusterModel(replace(AMES, thrust_lag_s=lag, thrust_delay_s=delay), 6)
     periods = rng.choice([0.005, 0.004, 0.0102, 0.02], 40)
     times, told = np.concatenate(([0.0], np.cumsum(periods))), rng.normal(size=(41, 6))
     now = times[-1]
@@ -45,7 +45,7 @@ def test_it_gives_what_thrusters_give_and_knows_what_they_will(lag: float, delay
 
 
 def test_who_asks_does_not_change_what_is_given() -> None:
-    model = ThrusterModel(AMES)
+    model = ThrusterModel(AMES, 6)
     for _ in range(3):
         model.follow(np.ones(6), 0.005)
     before = model.given.copy()
@@ -54,7 +54,7 @@ def test_who_asks_does_not_change_what_is_given() -> None:
 
 
 def test_periods_too_short_to_be_kept_for_the_delay_end_at_the_same() -> None:
-    model = ThrusterModel(AMES)
+    model = ThrusterModel(AMES, 6)
     for _ in range(4000):
         model.follow(np.ones(6), 1e-4)
     np.testing.assert_allclose(model.given, np.ones(6), atol=1e-3)
