@@ -5,10 +5,10 @@ told already turns the body until then is known, and T later, which takes the la
 far as their limits let it (O. J. M. Smith, Chem. Eng. Progress 53, 1957; Z. Artstein, IEEE TAC 27,
 1982):
 
-    e(t + d) = e + d ė + ½ d² ω̇_r − ∬ ω̇,   ė(t + d) = ė + d ω̇_r − ∫ ω̇,   ω̇ = J⁻¹ (τ + τ_rest)
+    e(t + d) = e + d ė + ½ d² ω̇_r − ∬ ω̇,   ė(t + d) = ė + d ω̇_r − ∫ ω̇,   ω̇ = J⁻¹ (τ + τ_d)
     e* = e(t + d) + T ė(t + d),             ė* = ė(t + d) + T (ω̇_r − ω̇(t + d))
 
-τ is what thrusters give by the model; τ_rest what else turns the body, as its gyroscope feels it
+τ is what thrusters give by the model; τ_d what else turns the body, as its gyroscope feels it
 now: the suspension, the air, and what is wrong with the model. The place goes without: the force
 that this adds for an instant is no force to hold in a gap, or to press an obstacle with.
 """
@@ -26,9 +26,9 @@ from pipeline.control.thruster_model import ThrusterModel
 from pipeline.frames import Array
 from pipeline.robot import Robot
 
-FELT_HZ: Final = 30.0
-"""How fast the rest is felt: keeps out the noise of the gyroscope's derivative; a lag here costs
-phase where the loop acts, at 2 to 3 Hz."""
+DISTURBANCE_HZ: Final = 30.0
+"""How fast τ_d is felt: keeps out the noise of the gyroscope's derivative; a lag here costs phase
+where the loop acts, at 2 to 3 Hz."""
 
 
 class DelayCompensation:
@@ -37,7 +37,7 @@ class DelayCompensation:
     def __init__(self, robot: Robot, thrusters: ThrusterModel) -> None:
         """At rest."""
         self._J, self._thrusters = robot.inertia, thrusters
-        self._rest_in_b = np.zeros(3)
+        self._disturbance_in_b = np.zeros(3)
         self._before: tuple[Array, Array] | None = None
 
     def observe(self, omega_bf_in_b: Array, h: float) -> None:
@@ -47,8 +47,10 @@ class DelayCompensation:
         self._before = now
         # a difference of rates is a mean over the period
         felt_in_b = self._J * (now[0] - omega) / h - 0.5 * (given_in_b + now[1])
-        share = low_pass.share(2.0 * pi * FELT_HZ * h)
-        self._rest_in_b = self._rest_in_b + share * (felt_in_b - self._rest_in_b)
+        share = low_pass.share(2.0 * pi * DISTURBANCE_HZ * h)
+        self._disturbance_in_b = self._disturbance_in_b + share * (
+            felt_in_b - self._disturbance_in_b
+        )
 
     def ahead(self, error: PoseError, omega_rate_in_b: Array) -> PoseError:
         """With (e*, ė*) of the attitude for the one now.
@@ -57,11 +59,15 @@ class DelayCompensation:
             error: As it is.
             omega_rate_in_b: Angular acceleration of the reference (3,) [rad/s²].
         """
-        d, T, rest_in_b = self._thrusters.delay_s, self._thrusters.lag_s, self._rest_in_b
+        d, T, disturbance_in_b = (
+            self._thrusters.delay_s,
+            self._thrusters.lag_s,
+            self._disturbance_in_b,
+        )
         given, once, twice = (wrench[3:] for wrench in self._thrusters.ahead())
-        gained = d * omega_rate_in_b - (once + d * rest_in_b) / self._J
-        turned = 0.5 * d * d * omega_rate_in_b - (twice + 0.5 * d * d * rest_in_b) / self._J
-        later = T * (omega_rate_in_b - (given + rest_in_b) / self._J)
+        gained = d * omega_rate_in_b - (once + d * disturbance_in_b) / self._J
+        turned = 0.5 * d * d * omega_rate_in_b - (twice + 0.5 * d * d * disturbance_in_b) / self._J
+        later = T * (omega_rate_in_b - (given + disturbance_in_b) / self._J)
         return PoseError(
             e_p_in_v=error.e_p_in_v,
             e_p_rate_in_v=error.e_p_rate_in_v,

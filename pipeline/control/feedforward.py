@@ -48,7 +48,7 @@ class FeedForward:
         if self._weight_in_f.any():
             self._pull_in_f = self._weight_in_f
         self._pull_at_start_in_f = self._pull_in_f
-        self.carried_in_b = np.zeros(6)
+        self.inertial_in_b = np.zeros(6)
         """What of the last wrench carries the body along with the hand (6,) [N, N m]."""
         self._omega_v: Array | None = None
         self.omega_rate_v_in_v = np.zeros(3)
@@ -100,8 +100,8 @@ class FeedForward:
         a_r_in_f = self._a_in_f[1] if shares_in_f is None else shares_in_f @ self._a_in_f[1]
         R_bf = view.R_vb.T @ view.R_fv.T
         torque_in_b = self._J * (view.R_vb.T @ self.omega_rate_v_in_v)
-        self.carried_in_b = np.concatenate((R_bf @ (self._m * a_r_in_f), torque_in_b))
-        wrench_in_b = self.carried_in_b.copy()
+        self.inertial_in_b = np.concatenate((R_bf @ (self._m * a_r_in_f), torque_in_b))
+        wrench_in_b = self.inertial_in_b.copy()
         wrench_in_b[:3] -= R_bf @ (self._pull_in_f - self._pull_at_start_in_f)
         return wrench_in_b
 

@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.config import PERIOD_S, EstimatorName, FeedForwardConfig, MarginsConfig
-from pipeline.control.delay_compensation import FELT_HZ
+from pipeline.control.delay_compensation import DISTURBANCE_HZ
 from pipeline.control.dynamics import Dynamics
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.gains import Gains
@@ -91,6 +91,10 @@ class Loop:
     nominal: Dynamics | None = None
     """What control takes body and thrusters for; None: what they are."""
 
+    @property
+    def _told(self) -> Dynamics:
+        return self.nominal or self.dynamics
+
     def open_loop(self, axis: int, sensing: Sensing) -> tuple[Complex, int]:
         """L(jω) over `OMEGA`, and how many of its poles are at the origin."""
         held, rated = self._measured(axis, sensing)
@@ -100,8 +104,11 @@ class Loop:
         control = (gains.Kp[axis] + Ki / S) * held + gains.Kd[axis] * S * rated
         poles = int(Ki > 0.0)
         if self.feedforward is not None:
-            control = self._looking_ahead(axis, control, rated, sensing, self.feedforward)
-            poles += int(axis < 3)
+            if axis < 3:
+                control = self._with_feedforward(axis, control, sensing, self.feedforward)
+                poles += 1
+            elif not (self.dynamics.needs_tilt and axis in TILT_AXIS.values()):
+                control = self._with_delay_compensation(axis, control, rated, sensing)
         d = self.dynamics
         m, k = float(d.inertia[axis]), float(d.stiffness[axis])
         c = max(float(d.damping[axis]), LEAST_DAMPING * 2.0 * sqrt(k * m))
@@ -141,34 +148,33 @@ class Loop:
         turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn]))
         return np.asarray(Kp * turned / (1.0 + (Kp + Kd * S) * known * turned))
 
-    def _looking_ahead(
-        self,
-        axis: int,
-        control: Complex,
-        rated: Complex,
-        sensing: Sensing,
-        config: FeedForwardConfig,
+    def _with_feedforward(
+        self, axis: int, control: Complex, sensing: Sensing, config: FeedForwardConfig
     ) -> Complex:
-        """Control that balances what else pulls, or goes by the attitude's error as it will be."""
-        told, by_tilting = self.nominal or self.dynamics, self.dynamics.needs_tilt
-        m, given = float(told.inertia[axis]), _thrusters(told)
-        felt = m * S * S * np.exp(-S * sensing.body_age)
-        if axis < 3:
-            passed = _low_pass(config.pull_hz)
-            if by_tilting and axis in TILT_AXIS:
-                given = self._actuator(axis, sensing)  # it knows where the thrust points
-            return np.asarray((control + passed * felt) / (1.0 - passed * given))
-        if by_tilting and axis in TILT_AXIS.values():
-            return control
-        d, T = told.delay, told.lag
+        """Control with the pull balanced that accelerometer and thrust model tell apart."""
+        passed, given = _low_pass(config.pull_hz), _thrusters(self._told)
+        if self.dynamics.needs_tilt and axis in TILT_AXIS:
+            given = self._actuator(axis, sensing)  # it knows where the thrust points
+        force = self._felt(axis, sensing)
+        return np.asarray((control + passed * force) / (1.0 - passed * given))
+
+    def _with_delay_compensation(
+        self, axis: int, control: Complex, rated: Complex, sensing: Sensing
+    ) -> Complex:
+        """Control by an attitude's error as it will be when the thrusters act."""
+        J, d, T = float(self._told.inertia[axis]), self._told.delay, self._told.lag
         Kp, Kd = float(self.gains.Kp[axis]), float(self.gains.Kd[axis])
         later: Complex = np.exp(S * d)
         once = (later - 1.0) / S
         twice = (once - d) / S
-        by_torque = (Kp * (twice + T * once) + Kd * (once + T * later)) / m
-        by_rest = (Kp * d * (0.5 * d + T) + Kd * (d + T)) / m * _low_pass(FELT_HZ)
-        control = control + Kp * (d + T) * S * rated + by_rest * felt
-        return np.asarray(control / (1.0 + given * (by_torque - by_rest)))
+        by_torque = (Kp * (twice + T * once) + Kd * (once + T * later)) / J
+        by_disturbance = (Kp * d * (0.5 * d + T) + Kd * (d + T)) / J * _low_pass(DISTURBANCE_HZ)
+        control = control + Kp * (d + T) * S * rated + by_disturbance * self._felt(axis, sensing)
+        return np.asarray(control / (1.0 + _thrusters(self._told) * (by_torque - by_disturbance)))
+
+    def _felt(self, axis: int, sensing: Sensing) -> Complex:
+        """Force or torque that control takes the body's felt acceleration for, by its place."""
+        return np.asarray(self._told.inertia[axis] * S * S * np.exp(-S * sensing.body_age))
 
 
 def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:

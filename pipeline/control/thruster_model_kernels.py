@@ -9,7 +9,7 @@ from pipeline.so3_kernels import kernel
 
 
 @kernel
-def _pass(told: Array, s: float, lag: float, given: Array, once: Array, twice: Array) -> None:
+def _respond(told: Array, s: float, lag: float, given: Array, once: Array, twice: Array) -> None:
     """Carry on by `s` seconds in which the same (k,) was told: as `follow` does."""
     left = exp(-s / lag)
     followed = lag * (1.0 - left)
@@ -47,10 +47,10 @@ def follow(
     for j in range(n):
         end += lasted[j]
     if older > end:  # nobody knows what was told before the oldest that is kept
-        _pass(told[n - 1], older - max(end, younger), lag, given, once, twice)
+        _respond(told[n - 1], older - max(end, younger), lag, given, once, twice)
     for j in range(n - 1, -1, -1):
         begin = end - lasted[j]
         s = min(end, older) - max(begin, younger)
         if s > 0.0:
-            _pass(told[j], s, lag, given, once, twice)
+            _respond(told[j], s, lag, given, once, twice)
         end = begin

@@ -115,18 +115,18 @@ class Tracking:
 
     def learn(self, error: PoseError, view: VirtualView, missing_in_b: Array, h: float) -> None:
         """Carry the integrals on; `missing_in_b` (6,) of the last wrench could not be given."""
-        not_given = _lasting(missing_in_b, self._ahead.carried_in_b)
+        not_given = _lasting(missing_in_b, self._ahead.inertial_in_b)
         not_given[:3] += self._cut_in_b
         self._pid.integrate(error, view, not_given, h)
 
 
-def _lasting(missing_in_b: Array, carried_in_b: Array) -> Array:
+def _lasting(missing_in_b: Array, inertial_in_b: Array) -> Array:
     """What would be missing if the body were not to be carried along with the hand (6,).
 
     A hand that starts asks for its acceleration, and when it stops for the opposite: an integral
     that gave way to what of that can't be had would need a second to learn again what it knew.
     """
-    rest_in_b = missing_in_b - carried_in_b
+    rest_in_b = missing_in_b - inertial_in_b
     size = np.minimum(np.abs(missing_in_b), np.abs(rest_in_b))
     goes_on = missing_in_b * rest_in_b > 0.0
     lasting_in_b: Array = np.where(goes_on, np.copysign(size, missing_in_b), 0.0)
