@@ -14,6 +14,7 @@ from hardware.gain_tuning import MarginGoals, TuningError, keeps, moved, tuned, 
 from hardware.robot_file import load_robot
 from pipeline.config import TeleopConfig
 from pipeline.control.margins import OMEGA, Loop, S, Sensing
+from pipeline.gains import Gains
 
 GOALS = MarginGoals(gain=2.0, phase=radians(35.0), delay=0.010)
 X, ROLL, YAW = 0, 3, 5
@@ -26,6 +27,17 @@ def loop(robot: str, gains: str = "phone") -> Loop:
     return Loop(dynamics, chosen, config.margins, config.no_filter, feedforward)
 
 
+BY_HAND = replace(
+    loop("ames"),
+    gains=Gains(
+        Kp=np.array([80.0, 80.0, 120.0, 4.0, 4.0, 4.0]),
+        Ki=np.array([90.0, 90.0, 150.0, 8.0, 8.0, 8.0]),
+        Kd=np.array([30.0, 30.0, 30.0, 0.9, 0.9, 1.4]),
+    ),
+)
+"""The AMES's for phones, before its attitude was controlled ahead of its thrusters."""
+
+
 @cache
 def best(robot: str, axis: int, latency: float) -> Loop:
     start = loop(robot)
@@ -33,11 +45,12 @@ def best(robot: str, axis: int, latency: float) -> Loop:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("axis", "share"), [(X, 0.8), (YAW, 0.95)])
-def test_it_keeps_the_margins_and_rejects_better_than_the_gains_for_phones(axis, share):
+@pytest.mark.parametrize("axis", [X, YAW])
+def test_it_keeps_the_margins_and_rejects_better_than_gains_chosen_by_hand(axis):
     sensing, found = Sensing("relative", 0.09), best("ames", axis, 0.09)
     assert keeps(found, axis, sensing, GOALS)
-    assert moved(found, axis, sensing) < share * moved(loop("ames"), axis, sensing)
+    assert moved(found, axis, sensing) < 0.8 * moved(BY_HAND, axis, sensing)
+    assert moved(found, axis, sensing) < moved(loop("ames"), axis, sensing)
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -12,15 +11,17 @@ from hardware.dynamics import dynamics_of
 from hardware.robot_file import load_robot
 from pipeline.config import FeedForwardConfig, MarginsConfig
 from pipeline.control.delay_compensation import DelayCompensation
+from pipeline.control.dynamics import Dynamics
 from pipeline.control.margins import Loop, Sensing, axis_margins
 from pipeline.control.pid import PoseError
 from pipeline.control.thruster_model import ThrusterModel
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.frames import Array
 from pipeline.gains import PHONE
+from tests.pipeline.control import one_axis
+from tests.pipeline.control.one_axis import H
 
 AMES = load_robot("ames")
-H, FINE = 0.005, 0.0005
 STILL = np.zeros(3)
 ROLL, YAW = 3, 5
 
@@ -35,36 +36,38 @@ def told(axis: int, torque: float) -> Array:
     return wrench
 
 
-def grows(axis: int, late: float, mass: float = 1.0, lag: float = 1.0) -> bool:
-    """Whether a body turned by 0.01 rad turns more and more, by thrusters `late` seconds more.
-
-    Of a body `mass` times as heavy and thrusters `lag` times as slow as control was told.
-    """
-    plant = dynamics_of(AMES.robot, AMES.plant)
+def compensated() -> tuple[ThrusterModel, DelayCompensation]:
     thrusters = ThrusterModel(AMES.robot, 6)
-    compensation = DelayCompensation(AMES.robot, thrusters)
-    J, c, k = mass * plant.inertia[axis], plant.damping[axis], plant.stiffness[axis]
-    waiting = deque([0.0] * round((late + plant.delay) / FINE))
-    angle, rate, torque, integral, command, sizes = 0.01, 0.0, 0.0, 0.0, 0.0, []
-    for step in range(round(24.0 / FINE)):
-        if step % round(H / FINE) == 0:
-            thrusters.follow(told(axis, command), H)
-            compensation.observe(rate * np.eye(3)[axis - 3], H)
-            ahead = compensation.ahead(turned(axis, angle, rate), STILL)
-            integral -= PHONE.Ki[axis] * angle * H
-            command = integral + float(
-                PHONE.Kp[axis] * ahead.e_eta_in_b[axis - 3]
-                + PHONE.Kd[axis] * ahead.e_eta_rate_in_b[axis - 3]
-            )
-        waiting.append(command)
-        torque += FINE / (lag * plant.lag) * (waiting.popleft() - torque)
-        rate += FINE * (torque - c * rate - k * angle) / J
-        angle += FINE * rate
-        sizes.append(abs(angle))
-        if sizes[-1] > 1e3:
-            return True
-    third = len(sizes) // 3
-    return max(sizes[-third:]) > max(sizes[third : 2 * third])
+    return thrusters, DelayCompensation(AMES.robot, thrusters)
+
+
+def holding(torque: float, periods: int) -> DelayCompensation:
+    """One whose body stands still though its thrusters were told this torque about x."""
+    thrusters, compensation = compensated()
+    for _ in range(periods):
+        thrusters.follow(told(ROLL, torque), H)
+        compensation.observe(STILL, H)
+    return compensation
+
+
+def grows(body: Dynamics, axis: int, late: float) -> bool:
+    """Whether a body that may be another than control was told turns more and more."""
+    thrusters, compensation = compensated()
+    integral = command = 0.0
+
+    def control(angle: float, rate: float) -> float:
+        nonlocal integral, command
+        thrusters.follow(told(axis, command), H)
+        compensation.observe(rate * np.eye(3)[axis - 3], H)
+        ahead = compensation.ahead(turned(axis, angle, rate), STILL)
+        integral -= PHONE.Ki[axis] * angle * H
+        command = integral + float(
+            PHONE.Kp[axis] * ahead.e_eta_in_b[axis - 3]
+            + PHONE.Kd[axis] * ahead.e_eta_rate_in_b[axis - 3]
+        )
+        return command
+
+    return one_axis.grows(body, axis, late, control)
 
 
 @pytest.mark.slow
@@ -79,8 +82,8 @@ def test_beyond_the_delay_margin_a_simulation_diverges_and_within_it_does_not(
     config = MarginsConfig(unfelt=0.0)
     loop = Loop(body, PHONE, config, NoFilterConfig(), FeedForwardConfig(), nominal)
     margin = axis_margins(loop, axis, Sensing("relative", latency=0.0, body_age=0.0)).delay
-    assert not grows(axis, 0.92 * margin, mass, lag)
-    assert grows(axis, 1.08 * margin, mass, lag)
+    assert not grows(body, axis, 0.92 * margin)
+    assert grows(body, axis, 1.08 * margin)
 
 
 @pytest.mark.parametrize("axis", [ROLL, YAW])
@@ -93,31 +96,20 @@ def test_it_leaves_half_as_much_again_of_the_phase(axis: int) -> None:
 
 
 def test_of_what_stands_still_against_a_pull_the_error_is_the_error() -> None:
-    thrusters = ThrusterModel(AMES.robot, 6)
-    compensation = DelayCompensation(AMES.robot, thrusters)
-    for _ in range(400):
-        thrusters.follow(told(ROLL, 0.3), H)
-        compensation.observe(STILL, H)
-    ahead = compensation.ahead(turned(ROLL, 0.02, 0.0), STILL)
+    ahead = holding(0.3, 400).ahead(turned(ROLL, 0.02, 0.0), STILL)
     np.testing.assert_allclose(ahead.e_eta_in_b, [-0.02, 0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(ahead.e_eta_rate_in_b, STILL, atol=1e-5)
 
 
 def test_a_torque_under_way_is_a_turn_that_will_be() -> None:
-    thrusters = ThrusterModel(AMES.robot, 6)
-    compensation = DelayCompensation(AMES.robot, thrusters)
-    for _ in range(3):
-        thrusters.follow(told(ROLL, 0.5), H)
-        compensation.observe(STILL, H)
-    ahead = compensation.ahead(turned(ROLL, 0.0, 0.0), STILL)
+    ahead = holding(0.5, 3).ahead(turned(ROLL, 0.0, 0.0), STILL)
     assert ahead.e_eta_in_b[0] < 0.0
     assert ahead.e_eta_rate_in_b[0] < -0.02
     np.testing.assert_array_equal(ahead.e_p_in_v, STILL)
 
 
 def test_a_reference_that_turns_faster_and_faster_is_gone_along_with() -> None:
-    thrusters = ThrusterModel(AMES.robot, 6)
-    compensation = DelayCompensation(AMES.robot, thrusters)
+    thrusters, compensation = compensated()
     lead = thrusters.delay_s + thrusters.lag_s
     ahead = compensation.ahead(turned(ROLL, 0.0, 0.0), np.array([2.0, 0.0, 0.0]))
     np.testing.assert_allclose(ahead.e_eta_rate_in_b, [2.0 * lead, 0.0, 0.0])

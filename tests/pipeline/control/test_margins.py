@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +14,8 @@ from pipeline.control.dynamics import Dynamics
 from pipeline.control.margins import Loop, Sensing, axis_margins, delay_margin
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.gains import PHONE, TABLE_II_WITH_EKF, TABLE_II_WITHOUT_EKF, Gains
+from tests.pipeline.control import one_axis
+from tests.pipeline.control.one_axis import H
 
 FRESH = Sensing("relative", latency=0.0, body_age=0.0)
 X, Y, Z, ROLL, PITCH, YAW = range(6)
@@ -30,24 +31,15 @@ def loop(gains: Gains, plant: Dynamics, feedforward: FeedForwardConfig | None = 
 
 
 def grows(gains: Gains, plant: Dynamics, axis: int, late: float, gain: float = 1.0) -> bool:
-    """In a simulation of one axis in steps of 0.5 ms, whatever frequency responses may say."""
-    h, hold = 0.0005, 10
-    waiting = deque([0.0] * round((late + plant.delay) / h))
-    m, c, k = plant.inertia[axis], plant.damping[axis], plant.stiffness[axis]
-    x, v, force, integral, command, sizes = 0.01, 0.0, 0.0, 0.0, 0.0, []
-    for step in range(round(24.0 / h)):
-        if step % hold == 0:
-            integral -= gain * gains.Ki[axis] * x * h * hold
-            command = integral - gain * (gains.Kp[axis] * x + gains.Kd[axis] * v)
-        waiting.append(command)
-        force += h / plant.lag * (waiting.popleft() - force)
-        v += h * (force - c * v - k * x) / m
-        x += h * v
-        sizes.append(abs(x))
-        if sizes[-1] > 1e3:
-            return True
-    third = len(sizes) // 3
-    return max(sizes[-third:]) > max(sizes[third : 2 * third])
+    """Whether a body under the PID with all its gains times `gain` goes off."""
+    integral = 0.0
+
+    def control(x: float, v: float) -> float:
+        nonlocal integral
+        integral -= gain * gains.Ki[axis] * x * H
+        return integral - gain * float(gains.Kp[axis] * x + gains.Kd[axis] * v)
+
+    return one_axis.grows(plant, axis, late, control)
 
 
 @pytest.mark.parametrize(("gains", "axis"), [(PHONE, X), (TABLE_II_WITHOUT_EKF, YAW)])
