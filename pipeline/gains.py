@@ -34,7 +34,7 @@ TABLE_II_WITHOUT_EKF = Gains(  # Table II (b)
     Ki=_row(90.0, 150.0, 200.0, 15.0, 15.0, 5.0),
     Kd=_row(10.0, 15.0, 15.0, 0.5, 0.5, 1.0),
 )
-PHONE = Gains(  # softer: for pictures 60-120 ms old, see `lightleash experiments loop`
+PHONE = Gains(  # for pictures 60-120 ms old, see `lightleash experiments loop`, `margins`
     Kp=_row(80.0, 80.0, 120.0, 5.0, 5.0, 6.0),
     Ki=_row(90.0, 90.0, 150.0, 12.0, 12.0, 15.0),
     Kd=_row(30.0, 30.0, 30.0, 0.7, 0.7, 1.3),
