@@ -29,6 +29,8 @@ from pipeline.robot import Robot
 DISTURBANCE_HZ: Final = 30.0
 """How fast τ_d is felt: keeps out the noise of the gyroscope's derivative; a lag here costs phase
 where the loop acts, at 2 to 3 Hz."""
+STANDS_S: Final = 0.05
+"""A rate that has not changed for longer does not change."""
 
 
 class DelayCompensation:
@@ -38,19 +40,31 @@ class DelayCompensation:
         """At rest."""
         self._J, self._thrusters = robot.inertia, thrusters
         self._disturbance_in_b = np.zeros(3)
-        self._before: tuple[Array, Array] | None = None
+        self._omega_bf_in_b: Array | None = None
+        self._impulse_in_b, self._since_s = np.zeros(3), 0.0
+        """What the thrusters have given since, and for how long."""
 
-    def observe(self, omega_bf_in_b: Array, h: float) -> None:
-        """Follow what else than the thrusters turns the body, `h` [s] after the last call."""
-        now = omega_bf_in_b, self._thrusters.given[3:].copy()
-        omega, given_in_b = self._before or now
-        self._before = now
-        # a difference of rates is a mean over the period
-        felt_in_b = self._J * (now[0] - omega) / h - 0.5 * (given_in_b + now[1])
-        share = low_pass.share(2.0 * pi * DISTURBANCE_HZ * h)
+    def observe(self, omega_bf_in_b: Array, impulse_in_b: Array, h: float) -> None:
+        """Follow what else than the thrusters turns the body.
+
+        Args:
+            omega_bf_in_b: The body's angular rate (3,) [rad/s].
+            impulse_in_b: What the thrusters have given since the last call (3,) [N m s].
+            h: The seconds since then.
+        """
+        before = omega_bf_in_b if self._omega_bf_in_b is None else self._omega_bf_in_b
+        self._impulse_in_b = self._impulse_in_b + impulse_in_b
+        self._since_s += h
+        # where a link brings samples by the handful, the rate stands still between them
+        if (before == omega_bf_in_b).all() and self._since_s < STANDS_S:
+            self._omega_bf_in_b = before
+            return
+        felt_in_b = (self._J * (omega_bf_in_b - before) - self._impulse_in_b) / self._since_s
+        share = low_pass.share(2.0 * pi * DISTURBANCE_HZ * self._since_s)
         self._disturbance_in_b = self._disturbance_in_b + share * (
             felt_in_b - self._disturbance_in_b
         )
+        self._omega_bf_in_b, self._impulse_in_b, self._since_s = omega_bf_in_b, np.zeros(3), 0.0
 
     def ahead(self, error: PoseError, omega_rate_in_b: Array) -> PoseError:
         """With (e*, ė*) of the attitude for the one now.

@@ -29,11 +29,16 @@ class ThrusterModel:
         """Now."""
         self.follow(self.given, 0.0)  # compiles or loads the kernel here: never inside the loop
 
-    def follow(self, told: Array, h: float) -> None:
-        """Go on by `h` [s], since the beginning of which they are `told` this."""
+    def follow(self, told: Array, h: float) -> Array:
+        """Go on by `h` [s], since the beginning of which they are `told` this.
+
+        Returns:
+            (k,) what they have given meanwhile, over time.
+        """
         self._told[1:], self._lasted[1:] = self._told[:-1], self._lasted[:-1]
         self._told[0], self._lasted[0] = told, h
-        self._carry_on(self.delay_s + h, self.delay_s, self.given)
+        impulse, _ = self._carry_on(self.delay_s + h, self.delay_s, self.given)
+        return impulse
 
     def ahead(self) -> tuple[Array, Array, Array]:
         """What they give when what is decided now begins (k,), and its integrals from now on.

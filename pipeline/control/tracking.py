@@ -63,9 +63,10 @@ class Tracking:
         They were `told_in_b` (6,) [N, N m] since the last one.
         """
         relative, R_fb = now.relative, now.view.R_fv @ now.view.R_vb
-        self._thrusters.follow(np.concatenate((R_fb @ told_in_b[:3], told_in_b[3:])), h)
+        told = np.concatenate((R_fb @ told_in_b[:3], told_in_b[3:]))
+        impulse = self._thrusters.follow(told, h)
         self._ahead.observe(relative.f_bf_in_b, R_fb, self._thrusters.given[:3], h)
-        self._compensation.observe(relative.omega_bf_in_b, h)
+        self._compensation.observe(relative.omega_bf_in_b, impulse[3:], h)
 
     def wrench(
         self,

@@ -45,8 +45,7 @@ def holding(torque: float, periods: int) -> DelayCompensation:
     """One whose body stands still though its thrusters were told this torque about x."""
     thrusters, compensation = compensated()
     for _ in range(periods):
-        thrusters.follow(told(ROLL, torque), H)
-        compensation.observe(STILL, H)
+        compensation.observe(STILL, thrusters.follow(told(ROLL, torque), H)[3:], H)
     return compensation
 
 
@@ -57,8 +56,8 @@ def grows(body: Dynamics, axis: int, late: float) -> bool:
 
     def control(angle: float, rate: float) -> float:
         nonlocal integral, command
-        thrusters.follow(told(axis, command), H)
-        compensation.observe(rate * np.eye(3)[axis - 3], H)
+        impulse = thrusters.follow(told(axis, command), H)
+        compensation.observe(rate * np.eye(3)[axis - 3], impulse[3:], H)
         ahead = compensation.ahead(turned(axis, angle, rate), STILL)
         integral -= PHONE.Ki[axis] * angle * H
         command = integral + float(
@@ -113,3 +112,16 @@ def test_a_reference_that_turns_faster_and_faster_is_gone_along_with() -> None:
     lead = thrusters.delay_s + thrusters.lag_s
     ahead = compensation.ahead(turned(ROLL, 0.0, 0.0), np.array([2.0, 0.0, 0.0]))
     np.testing.assert_allclose(ahead.e_eta_rate_in_b, [2.0 * lead, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_samples_by_the_handful_feel_the_torque_that_turns_a_body(every: int) -> None:
+    thrusters, compensation = compensated()
+    lead, gains = thrusters.delay_s + thrusters.lag_s, 0.2 / AMES.robot.inertia[0]
+    for k in range(80):
+        if k % every == 0:
+            rate = gains * k * H
+        compensation.observe(np.array([rate, 0.0, 0.0]), thrusters.follow(np.zeros(6), H)[3:], H)
+        if k >= 60:
+            ahead = compensation.ahead(turned(ROLL, 0.0, rate), STILL)
+            assert ahead.e_eta_rate_in_b[0] == pytest.approx(-rate - lead * gains, rel=1e-3)
