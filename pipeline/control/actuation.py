@@ -71,14 +71,19 @@ class Actuation:
         lever = float(np.linalg.norm(self._robot.A[3:], axis=0).max())
         return bool((np.abs(missing_in_b) <= HOVERS * weight * np.repeat((1.0, lever), 3)).all())
 
-    def give(self, wrench_in_b: Array, R_fb: Array, omega_bf_in_b: Array) -> ThrustDemand:
-        """Thrusts for a wrench (6,) at the attitude and angular rate of the body."""
+    def give(
+        self, wrench_in_b: Array, R_fb: Array, turned_in_b: Array, omega_in_b: Array
+    ) -> ThrustDemand:
+        """Thrusts for a wrench (6,) at the attitude R_fb.
+
+        One that must tilt goes by how far it will have turned (3,) and its angular rate (3,) then.
+        """
         if self._tilt is None:
             pushed_in_b = wrench_in_b + self.push_in_b
             thrusts = self._allocation.thrusts(pushed_in_b)
             missing_in_b = (pushed_in_b - self.A @ thrusts) * self._axes
             return ThrustDemand(thrusts, missing_in_b, _is_short(missing_in_b))
-        tilting = self._tilt.wrench(wrench_in_b, R_fb, omega_bf_in_b) + self.push_in_b
+        tilting = self._tilt.wrench(wrench_in_b, R_fb, turned_in_b, omega_in_b) + self.push_in_b
         thrusts = self._allocation.thrusts(tilting)
         missing_in_b = (tilting - self.A @ thrusts) * self._axes
         saturated = _is_short(missing_in_b) or _is_short(self._tilt.refused_in_b)

@@ -66,25 +66,33 @@ class DelayCompensation:
         )
         self._omega_bf_in_b, self._impulse_in_b, self._since_s = omega_bf_in_b, np.zeros(3), 0.0
 
-    def ahead(self, error: PoseError, omega_rate_in_b: Array) -> PoseError:
+    def body(self, omega_bf_in_b: Array) -> tuple[Array, Array]:
+        """How far the body will have turned (3,) [rad], and its angular rate (3,) [rad/s].
+
+        By its rate now, and led by the thrusters' lag.
+        """
+        d, T = self._thrusters.delay_s, self._thrusters.lag_s
+        given, once, twice = (wrench[3:] for wrench in self._thrusters.ahead())
+        omega_in_b = omega_bf_in_b + (once + d * self._disturbance_in_b) / self._J
+        turned_in_b = d * omega_bf_in_b + (twice + 0.5 * d * d * self._disturbance_in_b) / self._J
+        omega_rate_in_b = (given + self._disturbance_in_b) / self._J
+        return turned_in_b + T * omega_in_b, omega_in_b + T * omega_rate_in_b
+
+    def ahead(self, error: PoseError, omega_bf_in_b: Array, omega_rate_in_b: Array) -> PoseError:
         """With (e*, ė*) of the attitude for the one now.
 
         Args:
             error: As it is.
+            omega_bf_in_b: The body's angular rate (3,) [rad/s].
             omega_rate_in_b: Angular acceleration of the reference (3,) [rad/s²].
         """
-        d, T, disturbance_in_b = (
-            self._thrusters.delay_s,
-            self._thrusters.lag_s,
-            self._disturbance_in_b,
-        )
-        given, once, twice = (wrench[3:] for wrench in self._thrusters.ahead())
-        gained = d * omega_rate_in_b - (once + d * disturbance_in_b) / self._J
-        turned = 0.5 * d * d * omega_rate_in_b - (twice + 0.5 * d * d * disturbance_in_b) / self._J
-        later = T * (omega_rate_in_b - (given + disturbance_in_b) / self._J)
+        d, T = self._thrusters.delay_s, self._thrusters.lag_s
+        omega_rf_in_b = error.e_eta_rate_in_b + omega_bf_in_b
+        turned_in_b, omega_in_b = self.body(omega_bf_in_b)
+        goes_in_b = (d + T) * omega_rf_in_b + d * (0.5 * d + T) * omega_rate_in_b
         return PoseError(
             e_p_in_v=error.e_p_in_v,
             e_p_rate_in_v=error.e_p_rate_in_v,
-            e_eta_in_b=error.e_eta_in_b + (d + T) * error.e_eta_rate_in_b + turned + T * gained,
-            e_eta_rate_in_b=error.e_eta_rate_in_b + gained + later,
+            e_eta_in_b=error.e_eta_in_b + goes_in_b - turned_in_b,
+            e_eta_rate_in_b=omega_rf_in_b + (d + T) * omega_rate_in_b - omega_in_b,
         )

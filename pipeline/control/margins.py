@@ -107,8 +107,9 @@ class Loop:
             if axis < 3:
                 control = self._with_feedforward(axis, control, sensing, self.feedforward)
                 poles += 1
-            elif not (self.dynamics.needs_tilt and axis in TILT_AXIS.values()):
-                control = self._with_delay_compensation(axis, control, rated, sensing)
+            else:
+                control, answered = self._with_delay_compensation(axis, control, rated, sensing)
+                control = np.asarray(control / answered)
         d = self.dynamics
         m, k = float(d.inertia[axis]), float(d.stiffness[axis])
         c = max(float(d.damping[axis]), LEAST_DAMPING * 2.0 * sqrt(k * m))
@@ -145,8 +146,11 @@ class Loop:
         turn = TILT_AXIS[axis]
         known, _ = self._measured(turn, sensing)
         Kp, Kd = self.gains.Kp[turn], self.gains.Kd[turn]
-        turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn]))
-        return np.asarray(Kp * turned / (1.0 + (Kp + Kd * S) * known * turned))
+        control, answered = (Kp + Kd * S) * known, np.ones_like(S)
+        if self.feedforward is not None:
+            control, answered = self._with_delay_compensation(turn, control, known, sensing)
+        turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn])) / answered
+        return np.asarray(Kp * turned / (1.0 + control * turned))
 
     def _with_feedforward(
         self, axis: int, control: Complex, sensing: Sensing, config: FeedForwardConfig
@@ -160,8 +164,11 @@ class Loop:
 
     def _with_delay_compensation(
         self, axis: int, control: Complex, rated: Complex, sensing: Sensing
-    ) -> Complex:
-        """Control by an attitude's error as it will be when the thrusters act."""
+    ) -> tuple[Complex, Complex]:
+        """Control by an attitude's error as it will be when the thrusters act.
+
+        Beside it, by what a command is divided for the answer to itself.
+        """
         J, d, T = float(self._told.inertia[axis]), self._told.delay, self._told.lag
         Kp, Kd = float(self.gains.Kp[axis]), float(self.gains.Kd[axis])
         later: Complex = np.exp(S * d)
@@ -170,7 +177,7 @@ class Loop:
         by_torque = (Kp * (twice + T * once) + Kd * (once + T * later)) / J
         by_disturbance = (Kp * d * (0.5 * d + T) + Kd * (d + T)) / J * _low_pass(DISTURBANCE_HZ)
         control = control + Kp * (d + T) * S * rated + by_disturbance * self._felt(axis, sensing)
-        return np.asarray(control / (1.0 + _thrusters(self._told) * (by_torque - by_disturbance)))
+        return control, np.asarray(1.0 + _thrusters(self._told) * (by_torque - by_disturbance))
 
     def _felt(self, axis: int, sensing: Sensing) -> Complex:
         """Force or torque that control takes the body's felt acceleration for, by its place."""

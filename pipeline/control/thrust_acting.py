@@ -176,6 +176,7 @@ class ThrustActing:
         omega_m_bf_in_b = now.body.omega_m_bf_in_b
         if mode == Mode.TRACK and known and reference and leashed:
             R_fb, omega_bf_in_b = known.view.R_fv @ known.view.R_vb, known.view.omega_bf_in_b
+            turned_in_b, omega_in_b = self._tracking.body_ahead(omega_bf_in_b)
             shares_in_f = _shares_in_f(leashed, now.leading)
             wrench_in_b = self._tracking.wrench(  # Eq. (20)
                 known, reference, leashed.error, now.h, shares_in_f
@@ -188,10 +189,10 @@ class ThrustActing:
             self._stays = self._stays and not self._is_astray
             if mode == Mode.COAST and self._stays:
                 wrench_in_b[:3] = self._station.force_in_b(self._hold.R_fb)
-            R_fb, omega_bf_in_b = self._hold.R_fb, omega_m_bf_in_b
+            R_fb, turned_in_b, omega_in_b = self._hold.R_fb, np.zeros(3), omega_m_bf_in_b
         else:
             return Acted(np.zeros_like(self._thrusts), saturated=False)
-        given = self._actuation.give(wrench_in_b, R_fb, omega_bf_in_b)
+        given = self._actuation.give(wrench_in_b, R_fb, turned_in_b, omega_in_b)
         self._force_in_b = wrench_in_b[:3] - given.missing_in_b[:3]
         news = low_pass.share(now.h / MEAN_S)
         self._mean_force_in_f = self._mean_force_in_f + news * (

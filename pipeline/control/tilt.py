@@ -11,7 +11,7 @@ from math import atan2, sqrt, tan
 import numpy as np
 
 from pipeline.config import TiltConfig
-from pipeline.frames import Array
+from pipeline.frames import Array, exp
 from pipeline.gains import Gains
 from pipeline.robot import Robot
 
@@ -30,16 +30,20 @@ class TiltToMove:
         self.refused_in_b = np.zeros(3)
         """Force that the limit of the tilt cut off, at the last wrench (3,) [N]."""
 
-    def wrench(self, wrench_in_b: Array, R_fb: Array, omega_bf_in_b: Array) -> Array:
+    def wrench(
+        self, wrench_in_b: Array, R_fb: Array, turned_in_b: Array, omega_in_b: Array
+    ) -> Array:
         """(6,) thrust along z and torques for a wanted wrench (6,); its roll and pitch don't count.
 
-        The body turns until its z axis points along the wanted force, no farther than the limit.
+        The body turns until its z axis points along the wanted force, no farther than the limit; it
+        will have turned (3,) [rad] when the torque acts, and will turn at `omega_in_b` (3,).
         """
         wanted_in_f = R_fb @ wrench_in_b[:3]
         force_in_f = self._within_limit(wanted_in_f)
         force_in_b = R_fb.T @ force_in_f
         self.refused_in_b = wrench_in_b[:3] - force_in_b
-        torque_in_b = self._Kp * _turn_of_z_to(force_in_b) - self._Kd * omega_bf_in_b[:2]
+        left = _turn_of_z_to(exp(turned_in_b).T @ force_in_b)
+        torque_in_b = self._Kp * left - self._Kd * omega_in_b[:2]
         return np.array([0.0, 0.0, max(force_in_b[2], 0.0), *torque_in_b, wrench_in_b[5]])
 
     def _within_limit(self, force_in_f: Array) -> Array:

@@ -88,11 +88,20 @@ class Tracking:
             if not self._robot.needs_tilt:
                 ahead_in_b = ahead_in_b * self._robot.axes
             omega_rate_in_b = now.view.R_vb.T @ self._ahead.omega_rate_v_in_v
-            error = self._compensation.ahead(error, omega_rate_in_b)
+            error = self._compensation.ahead(error, now.view.omega_bf_in_b, omega_rate_in_b)
         wrench_in_b = self._pid.wrench(error, now.view) + ahead_in_b
         if self._compliance is not None:
             return self._softened(self._compliance, wrench_in_b, now, error, h)
         return wrench_in_b
+
+    def body_ahead(self, omega_bf_in_b: Array) -> tuple[Array, Array]:
+        """How far a body of this rate will have turned (3,) [rad], and its rate (3,) [rad/s] then.
+
+        When that which is decided now acts.
+        """
+        if not self._looks_ahead:
+            return np.zeros(3), omega_bf_in_b
+        return self._compensation.body(omega_bf_in_b)
 
     def _softened(
         self,

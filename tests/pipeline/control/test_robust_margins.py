@@ -95,3 +95,12 @@ def test_gains_that_are_robust_lose_it_when_they_are_turned_up() -> None:
     worst = worst_margins(hard, X, LATE)
     assert not is_robust(worst)
     assert degrees(worst.phase) < 30.0
+
+
+@pytest.mark.parametrize("name", ["ames", "quadrotor"])
+def test_attitudes_have_what_engineers_ask_for_with_pictures_90_ms_late(name: str) -> None:
+    robot_file = load_robot(name)
+    dynamics, gains = dynamics_of(robot_file.robot, robot_file.plant), robot_file.gains["phone"]
+    loop = Loop(dynamics, gains, MarginsConfig(), NoFilterConfig(), FeedForwardConfig())
+    for axis in (3, 4, 5):
+        assert is_robust(worst_margins(loop, axis, Sensing("relative", latency=0.09)))
