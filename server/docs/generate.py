@@ -54,6 +54,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     calibration_messages.Calibration,
     messages.Stream,
     messages.GapCount,
+    messages.LoggedEvent,
     runtime_parameters.RuntimeParameters,
     messages.VirtualCameraStatus,
     messages.Estimate,

@@ -26,7 +26,7 @@ from server.control.ipc import BodyRow
 from server.control.ipc_estimate import EstimateFields
 from server.media.image_format import ImageFormat
 from server.phone.ingest import ARRIVAL_S, phone_imu
-from server.protocol.messages import Command, Hello, Log, Status, decode_message
+from server.protocol.messages import Command, Hello, Log, LoggedEvent, decode_message
 from server.protocol.people_messages import Deed
 from server.protocol.wire import WireError, decode
 from server.protocol.wire_records import Motion, Picture, Record, Touch
@@ -193,7 +193,7 @@ class _Decoding:
         self._dates = PhoneDates(decoded.recording)
         self._extrinsics = IDENTITY
         self._state: RecordedState | None = None
-        self._shown: list[str] = []
+        self._shown: list[LoggedEvent | str] = []
         self._greet()
 
     def _greet(self) -> None:
@@ -260,9 +260,10 @@ class _Decoding:
             words = (message.who or "server", message.what, message.why)
             yield LogLine(message.t_s, "people", " ".join(filter(None, words)))
             return
-        shown, self._shown = self._shown, message.messages
-        for text in reversed(message.messages):  # newest first
-            if text not in shown:
+        shown, self._shown = self._shown, [*message.events, *message.messages]
+        for event in reversed(self._shown):  # newest first
+            if event not in shown:
+                text = event if isinstance(event, str) else event.text
                 yield LogLine(entry.t, "server", text)
 
     def _control(self, entry: Entry) -> Iterator[Item]:
@@ -280,5 +281,13 @@ class _Decoding:
         yield state
 
 
+class _StatusEvents(msgspec.Struct, tag="status"):
+    """Of a `Status`, as far as it is a log."""
+
+    events: list[LoggedEvent] = []
+    messages: list[str] = []
+    """In place of them, before they had a time."""
+
+
 _state = msgspec.json.Decoder(RecordedState)
-_to_page = msgspec.json.Decoder(Status | Deed)
+_to_page = msgspec.json.Decoder(_StatusEvents | Deed)

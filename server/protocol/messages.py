@@ -156,6 +156,16 @@ class Estimate(msgspec.Struct, frozen=True):
     """Of the phone's accelerometer."""
 
 
+class LoggedEvent(msgspec.Struct, frozen=True):
+    """What people should see."""
+
+    text: str
+    unix_ms: int
+    """When it happened, for the last time."""
+    times: int = 1
+    """How often, as far as it is remembered."""
+
+
 class Status(msgspec.Struct, tag="status", frozen=True):
     """Server → page, 10 Hz: the truth about the robot, on every screen."""
 
@@ -194,8 +204,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Class of the control loop: what holds its schedule."""
     control: dict[str, float]
     """Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms."""
-    messages: list[str]
-    """The newest events, newest first."""
+    events: list[LoggedEvent]
+    """What people should see, the newest first."""
     virtual_camera: VirtualCameraStatus | None = None
     """None before the control process has told of it."""
     estimate: Estimate | None = None
@@ -227,6 +237,10 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """None before the control process has told of it."""
     takes: Literal["thrusts", "twist"] = "thrusts"
     """What the robot is told: by its thrusters, or a velocity that it follows by itself."""
+    thrusts_n: list[float] = []
+    """What each thruster is told ..."""
+    thrust_limit_n: float = 0.0
+    """... and the most that one may be."""
     told_mm_s: float | None = None
     """The speed that a robot is told that takes a twist ..."""
     told_deg_s: float | None = None

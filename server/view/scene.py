@@ -200,6 +200,11 @@ def floor_z(plant: PlantParameters, start: StartParameters) -> float:
     return float(plant.stand.feet_in_b[:, 2].min()) - start.above
 
 
+def at_rest(start: StartParameters) -> Pose:
+    """Where a robot is taken to be that no phone has seen: as somebody would `start` with it."""
+    return Pose(np.array([start.distance, 0.0, -start.above]), (1.0, 0.0, 0.0, 0.0))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Craft:
     """What a robot looks like, in b."""

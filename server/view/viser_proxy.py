@@ -35,6 +35,11 @@ VIEW_POLICY = (
     "frame-ancestors 'self'"
 )
 """viser's page is one file with its scripts, styles and fonts inside."""
+BARE = (
+    b"<style>.mantine-Notifications-root, .mantine-Paper-root { display: none !important }</style>"
+)
+"""Nothing but the scene: what viser says of the browser's graphics card is no news of a robot, and
+its panel is empty."""
 SUBPROTOCOL = "viser-v"
 MAX_UP_BYTES = 2_048
 MAX_DOWN_BYTES = 16 * 2**20
@@ -88,7 +93,8 @@ async def _page() -> HTMLResponse:
 
 @cache
 def _html() -> bytes:
-    return files("viser").joinpath("client", "build", "index.html").read_bytes()
+    page = files("viser").joinpath("client", "build", "index.html").read_bytes()
+    return page.replace(b"</head>", BARE + b"</head>", 1)
 
 
 def camera_only(data: bytes) -> bytes | None:

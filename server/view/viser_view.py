@@ -74,6 +74,7 @@ class Dashboard:
         self._trail = scene.Trail()
         self._heading = scene.Heading()
         self._craft, self._is_fresh = craft, False
+        self._at_rest = scene.at_rest(start)
         self._thumbnail: Thumbnail | None = None
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
@@ -112,8 +113,9 @@ class Dashboard:
             _log.exception("the 3D view has stopped; control and recording go on")
 
     def show(self, status: ControlStatus | None, thumbnail: Thumbnail | None) -> None:
-        """Move everything to where `status` says; grey when it is None, no robot without a pose.
+        """Move everything to where `status` says; grey when it is None.
 
+        Without a pose there is no robot; before there is a phone, a grey one at rest.
         `thumbnail` is (h, w, 3) RGB; the same array again costs nothing.
         """
         with self._viser.atomic():
@@ -124,11 +126,12 @@ class Dashboard:
             self._turn(status, view)
             _place(self._phone, view.phone)
             _place(self._virtual, view.virtual_camera)
-            _place(self._robot, view.robot)
+            robot = self._at_rest if view.phone is None else view.robot
+            _place(self._robot, robot)
             _place(self._reference, view.reference)
             self._colour(view.is_fresh)
             self._show_picture(thumbnail)
-            self._show_robot(status, view)
+            self._show_lines(status, robot)
 
     def _turn(self, status: ControlStatus, view: scene.ViewState) -> None:
         yaw = self._heading.new_yaw(status.epoch, view)
@@ -146,17 +149,17 @@ class Dashboard:
                 frustum.aspect, frustum.fov = aspect, scene.fov_y(aspect)
         self._phone.image = thumbnail
 
-    def _show_robot(self, status: ControlStatus, view: scene.ViewState) -> None:
+    def _show_lines(self, status: ControlStatus, robot: scene.Pose | None) -> None:
         """Cable, trail and command."""
         lines = [node for node in (self._cable, self._trail_lines) if node is not None]
         for node in lines:
-            if node.visible != (view.robot is not None):
-                node.visible = view.robot is not None
-        if view.robot is None:
+            if node.visible != (robot is not None):
+                node.visible = robot is not None
+        if robot is None:
             return
         if self._cable is not None:
-            self._cable.position = view.robot.position
-        if self._trail.add(status.t, view.robot.position):
+            self._cable.position = robot.position
+        if self._trail.add(status.t, robot.position):
             self._trail_lines.points = self._trail.segments()
         commanded = status.thrusts if self._craft.drive is None else status.twist_in_b or ()
         command = np.asarray(commanded, dtype=np.float64)

@@ -16,7 +16,7 @@ from hardware.codec import Decoder
 from pipeline.control.leading import suits
 from pipeline.robot import Robot
 from pipeline.signals import Mode
-from server.common.clock import now
+from server.common.clock import now, unix_zero_ns
 from server.common.runtime_parameters import Tune
 from server.control.ipc import ControlStatus, server_end
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
@@ -34,7 +34,7 @@ from server.phone.transports import FastTransport, Transports
 from server.phone.vision_thread import Picture, jpeg
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.lead_messages import AS_EVER, Lead
-from server.protocol.messages import Command, Hello, Status, ToPage, encode_message
+from server.protocol.messages import Command, Hello, LoggedEvent, Status, ToPage, encode_message
 from server.protocol.people_messages import Deed
 from server.protocol.wire import WireError, encode
 from server.protocol.wire_records import Record, Thumbnail
@@ -85,7 +85,7 @@ class SessionManager:
         self.supervisors: set[ClientConnection] = set()
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
-        self._events, self.tally = Events(), Tally()
+        self._events, self.tally = Events(1e-9 * unix_zero_ns()), Tally()
         self._last_mode = self._last_complaint = ""
         self._weak: list[str] = []
         self._shown: Status | None = None
@@ -120,13 +120,13 @@ class SessionManager:
         self._control.send(message)
 
     @property
-    def events(self) -> Sequence[str]:
+    def events(self) -> Sequence[LoggedEvent]:
         """What people should see, newest first."""
         return self._events.shown
 
     def log_event(self, text: str, of: str = "") -> None:
         """An event that people should see, and the log keep; see `Events.add`."""
-        if said := self._events.add(text, of, now()):
+        if said := self._events.add(text, now(), of):
             log.info("%s", said)
 
     def _keep_deed(self, deed: Deed) -> None:

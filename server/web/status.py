@@ -17,7 +17,14 @@ from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
 from server.phone.phone_session import PhoneSession
 from server.protocol.lead_messages import LeadingStatus
-from server.protocol.messages import Estimate, GapCount, Status, Stream, VirtualCameraStatus
+from server.protocol.messages import (
+    Estimate,
+    GapCount,
+    LoggedEvent,
+    Status,
+    Stream,
+    VirtualCameraStatus,
+)
 from server.recording.control import Recordings
 from server.security.security import UNSAVED
 from server.web.people import People
@@ -40,7 +47,7 @@ class StatusSource(Protocol):
     people: People
 
     @property
-    def events(self) -> Sequence[str]:
+    def events(self) -> Sequence[LoggedEvent]:
         """Newest first."""
 
     @property
@@ -85,7 +92,7 @@ def build(manager: StatusSource) -> Status:
         supervisors=len(manager.supervisors),
         realtime=control.realtime if control else "",
         control=_control(control),
-        messages=list(manager.events),
+        events=list(manager.events),
         virtual_camera=_virtual_camera(control),
         estimate=_estimate(control),
         camera=health(phone.vision.front_end)
@@ -102,6 +109,8 @@ def build(manager: StatusSource) -> Status:
         people=manager.people.present(),
         leading=_leading(manager.robot, control),
         takes="thrusts" if manager.robot.twist is None else "twist",
+        thrusts_n=[round(f, 2) for f in control.thrusts] if control and not silence else [],
+        thrust_limit_n=manager.robot.f_max,
         told_mm_s=commanded_mm_s,
         told_deg_s=commanded_deg_s,
     )

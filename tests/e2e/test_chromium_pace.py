@@ -65,9 +65,9 @@ def test_pictures_become_fewer_then_smaller_and_the_robot_is_seen_at_every_size(
         phone.page.select_option("#path-wish", "WebSocket")
         wait_for(server, phone, lambda s: s["video_path"] == "websocket, H264" and s["leds"] == 5)
         phone.play(2.0)
-        said = server.request("GET", "/api/status")["messages"]
+        said = server.request("GET", "/api/status")["events"]
         assert isinstance(said, list)
-        assert any("can’t keep up" in words for words in said)
+        assert any("can’t keep up" in event["text"] for event in said)
         recording = read(Path(str(server.request("DELETE", "/api/recording")["path"])))
     bodies = [decode(data).body for _, data in recording.phone_records()]
     sizes = [(b.width, b.height, b.shrunk) for b in bodies if isinstance(b, Picture)]

@@ -35,6 +35,26 @@ OUTSIDE = """
   }).map((one) => one.textContent.trim());
 }
 """
+TELLING = [
+    *("#status", "#stop", ".scene", ".phone", ".arming", ".events"),
+    *(".tracking", ".latency", ".thrusts", ".streams"),
+]
+BELOW = """
+(selectors) => selectors.filter((selector) => {
+  const one = document.querySelector(selector);
+  const box = one.getBoundingClientRect();
+  return box.height < 50 || box.bottom > innerHeight || box.right > innerWidth
+    || one.scrollHeight > one.clientHeight + 1;
+})
+"""
+"""Which of them reach below the first screen, or hide a part of themselves."""
+STREAMS = """
+(rows) => document.getElementById('streams').replaceChildren(...rows.map((cells) => {
+  const row = document.createElement('tr');
+  for (const text of cells) row.insertCell().textContent = text;
+  return row;
+}))
+"""
 NAMES = [
     *("NIS / dof", "Age", "Rejected", "Fused", "Dropped", "Late", "Offset", "σ offset"),
     *("σ pos.", "σ att.", "Readout", "σ readout", "Larger", "Held", "Exposed"),
@@ -69,6 +89,19 @@ def supervisor(context: BrowserContext, size: tuple[int, int]) -> Page:
 def test_the_phone_cards_buttons_stay_in_it(context: BrowserContext, size: tuple[int, int]) -> None:
     page = supervisor(context, size)
     assert page.evaluate(OUTSIDE, ".card.phone > footer") == []
+    page.close()
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (1366, 768), (1440, 900), (1920, 1080)])
+def test_all_that_tells_is_on_the_first_screen(
+    context: BrowserContext, size: tuple[int, int]
+) -> None:
+    page = supervisor(context, size)
+    for name, rows in (("thrusts", 8), ("stages", 8)):
+        page.evaluate(FILL, [name, [(str(n), "12.3") for n in range(rows)]])
+    page.evaluate(STREAMS, [["Phone motion", "142 ms", "", "200 Hz", "0"]] * 6)
+    assert page.evaluate(BELOW, TELLING) == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     page.close()
 
 

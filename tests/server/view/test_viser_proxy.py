@@ -108,6 +108,7 @@ def test_the_page_is_the_viewers_own_with_its_own_policy(path):
     response = client().get(path)
     assert response.status_code == 200
     assert "<html" in response.text
+    assert ".mantine-Paper-root { display: none !important }</style></head>" in response.text
     assert response.headers["content-type"].startswith("text/html")
     assert "frame-ancestors 'self'" in response.headers["content-security-policy"]
     assert "*" not in response.headers["content-security-policy"]

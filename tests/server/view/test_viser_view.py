@@ -171,6 +171,14 @@ def test_the_scene_follows_the_status(dashboard):
     assert dashboard._phone.visible
 
 
+def test_before_there_is_a_phone_a_grey_robot_is_shown_at_rest(dashboard):
+    dashboard.show(status(R_fc_wxyz=None), None)
+    assert dashboard._robot.visible
+    assert np.allclose(dashboard._robot.position, (AMES.start.distance, 0.0, -AMES.start.above))
+    assert not dashboard._command.visible
+    assert not dashboard._phone.visible
+
+
 def test_a_robot_without_a_cable_is_shown_with_its_thrusts(tmp_path):
     dashboard = Dashboard(QUADROTOR.robot, QUADROTOR.plant, QUADROTOR.start, tmp_path / "view.sock")
     dashboard.show(status(thrusts=[2.0, 3.0, 4.0, 5.0]), None)

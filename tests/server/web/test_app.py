@@ -76,7 +76,7 @@ def test_a_stop_reaches_control_from_either_role(house, client, role):
     answer = client.post("/api/stop", headers={"Authorization": f"Bearer {token[role]}"})
     assert answer.status_code == 202
     assert any(map(is_request("stop"), house.control.inputs()))
-    assert list(house.manager.events) == [f"local program ({role}): stop"]
+    assert [event.text for event in house.manager.events] == [f"local program ({role}): stop"]
 
 
 def test_a_stop_by_request_is_told_what_the_robot_does(house, client):

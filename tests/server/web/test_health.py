@@ -51,7 +51,7 @@ def test_a_disk_that_fills_up_ends_the_recording_which_is_readable_and_people_ar
     recorder._thread.join(5.0)
     manager._tick()
     assert manager.recordings.name == ""
-    assert any("only 255 MB are left" in said for said in manager.events)
+    assert any("only 255 MB are left" in event.text for event in manager.events)
     assert next(tmp_path.rglob(f"{name}.mcap")).stat().st_size > 0
     monkeypatch.setattr(writer, "shutil", shutil)
     heard = manager.status.t

@@ -96,7 +96,7 @@ def test_each_page_is_told_how_the_hand_leads_and_who_chose_it(tmp_path):
             wanted = msgspec.to_builtins(LeadingStatus(0.25, "all", 0.5, "shift", any=True))
             for one in (page, watcher):
                 await one.until("status", leading=wanted)
-        assert any("0.5 times as far, shift" in text for text in house.manager.events)
+        assert any("0.5 times as far, shift" in event.text for event in house.manager.events)
 
     with house_in(tmp_path) as house:
         asyncio.run(scene(house))

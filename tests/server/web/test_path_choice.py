@@ -18,7 +18,7 @@ def chosen(wish: str, by: str) -> dict[str, str]:
 
 
 def told(manager: SessionManager) -> list[str]:
-    return [event for event in manager.events if event.startswith("pictures")]
+    return [event.text for event in manager.events if event.text.startswith("pictures")]
 
 
 def test_a_supervisors_choice_goes_to_the_page_and_the_operators_next_one_wins(tmp_path):

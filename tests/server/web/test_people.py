@@ -189,7 +189,7 @@ def test_a_full_disk_keeps_nobody_in_who_was_shut_out_and_ends_no_server(house, 
             await house.manager.handover.shut_out(anna.member.id, "stolen", sup)
             assert await page.closed() == REVOKED
             await house.control_hears(is_request("disarm"))
-        assert any("The disk takes nothing" in event for event in house.manager.events)
+        assert any("The disk takes nothing" in event.text for event in house.manager.events)
         assert any("The disk takes nothing" in text for text in build(house.manager).warnings)
         house.doors.clock = lambda: now() + WAIT_S
         await house.manager.handover.expire()
@@ -210,7 +210,7 @@ def test_a_revocation_that_could_not_be_written_down_is_written_once_the_disk_ta
         store.parent.mkdir()
         await eventually(store.exists)
         assert Doors(store=store).pairings.book.members[anna.member.id].state == "revoked"
-        await eventually(lambda: "written down again" in house.manager.events[0])
+        await eventually(lambda: "written down again" in house.manager.events[0].text)
         assert not build(house.manager).warnings
 
     play(house, scene)

@@ -252,7 +252,7 @@ def test_the_page_that_watches_is_told_who_leads_what_lacks_and_that_control_is_
             async with server.operator("one\x1b[31m phone"):
                 status = await watcher.until("status", phones=1)
                 assert any(
-                    words.endswith(" leads: one·[31m phone.") for words in status["messages"]
+                    event["text"].endswith(" leads: one·[31m phone.") for event in status["events"]
                 )
 
     play(server, scene)
@@ -310,7 +310,7 @@ def test_a_hub_whose_control_is_gone_says_that_a_stop_did_not_arrive(server, mon
         async with server.supervisor() as watcher:
             await watcher.say(type="command", what="stop")
             manager: SessionManager = server.manager
-            await eventually(lambda: any("did not reach" in text for text in manager.events))
+            await eventually(lambda: any("did not reach" in event.text for event in manager.events))
 
     play(server, scene)
 

@@ -31,6 +31,14 @@ export function age(ms) {
 }
 
 /**
+ * As the clock on the wall shows it.
+ * @param {number} unixMs
+ */
+export function timeOfDay(unixMs) {
+  return new Date(unixMs).toLocaleTimeString([], { hour: '2-digit', minute: '2-digit', second: '2-digit', hour12: false });
+}
+
+/**
  * How worrying an age is, by the timers of the failsafe machine.
  * @param {number | null} ms
  * @returns {'' | 'warn' | 'bad'}

@@ -6,7 +6,7 @@
 
 import { Elements, write } from './elements.js';
 import { modeWords, rampWords } from '../ui/mode_words.js';
-import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from './format.js';
+import { age, alarm, gapLine, metres, number, scaleEnd, streamName, timeOfDay } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
 import { REMEMBERED, beforeArming, requests, shownMode } from './model.js';
@@ -16,6 +16,8 @@ import { REMEMBERED, beforeArming, requests, shownMode } from './model.js';
 
 const ERROR_COLOUR = '#7cc4ff';
 const SIGMA_COLOUR = '#fbbf24';
+/** Of the limit: what is more, is at it. */
+const FULL = 0.99;
 
 export class BoardView extends Elements {
   /**
@@ -24,6 +26,7 @@ export class BoardView extends Elements {
    */
   constructor(document, handlers) {
     super(document);
+    this.shownEvents = '';
     for (const what of /** @type {const} */ (['arm', 'disarm', 'reset'])) {
       this.find(what).addEventListener('click', () => handlers.onRequest(what));
     }
@@ -53,9 +56,23 @@ export class BoardView extends Elements {
     for (const [name, stream] of Object.entries(status.streams)) this.stream(name, stream);
     this.tracking(status, board);
     this.latency(status.latency_ms);
+    this.told(status);
     this.control(status);
-    this.list('events', status.messages);
+    this.events(status.events);
     this.text('gaps', gapLine(status.gaps));
+  }
+
+  /** @param {Status['events']} events */
+  events(events) {
+    const key = JSON.stringify(events);
+    if (key === this.shownEvents) return;
+    this.shownEvents = key;
+    this.find('events').replaceChildren(...events.map(({ text, times, unix_ms: at }) => {
+      const line = this.make('li', '');
+      line.append(this.make('time', timeOfDay(at)), this.make('span', text));
+      if (times > 1) line.append(this.make('small', `× ${times}`));
+      return line;
+    }));
   }
 
   /** @param {Board} board */
@@ -139,7 +156,6 @@ export class BoardView extends Elements {
     this.figure('figures', 'Distance', number(metres(status.position_mm), 2), 'm');
     this.figure('figures', 'Lights', String(status.leds), '');
     this.figure('figures', 'Misfit', number(status.reprojection_px, 2), 'px');
-    this.show('saturated', status.saturated);
     this.graph('graph-mm', [
       { values: history.map((sample) => sample.sigmaMm), colour: SIGMA_COLOUR },
       { values: history.map((sample) => sample.errorMm), colour: ERROR_COLOUR },
@@ -176,15 +192,29 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  control({ realtime, control, server, takes, told_mm_s: speed, told_deg_s: rate }) {
+  told({ takes, saturated, thrusts_n: thrusts, thrust_limit_n: limit, told_mm_s: speed, told_deg_s: rate }) {
+    this.show('saturated', saturated);
+    this.text('told', takes === 'twist' ? 'Twist' : 'Thrusts');
+    thrusts.forEach((thrust, i) => {
+      const row = this.row('thrusts', String(i + 1), 'div', () => [
+        this.make('dt', String(i + 1)), this.make('i', ''), this.make('dd', ''),
+      ]);
+      row.style.setProperty('--share', `${(thrust / limit) * 100}%`);
+      row.classList.toggle('full', thrust >= FULL * limit);
+      write(row.lastElementChild, `${number(thrust, 2)} N`);
+    });
+    if (takes !== 'twist') return;
+    this.figure('twist', 'Told to move', number(speed, 0), 'mm/s');
+    this.figure('twist', 'Told to turn', number(rate, 1), '°/s');
+  }
+
+  /** @param {Status} status */
+  control({ realtime, control, server }) {
     this.text('realtime', realtime || '–');
     this.figure('control', 'p50', number(control.p50_ms, 2), 'ms');
     this.figure('control', 'p99', number(control.p99_ms, 2), 'ms');
     this.figure('control', 'p99.9', number(control.p999_ms, 2), 'ms');
     this.figure('control', 'Missed', number(control.missed), '');
     this.figure('control', 'Server pause', number(server.stall_ms, 0), 'ms');
-    if (takes !== 'twist') return;
-    this.figure('control', 'Told to move', number(speed, 0), 'mm/s');
-    this.figure('control', 'Told to turn', number(rate, 1), '°/s');
   }
 }

@@ -125,6 +125,14 @@
  */
 
 /**
+ * What people should see.
+ * @typedef {object} LoggedEvent
+ * @property {string} text
+ * @property {number} unix_ms When it happened, for the last time.
+ * @property {number} times How often, as far as it is remembered.
+ */
+
+/**
  * How the virtual camera smooths the turns of the phone.
  * @typedef {object} RuntimeParameters
  * @property {number} cutoff_hz −3 dB of the low pass [Hz].
@@ -230,7 +238,7 @@
  * @property {number} supervisors
  * @property {string} realtime Class of the control loop: what holds its schedule.
  * @property {Record<string, number>} control Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms.
- * @property {string[]} messages The newest events, newest first.
+ * @property {LoggedEvent[]} events What people should see, the newest first.
  * @property {VirtualCameraStatus | null} virtual_camera null before the control process has told of it.
  * @property {Estimate | null} estimate null before the control process has told of it.
  * @property {CameraHealth | null} camera Of the operator's phone; null while nobody looks through it.
@@ -245,6 +253,8 @@
  * @property {Person[]} people Who is paired, in the order they came.
  * @property {LeadingStatus | null} leading null before the control process has told of it.
  * @property {'thrusts' | 'twist'} takes What the robot is told: by its thrusters, or a velocity that it follows by itself.
+ * @property {number[]} thrusts_n What each thruster is told ...
+ * @property {number} thrust_limit_n ... and the most that one may be.
  * @property {number | null} told_mm_s The speed that a robot is told that takes a twist ...
  * @property {number | null} told_deg_s ... and how fast to turn.
  */
