@@ -109,10 +109,13 @@ test('every mode’s words stand out from its ground by 4.5 or more', () => {
   assert.ok(checked >= 7);
 });
 
-test('STOP is grey and black, never red on yellow: a page is no emergency stop', () => {
+test('STOP is red, white and black, never on yellow: a page is no emergency stop', () => {
   const rules = [...read('style.css').matchAll(/^\.stop[^{]*\{([^}]*)\}/gm)].map(([, rule]) => rule ?? '').join();
+  const grounds = [...rules.matchAll(/background: (#\w{6})/g)].map(([, colour]) => colour ?? '');
+  assert.equal(grounds.length, 2);
+  for (const ground of grounds) assert.ok(1.05 / (luminance(ground) + 0.05) >= 4.5, ground);
   for (const [colour] of rules.matchAll(/#\w{6}/g)) {
-    const [r, g, b] = [1, 3, 5].map((at) => colour.slice(at, at + 2));
-    assert.ok(r === g && g === b, colour);
+    const [r = 0, g = 0, b = 0] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+    assert.ok((r === g && g === b) || (r > 2 * g && r > 2 * b), colour);
   }
 });

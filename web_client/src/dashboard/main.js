@@ -6,13 +6,16 @@
 /** @import {Invite} from './phone_card.js' */
 /** @import {Role} from '../wire/pairing.js' */
 
+import { Alarm } from './alarm.js';
 import { browserOf } from '../app/browser.js';
 import { BoardView } from './view.js';
 import { ChoiceCard } from '../ui/choice_card.js';
 import { EstimatePanel } from './estimate.js';
-import { EMPTY, reduce } from './model.js';
+import { EMPTY, reduce, shownMode } from './model.js';
+import { Feedback } from '../ui/feedback.js';
 import { KnobPanel } from './runtime_parameters.js';
 import { LeadingChoice } from '../ui/leading_choice.js';
+import { modeWords } from '../ui/mode_words.js';
 import { ServerTime, WakefulClock, commandOf } from '../wire/command.js';
 import { Link, socketUrl } from '../wire/link.js';
 import { PathSelect } from './path_select.js';
@@ -67,6 +70,8 @@ const leading = new LeadingChoice(document, (lead) => void link.sendMessage(lead
 const path = new PathSelect(document, (choice) => void link.sendMessage(choice), () => performance.now());
 const estimate = new EstimatePanel(document);
 const choice = new ChoiceCard(document);
+const feedback = new Feedback(window.navigator, window.AudioContext, true);
+const alarm = new Alarm(document, (mode) => feedback.signal(mode));
 const card = new PhoneCard(document, URL, fetchInvite);
 const people = new PeopleCard(document, (deed, { id, code }) => void request('POST', `api/people/${deed}`, { id, code }), () => performance.now());
 
@@ -79,6 +84,8 @@ function dispatch(event) {
   requestAnimationFrame(() => {
     shown = false;
     const { problem } = board;
+    const mode = shownMode(board);
+    alarm.take(mode, modeWords(mode, board.status)[0], performance.now());
     view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
     estimate.render(board);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);
@@ -176,6 +183,7 @@ async function arrive() {
   }
 }
 
+window.addEventListener('pointerdown', () => feedback.unlock());
 void arrive().then(() => {
   window.setInterval(() => {
     if (board.linked) {

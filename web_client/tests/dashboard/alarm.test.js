@@ -1,0 +1,37 @@
+/** The supervisor's alarm: what it says in the title, and how long it sounds. */
+
+/** @import {ShownMode} from '../../src/ui/session_types.js' */
+
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import { Alarm } from '../../src/dashboard/alarm.js';
+
+/** @param {[ShownMode, number][]} modes */
+function heard(modes) {
+  const page = { title: '' };
+  /** @type {ShownMode[]} */
+  const signals = [];
+  const alarm = new Alarm(page, (mode) => signals.push(mode));
+  for (const [mode, now] of modes) alarm.take(mode, mode, now);
+  return { signals, title: page.title };
+}
+
+test('RAMP and LOST sound at once and again while they last, other modes do not', () => {
+  const { signals, title } = heard([
+    ['TRACK', 0], ['COAST', 100], ['RAMP', 200], ['RAMP', 300], ['RAMP', 3200], ['LOST', 3300], ['LOST', 6299],
+  ]);
+  assert.deepEqual(signals, ['RAMP', 'RAMP', 'LOST']);
+  assert.equal(title, '⚠ LOST · Lightleash');
+});
+
+test('a fault that is over is silent, and sounds at once when it comes back', () => {
+  const { signals, title } = heard([['RAMP', 0], ['DISARMED', 10], ['DISARMED', 9000], ['RAMP', 9010], ['TRACK', 9020]]);
+  assert.deepEqual(signals, ['RAMP', 'RAMP']);
+  assert.equal(title, 'TRACK · Lightleash');
+});
+
+test('a page that is left alone with a fault falls silent after a minute', () => {
+  /** @type {[ShownMode, number][]} */
+  const hour = Array.from({ length: 36_000 }, (_, i) => ['LOST', 100 * i]);
+  assert.equal(heard(hour).signals.length, 20);
+});
