@@ -30,6 +30,8 @@ BEYOND: Final = 100.0
 """... and so far no bias moves anything from one picture to the next: the picture lies."""
 FARTHEST: Final = 5.0
 """Times what a bias may be at a start it may step at most."""
+STEPPED: Final = 2.0
+"""Times what it may be at a start, and nobody who walks or trembles makes it seem so."""
 AGAIN_S: Final = 3.0
 """Moved again so soon, it did not step: it walks."""
 FADE_S: Final = 5.0
@@ -49,6 +51,8 @@ class BiasSteps:
         """Densities of random walks beside the configured ones [unit²/s]."""
         self.t_moved = np.full(4, -inf)
         """When each sensor was last found to have moved [s]."""
+        self.t_stepped = np.full(4, -inf)
+        """When by so much that it can't be chance."""
         self._forget(-inf)
 
     def _forget(self, t: float) -> None:
@@ -86,6 +90,8 @@ class BiasSteps:
             if 0.0 < since < AGAIN_S:
                 self.walks[k] = max(self.walks[k], by[k] * by[k] / since)
             self.t_moved[k] = t
+            if FARTHEST * by[k] > STEPPED * self._most[k]:
+                self.t_stepped[k] = t
         self._forget(t)
         return by
 

@@ -61,6 +61,8 @@ class Health:
     """Phone gyroscope (3,) [rad/s]."""
     bias_a_c: Array = field(default_factory=_unknown)
     """Phone accelerometer (3,) [m/s²]."""
+    doubts: tuple[str, ...] = ()
+    """What of the sensors is believed less than configured, each in words."""
 
 
 class Estimator(Protocol):

@@ -27,6 +27,7 @@ from pipeline.estimation.relative_start import (
 )
 from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_imu_sample
+from pipeline.estimation.sensor_doubts import sensor_doubts
 from pipeline.estimation.spot_noise import SpotNoise
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, log
@@ -94,11 +95,6 @@ class RelativeFilter:
             self.samples_late += 1
         elif not self._track.insert(stream, t, rate, force):
             self.samples_duplicate += 1
-
-    @property
-    def samples_clipped(self) -> int:
-        """Samples of which an axis was cut off: not believed there."""
-        return self._track.clipped
 
     def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Fuse the LEDs of a picture when it was taken; tells, and counts, what became of it."""
@@ -307,6 +303,14 @@ class RelativeFilter:
             bias_a_b=biases[1],
             bias_omega_c=biases[2],
             bias_a_c=biases[3],
+            doubts=sensor_doubts(
+                newest.t,
+                self._t_start,
+                self._track.t_clipped.ravel(),
+                self._bias_steps.t_stepped,
+                self._track.body_noise,
+                self._spot_noise.factor,
+            ),
         )
 
 

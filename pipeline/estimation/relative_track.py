@@ -47,8 +47,8 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         self._walks, self._calm = walks_of(config), walks_of(config)
         self._hand, self._phone_factor = HandPredictor(config.hand), 1.0
         self._scales = [[FullScale(loud) for loud in LOUD] for _ in range(2)]
-        self.clipped = 0
-        """Samples of which a sensor said as much as it can."""
+        self.t_clipped = np.full((2, 2), -np.inf)
+        """When each sensor last said as much as it can, by device [s]."""
         self._noise = noise_of(config)
         self._configured = self._noise[:, :3].copy()
         self._heard = [SampleNoise(sigmas) for sigmas in self._configured[:, 0]]
@@ -68,11 +68,17 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
             zip(self._scales[device], (rate, force), strict=True)
         ):
             if scale.hear(sample):
-                self.clipped += 1
+                self.t_clipped[device, sensor] = max(t, self.t_clipped[device, sensor])
             self._noise[device, 3, sensor] = scale.limit
         self._heard[device].add(t, rate, force)
         self._set_sample_noise(device)
         return True
+
+    @property
+    def body_noise(self) -> Array:
+        """(2,) how far samples of the robot's sensors scatter, by the configured noise."""
+        noise: Array = self._heard[0].levels[:, 0] / self._configured[0, 0]
+        return noise
 
     def doubt_phone(self, factor: float) -> None:
         """From now on the variances of the phone's samples are so many times the configured."""

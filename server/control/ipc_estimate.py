@@ -35,6 +35,8 @@ class EstimateFields(msgspec.Struct, array_like=True, frozen=True):
     """Phone gyroscope [rad/s]."""
     bias_a_c: Triple | None
     """Phone accelerometer [m/s²]."""
+    doubts: list[str] = []
+    """What of the sensors is believed less than configured, each in words."""
 
     @classmethod
     def of(
@@ -57,6 +59,7 @@ class EstimateFields(msgspec.Struct, array_like=True, frozen=True):
             bias_a_b=_finite_triple(health.bias_a_b),
             bias_omega_c=_finite_triple(health.bias_omega_c),
             bias_a_c=_finite_triple(health.bias_a_c),
+            doubts=list(health.doubts),
         )
 
 

@@ -224,6 +224,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """By side: `phone` (or its link), `robot` (its link), `server` (its computer stood still)."""
     warnings: list[str] = []
     """What who arms should know, each in words; refuses nothing."""
+    sensors_doubted: list[str] = []
+    """What of motion sensors and LEDs is believed less than usual, each in words."""
     thrusters_weak: list[str] = []
     """Each thruster that does not give what it is told, in words; arming is refused."""
     server: dict[str, float] = {}

@@ -87,7 +87,7 @@ class SessionManager:
         self.control_meter = Meter()
         self._events, self.tally = Events(1e-9 * unix_zero_ns()), Tally()
         self._last_mode = self._last_complaint = ""
-        self._weak: list[str] = []
+        self._unfit: set[str] = set()
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
         """What the phone saw, for the 3D view."""
@@ -331,9 +331,10 @@ class SessionManager:
         if complaint not in ("", self._last_complaint):
             self.log_event(complaint)
         self._last_complaint = complaint
-        for weak in set(status.thrusters_weak) - set(self._weak):
-            self.log_event(weak)
-        self._weak = status.thrusters_weak
+        unfit = {*status.thrusters_weak, *status.sensors_doubted}
+        for said in unfit - self._unfit:
+            self.log_event(said)
+        self._unfit = unfit
         self._shown = status
         self.tally.see(status)
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):

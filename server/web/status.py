@@ -104,6 +104,9 @@ def build(manager: StatusSource) -> Status:
         resumes=control is not None and control.resumes,
         gaps={side: GapCount(one.count, 1e3 * one.longest_s) for side, one in gaps.items()},
         warnings=[*warnings(gaps), *([UNSAVED] if manager.people.doors.is_unsaved else [])],
+        sensors_doubted=control.estimate.doubts
+        if control is not None and control.estimate is not None
+        else [],
         thrusters_weak=control.thrusters_weak if control is not None else [],
         server=manager.pauses.figures(),
         people=manager.people.present(),

@@ -23,7 +23,7 @@ def status(mode):
     flags = {"ready": True, "saturated": False, "resumes": False}
     tables: dict[str, object] = {
         **{name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")},
-        **{name: [] for name in ("refusals", "messages", "warnings", "thrusters_weak", "people")},
+        **{name: [] for name in ("refusals", "events", "warnings", "thrusters_weak", "people")},
     }
     words = {"mode": mode, "takes": "thrusts"}
     return Status(**fields | numbers | texts | flags | tables | words)

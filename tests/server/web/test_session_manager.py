@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from dataclasses import replace
 
+import msgspec
 import pytest
 
 from pipeline.prediction import Prediction
@@ -20,7 +21,7 @@ from server.security.pairings import of_this_machine
 from server.web import session_manager as hub_module
 from server.web.lease import LEASE_S
 from tests.pipeline.seeing import CAMERA
-from tests.server.house import JPEG, control_status, house_in, is_request
+from tests.server.house import JPEG, control_status, estimate_fields, house_in, is_request
 
 
 class Paper:
@@ -257,6 +258,17 @@ def test_a_change_of_mode_is_an_event_and_every_page_is_told(house):
     house.manager._tick()
     assert [event.times for event in house.manager.events if "STOPPED" in event.text] == [1]
     assert '"mode":"STOPPED"' in watcher.data[-1]
+
+
+def test_what_is_doubted_of_the_sensors_is_told_and_is_one_event_while_it_lasts(house):
+    watcher, said = Paper(), "The robot's gyroscope is much noisier than usual."
+    house.manager.supervisors.add(watcher)
+    for doubts in ([said], [said], [], [said]):
+        house.control.send(control_status(estimate=estimate_fields(doubts=doubts)))
+        house.manager._receive_status()
+        house.manager._tick()
+        assert msgspec.json.decode(watcher.data[-1])["sensors_doubted"] == doubts
+    assert [event.times for event in house.manager.events if event.text == said] == [2]
 
 
 class Eyes:

@@ -106,8 +106,8 @@ export class BoardView extends Elements {
     this.find('ready').className = `badge ${tone}`;
     this.list('refusals', lines);
     this.find('refusals').firstElementChild?.classList.toggle('fine', fine);
-    const { mode, thrusters_weak: weak, warnings } = status;
-    this.list('warnings', mode === 'DISARMED' ? warnings : [...weak, ...warnings]);
+    const { mode, sensors_doubted: doubted, thrusters_weak: weak, warnings } = status;
+    this.list('warnings', [...(mode === 'DISARMED' ? [] : weak), ...doubted, ...warnings]);
   }
 
   /** @param {Status} status */

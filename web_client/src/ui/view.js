@@ -165,7 +165,8 @@ export class View {
     const calm = mode === 'DISARMED' || mode === 'ARMED';
     // a weak thruster is news in flight; on the ground it stands among the refusals
     const known = (calm ? state.status?.warnings : state.status?.thrusters_weak) ?? [];
-    this.list('warnings', state.standby ? [] : known, MOST_WARNINGS);
+    const doubted = state.status?.sensors_doubted ?? [];
+    this.list('warnings', state.standby ? [] : [...known, ...doubted], MOST_WARNINGS);
   }
 
   /** @param {{ seconds: number, share: number } | null} left Until RAMP. */

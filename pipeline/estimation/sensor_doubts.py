@@ -1,0 +1,55 @@
+"""What of motion sensors and LEDs is believed less than configured, in words.
+
+The filter has allowed for it; who leads the robot should know, for its place is known less exactly.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from pipeline.frames import Array
+
+ROBOTS: Final = ("The robot's gyroscope", "The robot's accelerometer")
+SENSORS: Final = (*ROBOTS, "The phone's gyroscope", "The phone's accelerometer")
+"""In the order of the filter's biases."""
+KINDS: Final = ("A gyroscope", "An accelerometer")
+SAID_S: Final = 3.0
+"""What happens at once is said for so long."""
+LEARNS_S: Final = 5.0
+"""In which biases that are as at the start move, too."""
+NOISY: Final = 4.0
+"""Times the configured noise of a sample. Of the robot's alone: at 60 Hz a hand is as rough."""
+INEXACT: Final = 4.0
+"""Times the variance that a picture tells of its LEDs: by chance it is 1.5 now and then."""
+
+
+def sensor_doubts(
+    t: float, t_start: float, t_clipped: Array, t_stepped: Array, noise: Array, spot_noise: float
+) -> tuple[str, ...]:
+    """Sentences, one for each doubt at `t` [s].
+
+    Args:
+        t: Now.
+        t_start: When the filter began to learn.
+        t_clipped: When each sensor last said as much as it can (4,) [s].
+        t_stepped: When its bias last stepped (4,) [s].
+        noise: Of the robot's samples, by the configured (2,).
+        spot_noise: Factor of the variances of LEDs' rays.
+    """
+
+    def since(t_last: Array) -> list[int]:
+        return np.flatnonzero(t - t_last < SAID_S).tolist()
+
+    clipped = [f"{SENSORS[k]} is moved beyond the end of its range." for k in since(t_clipped)]
+    jumped = since(t_stepped) if t - t_start > LEARNS_S else ()
+    kinds = sorted({k % 2 for k in jumped})  # which of the two can hardly be told
+    stepped = [f"{KINDS[k]} of the robot or the phone seems to have another bias." for k in kinds]
+    noisy = [
+        f"{sensor} is much noisier than usual."
+        for sensor, ratio in zip(ROBOTS, noise, strict=True)
+        if ratio > NOISY
+    ]
+    inexact = ["LEDs are seen much less exactly than usual."] if spot_noise > INEXACT else []
+    return (*clipped, *stepped, *noisy, *inexact)

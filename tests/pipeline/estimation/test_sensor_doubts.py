@@ -1,0 +1,70 @@
+"""What is doubted is said, of the sensor that is at fault, and of none that only a hand moves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hardware.sim.measured_hands import MEASURED
+from hardware.sim.world.sensor_faults import ImuFault
+from hardware.sim.world.sensors import feed
+from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
+from pipeline.estimation.relative_filter import RelativeFilter
+from pipeline.estimator_config import RelativeConfig
+
+ASKED_S = 0.1
+SHAKEN = "The phone's accelerometer is moved beyond the end of its range."
+
+
+def said(options: WorldOptions) -> list[tuple[float, tuple[str, ...]]]:
+    """All doubts of a flight, ten times a second, with their times [s]."""
+    estimator, world, told, due = (
+        RelativeFilter(RelativeConfig(), LEDS_IN_B),
+        World(options),
+        [],
+        0.0,
+    )
+    for now, _ in feed(estimator, world):
+        if now >= due:
+            due = now + ASKED_S
+            told.append((now, estimator.health.doubts))
+    return told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hand", ["", *sorted(set(MEASURED) - {"shaken", "trembling_13_hz"})])
+def test_of_sound_sensors_nothing_is_said(hand: str) -> None:
+    assert {words for _, words in said(WorldOptions(seed=3, duration=8.0, hand=hand))} == {()}
+
+
+@pytest.mark.slow
+def test_a_shaken_phone_is_said_to_be_while_it_is_and_three_seconds_more() -> None:
+    told = said(WorldOptions(seed=5, duration=12.0, hand="shaken"))
+    times = [t for t, words in told if SHAKEN in words]
+    assert times
+    assert {words for _, words in told} == {(), (SHAKEN,)}
+    assert told[-1][1] == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "begins", "words"),
+    [
+        ({"body_fault": ImuFault(noise=20.0)}, 0.0, "The robot's accelerometer is much noisier"),
+        ({"body_fault": ImuFault(noise=20.0)}, 0.0, "The robot's gyroscope is much noisier"),
+        ({"pixel_noise": 2.5}, 0.0, "LEDs are seen much less exactly"),
+        ({"phone_fault": ImuFault(step=(0.05, 0.0), start=6.0)}, 6.0, "A gyroscope of the robot"),
+        (
+            {"body_fault": ImuFault(step=(0.0, 0.5), start=6.0)},
+            6.0,
+            "An accelerometer of the robot",
+        ),
+    ],
+)
+def test_a_fault_is_said_within_four_seconds(
+    fault: dict[str, Any], begins: float, words: str
+) -> None:
+    told = said(WorldOptions(seed=2, duration=11.0, **fault))
+    times = [t for t, doubts in told if any(one.startswith(words) for one in doubts)]
+    assert begins < times[0] < begins + 4.0
