@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, radians
 from typing import Final
 
 import numpy as np
@@ -22,6 +23,9 @@ from pipeline.frames import Array
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, Mode, VirtualView
 
+TUMBLED: Final = cos(radians(60.0))
+"""Cosine of the lean from which a robot in the air falls, whatever its thrusters do: as autopilots
+have it (PX4's FD_FAIL_R)."""
 MEAN_S: Final = 0.5
 """Of the force that a doubt begins with: the estimate was right for most of it."""
 
@@ -39,6 +43,7 @@ class ThrustActing:
         # what stands on the floor brakes and stays by itself
         self._can_stay = robot.hangs or robot.weight_to_carry > 0.0
         self._stays, self._hangs, self._in_doubt = self._can_stay, robot.hangs, False
+        self._flies, self._tumbled = robot.needs_tilt, False
         self._place = SuspendedPlace(robot)
         self._leash = leash_of(robot, config.leash)
         self._force_in_b = self._mean_force_in_f = np.zeros(3)
@@ -155,6 +160,7 @@ class ThrustActing:
             )
         if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
             self._tracking.reset()
+        self._tumbled = False
         # a supervisor's reset: somebody has looked at the robot
         if before == Mode.STOPPED and self._thruster_health.words:
             self._thruster_health.reset()
@@ -185,6 +191,10 @@ class ThrustActing:
             self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, accelerometer_bias_in_b, now.h)
         elif mode in (Mode.COAST, Mode.HOLD, Mode.RAMP):
             wrench_in_b = self._hold.wrench(omega_m_bf_in_b, now.h)
+            # it falls, or lies there: thrust that is to fade for seconds only throws it about
+            self._tumbled |= self._flies and mode == Mode.RAMP and self._hold.R_fb[2, 2] < TUMBLED
+            if self._tumbled:
+                return Acted(np.zeros_like(self._thrusts), saturated=True)
             # what is no place any more does not become one again: where it went meanwhile is lost
             self._stays = self._stays and not self._is_astray
             if mode == Mode.COAST and self._stays:

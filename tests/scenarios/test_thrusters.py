@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
@@ -53,6 +54,19 @@ def test_after_a_dead_thruster_arming_is_refused_until_somebody_resets() -> None
     output = loop.advance()
     assert output.thrusters == ()
     assert refusal not in output.refusals
+
+
+@pytest.mark.parametrize("thruster", range(4))
+def test_a_quadrotor_without_a_thruster_comes_down_where_it_was_and_is_still(thruster: int) -> None:
+    loop = flying("quadrotor", 8.0)
+    plant, failed = loop.follower.plant, loop.t
+    p_in_f, pushed = plant.p_bf_in_f.copy(), 0.0
+    plant.thruster_health[thruster] = 0.0
+    while loop.t < failed + 5.0:
+        if loop.advance().thrusts.any():
+            pushed = loop.t
+    assert pushed < failed + 1.0
+    assert np.linalg.norm(plant.p_bf_in_f[:2] - p_in_f[:2]) < 1.0
 
 
 def test_a_quadrotor_with_a_weak_thruster_is_told_and_flies_on() -> None:
