@@ -33,6 +33,7 @@ from pipeline.config import FailsafeConfig
 from pipeline.signals import Mode, Requests
 
 NO_REQUESTS = Requests()
+ROBOT_LOST = "The camera has lost the robot."
 FOREVER_MS = 1_000_000
 """Ages and timers saturate here."""
 FLYING = (Mode.TRACK, Mode.COAST, Mode.HOLD)
@@ -169,7 +170,7 @@ def silence(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
 def hindrance(inputs: FailsafeInputs, limits: FailsafeTimers) -> str:
     """Why a flight holds at once: it must not go on by itself; empty if it may."""
     if inputs.pose_ms > limits.pose_hold:  # longer than any gap
-        return "The camera has lost the robot."
+        return ROBOT_LOST
     return inputs.block
 
 

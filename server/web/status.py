@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from math import acos, degrees, hypot, isfinite
 from typing import Literal, Protocol, cast
 
+from pipeline.control.failsafe import ROBOT_LOST
 from pipeline.control.leading import knows_its_place
 from pipeline.robot import Robot
 from pipeline.signals import Mode
@@ -68,7 +69,7 @@ def build(manager: StatusSource) -> Status:
         mode=mode,
         reason=f"{silence}; the robot stops by its own watchdog."
         if control is None or silence
-        else manager.blame.reason(control, t),
+        else _reason(manager, control, t),
         ready=not refusals,
         refusals=list(refusals),
         robot=manager.robot.name,
@@ -117,6 +118,14 @@ def build(manager: StatusSource) -> Status:
         told_mm_s=commanded_mm_s,
         told_deg_s=commanded_deg_s,
     )
+
+
+def _reason(manager: StatusSource, control: ControlStatus, t: float) -> str:
+    """Control's reason; why the camera sees no robot is what the phone's pictures tell."""
+    reason, phone = manager.blame.reason(control, t), manager.phone
+    if reason == ROBOT_LOST and phone is not None and phone.detection is not None:
+        return f"{reason} {phone.detection.reason}".strip()
+    return reason
 
 
 def mode_of(manager: StatusSource, t: float) -> tuple[ModeName, str]:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from math import cos, inf, nan, radians, sin
+from types import SimpleNamespace
 
 import msgspec
 import pytest
 
 from hardware.robot_file import COMMANDS, load_robot
+from pipeline.control.failsafe import ROBOT_LOST
+from pipeline.signals import Mode
+from pipeline.vision.robot_identity import TWO
 from server.common.clock import now
 from server.common.runtime_parameters import RuntimeParameters
 from server.protocol.messages import encode_message
@@ -65,6 +69,20 @@ def test_what_control_says_is_shown_in_the_units_of_screens(manager):
     assert shown.control["missed"] == 3.0
     assert shown.control["p99_ms"] == 0.2
     assert shown.streams["body_imu"].rate_hz == 200.0
+
+
+@pytest.mark.parametrize(
+    ("reason", "seen", "shown"),
+    [
+        (ROBOT_LOST, TWO, f"{ROBOT_LOST} {TWO}"),
+        (ROBOT_LOST, "", ROBOT_LOST),
+        ("Following the phone.", TWO, "Following the phone."),
+    ],
+)
+def test_why_the_camera_has_lost_the_robot_is_told(manager, monkeypatch, reason, seen, shown):
+    phone = SimpleNamespace(detection=SimpleNamespace(reason=seen))
+    monkeypatch.setattr(manager, "phone", phone)
+    assert status._reason(manager, control_status(mode=Mode.HOLD, reason=reason), now()) == shown
 
 
 def test_a_robot_that_takes_a_twist_has_its_speeds_told(manager):
