@@ -1,10 +1,10 @@
 /** What the holder feels and hears when the mode changes, without looking. */
 
-/** @import {ShownMode} from './session_types.js' */
+/** @import {ShownMode, Signal} from './session_types.js' */
 
 /**
  * Vibration [ms on, off, on …] and tones [Hz] of each mode.
- * @type {Record<ShownMode | 'STOP_LOST', { vibration: number[], tones: number[] }>}
+ * @type {Record<Signal, { vibration: number[], tones: number[] }>}
  */
 const SIGNALS = {
   DISARMED: { vibration: [30], tones: [330] },
@@ -15,6 +15,7 @@ const SIGNALS = {
   RAMP: { vibration: [250], tones: [440, 330, 247] },
   STOPPED: { vibration: [500], tones: [196, 196] },
   LOST: { vibration: [200, 100, 200, 100, 200], tones: [247, 196, 247, 196] },
+  WEAK: { vibration: [80, 60, 80, 60, 80], tones: [330, 294, 330] },
   STOP_LOST: { vibration: [400, 100, 400, 100, 400], tones: [196, 175, 196, 175] },
   NO_LINK: { vibration: [200, 100, 200], tones: [247, 196] },
   NO_WORD: { vibration: [200, 100, 200], tones: [247, 196] },
@@ -42,7 +43,7 @@ export class Feedback {
     void this.context.resume();
   }
 
-  /** @param {ShownMode | 'STOP_LOST'} mode */
+  /** @param {Signal} mode */
   signal(mode) {
     const { vibration, tones } = SIGNALS[mode];
     this.navigator.vibrate?.(vibration);

@@ -5,7 +5,7 @@
 
 /** @import {Status, Refused} from '../wire/protocol_types.js' */
 /** @import {Touch} from '../wire/protocol.js' */
-/** @import {Effect, Event, Outcome, ShownMode, State} from './session_types.js' */
+/** @import {Effect, Event, Outcome, ShownMode, State, Signal} from './session_types.js' */
 
 import { GIVE_UP_MS } from '../wire/command.js';
 import { Problem } from '../wire/problems.js';
@@ -62,11 +62,21 @@ export const INITIAL = Object.freeze({
  */
 export function reduce(state, event) {
   const outcome = transition(state, event);
+  if (outcome.state.phase !== 'operating' || outcome.state.standby) return outcome;
   const mode = shownMode(outcome.state);
-  const news = mode !== shownMode(state) && outcome.state.phase === 'operating' && !outcome.state.standby;
-  return news
-    ? { state: outcome.state, effects: [...outcome.effects, { type: 'feel', mode }] }
-    : outcome;
+  if (mode !== shownMode(state)) return felt(outcome, mode);
+  const known = state.status?.thrusters_weak ?? [];
+  const isWeaker = outcome.state.status?.thrusters_weak.some((words) => !known.includes(words));
+  return isWeaker ? felt(outcome, 'WEAK') : outcome;
+}
+
+/**
+ * @param {Outcome} outcome
+ * @param {Signal} mode
+ * @returns {Outcome}
+ */
+function felt({ state, effects }, mode) {
+  return { state, effects: [...effects, { type: 'feel', mode }] };
 }
 
 /**

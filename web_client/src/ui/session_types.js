@@ -6,6 +6,8 @@
 
 /** @typedef {Status['mode'] | 'NO_LINK' | 'NO_WORD'} ShownMode */
 
+/** What is felt and heard. @typedef {ShownMode | 'STOP_LOST' | 'WEAK'} Signal */
+
 /**
  * @typedef {object} Health
  * @property {import('../video/video_paths.js').PathName} path The way pictures go.
@@ -64,7 +66,7 @@
 
 /**
  * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop', ageMs: number }
- *   | { type: 'post_stop', ageMs: number } | { type: 'feel', mode: ShownMode | 'STOP_LOST' } | { type: 'close_link' } | { type: 'stand_by' } | { type: 'ask_lead' }
+ *   | { type: 'post_stop', ageMs: number } | { type: 'feel', mode: Signal } | { type: 'close_link' } | { type: 'stand_by' } | { type: 'ask_lead' }
  *   | { type: 'calibrate', what: Calibrate['what'] }} Effect
  */
 

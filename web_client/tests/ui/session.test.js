@@ -174,6 +174,18 @@ test('a change of mode is felt once', () => {
   assert.deepEqual(after(...UP, status({ mode: 'ARMED' }), status({ mode: 'ARMED' })).effects, []);
 });
 
+test('a thruster that gives less is felt once, a change of mode before it', () => {
+  /** @type {Parameters<typeof status>[0]} */
+  const weak = { mode: 'TRACK', thrusters_weak: ['Thruster 2 gives no thrust.'] };
+  const flying = [...UP, status({ mode: 'TRACK' })];
+  assert.deepEqual(after(...flying, status(weak)).effects, [{ type: 'feel', mode: 'WEAK' }]);
+  assert.deepEqual(after(...flying, status(weak), status(weak)).effects, []);
+  const two = { ...weak, thrusters_weak: [...weak.thrusters_weak ?? [], 'Thruster 5 gives 60 % of its thrust.'] };
+  assert.deepEqual(after(...flying, status(weak), status(two)).effects, [{ type: 'feel', mode: 'WEAK' }]);
+  assert.deepEqual(after(...flying, status({ ...weak, mode: 'RAMP' })).effects, [{ type: 'feel', mode: 'RAMP' }]);
+  assert.deepEqual(after(...flying, status(weak), status({ mode: 'TRACK' })).effects, []);
+});
+
 test('arming is offered when the server is ready and nobody holds', () => {
   const ready = status({ ready: true });
   assert.deepEqual(requestOf(after(...UP).state), { what: 'arm', enabled: false });
