@@ -20,6 +20,7 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
+from hardware.link import blink_datagram, datagram
 from server.common import runtime_parameters
 from server.common.options import Parser
 from server.docs.protocol_text import RECORDS, page
@@ -239,6 +240,12 @@ def message_tables() -> str:
     return "\n".join(lines).rstrip()
 
 
+def links() -> str:
+    """Datagrams of the robot's own link, as their modules tell them."""
+    told = (inspect.cleandoc(module.__doc__ or "") for module in (datagram, blink_datagram))
+    return "\n\n".join(told)
+
+
 def javascript() -> str:
     """`web_client/src/wire/protocol_types.js`."""
     head = "The JSON messages between the pages and the server."
@@ -258,7 +265,7 @@ def javascript() -> str:
 def outputs() -> dict[Path, str]:
     """Every generated file."""
     return {
-        ROOT / "PROTOCOL.md": page(records(), message_tables()),
+        ROOT / "PROTOCOL.md": page(records(), message_tables(), links()),
         ROOT / "web_client/src/wire/protocol_types.js": javascript(),
     }
 

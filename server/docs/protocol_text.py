@@ -127,13 +127,14 @@ def requests() -> str:
     return "\n".join(lines)
 
 
-def page(records: str, messages: str) -> str:
+def page(records: str, messages: str, links: str) -> str:
     """`PROTOCOL.md`."""
     codes = "\n".join(f"| `{code}` | {words} |" for code, words in CODES.items())
     return f"""# Protocol
 
 Version {wire.VERSION}. Generated from `server/protocol/wire.py`, `server/protocol/wire_records.py`,
-`server/protocol/messages.py` and the server's routes by `python -m server.docs.generate`: edit
+`server/protocol/messages.py`, `hardware/link/` and the server's routes by
+`python -m server.docs.generate`: edit
 those, not this.
 
 ## Sockets
@@ -270,9 +271,16 @@ keep the robot flying, and who is heard well is not taken for silent while our P
 the last {ingest.REMEMBERED_NONCES} nonces each is taken; nonce 0 says that none has come yet. A
 PONG is taken once.
 
+## The robot's link
+
+By UDP, each end with the robot's key, which `lightleash robot key` makes: between control and a
+robot, never a page. With `[link] kind` another link is spoken instead.
+
+{links}
+
 ## Versions
 
 `hello`, `welcome` and every record carry the version. There is no negotiation: the server serves
 the pages that fit it, and a page of another version is refused (`version`) and asks its user to
-reload. Any change to bytes, fields or their meaning raises it.
+reload. Once there is a release, any change to bytes, fields or their meaning raises it.
 """
