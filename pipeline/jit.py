@@ -7,11 +7,11 @@ numba's own index tells versions of numba and kinds of processor apart. Whoever 
 `numba` from here. Reading those sources and keeping what was compiled is the one file access of
 this package: it belongs to compiling.
 
-Compiled kernels lie in NUMBA_CACHE_DIR if that is set; else beside their sources; else, where those
-can't be written and nobody has compiled them there, in the user's cache directory. A folder that
-can't be written serves as well, once all is in it; without any folder kernels are compiled and not
-kept. Numba's own way ends in an error there. With NUMBA_CPU_NAME set, in an image for many
-machines, all machines of that level take them.
+Compiled kernels lie in NUMBA_CACHE_DIR if that is set, else beside their sources; where those can't
+be written and nobody has compiled them there, in the user's cache directory. A folder that can't be
+written serves as well, once all is in it; without any folder kernels are compiled and not kept.
+Numba's own way ends in an error there. With NUMBA_CPU_NAME set, in an image for many machines, all
+machines of that level take them.
 """
 
 from __future__ import annotations
@@ -79,13 +79,24 @@ def kernel_stamp() -> str:
     return digest.hexdigest()
 
 
+def pin_processor() -> None:
+    """Compile for the processor that NUMBA_CPU_NAME names, if it does, and for no more.
+
+    Numba goes by the name, and by what this very machine can do beside it: what an image's builder
+    compiled so, no other machine would find again, or it would not run there.
+    """
+    named = os.environ.get("NUMBA_CPU_NAME")
+    if named == "":
+        vars(numba.config).update(CPU_NAME=None)
+    elif named is not None and "NUMBA_CPU_FEATURES" not in os.environ:
+        vars(numba.config).update(CPU_FEATURES="")
+
+
 def _cache_folders() -> tuple[str, ...]:
     """Where compiled kernels may lie, the best first; "" is beside each source."""
-    named = os.environ.get("NUMBA_CACHE_DIR")
-    if named:
-        return (named,)
     users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return "", os.path.join(users, "lightleash", "kernels")
+    named = os.environ.get("NUMBA_CACHE_DIR", "")
+    return named, os.path.join(users, "lightleash", "kernels")
 
 
 def _mark_of(folder: str) -> str:
@@ -171,5 +182,6 @@ class Index(caching.IndexDataCacheFile):
             super().save(key, data)
 
 
+pin_processor()
 vars(caching).update(IndexDataCacheFile=Index)
 vars(numba.config).update(CACHE_LOCATOR_CLASSES=f"{__name__}.{KernelLocator.__name__}")

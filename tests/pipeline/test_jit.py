@@ -1,3 +1,4 @@
+import ast
 import os
 import re
 import subprocess
@@ -114,7 +115,33 @@ def test_where_the_tree_cannot_be_written_the_users_cache_is_taken_and_without_o
     assert list((tmp_path / "cache" / "lightleash" / "kernels").rglob("*.nbc"))
     for _ in range(2):
         assert run(tmp_path, XDG_CACHE_HOME="/proc/nowhere") == (first, 0)
-    assert run(tmp_path, NUMBA_CACHE_DIR="/proc/nowhere", **users) == (first, 0)
+    # an image's own folder, of another level: the user's in place of compiling at each start
+    assert run(tmp_path, NUMBA_CACHE_DIR="/proc/nowhere", **users) == (first, 1)
+
+
+TARGET = """
+import pipeline.jit
+from numba.core.registry import cpu_target
+print(cpu_target.target_context.codegen().magic_tuple()[1:])
+"""
+
+
+@pytest.mark.skipif(os.uname().machine != "x86_64", reason="levels are those of this processor")
+def test_an_images_kernels_are_for_the_level_that_is_named_and_nothing_that_its_builder_can(
+    tmp_path,
+):
+    def compiled_for(**settings: str) -> tuple[str, str]:
+        environment = {"PATH": os.environ["PATH"], "PYTHONPATH": ROOT} | settings
+        command = [sys.executable, "-c", TARGET]
+        said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        name, features = ast.literal_eval(said.stdout)
+        return name, features
+
+    own = compiled_for()
+    assert "+" in own[1]
+    assert compiled_for(NUMBA_CPU_NAME="") == own
+    assert compiled_for(NUMBA_CPU_NAME="x86-64-v3") == ("x86-64-v3", "")
+    assert compiled_for(NUMBA_CPU_NAME="x86-64", NUMBA_CPU_FEATURES="+avx")[1] == "+avx"
 
 
 def test_a_folder_with_all_kernels_goes_before_one_that_can_be_written(tmp_path, monkeypatch):
