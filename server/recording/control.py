@@ -55,10 +55,15 @@ class Recordings:
             self._knows_camera = True
             self._recorder.learn({DEVICE_KEY: device, CAMERA_KEY: camera_text})
 
-    def stop(self) -> str:
-        """End; gives the path of the file, or ""."""
+    def detach(self) -> Recorder | None:
+        """The running recording, which is ours no more and is to be closed; None without one."""
         recorder, self._recorder = self._recorder, None
         self._has_key = True
+        return recorder
+
+    def stop(self) -> str:
+        """End, and wait for the disk; gives the path of the file, or ""."""
+        recorder = self.detach()
         if recorder is None:
             return ""
         recorder.close()
@@ -75,7 +80,8 @@ class Recordings:
     def why_not(self) -> str:
         """Why nothing could be recorded now, or ""."""
         there = next(path for path in (self._directory, *self._directory.parents) if path.exists())
-        return self.failure or full_disk(there)
+        stuck = self._recorder.stuck if self._recorder is not None else ""
+        return self.failure or stuck or full_disk(there)
 
     def key_is_due(self, now: float) -> bool:
         """Whether to ask the page for a key: without one no recorded picture can be decoded."""

@@ -17,6 +17,7 @@ time at 0 of the server's clock, for both clocks together say what day it was. A
 from __future__ import annotations
 
 import fcntl
+import logging
 import os
 import queue
 import shutil
@@ -63,6 +64,9 @@ MAX_BYTES = 8 << 30
 RESERVE_BYTES = 256 << 20
 """Left on the disk for whatever else this machine does: a full one stops more than a recording."""
 MAX_NS = (1 << 64) - 1
+STUCK_S = 5.0
+"""A disk that takes nothing for so long is out of order."""
+_log = logging.getLogger(__name__)
 
 
 class RecordingError(Exception):
@@ -106,7 +110,7 @@ class Recorder:
         self.written = self.dropped = 0
         self.error = ""
         """Why the recording ended early, or ""."""
-        self._max_bytes = max_bytes
+        self._max_bytes, self._t_alive = max_bytes, clock.now()
         self._closing = threading.Event()
         self._queue: queue.Queue[_Item | _Learnt | None] = queue.Queue(CAPACITY)
         self._directory = directory
@@ -141,6 +145,17 @@ class Recorder:
         """Keep what is only known now: it counts for the whole recording."""
         self._put(metadata)
 
+    @property
+    def stuck(self) -> str:
+        """Why what comes is not written though it has not ended, or ""."""
+        waits_s = clock.now() - self._t_alive
+        return f"the disk has taken nothing for {waits_s:.0f} s" if waits_s > STUCK_S else ""
+
+    @property
+    def lacks(self) -> str:
+        """What the file has not got of what came, in words, or ""."""
+        return f"{self.dropped} items are missing, the disk was too slow" if self.dropped else ""
+
     def close(self) -> None:
         """Write what is waiting, close and rename the file; waits for the disk."""
         self._closing.set()
@@ -166,6 +181,9 @@ class Recorder:
             part_of(self.path).rename(self.path)
         except OSError as error:  # a full or vanished disk must not take the robot down
             self.error = str(error)
+        except Exception as error:  # noqa: BLE001 (a thread that ends in silence records nothing)
+            _log.exception("the recorder has failed")
+            self.error = f"{type(error).__name__}: {error}"
 
     def _write(self, writer: Writer, channels: dict[str, int]) -> None:
         flushed = clock.now()
@@ -177,7 +195,8 @@ class Recorder:
                 elif item is not None:
                     _add(writer, channels[item.topic], item)
                     self.written += 1
-            if clock.now() - flushed >= FLUSH_S:
+            self._t_alive = clock.now()
+            if self._t_alive - flushed >= FLUSH_S:
                 writer.flush()  # type: ignore[no-untyped-call]
                 flushed = clock.now()
                 self.error = full_disk(self._directory)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable, Sequence
@@ -165,9 +166,15 @@ class Api:
     async def _stop_recording(self, by: Supervisor) -> Reply[RecordedAnswer]:
         """End the recording that runs."""
         self._manager.people.note("recording", by, "stop")
-        path = self._manager.recordings.stop()
-        self._manager.log_event(f"Recorded: {path}" if path else "No recording was running.")
-        return RecordedAnswer(path)
+        recorder = self._manager.recordings.detach()
+        if recorder is None:
+            self._manager.log_event("No recording was running.")
+            return RecordedAnswer("")
+        await asyncio.to_thread(recorder.close)  # a slow disk must not stop who flies
+        lacks = recorder.error or recorder.lacks
+        said = f"Recorded: {recorder.path}"
+        self._manager.log_event(f"{said}; {lacks}." if lacks else said)
+        return RecordedAnswer(str(recorder.path))
 
     async def _status(self) -> Response:
         """What every screen shows."""

@@ -184,6 +184,39 @@ def test_a_slow_disk_costs_items_not_time(tmp_path, monkeypatch):
     assert recorder.written == CAPACITY + 1
 
 
+def test_a_recorder_that_fails_by_whatever_it_is_says_so(tmp_path, monkeypatch):
+    def failing(*_args):
+        raise MemoryError("no more")
+
+    monkeypatch.setattr("server.recording.writer._add", failing)
+    recorder = make(tmp_path)
+    recorder.record("phone", TOUCH, 1.0)
+    recorder._thread.join(5.0)
+    assert recorder.error == "MemoryError: no more"
+
+
+def test_a_disk_that_takes_nothing_is_told_while_it_does_and_what_is_missing_afterwards(
+    tmp_path, monkeypatch
+):
+    disk, taken = threading.Event(), threading.Event()
+
+    def hanging(*_args):
+        taken.set()
+        disk.wait()
+
+    monkeypatch.setattr("server.recording.writer._add", hanging)
+    recorder = make(tmp_path)
+    for _ in range(CAPACITY + 2):
+        recorder.record("phone", TOUCH, 1.0)
+    taken.wait()
+    assert recorder.stuck == ""
+    monkeypatch.setattr("server.recording.writer.STUCK_S", 0.0)
+    assert "the disk has taken nothing for" in recorder.stuck
+    disk.set()
+    recorder.close()
+    assert "items are missing" in recorder.lacks
+
+
 def test_a_full_disk_ends_the_recording_and_says_so(tmp_path):
     recorder = Recorder(tmp_path, "flight", METADATA, max_bytes=0)
     while not recorder.error:

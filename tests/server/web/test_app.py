@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from pathlib import Path
+from threading import current_thread
 
 import pytest
 from starlette.testclient import TestClient
@@ -154,6 +155,17 @@ def test_a_recording_is_started_named_and_ended(house, client):
     path = Path(client.delete("/api/recording").json()["path"])
     assert path.stat().st_size > 0
     assert client.delete("/api/recording").json() == {"path": ""}
+
+
+def test_a_recording_is_ended_beside_the_loop_that_flies(house, client, monkeypatch):
+    client.post("/api/recording")
+    recorder, threads = house.manager.recordings._recorder, []
+    close = recorder.close
+    monkeypatch.setattr(recorder, "close", lambda: (threads.append(current_thread()), close()))
+    monkeypatch.setattr(recorder, "dropped", 3)
+    client.delete("/api/recording")
+    assert threads[0].name.startswith("asyncio_")
+    assert house.manager.events[0].text.endswith("; 3 items are missing, the disk was too slow.")
 
 
 def test_a_recording_that_cannot_be_made_says_why(house, client, monkeypatch):
