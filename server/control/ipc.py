@@ -7,6 +7,7 @@ The server sends *inputs* to `control.sock`; the control process sends `ControlS
 from __future__ import annotations
 
 import contextlib
+import errno
 import socket
 from pathlib import Path
 
@@ -22,6 +23,10 @@ from server.control.ipc_inputs import Input, decode, encode
 from server.protocol.lead_messages import Lead
 
 MAX_DATAGRAM = 16_384
+BUFFER_BYTES = 1 << 18
+"""Of a socket: some of the largest datagrams. macOS takes no datagram beyond 2 kB otherwise."""
+NO_ROOM = (errno.EMSGSIZE, errno.ENOBUFS)
+"""What is said where others say that it would block, or of a datagram beyond the buffer."""
 """Bytes that are read of one."""
 BodyRow = tuple[float, float, float, float, float, float, float]
 """A time [s] and two vectors in b."""
@@ -138,6 +143,8 @@ class Endpoint:
         own.unlink(missing_ok=True)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
+        for buffer in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+            self._socket.setsockopt(socket.SOL_SOCKET, buffer, BUFFER_BYTES)
         self._socket.bind(str(own))
         self._other = str(other)
         self.dropped = 0
@@ -155,6 +162,11 @@ class Endpoint:
         try:
             self._socket.sendto(datagram, self._other)
         except (FileNotFoundError, ConnectionRefusedError, BlockingIOError):
+            self.dropped += 1
+            return False
+        except OSError as error:
+            if error.errno not in NO_ROOM:
+                raise
             self.dropped += 1
             return False
         return True

@@ -220,6 +220,15 @@ def test_a_full_queue_is_no_error_and_what_is_lost_is_counted(ends):
     assert len(control.inputs(10_000)) == sent
 
 
+def test_what_is_larger_than_a_socket_takes_is_no_error_either(ends):
+    server, control = ends
+    control._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4_096)
+    assert not control.send(control_status(reason="x" * 100_000))
+    assert control.dropped == 1
+    assert control.send(control_status())
+    assert len(server.statuses()) == 1
+
+
 def test_a_turn_takes_no_more_than_its_limit(ends):
     server, control = ends
     server.send(IMU)
