@@ -16,11 +16,13 @@ from server.experiments import processes
 from server.experiments.processes import AHEAD
 from server.experiments.sweep import provenance
 from server.experiments.sweep.errors import SweepError
-from server.simulation.session import SessionOutcome, SweepSession, fly
+from server.simulation.session import Figures, SessionOutcome, SweepSession, fly
 
 if TYPE_CHECKING:
     from distributed import Client
 
+RETRIES: Final = 1
+"""Of what ended with an error: a worker's disk or memory may have been at fault."""
 ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 
 
@@ -45,6 +47,9 @@ def on_cluster(
 ) -> Generator[SessionOutcome, None, None]:
     """Outcomes as they come, by the workers of the Dask scheduler at `address`.
 
+    What a worker that dies was flying another one flies; what ends with an error, or one worker
+    after the other, is an outcome that says so.
+
     Raises:
         SweepError: no Dask here, no scheduler or workers there, or workers unlike this machine.
     """
@@ -60,14 +65,24 @@ def on_cluster(
         raise SweepError("--scheduler", f"{address}: {error}") from error
     with client:
         hands, coming = _hands(client, address), as_completed(loop=client.loop)
-        waiting = iter(sessions)
-        for session in islice(waiting, AHEAD * hands):
-            coming.add(client.submit(fly, session, pure=False))
+        waiting, indices = iter(sessions), dict[object, int]()
+
+        def submit(count: int) -> None:
+            for session in islice(waiting, count):
+                future = client.submit(fly, session, pure=False, retries=RETRIES)
+                indices[future.key] = session.index
+                coming.add(future)
+
+        submit(AHEAD * hands)
         for future in coming:
-            outcome: SessionOutcome = future.result()
-            yield outcome
-            for session in islice(waiting, 1):
-                coming.add(client.submit(fly, session, pure=False))
+            index = indices.pop(future.key)
+            fault = future.exception()  # whatever a worker failed with is sent here
+            if fault is None:
+                yield future.result()
+            else:
+                failed = Figures(ended=f"failed: {type(fault).__name__}: {fault}")
+                yield SessionOutcome(index, failed, 0.0)
+            submit(1)
 
 
 def _hands(client: Client, address: str) -> int:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 from contextlib import closing
 from dataclasses import replace
@@ -363,15 +365,18 @@ def test_a_cluster_without_dask_or_scheduler_is_refused_in_one_line(tmp_path, ca
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_two_workers_of_a_dask_cluster_give_the_same_figures_to_the_last_bit(tmp_path):
+def test_two_workers_of_a_dask_cluster_one_killed_give_the_same_figures_to_the_last_bit(tmp_path):
     from distributed import LocalCluster  # takes a while to import
 
     sessions = swept(tmp_path, SHORT).sessions()
+    broken = replace(sessions[0], index=len(sessions), seconds="long")
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        flown = workers.on_cluster(sessions, cluster.scheduler_address)
-        found = {one.index: one.figures for one in flown}
-    assert len(found) == len(sessions)
-    assert found == {one.index: one.figures for one in workers.on_processes(sessions, 2)}
+        flown = workers.on_cluster([*sessions, broken], cluster.scheduler_address)
+        found = [next(flown)]
+        os.kill(cluster.workers[0].pid, signal.SIGKILL)
+        figures = {one.index: one.figures for one in [*found, *flown]}
+    assert figures.pop(broken.index).ended.startswith("failed: TypeError")
+    assert figures == {one.index: one.figures for one in workers.on_processes(sessions, 2)}
 
 
 def test_keys_are_listed(capsys):
