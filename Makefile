@@ -10,13 +10,14 @@
 #: make hooks   let git run the quick checks before each commit
 #: make lock    write requirements/*.txt anew from pyproject.toml (UPGRADE=1: newest versions)
 #: make image   build the container image and try it: by Docker, or by buildah without an engine
+#: make wheels  all that an installation without internet needs, in dist/wheels
 #: make clean   remove .venv, node_modules and caches
 #: Needs Python 3.11 or later and make; uses uv where there is one. PYTHON=... picks the Python.
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
 .PHONY: real robots pages quiet fast-server fast-others fuzz test-all counterparts mutants
-.PHONY: hooks lock image clean
+.PHONY: hooks lock image wheels clean
 
 BIN := .venv/bin
 WEB := web_client/node_modules/.package-lock.json
@@ -177,6 +178,12 @@ COMPILE := --quiet --universal --python-version 3.11 --only-binary :all: --gener
 
 image:
 	deploy/make_image.sh
+
+# For this machine's Python and processor: make them on one like the lab's.
+wheels:
+	rm -rf dist/wheels
+	"$(PYTHON)" -m pip download --quiet --require-hashes --only-binary :all: -r requirements/core.txt --dest dist/wheels
+	"$(PYTHON)" -m pip wheel --quiet --no-deps . --wheel-dir dist/wheels
 
 clean:
 	rm -rf .venv web_client/node_modules build dist .mypy_cache .pytest_cache .ruff_cache \
