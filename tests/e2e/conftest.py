@@ -3,8 +3,12 @@
 import os
 import shutil
 import subprocess
+from collections.abc import Iterator
 
 import pytest
+from playwright.sync_api import BrowserContext
+
+from tests.e2e.written_pages import written_pages
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FIREFOX_NAMES = ("firefox-esr", "firefox")
@@ -54,3 +58,10 @@ def chromium() -> str:
 def firefox_path() -> str:
     """Path to a Firefox executable."""
     return demand(FIREFOX_NAMES, "firefox-esr")
+
+
+@pytest.fixture(scope="module")
+def written(chromium: str) -> Iterator[BrowserContext]:
+    """The pages' files, without their scripts."""
+    with written_pages(chromium) as context:
+        yield context

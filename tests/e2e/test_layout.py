@@ -1,18 +1,14 @@
-"""The pages' own style in a real Chromium: no text leaves its card, none lies on another."""
+"""The pages' own style in a real Chromium: no text leaves its card, everybody can use them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
-from playwright.sync_api import BrowserContext, Page, Route
+from playwright.sync_api import BrowserContext
 
-from tests.e2e.chromium_phone import browser
+from tests.e2e.axe import violations
+from tests.e2e.written_pages import opened
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
-ORIGIN = "http://pages.test/"
-CLIENT = Path(__file__).parents[2] / "web_client"
 DESKTOPS = [(820, 1180), (1280, 720), (1440, 900)]
 
 FILL = """
@@ -62,41 +58,18 @@ NAMES = [
 """In the order of `web_client/src/dashboard/estimate.js`."""
 
 
-@pytest.fixture(scope="module")
-def context(chromium: str) -> Iterator[BrowserContext]:
-    """Files of the pages, without their scripts: what stands in them is the test's."""
-
-    def answer(route: Route) -> None:
-        path = CLIENT / route.request.url.removeprefix(ORIGIN)
-        if path.suffix in {".html", ".css", ".svg"} and path.is_file():
-            route.fulfill(path=path)
-        else:
-            route.abort()
-
-    with browser(chromium) as opened:
-        opened.route("**/*", answer)
-        yield opened
-
-
-def supervisor(context: BrowserContext, size: tuple[int, int]) -> Page:
-    page = context.new_page()
-    page.set_viewport_size({"width": size[0], "height": size[1]})
-    page.goto(f"{ORIGIN}supervisor.html")
-    return page
-
-
 @pytest.mark.parametrize("size", DESKTOPS)
-def test_the_phone_cards_buttons_stay_in_it(context: BrowserContext, size: tuple[int, int]) -> None:
-    page = supervisor(context, size)
+def test_the_phone_cards_buttons_stay_in_it(written: BrowserContext, size: tuple[int, int]) -> None:
+    page = opened(written, "supervisor", size)
     assert page.evaluate(OUTSIDE, ".card.phone > footer") == []
     page.close()
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1366, 768), (1440, 900), (1920, 1080)])
 def test_all_that_tells_is_on_the_first_screen(
-    context: BrowserContext, size: tuple[int, int]
+    written: BrowserContext, size: tuple[int, int]
 ) -> None:
-    page = supervisor(context, size)
+    page = opened(written, "supervisor", size)
     for name, rows in (("thrusts", 8), ("stages", 8)):
         page.evaluate(FILL, [name, [(str(n), "12.3") for n in range(rows)]])
     page.evaluate(STREAMS, [["Phone motion", "142 ms", "", "200 Hz", "0"]] * 6)
@@ -107,10 +80,17 @@ def test_all_that_tells_is_on_the_first_screen(
 
 @pytest.mark.parametrize("size", DESKTOPS)
 def test_a_large_sigma_lies_on_no_other_number(
-    context: BrowserContext, size: tuple[int, int]
+    written: BrowserContext, size: tuple[int, int]
 ) -> None:
-    page = supervisor(context, size)
+    page = opened(written, "supervisor", size)
     large = {"σ pos.": "123456.7mm", "Fused": "123456", "σ offset": "12345.67ms"}
     page.evaluate(FILL, ["estimate", [(name, large.get(name, "12.3")) for name in NAMES]])
     assert page.evaluate(OUTSIDE, "#estimate") == []
+    page.close()
+
+
+@pytest.mark.parametrize("name", ["index", "supervisor", "screen", "board", "trust"])
+def test_everybody_can_use_a_page_as_it_is_written(written: BrowserContext, name: str) -> None:
+    page = opened(written, name, (1280, 720))
+    assert violations(page) == []
     page.close()

@@ -183,10 +183,8 @@ export class BoardView extends Elements {
       part.className = `tone-${i % 8}`;
       part.title = name;
       part.style.width = `${(ms / end) * 100}%`;
-      const row = this.row('stages', name, 'div', () => [
-        this.make('i', ''), this.make('dt', name), this.make('dd', ''),
-      ]);
-      /** @type {HTMLElement} */ (row.firstElementChild).className = `tone-${i % 8}`;
+      const row = this.row('stages', name, 'div', () => [this.make('dt', name), this.make('dd', '')]);
+      row.className = `tone-${i % 8}`;
       write(row.lastElementChild, number(ms, 1));
     });
   }
@@ -197,7 +195,7 @@ export class BoardView extends Elements {
     this.text('told', takes === 'twist' ? 'Twist' : 'Thrusts');
     thrusts.forEach((thrust, i) => {
       const row = this.row('thrusts', String(i + 1), 'div', () => [
-        this.make('dt', String(i + 1)), this.make('i', ''), this.make('dd', ''),
+        this.make('dt', String(i + 1)), this.make('dd', ''),
       ]);
       row.style.setProperty('--share', `${(thrust / limit) * 100}%`);
       row.classList.toggle('full', thrust >= FULL * limit);
