@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Sequence
 from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated
@@ -17,7 +17,6 @@ from fastapi.telemetry import TelemetryConfig
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
-from starlette.staticfiles import StaticFiles
 
 from server import __version__
 from server.common.clock import now
@@ -38,14 +37,13 @@ from server.security.least_role import (
 )
 from server.web.health import problems
 from server.web.metrics import exposition
+from server.web.page_files import LOOKS, PageScripts, page_file
 from server.web.replies import HANDLERS
 from server.web.session_manager import SessionManager
 from server.web.status import ModeName, mode_of
 from server.web.typed_routes import ApiRoute, Asked, Reply
 from server.web.websocket import PageServer
 
-CLIENT = Path(__file__).resolve().parents[2] / "web_client"
-LOOKS = sorted((*CLIENT.glob("*.css"), *CLIENT.glob("*.svg")))
 METRICS_S = 1.0
 """So old they may be: they cost some milliseconds."""
 NO_TELEMETRY = TelemetryConfig(tracing=False, metrics=False, logs=False, auto_configure=False)
@@ -232,7 +230,7 @@ def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAP
             APIWebSocketRoute("/ws/screen", pages.screen, dependencies=watches),
             *others,
             *(Route(f"/{path.name}", page_file(path.name)) for path in LOOKS),
-            Mount("/src", StaticFiles(directory=CLIENT / "src")),
+            Mount("/src", PageScripts()),
         ],
     )
 
@@ -240,12 +238,3 @@ def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAP
 async def _openapi(request: Request) -> JSONResponse:
     """This description."""
     return JSONResponse(request.app.openapi())
-
-
-def page_file(name: str) -> Callable[[Request], Awaitable[Response]]:
-    """The route of a file of the pages."""
-
-    async def file(_request: Request) -> Response:
-        return FileResponse(CLIENT / name)
-
-    return file

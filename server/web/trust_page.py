@@ -16,7 +16,8 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import Route
 
 from server.security.tls import fingerprint
-from server.web.app import CLIENT, authority_file, page_file
+from server.web.app import authority_file
+from server.web.page_files import CLIENT, page_file
 
 STYLES = ("style.css", "trust.css")
 

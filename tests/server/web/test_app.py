@@ -13,7 +13,8 @@ from starlette.testclient import TestClient
 from pipeline.signals import Mode
 from server.common.clock import now
 from server.recording.writer import RecordingError
-from server.web.app import CLIENT, Api
+from server.web.app import Api
+from server.web.page_files import CLIENT
 from tests.server.house import control_status, house_in, is_request
 
 BASE = "http://127.0.0.1:8080"
