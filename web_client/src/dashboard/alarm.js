@@ -4,6 +4,8 @@
 
 /** @type {readonly ShownMode[]} */
 const ALARMS = ['RAMP', 'LOST'];
+/** Alarms of a robot that was last heard of in the air. @type {readonly ShownMode[]} */
+const DEAF = ['NO_LINK', 'NO_WORD'];
 const AGAIN_MS = 3000;
 /** Of one fault: a page left open overnight falls silent. */
 const MOST = 20;
@@ -25,10 +27,11 @@ export class Alarm {
   /**
    * @param {ShownMode} mode
    * @param {string} name For people.
+   * @param {boolean} flies As far as the page knows.
    * @param {number} now
    */
-  take(mode, name, now) {
-    const isAlarm = ALARMS.includes(mode);
+  take(mode, name, flies, now) {
+    const isAlarm = ALARMS.includes(mode) || (flies && DEAF.includes(mode));
     this.document.title = `${isAlarm ? '⚠ ' : ''}${name} · Lightleash`;
     if (mode !== this.mode) this.signals = 0;
     this.mode = mode;

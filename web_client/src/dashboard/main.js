@@ -11,7 +11,7 @@ import { browserOf } from '../app/browser.js';
 import { BoardView } from './view.js';
 import { ChoiceCard } from '../ui/choice_card.js';
 import { EstimatePanel } from './estimate.js';
-import { EMPTY, reduce, shownMode } from './model.js';
+import { AT_REST, EMPTY, reduce, shownMode } from './model.js';
 import { Feedback } from '../ui/feedback.js';
 import { KnobPanel } from './runtime_parameters.js';
 import { LeadingChoice } from '../ui/leading_choice.js';
@@ -85,7 +85,8 @@ function dispatch(event) {
     shown = false;
     const { problem } = board;
     const mode = shownMode(board);
-    alarm.take(mode, modeWords(mode, board.status)[0], performance.now());
+    const flies = board.status !== null && !AT_REST.includes(board.status.mode);
+    alarm.take(mode, modeWords(mode, board.status)[0], flies, performance.now());
     view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
     estimate.render(board);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);

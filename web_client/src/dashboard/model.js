@@ -13,7 +13,7 @@ import { STATUS_LIFE_MS } from '../ui/session.js';
 export const REMEMBERED = 200;
 const NOTICE_MS = 5000;
 /** With the robot there nobody need be told any more that STOP did not reach it. @type {Status['mode'][]} */
-const AT_REST = ['DISARMED', 'STOPPED'];
+export const AT_REST = ['DISARMED', 'STOPPED'];
 
 /**
  * @typedef {{ errorMm: number | null, errorDeg: number | null, sigmaMm: number | null,

@@ -6,13 +6,16 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 import { Alarm } from '../../src/dashboard/alarm.js';
 
-/** @param {[ShownMode, number][]} modes */
-function heard(modes) {
+/**
+ * @param {[ShownMode, number][]} modes
+ * @param {boolean} flies
+ */
+function heard(modes, flies = false) {
   const page = { title: '' };
   /** @type {ShownMode[]} */
   const signals = [];
   const alarm = new Alarm(page, (mode) => signals.push(mode));
-  for (const [mode, now] of modes) alarm.take(mode, mode, now);
+  for (const [mode, now] of modes) alarm.take(mode, mode, flies, now);
   return { signals, title: page.title };
 }
 
@@ -28,6 +31,11 @@ test('a fault that is over is silent, and sounds at once when it comes back', ()
   const { signals, title } = heard([['RAMP', 0], ['DISARMED', 10], ['DISARMED', 9000], ['RAMP', 9010], ['TRACK', 9020]]);
   assert.deepEqual(signals, ['RAMP', 'RAMP']);
   assert.equal(title, 'TRACK · Lightleash');
+});
+
+test('a server that falls silent is an alarm while a robot is in the air, and none of a page left open', () => {
+  assert.deepEqual(heard([['NO_WORD', 0], ['NO_LINK', 100]]).signals, []);
+  assert.deepEqual(heard([['NO_WORD', 0], ['NO_LINK', 100]], true).signals, ['NO_WORD', 'NO_LINK']);
 });
 
 test('a page that is left alone with a fault falls silent after a minute', () => {
