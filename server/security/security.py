@@ -6,6 +6,7 @@ import base64
 import contextlib
 import hmac
 import logging
+import re
 import secrets
 from collections.abc import Callable
 from pathlib import Path
@@ -24,6 +25,7 @@ from server.security.sockets import Sockets
 log = logging.getLogger("lightleash")
 
 COOKIE = "lightleash"
+PORT = re.compile(r":(\d{1,5})$")
 PAIR_TRIES, PAIR_WINDOW_S = 10, 60.0
 """So many wrong links of one address in that time."""
 MAX_ADDRESSES = 1_000
@@ -131,7 +133,9 @@ class Doors:
         if scheme.lower() == "bearer":
             role = self.role_of_token(token.strip())
             return of_this_machine(role, address) if role is not None else None
-        value = cookie_parser(headers.get("cookie", "")).get(cookie_name(secure), "")
+        value = cookie_parser(headers.get("cookie", "")).get(
+            cookie_name(secure, headers.get("host", "")), ""
+        )
         return self.pairings.of_cookie(value, self.clock()) if value else None
 
     def has_still(self, member: Member) -> bool:
@@ -139,9 +143,14 @@ class Doors:
         return not member.digest or member.id in {one.id for one in self.pairings.present()}
 
 
-def cookie_name(secure: bool) -> str:
-    """Name of the session's cookie, over TLS or on this machine."""
-    return f"__Host-{COOKIE}" if secure else COOKIE
+def cookie_name(secure: bool, host: str) -> str:
+    """Name of the session's cookie, over TLS or on this machine.
+
+    Browsers send a cookie to every port of its host: servers of several robots on one machine would
+    take each other's place, so the port of their `host` is in it.
+    """
+    port = PORT.search(host)
+    return ("__Host-" if secure else "") + COOKIE + (f"-{port[1]}" if port else "")
 
 
 def _book_in(store: Path | None) -> Book | None:

@@ -113,7 +113,8 @@ class PeopleApi:
         doors, secure = self._doors, request.url.scheme == "https"
         if not doors.may_try(address):
             raise RefusedRequest(429, "token", f"{PAIR_TRIES} wrong links a minute")
-        former = self._former(request, secure)
+        name = cookie_name(secure, request.headers.get("host", ""))
+        former = self._former(request.cookies.get(name, ""))
         try:
             role, must_wait = doors.pairings.opens(asked.token, doors.clock())
             if not asked.replace and former is not None and _loses(former, role, must_wait):
@@ -130,13 +131,11 @@ class PeopleApi:
         unconfirmed = ", waits to be confirmed" if member.state == "waiting" else ""
         self._manager.log_event(f"{member.name} has paired as {member.role}{unconfirmed}.")
         response = JSONResponse(msgspec.to_builtins(PairAnswer.of(member)))
-        name = cookie_name(secure)
         response.set_cookie(name, cookie, httponly=True, secure=secure, samesite="strict")
         return response
 
-    def _former(self, request: Request, secure: bool) -> Member | None:
-        """Member that a browser that pairs anew has been until now."""
-        value = request.cookies.get(cookie_name(secure), "")
+    def _former(self, value: str) -> Member | None:
+        """Member that a browser that pairs anew has been until now, by its cookie."""
         former = self._doors.pairings.of_cookie(value, self._doors.clock()) if value else None
         return former if former is not None and former.state in ("waiting", "in") else None
 

@@ -19,12 +19,13 @@ from server.security.audit import STRANGERS_FILE, Audit
 from server.security.least_role import RefusedRequest
 from server.security.quotas import Quotas
 from server.security.request_guard import Guard
-from server.security.security import COOKIE, PAIR_TRIES, Doors
+from server.security.security import PAIR_TRIES, Doors, cookie_name
 from server.web import typed_routes
 from tests.server.live_server import UNLIMITED, LiveServer
 
 BASE = "http://127.0.0.1:8080"
 WS = "ws://127.0.0.1:8080"
+COOKIE = cookie_name(False, "127.0.0.1:8080")
 OWN = {"Origin": BASE, "X-Lightleash": "1"}
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS")
 STYLES = (
@@ -334,11 +335,23 @@ def test_pairing_never_takes_up_a_cookie_that_was_planted(rig):
     assert stranger.get("/api/whoami").status_code == 401
 
 
+def test_a_browser_is_paired_with_the_servers_of_two_ports_of_one_host(rig, tmp_path):
+    pair(rig, "viewer")
+    kept = dict(rig.client.cookies)
+    other = TestClient(rig.guard, base_url="http://127.0.0.1:8090", cookies=kept)
+    other.headers = {"Origin": "http://127.0.0.1:8090", "X-Lightleash": "1"}
+    assert other.get("/api/whoami").status_code == 401
+    pair(rig, "supervisor", other)
+    again = TestClient(rig.guard, base_url=BASE, cookies=dict(other.cookies))
+    assert again.get("/api/whoami").json()["role"] == "viewer"
+
+
 def test_over_tls_a_cookie_counts_only_if_nobody_between_could_have_planted_it(rig):
     attacker = TestClient(rig.guard, base_url=BASE)
     pair(rig, "viewer", attacker)
     planted = attacker.cookies[COOKIE]
-    victim = TestClient(rig.guard, base_url="https://robot.lan", cookies={COOKIE: planted})
+    cookies = {cookie_name(False, host): planted for host in ("robot.lan", "robot.lan:8080")}
+    victim = TestClient(rig.guard, base_url="https://robot.lan", cookies=cookies)
     assert victim.get("/api/whoami").status_code == 401
     assert attacker.get("/api/whoami").status_code == 200
 
@@ -431,7 +444,7 @@ def test_over_tls_the_cookie_is_for_this_host_and_tls_alone(rig):
     own = {"Origin": "https://robot.lan", "X-Lightleash": "1"}
     key = rig.doors.pairings.invite("viewer", now())
     cookie = client.post("/api/pair", json={"token": key}, headers=own).headers["set-cookie"]
-    assert cookie.startswith(f"__Host-{COOKIE}=")
+    assert cookie.startswith("__Host-lightleash=")
     assert "Secure" in cookie
     assert "Path=/" in cookie
     assert client.get("/api/whoami").json()["role"] == "viewer"

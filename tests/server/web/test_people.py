@@ -19,7 +19,7 @@ from server.protocol.people_messages import Deed
 from server.recording.writer import SERVER_MESSAGES
 from server.security.audit import AUDIT_FILE
 from server.security.pairings import WAIT_S, PairingError
-from server.security.security import COOKIE, Doors
+from server.security.security import Doors, cookie_name
 from server.security.sockets import REVOKED
 from server.web.status import build
 from tests.server.house import (
@@ -58,12 +58,13 @@ class Browser:
         self.member, cookie = doors.pairings.pair(key, name, HOST, now())
         if self.member.state == "waiting":
             self.member = doors.pairings.confirm(self.member.id, self.member.code)
-        self.house, self.cookie = house, f"{COOKIE}={cookie}"
+        self.house, self.value = house, cookie
 
     @contextlib.asynccontextmanager
     async def page(self, path):
         base = f"http://{HOST}:{self.house.port}"
-        headers = {"Cookie": self.cookie, "Origin": base}
+        name = cookie_name(False, f"{HOST}:{self.house.port}")
+        headers = {"Cookie": f"{name}={self.value}", "Origin": base}
         url = base.replace("http", "ws") + path
         async with connect(url, additional_headers=headers, compression=None, proxy=None) as one:
             yield Talker(one)

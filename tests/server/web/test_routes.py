@@ -30,7 +30,7 @@ from server.security.least_role import (
 from server.security.pairings import of_this_machine
 from server.security.quotas import Quotas
 from server.security.request_guard import Guard
-from server.security.security import COOKIE
+from server.security.security import cookie_name
 from tests.server.live_server import UNLIMITED, LiveServer
 
 HOST = "127.0.0.1:8080"
@@ -132,7 +132,8 @@ def key(rig, name):
     if name == "none":
         return {}
     if name == "forged":
-        return {"Cookie": f"{COOKIE}=supervisor.x.{rig.doors.operator_token}"}
+        name = cookie_name(False, "127.0.0.1:8080")
+        return {"Cookie": f"{name}=supervisor.x.{rig.doors.operator_token}"}
     return {"Authorization": f"Bearer {rig.token(name)}"}
 
 
