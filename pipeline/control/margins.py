@@ -108,8 +108,8 @@ class Loop:
                 control = self._with_feedforward(axis, control, sensing, self.feedforward)
                 poles += 1
             else:
-                control, answered = self._with_delay_compensation(axis, control, rated, sensing)
-                control = np.asarray(control / answered)
+                control, own_loop = self._with_delay_compensation(axis, control, rated, sensing)
+                control = np.asarray(control / own_loop)
         d = self.dynamics
         m, k = float(d.inertia[axis]), float(d.stiffness[axis])
         c = max(float(d.damping[axis]), LEAST_DAMPING * 2.0 * sqrt(k * m))
@@ -146,10 +146,10 @@ class Loop:
         turn = TILT_AXIS[axis]
         known, _ = self._measured(turn, sensing)
         Kp, Kd = self.gains.Kp[turn], self.gains.Kd[turn]
-        control, answered = (Kp + Kd * S) * known, np.ones_like(S)
+        control, own_loop = (Kp + Kd * S) * known, np.ones_like(S)
         if self.feedforward is not None:
-            control, answered = self._with_delay_compensation(turn, control, known, sensing)
-        turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn])) / answered
+            control, own_loop = self._with_delay_compensation(turn, control, known, sensing)
+        turned = thrusters / (S * (d.inertia[turn] * S + d.damping[turn])) / own_loop
         return np.asarray(Kp * turned / (1.0 + control * turned))
 
     def _with_feedforward(
@@ -165,9 +165,9 @@ class Loop:
     def _with_delay_compensation(
         self, axis: int, control: Complex, rated: Complex, sensing: Sensing
     ) -> tuple[Complex, Complex]:
-        """Control by an attitude's error as it will be when the thrusters act.
+        """Control by an attitude's error as it will be, and what it is to be divided by.
 
-        Beside it, by what a command is divided for the answer to itself.
+        That is 1 + L of the loop around its own commands, which it knows to be on their way.
         """
         J, d, T = float(self._told.inertia[axis]), self._told.delay, self._told.lag
         Kp, Kd = float(self.gains.Kp[axis]), float(self.gains.Kd[axis])

@@ -204,7 +204,7 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Class of the control loop: what holds its schedule."""
     control: dict[str, float]
     """Of the control loop: lateness p50_ms, p99_ms, p999_ms, max_ms, missed ticks, step_ms."""
-    events: list[LoggedEvent]
+    events: list[LoggedEvent] = []
     """What people should see, the newest first."""
     virtual_camera: VirtualCameraStatus | None = None
     """None before the control process has told of it."""

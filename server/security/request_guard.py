@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 
 from msgspec.structs import replace
@@ -14,9 +13,8 @@ from server.security.admission import LOOPBACK, Admission, RemotePeer, peer_of
 from server.security.least_role import RefusedRequest, RoleTable, refusal_of
 from server.security.pairings import Member
 from server.security.quotas import Asker, Quotas
-from server.security.security import Doors
+from server.security.security import PORT, Doors
 
-PORT = re.compile(r":\d{1,5}$")
 """The port at the end of a Host header; an IPv6 address is in brackets."""
 
 

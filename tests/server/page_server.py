@@ -16,14 +16,15 @@ JPEG = b"\xff\xd8" + bytes(30)
 
 def status(mode):
     fields = dict.fromkeys(Status.__struct_fields__)
-    numbers = dict.fromkeys(("leds", "phones", "supervisors", "time_ms"), 0)
+    numbers = dict.fromkeys(("leds", "phones", "supervisors", "time_ms", "thrust_limit_n"), 0)
     texts = dict.fromkeys(
         ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""
     )
     flags = {"ready": True, "saturated": False, "resumes": False}
     tables: dict[str, object] = {
         **{name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")},
-        **{name: [] for name in ("refusals", "events", "warnings", "thrusters_weak", "people")},
+        **{name: [] for name in ("refusals", "events", "warnings", "people", "thrusts_n")},
+        **{name: [] for name in ("sensors_doubted", "thrusters_weak")},
     }
     words = {"mode": mode, "takes": "thrusts"}
     return Status(**fields | numbers | texts | flags | tables | words)

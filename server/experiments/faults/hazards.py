@@ -254,7 +254,8 @@ HAZARDS: Final = (
         "29",
         "A thruster is dead or weak",
         "what the body feels, against what its thrusters were told",
-        "named on both pages, wrenches shared anew; arming is refused; who can't hover: RAMP",
+        "named on both pages, wrenches shared anew; arming is refused; who can't hover: RAMP, "
+        "and no thrust once it leans by 60° in the air",
         ("pipeline/control/test_thruster_health.py::test_who_fails_is_named_soon_and_alone",),
     ),
     Hazard(

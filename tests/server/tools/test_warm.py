@@ -23,7 +23,7 @@ def warmed(**settings: str) -> tuple[int, str]:
 
 
 def test_where_nothing_can_be_kept_it_says_what_to_do_and_compiles_nothing():
-    code, said = warmed(NUMBA_CACHE_DIR="/proc/nowhere")
+    code, said = warmed(NUMBA_CACHE_DIR="/proc/nowhere", XDG_CACHE_HOME="/proc/nowhere")
     assert code == 1
     assert said == warm.NOWHERE + "\n"
 
