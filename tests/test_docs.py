@@ -51,6 +51,31 @@ def test_the_equation_map_and_the_docstrings_agree() -> None:
     assert cited == mapped
 
 
+PATH = re.compile(r"`([\w./-]*/[\w-]+\.(?:py|js|c|h|toml|css|html))`")
+
+
+def test_files_that_documents_name_are_there() -> None:
+    """By their path, or by the end of it."""
+    named = {
+        (page.name, path)
+        for page in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))
+        for path in PATH.findall(page.read_text())
+    }
+    rooms = (
+        "deploy",
+        "docs",
+        "examples",
+        "hardware",
+        "pipeline",
+        "server",
+        "tests",
+        "web_client/src",
+    )
+    there = [f"/{file.relative_to(ROOT)}" for room in rooms for file in (ROOT / room).rglob("*.*")]
+    assert len(named) > 100
+    assert {one for one in named if not any(file.endswith(f"/{one[1]}") for file in there)} == set()
+
+
 def test_every_equation_from_1_to_24_has_a_home() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text()
     rows = re.findall(r"^\| \((\d+)\)(?:-\((\d+)\))? \|", text, re.MULTILINE)
