@@ -97,9 +97,10 @@ class Tracking:
     def body_ahead(self, omega_bf_in_b: Array) -> tuple[Array, Array]:
         """How far a body of this rate will have turned (3,) [rad], and its rate (3,) [rad/s] then.
 
-        When that which is decided now acts.
+        When that which is decided now acts. Only one that must tilt to move goes by it: of others
+        it is not worked out.
         """
-        if not self._looks_ahead:
+        if not (self._looks_ahead and self._robot.needs_tilt):
             return np.zeros(3), omega_bf_in_b
         return self._compensation.body(omega_bf_in_b)
 

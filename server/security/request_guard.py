@@ -15,9 +15,6 @@ from server.security.pairings import Member
 from server.security.quotas import Asker, Quotas
 from server.security.security import PORT, Doors
 
-"""The port at the end of a Host header; an IPv6 address is in brackets."""
-
-
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
     "media-src 'self' blob:; connect-src 'self'; worker-src 'self'; frame-src 'self'; "

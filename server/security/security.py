@@ -26,6 +26,7 @@ log = logging.getLogger("lightleash")
 
 COOKIE = "lightleash"
 PORT = re.compile(r":(\d{1,5})$")
+"""The port at the end of a Host header; an IPv6 address is in brackets."""
 PAIR_TRIES, PAIR_WINDOW_S = 10, 60.0
 """So many wrong links of one address in that time."""
 MAX_ADDRESSES = 1_000
