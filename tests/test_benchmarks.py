@@ -73,6 +73,18 @@ def test_each_block_of_the_documents_names_what_exists() -> None:
     ] == []
 
 
+def test_each_block_was_made_at_a_commit_of_this_branch() -> None:
+    """One that was amended away is still found beside it, and by no one who clones."""
+    if not history_is_whole():
+        return  # an archive of the tree cannot tell
+    history = blocks.git("rev-list", "HEAD").split()
+    assert [
+        (block.name, block.commit)
+        for block in blocks.blocks()
+        if not any(commit.startswith(block.commit) for commit in history)
+    ] == []
+
+
 def test_no_block_is_further_behind_its_code_than_is_stated() -> None:
     if not history_is_whole():
         return  # an archive of the tree cannot tell
