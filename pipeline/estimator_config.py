@@ -126,6 +126,8 @@ class RelativeConfig:
     """At a start: of the body seen from f [m/s]."""
     initial_omega_b: float = 0.03
     initial_f_b: float = 0.3
+    body_steps: bool = True
+    """The body has motion sensors, whose biases may jump; else its samples are told."""
     initial_omega_c: float = 0.005
     initial_f_c: float = 0.1
     initial_offset: float = 0.02

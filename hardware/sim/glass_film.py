@@ -36,11 +36,21 @@ def film(
     """
     look = look or RenderOptions(led_radius_m=DOT_M, room=0.005)
     image = render(camera, glass_at, on_glass(dots), look, rng)
-    R_cg, p_gc_in_c = glass_at(0.0)
     fiducials = glass.fiducials().reshape(4, 4, 3)
     for name, corners in zip(MARKER_IDS, fiducials, strict=True):
-        _put(image, camera.pixels(p_gc_in_c + corners @ R_cg.T), grey / 255.0 * _tile(name))
+        _put(image, _rolled(camera, glass_at, corners), grey / 255.0 * _tile(name))
     return image
+
+
+def _rolled(camera: Camera, glass_at: RelativePoseAt, corners: Array) -> Array:
+    """Pixels (4, 2) of a marker's corners (4, 3), each where it is when its line is read."""
+
+    def pixels(corner: Array, delay_s: float) -> Array:
+        R_cg, p_gc_in_c = glass_at(delay_s)
+        return camera.pixels((p_gc_in_c + R_cg @ corner)[None])
+
+    delays = [float(camera.delays(pixels(corner, 0.0))[0]) for corner in corners]
+    return np.concatenate([pixels(*one) for one in zip(corners, delays, strict=True)])
 
 
 @cache

@@ -45,7 +45,7 @@ class BiasSteps:
     """Watches the four sensors' biases."""
 
     def __init__(self, initial: Array) -> None:
-        """Standard deviations (4,) of biases at a start."""
+        """Standard deviations (4,) of biases at a start; 0 of samples that no sensor took."""
         self._most = FARTHEST * initial
         self.walks = np.zeros(4)
         """Densities of random walks beside the configured ones [unit²/s]."""
@@ -80,7 +80,11 @@ class BiasSteps:
         self._shift = keep * self._shift + shift
         self._variance = keep * keep * self._variance + reduction
         self._learnt = keep * self._learnt + reduction
-        chi2 = (self._shift * _solve(self._variance, self._shift)).sum(axis=1) / 3.0
+        chi2 = (
+            np.sign(self._most)
+            * (self._shift * _solve(self._variance, self._shift)).sum(axis=1)
+            / 3.0
+        )
         if not chi2.max() > SURPRISING:
             return NOWHERE
         by: Array = np.zeros(4)

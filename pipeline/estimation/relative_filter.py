@@ -55,6 +55,8 @@ class RelativeFilter:
         """Knows nothing until the first picture with a pose and samples of both IMUs near it."""
         self._config, self._leds_in_b = config, leds_in_b
         self._initial = initial_biases(config)
+        if not config.body_steps:
+            self._initial[:2] = 0.0
         self.pictures: Counter[Fusion] = Counter()
         """What became of them."""
         self.leds_rejected = 0

@@ -24,6 +24,7 @@ AT_REST = RelativeConfig(
     drift_f_b=1e-3,
     walk_omega_b=1e-6,
     initial_omega_b=1e-5,
+    body_steps=False,
 )
 """Nothing moves the glass; its vertical is as wrong as the phone's accelerometer says it."""
 VERTICAL_PICTURES = 10

@@ -1,6 +1,7 @@
 """A robot of light, sans-I/O: what a phone saw of the glass in, what the glass shall show out.
 
-First the phone finds the glass, then it measures how late the glass is, then it sees the robot.
+First the phone finds the glass, then it measures how late the glass is and, where nobody did so
+before, its own lens, then it sees the robot.
 """
 
 from __future__ import annotations
@@ -11,10 +12,13 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.camera.lens import Camera
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.frames import Array, R_from_wxyz
 from pipeline.glass.display_lag import SWEEP_SHARE, DisplayLag, DisplayLagMeter
 from pipeline.glass.eye import Eye, EyeTracker
 from pipeline.glass.lag_tracker import LagTracker
+from pipeline.glass.lens_meter import TILT, GlassCorners, LensMeter
 from pipeline.glass.window import Glass, Hanging, pierced, seen_through
 from pipeline.signals import PhoneImu, VisionMeasurement
 
@@ -60,6 +64,8 @@ class RobotOfLight:
         self._eye = EyeTracker(glass)
         self._meter = DisplayLagMeter(SWEEP_SHARE * glass.width_m)
         self._tracker = LagTracker()
+        self._lens: LensMeter | None = None
+        """None: the lens is calibrated, or was measured."""
         self.lag: DisplayLag | None = None
         """Of the display, once it is measured; followed from then on."""
         self.eye: Eye | None = None
@@ -71,9 +77,27 @@ class RobotOfLight:
         heights = self._leds_in_b[:, 2]
         return self.glass.height_m < LEAST_PER_HEIGHT * float(np.ptp(heights))
 
+    def begin_camera(self, camera: Camera, *, is_guessed: bool) -> None:
+        """Another camera films the glass now; one whose lens `is_guessed` is measured first."""
+        self._eye, self.eye = EyeTracker(self.glass), None
+        # through another lens lights seem elsewhere, which a meter would take for a lag
+        self._meter = DisplayLagMeter(SWEEP_SHARE * self.glass.width_m)
+        self._tracker = LagTracker()
+        self._lens = LensMeter(camera, self.glass) if is_guessed else None
+
+    def lens_of(self, camera: Camera) -> SimpleLens | None:
+        """What a camera that was guessed truly has, once it is measured."""
+        meter = self._lens
+        return meter.lens if meter is not None and meter.camera is camera else None
+
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """The phone has moved."""
         self._eye.add_phone_imu(sample)
+
+    def add_corners(self, corners: GlassCorners) -> None:
+        """The phone has seen corners of fiducials."""
+        if self._lens is not None:
+            self._lens.add_corners(corners)
 
     def add_seen(self, seen: VisionMeasurement, lights_in_c: Array, now: float) -> None:
         """The phone has seen the glass, and lights in directions (n, 3), the brightest first."""
@@ -118,6 +142,8 @@ class RobotOfLight:
             late_ms = 1e3 * self.lag.value
             return Lights("search", f"This screen shows everything {late_ms:.0f} ms late, which is "
                           "too late to lead by: choose its game mode, or another one.")  # fmt: skip
+        if self._lens is not None:
+            return Lights("search", self._misplaced(eye) or TILT)
         return self._shown(eye, up_in_g, now, robot)
 
     def _shown(self, eye: Eye, up_in_g: Array, now: float, robot: PathAhead) -> Lights:

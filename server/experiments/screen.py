@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, nan
 from pathlib import Path
@@ -17,7 +17,10 @@ from typing import Final
 
 import numpy as np
 
+from hardware.camera_file import find_camera
 from hardware.robot_file import RobotFile, load_robot
+from pipeline.camera.lens import Camera
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import PERIOD_S, TeleopConfig
 from server.common.ranges import number, whole
 from server.common.text import Column, dashed, flights
@@ -28,12 +31,19 @@ from server.experiments.runner import ExperimentReport, experiment
 from server.simulation.figures import SETTLE_S, result_of, rms
 from server.simulation.screen import FRAMES_HZ, Display, ScreenSimulation
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
+from server.virtual_phone.phone_script import DEVICE
 
 REAL: Final = "real"
 LAGS_MS: Final = (20.0, 40.0, 60.0)
 MISJUDGED_MS: Final = 20.0
 LATE_MS: Final = 100.0
 """A television's."""
+UNCALIBRATED: Final = ((0.70, 0.02), (0.86, -0.03))
+"""Focal length, of the longer side, and first radial coefficient of phones' cameras: whole, and
+cropped by a stabiliser."""
+MIDDLE_PX: Final = (8.0, -6.0)
+"""Where their middles are, beside the picture's."""
+READOUT_S: Final = 0.020
 MOST_BEFORE_S: Final = 12.0
 """Until it is led: the screen is found, its lag measured, the robot armed."""
 REFUSED_S: Final = 6.0
@@ -44,6 +54,14 @@ MOST_OFF_MS: Final = 3.0
 """Of a measured lag."""
 
 
+def uncalibrated(focal: float, k1: float) -> Camera:
+    """A phone's camera that is none of ours: nothing of it is where `SimpleLens` guesses it."""
+    camera = SimpleLens(focal, k1).camera(1280, 720)
+    K = camera.K.copy()
+    K[:2, 2] += MIDDLE_PX
+    return replace(camera, K=K, readout_s=READOUT_S)
+
+
 @dataclass(frozen=True, slots=True)
 class ScreenCase:
     """What is led."""
@@ -51,6 +69,8 @@ class ScreenCase:
     name: str
     display: Display | None = None
     """None: the robot itself is there."""
+    camera: Camera | None = None
+    """Of a phone that nobody calibrated; None: the virtual phone's, calibrated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +142,8 @@ def cases() -> Iterator[ScreenCase]:
         light_s = 1e-3 * lag_ms + 0.5 / FRAMES_HZ  # a frame stays until the next
         display = Display(lag_s=1e-3 * lag_ms, believed_lag_s=light_s + 1e-3 * off_ms)
         yield ScreenCase(f"{lag_ms:g} ms, believed {off_ms:+g}", display)
+    for focal, k1 in UNCALIBRATED:
+        yield ScreenCase(f"lens of {focal:g}, guessed", Display(), uncalibrated(focal, k1))
 
 
 def unfit() -> Iterator[ScreenCase]:
@@ -138,10 +160,18 @@ class ScreenSetting:
     config: TeleopConfig
     hand: str
 
-    def simulation(self, display: Display, seed: int) -> ScreenSimulation:
-        """At rest before a screen."""
-        scene = SimulationOptions(hand=self.hand, seed=seed)
-        return ScreenSimulation(self.robot_file, self.config, scene, display)
+    def simulation(
+        self, display: Display, seed: int, camera: Camera | None = None
+    ) -> ScreenSimulation:
+        """At rest before a screen, with a `camera` that nobody calibrated, or the usual one."""
+        scene, robot_file = SimulationOptions(hand=self.hand, seed=seed), self.robot_file
+        if camera is not None:
+            # who sees more goes nearer, who sees less goes back, until all corners are in
+            share = camera.focal_px / find_camera(DEVICE, camera.width, camera.height).focal_px
+            start = replace(robot_file.start, distance=share * robot_file.start.distance)
+            robot_file = replace(robot_file, start=start)
+            scene = replace(scene, camera=camera, knows_camera=False)
+        return ScreenSimulation(robot_file, self.config, scene, display)
 
     def real(self, seed: int) -> VirtualTimeSimulation:
         """At rest before the robot itself."""
@@ -156,7 +186,7 @@ def fly(setting: ScreenSetting, seconds: float, job: tuple[ScreenCase, int]) -> 
         simulation, lag_ms, found_ms = setting.real(seed), nan, nan
         _lead(simulation, seconds)
     else:
-        screen = simulation = setting.simulation(case.display, seed)
+        screen = simulation = setting.simulation(case.display, seed, case.camera)
         _lead(screen, seconds)
         lag = screen.robot_of_light.lag
         lag_ms = 1e3 * float(np.mean(screen.drawn_before_s or [nan]))

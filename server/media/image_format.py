@@ -6,14 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from hardware.camera_file import find_camera_file
 from pipeline.camera.lens import Camera
+from pipeline.camera.simple_lens import SimpleLens
 from server.protocol.wire_records import QUARTERS, Picture
-
-USUAL_FOCAL = 0.78
-"""Focal length of a phone's main camera, of the longer side of its film: 65° wide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +42,13 @@ class ImageFormat:
         path, camera = find_camera_file(device, *self.taken, folders, self.screen_angle_deg)
         return path, camera.resized(self.width, self.height)
 
-    def guessed(self) -> Camera:
-        """A phone's usual camera, by the size of its pictures alone."""
-        focal = USUAL_FOCAL * max(self.width, self.height)
-        u, v = 0.5 * (self.width - 1), 0.5 * (self.height - 1)
-        K = np.array([[focal, 0.0, u], [0.0, focal, v], [0.0, 0.0, 1.0]])
-        return Camera(self.width, self.height, K, "plumb_bob", np.zeros(5))
+    def guessed(self, lens: SimpleLens) -> Camera:
+        """The camera of a phone without a calibration, whose lens is guessed or was measured.
+
+        Its lines are read from the upper one down while the phone lies on its right side.
+        """
+        long, short = max(self.width, self.height), min(self.width, self.height)
+        is_phone = (self.width > self.height) == (self.screen_angle_deg % 180 == 90)
+        upright_deg = 90 if is_phone else 0
+        camera = lens.camera(long, short)
+        return camera.turned((upright_deg - self.screen_angle_deg) // 90)

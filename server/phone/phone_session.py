@@ -15,6 +15,7 @@ from hardware.camera_file import CameraFileError
 from hardware.codec import Decoder
 from pipeline.camera.extrinsics import IDENTITY
 from pipeline.camera.lens import Camera
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, PhoneImu, TouchState
 from pipeline.vision.detection import Detection
@@ -81,6 +82,10 @@ class PhoneSession:
         """How the pictures come, in words."""
         self.path_choice: PathChoice | None = None
         self.camera_problem = self.camera_text = ""
+        self._lens: SimpleLens | None = None
+        """Of a camera without a calibration, once a screen has measured it."""
+        self._guessed: Camera | None = None
+        """The camera in use, as long as its lens is only guessed."""
         self.meters = {name: Meter() for name in ("operator", "phone_imu", "video", "pose")}
         self.detection: Detection | None = None
         self._t_sight = -inf
@@ -153,7 +158,10 @@ class PhoneSession:
         self.link.came("pictures", frame.t, now)
         shape = ImageFormat.of(frame.picture)
         may_guess = self.camera_problem != "" and self.wizard is None and self._films_screen
-        if shape != self._shape or may_guess:
+        if self._guessed is not None and self._screen is not None:
+            self._lens = self._screen.lens_of(self._guessed)
+        is_measured = self._guessed is not None and self._lens is not None
+        if shape != self._shape or may_guess or is_measured:
             self._open_eyes(shape)
         if self.wizard is not None:
             self.wizard.offer(frame)
@@ -172,7 +180,7 @@ class PhoneSession:
         """Begin to look, or begin again at another size or angle: that is another camera."""
         is_calibrating = self.wizard is not None and self.wizard.stored is None
         self.close()
-        self._shape, self.camera_problem = shape, ""
+        self._shape, self.camera_problem, self._guessed = shape, "", None
         if is_calibrating and not shape.shrunk:
             self._calibrate(shape)
             return
@@ -183,18 +191,21 @@ class PhoneSession:
             if not self._films_screen:
                 self.camera_problem = str(error)
                 return
-            camera, self.camera_text = shape.guessed(), ""  # enough for a robot that is only light
+            # enough for a robot that is only light, and its screen measures what is guessed
+            lens, self.camera_text = self._lens or SimpleLens(), ""
+            camera = shape.guessed(lens)
+            self._guessed = camera if self._lens is None else None
         self.ingest.extrinsics = camera.extrinsics
         frame_pipeline = FramePipeline(
             camera, self._robot, GatesConfig(), self._clock, self._make_decoder
         )
-        screen = self._screen
+        screen, is_guessed = self._screen, self._guessed is not None
         self.vision = VisionThread(
             frame_pipeline,
             partial(self._on_detection, frame_pipeline),
             self._on_taken,
             self._on_key_wanted,
-            partial(screen.add_detection, camera) if screen is not None else None,
+            partial(screen.add_detection, camera, is_guessed) if screen is not None else None,
         )
 
     def _on_detection(self, eye: FramePipeline, detection: Detection, frame: EncodedFrame) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from pipeline.camera.lens import Camera
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.signals import Image, PhoneImu
 from pipeline.vision.detection import Detection
 from server.protocol.screen_messages import ScreenLights, ScreenSize
@@ -37,5 +38,10 @@ class ScreenDoor(Protocol):
     def add_imu(self, sample: PhoneImu) -> None:
         """The phone has moved."""
 
-    def add_detection(self, camera: Camera, luma: Image, detection: Detection) -> None:
+    def add_detection(
+        self, camera: Camera, is_guessed: bool, luma: Image, detection: Detection
+    ) -> None:
         """The phone has seen something; in the vision thread."""
+
+    def lens_of(self, camera: Camera) -> SimpleLens | None:
+        """What a `camera` that `is_guessed` truly has, once it is measured."""

@@ -20,6 +20,7 @@ from pipeline.glass.window import Glass
 from pipeline.signals import BodyImu, Image, PhoneImu
 from pipeline.teleop import Output
 from pipeline.vision.detection import Detection
+from server.phone.frame_pipeline import FramePipeline
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 from server.view.glass_watch import GlassWatch
 
@@ -59,12 +60,13 @@ class ScreenSimulation(VirtualTimeSimulation):
         """Everything at rest at time 0, the robot not shown yet."""
         super().__init__(robot_file, config, scene, hand=hand)
         leds_in_b = robot_file.robot.leds_in_b
+        self._robot, self._gates = robot_file.robot, config.gates
         self._display, self._rest_in_f = display, leds_in_b.mean(axis=0)
         self.phone.films = self._film
         self._shown: deque[tuple[float, Array]] = deque(maxlen=64)
         """(Time of its light [s], dots (n, 2) [m]) of the frames lately drawn."""
-        self._watch = GlassWatch(self._frame_pipeline.camera, display.glass)
         self.robot_of_light = RobotOfLight(leds_in_b, display.glass)
+        self._begin_camera(self._frame_pipeline.camera, is_guessed=not scene.knows_camera)
         if display.believed_lag_s is not None:
             self.robot_of_light.lag = DisplayLag(display.believed_lag_s, 0.0)
         self._sent: deque[tuple[float, Lights]] = deque(maxlen=16)
@@ -120,12 +122,23 @@ class ScreenSimulation(VirtualTimeSimulation):
             if isinstance(sample, PhoneImu):
                 self.robot_of_light.add_phone_imu(sample)
 
+    def _begin_camera(self, camera: Camera, *, is_guessed: bool) -> None:
+        self._watch, self.camera_in_use = GlassWatch(camera, self._display.glass), camera
+        self.robot_of_light.begin_camera(camera, is_guessed=is_guessed)
+
     def _look_further(self, detection: Detection) -> None:
-        """Look for the glass."""
+        """Look for the glass; with a lens that is measured, begin to look again, as the server."""
         luma = self._frame_pipeline.luma
         if luma is None or detection.comes_again:
             return
         look = self._watch.look(luma, detection)
+        self.robot_of_light.add_corners(look.corners)
+        lens = self.robot_of_light.lens_of(self.camera_in_use)
+        if lens is not None:
+            camera = lens.camera(self.camera_in_use.width, self.camera_in_use.height)
+            self._frame_pipeline = FramePipeline(camera, self._robot, self._gates)
+            self._begin_camera(camera, is_guessed=False)
+            return
         if look.seen is not None:
             self.robot_of_light.add_seen(look.seen, look.lights_in_c, self.t)
 

@@ -27,6 +27,7 @@ from hardware.sim.truth import Truth
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from pipeline.camera.extrinsics import IDENTITY, Extrinsics
 from pipeline.camera.lens import Camera
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array
 from pipeline.signals import BodyImu, PhoneImu, TouchState, VisionMeasurement
@@ -84,6 +85,8 @@ class SimulationOptions:
     """None: pictures are rendered and looked at; else LEDs' rays come with this noise instead."""
     camera: Camera | None = None
     """None: the virtual phone's, as large as said above."""
+    knows_camera: bool = True
+    """The server has its calibration; else it takes it for a phone's usual one."""
     sensors: PhoneOptions | None = None
     """None: those of a phone with Chromium, with pictures as often and as late as said above."""
     knows_clock: bool = False
@@ -150,6 +153,8 @@ class VirtualTimeSimulation:
         self.phone.hidden = self._hidden_at
         self._nonces = np.random.default_rng((scene.seed, 7))
         camera = self.phone.camera
+        if not scene.knows_camera:
+            camera = SimpleLens().camera(camera.width, camera.height)
         camera = camera if scene.knows_extrinsics else replace(camera, extrinsics=IDENTITY)
         self._frame_pipeline = FramePipeline(camera, robot_file.robot, config.gates)
         self._ingest = self._new_ingest()
@@ -275,8 +280,9 @@ class VirtualTimeSimulation:
         if self._ticks % EVERY_TICKS["touch"] == 0:
             self._send_later(self._script.touch(self.t))
         if self._ticks % EVERY_TICKS["ready"] == 0:
-            clock = [] if self._ingest.clock.ready else ["The phone's clock is not known yet."]
-            self._inbox.append(ReadyInput(clock))
+            lacks = [] if self._ingest.clock.ready else ["The phone's clock is not known yet."]
+            complaint = self._frame_pipeline.front_end.complaint
+            self._inbox.append(ReadyInput(lacks + [complaint] * (complaint != "")))
         while self._on_their_way and self._on_their_way[0][0] <= self._ticks:
             _, record = self._on_their_way.popleft()
             if isinstance(record.body, Ping):

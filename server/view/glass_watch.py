@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.camera.lens import Camera, points_of
 from pipeline.frames import Array
 from pipeline.glass.fiducials import FiducialDetector, glass_seen
+from pipeline.glass.lens_meter import GlassCorners
 from pipeline.glass.window import Glass
 from pipeline.signals import Image, VisionMeasurement
 from pipeline.vision.detection import Detection
@@ -27,6 +28,7 @@ class GlassLook:
     seen: VisionMeasurement | None
     lights_in_c: Array
     """(n, 3) directions of lights, brightest first."""
+    corners: GlassCorners
     why: str = ""
     """There is no glass, and this may be the reason, in words."""
 
@@ -46,12 +48,13 @@ class GlassWatch:
         seen = glass_seen(self._camera, self._glass, numbers, pixels, detection.t)
         order = np.argsort(-detection.spots.brightness, kind="stable")
         lights = points_of(self._camera.normalised(detection.spots.pixels[order]))
+        corners = GlassCorners(detection.t, numbers, pixels)
         if seen is not None:
             self._without = 0
-            return GlassLook(seen, lights)
+            return GlassLook(seen, lights, corners)
         self._without += 1
         is_asked = self._without % DOUBT_PICTURES == 0
-        return GlassLook(None, lights, self._why(luma) if is_asked else "")
+        return GlassLook(None, lights, corners, self._why(luma) if is_asked else "")
 
     def _why(self, luma: Image) -> str:
         small = luma[::4, ::4]

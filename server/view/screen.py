@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections import deque
+from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from hardware.follower import FollowerError
 from hardware.sim.truth import MAX_AHEAD_S, TruthClient
 from pipeline.camera.lens import Camera
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.frames import Array
 from pipeline.glass import window
 from pipeline.glass.display_lag import SWEEP_SHARE
@@ -33,6 +35,15 @@ WHY_S = 3.0
 """So long a guess stays why there is no glass in the pictures."""
 MAX_NEWS = 256
 """Motion samples and looks that wait, the oldest forgotten: two seconds."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NewCamera:
+    """Another camera films the glass from now on."""
+
+    camera: Camera
+    is_guessed: bool
+    """Its lens is to be measured."""
 
 
 class Screen:
@@ -81,11 +92,17 @@ class Screen:
         if self._thread is not None:
             self._thread.add(sample)
 
-    def add_detection(self, camera: Camera, luma: Image, detection: Detection) -> None:
+    def lens_of(self, camera: Camera) -> SimpleLens | None:
+        """What a camera that was guessed truly has, once it is measured."""
+        return self._thread.lens_of(camera) if self._thread is not None else None
+
+    def add_detection(
+        self, camera: Camera, is_guessed: bool, luma: Image, detection: Detection
+    ) -> None:
         """The phone has seen something; in the vision thread."""
         thread = self._thread
         if thread is not None:
-            thread.add(thread.look(camera, luma, detection))
+            thread.add(thread.look(camera, is_guessed, luma, detection))
 
     def _end(self) -> None:
         if self._thread is not None:
@@ -100,7 +117,7 @@ class LightsThread:
         """`start` begins."""
         self._truth = TruthClient(truth_port)
         self._robot, self._glass, self._show = RobotOfLight(leds_in_b, glass), glass, show
-        self._news: deque[PhoneImu | GlassLook] = deque(maxlen=MAX_NEWS)
+        self._news: deque[PhoneImu | GlassLook | NewCamera] = deque(maxlen=MAX_NEWS)
         self._camera: Camera | None = None
         self._watch: GlassWatch | None = None
         self._guess, self._t_guess = "", -np.inf
@@ -120,14 +137,21 @@ class LightsThread:
         """Give the socket back; who starts the thread need not."""
         self._truth.close()
 
-    def add(self, news: PhoneImu | GlassLook) -> None:
+    def lens_of(self, camera: Camera) -> SimpleLens | None:
+        """What a camera that was guessed truly has, once it is measured."""
+        return self._robot.lens_of(camera)
+
+    def add(self, news: PhoneImu | GlassLook | NewCamera) -> None:
         """Motion, or a look at the glass; any thread may say it."""
         self._news.append(news)
 
-    def look(self, camera: Camera, luma: Image, detection: Detection) -> GlassLook:
+    def look(
+        self, camera: Camera, is_guessed: bool, luma: Image, detection: Detection
+    ) -> GlassLook:
         """Look for the glass; in the vision thread."""
         if self._watch is None or camera is not self._camera:
             self._camera, self._watch = camera, GlassWatch(camera, self._glass)
+            self.add(NewCamera(camera, is_guessed))
         return self._watch.look(luma, detection)
 
     def _run(self) -> None:
@@ -159,10 +183,15 @@ class LightsThread:
             self.why = self._guess
         return self._message(shown)
 
-    def _take(self, news: PhoneImu | GlassLook, t: float) -> None:
+    def _take(self, news: PhoneImu | GlassLook | NewCamera, t: float) -> None:
         if isinstance(news, PhoneImu):
             self._robot.add_phone_imu(news)
-        elif news.seen is not None:
+            return
+        if isinstance(news, NewCamera):
+            self._robot.begin_camera(news.camera, is_guessed=news.is_guessed)
+            return
+        self._robot.add_corners(news.corners)
+        if news.seen is not None:
             self._robot.add_seen(news.seen, news.lights_in_c, t)
         elif news.why:
             self._guess, self._t_guess = news.why, t

@@ -3,8 +3,10 @@
 import pytest
 
 from hardware.robot_file import load_robot
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import TeleopConfig
 from server.control.process import teleop_config
+from server.experiments.screen import uncalibrated
 from server.simulation.figures import result_of
 from server.simulation.screen import Display, ScreenSimulation
 from server.simulation.virtual_time import SimulationOptions
@@ -39,3 +41,16 @@ def test_a_television_that_is_too_late_is_refused_and_not_flown():
     assert "robot" not in simulation.phases
     assert not simulation.trace.t
     assert "too late" in simulation.shows.why
+
+
+@pytest.mark.slow
+def test_a_phone_that_nobody_calibrated_leads_with_the_lens_that_the_screen_measured():
+    camera = uncalibrated(0.70, 0.02)
+    scene = SimulationOptions(hand="moving", seed=1000, camera=camera, knows_camera=False)
+    simulation = ScreenSimulation(SCREEN, CONFIG, scene, Display())
+    figures = result_of(simulation.run(9.0), simulation.scene, 0.0)
+    assert figures.tracked_s > 2.0
+    assert not figures.ended
+    assert figures.rms_mm < 8.0
+    found = simulation.camera_in_use.focal_px / camera.focal_px
+    assert abs(found - 1.0) < 0.06 < SimpleLens().focal / 0.70 - 1.0

@@ -11,6 +11,7 @@ import yaml
 
 from hardware.camera_file import CAMERAS
 from pipeline.camera import verdict as camera_verdict
+from pipeline.camera.simple_lens import SimpleLens
 from pipeline.estimation import sensor_validation
 from pipeline.frames import exp
 from pipeline.signals import LedRays, PhoneImu, RelativePose, Spots, TouchState, VisionMeasurement
@@ -294,11 +295,18 @@ class OpenableScreen:
 
     is_open, why = False, ""
 
+    def __init__(self) -> None:
+        self.lens: SimpleLens | None = None
+
     def add_imu(self, sample: object) -> None:
         """Nothing of it."""
 
-    def add_detection(self, camera: object, luma: object, detection: object) -> None:
+    def add_detection(self, *seen: object) -> None:
         """Nothing of it."""
+
+    def lens_of(self, camera: object) -> SimpleLens | None:
+        """Whatever a test says."""
+        return self.lens
 
 
 def test_only_before_a_screen_a_camera_without_a_calibration_may_be_guessed() -> None:
@@ -313,7 +321,17 @@ def test_only_before_a_screen_a_camera_without_a_calibration_may_be_guessed() ->
     assert rig.phone.camera_problem == ""
     assert rig.phone.vision is not None
     focal_px = rig.phone.vision.front_end.camera.focal_px
-    assert 0.7 * JPEG.width < focal_px < 0.9 * JPEG.width
+    assert focal_px == SimpleLens().focal * JPEG.width
+    screen.lens = SimpleLens(0.7)
+    rig.say(JPEG, 3)
+    eyes = rig.phone.vision
+    assert eyes.front_end.camera.focal_px == 0.7 * JPEG.width
+    screen.lens = None
+    rig.say(JPEG, 4)
+    assert rig.phone.vision is eyes
+    rig.say(replace(JPEG, screen_angle_deg=90), 5)  # the same lens
+    assert rig.phone.vision is not eyes
+    assert rig.phone.vision.front_end.camera.focal_px == 0.7 * JPEG.width
     rig.phone.close()
 
 

@@ -14,14 +14,16 @@ from hardware.follower import FollowerState
 from hardware.robot_file import load_robot
 from hardware.sim.truth import ahead_of, encode_truth
 from pipeline.camera.lens import Camera
-from pipeline.frames import GRAVITY
+from pipeline.camera.simple_lens import SimpleLens
+from pipeline.frames import GRAVITY, R_from_rpy
 from pipeline.glass.display_lag import SWEEP_SHARE, swept
 from pipeline.glass.fiducials import glass_seen
+from pipeline.glass.lens_meter import TILT, GlassCorners
 from pipeline.glass.window import CELLS, MARKER_IDS, TILE_SHARE, Glass, on_glass
 from pipeline.signals import PhoneImu
 from server.protocol.screen_messages import ScreenSize
 from server.view.glass_watch import GlassLook
-from server.view.screen import LightsThread, Screen
+from server.view.screen import LightsThread, NewCamera, Screen
 
 LEDS_IN_B = load_robot("screen").robot.leds_in_b
 GLASS = Glass(0.53, 0.30)
@@ -29,6 +31,8 @@ K = np.array([[950.0, 0.0, 639.5], [0.0, 950.0, 359.5], [0.0, 0.0, 1.0]])
 CAMERA = Camera(1280, 720, K, "plumb_bob", np.zeros(5))
 AWAY = np.array([0.6, 0.0, 0.0])
 """The glass from the camera, which looks straight at it [m]."""
+STRAIGHT = np.eye(3)
+NO_CORNERS = GlassCorners(0.0, np.zeros(0, dtype=np.intp), np.zeros((0, 2)))
 
 
 @pytest.fixture
@@ -66,17 +70,17 @@ def make(truth_port):
         yield thread
 
 
-def filmed(thread, seconds, lag_s, since=0.0):
+def filmed(thread, seconds, lag_s, since=0.0, R_cg=STRAIGHT):
     """What the thread says at last, of a phone that holds still and films."""
-    pixels, still = CAMERA.pixels(AWAY + GLASS.fiducials()), np.zeros(3)
+    pixels, still = CAMERA.pixels(AWAY + GLASS.fiducials() @ R_cg.T), np.zeros(3)
     for k in range(int(60 * seconds)):
         t = since + k / 60.0
         thread.add(PhoneImu(t, still, np.array([0.0, 0.0, GRAVITY])))
         if k % 2 == 0:
             seen = glass_seen(CAMERA, GLASS, np.arange(16), pixels, t)
             right = SWEEP_SHARE * GLASS.width_m * float(swept(np.array(t - lag_s)))
-            light = AWAY + on_glass(np.array([[right, 0.0]]))
-            thread.add(GlassLook(seen, light))
+            light = AWAY + on_glass(np.array([[right, 0.0]])) @ R_cg.T
+            thread.add(GlassLook(seen, light, GlassCorners(t, np.arange(16), pixels)))
         lights = thread.step(t + 0.01)
     return lights
 
@@ -96,6 +100,21 @@ def test_a_phone_that_films_is_shown_a_sweep_and_then_the_robot(make):
     perspective = 0.6 / (0.6 + at[:, 0])
     wanted = 1e3 * perspective[:, None] * np.column_stack((-at[:, 1], at[:, 2]))
     assert np.abs(shown - wanted).max() < 1.0
+
+
+def test_a_lens_that_was_guessed_is_measured_before_the_robot_is_shown(make):
+    thread = make()
+    guessed = SimpleLens(0.78).camera(1280, 720)
+    thread.add(NewCamera(guessed, is_guessed=True))
+    lights = filmed(thread, 4.0, 0.03)
+    assert (lights.phase, thread.why) == ("search", TILT)
+    assert thread.lens_of(guessed) is None
+    filmed(thread, 5.0, 0.03, since=4.0, R_cg=R_from_rpy(np.array([0.0, -0.2, 0.0])))
+    lens = thread.lens_of(guessed)
+    assert lens.focal == pytest.approx(950.0 / 1280.0, rel=0.01)
+    assert thread.lens_of(SimpleLens(0.78).camera(1280, 720)) is None  # another phone's
+    thread.add(NewCamera(lens.camera(1280, 720), is_guessed=False))
+    assert filmed(thread, 1.0, 0.03, since=9.0).phase == "robot"
 
 
 def test_a_screen_that_is_too_late_is_told_so_and_shows_no_robot(make):
@@ -119,7 +138,7 @@ def test_a_robot_larger_than_the_screen_is_not_shown_on_it(make):
 
 def test_why_there_is_no_glass_is_told_for_a_while(make):
     thread = make()
-    thread.add(GlassLook(None, np.zeros((0, 3)), "The picture is mirrored."))
+    thread.add(GlassLook(None, np.zeros((0, 3)), NO_CORNERS, "The picture is mirrored."))
     assert thread.step(1.0).why == thread.why == "The picture is mirrored."
     assert "four corners" in thread.step(5.0).why
 

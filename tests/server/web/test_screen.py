@@ -42,7 +42,10 @@ class Door:
     def add_imu(self, sample):
         raise AssertionError("no phone is here")
 
-    def add_detection(self, camera, luma, detection):
+    def add_detection(self, camera, is_guessed, luma, detection):
+        raise AssertionError("no phone is here")
+
+    def lens_of(self, camera):
         raise AssertionError("no phone is here")
 
 
