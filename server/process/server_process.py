@@ -148,12 +148,13 @@ def _manager(
     folder = private_directory(private_directory(settings.state) / "recordings")
     recover_all(folder)
     recordings = Recordings(folder, _metadata(settings))
-    robot = load_robot(settings.robot, takes=COMMANDS).robot
+    robot_file = load_robot(settings.robot, takes=COMMANDS)
+    robot, distance_m = robot_file.robot, robot_file.start.distance
     profiles = private_directory(settings.state / PROFILES)
     cameras = [*settings.cameras, profiles, CAMERAS]
     screen = Screen(given.truth_port, robot.leds_in_b) if given.truth_port else None
     return SessionManager(
-        given.runtime, robot, cameras, recordings, profiles, doors, decoding, screen
+        given.runtime, robot, cameras, recordings, profiles, doors, decoding, screen, distance_m
     )
 
 

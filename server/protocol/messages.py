@@ -79,6 +79,8 @@ class Welcome(msgspec.Struct, tag="welcome", frozen=True):
     bitrate_bps: int
     you: str = ""
     """Id of this page's pairing, as in `people` of a status."""
+    distance_m: float = 2.0
+    """From which the robot is filmed, for a lens that is focused once."""
 
 
 class Refused(msgspec.Struct, tag="refused", frozen=True):

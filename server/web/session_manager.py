@@ -68,12 +68,14 @@ class SessionManager:
         doors: Doors | None = None,
         decoding: Decoding | None = None,
         screen: ScreenDoor | None = None,
+        distance_m: float = 2.0,
     ) -> None:
         """Listens to control in `runtime`; `profiles` is where new calibrations go.
 
         Without `decoding` pictures are decoded in this process; a `screen` can show a simulated
-        robot.
+        robot; the robot is filmed from `distance_m`.
         """
+        self.distance_m = distance_m
         self.robot, self.recordings, self.screen = robot, recordings, screen
         self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
         self.paths = Transports(lambda data: recordings.record("server", data, now()))

@@ -206,6 +206,7 @@ class PageServer:
                     frame_rate_hz=video.frame_rate_hz,
                     bitrate_bps=video.bitrate_bps,
                     you=member.id,
+                    distance_m=self._manager.distance_m,
                 )
             )
         )

@@ -59,7 +59,9 @@ def house(tmp_path):
 def test_a_viewers_screen_tells_its_size_and_is_told_what_to_show(house):
     async def scene():
         async with Browser(house, "viewer", "Vera").page("/ws/screen") as page:
-            assert (await page.hello("screen"))["type"] == "welcome"
+            house.manager.distance_m = 0.6
+            welcome = await page.hello("screen")
+            assert (welcome["type"], welcome["distance_m"]) == ("welcome", 0.6)
             await page.say(type="glass", width_mm=531.0, height_mm=299.0)
             await eventually(lambda: house.manager.screen.size == ScreenSize(531.0, 299.0))
             await asyncio.to_thread(house.manager.screen.show, LIGHTS)

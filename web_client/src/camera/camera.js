@@ -7,6 +7,7 @@ import { Problem } from '../wire/problems.js';
  * @property {number} width Of the picture with the phone in its side [px].
  * @property {number} height
  * @property {number} frame_rate_hz
+ * @property {number} [distance_m] From which the robot is filmed.
  */
 
 /** Asked for before the server has said what it wants. */

@@ -67,7 +67,7 @@ export class CameraFeed {
     if (track === null || settings === null) return 'no camera';
     this.source?.stop();
     await settleCamera(track, wanted);
-    await settings.steady();
+    await settings.steady(wanted.distance_m);
     this.source = await startFrames({ ...this.surroundings, track });
     return `${settingsWords(track.getSettings())}, through the ${this.source.name}`;
   }

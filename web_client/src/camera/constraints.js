@@ -31,11 +31,14 @@ export class Lens {
     return this.is.exposureMode === 'manual';
   }
 
-  /** Sets what an LED wants, once for each opened camera. */
-  async steady() {
+  /**
+   * Sets what an LED wants, once for each opened camera.
+   * @param {number} [robotM] From which the robot is filmed.
+   */
+  async steady(robotM) {
     if (this.steadied) return;
     this.steadied = true;
-    const { wish, lacks } = wished(this.able, this.is);
+    const { wish, lacks } = wished(this.able, this.is, robotM);
     await this.set(wish);
     this.lacks = [...lacks, ...refusedOf(wish, this.is)];
   }

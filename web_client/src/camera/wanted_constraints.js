@@ -12,7 +12,7 @@ export const SHORT = 30;
 /** Longer is not short any more. */
 const LONGEST = 80;
 const SHORTEST = 3;
-/** A lens that stays still: sharp from arm's length to the far wall [m]. */
+/** A lens that stays still, where nobody said from how far: sharp from arm's length to the far wall [m]. */
 const FOCUS_M = 2;
 /** How much brighter or darker a step makes. */
 const STEP = 1.6;
@@ -47,9 +47,10 @@ export function canExpose(able) {
  * The settings an LED wants, as far as this camera has them.
  * @param {Settings} able
  * @param {Settings} is
+ * @param {number} [robotM] From which the robot is filmed: one on a screen is far nearer than one that hangs.
  * @returns {{ wish: Settings, lacks: Lack[] }}
  */
-export function wished(able, is) {
+export function wished(able, is, robotM = FOCUS_M) {
   /** @type {Lack[]} */
   const lacks = [];
   /** @type {Settings} */
@@ -61,7 +62,7 @@ export function wished(able, is) {
   }
   if (able.focusMode?.includes('manual') && isRange(able.focusDistance)) {
     wish.focusMode = 'manual';
-    wish.focusDistance = within(able.focusDistance, FOCUS_M);
+    wish.focusDistance = within(able.focusDistance, robotM);
   } else if (!(able.focusMode?.length === 1 && able.focusMode[0] === 'fixed')) {
     lacks.push('focus');
   }

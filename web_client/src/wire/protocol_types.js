@@ -77,6 +77,7 @@
  * @property {number} frame_rate_hz
  * @property {number} bitrate_bps
  * @property {string} you Id of this page's pairing, as in `people` of a status.
+ * @property {number} distance_m From which the robot is filmed, for a lens that is focused once.
  */
 
 /**

@@ -86,6 +86,12 @@ test('Chrome on Android: exposed shortly, focused once, as sensitive as before',
   assert.deepEqual(Object.keys(track.asked[0]), ['advanced'], 'Chrome refuses a mixture with the size');
 });
 
+test('a lens is focused on where the robot is filmed from', async () => {
+  const track = new FakeTrack(CHROME);
+  await new Lens(/** @type {any} */ (track)).steady(0.6);
+  assert.equal(track.is.focusDistance, 0.6);
+});
+
 test('the lens is told once for each opened camera', async () => {
   const { track, lens } = await steadied(CHROME);
   await lens.steady();
