@@ -141,7 +141,8 @@ class LeashConfig:
     """How near to the end of its reach a robot that hangs may be led."""
 
     enabled: bool = False
-    """Off: what it does to a robot that touches something is not measured yet."""
+    """Off: what it does to a robot that touches something is not measured yet. That the robot is
+    led beyond its reach is told nevertheless."""
     kept: float = 0.1
     """Share of each thruster's largest thrust that no place may take up: it is left for control."""
     free: float = 0.85

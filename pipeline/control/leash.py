@@ -50,14 +50,20 @@ def leash_of(robot: Robot, config: LeashConfig) -> Leash | None:
     """Leash of a robot that knows its place; None for another: nothing pulls it back.
 
     Raises:
-        ValueError: the robot hangs, and its thrusters have no reach.
+        ValueError: the robot hangs and is to be held, and its thrusters have no reach.
     """
-    held = config.enabled and knows_its_place(robot) and not robot.needs_tilt
-    return Leash(robot, config) if held else None
+    if not knows_its_place(robot) or robot.needs_tilt:
+        return None
+    try:
+        return Leash(robot, config)
+    except ValueError:
+        if config.enabled:
+            raise
+        return None  # of its limits nothing can be told
 
 
 class Leash:
-    """Keeps what the robot is led to within its reach."""
+    """Tells when the robot is led beyond its reach and, if enabled, keeps it within."""
 
     def __init__(self, robot: Robot, config: LeashConfig) -> None:
         """For one robot that hangs.
@@ -67,11 +73,12 @@ class Leash:
         """
         self._reach = ThrustReach(robot, config.kept * robot.f_max)
         self._stiffness_in_f, self._free = robot.stiffness_in_f, config.free
+        self._is_held = config.enabled
 
     def hold(
         self, error: PoseError, R_fv: Array, R_fr: Array, x_bf_in_f: Array, v_bf_in_f: Array
     ) -> Leashed:
-        """The error to where the robot can be held.
+        """The error to where the robot can be held; as it is, if that is all that is asked.
 
         Args:
             error: To where it is led.
@@ -82,7 +89,7 @@ class Leash:
         """
         x_r_in_f = x_bf_in_f + R_fv @ error.e_p_in_v
         taken, gradient = self._reach.taken(R_fr.T @ (self._stiffness_in_f * x_r_in_f))
-        if taken <= self._free:
+        if taken <= self._free or not self._is_held:
             return Leashed(error, taken)
         rest = 1.0 - self._free
         bent = tanh((taken - self._free) / rest)

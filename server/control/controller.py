@@ -262,6 +262,7 @@ class Controller:
             lead=Lead.of(output.leading),
             next_lead=Lead.of(self.teleop.next_leading),
             thrusters_weak=list(output.thrusters),
+            at_limit=output.at_limit,
             twist_in_b=None
             if twist_in_b is None
             else (*triple(twist_in_b[:3]), *triple(twist_in_b[3:])),

@@ -105,6 +105,8 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """What such a robot measures, of each of `body_samples`: t, v, ω in b."""
     commands: list[tuple[float, ...]] = []
     """Thrusts commanded since the last status, for recordings: each time t, then `thrusts`."""
+    at_limit: bool = False
+    """The robot is led to where its thrusters can't hold it."""
 
 
 def _has_attitudes(status: ControlStatus) -> bool:

@@ -109,6 +109,7 @@ def build(manager: StatusSource) -> Status:
         if control is not None and control.estimate is not None
         else [],
         thrusters_weak=control.thrusters_weak if control is not None else [],
+        at_limit=control.at_limit if control is not None else False,
         server=manager.pauses.figures(),
         people=manager.people.present(),
         leading=_leading(manager.robot, control),

@@ -66,6 +66,7 @@ def control_status(**changes: object) -> ControlStatus:
         "gaps": {},
         "warnings": [],
         "thrusters_weak": [],
+        "at_limit": False,
     }
     return ControlStatus(**{**values, **changes})
 

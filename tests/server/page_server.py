@@ -20,7 +20,7 @@ def status(mode):
     texts = dict.fromkeys(
         ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""
     )
-    flags = {"ready": True, "saturated": False, "resumes": False}
+    flags = {"ready": True, "saturated": False, "resumes": False, "at_limit": False}
     tables: dict[str, object] = {
         **{name: {} for name in ("streams", "latency_ms", "control", "server", "gaps")},
         **{name: [] for name in ("refusals", "events", "warnings", "people", "thrusts_n")},

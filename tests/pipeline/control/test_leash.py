@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -94,8 +96,21 @@ def test_what_hangs_from_nothing_has_no_leash(name: str) -> None:
     assert leash_of(load_robot(name).robot, CONFIG) is None
 
 
-def test_who_does_not_ask_for_one_has_none() -> None:
-    assert leash_of(AMES, LeashConfig()) is None
+def test_who_does_not_ask_for_one_is_told_of_the_end_of_its_reach_and_held_nowhere() -> None:
+    leash = leash_of(AMES, LeashConfig())
+    assert leash is not None
+    for away in AWAY:
+        for times, said in ((0.99, False), (1.01, True), (20.0, True)):
+            error = error_to(times / taken(away) * away, np.zeros(3))
+            held = leash.hold(error, R_FV, R_FR, X_IN_F, V_IN_F)
+            assert (held.error is error, held.shares_in_f, held.at_limit) == (True, None, said)
+
+
+def test_without_any_reach_nothing_is_told_and_no_leash_can_be_asked_for() -> None:
+    weak = replace(AMES, f_max=1.001 * AMES.f_min)
+    assert leash_of(weak, LeashConfig()) is None
+    with pytest.raises(ValueError, match="reach"):
+        leash_of(weak, CONFIG)
 
 
 @pytest.mark.parametrize("name", ["kept", "free"])

@@ -7,6 +7,7 @@ import { browserOf } from './browser.js';
 import { CameraFeed } from '../camera/camera_feed.js';
 import { ChoiceCard } from '../ui/choice_card.js';
 import { Feedback } from '../ui/feedback.js';
+import { Lasting, lastingSignal } from '../ui/lasting.js';
 import { LensPanel } from '../ui/constraints_panel.js';
 import { PaceKeeper } from '../video/rate_control.js';
 import { WakefulClock, commandOf } from '../wire/command.js';
@@ -30,6 +31,7 @@ import { INITIAL, reduce, requestOf, touchOf } from '../ui/session.js';
 
 const TICK_MS = 33;
 const STOP_TICK_MS = 50;
+const LASTING_MS = 50;
 const HEALTH_MS = 500;
 /** Phases of a calibration that need pictures of the camera's own size. */
 const WHOLE = ['filming', 'solving'];
@@ -39,7 +41,8 @@ const here = browserOf(window);
 const { scope, platform, fetchHere, links, screenAngle, startJpegWorker, startWorker, later } = here;
 const clock = new WakefulClock(performance, Date);
 const stopPost = new StopPost(fetchHere, (answer) => dispatch({ type: 'stop_answer', answer, now: clock.now() }));
-const feedback = new Feedback(navigator, window.AudioContext, platform !== 'android');
+const feedback = new Feedback(navigator, window.AudioContext, true);
+const lasting = new Lasting((signal) => feedback.signal(signal), { againMs: 1200, most: 50 });
 const motionRate = new Rate();
 const identity = { device: '', sensors: '', video: '' };
 let state = INITIAL;
@@ -183,6 +186,7 @@ function perform(effect) {
       break;
     case 'feel':
       feedback.signal(effect.mode);
+      lasting.felt(effect.mode, performance.now());
       break;
     case 'calibrate':
       phone.calibrate(effect.what);
@@ -264,6 +268,7 @@ window.addEventListener('error', (event) => phone.log(`page: ${event.message}`))
 view.sound(feedback.sound);
 void start.arrive().then(() => {
   window.setInterval(() => dispatch({ type: 'tick', now: clock.now() }), TICK_MS);
+  window.setInterval(() => lasting.take(lastingSignal(state), performance.now()), LASTING_MS);
   window.setInterval(() => dispatch({ type: 'stop_tick', now: clock.now() }), STOP_TICK_MS);
   window.setInterval(reportHealth, HEALTH_MS);
 });

@@ -2,13 +2,14 @@
 
 /** @import {ShownMode} from '../ui/session_types.js' */
 
+import { Lasting } from '../ui/lasting.js';
+
 /** @type {readonly ShownMode[]} */
 const ALARMS = ['RAMP', 'LOST'];
 /** Alarms of a robot that was last heard of in the air. @type {readonly ShownMode[]} */
 const DEAF = ['NO_LINK', 'NO_WORD'];
-const AGAIN_MS = 3000;
-/** Of one fault: a page left open overnight falls silent. */
-const MOST = 20;
+/** For a minute. */
+const LIMITS = { againMs: 3000, most: 20 };
 
 export class Alarm {
   /**
@@ -17,11 +18,7 @@ export class Alarm {
    */
   constructor(document, signal) {
     this.document = document;
-    this.signal = signal;
-    /** @type {ShownMode | ''} */
-    this.mode = '';
-    this.signals = 0;
-    this.lastMs = 0;
+    this.lasting = new Lasting(/** @type {(mode: any) => void} */ (signal), LIMITS);
   }
 
   /**
@@ -33,12 +30,6 @@ export class Alarm {
   take(mode, name, flies, now) {
     const isAlarm = ALARMS.includes(mode) || (flies && DEAF.includes(mode));
     this.document.title = `${isAlarm ? '⚠ ' : ''}${name} · Lightleash`;
-    if (mode !== this.mode) this.signals = 0;
-    this.mode = mode;
-    if (!isAlarm || this.signals >= MOST) return;
-    if (this.signals > 0 && now - this.lastMs < AGAIN_MS) return;
-    this.signals += 1;
-    this.lastMs = now;
-    this.signal(mode);
+    this.lasting.take(isAlarm ? mode : null, now);
   }
 }

@@ -5,7 +5,7 @@
 /** @import {Status} from '../wire/protocol_types.js' */
 
 import { Elements, write } from './elements.js';
-import { modeWords, rampWords } from '../ui/mode_words.js';
+import { limitWords, modeWords, rampWords } from '../ui/mode_words.js';
 import { age, alarm, gapLine, metres, number, scaleEnd, streamName, timeOfDay } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
@@ -107,7 +107,7 @@ export class BoardView extends Elements {
     this.list('refusals', lines);
     this.find('refusals').firstElementChild?.classList.toggle('fine', fine);
     const { mode, sensors_doubted: doubted, thrusters_weak: weak, warnings } = status;
-    this.list('warnings', [...(mode === 'DISARMED' ? [] : weak), ...doubted, ...warnings]);
+    this.list('warnings', [...limitWords(status), ...(mode === 'DISARMED' ? [] : weak), ...doubted, ...warnings]);
   }
 
   /** @param {Status} status */

@@ -15,6 +15,7 @@ const SIGNALS = {
   RAMP: { vibration: [250], tones: [440, 330, 247] },
   STOPPED: { vibration: [500], tones: [196, 196] },
   LOST: { vibration: [200, 100, 200, 100, 200], tones: [247, 196, 247, 196] },
+  LIMIT: { vibration: [35, 45, 35], tones: [587, 494] },
   WEAK: { vibration: [80, 60, 80, 60, 80], tones: [330, 294, 330] },
   STOP_LOST: { vibration: [400, 100, 400, 100, 400], tones: [196, 175, 196, 175] },
   NO_LINK: { vibration: [200, 100, 200], tones: [247, 196] },
@@ -26,7 +27,7 @@ export class Feedback {
   /**
    * @param {{ vibrate?: (pattern: number[]) => boolean }} navigator
    * @param {(new () => AudioContext) | undefined} Audio
-   * @param {boolean} sound Where vibration does nothing the change must be heard.
+   * @param {boolean} sound Changes are heard too: vibration is nothing to a phone in a holder, or an iPhone.
    */
   constructor(navigator, Audio, sound) {
     this.navigator = navigator;

@@ -41,6 +41,14 @@ export function rampWords(seconds, status) {
   return `${status?.takes === 'twist' ? 'Disarms' : 'Thrust fades'} in ${seconds} s`;
 }
 
+/**
+ * What is said of a robot that is led to where it can't go.
+ * @param {Status | null} status
+ */
+export function limitWords(status) {
+  return status?.at_limit && status.mode === 'TRACK' ? ['At the end of its reach: lead it back.'] : [];
+}
+
 /** On whose side a silence was. @type {Record<string, string>} */
 export const SIDES = { phone: 'phone', robot: 'robot', server: 'computer' };
 
