@@ -27,6 +27,9 @@ from pipeline.robot import Robot
 
 REST_S: float = 5.0
 """How fast is learnt what is measured at rest, thrusters off [s]: two swings of the AMES."""
+FARTHEST_M = 0.1
+"""A rest measured farther away [m] is an attitude's fault: 5° of tilt, or 3° and an accelerometer
+that is 40 mg off. A phone that was turned with its gyroscope silent had it at 0.7."""
 POLES: float = 3.0
 """ω [1/s]: the pendulum's own is 2.7. Faster, thrusters' lag and damping count for motion; slower,
 an error of the vertical, which the accelerometer takes for a / ω²."""
@@ -113,7 +116,8 @@ class SuspendedPlace:
         self._thrust_in_f = self._thrust_in_f + given * (R_fb @ force_in_b - self._thrust_in_f)
         a_in_f = R_fb @ f_bf_in_b + G_IN_F
         pulled_in_f = self._softness_in_f * (self._thrust_in_f - self._m * a_in_f)
-        if knows_vertical and not force_in_b.any():
+        is_near = float(pulled_in_f @ pulled_in_f) < FARTHEST_M**2
+        if knows_vertical and is_near and not force_in_b.any():
             self._rested_s += h
             share = max(low_pass.share(h / REST_S), h / self._rested_s)
             self._rest_in_f = self._rest_in_f + share * (pulled_in_f - self._rest_in_f)

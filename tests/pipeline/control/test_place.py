@@ -194,3 +194,18 @@ def test_what_a_drifting_vertical_says_of_its_rest_is_not_learnt(again_s: float)
     for _ in range(round(2.0 / H)):
         swing.step(np.array([2.0, 0.0, 0.0]))
     np.testing.assert_allclose(swing.place.from_rest_in_f, swing.x, atol=0.005)
+
+
+def test_what_an_attitude_far_from_upright_says_of_its_rest_is_not_learnt() -> None:
+    """Thirty degrees off for seconds, and nobody knows it: a phone's gyroscope missed a turn."""
+    swing = Swing(BIAS, R_FB)
+    for _ in range(round(1.0 / H)):
+        swing.step(np.zeros(3))
+    for _ in range(round(3.0 / H)):
+        R_fb, f_bf_in_b = exp(np.array([0.5, 0.0, 0.0])) @ R_FB, R_FB.T @ UP + BIAS
+        swing.place.propagate(f_bf_in_b, R_fb, np.zeros(3), H, True)
+    for _ in range(round(3.0 / H)):
+        swing.step(np.zeros(3))
+    for _ in range(round(2.0 / H)):
+        swing.step(np.array([2.0, 0.0, 0.0]))
+    np.testing.assert_allclose(swing.place.from_rest_in_f, swing.x, atol=0.006)
