@@ -55,6 +55,11 @@ class Lights:
     """(k, n, 2) of each LED on the glass [m], right and up; NaN where there is none."""
 
 
+def least_height(leds_in_b: Array) -> float:
+    """Of a glass that these LEDs (n, 3) fit [m]."""
+    return LEAST_PER_HEIGHT * float(np.ptp(leds_in_b[:, 2]))
+
+
 class RobotOfLight:
     """One robot behind one glass, for one phone."""
 
@@ -70,12 +75,6 @@ class RobotOfLight:
         """Of the display, once it is measured; followed from then on."""
         self.eye: Eye | None = None
         """At the last step."""
-
-    @property
-    def is_too_small(self) -> bool:
-        """Whether this robot's LEDs don't fit the glass."""
-        heights = self._leds_in_b[:, 2]
-        return self.glass.height_m < LEAST_PER_HEIGHT * float(np.ptp(heights))
 
     def begin_camera(self, camera: Camera, *, is_guessed: bool) -> None:
         """Another camera films the glass now; one whose lens `is_guessed` is measured first."""
@@ -129,7 +128,7 @@ class RobotOfLight:
 
     def step(self, now: float, robot: PathAhead) -> Lights:
         """What to show from `now` [s] on."""
-        if self.is_too_small:
+        if self.glass.height_m < least_height(self._leds_in_b):
             return Lights("search", "This robot does not fit the screen: choose a larger screen, "
                           "or start with --robot screen.")  # fmt: skip
         self.eye = eye = self._eye.at(now)

@@ -23,6 +23,10 @@ class ScreenDoor(Protocol):
         """Whether a screen is there."""
 
     @property
+    def least_height_m(self) -> float:
+        """Of a screen that this robot fits."""
+
+    @property
     def why(self) -> str:
         """What is wrong with what the phone sees of it, in words, or ""."""
 

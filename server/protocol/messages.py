@@ -81,6 +81,8 @@ class Welcome(msgspec.Struct, tag="welcome", frozen=True):
     """Id of this page's pairing, as in `people` of a status."""
     distance_m: float = 2.0
     """From which the robot is filmed, for a lens that is focused once."""
+    screen_height_m: float | None = None
+    """Of the smallest screen that can show the robot; None: no screen can, it is a real one."""
 
 
 class Refused(msgspec.Struct, tag="refused", frozen=True):

@@ -17,7 +17,7 @@ from pipeline.camera.simple_lens import SimpleLens
 from pipeline.frames import Array
 from pipeline.glass import window
 from pipeline.glass.display_lag import SWEEP_SHARE
-from pipeline.glass.robot_of_light import STEP_S, Lights, RobotOfLight
+from pipeline.glass.robot_of_light import STEP_S, Lights, RobotOfLight, least_height
 from pipeline.signals import Image, PhoneImu
 from pipeline.vision.detection import Detection
 from server.common.clock import now
@@ -59,6 +59,11 @@ class Screen:
     def is_open(self) -> bool:
         """Whether a screen is there."""
         return self._show is not None
+
+    @property
+    def least_height_m(self) -> float:
+        """Of a screen that this robot fits."""
+        return least_height(self._leds_in_b)
 
     @property
     def why(self) -> str:

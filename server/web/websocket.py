@@ -194,7 +194,7 @@ class PageServer:
             self._enter(page)
         else:
             self._manager.supervisors.add(page)
-        video = self._video
+        video, screen = self._video, self._manager.screen
         page.send(
             encode_message(
                 Welcome(
@@ -207,6 +207,7 @@ class PageServer:
                     bitrate_bps=video.bitrate_bps,
                     you=member.id,
                     distance_m=self._manager.distance_m,
+                    screen_height_m=screen.least_height_m if screen is not None else None,
                 )
             )
         )

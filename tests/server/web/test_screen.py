@@ -45,6 +45,8 @@ class Door:
     def add_detection(self, camera, is_guessed, luma, detection):
         raise AssertionError("no phone is here")
 
+    least_height_m = 0.16
+
     def lens_of(self, camera):
         raise AssertionError("no phone is here")
 
@@ -62,6 +64,7 @@ def test_a_viewers_screen_tells_its_size_and_is_told_what_to_show(house):
             house.manager.distance_m = 0.6
             welcome = await page.hello("screen")
             assert (welcome["type"], welcome["distance_m"]) == ("welcome", 0.6)
+            assert welcome["screen_height_m"] == 0.16
             await page.say(type="glass", width_mm=531.0, height_mm=299.0)
             await eventually(lambda: house.manager.screen.size == ScreenSize(531.0, 299.0))
             await asyncio.to_thread(house.manager.screen.show, LIGHTS)

@@ -86,3 +86,15 @@ const STREAMS = {
 export function streamName(name) {
   return STREAMS[name] ?? name;
 }
+
+/** What a monitor of 27 inches has [m]. */
+const USUAL_SCREEN_M = 0.34;
+
+/**
+ * The way to show the robot on a screen, and how large that must be where a usual one is too small.
+ * @param {number} heightM Of the smallest one.
+ */
+export function screenWords(heightM) {
+  const size = heightM > USUAL_SCREEN_M ? ` ${Math.ceil(100 * heightM)} cm high` : '';
+  return `Robot on a screen${size}`;
+}

@@ -100,7 +100,10 @@ function dispatch(event) {
 /** @param {ToPage} message */
 function take(message) {
   const now = clock.now();
-  if (message.type === 'welcome') dispatch({ type: 'welcomed' });
+  if (message.type === 'welcome') {
+    view.screen(message.screen_height_m);
+    dispatch({ type: 'welcomed' });
+  }
   if (message.type === 'status') {
     serverTime.heard(message.time_ms);
     dispatch({ type: 'status', status: message, now });

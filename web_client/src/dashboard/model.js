@@ -11,6 +11,8 @@ import { STATUS_LIFE_MS } from '../ui/session.js';
 
 /** Twenty seconds of Status at 10 Hz. */
 export const REMEMBERED = 200;
+/** A place that is less sure than this is none, and no other could be read beside it. */
+const NOWHERE_MM = 1000;
 const NOTICE_MS = 5000;
 /** With the robot there nobody need be told any more that STOP did not reach it. @type {Status['mode'][]} */
 export const AT_REST = ['DISARMED', 'STOPPED'];
@@ -99,7 +101,7 @@ function heardFrom(board, status, now) {
   const sample = {
     errorMm: status.error_mm,
     errorDeg: status.error_deg,
-    sigmaMm: status.sigma_mm,
+    sigmaMm: status.sigma_mm !== null && status.sigma_mm < NOWHERE_MM ? status.sigma_mm : null,
     rejected: status.estimate?.leds_rejected ?? null,
   };
   return {

@@ -6,7 +6,7 @@
 
 import { Elements, write } from './elements.js';
 import { limitWords, modeWords, rampWords } from '../ui/mode_words.js';
-import { age, alarm, gapLine, metres, number, scaleEnd, streamName, timeOfDay } from './format.js';
+import { age, alarm, gapLine, metres, number, scaleEnd, screenWords, streamName, timeOfDay } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
 import { REMEMBERED, beforeArming, requests, shownMode } from './model.js';
@@ -96,6 +96,14 @@ export class BoardView extends Elements {
       this.show(id, text !== '');
       this.text(id, text);
     }
+  }
+
+  /** @param {number | null} heightM Of the smallest screen that can show the robot. */
+  screen(heightM) {
+    this.show('screen', heightM !== null);
+    if (heightM === null) return;
+    this.text('screen', screenWords(heightM));
+    this.find('screen').title = 'A phone that films the screen leads the simulated robot';
   }
 
   /** @param {Status} status */

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { age, alarm, gapLine, metres, number, scaleEnd, streamName } from '../../src/dashboard/format.js';
+import { age, alarm, gapLine, metres, number, scaleEnd, streamName, screenWords } from '../../src/dashboard/format.js';
 import { EMPTY, REMEMBERED, beforeArming, reduce, requests, shownMode } from '../../src/dashboard/model.js';
 import { INVITE_LIFE_MS, PhoneCard } from '../../src/dashboard/phone_card.js';
 import { Problem } from '../../src/wire/problems.js';
@@ -153,4 +153,16 @@ test('gaps of the last minute are told by side, the longest of each', () => {
   assert.equal(gapLine({}), '');
   const gaps = { phone: { count: 2, longest_ms: 312 }, robot: { count: 0, longest_ms: 0 }, server: { count: 1, longest_ms: 90 } };
   assert.equal(gapLine(gaps), 'Gaps in the last minute: phone 2 (0.31 s) · robot 0 · computer 1 (0.09 s)');
+});
+
+test('a screen that must be larger than usual is told by its height', () => {
+  assert.equal(screenWords(0.16), 'Robot on a screen');
+  assert.equal(screenWords(0.641), 'Robot on a screen 65 cm high');
+});
+
+test('a place that is known to kilometres is not drawn, and what is drawn stays readable', () => {
+  const { history } = [12, 2e6].reduce(
+    (board, sigma_mm) => reduce(board, { type: 'status', status: statusOf({ sigma_mm }), now: 0 }), EMPTY,
+  );
+  assert.deepEqual(history.slice(-2).map(({ sigmaMm }) => sigmaMm), [12, null]);
 });
