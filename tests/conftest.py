@@ -18,7 +18,7 @@ from hypothesis import settings
 
 matplotlib.use("agg")  # no test needs a display
 
-pytest_plugins = ["tests.cost"]
+pytest_plugins = ["tests.cost", "tests.retries"]
 IS_CI = bool(os.environ.get("CI"))
 
 # A busy machine is not a failed law: examples have no deadline. In CI they are the same each time.

@@ -1,4 +1,5 @@
-"""What can't run here is told at the end and fails in CI; what is dear is not for who waits."""
+"""What can't run here is told at the end and fails in CI, and what was tried again because the
+machine was away is told with its proof; what is dear is not for who waits."""
 
 from __future__ import annotations
 
@@ -35,6 +36,23 @@ import numba
 def test_a_fresh_clone(): assert numba.njit(lambda x: 2 * x)(3) == 6
 """
 
+TRIED_AGAIN = """
+import pytest
+from tests.e2e.flight_log import Flight, Said, to_its_end
+from tests.e2e.witness import Hole
+
+@pytest.mark.parametrize("n", range(5))
+def test_flies(n):
+    ways = iter([True] * (n < {retried}) + [False])
+    def fly():
+        mode, hole = ("RAMP", Hole("machine", 0.1, 0.08)) if next(ways) else ("TRACK", None)
+        said = [Said(0.1, "TRACK", "", {{}})]
+        return Flight(1.0, [], {{"mode": mode, "reason": "why"}}, said, [hole] if hole else [])
+    assert not to_its_end(fly, lambda: None).ended
+
+def test_on_the_ground(): pass
+"""
+
 
 def ran(folder: Path, ci: str, *words: str, tests: str = TESTS) -> tuple[int, str]:
     """Exit code and last words of pytest with our conftest."""
@@ -63,6 +81,22 @@ def test_a_skip_is_named_last_and_fails_in_ci(tmp_path: Path, words: tuple[str, 
     assert "1 failed, 1 passed, 1 error" in told
     assert "skipped in CI: NO KERNEL, not tested" in told
     assert "NOT TESTED" not in told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [(), ("-n", "1")], ids=["one process", "workers"])
+def test_what_was_tried_again_is_told_with_its_proof_and_more_than_a_fifth_fails_the_run(
+    tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    code, told = ran(tmp_path, "", *words, tests=TRIED_AGAIN.format(retried=1))
+    assert code == 0
+    assert "TRIED AGAIN: test_some.py::test_flies[0]" in told
+    assert told.count("machine 80 ms at 0.1 s") == 1
+    assert "tried again were 1 of the 5 tests that may be\n" in told
+    code, told = ran(tmp_path, "", *words, tests=TRIED_AGAIN.format(retried=2))
+    assert code == 1
+    assert "6 passed" in told
+    assert "tried again were 2 of the 5 tests that may be, more than 20 %: THE RUN FAILS" in told
 
 
 @pytest.mark.long

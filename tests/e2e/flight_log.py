@@ -15,6 +15,7 @@ from websockets.sync.client import connect
 
 from pipeline.config import FailsafeConfig
 from server.protocol.wire import VERSION
+from tests import retries
 from tests.e2e.serving import Serving
 from tests.e2e.witness import Hole
 
@@ -167,6 +168,7 @@ def to_its_end(fly: Callable[[], Flight], let_go: Callable[[], object]) -> Fligh
     Raises:
         AssertionError: one did not, and the machine was there; or it was away too often.
     """
+    retries.may_follow()
     for left in reversed(range(MOST_FLIGHTS)):
         one = fly()
         if not one.ended:
@@ -176,4 +178,5 @@ def to_its_end(fly: Callable[[], Flight], let_go: Callable[[], object]) -> Fligh
         if not one.excuse or not left:
             break
         print(f"once more, {left} left, for the machine was away:", *map(str, one.excuse))
+        retries.note(str(max(one.excuse, key=lambda hole: hole.s)))
     raise AssertionError(one.account())
