@@ -102,13 +102,14 @@ def flown(
     server: Serving,
     seconds: float,
     meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
+    misses: Callable[[Flight], str] = lambda _: "",
 ) -> Flight:
-    """A flight that reached its end: the first one, or the machine's absence is proven.
+    """A flight that reached its end, and its bounds: the first, or the machine's absence is proven.
 
     Raises:
         AssertionError: it did not, and the machine was there; or it was away too often.
     """
-    return to_its_end(lambda: flight(phone, server, seconds, meanwhile), phone.let_go)
+    return to_its_end(lambda: flight(phone, server, seconds, meanwhile), phone.let_go, misses)
 
 
 @contextlib.contextmanager

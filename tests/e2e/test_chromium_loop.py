@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.e2e.chromium_rig import flown, led_server, start
+from tests.e2e.flight_log import Flight
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 LEARNT_S, STEADY_S, CHANGED_S = 8.0, 14.0, 4.0
@@ -16,6 +17,9 @@ LEARNT_S, STEADY_S, CHANGED_S = 8.0, 14.0, 4.0
 WAYS = {"WebRTC": "WebRTC", "WebSocket": "websocket, H264", "JPEG": "websocket, JPEG"}
 """What the server says of the page's ways."""
 CHANGES = ("WebSocket", "JPEG", "WebRTC")
+MOST_RMS_MM = 20.0
+LEAST_HZ = {"phone_imu": 45.0, "video": 24.0}
+"""Of 60 and 30, by each way."""
 
 
 def test_the_robot_follows_by_each_way_does_not_jump_when_it_is_changed_and_stops_on_its_stop(
@@ -27,27 +31,45 @@ def test_the_robot_follows_by_each_way_does_not_jump_when_it_is_changed_and_stop
         start(phone, server)
         phone.play_until("document.querySelector('#h-path').innerText === 'WebRTC'", 25.0)
         came: dict[str, str] = {}
+        rates: dict[str, dict[str, float]] = {}
 
         def look(wish: str) -> None:
-            came[wish] = str(server.request("GET", "/api/status")["video_path"])
+            status = server.request("GET", "/api/status")
+            came[wish] = str(status["video_path"])
+            streams = status["streams"]
+            assert isinstance(streams, dict)
+            rates[wish] = {name: streams[name]["rate_hz"] for name in LEAST_HZ}
 
         starts = [STEADY_S + CHANGED_S * k for k in range(len(CHANGES) + 1)]
+        spans = list(zip(CHANGES, pairwise(starts), strict=True))
         # a flight that a busy machine ended may have left another way
         wishes = [(0.0, partial(phone.choose, "#path-wish", "WebRTC"))]
-        for wish, (begin, end) in zip(CHANGES, pairwise(starts), strict=True):
+        for wish, (begin, end) in spans:
             wishes.append((begin, partial(phone.choose, "#path-wish", wish)))
             wishes.append((end - 0.1, partial(look, wish)))
-        flight = flown(phone, server, starts[-1], wishes)
-        assert phone.rms_mm(flight.distances, LEARNT_S) <= 40.0
-        steady = max(d for t, d in flight.distances if LEARNT_S <= t < STEADY_S)
-        for wish, (begin, end) in zip(CHANGES, pairwise(starts), strict=True):
+
+        def misses(flight: Flight) -> str:
+            def farthest(begin: float, end: float) -> float:
+                return max(d for t, d in flight.distances if begin <= t < end)
+
+            rms_mm = phone.rms_mm(flight.distances, LEARNT_S)
+            allowed = 1.5 * farthest(LEARNT_S, STEADY_S) + 0.03
+            jumps = {wish: farthest(*span) for wish, span in spans}
+            print(f"{rms_mm:.1f} mm RMS, {jumps} of {allowed:.3f} m, {rates} Hz")
+            return "; ".join(
+                [f"{rms_mm:.1f} mm RMS"] * (rms_mm > MOST_RMS_MM)
+                + [f"{wish}: {d:.3f} m away" for wish, d in jumps.items() if d > allowed]
+                + [
+                    f"{wish}: {name} at {hz} Hz"
+                    for wish, by_name in rates.items()
+                    for name, hz in by_name.items()
+                    if hz < LEAST_HZ[name]
+                ]
+            )
+
+        flown(phone, server, starts[-1], wishes, misses)
+        for wish in CHANGES:
             assert came[wish].startswith(WAYS[wish])
-            changed = max(d for t, d in flight.distances if begin <= t < end)
-            assert changed <= 1.5 * steady + 0.03, f"{wish}: {flight.account()}"
-        streams = flight.status["streams"]
-        assert isinstance(streams, dict)
-        assert streams["phone_imu"]["rate_hz"] >= 25.0  # 60 on a quiet machine
-        assert streams["video"]["rate_hz"] >= 10.0  # 30 on a quiet machine
         phone.page.tap("#stop")
         phone.play_until("document.body.innerText.includes('STOPPED')", 3.0)
         assert not [text for text in refused if "Content Security Policy" in text]

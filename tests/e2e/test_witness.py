@@ -81,6 +81,17 @@ def test_a_flight_is_excused_by_a_hole_longer_than_is_borne_where_it_ended() -> 
     assert not flight("RAMP", Hole("page", 4.8, 2.0)).excuse  # it may be the page's own doing
 
 
+def test_a_missed_bound_is_excused_by_such_a_hole_while_it_followed_and_by_nothing_else() -> None:
+    def excuse(*holes: Hole) -> list[Hole]:
+        return replace(flight("TRACK", *holes), missed="30 mm").excuse
+
+    assert excuse(Hole("machine", 2.0, 0.08))
+    assert not excuse(Hole("machine", 2.0, 0.05))
+    assert not excuse(Hole("machine", -1.0, 0.08))
+    assert not excuse(Hole("page", 2.0, 9.0))
+    assert replace(flight("TRACK"), missed="30 mm").account().startswith("30 mm; followed")
+
+
 @pytest.mark.parametrize("where", ["sensors", "lights"])
 def test_a_played_phone_that_stood_still_is_told_of_and_no_excuse(where: str) -> None:
     ended = flight("RAMP", Hole(where, 4.8, 2.0))  # a page or a server that takes all does that
