@@ -2,6 +2,7 @@
 
 import importlib
 import re
+import tomllib
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 
@@ -42,6 +43,16 @@ def test_lock_file_names_no_host(path):
     assert not re.findall(
         r"\w+://\S*|--\S*(?:index|find-links|host)\S*|\"resolved\"", path.read_text()
     )
+
+
+def test_pictures_are_an_extra_that_development_brings():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    plots = project["project"]["optional-dependencies"]["plots"]
+    assert [one for one in plots if one.startswith("matplotlib")] == plots
+    assert set(plots) <= set(project["dependency-groups"]["test"])
+    core, dev = (path.read_text() for path in LOCKS)
+    assert "matplotlib" not in core
+    assert re.search(r"^matplotlib==", dev, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("path", LOCKS, ids=lambda path: path.name)

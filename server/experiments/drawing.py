@@ -1,9 +1,11 @@
-"""Panels to draw on, and their file; matplotlib is loaded only when something is drawn."""
+"""Panels to draw on, and their file."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+from server.media.plots import pyplot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,13 +21,12 @@ def panels(
     squeeze: bool = True,
     width_ratios: tuple[float, ...] | None = None,
 ) -> tuple[Figure, Any]:
-    """A figure with its axes, as `pyplot.subplots` gives them; needs no screen."""
-    import matplotlib
+    """A figure with its axes, as `pyplot.subplots` gives them.
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(
+    Raises:
+        NoPlotsError: matplotlib is not there.
+    """
+    figure, axes = pyplot().subplots(
         rows,
         columns,
         figsize=figsize,
@@ -39,10 +40,8 @@ def panels(
 
 def save(figure: Figure, path: Path) -> Path:
     """Write it, in a folder that may have to be made, and close it."""
-    from matplotlib import pyplot
-
     figure.tight_layout()
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)
-    pyplot.close(figure)
+    pyplot().close(figure)
     return path

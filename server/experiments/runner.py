@@ -12,6 +12,7 @@ from typing import Final
 
 from hardware.robot_file import RobotFileError
 from server.common.text import plain, statements
+from server.media.plots import drawn
 
 MISSED: Final = 1
 REFUSED: Final = 2
@@ -44,7 +45,7 @@ class ExperimentReport:
         return 0 if self.is_good and all(self.holds.values()) else MISSED
 
     def write(self, folder: Path, name: str) -> list[Path]:
-        """JSON called `name`, and pictures; gives the files."""
+        """JSON called `name`, and pictures, if they can be drawn; gives the files."""
         folder.mkdir(parents=True, exist_ok=True)
         figures = plain(self.figures)
         if self.holds and isinstance(figures, dict):
@@ -52,7 +53,8 @@ class ExperimentReport:
         file = folder / f"{name}.json"
         text = json.dumps(figures, indent=1, ensure_ascii=False, allow_nan=False)
         file.write_text(text, encoding="utf-8")
-        return [file, *(self.draw(folder) if self.draw is not None else ())]
+        draw = self.draw
+        return [file, *(drawn(lambda: draw(folder)) if draw is not None else ())]
 
 
 def experiment(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from pathlib import Path
@@ -18,6 +18,7 @@ from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.results import SweepResults
 from server.experiments.sweep.sweep_file import Sweep, examples, read
 from server.experiments.sweep.workers import on_cluster, on_processes
+from server.media.plots import drawn
 from server.simulation.session import SessionOutcome, SweepSession
 from server.simulation.sweep_keys import Number, Switch, Word, known_keys
 
@@ -72,12 +73,12 @@ def _flown(sweep: Sweep, results: SweepResults, folder: Path, arguments: argpars
             f"{len(results.done)} sessions; now {results.cpu_s - cpu_s:.1f} CPU-seconds "
             f"by {hands} in {now() - started:.1f} s"
         )
-    drawn = ""
+    pictures: Sequence[Path] = ()
     if results.done:
         print(summary.table(sweep, results.done))
-        picture.draw(sweep, results.done, folder / "sweep.png")
-        drawn = ", sweep.png"
-    print(f"written: {folder}/results.csv, sweep.json{drawn}")
+        pictures = drawn(lambda: [picture.draw(sweep, results.done, folder / "sweep.png")])
+    names = ["results.csv", "sweep.json", *(path.name for path in pictures)]
+    print(f"written: {folder}/{', '.join(names)}")
     return code
 
 

@@ -27,7 +27,7 @@ SPREAD: Final = 0.32
 """How far from its value a point may stand, for those that would cover each other."""
 
 
-def draw(sweep: Sweep, done: Mapping[int, SessionOutcome], path: Path) -> None:
+def draw(sweep: Sweep, done: Mapping[int, SessionOutcome], path: Path) -> Path:
     """A panel a key; colours are the values of the key after it; what ended early stands on top."""
     keys = sweep.varied or ("",)
     columns = min(COLUMNS, len(keys))
@@ -48,7 +48,7 @@ def draw(sweep: Sweep, done: Mapping[int, SessionOutcome], path: Path) -> None:
     early = f", {bad} ended early (crosses on top)" if bad else ""
     lines = "lines: medians" if sweep.varied else "line: median"
     figure.suptitle(f"{len(done)} sessions of {sweep.seconds:g} s{early}; points: seeds, {lines}")
-    save(figure, path)
+    return save(figure, path)
 
 
 def _panel(

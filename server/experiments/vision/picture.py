@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from server.experiments.vision.rows import VisionRow
 from server.experiments.vision.verdicts import NEES
+from server.media.plots import pyplot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Figures = tuple[str, Callable[[VisionRow], float], bool, tuple[float, ...]]
 PANELS: tuple[Figures, ...] = (
@@ -21,17 +23,19 @@ PANELS: tuple[Figures, ...] = (
 )
 
 
-def draw(rows: list[VisionRow], path: Path) -> None:
+def draw(rows: list[VisionRow], path: Path) -> Path:
     """Scenes side by side, a mark for each size and channel."""
     scenes = list(dict.fromkeys(row.scene for row in rows))
     channels = list(dict.fromkeys(row.channel for row in rows if row.frames))
-    figure = Figure(figsize=(14.0, 3.0 * len(PANELS)), layout="constrained")
+    figure = pyplot().figure(figsize=(14.0, 3.0 * len(PANELS)), layout="constrained")
     axes = figure.subplots(len(PANELS), 1, sharex=True, squeeze=False)[:, 0]
     for panel, axis in zip(PANELS, axes, strict=True):
         _panel(axis, panel, rows, scenes, channels)
     axes[-1].set_xticks(range(len(scenes)), scenes, rotation=35, ha="right")
     axes[0].legend(ncols=len(channels), fontsize="small", loc="lower left")
     figure.savefig(path, dpi=90)
+    pyplot().close(figure)
+    return path
 
 
 def _panel(

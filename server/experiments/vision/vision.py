@@ -37,10 +37,12 @@ from pipeline.vision.visual_front_end import warm_up
 from server.experiments.vision import lies
 from server.experiments.vision.channel import DEFAULT_CODECS, WITHOUT_IMU, Channel, channel
 from server.experiments.vision.learning import LearningFigures, learn
+from server.experiments.vision.picture import draw
 from server.experiments.vision.rows import VisionRow, plain_values, row, text
 from server.experiments.vision.verdicts import REFERENCE, verdicts, verdicts_on_learning
 from server.experiments.vision.watch import SceneRecord, watch
 from server.experiments.vision.write import write_film
+from server.media.plots import drawn
 
 FRAMES = 90
 FILM_FRAMES, LONG_FILM_FRAMES = 45, 90
@@ -152,11 +154,10 @@ def _report(
             "learnt": films,
             "verdicts": goals,
         }
-        (out / "vision.json").write_text(json.dumps(values, indent=1, ensure_ascii=False))
-        from server.experiments.vision.picture import draw  # brings matplotlib
-
-        draw(rows, out / "vision.png")
-        print(f"\nwritten: {out / 'vision.json'}, {out / 'vision.png'}")
+        file = out / "vision.json"
+        file.write_text(json.dumps(values, indent=1, ensure_ascii=False))
+        files = [file, *drawn(lambda: [draw(rows, out / "vision.png")])]
+        print(f"\nwritten: {', '.join(map(str, files))}")
     return 1 if any(verdict.met is False for verdict in judged) else 0
 
 

@@ -22,6 +22,7 @@ from server.common.errors import InputError
 from server.common.options import Parser
 from server.common.settings import state_directory
 from server.export.recorded_film import imu_samples
+from server.media.plots import drawn
 from server.media.tables import IMU_HEADER, load_imu
 from server.tools.calibrate.draw_board import write_board
 from server.tools.calibrate.report import draw
@@ -113,8 +114,8 @@ def _calibrate(arguments: argparse.Namespace, board: Board) -> int:
     print("\n".join(table(found, filmed)))
     name = arguments.name or "camera"
     if arguments.report is not None:
-        draw(found, verdict, name, arguments.report)
-        print(f"picture: {arguments.report}")
+        for path in drawn(lambda: [draw(found, verdict, name, arguments.report)]):
+            print(f"picture: {path}")
     if verdict.level == "refused":
         return _refuse(verdict)
     _print_verdict(verdict)

@@ -10,6 +10,7 @@ import numpy as np
 from server.calibration.choice import CELLS, coverage
 from server.calibration.solve import CalibrationSolution, ray_sigma
 from server.calibration.verdict import Verdict
+from server.media.plots import pyplot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,14 +19,9 @@ if TYPE_CHECKING:
 COLOURS = {"good": "#15703a", "usable": "#92640a", "refused": "#9f1239"}
 
 
-def draw(solution: CalibrationSolution, verdict: Verdict, name: str, path: Path) -> None:
-    """Write the picture."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(2, 2, figsize=(13.0, 8.6))
+def draw(solution: CalibrationSolution, verdict: Verdict, name: str, path: Path) -> Path:
+    """Write the picture; gives its file."""
+    figure, axes = pyplot().subplots(2, 2, figsize=(13.0, 8.6))
     width, height = solution.size
     for axis in (axes[0, 0], axes[1, 0]):
         axis.set_xlim(0, width)
@@ -39,7 +35,8 @@ def draw(solution: CalibrationSolution, verdict: Verdict, name: str, path: Path)
     figure.suptitle(title, color=COLOURS[verdict.level], fontsize=15, fontweight="bold")
     figure.tight_layout()
     figure.savefig(path, dpi=100)
-    pyplot.close(figure)
+    pyplot().close(figure)
+    return path
 
 
 def _coverage(solution: CalibrationSolution, axis: Axes) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from hardware.led_layout.margins import KNOWN
 from pipeline.frames import Array
+from server.media.plots import drawn
 from server.tools.led_layout.picture import draw
 from server.tools.led_layout.report import LayoutReport
 
@@ -104,9 +105,10 @@ def write(layouts: list[LayoutReport], folder: Path) -> None:
     if len(layouts) > 1:
         files["leds_improved.toml"] = "\n".join(toml(layouts[-1].leds_in_b))
     try:
-        draw(layouts, folder / "leds.png")
+        pictures = drawn(lambda: [draw(layouts, folder / "leds.png")])
         for name, text in files.items():
             (folder / name).write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise OutError(f"--out: {folder}: {error.strerror}") from error
-    print(f"wrote {', '.join(('leds.png', *files))} in {folder}", file=sys.stderr)
+    names = [*(path.name for path in pictures), *files]
+    print(f"wrote {', '.join(names)} in {folder}", file=sys.stderr)

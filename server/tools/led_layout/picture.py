@@ -12,6 +12,7 @@ import numpy as np
 from hardware.led_layout.margins import FAR_PX
 from hardware.led_layout.viewpoints import attitude, direction, seen
 from pipeline.frames import Array
+from server.media.plots import pyplot
 from server.tools.led_layout.report import GOOD_PX, MERGED_PX, LayoutReport
 
 if TYPE_CHECKING:
@@ -38,16 +39,11 @@ class _Map:
     """What it is there."""
 
 
-def draw(layouts: list[LayoutReport], path: Path) -> None:
+def draw(layouts: list[LayoutReport], path: Path) -> Path:
     """Two rows of maps per layout, all at its usual distance, each with one scale for all."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     columns = [_maps(it) for it in layouts]
     tall = 2 * len(layouts)
-    figure = pyplot.figure(figsize=(4.3 * WIDE, 3.7 * tall + 0.4), layout="constrained")
+    figure = pyplot().figure(figsize=(4.3 * WIDE, 3.7 * tall + 0.4), layout="constrained")
     parts = figure.subfigures(len(layouts), 1, squeeze=False)[:, 0]
     for part, it, maps in zip(parts, layouts, columns, strict=True):
         part.suptitle(_headline(it), fontsize=12, weight="bold")
@@ -57,7 +53,8 @@ def draw(layouts: list[LayoutReport], path: Path) -> None:
             _draw_map(part, panels[k], it, shown, same)
         _draw_leds(panels[-1], it)
     figure.savefig(path, dpi=100)
-    pyplot.close(figure)
+    pyplot().close(figure)
+    return path
 
 
 def _headline(it: LayoutReport) -> str:

@@ -22,6 +22,7 @@ from server.common.errors import InputError
 from server.common.progress import progress_bar
 from server.export.recorded_film import imu_samples, open_film
 from server.media.frame_source import Frames
+from server.media.plots import no_plots
 from server.media.tables import load_imu
 from server.tools.locate import overlay, plot
 from server.tools.locate.history import History
@@ -39,6 +40,9 @@ FEW = 4
 
 def _run(given: argparse.Namespace) -> None:
     outputs = outputs_of(given)
+    if "--plot" in outputs and (why := no_plots()):
+        _print_notes([why])
+        del outputs["--plot"]
     inputs = [path for path in (given.camera, given.imu, given.body_imu) if path is not None]
     inputs += [path for path in (Path(given.robot), given.frames) if path.is_file()]
     check_places(list(outputs.items()), inputs, given.frames)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.frames import Array
+from server.media.plots import pyplot
 from server.tools.locate.history import History
 
 if TYPE_CHECKING:
@@ -27,9 +28,7 @@ MARKED = 400
 
 def draw(history: History, path: Path, title: str) -> None:
     """Position, and rotation since the first pose, in o; ±3 σ as a band, red where not found."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 10.0), layout="constrained")
+    figure = pyplot().figure(figsize=(11.0, 10.0), layout="constrained")
     axes = figure.subplots(6, 1, sharex=True)
     times, found = np.array(history.times), history.found
     values = np.column_stack((history.positions, np.rad2deg(history.turns)))
@@ -48,6 +47,7 @@ def draw(history: History, path: Path, title: str) -> None:
     axes[0].set_title(title)
     axes[-1].set_xlabel("time [s]")
     figure.savefig(path, dpi=110, format=path.name.removesuffix(".part").rsplit(".", 1)[-1].lower())
+    pyplot().close(figure)
 
 
 def _mark_lost(axis: Axes, times: Array, found: np.typing.NDArray[np.bool_]) -> None:

@@ -18,6 +18,7 @@ from pipeline.camera.lens import Camera
 from pipeline.frames import Array
 from server.common.errors import InputError
 from server.common.options import Parser
+from server.media.plots import drawn
 from server.media.tables import load_imu
 from server.tools.survey import options
 from server.tools.survey.picture import draw
@@ -204,7 +205,8 @@ def _write(
     try:
         out.write_text("\n".join(toml(survey)) + "\n", encoding="utf-8")
         out.with_suffix(".json").write_text(text, encoding="utf-8")
-        draw(survey, camera, luma, out.with_suffix(".png"))
+        pictures = drawn(lambda: [draw(survey, camera, luma, out.with_suffix(".png"))])
     except OSError as error:
         raise SurveyError(f"--out: {error.filename}: {error.strerror}") from error
-    print(f"wrote {out}, {out.with_suffix('.json')}, {out.with_suffix('.png')}", file=sys.stderr)
+    files = [out, out.with_suffix(".json"), *pictures]
+    print(f"wrote {', '.join(map(str, files))}", file=sys.stderr)

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.camera.lens import Camera
 from pipeline.signals import Image
+from server.media.plots import pyplot
 from server.tools.survey.reconstruction.association import projected
 from server.tools.survey.report import Survey
 
@@ -18,14 +19,9 @@ if TYPE_CHECKING:
 MARGIN_PX = 90.0
 
 
-def draw(it: Survey, camera: Camera, luma: Image | None, path: Path) -> None:
-    """Writes the picture."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, panels = pyplot.subplots(2, 2, figsize=(13.0, 10.0), layout="constrained")
+def draw(it: Survey, camera: Camera, luma: Image | None, path: Path) -> Path:
+    """Write the picture; gives its file."""
+    figure, panels = pyplot().subplots(2, 2, figsize=(13.0, 10.0), layout="constrained")
     worst = 1e3 * float(it.sigmas.max())
     figure.suptitle(
         f"{it.grade}: {len(it.leds_in_b)} LEDs known to {worst:.2f} mm (σ of the worst coordinate),"
@@ -37,7 +33,8 @@ def draw(it: Survey, camera: Camera, luma: Image | None, path: Path) -> None:
     _way(panels[1, 0], it, 2, "from the side")
     _bars(panels[1, 1], it)
     figure.savefig(path, dpi=100)
-    pyplot.close(figure)
+    pyplot().close(figure)
+    return path
 
 
 def _frame(axis: Axes, it: Survey, camera: Camera, luma: Image | None) -> None:

@@ -109,6 +109,16 @@ def test_what_was_done_before_an_interruption_is_not_flown_again(tmp_path, capsy
     assert flown == [3]
 
 
+def test_without_matplotlib_results_are_written_all_the_same(tmp_path, capsys, monkeypatch):
+    (tmp_path / "short.toml").write_text(SHORT)
+    flown_here(monkeypatch)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert main(["sweep", str(tmp_path / "short.toml")]) == 0
+    told = capsys.readouterr()
+    assert told.out.endswith(f"written: {tmp_path}/short/results.csv, sweep.json\n")
+    assert "pip install 'lightleash[plots]'" in told.err
+
+
 def test_a_line_that_a_crash_cut_off_is_flown_again(tmp_path):
     sweep = swept(tmp_path, SHORT)
     with SweepResults(tmp_path / "out", sweep) as begun:

@@ -1,6 +1,7 @@
 """`lightleash robot leds`: report, figures, picture, exit code."""
 
 import json
+import sys
 import tomllib
 
 import numpy as np
@@ -45,6 +46,16 @@ def test_figures_are_json_and_a_picture_is_drawn(tmp_path, capsys):
     assert 0.0 < row["sigma_lateral_median_m"] < row["sigma_depth_median_m"]
     assert (tmp_path / "out" / "leds.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "out" / "leds.json").read_text()) == [figures]
+
+
+@pytest.mark.slow
+def test_without_matplotlib_figures_are_written_all_the_same(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert main(["leds", "quadrotor", *QUICK, "--out", str(tmp_path)]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["leds.json"]
+    told = capsys.readouterr().err
+    assert "pip install 'lightleash[plots]'" in told
+    assert f"wrote leds.json in {tmp_path}" in told
 
 
 @pytest.mark.slow

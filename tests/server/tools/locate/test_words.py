@@ -1,5 +1,7 @@
 """What `lightleash locate` says, and which words it refuses."""
 
+import sys
+
 import cv2
 import numpy as np
 import pytest
@@ -20,6 +22,16 @@ def test_without_motion_sensors_it_works_and_says_so(films, tmp_path, capsys):
         file = folder / ("imu.csv" if option == "--imu" else "body.csv")
         assert run(folder, out, "--no-plot", option, file, imu=False) == 0
         assert missing in capsys.readouterr().err
+
+
+def test_without_matplotlib_poses_are_written_all_the_same(films, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert run(films["typical"], tmp_path / "poses.csv") == 0
+    assert len(table(tmp_path / "poses.csv")) == FRAMES
+    assert [path.name for path in tmp_path.iterdir()] == ["poses.csv"]
+    told = capsys.readouterr()
+    assert "pip install 'lightleash[plots]'" in told.err
+    assert told.out.endswith("written: " + str(tmp_path / "poses.csv") + "\n")
 
 
 def test_frames_that_show_nothing_or_cannot_be_read_are_rows_without_a_pose(
