@@ -134,10 +134,14 @@ def are_kernels_kept() -> bool:
 
 
 def note_kernels_kept() -> None:
-    """Say so, for the next process."""
+    """Say so, for the next process.
+
+    Raises:
+        OSError: `cache_folder` can't be written, or is full: what was compiled may not be kept.
+    """
     folder = cache_folder()
     if folder is not None:
-        with contextlib.suppress(OSError), open(_mark_of(folder), "wb"):
+        with open(_mark_of(folder), "wb"):
             pass
 
 

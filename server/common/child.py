@@ -61,7 +61,7 @@ class Child:
         self.deaths += 1
         self._due = now + wait
         return (
-            f"The {self.name} process ended ({_ending(self.process.returncode)}); "
+            f"The {self.name} process ended ({ending(self.process.returncode)}); "
             f"starting it again in {wait:g} s."
         )
 
@@ -146,5 +146,6 @@ def raise_niceness(least: int) -> None:
     os.nice(max(0, least - os.getpriority(os.PRIO_PROCESS, 0)))
 
 
-def _ending(code: int) -> str:
+def ending(code: int) -> str:
+    """How a process ended, by its return code, in words."""
     return signal.Signals(-code).name if code < 0 else f"exit code {code}"

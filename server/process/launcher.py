@@ -21,7 +21,7 @@ from hardware.link.registry import link_kind
 from hardware.robot_file import COMMANDS, RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
-from server.common.child import PROMPT_NICENESS, Child, die_with, watched
+from server.common.child import PROMPT_NICENESS, Child, die_with, ending, watched
 from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.common.settings import GAINS, Settings
 from server.process.invite import invite, print_code
@@ -36,6 +36,10 @@ REMIND_S = 15.0
 """People wait longer for what still speaks."""
 FLIES, SERVES = -900, 300
 """Who dies first when memory runs out: the server is started anew and nothing falls down."""
+NOT_WARM = (
+    "`lightleash warm` ended by {}: its reason, if it had time for one, stands above. Robot, "
+    "control and server start all the same, and compile for themselves, for minutes."
+)
 SECRET_VARIABLE = "_LIGHTLEASH_SECRET"
 
 
@@ -205,16 +209,18 @@ def _without_tls(url: str) -> str:
 def _compile() -> None:
     """What they all need is compiled once, by one process, which tells how long that takes.
 
-    What fails there fails in theirs, too, and is told there.
+    What fails there they do for themselves, each more slowly: no reason not to start, but to say.
     """
     parent = os.getpid()
-    subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-m", *watched(["server", "warm"], parent)],
         preexec_fn=lambda: die_with(parent),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         check=False,
     )
+    if done.returncode:
+        print(NOT_WARM.format(ending(done.returncode)), file=sys.stderr, flush=True)
 
 
 def main(settings: Settings, arguments: Sequence[str]) -> int:

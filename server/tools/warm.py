@@ -41,7 +41,11 @@ def _in_flight() -> None:
 
 
 def compile_kernels() -> None:
-    """All that flies, with a bar on a terminal; what only tools need they compile themselves."""
+    """All that flies, with a bar on a terminal; what only tools need they compile themselves.
+
+    Raises:
+        OSError: it can't be kept.
+    """
     parts: list[Callable[[], object]] = [partial(import_module, name) for name in kernel_sources()]
     with progress_bar(len(parts) + 1, "parts") as bar:
         for part in (*parts, _in_flight):
@@ -60,6 +64,10 @@ def main(argv: Sequence[str]) -> int:
     if not are_kernels_kept():
         print("Compiling what must be fast: about a minute, once.", file=sys.stderr, flush=True)
         raise_niceness(NICENESS)
-        compile_kernels()
+        try:
+            compile_kernels()
+        except OSError as error:
+            print(f"{NOWHERE} This one can't: {error}", file=sys.stderr)
+            return 1
     print(f"Compiled code lies {f'in {folder}' if folder else 'beside its sources'}.")
     return 0

@@ -269,3 +269,22 @@ def test_who_waits_long_is_told_what_for(tmp_path, capsys, monkeypatch):
 
     one.revive = stop_when_reminded
     assert one.run() == 0
+
+
+KILLED = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+
+
+@pytest.mark.parametrize(
+    ("warm", "says"),
+    [("raise SystemExit('no room')", "exit code 1"), (KILLED, "SIGKILL"), ("", "")],
+    ids=["with a reason", "killed", "well"],
+)
+def test_how_a_warm_up_failed_is_told_and_stops_nothing(warm, says, tmp_path, capfd, monkeypatch):
+    (tmp_path / "server").mkdir()
+    (tmp_path / "server/__init__.py").touch()
+    (tmp_path / "server/__main__.py").write_text(warm)
+    monkeypatch.chdir(tmp_path)  # there it is found before ours
+    launcher._compile()
+    said = capfd.readouterr().err
+    assert ("`lightleash warm` ended by" in said) == bool(says)
+    assert says in said

@@ -28,6 +28,22 @@ def test_where_nothing_can_be_kept_it_says_what_to_do_and_compiles_nothing():
     assert said == warm.NOWHERE + "\n"
 
 
+def test_what_was_compiled_and_cannot_be_kept_is_told_with_the_reason(monkeypatch, capsys):
+    def full():
+        raise OSError(28, "No space left on device", "/kernels/warm-0")
+
+    monkeypatch.setattr(warm, "kernel_sources", dict)
+    monkeypatch.setattr(warm, "_in_flight", lambda: None)
+    monkeypatch.setattr(warm, "raise_niceness", lambda least: None)
+    monkeypatch.setattr(warm, "are_kernels_kept", lambda: False)
+    monkeypatch.setattr(warm, "note_kernels_kept", full)
+    assert warm.main([]) == 1
+    told = capsys.readouterr()
+    assert "NUMBA_CACHE_DIR" in told.err
+    assert "No space left on device: '/kernels/warm-0'" in told.err
+    assert told.out == ""
+
+
 def test_a_second_time_nothing_is_compiled(monkeypatch, capsys):
     compiled = []
     kept = [False, True]
