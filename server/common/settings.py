@@ -32,6 +32,8 @@ from server.common.runtime_parameters import (
 )
 
 PREFIX = "LIGHTLEASH_"
+MOST_GIB = 1e6
+"""More than any disk has."""
 
 
 def state_directory() -> Path:
@@ -59,6 +61,28 @@ class PairingSettings(BaseModel):
     confirm: Confirm = Field(
         default="supervisor",
         description="who confirms an operator: a supervisor, or the link is enough",
+    )
+
+
+class RecordingSettings(BaseModel):
+    """What recordings may take of the disk."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    budget_gib: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=MOST_GIB,
+        allow_inf_nan=False,
+        description="of all; the oldest go for new ones, but none that is write-protected; 0: no "
+        "bound, none goes",
+    )
+    reserve_gib: float = Field(
+        default=0.25,
+        ge=0.25,
+        le=MOST_GIB,
+        allow_inf_nan=False,
+        description="left free; with a budget the oldest go for that, too, else recording ends",
     )
 
 
@@ -181,6 +205,7 @@ class Settings(BaseSettings):
     cameras: list[Path] = Field([], description="folders with calibrations of phones")
     video: VideoSettings = Field(default_factory=VideoSettings)
     rtc: RtcSettings = Field(default_factory=RtcSettings)
+    recording: RecordingSettings = Field(default_factory=RecordingSettings)
     pairing: PairingSettings = Field(default_factory=PairingSettings)
     virtual_camera: VirtualCameraSettings = Field(default_factory=VirtualCameraSettings)
 
@@ -200,6 +225,7 @@ class Settings(BaseSettings):
 TABLES: dict[str, type[BaseModel]] = {
     "video": VideoSettings,
     "rtc": RtcSettings,
+    "recording": RecordingSettings,
     "pairing": PairingSettings,
     "virtual_camera": VirtualCameraSettings,
 }

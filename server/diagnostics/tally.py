@@ -31,6 +31,9 @@ class Tally:
             buckets=STAGES_S,
             registry=self.registry,
         )
+        self._removed = Counter(
+            "lightleash_recordings_removed", "the oldest, to make room", registry=self.registry
+        )
         self._mode = ""
 
     def see(self, status: Status) -> None:
@@ -42,3 +45,7 @@ class Tally:
         if video is not None and video.age_ms is not None and video.age_ms <= FRESH_MS:
             for stage, ms in status.latency_ms.items():
                 self._latency.labels(stage).observe(1e-3 * ms)
+
+    def removed(self, count: int) -> None:
+        """Count recordings that had to make room."""
+        self._removed.inc(count)

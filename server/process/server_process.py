@@ -29,6 +29,7 @@ from server.diagnostics import bounded_log
 from server.media.decoding import Decoding
 from server.phone.frame_worker import join_all
 from server.recording.control import Recordings
+from server.recording.folder import GIB, DiskLimits
 from server.recording.reader import recover_all
 from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
 from server.rtc.signalling_endpoint import SignallingEndpoint
@@ -147,7 +148,9 @@ def _manager(
 ) -> SessionManager:
     folder = private_directory(private_directory(settings.state) / "recordings")
     recover_all(folder)
-    recordings = Recordings(folder, _metadata(settings))
+    asked = settings.recording
+    limits = DiskLimits(int(GIB * asked.budget_gib), int(GIB * asked.reserve_gib))
+    recordings = Recordings(folder, _metadata(settings), limits)
     robot_file = load_robot(settings.robot, takes=COMMANDS)
     robot, distance_m = robot_file.robot, robot_file.start.distance
     profiles = private_directory(settings.state / PROFILES)

@@ -8,7 +8,8 @@ from pathlib import Path
 from server.common import clock
 from server.control.ipc import ControlStatus
 from server.protocol.wire import HEADER, KEY_FLAG, Kind
-from server.recording.writer import CAMERA_KEY, DEVICE_KEY, Direction, Recorder, full_disk
+from server.recording.folder import DiskLimits, RecordingFolder
+from server.recording.writer import CAMERA_KEY, DEVICE_KEY, Direction, Recorder
 
 KEY_S = 0.5
 """Between two requests for a key: one may be lost on the way."""
@@ -17,9 +18,11 @@ KEY_S = 0.5
 class Recordings:
     """At most one recording at a time."""
 
-    def __init__(self, directory: Path, metadata: dict[str, str]) -> None:
-        """Files go to `directory`; `metadata` goes into each."""
-        self._directory, self._metadata = directory, metadata
+    def __init__(
+        self, directory: Path, metadata: dict[str, str], limits: DiskLimits | None = None
+    ) -> None:
+        """Files go to `directory`, within `limits`; `metadata` goes into each."""
+        self.folder, self._metadata = RecordingFolder(directory, limits), metadata
         self._recorder: Recorder | None = None
         self._has_key, self._t_asked = True, -inf
         self._knows_camera = True
@@ -40,7 +43,7 @@ class Recordings:
         if self._recorder is None:
             name = clock.file_stamp()
             own = {DEVICE_KEY: device, CAMERA_KEY: camera_text}
-            self._recorder = Recorder(self._directory, name, {**self._metadata, **own})
+            self._recorder = Recorder(self.folder, name, {**self._metadata, **own})
             self.failure = ""
             self._has_key, self._t_asked = False, -inf
             self._knows_camera = bool(camera_text)
@@ -79,9 +82,8 @@ class Recordings:
 
     def why_not(self) -> str:
         """Why nothing could be recorded now, or ""."""
-        there = next(path for path in (self._directory, *self._directory.parents) if path.exists())
         stuck = self._recorder.stuck if self._recorder is not None else ""
-        return self.failure or stuck or full_disk(there)
+        return self.failure or stuck or self.folder.full()
 
     def key_is_due(self, now: float) -> bool:
         """Whether to ask the page for a key: without one no recorded picture can be decoded."""

@@ -20,7 +20,6 @@ import fcntl
 import logging
 import os
 import queue
-import shutil
 import threading
 from collections.abc import Iterable
 from contextlib import suppress
@@ -36,6 +35,7 @@ from server.common import clock
 from server.common.runtime import new_private_file
 from server.control.ipc import ControlStatus
 from server.protocol.wire import HEADER, VERSION
+from server.recording.folder import RecordingFolder
 
 Direction = Literal["phone", "server"]
 PHONE_RECORDS, SERVER_RECORDS = "phone/records", "server/records"
@@ -61,8 +61,6 @@ FLUSH_S = 0.25
 CAPACITY = 4_096
 """Items waiting for the disk; at 300 a second more than ten seconds."""
 MAX_BYTES = 8 << 30
-RESERVE_BYTES = 256 << 20
-"""Left on the disk for whatever else this machine does: a full one stops more than a recording."""
 MAX_NS = (1 << 64) - 1
 STUCK_S = 5.0
 """A disk that takes nothing for so long is out of order."""
@@ -98,25 +96,29 @@ class Recorder:
     """Writes one recording from its own thread; what the disk can't take in time is dropped."""
 
     def __init__(
-        self, directory: Path, name: str, metadata: dict[str, str], max_bytes: int = MAX_BYTES
+        self,
+        folder: RecordingFolder,
+        name: str,
+        metadata: dict[str, str],
+        max_bytes: int = MAX_BYTES,
     ) -> None:
-        """Open `directory/name.mcap.part`.
+        """Open `name.mcap.part` in a folder, where the oldest may have to make room.
 
         Raises:
             RecordingError: it can't be created, or there is one of this name.
         """
         self.name = name
-        self.path = directory / f"{name}.mcap"
+        self.path = folder.path / f"{name}.mcap"
         self.written = self.dropped = 0
         self.error = ""
         """Why the recording ended early, or ""."""
         self._max_bytes, self._t_alive = max_bytes, clock.now()
         self._closing = threading.Event()
         self._queue: queue.Queue[_Item | _Learnt | None] = queue.Queue(CAPACITY)
-        self._directory = directory
+        self._folder = folder
         try:
-            directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if why := full_disk(directory):
+            folder.path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if why := folder.full():
                 raise OSError(why)
             if self.path.exists():
                 raise FileExistsError("there is a recording of this name")
@@ -175,6 +177,7 @@ class Recorder:
     def _run(self) -> None:
         try:
             with self._file:
+                self._folder.make_room()
                 writer, channels = start_file(self._file, self._metadata)
                 self._write(writer, channels)
                 finish_file(writer, self._file)
@@ -199,17 +202,12 @@ class Recorder:
             if self._t_alive - flushed >= FLUSH_S:
                 writer.flush()  # type: ignore[no-untyped-call]
                 flushed = clock.now()
-                self.error = full_disk(self._directory)
-                if self._file.tell() > self._max_bytes:
+                size = self._file.tell()
+                self.error = self._folder.make_room(self.path, size)
+                if size > self._max_bytes:
                     self.error = f"larger than {self._max_bytes} bytes"
                 if self.error:
                     return
-
-
-def full_disk(directory: Path) -> str:
-    """Why nothing should be recorded in a directory that exists, or ""."""
-    left = shutil.disk_usage(directory).free
-    return f"only {left >> 20} MB are left on the disk" if left < RESERVE_BYTES else ""
 
 
 def write_whole(

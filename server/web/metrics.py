@@ -41,6 +41,8 @@ def exposition(manager: SessionManager) -> bytes:
     )
     for name, value in status.server.items():
         pauses.labels(name).set(value)
+    taken = Gauge("lightleash_recordings_bytes", "of those that are finished", registry=registry)
+    taken.set(manager.recordings.folder.taken())
     if status.error_mm is not None:
         error = Gauge("lightleash_error_metres", "from the reference", registry=registry)
         error.set(1e-3 * status.error_mm)

@@ -343,6 +343,10 @@ class SessionManager:
             self.log_event(paused)
         if self._decoding is not None and (ended := self._decoding.news(now())):
             self.log_event(ended)
+        count, gone = self.recordings.folder.removed()
+        if gone:
+            self.tally.removed(count)
+            self.log_event(gone)
         if self.recordings.end_if_failed():
             self.log_event(f"The recording has ended: {self.recordings.failure}.")
         self.broadcast(status)

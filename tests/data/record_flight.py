@@ -9,6 +9,7 @@ from pipeline.config import TeleopConfig
 from server.protocol.messages import Hello, encode_message
 from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Ping
+from server.recording.folder import RecordingFolder
 from server.recording.writer import CAMERA_KEY, DEVICE_KEY, ROBOT_KEY, SETTINGS_KEY, Recorder
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 from server.virtual_phone.phone_script import DEVICE
@@ -64,7 +65,7 @@ def record_flight(directory, name="virtual_phone", scene=SCENE, seconds=SECONDS)
         CAMERA_KEY: (CAMERAS / "virtual_phone.yaml").read_text(),
         SETTINGS_KEY: repr(scene),
     }
-    recorder = Recorder(directory, name, metadata)
+    recorder = Recorder(RecordingFolder(directory), name, metadata)
     flight = RecordedFlight(recorder, scene)
     try:
         while flight.t < seconds:

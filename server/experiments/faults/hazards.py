@@ -276,8 +276,11 @@ HAZARDS: Final = (
         "36",
         "The disk is full or slow",
         "the recorder",
-        "the recording ends and says so; the flight does not notice",
-        ("server/recording/test_recording.py::test_a_full_disk_ends_the_recording_and_says_so",),
+        "old recordings go if they may; else it ends and says so; the flight does not notice",
+        (
+            "server/recording/test_recording.py::test_a_full_disk_ends_the_recording_and_says_so",
+            "server/recording/test_folder.py::test_with_a_budget_the_oldest_go_for_the_reserve_too",
+        ),
     ),
     Hazard(
         "38",

@@ -62,6 +62,13 @@ def test_the_virtual_camera_is_a_table_of_its_own(tmp_path, monkeypatch):
     assert not load(["--no-virtual-camera.guard"]).virtual_camera.guard
 
 
+def test_what_recordings_may_take_is_a_table_of_its_own_and_without_it_none_goes(monkeypatch):
+    monkeypatch.setenv("LIGHTLEASH_RECORDING__RESERVE_GIB", "2")
+    recording = load(["--recording.budget-gib", "20"]).recording
+    assert (recording.budget_gib, recording.reserve_gib) == (20.0, 2.0)
+    assert load([]).recording.budget_gib == 0.0
+
+
 def test_lists_grow_with_each_mention():
     settings = load(["--names", "robot.lan", "--names", "lab.lan", "--cameras", "/a"])
     assert settings.names == ["robot.lan", "lab.lan"]
@@ -75,6 +82,8 @@ def test_lists_grow_with_each_mention():
         ("[video]\nwidht = 640", ["video.widht", "video.width"]),
         ("qqq = 1", ["qqq", "https_port", "video.width"]),
         ("https_port = 70000", ["https_port", "65535", "70000"]),
+        ("[recording]\nreserve_gib = 0.1", ["recording.reserve_gib", "0.25"]),
+        ("[recording]\nbudget_gib = -1", ["recording.budget_gib", "0"]),
         ("[virtual_camera]\ncutoff_hz = nan", ["virtual_camera.cutoff_hz"]),
         ("[virtual_camera]\ncutoff_hz = 9.0", ["virtual_camera.cutoff_hz", "9.0"]),
         ("[virtual_camera]\nmax_speed_m_s = inf", ["virtual_camera.max_speed_m_s"]),

@@ -10,6 +10,7 @@ from hardware.codec import Encoder
 from hardware.robot_file import ROBOTS
 from server.protocol.wire import encode
 from server.protocol.wire_records import Codec, Motion, Picture, Record, Touch
+from server.recording.folder import RecordingFolder
 from server.recording.reader import read
 from server.recording.writer import (
     ROBOT_KEY,
@@ -72,7 +73,7 @@ def spot_at(luma):
 def film(folder, codec, pictures=6, touches=()):
     """A phone without pings: its quickest record took no time."""
     encoder = Encoder(*SIZE, 30.0, 1_000_000, codec)
-    recorder = Recorder(folder, codec, {"device": "a stranger's phone"})
+    recorder = Recorder(RecordingFolder(folder), codec, {"device": "a stranger's phone"})
     at_rest = Motion((0.1, 0.2, 0.3), (0.0, 9.8, 0.0), None, 0)
     for k in range(pictures):
         t = 100.0 + k / 30.0

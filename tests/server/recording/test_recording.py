@@ -15,6 +15,7 @@ from server.control.ipc import ControlStatus
 from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Ping, Pong, Record, Touch
 from server.recording.control import Recordings
+from server.recording.folder import RecordingFolder
 from server.recording.reader import read, recover, recover_all
 from server.recording.writer import (
     CAMERA_KEY,
@@ -35,8 +36,9 @@ METADATA = {"device": "a phone", "robot_file": "name = 'ames'\n"}
 WRITER = """
 import sys
 from pathlib import Path
+from server.recording.folder import RecordingFolder
 from server.recording.writer import Recorder
-recorder = Recorder(Path(sys.argv[1]), "killed", {"device": "a phone"})
+recorder = Recorder(RecordingFolder(Path(sys.argv[1])), "killed", {"device": "a phone"})
 touch = bytes.fromhex(sys.argv[2])
 count, size = 0, 0
 while size < 3 * 131072:
@@ -56,7 +58,7 @@ def status(t):
 
 
 def make(directory, name="flight", touches=1):
-    recorder = Recorder(directory, name, METADATA)
+    recorder = Recorder(RecordingFolder(directory), name, METADATA)
     for k in range(touches):
         recorder.record("phone", TOUCH, 100.0 + 0.1 * k)
     return recorder
@@ -118,7 +120,7 @@ def test_a_recording_that_knew_its_camera_keeps_it(tmp_path):
 def test_older_recordings_know_no_day_and_a_wrong_one_is_named(tmp_path):
     old = read(Path(__file__).parents[2] / "data" / "chromium.mcap")
     assert old.unix_zero_ns is None
-    recorder = Recorder(tmp_path, "odd", {UNIX_ZERO_KEY: "yesterday"})
+    recorder = Recorder(RecordingFolder(tmp_path), "odd", {UNIX_ZERO_KEY: "yesterday"})
     recorder.record("phone", TOUCH, 1.0)
     recorder.close()
     with pytest.raises(RecordingError, match="'yesterday'"):
@@ -218,7 +220,7 @@ def test_a_disk_that_takes_nothing_is_told_while_it_does_and_what_is_missing_aft
 
 
 def test_a_full_disk_ends_the_recording_and_says_so(tmp_path):
-    recorder = Recorder(tmp_path, "flight", METADATA, max_bytes=0)
+    recorder = Recorder(RecordingFolder(tmp_path), "flight", METADATA, max_bytes=0)
     while not recorder.error:
         recorder.record("phone", TOUCH, 1.0)
     recorder.close()

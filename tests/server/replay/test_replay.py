@@ -15,6 +15,7 @@ from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.messages import encode_message
 from server.protocol.wire import decode, encode
 from server.protocol.wire_records import Motion, Ping, Pong, Record, Touch
+from server.recording.folder import RecordingFolder
 from server.recording.reader import Recording, device_of, read
 from server.recording.writer import PHONE_RECORDS, STATUS, Recorder, RecordingError
 from server.replay import command
@@ -55,7 +56,7 @@ def test_recorded_latencies_are_those_of_the_virtual_phone(flight):
 
 
 def test_without_pongs_the_quickest_record_took_no_time(tmp_path):
-    recorder = Recorder(tmp_path, "old", {})
+    recorder = Recorder(RecordingFolder(tmp_path), "old", {})
     for k, latency in enumerate((0.03, 0.01, 0.05)):
         t_us = round(1e6 * (777.0 + k - latency))
         recorder.record("phone", encode(Record(k, t_us, AT_REST)), 100.0 + k)
@@ -167,7 +168,7 @@ def test_offline_the_key_picture_may_come_before_the_phones_clock_is_known(fligh
 
 
 def test_offline_without_a_known_camera_says_so(tmp_path):
-    recorder = Recorder(tmp_path, "stranger", {"device": "a stranger's phone"})
+    recorder = Recorder(RecordingFolder(tmp_path), "stranger", {"device": "a stranger's phone"})
     recorder.record("phone", encode(Record(1, 5, AT_REST)), 1.0)
     recorder.close()
     with pytest.raises(RecordingError, match="no picture"):
@@ -175,7 +176,7 @@ def test_offline_without_a_known_camera_says_so(tmp_path):
 
 
 def test_a_recording_begun_before_the_phone_came_knows_it_from_the_statuses(tmp_path):
-    recorder = Recorder(tmp_path, "early", {"device": ""})
+    recorder = Recorder(RecordingFolder(tmp_path), "early", {"device": ""})
     recorder.record("phone", encode(Record(1, 5, AT_REST)), 1.0)
     recorder.message("server", "not a message", 1.0)
     shown = status("ARMED")
