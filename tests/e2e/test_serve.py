@@ -24,7 +24,10 @@ from websockets.sync.client import connect
 
 from hardware.follower import FollowerError
 from hardware.sim.truth import TruthClient
+from server.protocol.messages import Status, decode_from_server
 from server.protocol.wire import VERSION
+from server.recording.reader import read
+from server.recording.writer import SERVER_MESSAGES
 from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
@@ -32,6 +35,8 @@ MODULES = {"robot": "hardware.sim.robot", "control": "server.control.process", "
 ZERO_N = 1e-3
 RAMP_S = 6.0
 """A ramp of one period of the suspension, with the failsafe's waits before it."""
+LOST_S = 0.3
+"""Of a recording, at most, by a server that is killed."""
 ANSWER_S = 0.5
 """A robot that has not told its thrust by then is taken for dead: 50 ms are few when it is busy."""
 
@@ -250,6 +255,29 @@ def test_the_server_killed_in_flight_leaves_control_to_ramp_down_and_comes_back_
             until(lambda: thrust(truth) < ZERO_N, RAMP_S, "no thrust")
             until(lambda: mode(server) == "DISARMED", 10.0, "DISARMED, with the old token")
             assert processes(server.process.pid)["control"] == control
+        finally:
+            phone.send_signal(signal.SIGCONT)
+
+
+def test_a_server_killed_while_it_records_loses_the_last_moment_and_mends_the_recording(
+    server: Serving,
+) -> None:
+    folder = server.state / "recordings"
+    with flight(server) as phone:
+        name = str(server.request("POST", "/api/recording")["name"])
+        until(lambda: status(server)["recording"] == name, 1.0, "a recording in the status")
+        time.sleep(1.0)
+        heard_ms = int(str(status(server)["time_ms"]))
+        kill(server, "server")
+        assert (folder / f"{name}.mcap.part").exists()
+        phone.send_signal(signal.SIGSTOP)  # it would arm again
+        try:
+            until(lambda: mode(server) == "DISARMED", 20.0, "a server that is back")
+            mended = read(folder / f"{name}.mcap")
+            told = [decode_from_server(entry.data) for entry in mended.entries(SERVER_MESSAGES)]
+            kept_ms = max(one.time_ms for one in told if isinstance(one, Status))
+            assert heard_ms - kept_ms <= 1e3 * LOST_S  # by the server's own clock
+            assert list(mended.phone_records())
         finally:
             phone.send_signal(signal.SIGCONT)
 

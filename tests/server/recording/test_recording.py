@@ -1,6 +1,7 @@
 """Recordings: what was put in comes out; crashes cost the last moments only; damage is named."""
 
 import json
+import signal
 import subprocess
 import sys
 import threading
@@ -48,6 +49,25 @@ while size < 3 * 131072:
     size = Path(recorder._file.name).stat().st_size * 20  # it compresses
 print("written", flush=True)
 sys.stdin.read()
+"""
+
+STEP_S, LOST_S = 0.01, 0.3
+"""Between items of a recorder that is killed; what is promised to be lost at most."""
+KILLED = """
+import os, signal, sys, time
+from pathlib import Path
+from server.common import clock
+from server.recording.folder import RecordingFolder
+from server.recording.writer import Recorder
+t = 0.0
+clock.now = lambda: t
+recorder = Recorder(RecordingFolder(Path(sys.argv[1])), "killed", {"device": "a phone"})
+for k in range(int(sys.argv[3])):
+    t = k * float(sys.argv[4])
+    recorder.record("phone", bytes.fromhex(sys.argv[2]), t)
+    while recorder.written <= k:
+        time.sleep(0.0)
+os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
@@ -245,6 +265,17 @@ def test_a_killed_recording_is_refused_then_recovered(tmp_path):
     assert len(records) > 1000
     assert all(data == TOUCH for _, data in records)
     assert [t for t, _ in records] == pytest.approx([100 + 0.01 * k for k in range(len(records))])
+
+
+@pytest.mark.parametrize("count", [100, 112, 124])
+def test_a_killed_recording_loses_no_more_than_is_promised(tmp_path, count):
+    words = [str(tmp_path), TOUCH.hex(), str(count), str(STEP_S)]
+    done = subprocess.run([sys.executable, "-c", KILLED, *words], check=False)
+    assert done.returncode == -signal.SIGKILL
+    (path,) = recover_all(tmp_path)
+    times = [t for t, _ in read(path).phone_records()]
+    assert times == pytest.approx([STEP_S * k for k in range(len(times))])
+    assert count - len(times) <= LOST_S / STEP_S
 
 
 def test_recovering_twice_changes_nothing(tmp_path):
