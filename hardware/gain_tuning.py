@@ -7,23 +7,32 @@ whose spectrum is that of gusts and hands, by feedback alone:
 
     J² = (1/π) ∫ |P(jω) / (1 + L(jω))|² · 2 ω₀ / (ω² + ω₀²) dω,   P = 1 / (m s² + c s + k)
 
-Margins hold with and without feed-forward, whose measured pull is another loop. Beside gain, phase
-and delay, L keeps off −1, about as far as a loop that has both margins just so
-(`MarginGoals.modulus`).
+Margins are the worst of all bodies that the robot may be (`pipeline.control.robust_margins`), and
+hold for the body as told without feed-forward, too, whose measured pull is another loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from math import pi, sin
+from collections.abc import Iterable
+from dataclasses import replace
+from math import pi
 from typing import Final
 
 import numpy as np
 from scipy.optimize import differential_evolution
 
 from hardware.robot_schema import AXES
-from pipeline.control.margins import OMEGA, TILT_AXIS, AxisMargins, Loop, S, Sensing, axis_margins
+from pipeline.control.margins import (
+    OMEGA,
+    TILT_AXIS,
+    AxisMargins,
+    Loop,
+    S,
+    Sensing,
+    alike,
+    axis_margins,
+)
+from pipeline.control.robust_margins import MarginGoals, worst_margins, worst_of
 from pipeline.frames import Array
 from pipeline.gains import Gains
 
@@ -40,33 +49,19 @@ FORBIDDEN: Final = 10.0
 """Costs above all that a stable loop, and one with its margins, may have."""
 
 
-@dataclass(frozen=True, slots=True)
-class MarginGoals:
-    """Margins that every loop must keep."""
-
-    gain: float
-    """All gains times this, or divided by it, still stable."""
-    phase: float
-    """[rad]."""
-    delay: float
-    """Further delay anywhere in the loop [s]."""
-
-    @property
-    def modulus(self) -> float:
-        """How near to −1 the open loop may come."""
-        return min(1.0 - 1.0 / self.gain, 2.0 * sin(0.5 * self.phase)) / 1.25
-
-
 class TuningError(Exception):
     """No gains keep the goals.
 
     Attributes:
         axis: On this axis.
+        lacking: What the nearest ones lack, in words.
     """
 
-    def __init__(self, axis: int) -> None:
-        super().__init__(f"no gains on {AXES[axis]} keep these margins at this latency")
-        self.axis = axis
+    def __init__(self, axis: int, lacking: str) -> None:
+        super().__init__(
+            f"no gains on {AXES[axis]} keep these margins at this latency; the nearest: {lacking}"
+        )
+        self.axis, self.lacking = axis, lacking
 
 
 def tuned(loop: Loop, axes: Iterable[int], sensing: Sensing, goals: MarginGoals) -> Gains:
@@ -80,18 +75,12 @@ def tuned(loop: Loop, axes: Iterable[int], sensing: Sensing, goals: MarginGoals)
     rows = np.array([loop.gains.Kp, loop.gains.Ki, loop.gains.Kd])
     known: dict[tuple[float, ...], Array] = {}
     for axis in sorted(axes, key=lambda axis: (axis not in TILT_AXIS.values(), axis)):
-        alike = _alike(loop, axis, rows)
-        if alike not in known:
-            known[alike] = _best(replace(loop, gains=Gains(*rows)), axis, sensing, goals)
-        rows[:, axis] = known[alike]
+        so_far = replace(loop, gains=Gains(*rows.copy()))
+        key = alike(so_far, axis)
+        if key not in known:
+            known[key] = _best(so_far, axis, sensing, goals)
+        rows[:, axis] = known[key]
     return Gains(*rows)
-
-
-def _alike(loop: Loop, axis: int, rows: Array) -> tuple[float, ...]:
-    """Axes that share this share their gains: x and y of most robots."""
-    d = loop.dynamics
-    inner = rows[:, TILT_AXIS[axis]] if d.needs_tilt and axis in TILT_AXIS else ()
-    return (axis // 3, d.inertia[axis], d.damping[axis], d.stiffness[axis], *rows[:, axis], *inner)
 
 
 def _best(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> Array:
@@ -112,8 +101,8 @@ def _best(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> Array:
         cost, BOUNDS, x0=start, popsize=12, maxiter=80, tol=1e-4, polish=False, rng=0
     )
     best = _rounded(gains_of(found.x))
-    if not keeps(with_gains(loop, axis, best), axis, sensing, goals):
-        raise TuningError(axis)
+    if lacking := goals.lacking(margins_of(with_gains(loop, axis, best), axis, sensing)):
+        raise TuningError(axis, lacking)
     return best
 
 
@@ -126,47 +115,31 @@ def _start(loop: Loop, axis: int, inertia: float) -> Array:
 
 def _cost(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> float:
     """Logarithm of J; above all of those, by how much the goals are missed."""
-    missing = sum(shortfall(one, axis, sensing, goals) for one in variants(loop))
+    missing = shortfall(margins_of(loop, axis, sensing), goals)
     if missing > 0.0:
         return FORBIDDEN + missing
     return float(np.log10(moved(loop, axis, sensing)))
 
 
-def variants(loop: Loop) -> Sequence[Loop]:
-    """The loop as it is, and without feed-forward."""
-    return (loop,) if loop.feedforward is None else (loop, replace(loop, feedforward=None))
+def margins_of(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
+    """The worst of all bodies, and of the one as told without feed-forward."""
+    if loop.feedforward is None:
+        return worst_margins(loop, axis, sensing)
+    without = axis_margins(replace(loop, feedforward=None), axis, sensing)
+    return worst_of([without, worst_margins(loop, axis, sensing)]) if without.stable else without
 
 
-def shortfall(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> float:
+def shortfall(found: AxisMargins, goals: MarginGoals) -> float:
     """By how much the goals are missed, as shares of them; 0: they are kept with some to spare."""
-    found = axis_margins(loop, axis, sensing)
     if not found.stable:
         return UNSTABLE
     pairs = (
-        (np.log(found.gain_up), np.log(goals.gain)),
-        (-np.log(max(found.gain_down, 1e-9)), np.log(goals.gain)),
+        (np.log(found.gain), np.log(goals.gain)),
         (found.phase, goals.phase),
         (found.delay, goals.delay),
-        (nearest(loop, axis, sensing), goals.modulus),
+        (1.0 / found.peak, 1.0 / goals.peak),
     )
-    return float(sum(max(0.0, 1.0 - has / (SPARE * wanted)) for has, wanted in pairs))
-
-
-def keeps(loop: Loop, axis: int, sensing: Sensing, goals: MarginGoals) -> bool:
-    """Whether the goals themselves are kept."""
-    found = [axis_margins(one, axis, sensing) for one in variants(loop)]
-    return all(_is_enough(one, goals) for one in found)
-
-
-def _is_enough(found: AxisMargins, goals: MarginGoals) -> bool:
-    gain = found.gain_up >= goals.gain and found.gain_down <= 1.0 / goals.gain
-    return found.stable and gain and found.phase >= goals.phase and found.delay >= goals.delay
-
-
-def nearest(loop: Loop, axis: int, sensing: Sensing) -> float:
-    """How near to −1 the open loop comes."""
-    L, _ = loop.open_loop(axis, sensing)
-    return float(np.abs(1.0 + L).min())
+    return float(sum(max(0.0, 1.0 - has / (SPARE * wanted)) for has, wanted in pairs if wanted))
 
 
 def moved(loop: Loop, axis: int, sensing: Sensing) -> float:

@@ -196,6 +196,15 @@ def robot_path(name_or_path: str | Path) -> Path:
     return ROBOTS / f"{path}.toml"
 
 
+def is_shipped(name_or_path: str | Path) -> bool:
+    """Whether it is one of this project's robots, as they come.
+
+    Raises:
+        RobotFileError: no such robot; says which there are.
+    """
+    return robot_path(name_or_path).resolve().parent == ROBOTS.resolve()
+
+
 def _named(wrong: str, known: list[str]) -> str:
     close = get_close_matches(wrong, known, n=1)
     hint = f" (did you mean {close[0]!r}?)" if close else ""

@@ -1,13 +1,15 @@
 """Is the loop still sound with pictures and body samples as old as they are? If not, what would be?
 
 How old pictures may be is worked out once, for every gain set, estimator and age of the body's
-samples; a question in flight costs microseconds.
+samples; a question in flight costs microseconds. The robot as its file tells it must keep margins;
+one that is heavier, lighter, slower or faster than told (`robust_margins`) must not be unstable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -15,13 +17,18 @@ import numpy.typing as npt
 
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.dynamics import Dynamics
-from pipeline.control.margins import Loop, Sensing, axis_margins
+from pipeline.control.margins import Loop, Sensing, axis_margins, is_stable, unlike
+from pipeline.control.robust_margins import bodies
 from pipeline.gains import Gains
 
 BODY_AGES_S: Final = tuple(0.0025 * k for k in range(1, 33))
 """Up to 80 ms; in between, what holds for the next older one counts."""
 RESOLUTION_S: Final = 0.002
 NEVER: Final = -1.0  # no age [s]
+OTHER_BODY: Final = (
+    "With gains {gains!r} a robot with a mass ± 30 % or thrusters' lag × 0.7-1.5 of what its file"
+    " says could become unstable"
+)
 KINDS: Final[tuple[EstimatorName, ...]] = ("relative", "none")
 """`paper` bears what `relative` bears: both fuse a picture when it was taken."""
 
@@ -49,7 +56,7 @@ class LatencyGuard:
         sets: Mapping[str, Gains],
         config: TeleopConfig,
     ) -> None:
-        """Works everything out: some tenths of a second.
+        """Works everything out: some tenths of a second of CPU time.
 
         Args:
             dynamics: Of the robot.
@@ -61,11 +68,13 @@ class LatencyGuard:
         feedforward = config.feedforward if config.feedforward.enabled else None
         self._margins = config.margins
         loop = Loop(dynamics, config.gains, config.margins, config.no_filter, feedforward)
-        self.bearable = {
-            (name, kind): self._bearable(replace(loop, gains=gains), kind)
-            for name, gains in sets.items()
-            for kind in KINDS
-        }
+        self.bearable: dict[tuple[str, EstimatorName], Bearable] = {}
+        """Of the robot as told ..."""
+        self.bearable_in_all: dict[tuple[str, EstimatorName], Bearable] = {}
+        """... and where no other body that it may be is unstable: never more."""
+        for name, kind in product(sets, KINDS):
+            found = self._bearable(replace(loop, gains=sets[name]), kind)
+            self.bearable[name, kind], self.bearable_in_all[name, kind] = found
 
     def refusal(
         self, chosen: str, estimator: EstimatorName, latency: float, body_age: float
@@ -81,10 +90,14 @@ class LatencyGuard:
         Raises:
             KeyError: there is no such gain set.
         """
-        allowed = self.bearable[chosen, _kind(estimator)].latency(body_age)
-        if latency <= allowed or not self._margins.enforced:
+        key = chosen, _kind(estimator)
+        allowed = self.bearable[key].latency(body_age)
+        in_all = self.bearable_in_all[key].latency(body_age)
+        if latency <= in_all or not self._margins.enforced:
             return ""
-        if allowed == NEVER and estimator != "none":
+        if latency <= allowed:
+            wrong = OTHER_BODY.format(gains=chosen)
+        elif allowed == NEVER and estimator != "none":
             wrong = f"The robot's motion is felt {1e3 * body_age:.0f} ms late"
             wrong += f", too late for gains {chosen!r}"
         else:
@@ -100,7 +113,7 @@ class LatencyGuard:
     ) -> Iterator[str]:
         """What would do, the least change first."""
         kind = _kind(estimator)
-        fits = [key for key, b in self.bearable.items() if latency <= b.latency(body_age)]
+        fits = [k for k, b in self.bearable_in_all.items() if latency <= b.latency(body_age)]
         yield from (f"gains {name!r}" for name, other in fits if other == kind)
         if kind == "none":
             filtered = [name for name, other in fits if other == "relative"]
@@ -109,33 +122,62 @@ class LatencyGuard:
             elif filtered:
                 yield f"estimator 'relative' with gains {filtered[0]!r}"
 
-    def _bearable(self, loop: Loop, kind: EstimatorName) -> Bearable:
+    def _bearable(self, loop: Loop, kind: EstimatorName) -> tuple[Bearable, Bearable]:
+        """Of the robot as told, and of all bodies that it may be."""
         if kind == "none":
-            return Bearable((self._largest_latency(loop, Sensing(kind, 0.0)),) * len(BODY_AGES_S))
-        latencies: list[float] = []
+            found = self._largest_latencies(loop, Sensing(kind, 0.0), (0.0, 0.0))
+            told, in_all = ((latency,) * len(BODY_AGES_S) for latency in found)
+            return Bearable(told), Bearable(in_all)
+        latencies: list[tuple[float, float]] = []
         for age in BODY_AGES_S:
-            dead = bool(latencies) and latencies[-1] == NEVER
-            found = NEVER if dead else self._largest_latency(loop, Sensing(kind, 0.0, age))
-            latencies.append(found)
-        return Bearable(tuple(latencies))
+            before = latencies[-1] if latencies else (0.0, 0.0)
+            latencies.append(self._largest_latencies(loop, Sensing(kind, 0.0, age), before))
+        told, in_all = zip(*latencies, strict=True)
+        return Bearable(told), Bearable(in_all)
 
-    def _largest_latency(self, loop: Loop, sensing: Sensing) -> float:
-        """Largest bearable age of images [s], by bisection: margins shrink as they get older."""
-        low, high = 0.0, self._margins.max_latency_s
-        if not self._is_sound(loop, replace(sensing, latency=low)):
-            return NEVER
-        if self._is_sound(loop, replace(sensing, latency=high)):
-            return high
-        while high - low > RESOLUTION_S:
-            middle = 0.5 * (low + high)
-            sound = self._is_sound(loop, replace(sensing, latency=middle))
-            low, high = (middle, high) if sound else (low, middle)
-        return low
+    def _largest_latencies(
+        self, loop: Loop, sensing: Sensing, younger: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Largest bearable ages of images [s]: of the robot as told, of all that it may be.
 
-    def _is_sound(self, loop: Loop, sensing: Sensing) -> bool:
-        least = self._margins
-        found = (axis_margins(loop, axis, sensing) for axis in self._axes)
-        return all(m.delay >= least.min_delay_s and m.phase >= least.min_phase_rad for m in found)
+        What is not borne with `younger` samples of the body is not with these.
+        """
+        axes, least = unlike(loop, self._axes), self._margins
+
+        def is_sound(latency: float) -> bool:
+            aged = replace(sensing, latency=latency)
+            found = (axis_margins(loop, axis, aged) for axis in axes)
+            return all(
+                m.delay >= least.min_delay_s and m.phase >= least.min_phase_rad for m in found
+            )
+
+        told = NEVER if younger[0] == NEVER else _largest(is_sound, least.max_latency_s)
+        in_all = NEVER if younger[1] == NEVER else told
+        for body, axis in product(bodies(loop), axes):
+            if in_all == NEVER:
+                break
+
+            def holds(latency: float, body: Loop = body, axis: int = axis) -> bool:
+                return is_stable(body, axis, replace(sensing, latency=latency))
+
+            in_all = _largest(holds, in_all)
+        return told, in_all
+
+
+def _largest(holds: Callable[[float], bool], most: float) -> float:
+    """Largest age of images [s] up to `most` at which something holds, by bisection.
+
+    Margins shrink as images get older.
+    """
+    low, high = 0.0, most
+    if not holds(low):
+        return NEVER
+    if holds(high):
+        return high
+    while high - low > RESOLUTION_S:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
 
 
 def _kind(estimator: EstimatorName) -> EstimatorName:

@@ -19,8 +19,9 @@ lever arm, alignment), and that is mended by the late camera with the filter's b
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf, pi, sqrt
 from typing import Final
 
@@ -39,6 +40,8 @@ OMEGA: Final = np.geomspace(0.03, 1500.0, 1200)
 """[rad/s]; up to five times the hold's first zero."""
 OMEGA.setflags(write=False)
 S: Final = 1j * OMEGA
+KEPT: Final = 64
+"""Transfer functions of delays: a search asks for the same few again and again."""
 LEAST_DAMPING: Final = 0.01
 """Share of the critical one: without any, a pendulum's pole lies on the axis of the response."""
 TILT_AXIS: Final = {0: 4, 1: 3}
@@ -73,6 +76,11 @@ class AxisMargins:
     """Highest frequency at which the loop still acts [rad/s]."""
     peak: float
     """Of the sensitivity |1/(1 + L)|: how much it makes of a disturbance at the worst frequency."""
+
+    @property
+    def gain(self) -> float:
+        """All gains times this, or divided by it, whichever is less: unstable."""
+        return min(self.gain_up, 1.0 / self.gain_down if self.gain_down > 0.0 else inf)
 
 
 UNSTABLE: Final = AxisMargins(False, 0.0, 0.0, 1.0, 1.0, 0.0, inf)
@@ -120,11 +128,11 @@ class Loop:
     def _measured(self, axis: int, sensing: Sensing) -> tuple[Complex, Complex]:
         """M(s) of place and of speed."""
         frame = self.config.frame_s
-        seen: Complex = np.exp(-S * sensing.latency) * _hold(frame)
+        seen: Complex = _late(sensing.latency) * _hold(frame)
         if sensing.estimator == "none":
             rated: Complex = seen * _hold(frame) / (1.0 + self.no_filter.tau * S)
             return seen, rated
-        imu: Complex = np.exp(-S * sensing.body_age)
+        imu = _late(sensing.body_age)
         share = self.config.unfelt * self._correction(axis)
         known: Complex = imu * (1.0 - share) + share * seen
         return known, known
@@ -171,7 +179,7 @@ class Loop:
         """
         J, d, T = float(self._told.inertia[axis]), self._told.delay, self._told.lag
         Kp, Kd = float(self.gains.Kp[axis]), float(self.gains.Kd[axis])
-        later: Complex = np.exp(S * d)
+        later = _late(-d)
         once = (later - 1.0) / S
         twice = (once - d) / S
         by_torque = (Kp * (twice + T * once) + Kd * (once + T * later)) / J
@@ -181,17 +189,37 @@ class Loop:
 
     def _felt(self, axis: int, sensing: Sensing) -> Complex:
         """Force or torque that control takes the body's felt acceleration for, by its place."""
-        return np.asarray(self._told.inertia[axis] * S * S * np.exp(-S * sensing.body_age))
+        return np.asarray(self._told.inertia[axis] * S * S * _late(sensing.body_age))
+
+
+def unlike(loop: Loop, axes: Iterable[int]) -> list[int]:
+    """Those of `axes` whose loops differ: x and y of most robots are alike, as roll and pitch."""
+    return list({alike(loop, axis): axis for axis in axes}.values())
+
+
+def alike(loop: Loop, axis: int) -> tuple[float, ...]:
+    """What axes share whose loops are the same."""
+    tilting = loop.dynamics.needs_tilt
+    turns = tilting and axis in TILT_AXIS.values()
+    inner = _numbers(loop, TILT_AXIS[axis]) if tilting and axis in TILT_AXIS else ()
+    return (axis // 3, turns, *_numbers(loop, axis), *inner)
+
+
+def _numbers(loop: Loop, axis: int) -> tuple[float, ...]:
+    d, gains = loop.dynamics, loop.gains
+    rows = (d.inertia, d.damping, d.stiffness, gains.Kp, gains.Ki, gains.Kd)
+    return tuple(float(row[axis]) for row in rows)
+
+
+def is_stable(loop: Loop, axis: int, sensing: Sensing) -> bool:
+    """Whether one of x, y, z, roll, pitch, yaw (0 to 5) is stable when its loop is closed."""
+    return _stable_open_loop(loop, axis, sensing) is not None
 
 
 def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
     """Margins of one of x, y, z, roll, pitch, yaw (0 to 5)."""
-    tilting = loop.dynamics.needs_tilt and axis in TILT_AXIS
-    if tilting and not axis_margins(loop, TILT_AXIS[axis], sensing).stable:
-        return UNSTABLE
-    L, poles = loop.open_loop(axis, sensing)
-    turned = np.unwrap(np.angle(1.0 + L))
-    if round((poles - 2.0 * (turned[-1] - turned[0]) / pi) / 2.0) != 0:
+    L = _stable_open_loop(loop, axis, sensing)
+    if L is None:
         return UNSTABLE
     crossings = list(_gain_crossings(L))
     factors = list(_critical_factors(L))
@@ -204,6 +232,17 @@ def axis_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
         crossover=max((omega for omega, _ in crossings), default=0.0),
         peak=float((1.0 / np.abs(1.0 + L)).max()),
     )
+
+
+def _stable_open_loop(loop: Loop, axis: int, sensing: Sensing) -> Complex | None:
+    """L(jω), None if it is unstable when closed: how often 1 + L goes round −1 tells it."""
+    tilting = loop.dynamics.needs_tilt and axis in TILT_AXIS
+    if tilting and not is_stable(loop, TILT_AXIS[axis], sensing):
+        return None
+    L, poles = loop.open_loop(axis, sensing)
+    beyond = 1.0 + L
+    turned = float(np.angle(beyond[1:] / beyond[:-1]).sum())
+    return L if round((poles - 2.0 * turned / pi) / 2.0) == 0 else None
 
 
 def delay_margin(late: Complex, fresh: Complex | float = 0.0) -> float:
@@ -232,8 +271,7 @@ def _critical_factors(L: Complex) -> Iterator[float]:
 
 def _thrusters(dynamics: Dynamics) -> Complex:
     """Transfer function from the command of a force or torque to it, of one that never tilts."""
-    late = np.exp(-S * dynamics.delay) / (1.0 + dynamics.lag * S)
-    return np.asarray(late * _hold(PERIOD_S))
+    return np.asarray(_late(dynamics.delay) / (1.0 + dynamics.lag * S) * _hold(PERIOD_S))
 
 
 def _low_pass(hz: float) -> Complex:
@@ -242,4 +280,12 @@ def _low_pass(hz: float) -> Complex:
 
 def _hold(period: float) -> Complex:
     """Transfer function of a value held for `period` [s]."""
-    return np.asarray((1.0 - np.exp(-S * period)) / (S * period))
+    return np.asarray((1.0 - _late(period)) / (S * period))
+
+
+@lru_cache(maxsize=KEPT)
+def _late(delay: float) -> Complex:
+    """Transfer function of a delay [s]; most of what a margin costs, if worked out each time."""
+    late: Complex = np.exp(-S * delay)
+    late.setflags(write=False)
+    return late

@@ -8,10 +8,10 @@ comes back late, and where all is felt the pull that feed-forward balances acts 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
-from math import pi
+from math import degrees, log10, pi
 from typing import Final
 
 from pipeline.control.margins import AxisMargins, Loop, Sensing, axis_margins
@@ -27,9 +27,46 @@ MAX_PEAK: Final = 2.0
 """What engineers ask of a loop: 30°, 6 dB, and no disturbance more than doubled."""
 
 
+@dataclass(frozen=True, slots=True)
+class MarginGoals:
+    """Margins that a loop must keep; those that engineers ask for, if nothing else is told."""
+
+    gain: float = MIN_GAIN
+    """All gains times this, or divided by it, still stable."""
+    phase: float = MIN_PHASE_RAD
+    """[rad]."""
+    delay: float = 0.0
+    """Further delay anywhere in the loop [s]."""
+    peak: float = MAX_PEAK
+    """Of the sensitivity."""
+
+    def lacking(self, found: AxisMargins) -> str:
+        """What is less than this, in words; "" if nothing is."""
+        if not found.stable:
+            return "unstable"
+        has, wanted = degrees(found.phase), degrees(self.phase)
+        missed = (
+            (found.phase < self.phase, f"{has:.1f}° of phase instead of {wanted:.0f}°"),
+            (
+                found.gain < self.gain,
+                f"gain {_db(found.gain):.1f} dB instead of {_db(self.gain):.2g}",
+            ),
+            (found.peak > self.peak, f"peak {found.peak:.2f} instead of {self.peak:g}"),
+            (
+                found.delay < self.delay,
+                f"{1e3 * found.delay:.1f} ms of delay instead of {1e3 * self.delay:g}",
+            ),
+        )
+        return ", ".join(words for is_missed, words in missed if is_missed)
+
+
 def worst_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
     """Each margin of one axis, the worst of all bodies that the robot may be."""
-    found = [axis_margins(one, axis, sensing) for one in _bodies(loop)]
+    return worst_of([axis_margins(one, axis, sensing) for one in bodies(loop)])
+
+
+def worst_of(found: Sequence[AxisMargins]) -> AxisMargins:
+    """Each margin, the worst of one or more loops."""
     return AxisMargins(
         stable=all(one.stable for one in found),
         delay=min(one.delay for one in found),
@@ -43,11 +80,15 @@ def worst_margins(loop: Loop, axis: int, sensing: Sensing) -> AxisMargins:
 
 def is_robust(worst: AxisMargins) -> bool:
     """Whether these are the margins that engineers ask for."""
-    gains = worst.gain_up >= MIN_GAIN and worst.gain_down <= 1.0 / MIN_GAIN
-    return worst.stable and gains and worst.phase >= MIN_PHASE_RAD and worst.peak <= MAX_PEAK
+    return not MarginGoals().lacking(worst)
 
 
-def _bodies(loop: Loop) -> Iterator[Loop]:
+def _db(gain: float) -> float:
+    return 20.0 * log10(gain)
+
+
+def bodies(loop: Loop) -> Iterator[Loop]:
+    """The loop around every body that the robot may be, as told among them."""
     nominal = loop.dynamics
     for mass, lag, unfelt in product(MASSES, LAGS, (0.0, loop.config.unfelt)):
         dynamics = replace(nominal, inertia=mass * nominal.inertia, lag=lag * nominal.lag)

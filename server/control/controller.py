@@ -65,12 +65,14 @@ class Controller:
         config: TeleopConfig,
         unfit: str = "",
         too_late: TooLate = never_too_late,
+        gains_weak: str = "",
     ) -> None:
         """Disarmed, until somebody asks.
 
         `unfit` says why this process may never arm, if so; `too_late` why not with pictures and
-        body samples so old [s].
+        body samples so old [s]; `gains_weak` what its gains lack, which refuses nothing.
         """
+        self._gains_weak = gains_weak
         self._unfit, self._too_late = unfit, too_late
         self._picture_age, self._body_age = Mean(), Mean()
         self.teleop = Teleop(robot, config)
@@ -268,6 +270,7 @@ class Controller:
             else (*triple(twist_in_b[:3]), *triple(twist_in_b[3:])),
             body_twists=twists,
             commands=commands,
+            gains_weak=self._gains_weak,
         )
 
 

@@ -107,6 +107,8 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """Thrusts commanded since the last status, for recordings: each time t, then `thrusts`."""
     at_limit: bool = False
     """The robot is led to where its thrusters can't hold it."""
+    gains_weak: str = ""
+    """What gains of the user's own lack if the robot is not as told, in words; refuses nothing."""
 
 
 def _has_attitudes(status: ControlStatus) -> bool:

@@ -20,9 +20,10 @@ import numpy as np
 
 from hardware.dynamics import dynamics_of
 from hardware.follower import Follower, RobotCommand, zero_command
+from hardware.gain_check import BODIES, report
 from hardware.link.link_key import LinkKeyError, take_key
 from hardware.link.registry import SIMULATED, connect, link_kind
-from hardware.robot_file import COMMANDS, RobotFile, load_robot
+from hardware.robot_file import COMMANDS, RobotFile, is_shipped, load_robot
 from pipeline.config import PERIOD_S, EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.control.twist_margins import twist_refusal
@@ -44,6 +45,10 @@ LATENESS_EVERY = 400
 
 STOPPED_BY_NOBODY = (
     "Nothing stops this robot when control falls silent: its file must say who does (stopped_by)."
+)
+WEAK = (
+    "Gains {gains!r} have less margin than is usual {bodies}: {lacking}. `lightleash tune` finds"
+    " others."
 )
 UPRIGHT = "This robot flies, but does not keep its attitude by itself (keeps_attitude_in_ramp)."
 
@@ -122,6 +127,18 @@ def too_late(robot_file: RobotFile, gains: str, config: TeleopConfig) -> TooLate
     return partial(guard.refusal, gains, config.estimator)
 
 
+def weak_gains(robot: str, robot_file: RobotFile, gains: str, estimator: EstimatorName) -> str:
+    """What gains lack if the robot is not quite as told, in words, or "".
+
+    Of the user's own robot file alone: what those of this project lack stands in `doctor`. Without
+    a filter the latency guard has its say.
+    """
+    if robot_file.robot.twist is not None or estimator == "none" or is_shipped(robot):
+        return ""
+    lacking = report(robot_file, robot_file.gains[gains]).lacking
+    return WEAK.format(gains=gains, bodies=BODIES, lacking=lacking) if lacking else ""
+
+
 def unfit(robot_file: RobotFile, granted: str, *, real: bool) -> str:
     """Why this process may never arm this robot, or ""."""
     if real and not granted.startswith(realtime.GRANTED):
@@ -168,6 +185,7 @@ def run(options: ControlOptions) -> None:
         config,
         unfit(robot_file, granted, real=options.real),
         too_late(robot_file, options.gains, config),
+        weak_gains(options.robot, robot_file, options.gains, options.estimator),
     )
     epoch = next_epoch(options.epochs, unix_ms())
     follower = connect(robot_file, key, epoch)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from math import degrees, inf, log10
+from math import degrees, log10
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +92,6 @@ def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[Margi
 def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
     """Row of one axis."""
     margins, worst = axis_margins(loop, axis, sensing), worst_margins(loop, axis, sensing)
-    down = 1.0 / worst.gain_down if worst.gain_down > 0.0 else inf
     return MarginRow(
         gains=gains,
         estimator=sensing.estimator,
@@ -105,7 +104,7 @@ def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
         gain_down=margins.gain_down,
         crossover=margins.crossover,
         worst_phase_deg=degrees(worst.phase),
-        worst_gain_db=20.0 * log10(min(worst.gain_up, down)),
+        worst_gain_db=20.0 * log10(worst.gain),
         worst_peak=worst.peak,
         robust="yes" if is_robust(worst) else "no",
     )

@@ -147,6 +147,31 @@ def cameras() -> Iterator[Finding]:
             yield Finding(BAD, "calibration", str(error), "mend the file")
 
 
+def gains() -> Iterator[Finding]:
+    """What gains of the chosen robot lack if it is not quite as its file says."""
+    from hardware.gain_check import BODIES, report, worst_words
+    from hardware.robot_file import COMMANDS, RobotFileError, load_robot
+    from server.common.settings import SettingsError, load
+
+    try:
+        chosen = load(())
+        robot_file = load_robot(chosen.robot, takes=COMMANDS)
+    except (SettingsError, RobotFileError) as error:
+        yield Finding(BAD, "robot", str(error), "mend the setting or the file")
+        return
+    if robot_file.robot.twist is not None:
+        return
+    if chosen.gains not in robot_file.gains:
+        allowed = ", ".join(robot_file.gains)
+        yield Finding(BAD, "gains", f"{chosen.gains!r} is not one of {allowed}", "mend the setting")
+        return
+    found = report(robot_file, robot_file.gains[chosen.gains])
+    what, said = f"gains {chosen.gains} of {chosen.robot}", worst_words(found.worst)
+    advice = f"less than is usual: {found.lacking}; `lightleash tune` finds others"
+    grade = POOR if found.lacking else GOOD
+    yield Finding(grade, what, f"{said} {BODIES}", advice if found.lacking else "")
+
+
 def _phone(parser: Parser, arguments: argparse.Namespace) -> int:
     seconds = KEPT_S if arguments.seconds is None else arguments.seconds
     if not LEAST_S <= seconds <= KEPT_S:
@@ -178,6 +203,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         lambda: ports((8443, 8080)),
         codecs,
         cameras,
+        gains,
     ]
     findings: list[Finding] = []
     for finding in chain.from_iterable(check() for check in checks):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from math import degrees, inf, isfinite, radians
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import numpy as np
 from hardware.authority import authority
 from hardware.dynamics import dynamics_of
 from hardware.follower import FollowerError
+from hardware.gain_check import BODIES, controlled, loop_of, report, worst_words
 from hardware.led_layout.margins import margins
 from hardware.led_layout.viewpoints import looks_about
 from hardware.link.registry import link_kind
@@ -21,9 +22,9 @@ from hardware.link.robot_end import SILENCE_US
 from hardware.robot_file import COMMANDS, RobotFile, load_robot
 from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
-from pipeline.control.margins import Loop, Sensing, axis_margins
+from pipeline.control.margins import Sensing, axis_margins
+from pipeline.control.robust_margins import worst_of
 from pipeline.control.twist_margins import LEAST_PHASE_RAD, phase_left
-from pipeline.gains import Gains
 from pipeline.robot import TwistDrive
 from server.common.settings import state_directory
 from server.control.process import never_stops, never_upright
@@ -31,15 +32,10 @@ from server.process.robot_key import key_file
 from server.tools.led_layout.report import LayoutReport, judged
 
 HELP = "Can the robot of a file be flown, how well, and what is missing?"
+LATE = Sensing("relative", latency=0.100, body_age=0.010)
+"""Of a phone's pictures and the body's samples, at a good network's later end."""
 LEAST_FORCE_PER_WEIGHT, LEAST_REACH_M = 0.05, 0.05
 """Below, a robot hardly answers."""
-MASSES, LAGS = (0.7, 1.0, 1.3), (0.7, 1.0, 1.5)
-"""What a robot may be beside what its file says, as factors."""
-BODY_AGE_S = 0.010
-"""Of the body's samples when they are used."""
-CORNERS = "with any mass ± 30 %, lag × 0.7-1.5"
-USUAL_LATENCY_S = 0.100
-"""Of a phone's pictures, from capture to fusion; 0.06 to 0.12 by a good network."""
 VIEWS, FOCAL_PX, NOISE_PX = 40, 914.0, 0.1
 """A phone at 720p."""
 
@@ -99,9 +95,9 @@ def _twist(drive: TwistDrive) -> Iterator[RobotFinding]:
     follows_s = drive.delay_s + drive.lag_s
     said = f"told zero {zeroed_s:.2f} s after the last command, its lag of {follows_s:.2f} s beyond"
     yield RobotFinding("stops", True, said)
-    phase = phase_left(drive, USUAL_LATENCY_S, BODY_AGE_S)
+    phase = phase_left(drive, LATE.latency, LATE.body_age)
     delay_s = phase / max(drive.position_gain, drive.attitude_gain)
-    usual = f"with pictures {1e3 * USUAL_LATENCY_S:.0f} ms old"
+    usual = f"with pictures {1e3 * LATE.latency:.0f} ms old"
     said = f"margins {1e3 * delay_s:.0f} ms, {degrees(phase):.0f}° {usual}"
     ok = phase >= LEAST_PHASE_RAD
     yield RobotFinding("gains", ok, said + ("" if ok else ": too little to lead it"))
@@ -122,40 +118,25 @@ def _thrust(robot_file: RobotFile) -> Iterator[RobotFinding]:
 
 
 def _gains(robot_file: RobotFile) -> Iterator[RobotFinding]:
-    """Margins of each gain set, as told and in the worst corner of what the robot may be."""
+    """Margins of each gain set, as told and of the worst body that the robot may be."""
     least = TeleopConfig().margins
     sound = 0
     for name, gains in robot_file.gains.items():
-        delay, phase = _margins(robot_file, gains)
-        corners = [_margins(_other(robot_file, m, lag), gains) for m in MASSES for lag in LAGS]
-        worst_delay, worst_phase = (min(values) for values in zip(*corners, strict=True))
-        ok = delay >= least.min_delay_s and phase >= least.min_phase_rad
+        loop = loop_of(robot_file, gains)
+        told = worst_of([axis_margins(loop, axis, LATE) for axis in controlled(robot_file)])
+        found = report(robot_file, gains)
+        kept = told.delay >= least.min_delay_s and told.phase >= least.min_phase_rad
+        ok = kept and report(robot_file, gains, LATE).worst.stable
         sound += ok
-        said = f"margins {1e3 * delay:.0f} ms, {degrees(phase):.0f}°"
-        said += f"; {1e3 * worst_delay:.0f} ms, {degrees(worst_phase):.0f}° {CORNERS}"
-        yield RobotFinding(f"gains {name}", True, said + ("" if ok else ": too little to fly"))
+        said = f"margins {1e3 * told.delay:.0f} ms, {degrees(told.phase):.0f}°; "
+        said += f"{worst_words(found.worst)} {BODIES}"
+        if not ok:
+            said += ": refused" if kept else ": too little to fly"
+        elif found.lacking:
+            said += f"; less than is usual: {found.lacking}"
+        yield RobotFinding(f"gains {name}", True, said)
     said = f"{sound} of {len(robot_file.gains)} sets can be flown (`lightleash tune` finds others)"
     yield RobotFinding("any gains", sound > 0, said)
-
-
-def _margins(robot_file: RobotFile, gains: Gains) -> tuple[float, float]:
-    """Least further delay [s] and phase margin [rad] of all controlled axes."""
-    config, robot = TeleopConfig(), robot_file.robot
-    feedforward = config.feedforward if config.feedforward.enabled else None
-    dynamics = dynamics_of(robot, robot_file.plant)
-    loop = Loop(dynamics, gains, config.margins, config.no_filter, feedforward)
-    sensing = Sensing("relative", USUAL_LATENCY_S, BODY_AGE_S)
-    axes = np.flatnonzero(robot.axes | robot.wrench_axes).tolist()
-    found = [axis_margins(loop, axis, sensing) for axis in axes]
-    return min(one.delay for one in found), min(one.phase for one in found)
-
-
-def _other(robot_file: RobotFile, mass: float, lag: float) -> RobotFile:
-    plant = robot_file.plant
-    other = replace(
-        plant, mass=mass * plant.mass, inertia=mass * plant.inertia, lag=lag * plant.lag
-    )
-    return replace(robot_file, plant=other)
 
 
 def _leds(robot_file: RobotFile) -> RobotFinding:

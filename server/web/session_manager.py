@@ -334,6 +334,8 @@ class SessionManager:
             self.log_event(complaint)
         self._last_complaint = complaint
         unfit = {*status.thrusters_weak, *status.sensors_doubted}
+        if self.status is not None and self.status.gains_weak:
+            unfit.add(self.status.gains_weak)
         for said in unfit - self._unfit:
             self.log_event(said)
         self._unfit = unfit

@@ -67,6 +67,7 @@ def control_status(**changes: object) -> ControlStatus:
         "warnings": [],
         "thrusters_weak": [],
         "at_limit": False,
+        "gains_weak": "",
     }
     return ControlStatus(**{**values, **changes})
 

@@ -1,7 +1,9 @@
 """`lightleash tune ROBOT`: a gain set for a measured latency, into the robot's file.
 
-The search is `hardware.gain_tuning`'s. What it finds is flown in virtual time, in calm air and in
-gusts, beside the set it is to replace, before it is written; a set that doesn't fly is not.
+The search is `hardware.gain_tuning`'s: margins are those of the worst body that the robot may be,
+and where nothing keeps them, what binds is told. What is found is flown in virtual time, in calm
+air and in gusts, beside the set it is to replace, before it is written; a set that doesn't fly is
+not.
 """
 
 from __future__ import annotations
@@ -16,19 +18,20 @@ from typing import Any, Final, cast, get_args
 
 import numpy as np
 
-from hardware.dynamics import dynamics_of
-from hardware.gain_tuning import MarginGoals, TuningError, tuned
+from hardware.gain_check import controlled, loop_of
+from hardware.gain_tuning import TuningError, tuned
 from hardware.robot_file import (
-    ROBOTS,
     RobotFile,
     RobotFileError,
+    is_shipped,
     load_robot,
     robot_path,
     robot_table,
 )
 from hardware.robot_text import RobotTextError, with_gains
 from pipeline.config import EstimatorName, TeleopConfig
-from pipeline.control.margins import Loop, Sensing
+from pipeline.control.margins import Sensing
+from pipeline.control.robust_margins import MAX_PEAK, MarginGoals
 from pipeline.gains import Gains
 from server.common.options import Parser
 from server.common.ranges import number
@@ -78,12 +81,12 @@ def _tuned(arguments: argparse.Namespace) -> str:
     name, comment = arguments.name or f"tuned_{arguments.latency_ms:.0f}ms", _comment(arguments)
     before = robot_file.gains[base]
     with_gains(content, name, before, comment, arguments.replace)  # refuses before the work
-    loop = _loop(robot_file, base)
-    found = _found(robot_file, loop, arguments)
+    loop = loop_of(robot_file, before)
+    found = tuned(loop, controlled(robot_file), _sensing(arguments), _goals(arguments))
     base = base if base != name else f"{base} before"
     loops, sensing = {base: loop, name: replace(loop, gains=found)}, _sensing(arguments)
     print(f"{robot_file.robot.name}: pictures {arguments.latency_ms:g} ms late")
-    print(table.table(loops, _axes(robot_file), sensing), flush=True)
+    print(table.table(loops, controlled(robot_file), sensing), flush=True)
     if not _flies(robot_table(path), {base: before, name: found}, arguments):
         raise TuningFlightError(f"{name} does not fly here: nothing is written")
     written = with_gains(content, name, found, comment, arguments.replace)
@@ -105,7 +108,7 @@ def _base(robot_file: RobotFile, wanted: str | None) -> str:
 def _target(path: Path, arguments: argparse.Namespace) -> Path:
     """Where the set is written to: the robot's own file, or a copy."""
     out: Path | None = arguments.out
-    if out is None and path.resolve().parent == ROBOTS.resolve():
+    if out is None and is_shipped(path):
         raise TuneError(f"{path.stem} is built in: --out FILE.toml says where its copy goes")
     if out is None:
         return path
@@ -119,33 +122,17 @@ def _target(path: Path, arguments: argparse.Namespace) -> Path:
 def _comment(arguments: argparse.Namespace) -> str:
     return (
         f"lightleash tune: pictures {arguments.latency_ms:g} ms late, {arguments.estimator}; "
-        f"{arguments.gain_margin:g} dB, {arguments.phase_margin:g} degrees"
+        f"{arguments.gain_margin:g} dB, {arguments.phase_margin:g} degrees, peak {arguments.peak:g}"
     )
 
 
-def _loop(robot_file: RobotFile, gains: str) -> Loop:
-    config = TeleopConfig()
-    return Loop(
-        dynamics_of(robot_file.robot, robot_file.plant),
-        robot_file.gains[gains],
-        config.margins,
-        config.no_filter,
-        config.feedforward if config.feedforward.enabled else None,
+def _goals(arguments: argparse.Namespace) -> MarginGoals:
+    return MarginGoals(
+        gain=10.0 ** (arguments.gain_margin / 20.0),
+        phase=radians(arguments.phase_margin),
+        delay=TeleopConfig().margins.min_delay_s,
+        peak=arguments.peak,
     )
-
-
-def _found(robot_file: RobotFile, loop: Loop, arguments: argparse.Namespace) -> Gains:
-    goals = MarginGoals(
-        10.0 ** (arguments.gain_margin / 20.0),
-        radians(arguments.phase_margin),
-        loop.config.min_delay_s,
-    )
-    return tuned(loop, _axes(robot_file), _sensing(arguments), goals)
-
-
-def _axes(robot_file: RobotFile) -> list[int]:
-    robot = robot_file.robot
-    return [int(axis) for axis in np.flatnonzero(robot.axes | robot.wrench_axes)]
 
 
 def _sensing(arguments: argparse.Namespace) -> Sensing:
@@ -198,7 +185,10 @@ def parse(argv: Sequence[str] | None) -> argparse.Namespace:
         "--latency-ms", type=latency, required=True, metavar="X", help="of a picture, until fused"
     )
     parser.add_argument("--gain-margin", type=gain, default=6.0, metavar="DB")
-    parser.add_argument("--phase-margin", type=phase, default=35.0, metavar="DEG")
+    parser.add_argument("--phase-margin", type=phase, default=30.0, metavar="DEG")
+    parser.add_argument(
+        "--peak", type=number(1.2, 5.0), default=MAX_PEAK, help="of the sensitivity, at most"
+    )
     parser.add_argument("--estimator", choices=get_args(EstimatorName), default="relative")
     parser.add_argument("--name", help="of the new set; default: tuned_Xms")
     parser.add_argument("--from", dest="base", metavar="SET", help="compared with; default: phone")

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees, inf, log10
+from math import degrees, log10
 from typing import Final
 
-from hardware.gain_tuning import moved, variants
+from hardware.gain_tuning import margins_of, moved
 from hardware.robot_schema import AXES
-from pipeline.control.margins import Loop, Sensing, axis_margins
+from pipeline.control.margins import Loop, Sensing
 from server.common import text
 
 
 @dataclass(frozen=True, slots=True)
 class AxisRow:
-    """One axis before or after; margins are the worse of with and without feed-forward."""
+    """One axis before or after; margins are the worst of `hardware.gain_tuning.margins_of`."""
 
     set: str
     axis: str
@@ -26,6 +26,8 @@ class AxisRow:
     """Up or down, whichever is less."""
     phase_deg: float
     delay_ms: float
+    peak: float
+    """Of the sensitivity."""
     bandwidth: float
     """Highest frequency at which the loop still acts [rad/s]."""
     moved: float
@@ -41,6 +43,7 @@ COLUMNS: Final = (
     ("gain_db", "gain dB", "{:.1f}"),
     ("phase_deg", "phase °", "{:.0f}"),
     ("delay_ms", "delay ms", "{:.0f}"),
+    ("peak", "peak", "{:.2f}"),
     ("bandwidth", "acts to rad/s", "{:.1f}"),
     ("moved", "mm/N, °/N m", "{:.1f}"),
 )
@@ -53,18 +56,18 @@ def table(loops: Mapping[str, Loop], axes: Sequence[int], sensing: Sensing) -> s
 
 
 def _row(name: str, loop: Loop, axis: int, sensing: Sensing) -> AxisRow:
-    found = [axis_margins(one, axis, sensing) for one in variants(loop)]
+    found = margins_of(loop, axis, sensing)
     gains, unit = loop.gains, 1e3 if axis < 3 else degrees(1.0)
-    least = min(min(one.gain_up, 1.0 / one.gain_down if one.gain_down else inf) for one in found)
     return AxisRow(
         set=name,
         axis=AXES[axis],
         Kp=float(gains.Kp[axis]),
         Ki=float(gains.Ki[axis]),
         Kd=float(gains.Kd[axis]),
-        gain_db=20.0 * log10(least),
-        phase_deg=degrees(min(one.phase for one in found)),
-        delay_ms=1e3 * min(one.delay for one in found),
-        bandwidth=max(one.crossover for one in found),
+        gain_db=20.0 * log10(found.gain),
+        phase_deg=degrees(found.phase),
+        delay_ms=1e3 * found.delay,
+        peak=found.peak,
+        bandwidth=found.crossover,
         moved=unit * moved(loop, axis, sensing),
     )

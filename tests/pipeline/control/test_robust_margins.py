@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import degrees
+from math import degrees, radians
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ import pytest
 from hardware.dynamics import dynamics_of
 from hardware.robot_file import load_robot
 from pipeline.config import FeedForwardConfig, MarginsConfig
-from pipeline.control.margins import OMEGA, Loop, Sensing, axis_margins
-from pipeline.control.robust_margins import is_robust, worst_margins
+from pipeline.control.margins import OMEGA, UNSTABLE, AxisMargins, Loop, Sensing, axis_margins
+from pipeline.control.robust_margins import MarginGoals, is_robust, worst_margins
 from pipeline.estimator_config import NoFilterConfig
 from pipeline.gains import PHONE, Gains
 
@@ -95,6 +95,24 @@ def test_gains_that_are_robust_lose_it_when_they_are_turned_up() -> None:
     worst = worst_margins(hard, X, LATE)
     assert not is_robust(worst)
     assert degrees(worst.phase) < 30.0
+
+
+def test_what_a_loop_lacks_is_said_and_what_it_has_is_not() -> None:
+    enough = AxisMargins(True, 0.02, radians(31.0), 2.1, 0.4, 9.0, 1.9)
+    goals = MarginGoals(delay=0.01)
+    assert goals.lacking(enough) == ""
+    for change, words in (
+        ({"phase": radians(28.0)}, "28.0° of phase instead of 30°"),
+        ({"gain_up": 1.5}, "gain 3.5 dB instead of 6"),
+        ({"gain_down": 0.8}, "gain 1.9 dB instead of 6"),
+        ({"peak": 2.5}, "peak 2.50 instead of 2"),
+        ({"delay": 0.005}, "5.0 ms of delay instead of 10"),
+    ):
+        assert goals.lacking(replace(enough, **change)) == words
+    both = replace(enough, phase=radians(28.0), peak=2.5)
+    assert goals.lacking(both) == "28.0° of phase instead of 30°, peak 2.50 instead of 2"
+    assert goals.lacking(UNSTABLE) == "unstable"
+    assert goals.lacking(replace(enough, gain_down=0.0)) == ""
 
 
 @pytest.mark.parametrize("name", ["ames", "quadrotor"])

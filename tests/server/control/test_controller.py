@@ -44,8 +44,10 @@ def picture(t: float) -> VisionMeasurement:
 class Rig:
     """A phone at rest that sees a robot at rest; time passes as `run` says."""
 
-    def __init__(self, unfit: str = "", too_late: TooLate = never_too_late) -> None:
-        self.controller = Controller(ROBOT, TeleopConfig(), unfit, too_late)
+    def __init__(
+        self, unfit: str = "", too_late: TooLate = never_too_late, gains_weak: str = ""
+    ) -> None:
+        self.controller = Controller(ROBOT, TeleopConfig(), unfit, too_late, gains_weak)
         self.k = 0
         self.held = False
         self.press = 0
@@ -155,6 +157,14 @@ def test_a_process_that_is_unfit_never_arms_and_says_why():
     rig = Rig(unfit="No real-time priority.")
     assert rig.run(1.0)[-1][1].refusals == ("No real-time priority.",)
     assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+def test_what_gains_lack_is_told_and_refuses_nothing():
+    rig = Rig(gains_weak="Gains 'mine' have little margin.")
+    output = rig.run(1.0)[-1][1]
+    assert rig.status(output).gains_weak == "Gains 'mine' have little margin."
+    assert output.refusals == ()
+    assert Rig().status(output).gains_weak == ""
 
 
 def test_how_old_pictures_and_body_samples_are_lately_is_asked_before_arming():

@@ -35,6 +35,29 @@ def test_calibrations_are_listed_and_a_broken_one_is_named(tmp_path, monkeypatch
     assert "broken.yaml" in finding.found
 
 
+def test_what_gains_lack_is_told_of_the_chosen_robot_and_breaks_nothing(monkeypatch):
+    (finding,) = doctor.gains()
+    assert (finding.grade, finding.what) == (POOR, "gains phone of ames")
+    assert "any mass ± 30 %" in finding.found
+    assert "x, y: 25.3° of phase instead of 30°" in finding.advice
+    monkeypatch.setenv("LIGHTLEASH_ROBOT", "ground")
+    (finding,) = doctor.gains()
+    assert (finding.grade, finding.advice) == (GOOD, "")
+    monkeypatch.setenv("LIGHTLEASH_ROBOT", "twister")
+    assert list(doctor.gains()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [("ROBOT", "amse", "did you mean"), ("GAINS", "sport", "phone, paper")],
+)
+def test_a_robot_or_gains_that_there_are_not_are_named(name, value, says, monkeypatch):
+    monkeypatch.setenv(f"LIGHTLEASH_{name}", value)
+    (finding,) = doctor.gains()
+    assert finding.grade == BAD
+    assert says in finding.found
+
+
 def test_a_state_directory_that_cannot_be_written_is_told(monkeypatch):
     def denied(_state):
         raise PermissionError("no")
@@ -47,7 +70,7 @@ def test_a_state_directory_that_cannot_be_written_is_told(monkeypatch):
 
 @pytest.mark.parametrize(("grade", "code"), [(GOOD, 0), (POOR, 0), (BAD, 1)])
 def test_only_what_is_broken_fails(monkeypatch, capsys, grade, code):
-    for name in ("machine", "certificates", "codecs", "cameras"):
+    for name in ("machine", "certificates", "codecs", "cameras", "gains"):
         monkeypatch.setattr(doctor, name, lambda: iter(()))
     monkeypatch.setattr(doctor, "ports", lambda _: iter(()))
     finding = Finding(grade, "thing", "state", "do this")
@@ -66,7 +89,7 @@ def test_the_schedule_is_measured_in_a_process_of_its_own():
 
 
 def test_a_report_for_others_holds_the_same_and_the_machine(monkeypatch, capsys):
-    for check in ("machine", "certificates", "codecs", "cameras"):
+    for check in ("machine", "certificates", "codecs", "cameras", "gains"):
         monkeypatch.setattr(doctor, check, lambda: iter(()))
     monkeypatch.setattr(doctor, "ports", lambda wanted: iter((Finding(BAD, "port 1", "taken"),)))
     monkeypatch.setattr(doctor, "realtime", lambda seconds: iter((Finding(POOR, "time", "ü"),)))

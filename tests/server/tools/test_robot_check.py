@@ -24,6 +24,17 @@ def test_the_robots_of_this_project_can_be_flown(robot, capsys, tmp_path):
     assert all(one["ok"] for one in found.values())
 
 
+@pytest.mark.slow
+def test_margins_of_a_body_that_is_not_as_told_are_said_and_what_it_would_lose_is_refused(
+    capsys, tmp_path
+):
+    _, found = findings(capsys, "ames", tmp_path)
+    assert "25°, 6.6 dB, peak 2.68 with any mass ± 30 %" in found["gains phone"]["said"]
+    assert "less than is usual: x, y: 25.3° of phase" in found["gains phone"]["said"]
+    assert found["gains paper_without_ekf"]["said"].endswith(": refused")
+    assert found["any gains"]["said"].startswith("2 of 3 sets")
+
+
 def changed(tmp_path, *changes):
     text = robot_path("ames").read_text()
     for old, new in changes:

@@ -271,6 +271,15 @@ def test_what_is_doubted_of_the_sensors_is_told_and_is_one_event_while_it_lasts(
     assert [event.times for event in house.manager.events if event.text == said] == [2]
 
 
+def test_what_gains_lack_is_one_event(house):
+    said = "Gains 'mine' have less margin than is usual."
+    for _ in range(3):
+        house.control.send(control_status(gains_weak=said))
+        house.manager._receive_status()
+        house.manager._tick()
+    assert [event.times for event in house.manager.events if event.text == said] == [1]
+
+
 class Eyes:
     """A vision thread and its front-end, which keep what control expects."""
 

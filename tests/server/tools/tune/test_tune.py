@@ -27,12 +27,12 @@ def test_a_set_is_found_flown_and_written_into_the_robots_own_file(mine, capsys,
     told = capsys.readouterr().out
     robot_file = load_robot(mine)
     assert list(robot_file.gains) == ["phone", "tuned_120ms"]
-    assert robot_file.gains["tuned_120ms"].Kp[0] > robot_file.gains["phone"].Kp[0]
+    assert robot_file.gains["tuned_120ms"].Kp[5] > robot_file.gains["phone"].Kp[5]
     assert all(line in mine.read_text() for line in text.splitlines())
-    assert "45 degrees" in mine.read_text()
+    assert "45 degrees, peak 2" in mine.read_text()
     rows = [line.split() for line in told.splitlines() if line.split()[:1] == ["tuned_120ms"]]
     assert [row[1] for row in rows] == ["x", "y", "yaw"]
-    assert all(float(row[6]) >= 45.0 for row in rows)
+    assert all(float(row[6]) >= 45.0 and float(row[8]) <= 2.0 for row in rows)
     assert "tracking RMS, hand moving: phone " in told
     assert command.main(words) == 2
     assert "--replace" in capsys.readouterr().err
