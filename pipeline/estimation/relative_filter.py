@@ -29,6 +29,7 @@ from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_imu_sample
 from pipeline.estimation.sensor_doubts import sensor_doubts
 from pipeline.estimation.spot_noise import SpotNoise
+from pipeline.estimation.tones import PICTURES, Tones
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, log
 from pipeline.imu_stream import ImuStream
@@ -79,6 +80,7 @@ class RelativeFilter:
         self._offset = OffsetMonitor()
         self._adaptive_noise, self._spot_noise = AdaptiveNoise(), SpotNoise()
         self._bias_steps, self._misdated = BiasSteps(self._initial), MisdatedPictures()
+        self._off = Tones(PICTURES)
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
@@ -144,6 +146,7 @@ class RelativeFilter:
             return seen, 1.0
         track, C = self._track, seen.pose.covariance
         e, P = _missed(seen.pose, predicted), track.in_picture(predicted)
+        self._off.add(seen.t, e[3:], e[:3])
         if variance < ONE_DATE_S**2:
             passing = track.passing(predicted)
             misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
@@ -309,6 +312,8 @@ class RelativeFilter:
                 newest.t,
                 self._t_start,
                 self._track.t_clipped.ravel(),
+                self._track.t_vibrating.ravel(),
+                self._off.t_heard,
                 self._bias_steps.t_stepped,
                 self._track.body_noise,
                 self._spot_noise.factor,

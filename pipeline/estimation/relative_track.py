@@ -26,6 +26,7 @@ from pipeline.estimation.relative_kernels import (
 )
 from pipeline.estimation.relative_noise import noise_of, walks_of
 from pipeline.estimation.sample_noise import SampleNoise
+from pipeline.estimation.tones import PHONE, ROBOT, Tones
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, cross
 from pipeline.imu_stream import ImuStream
@@ -52,6 +53,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         self._noise = noise_of(config)
         self._configured = self._noise[:, :3].copy()
         self._heard = [SampleNoise(sigmas) for sigmas in self._configured[:, 0]]
+        self._tones = [Tones(limits) for limits in (ROBOT, PHONE)]
         self._gate, self._still = config.gate_chi2, config.offset_still
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
         self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
@@ -71,6 +73,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
                 self.t_clipped[device, sensor] = max(t, self.t_clipped[device, sensor])
             self._noise[device, 3, sensor] = scale.limit
         self._heard[device].add(t, rate, force)
+        self._tones[device].add(t, rate, force)
         self._set_sample_noise(device)
         return True
 
@@ -79,6 +82,11 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         """(2,) how far samples of the robot's sensors scatter, by the configured noise."""
         noise: Array = self._heard[0].levels[:, 0] / self._configured[0, 0]
         return noise
+
+    @property
+    def t_vibrating(self) -> Array:
+        """(2, 2) when each sensor last had a tone, by device [s]."""
+        return np.array([one.t_heard for one in self._tones])
 
     def doubt_phone(self, factor: float) -> None:
         """From now on the variances of the phone's samples are so many times the configured."""

@@ -12,9 +12,15 @@ import numpy as np
 from pipeline.frames import Array
 
 ROBOTS: Final = ("The robot's gyroscope", "The robot's accelerometer")
-SENSORS: Final = (*ROBOTS, "The phone's gyroscope", "The phone's accelerometer")
+PHONES: Final = ("The phone's gyroscope", "The phone's accelerometer")
+SENSORS: Final = (*ROBOTS, *PHONES)
 """In the order of the filter's biases."""
 KINDS: Final = ("A gyroscope", "An accelerometer")
+VIBRATES: Final = "{sensor} feels a vibration, as of a propeller or a motor."
+SWAYS: Final = (
+    "{kind} of the robot or the phone sways where pictures don't: does something vibrate at about"
+    " its sample rate?"
+)
 SAID_S: Final = 3.0
 """What happens at once is said for so long."""
 LEARNS_S: Final = 5.0
@@ -26,7 +32,14 @@ INEXACT: Final = 4.0
 
 
 def sensor_doubts(
-    t: float, t_start: float, t_clipped: Array, t_stepped: Array, noise: Array, spot_noise: float
+    t: float,
+    t_start: float,
+    t_clipped: Array,
+    t_vibrating: Array,
+    t_swaying: Array,
+    t_stepped: Array,
+    noise: Array,
+    spot_noise: float,
 ) -> tuple[str, ...]:
     """Sentences, one for each doubt at `t` [s].
 
@@ -34,6 +47,8 @@ def sensor_doubts(
         t: Now.
         t_start: When the filter began to learn.
         t_clipped: When each sensor last said as much as it can (4,) [s].
+        t_vibrating: When it last had a tone (4,) [s].
+        t_swaying: When pictures were last off by one in turn and in place (2,) [s].
         t_stepped: When its bias last stepped (4,) [s].
         noise: Of the robot's samples, by the configured (2,).
         spot_noise: Factor of the variances of LEDs' rays.
@@ -43,6 +58,10 @@ def sensor_doubts(
         return np.flatnonzero(t - t_last < SAID_S).tolist()
 
     clipped = [f"{SENSORS[k]} is moved beyond the end of its range." for k in since(t_clipped)]
+    # what is cut off has overtones, too
+    shaken = [k for k in since(t_vibrating) if t_vibrating[k] - t_clipped[k] > SAID_S]
+    vibrating = [VIBRATES.format(sensor=SENSORS[k]) for k in shaken]
+    swaying = [SWAYS.format(kind=KINDS[k]) for k in since(t_swaying)]
     jumped = since(t_stepped) if t - t_start > LEARNS_S else ()
     kinds = sorted({k % 2 for k in jumped})  # which of the two can hardly be told
     stepped = [f"{KINDS[k]} of the robot or the phone seems to have another bias." for k in kinds]
@@ -52,4 +71,4 @@ def sensor_doubts(
         if ratio > NOISY
     ]
     inexact = ["LEDs are seen much less exactly than usual."] if spot_noise > INEXACT else []
-    return (*clipped, *stepped, *noisy, *inexact)
+    return (*clipped, *vibrating, *swaying, *stepped, *noisy, *inexact)

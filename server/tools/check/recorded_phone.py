@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from math import nan, sqrt
+from math import isfinite, nan, sqrt
 from typing import Final
 
 import numpy as np
 
 from pipeline.config import FailsafeConfig
+from pipeline.estimation.sensor_doubts import PHONES, VIBRATES
+from pipeline.estimation.tones import PHONE, Tones
 from pipeline.frames import Array
 from pipeline.signals import PhoneImu
 from pipeline.vision.detection import Detection
@@ -98,6 +101,7 @@ class RecordedPhone(Offline):
         self._bytes = 0
         self._looked_at = self._found = self._undecodable = self._undecodable_first = 0
         self._noise: list[float] = []
+        self._tones = Tones(PHONE)
         self._complaints: list[str] = []
         self._sensors = SensorCheck()
         super().__init__(recording)
@@ -148,9 +152,16 @@ class RecordedPhone(Offline):
             found_pct=100.0 * self._found / self._looked_at if self._looked_at else nan,
             noise_px=float(np.median(self._noise)) if self._noise else nan,
             camera=camera_health.health(self._frame_pipeline.front_end),
-            complaints=tuple(dict.fromkeys((*self._complaints, *self._sensors.faults()))),
+            complaints=tuple(
+                dict.fromkeys((*self._complaints, *self._sensors.faults(), *self._vibrations()))
+            ),
             link=check(series, FailsafeConfig()),
         )
+
+    def _vibrations(self) -> Iterator[str]:
+        for sensor, t in zip(PHONES, self._tones.t_heard.tolist(), strict=True):
+            if isfinite(t):
+                yield VIBRATES.format(sensor=sensor)
 
     def _new_sight(self) -> None:
         if self._first is not None:
@@ -174,6 +185,7 @@ class RecordedPhone(Offline):
         self._rates.append(sample.omega_m_cf_in_c)
         self._forces.append(sample.a_m_cf_in_c)
         self._sensors.add_imu(sample.t, motion)
+        self._tones.add(sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
 
     def _on_detection(self, frame: EncodedFrame, detection: Detection | None) -> None:
         self._pictures.append((frame.t, frame.t_received))

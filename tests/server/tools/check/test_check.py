@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as with_fields
 
+from pipeline.signals import PhoneImu
 from pipeline.vision.detection import Detection
 from server.phone.ingest import EncodedFrame
+from server.protocol.wire_records import Motion
 from server.recording.reader import Recording, read
 from server.tools.check.command import POOR, REFUSED, main
 from server.tools.check.page import page
@@ -91,6 +93,21 @@ def test_pictures_that_are_missing_are_counted_and_residuals_are_no_noise_yet() 
     found = thinned.figures()
     assert found.lost_pct == pytest.approx(10.0, abs=1.5)
     assert found.noise_px == pytest.approx(1.118 * np.median(thinned.residuals), rel=0.05)
+
+
+class Humming(RecordedPhone):
+    """Which something beside it shakes, beyond half of the sample rate."""
+
+    def _on_motion(self, sample: PhoneImu, motion: Motion, now: float) -> None:
+        shaken = np.array([0.0, 1.5, 0.0]) * np.sin(2.0 * np.pi * 41.0 * sample.t)
+        super()._on_motion(replace(sample, a_m_cf_in_c=sample.a_m_cf_in_c + shaken), motion, now)
+
+
+def test_a_vibration_is_said_of_the_sensor_that_feels_it() -> None:
+    complaints = Humming(read(FLIGHT)).figures().complaints
+    assert complaints == (
+        "The phone's accelerometer feels a vibration, as of a propeller or a motor.",
+    )
 
 
 def test_nothing_speaks_against_a_fine_phone(fine: PhoneFigures) -> None:
