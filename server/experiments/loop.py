@@ -24,6 +24,8 @@ from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulat
 
 Hidden = tuple[float, float, tuple[int, ...]]
 
+RECORDED = ("filming", "before_target")
+"""Hands as people's move; what `steady` and `moving` are shaken by is no hand's tremor."""
 HEADINGS = (
     ("hand", "hand", "{:<9}"),
     ("seed", "seed", "{:>4}"),
@@ -150,7 +152,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robot", default="ames", help="name or path of a robot file")
     parser.add_argument("--gains", default="phone", help="a gain set of the robot file")
     parser.add_argument("--estimator", choices=get_args(EstimatorName), default="relative")
-    parser.add_argument("--hands", nargs="+", default=["steady", "moving"], metavar="HAND")
+    parser.add_argument(
+        "--hands",
+        nargs="+",
+        default=list(RECORDED),
+        metavar="HAND",
+        help=f"default: {', '.join(RECORDED)}, as recorded ones move",
+    )
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--latency-ms", nargs=2, type=float, default=(60.0, 120.0))

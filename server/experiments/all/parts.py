@@ -46,7 +46,7 @@ PARTS: Final[tuple[ReportPart, ...]] = (
     ),
     ReportPart(
         "loop",
-        "loop --seconds 60 --seed 1",
+        "loop --hands steady moving --seconds 60 --seed 1",
         "loop --seconds 12 --seed 1 --hands moving",
         "The closed loop",
         "How closely the robot follows a phone's hand in virtual time, through rendered and "

@@ -1,0 +1,25 @@
+"""`lightleash experiments loop`: whose hand leads where nobody says."""
+
+from __future__ import annotations
+
+import argparse
+
+from hardware.sim.measured_hands import MEASURED
+from server.experiments import loop
+from tests.bench.blocks import PAGES
+
+
+def test_hands_move_as_recorded_ones_do_if_nobody_says_otherwise() -> None:
+    parser = argparse.ArgumentParser()
+    loop.add_arguments(parser)
+    hands = parser.parse_args([]).hands
+    assert len(hands) == len(set(hands)) == 2
+    assert set(hands) <= set(MEASURED)
+
+
+def test_the_figures_of_hands_that_are_none_name_them() -> None:
+    """Else a block would say something else when it is made anew."""
+    lines = (PAGES / "loop.md").read_text().splitlines()
+    commands = [line for line in lines if line.startswith(".venv/bin/lightleash experiments loop")]
+    assert commands
+    assert all("--hands steady moving" in command for command in commands)
