@@ -132,8 +132,10 @@ class LatencyGuard:
         for age in BODY_AGES_S:
             before = latencies[-1] if latencies else (0.0, 0.0)
             latencies.append(self._largest_latencies(loop, Sensing(kind, 0.0, age), before))
-        told, in_all = zip(*latencies, strict=True)
-        return Bearable(told), Bearable(in_all)
+        return (
+            Bearable(tuple(told for told, _ in latencies)),
+            Bearable(tuple(in_all for _, in_all in latencies)),
+        )
 
     def _largest_latencies(
         self, loop: Loop, sensing: Sensing, younger: tuple[float, float]
