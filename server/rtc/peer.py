@@ -66,6 +66,8 @@ class PeerConnection:
     def __init__(self, settings: RtcSettings, bitrate_bps: int, listener: PeerCallbacks) -> None:
         """Nothing is sent before `offer`."""
         self._listener, self._bitrate_bps = listener, bitrate_bps
+        self.is_answered = False
+        """An answer has been taken up: there is no second one."""
         self._codecs: dict[int, Codec] = {}
         self._has_relay = bool(settings.turn_url)
         servers = [RTCIceServer(**server) for server in settings.ice_servers(1e-3 * unix_ms())]
@@ -109,9 +111,9 @@ class PeerConnection:
             WireError: it is no answer to our offer, or the second one.
         """
         codecs = check_answer(sdp)
-        if self._connection.signalingState != "have-local-offer":
+        if self.is_answered:
             raise WireError("order", "sdp", "one answer to one offer")
-        self._codecs = codecs
+        self.is_answered, self._codecs = True, codecs
         try:
             sdp = candidates.reachable(sdp, source, own_addresses(), self._has_relay)
             description = RTCSessionDescription(sdp=sdp, type="answer")

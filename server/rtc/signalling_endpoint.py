@@ -89,15 +89,17 @@ class SignallingEndpoint:
         return Offer(link.id, sdp, self._settings.ice_servers(1e-3 * unix_ms()))
 
     async def _answer(self, request: Request, answer: Asked[Answer]) -> Reply[Connecting]:
-        """Take the page's answer to the newest offer."""
+        """Take the page's answer to the newest offer; a second one ends nothing."""
         link = self._link
         if link is None or link.id != answer.id:
             raise RefusedRequest(404, "id", "of the newest offer")
+        is_first = not link.peer.is_answered
         try:
             await link.peer.answer(answer.sdp, address_of(request))
         except WireError as error:
             log.warning("an answer is refused: %s", error)
-            self._gone(link)
+            if is_first:  # else it may be flown by
+                self._gone(link)
             raise
         if link.is_closing or self._manager.join_fast(link.session, link) is None:
             self._gone(link)

@@ -252,6 +252,37 @@ def test_a_phone_that_leaves_and_one_that_calls_again_leave_no_connection_behind
     in_house(tmp_path, play)
 
 
+def test_a_second_answer_is_read_refused_and_costs_the_connection_nothing(tmp_path):
+    async def play(house, page):
+        link = house.signalling._link
+        answer = page.client._connection.localDescription.sdp
+        for sdp, field in (
+            ("Once upon a time", "sdp"),
+            (answer.replace("a=setup:", "a=setup:not"), "sdp.setup"),
+            (answer, "sdp"),
+        ):
+            refused = await house.post("/api/rtc/answer", {"id": link.id, "sdp": sdp})
+            assert (refused.status_code, refused.json()["field"]) == (400, field)
+        assert not link.is_closing
+        await page.film(PICTURES)
+        await eventually(lambda: pictures(house) == sent(page))
+
+    in_house(tmp_path, play)
+
+
+def test_a_first_answer_that_is_none_withdraws_the_offer(tmp_path):
+    async def play(house, page):
+        offer = await house.post("/api/rtc", {"session": house.manager.phone.id})
+        link, answer = house.signalling._link, page.client._connection.localDescription.sdp
+        refused = await house.post(
+            "/api/rtc/answer", {"id": offer.json()["id"], "sdp": answer.replace("H264", "H265")}
+        )
+        assert (refused.status_code, refused.json()["field"]) == (400, "sdp.codec")
+        assert link.is_closing
+
+    in_house(tmp_path, play)
+
+
 def test_another_hand_takes_the_fast_path_away(tmp_path):
     async def play(house, page):
         link = house.signalling._link
