@@ -22,7 +22,7 @@ from hardware.codec import CODECS, DecodeError
 from pipeline.signals import Image
 from server.common.child import BACKOFF_S, STEADY_S
 from server.common.clock import now
-from server.media.decoder_process import ANSWER, DECODED, DIED, REQUEST
+from server.media.decoder_process import ANSWER, DECODED, DIED, REFUSED, REQUEST
 from server.protocol.wire import MAX_PIXELS, MAX_RECORD_BYTES
 
 MEMORY_BYTES = max(MAX_PIXELS, MAX_RECORD_BYTES)
@@ -132,8 +132,8 @@ class Decoding:
         self._lock = threading.Lock()
         self._streams = self._asked = 0
         self._running: _Running | None = _Running(cpu_s)
-        self.deaths = 0
-        """Pictures that ended it."""
+        self.refused = self.deaths = 0
+        """Pictures that it read and could not decode; that ended it."""
         self._reported, self._t_reported = 0, -float("inf")
 
     @property
@@ -177,6 +177,7 @@ class Decoding:
                 self._running.close()
                 self._running, became = None, DIED
                 self._wait_to_start()
+            self.refused += became == REFUSED
             self.deaths += became == DIED
             if self._running is None or became != DECODED:
                 return None

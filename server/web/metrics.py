@@ -11,6 +11,7 @@ from prometheus_client.core import CounterMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from pipeline.signals import Mode
+from server.media.decoding import Decoding
 from server.protocol.messages import Estimate, Status
 from server.web.session_manager import SessionManager
 from server.web.status import build
@@ -26,7 +27,7 @@ def exposition(manager: SessionManager) -> bytes:
         "lightleash_stream_age_seconds", "of the newest item", ["stream"], registry=registry
     )
     rate = Gauge("lightleash_stream_rate_hertz", "items a second", ["stream"], registry=registry)
-    registry.register(_Totals(status))
+    registry.register(_Totals(status, manager.decoding))
     for name, stream in status.streams.items():
         if stream.age_ms is not None:
             age.labels(name).set(1e-3 * stream.age_ms)
@@ -56,6 +57,7 @@ class _Totals(Collector):
     """What others have counted since they started; control's begin again with it."""
 
     status: Status
+    decoding: Decoding | None
 
     def collect(self) -> Iterable[Metric]:
         """Each as a counter."""
@@ -72,6 +74,15 @@ class _Totals(Collector):
             for fate in ("fused", "dropped", "late"):
                 pictures.add_metric([fate], getattr(estimate, fate))
             yield pictures
+        if self.decoding is not None:
+            undecodable = CounterMetricFamily(
+                "lightleash_undecodable_pictures",
+                "that their decoder refused, that ended it",
+                labels=["fate"],
+            )
+            undecodable.add_metric(["refused"], self.decoding.refused)
+            undecodable.add_metric(["ended it"], self.decoding.deaths)
+            yield undecodable
 
 
 def _estimate(estimate: Estimate, status: Status, registry: CollectorRegistry) -> None:

@@ -77,7 +77,7 @@ class SessionManager:
         """
         self.distance_m = distance_m
         self.robot, self.recordings, self.screen = robot, recordings, screen
-        self._cameras, self._profiles, self._decoding = cameras, profiles, decoding
+        self._cameras, self._profiles, self.decoding = cameras, profiles, decoding
         self.paths = Transports(lambda data: recordings.record("server", data, now()))
         self._calibration = CalibrationControl(self.paths.send)
         self._control = server_end(runtime)
@@ -217,7 +217,7 @@ class SessionManager:
             on_taken=partial(soon, self.paths.taken),
             on_key_wanted=partial(soon, self.paths.want_key),
             profiles=self._profiles,
-            make_decoder=self._decoding.open if self._decoding is not None else Decoder,
+            make_decoder=self.decoding.open if self.decoding is not None else Decoder,
             screen=self.screen,
         )
         self.paths.begin(page)
@@ -343,7 +343,7 @@ class SessionManager:
         self.tally.see(status)
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
             self.log_event(paused)
-        if self._decoding is not None and (ended := self._decoding.news(now())):
+        if self.decoding is not None and (ended := self.decoding.news(now())):
             self.log_event(ended)
         count, gone = self.recordings.folder.removed()
         if gone:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
+import signal
 from pathlib import Path
 
 import pytest
@@ -10,11 +13,13 @@ import yaml
 from msgspec.structs import replace
 from prometheus_client.parser import text_string_to_metric_families
 
+from hardware.codec import DecodeError
 from pipeline.signals import Mode
 from server import __version__
 from server.common.clock import now
 from server.diagnostics.pauses import Stall
 from server.diagnostics.tally import Tally
+from server.media.decoding import Decoding
 from server.protocol.messages import Stream
 from server.web.metrics import exposition
 from server.web.status import build
@@ -63,6 +68,21 @@ def test_lateness_ages_and_the_error_are_told_in_si_units(manager):
     assert found["lightleash_stream_rate_hertz", "body_imu"] == 200.0
     assert 0.0 < found["lightleash_stream_age_seconds", "body_imu"] < 1.0
     assert found["lightleash_stream_dropped_total", "control"] == 4.0
+
+
+def test_pictures_that_could_not_be_decoded_are_counted_by_what_became_of_them(manager):
+    assert not any(name.startswith("lightleash_undecodable") for name, *_ in samples(manager))
+    with contextlib.closing(Decoding(clock=lambda: 0.0)) as manager.decoding:
+        there = manager.decoding.open("jpeg", 640, 360)
+        for data in (b"no picture", b"neither"):
+            with pytest.raises(DecodeError):
+                there.decode(data)
+        os.killpg(manager.decoding.pid, signal.SIGKILL)
+        with pytest.raises(DecodeError):
+            there.decode(b"never read")
+        found = samples(manager)
+    assert found["lightleash_undecodable_pictures_total", "refused"] == 2.0
+    assert found["lightleash_undecodable_pictures_total", "ended it"] == 1.0
 
 
 def test_what_a_server_saw_is_counted_and_latencies_are_kept_while_pictures_come(manager):
