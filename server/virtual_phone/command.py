@@ -131,7 +131,8 @@ def _rate(text: str) -> float:
     return rate
 
 
-def _parser() -> argparse.ArgumentParser:
+def make_parser() -> argparse.ArgumentParser:
+    """Its command line."""
     parser = Parser(prog="lightleash phone", description=__doc__)
     add_access_arguments(parser)
     parser.add_argument("--hand", default="demo", help=f"{', '.join(HANDS)}, or a CSV file")
@@ -159,7 +160,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _client_of(arguments: argparse.Namespace) -> MakeClient:
+def client_of(arguments: argparse.Namespace) -> MakeClient:
     """The page's way to the server.
 
     Raises:
@@ -174,12 +175,13 @@ def _client_of(arguments: argparse.Namespace) -> MakeClient:
     return partial(RtcPhoneClient, codec=arguments.codec, dated_by=arguments.dated_by)
 
 
-async def _play(arguments: argparse.Namespace) -> LivePhone:
+async def play(arguments: argparse.Namespace, make_client: MakeClient) -> LivePhone:
+    """Lead until told to leave, or for as long as asked."""
     access = access_of(arguments)
     port = access.truth_port if arguments.truth_port is None else arguments.truth_port
     robot_file = load_robot(arguments.robot or access.robot, takes=COMMANDS)
     script = make_script(arguments, robot_file, port)
-    live = LivePhone(access, script, port, robot_file.robot.axes, _client_of(arguments))
+    live = LivePhone(access, script, port, robot_file.robot.axes, make_client)
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, live.leave)
     await live.run(arguments.seconds, _show)
@@ -188,11 +190,11 @@ async def _play(arguments: argparse.Namespace) -> LivePhone:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command; gives the exit status."""
-    arguments = _parser().parse_args(argv)
+    arguments = make_parser().parse_args(argv)
     set_oom_score(FIRST_TO_GO)
     raise_niceness(0)  # the server, whose button may have started it, goes before
     try:
-        live = asyncio.run(_play(arguments))
+        live = asyncio.run(play(arguments, client_of(arguments)))
     except (PhoneClientError, FollowerError, ValueError, OSError) as error:
         sys.stderr.write(f"lightleash phone: {error}\n")
         return 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import random
 import re
@@ -19,8 +20,7 @@ from pathlib import Path
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
-from server.protocol.wire import VERSION, encode
-from server.protocol.wire_records import Codec, Picture, Record
+from server.protocol.wire import VERSION
 
 HOST = "127.0.0.1"
 STRANGERS = [f"127.0.0.{n}" for n in range(2, 22)]
@@ -29,13 +29,6 @@ MEMBER = "127.0.0.90"
 """One that somebody who was let in has."""
 DATAGRAMS_HZ = 2_000.0
 """To each port: what a flood costs is the machine's, which attacker and server share here."""
-JPEG_BOMB = (
-    b"\xff\xd8\xff\xc0" + struct.pack(">HBHHB", 17, 8, 30_000, 30_000, 3)
-    + b"\x01\x22\x00\x02\x11\x01\x03\x11\x01" + bytes(300)
-)  # fmt: skip
-H264_BOMB = (
-    b"\0\0\0\1\x67\x64\x00\x34\xac\x2b\x40\x20\x00\x20\x00" + b"\0\0\0\1\x65" + bytes(40_000)
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,43 +250,32 @@ def flood_datagrams(target: Target, over: threading.Event, tally: Tally) -> None
                 tally.add("datagrams", int(0.01 * DATAGRAMS_HZ))
 
 
-def bombs(target: Target, over: threading.Event, tally: Tally) -> None:
-    """Another paired phone sends pictures that are far larger than they say, by both sockets."""
+def second_phones(target: Target, over: threading.Event, tally: Tally) -> None:
+    """Another paired phone wants to lead, again and again; it never comes so far as a picture."""
     headers = {"Authorization": f"Bearer {target.operator_token}"}
-    hello = f'{{"type":"hello","version":{VERSION},"role":"operator","device":"bomber"}}'
-    pictures = [Picture(Codec.JPEG, True, 640, 480, 0, JPEG_BOMB),
-                Picture(Codec.H264, True, 640, 480, 0, H264_BOMB)]  # fmt: skip
+    hello = f'{{"type":"hello","version":{VERSION},"role":"operator","device":"second"}}'
     while not over.wait(0.3):
-        for path in ("/ws/phone", "/ws/video"):
-            with contextlib.suppress(OSError, TimeoutError, WebSocketException):
-                url = f"ws://{HOST}:{target.http}{path}"
-                with connect(url, additional_headers=headers, proxy=None, open_timeout=2) as page:
-                    page.send(hello)
-                    for n, picture in enumerate(pictures):
-                        page.send(encode(Record(n + 1, int(1e6 * time.monotonic()), picture)))
-                        tally.add("bombs")
-                    page.recv(timeout=0.2)
+        with contextlib.suppress(OSError, TimeoutError, WebSocketException):
+            url = f"ws://{HOST}:{target.http}/ws/phone"
+            with connect(url, additional_headers=headers, proxy=None, open_timeout=2) as page:
+                page.send(hello)
+                said = json.loads(page.recv(timeout=0.5))
+                tally.add("second phones turned away" if said["type"] == "refused" else "LET IN")
 
 
-def hostile_sdp(target: Target, over: threading.Event, tally: Tally) -> None:
-    """A paired page's answers that are none."""
+def stray_answers(target: Target, over: threading.Event, tally: Tally) -> None:
+    """A paired page answers offers that nobody made."""
     rng = random.Random(3)
-    texts = [
-        "v=0\\r\\n" + "a=x\\r\\n" * 300,
-        "x" * 16_000,
-        "v=0\\r\\nm=audio 9 x 0\\r\\n",
-        "[" * 9_000,
-    ]
     while not over.wait(0.1):
-        body = f'{{"id": "{rng.random()}", "sdp": "{rng.choice(texts)}"}}'.encode()
+        body = f'{{"id": "{rng.random()}", "sdp": "v=0"}}'.encode()
         head = (
             f"POST /api/rtc/answer HTTP/1.1\r\nHost: {HOST}\r\nConnection: close\r\n"
             f"Authorization: Bearer {target.operator_token}\r\nContent-Length: {len(body)}\r\n\r\n"
         )
         with contextlib.suppress(OSError), open_from(HOST, target.http) as one:
             one.sendall(head.encode() + body)
-            one.recv(4_096)
-            tally.add("hostile SDP")
+            refused = b" 404 " in one.recv(4_096)
+            tally.add("stray answers refused" if refused else "STRAY ANSWERS TAKEN")
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""The attack bench, briefly and without a flight: everybody who may is answered, memory stays."""
+"""The attack bench, briefly and without a judged flight: who may is answered, memory stays."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ pytestmark = pytest.mark.e2e
 
 
 def test_under_attack_phone_and_supervisor_are_answered_stop_works_and_memory_and_log_stay_small():
-    outcome = run(4.0, 0.3, flies=False)
-    *goals, _led, _error = outcome.goals()
+    outcome = run(6.0, 0.3, flies=False, path="websocket")
+    *goals, _missed, _led, _error = outcome.goals()
     assert [words for met, words in goals if not met] == []
     assert outcome.tally["silent sockets"] == 600
+    assert outcome.did["answers: 400 sdp.candidate"] >= 1
+    assert outcome.done("bombs") >= 5, "each kind at least once"

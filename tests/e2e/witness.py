@@ -5,7 +5,8 @@ It also judges its own rate as control judges its own: many holes, each short, a
 and reads what a virtual machine's host took from each processor, which who sleeps does not feel.
 One like everybody else: what it misses though it asks for next to nothing, others took.
 
-    python -m tests.e2e.witness machine|others    # prints "where end [s] length [s]" of each hole
+    python -m tests.e2e.witness machine|others [0.02]    # "where end [s] length [s]" of each hole
+                                                         # that is longer
 """
 
 from __future__ import annotations
@@ -58,10 +59,10 @@ class Hole:
 class Witness:
     """The two processes; they end with `close`, or when this one does."""
 
-    def __init__(self) -> None:
-        """Started, and ticking."""
+    def __init__(self, noted_s: float = NOTED_S) -> None:
+        """Started, and ticking; no shorter hole is noted."""
         self._holes: list[Hole] = []
-        self._processes = [_start(where) for where in WAYS]
+        self._processes = [_start(where, noted_s) for where in WAYS]
         self._threads = [
             threading.Thread(target=self._read, args=(process.stdout,), daemon=True)
             for process in self._processes
@@ -74,7 +75,7 @@ class Witness:
             where, t, s = line.split()
             self._holes.append(Hole(where, float(t), float(s)))
 
-    def holes(self, since: float = 0.0, longer_s: float = NOTED_S) -> list[Hole]:
+    def holes(self, since: float = 0.0, longer_s: float = 0.0) -> list[Hole]:
         """Those that ended after `since` [s, monotonic]."""
         return [hole for hole in self._holes if hole.t >= since and hole.s >= longer_s]
 
@@ -96,8 +97,8 @@ def longest(holes: Iterable[Hole], where: str) -> float:
     return max((hole.s for hole in holes if hole.where == where), default=0.0)
 
 
-def _start(where: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "tests.e2e.witness", where]
+def _start(where: str, noted_s: float) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "tests.e2e.witness", where, str(noted_s)]
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
     )
@@ -106,11 +107,13 @@ def _start(where: str) -> subprocess.Popen[str]:
     return process
 
 
-def holes_of(where: str, steps: Iterable[tuple[float, float]]) -> Iterator[Hole]:
+def holes_of(
+    where: str, steps: Iterable[tuple[float, float]], noted_s: float = NOTED_S
+) -> Iterator[Hole]:
     """Holes of a ticker, by the time of each tick and the time since the one before it [s]."""
     rate = TickRate(PERIOD_S, longest_s=OVER_S)
     for now, step in steps:
-        if step - PERIOD_S > NOTED_S:
+        if step - PERIOD_S > noted_s:
             yield Hole(where, now, step - PERIOD_S)
         if rate.complaint(step) and where == "machine":
             yield Hole("slow", now, OVER_S)
@@ -179,7 +182,7 @@ def main() -> None:
         threading.Thread(target=_look, daemon=True).start()
     threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
     print("ticking", flush=True)
-    _say(holes_of(where, _ticks()))
+    _say(holes_of(where, _ticks(), float(sys.argv[2]) if len(sys.argv) > 2 else NOTED_S))
 
 
 if __name__ == "__main__":
