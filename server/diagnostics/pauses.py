@@ -58,11 +58,15 @@ class LoopWatch:
         """In the window, each shorter than the one before."""
         self.armed = Stall()
         """The longest while a robot was armed, the last time it was."""
+        self.recent, self.t_recent = Stall(), 0.0
+        """The longest since whoever asks last set this back; its end [s]."""
 
     def add_stall(self, t: float, stall: Stall, armed: bool) -> None:
         """A tick at `t` [s] was late."""
         if armed and stall.late_s > self.armed.late_s:
             self.armed = stall
+        if stall.late_s > self.recent.late_s:
+            self.recent, self.t_recent = stall, t
         while self._worst and self._worst[-1][1].late_s <= stall.late_s:
             self._worst.pop()
         self._worst.append((t, stall))
@@ -124,6 +128,7 @@ class Pauses:
             self._said = Stall()
         self._is_armed = self.garbage.counts = armed
         self.garbage.tick(idle and not armed)
+        self.loop.recent = Stall()
         return self._words() if armed else ""
 
     def _words(self) -> str:
@@ -137,12 +142,16 @@ class Pauses:
 
     def figures(self) -> dict[str, float]:
         """Figures for a status [ms]."""
-        lately, armed = self.loop.lately(self._clock()), self.loop.armed
+        lately, armed, recent = self.loop.lately(self._clock()), self.loop.armed, self.loop.recent
         return {
             "stall_ms": round(1e3 * lately.late_s, 1),
             "armed_stall_ms": round(1e3 * armed.late_s, 1),
             "armed_stall_cpu_ms": round(1e3 * armed.cpu_s, 1),
             "armed_stall_waited_ms": round(1e3 * armed.waited_s, 1),
+            "recent_stall_ms": round(1e3 * recent.late_s, 1),
+            "recent_stall_cpu_ms": round(1e3 * recent.cpu_s, 1),
+            "recent_stall_waited_ms": round(1e3 * recent.waited_s, 1),
+            "recent_stall_until_ms": round(1e3 * self.loop.t_recent, 1),
             "gc_ms": round(1e3 * self.garbage.longest_s, 2),
             "gc_full": float(self.garbage.count),
         }

@@ -237,8 +237,10 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     server: dict[str, float] = {}
     """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
     while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a
-    processor for armed_stall_waited_ms; garbage collections while it was armed: processor time of
-    the longest, gc_ms, and number of full ones, gc_full."""
+    processor for armed_stall_waited_ms; recent_stall_ms, since the status before, so that none is
+    hidden by a longer one, recent_stall_cpu_ms of it at work, recent_stall_waited_ms without a
+    processor, until recent_stall_until_ms of the clock of time_ms; garbage collections while it was
+    armed: processor time of the longest, gc_ms, and number of full ones, gc_full."""
     people: list[Person] = []
     """Who is paired, in the order they came."""
     leading: LeadingStatus | None = None

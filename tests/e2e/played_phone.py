@@ -19,7 +19,7 @@ from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd, exp, log
 from tests.e2e.page_scripts import BE_CAMERA, TICKER
-from tests.e2e.witness import Hole, Witness
+from tests.e2e.witness import PERIOD_S, Hole, Witness
 
 STEP_S = 0.01
 """The hand is told so often, to the page where that manages."""
@@ -114,7 +114,7 @@ class PlayedPhone(ABC):
         self._felt = Felt(hand, R_cd(screen_angle_deg).T)
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
-        self._witness = Witness()
+        self._witness = Witness(PERIOD_S)
         self._still: list[Hole] = []
         """When what is played stood still, as no phone's hardware does."""
         ReferenceTrajectory.warm_up()

@@ -55,6 +55,28 @@ def test_what_keeps_the_loop_is_measured_with_its_processor_time() -> None:
     assert figures["armed_stall_waited_ms"] == pytest.approx(51.2, abs=0.1)
 
 
+def test_each_status_tells_of_the_longest_stall_since_the_one_before() -> None:
+    clock = Clock()
+    pauses = Pauses(clock, lambda: 0.0, lambda: 0.0)
+
+    def told(*stalls: float) -> list[float]:
+        """In a status, which is made before the tick; a second look changes nothing."""
+        for seconds in stalls:
+            clock.t += 0.01
+            pauses.loop.add_stall(
+                clock(), Stall(seconds, 0.5 * seconds, 0.25 * seconds), armed=True
+            )
+        figures = pauses.figures()
+        assert pauses.figures() == figures
+        pauses.tick(armed=True, idle=False)
+        return [value for name, value in figures.items() if name.startswith("recent_stall")]
+
+    assert told(0.3, 0.01) == [300.0, 150.0, 75.0, 100_010.0]
+    assert told(0.03, 0.04, 0.02) == [40.0, 20.0, 10.0, 100_040.0]
+    assert told()[:3] == [0.0, 0.0, 0.0]
+    assert pauses.figures()["armed_stall_ms"] == 40.0
+
+
 def test_waiting_for_a_processor_is_counted_where_the_system_tells() -> None:
     with closing(RunQueue()) as waited:
         assert 0.0 <= waited() <= waited() < 1e6
