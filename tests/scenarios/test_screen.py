@@ -48,7 +48,7 @@ def test_a_phone_that_nobody_calibrated_leads_with_the_lens_that_the_screen_meas
     camera = uncalibrated(0.70, 0.02)
     scene = SimulationOptions(hand="moving", seed=1000, camera=camera, knows_camera=False)
     simulation = ScreenSimulation(SCREEN, CONFIG, scene, Display())
-    figures = result_of(simulation.run(9.0), simulation.scene, 0.0)
+    figures = result_of(simulation.run(11.0), simulation.scene, 0.0)
     assert figures.tracked_s > 2.0
     assert not figures.ended
     assert figures.rms_mm < 8.0
