@@ -7,7 +7,7 @@ magnetometer does, comes in steps of 0.1°, and would cost centimetres: it is no
 
 from __future__ import annotations
 
-from math import inf, sqrt, tanh
+from math import inf, radians, sqrt, tanh
 
 import numpy as np
 
@@ -23,6 +23,9 @@ BIAS_GAIN = 0.01
 HAND_VARIANCE = 0.005
 """Density of the tilt that a hand's acceleration adds to gravity [rad² s]: 1.5 m/s² for 0.2 s. A
 gain g [1/s] is that of a Kalman filter whose tilt has the variance g `HAND_VARIANCE`."""
+MISSED, MISSED_S = radians(15.0), 0.5
+"""The accelerometer's vertical so far beside, averaged over so long [s], is no hand's acceleration:
+the gyroscope missed a turn. By `GAIN` alone a tilt of 33° would stay for half a minute."""
 SAMPLE_S = 0.02
 """What one sample of the accelerometer counts for after a gap."""
 LOST_S = 3.0
@@ -43,6 +46,8 @@ class Attitude:
         self._t = self._t_start = -np.inf
         self._is_lost = False
         self._turn: Array = np.eye(3)
+        self._off_in_f = np.zeros(3)
+        """By how much the accelerometer's vertical is beside, on average; sine of the angle."""
         self.resets = 0
 
     @property
@@ -114,11 +119,20 @@ class Attitude:
         if 0.7 * GRAVITY < norm < 1.3 * GRAVITY:
             h = dt if dt <= MAX_GAP_S else SAMPLE_S
             tilt = cross(force / norm, R_fc[2])
+            self._watch(R_fc @ tilt, h)
             gain = max(GAIN, 1.0 / (imu.t - self._t_start + h))
             turn = exp(min(1.0, gain * h) * (R_fc @ tilt))
             R_fc, self._turn = turn @ R_fc, turn @ self._turn
             self._bias = self._bias - BIAS_GAIN * h * tilt
         self._R_fc = R_fc
+
+    def _watch(self, off_in_f: Array, h: float) -> None:
+        """Doubt the tilt if the accelerometer has denied it for long enough."""
+        self._off_in_f = self._off_in_f + min(1.0, h / MISSED_S) * (off_in_f - self._off_in_f)
+        off2 = float(self._off_in_f @ self._off_in_f)
+        if off2 > max(MISSED, self.sigma) ** 2:
+            self._set_variance(off2)
+            self._off_in_f = np.zeros(3)
 
     def _bridge(self, dt: float) -> float:
         """Grow the variance by a gap of `dt` [s]; gives how far the mean rate of its ends counts.
@@ -140,3 +154,4 @@ class Attitude:
         self.resets += self._R_fc is not None
         self._R_fc = R_fc_level_from_specific_force(R_fc @ force_in_c) @ R_fc
         self._t_start, self._is_lost = t, False
+        self._off_in_f = np.zeros(3)

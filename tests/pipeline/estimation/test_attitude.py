@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hardware.sim.hand import make_hand
 from pipeline.estimation.attitude import HAND_RATE, HAND_RATE_S, LOST_S, Attitude
 from pipeline.frames import GRAVITY, exp, log, rotation_about_z
 from pipeline.signals import PhoneImu
@@ -172,3 +173,24 @@ def test_who_knows_better_after_a_gap_is_believed_as_far_as_he_knows() -> None:
     np.testing.assert_array_equal(attitude.R_fc, R_fc)
     assert attitude.sigma == pytest.approx(before)
     np.testing.assert_array_equal(attitude.take_turn(), np.eye(3))
+
+
+@pytest.mark.parametrize("turn_deg", [20.0, 33.0, 120.0])
+def test_a_turn_that_the_gyroscope_missed_is_found_by_the_accelerometer(turn_deg: float) -> None:
+    attitude = rested(5.0)
+    turned = exp(np.array([np.deg2rad(turn_deg), 0.0, 0.0]))
+    for k in range(1, round(2.0 / DT)):
+        attitude.add(sample(5.0 + k * DT, turned, np.zeros(3)))
+    assert attitude.up_in_c is not None
+    assert np.rad2deg(np.linalg.norm(attitude.up_in_c - turned.T @ UP)) < 3.0
+
+
+@pytest.mark.parametrize("kind", ["walking", "shaken", "put_down", "restless", "trembling_6_hz"])
+def test_no_hand_is_taken_for_a_turn_that_was_missed(kind: str) -> None:
+    hand, attitude = make_hand(kind, seed=4), Attitude()
+    sigmas = []
+    for k in range(round(40.0 / DT)):
+        t = k * DT
+        attitude.add(PhoneImu(t, hand.omega_in_c(t), hand.specific_force_in_c(t)))
+        sigmas.append(attitude.sigma)
+    assert np.max(sigmas[round(10.0 / DT) :]) == pytest.approx(sigmas[-1])  # never anew
