@@ -30,6 +30,7 @@ export class Alarm {
   take(mode, name, flies, now) {
     const isAlarm = ALARMS.includes(mode) || (flies && DEAF.includes(mode));
     this.document.title = `${isAlarm ? '⚠ ' : ''}${name} · Lightleash`;
-    this.lasting.take(isAlarm ? mode : null, now);
+    if (isAlarm) this.lasting.take(mode, now);
+    else this.lasting.over();
   }
 }

@@ -35,8 +35,13 @@ export class Lasting {
     this.lastMs = now;
   }
 
+  /** It is over for good: what comes next is signalled at once, the same again, too. */
+  over() {
+    this.last = null;
+  }
+
   /**
-   * @param {Signal | null} signal What goes on; null: nothing does.
+   * @param {Signal | null} signal What goes on; null: nothing does for the moment.
    * @param {number} now
    */
   take(signal, now) {

@@ -33,6 +33,10 @@ test('a fault that is over is silent, and sounds at once when it comes back', ()
   assert.equal(title, 'TRACK · Lightleash');
 });
 
+test('one that comes back within the time between two sounds is heard at once, too', () => {
+  assert.deepEqual(heard([['RAMP', 0], ['TRACK', 100], ['RAMP', 400]]).signals, ['RAMP', 'RAMP']);
+});
+
 test('a server that falls silent is an alarm while a robot is in the air, and none of a page left open', () => {
   assert.deepEqual(heard([['NO_WORD', 0], ['NO_LINK', 100]]).signals, []);
   assert.deepEqual(heard([['NO_WORD', 0], ['NO_LINK', 100]], true).signals, ['NO_WORD', 'NO_LINK']);
