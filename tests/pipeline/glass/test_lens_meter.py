@@ -76,3 +76,16 @@ def test_neighbours_and_halves_of_the_glass_do_not_count():
         meter.add_corners(GlassCorners(1.0 + k, np.arange(8), pixels[:8]))
     assert meter.lens is None
     assert len(meter._views) == 1
+
+
+def test_a_phone_that_is_not_tilted_costs_a_trial_now_and_then_only(monkeypatch):
+    trials = []
+    measured = LensMeter._measured
+
+    def counted(meter):
+        trials.append(meter)
+        return measured(meter)
+
+    monkeypatch.setattr(LensMeter, "_measured", counted)
+    filmed(SimpleLens(0.68), 0.0, hold_deg=0.2, views=VIEWS + 20)
+    assert len(trials) == 5
