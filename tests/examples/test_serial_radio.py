@@ -1,4 +1,4 @@
-"""`examples/serial_radio`, as somebody else's package: found by its name, and a follower."""
+"""`examples/serial_radio`, as somebody else's package: found by its name, with either contract."""
 
 import os
 import select
@@ -8,15 +8,16 @@ from pathlib import Path
 import pytest
 
 from hardware.follower import FollowerError
-from hardware.link.registry import GROUP, link_kind
+from hardware.link.registry import GROUP, connect
 from hardware.link.robot_server import TICK_US
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from hardware.sim.simulated import SimulatedRobot, seeded_nonces
 from tests.hardware.follower_contract import FollowerContract
 from tests.hardware.rigs import KEY
+from tests.hardware.twist_follower_contract import TwistFollowerContract
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "serial_radio"
-AMES = load_robot("ames")
+AMES, TWISTER = load_robot("ames"), load_robot("twister", takes=COMMANDS)
 PEER = ("radio", 0)
 
 
@@ -33,18 +34,18 @@ def kind(tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text(f"[{GROUP}]\n{name} = {target}\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.syspath_prepend(str(FOLDER))
-    return link_kind(name)
+    return name
 
 
 class SerialRig:
     """A simulated robot at the other end of a real pseudo-terminal, in virtual time."""
 
-    def __init__(self, kind) -> None:
-        self.robot = SimulatedRobot(AMES, 0, 7, seeded_nonces(0), KEY)
-        self.f_max = AMES.robot.f_max
+    def __init__(self, kind, robot_file=AMES) -> None:
+        self.robot = SimulatedRobot(robot_file, 0, 7, seeded_nonces(0), KEY)
+        self.f_max = robot_file.robot.f_max
         self.radio, self.port = os.openpty()
         os.set_blocking(self.radio, False)
-        self.follower = kind.connect(AMES.reached(os.ttyname(self.port), 1), KEY, 1)
+        self.follower = connect(robot_file.reached(os.ttyname(self.port), 1, kind), KEY, 1)
         self.now_us, self.connected, self.heard = 0, True, b""
 
     def advance(self, dt: float) -> None:
@@ -82,6 +83,14 @@ class TestContract(FollowerContract):
         rig.close()
 
 
+class TestContractOfTwists(TwistFollowerContract):
+    @pytest.fixture
+    def rig(self, kind):
+        rig = SerialRig(kind, TWISTER)
+        yield rig
+        rig.close()
+
+
 def test_noise_on_the_line_is_dropped_and_counted(kind):
     rig = SerialRig(kind)
     rig.follower.receive()
@@ -94,7 +103,7 @@ def test_noise_on_the_line_is_dropped_and_counted(kind):
 
 def test_a_port_that_is_not_there_is_named(kind):
     with pytest.raises(FollowerError, match="/dev/no-such-port"):
-        kind.connect(AMES.reached("/dev/no-such-port", 1), KEY, 1)
+        connect(AMES.reached("/dev/no-such-port", 1, kind), KEY, 1)
 
 
 def test_it_is_as_short_as_an_example_should_be():

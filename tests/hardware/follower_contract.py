@@ -63,6 +63,15 @@ class FollowerContract:
             rig.advance(0.005)
         return samples
 
+    @staticmethod
+    def listen(rig: Rig, duration: float) -> list[BodySample]:
+        """Say nothing; take what comes as it comes: a serial line's buffer holds 4 KiB of it."""
+        samples: list[BodySample] = []
+        for _ in range(round(duration / 0.005)):
+            rig.advance(0.005)
+            samples += rig.follower.receive()
+        return samples
+
     def ready(self, rig: Rig) -> None:
         samples = self.fly(rig, 0.0, 0.7)
         assert samples[-1].state == FollowerState.IDLE
@@ -95,9 +104,10 @@ class FollowerContract:
 
     def test_stop_is_zero_at_once(self, rig: Rig) -> None:
         self.ready(rig)
-        self.fly(rig, 2.0, 0.2)
+        self.fly(rig, 2.0, 0.4)
         rig.follower.stop()
-        rig.advance(0.010)
+        # silence alone is answered by COAST, RAMP and REFUSING
+        assert FollowerState.IDLE in {s.state for s in self.listen(rig, 0.05)}
         samples = self.fly(rig, 0.0, 0.3)
         assert samples[-1].state == FollowerState.IDLE
         assert self.given(samples[-1]).max() < 1e-2

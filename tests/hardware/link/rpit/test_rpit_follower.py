@@ -52,6 +52,15 @@ class TestContract(FollowerContract):
         rig.advance(0.005)
         assert rig.follower.receive() == []
 
+    def test_stop_is_zero_at_once(self, rig) -> None:
+        """The same: what it did is told when it is asked again, so its model is looked at."""
+        self.ready(rig)
+        self.fly(rig, 2.0, 0.4)
+        rig.follower.stop()
+        rig.advance(0.010)
+        assert rig.robot.model.state == FollowerState.IDLE
+        assert rig.robot.set == [0.0] * 8
+
 
 def run(rig, command, ticks):
     samples = []
