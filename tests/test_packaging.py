@@ -1,14 +1,20 @@
 """The project as a package: its names, its lock files."""
 
 import importlib
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
+from textwrap import dedent
+from zipfile import ZipFile
 
 import pytest
 
 import server
+from hardware.contract import FollowerContract
 
 ROOT = Path(__file__).resolve().parents[1]
 LOCKS = sorted(ROOT.glob("requirements/*.txt"))
@@ -68,3 +74,64 @@ def test_locked_release_has_no_known_hole(path, name):
     locked = re.findall(rf"^{name}==([\d.]+)", path.read_text(), flags=re.MULTILINE)
     assert locked
     assert all(tuple(map(int, one.split("."))) >= SECURITY_FLOORS[name] for one in locked)
+
+
+RIG = """
+import hardware, site_of_it
+from hardware.robot_file import load_robot
+from hardware.sim.virtual_time_follower import VirtualTimeFollower
+
+assert hardware.__file__.startswith(site_of_it.PATH)
+
+
+class Rig:
+    def __init__(self):
+        self.follower = VirtualTimeFollower(load_robot("ames"))
+        self.advance = self.follower.advance
+
+    def cut_link(self):
+        self.follower.connected = False
+"""
+DEAF_TO_STOP = RIG + "\n\nVirtualTimeFollower.stop = lambda self: None\n"
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """What `pip install` of the project's wheel unpacks."""
+    made = tmp_path_factory.mktemp("wheel")
+    build = ("-m", "hatchling", "build", "-t", "wheel", "-d", str(made))
+    subprocess.run([sys.executable, *build], cwd=ROOT, check=True, capture_output=True)
+    (file,) = made.glob("*.whl")
+    with ZipFile(file) as packed:
+        packed.extractall(made / "site")
+    (made / "site" / "site_of_it.py").write_text(f"PATH = {str(made)!r}\n")
+    return made / "site"
+
+
+def said_of(wheel, folder, rig):
+    """What pytest says of the test that the documentation shows, in somebody else's project."""
+    text = (ROOT / "docs" / "your_robot.md").read_text()
+    (shown,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    (folder / "test_my_link.py").write_text(dedent(shown))
+    (folder / "my_robot.py").write_text(rig)
+    words = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error", str(folder))
+    found = {**os.environ, "PYTHONPATH": f"{wheel}{os.pathsep}{folder}"}
+    done = subprocess.run(
+        [sys.executable, *words], cwd=folder, env=found, capture_output=True, text=True, check=False
+    )
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_the_contract_of_links_comes_with_the_wheel_and_runs_as_documented(wheel, tmp_path):
+    laws = [name for name in vars(FollowerContract) if name.startswith("test_")]
+    passed = re.search(r"^(\d+) passed", said_of(wheel, tmp_path, RIG), flags=re.MULTILINE)
+    assert passed
+    assert int(passed[1]) > len(laws)  # one has several parameters
+
+
+@pytest.mark.slow
+def test_who_breaks_the_contract_is_told_what_was_there_instead(wheel, tmp_path):
+    said = said_of(wheel, tmp_path, DEAF_TO_STOP)
+    assert "1 failed" in said
+    assert "assert <FollowerState.IDLE: 0> in {<FollowerState." in said

@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
+from hardware.contract import FollowerContract
 from server.common.options import Parser
 from tests.e2e.robot_rig import (
     compiled_watchdog,
@@ -31,7 +32,6 @@ from tests.e2e.robot_rig import (
     watchdog_robot,
 )
 from tests.e2e.stranger import MOST_TICKS, TICK_S, ended, flooding, ticks_to_stop, what_it_got
-from tests.hardware.follower_contract import FollowerContract
 
 ROBOTS: Final = ("python", "c")
 

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from hardware.contract import FollowerContract
 from hardware.robot_file import load_robot
 from tests.counterparts.betaflight import Firmware, FirmwareFollower, NoFirmwareError
 from tests.counterparts.betaflight_flight import ratio_to_our_link
-from tests.hardware.follower_contract import FollowerContract
 
 pytestmark = pytest.mark.counterpart
 AMES = load_robot("ames")

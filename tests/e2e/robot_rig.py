@@ -30,7 +30,6 @@ class RealTimeRig:
     def __init__(self, process: subprocess.Popen[str], port: int, truth_port: int = 0) -> None:
         self.process, self.port, self.truth_port = process, port, truth_port
         self.follower = connect(port)
-        self.f_max = AMES.robot.f_max
         self._now = time.monotonic()
 
     def advance(self, dt: float) -> None:

@@ -12,10 +12,10 @@ from typing import Final
 
 import numpy as np
 
+from hardware.contract import FollowerContract, exchange
 from hardware.follower import BodySample, FollowerState, ThrustCommand
 from hardware.link.udp import UdpFollower
 from tests.e2e.robot_rig import RealTimeRig
-from tests.hardware.follower_contract import FollowerContract, exchange
 
 TICK_S: Final = 0.005
 """Of the robot."""

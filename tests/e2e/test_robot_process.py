@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hardware.contract import FollowerContract, exchange
 from hardware.follower import FollowerState, ThrustCommand
 from hardware.sim.truth import TruthClient
 from tests.e2e.robot_rig import AMES, ENVIRONMENT, connect, priority, simulated_robot
-from tests.hardware.follower_contract import FollowerContract, exchange
 
 pytestmark = pytest.mark.e2e
 TICK_US = 5_000

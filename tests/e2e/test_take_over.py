@@ -9,6 +9,7 @@ import signal
 
 import pytest
 
+from hardware.contract import FollowerContract
 from hardware.follower import FollowerState
 from tests.e2e.robot_rig import (
     AMES,
@@ -19,7 +20,6 @@ from tests.e2e.robot_rig import (
     watchdog_robot,
 )
 from tests.e2e.stranger import MOST_TICKS, ended, flooding, python, ticks_to_stop, what_it_got
-from tests.hardware.follower_contract import FollowerContract
 
 pytestmark = pytest.mark.e2e
 

@@ -4,10 +4,10 @@ import subprocess
 
 import pytest
 
+from hardware.contract import FollowerContract, exchange
 from hardware.follower import FollowerState, ThrustCommand
 from hardware.link.link_key import write_key
 from tests.e2e.robot_rig import KEY, compiled_watchdog, priority, watchdog_robot
-from tests.hardware.follower_contract import FollowerContract, exchange
 
 pytestmark = pytest.mark.e2e
 

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from hardware.contract import FollowerContract, TwistFollowerContract
 from hardware.follower import FollowerError
 from hardware.link.registry import GROUP, connect
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import COMMANDS, load_robot
 from hardware.sim.simulated import SimulatedRobot, seeded_nonces
-from tests.hardware.follower_contract import FollowerContract
 from tests.hardware.rigs import KEY
-from tests.hardware.twist_follower_contract import TwistFollowerContract
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "serial_radio"
 AMES, TWISTER = load_robot("ames"), load_robot("twister", takes=COMMANDS)
@@ -42,7 +41,6 @@ class SerialRig:
 
     def __init__(self, kind, robot_file=AMES) -> None:
         self.robot = SimulatedRobot(robot_file, 0, 7, seeded_nonces(0), KEY)
-        self.f_max = robot_file.robot.f_max
         self.radio, self.port = os.openpty()
         os.set_blocking(self.radio, False)
         self.follower = connect(robot_file.reached(os.ttyname(self.port), 1, kind), KEY, 1)

@@ -17,7 +17,6 @@ KEY = bytes(range(16))
 class LockstepRig:
     def __init__(self, robot_file: RobotFile) -> None:
         self.follower = VirtualTimeFollower(robot_file)
-        self.f_max = robot_file.robot.f_max
 
     def advance(self, dt: float) -> None:
         self.follower.advance(dt)
@@ -36,7 +35,6 @@ class LoopbackRig:
         self.socket.setblocking(False)
         self.now_us = 0
         self.connected = True
-        self.f_max = robot_file.robot.f_max
         self.follower = UdpFollower(  # type: ignore[call-arg]
             *self.socket.getsockname(),
             ControlEnd.of(robot_file, KEY, 1),

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hardware.contract import TwistFollowerContract, exchange
 from hardware.follower import FollowerError, Refusal, ThrustCommand, TwistCommand
 from hardware.link.datagram import (
     CommandDatagram,
@@ -21,9 +22,7 @@ from hardware.sim.plant.plant import PlantOptions
 from hardware.sim.plant.twist_plant import TwistPlant
 from hardware.sim.virtual_time_follower import KEY, VirtualTimeFollower
 from pipeline.frames import GRAVITY
-from tests.hardware.follower_contract import exchange
 from tests.hardware.rigs import LockstepRig, LoopbackRig
-from tests.hardware.twist_follower_contract import TwistFollowerContract
 
 TWISTER = load_robot("twister", takes=COMMANDS)
 DRIVE = TWISTER.robot.twist

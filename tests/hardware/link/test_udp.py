@@ -5,11 +5,11 @@ import socket
 import numpy as np
 import pytest
 
+from hardware.contract import FollowerContract, exchange
 from hardware.follower import FollowerError, FollowerState, ThrustCommand
 from hardware.link import udp
 from hardware.robot_file import load_robot
 from hardware.sim.simulated import SimulatedRobot, seeded_nonces
-from tests.hardware.follower_contract import FollowerContract, exchange
 from tests.hardware.rigs import KEY, LoopbackRig
 
 AMES = load_robot("ames")

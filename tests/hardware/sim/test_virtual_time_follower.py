@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from hardware.contract import FollowerContract, exchange
 from hardware.follower import FollowerState, ThrustCommand
 from hardware.robot_file import load_robot
 from hardware.sim.virtual_time_follower import VirtualTimeFollower
-from tests.hardware.follower_contract import FollowerContract, exchange
 from tests.hardware.rigs import LockstepRig
 
 AMES = load_robot("ames")

@@ -19,7 +19,7 @@ BOOT_ID = 4_503_599_627_370_497
 
 class RpitRig:
     def __init__(self, robot_file: RobotFile, seed: int = 0, host: str = LOCALHOST) -> None:
-        self.robot_file, self.f_max = robot_file, robot_file.robot.f_max
+        self.robot_file = robot_file
         self.body = self.plant = Plant(robot_file.plant, np.random.default_rng(seed))
         self.now = 50.0
         """On the ground station's clock, which is another than the robot's [s]."""

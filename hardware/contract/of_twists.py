@@ -1,6 +1,7 @@
 """What every follower of a robot that takes a twist must do, beside what all must.
 
-A level of 1 is 0.1 m/s and 0.1 rad/s along and about x; its robot is `twister`, or as quick.
+A level of 1 is 0.1 m/s and 0.1 rad/s along and about x; its robot is that of
+`hardware/robots/twister.toml`, or as quick.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hardware.contract.of_all import FollowerContract, Rig
 from hardware.follower import (
     BodySample,
     FollowerError,
@@ -17,7 +19,6 @@ from hardware.follower import (
     TwistCommand,
 )
 from pipeline.frames import Array
-from tests.hardware.follower_contract import FollowerContract, Rig
 
 LEVEL = 0.1 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 SILENT_S = 0.17
@@ -27,10 +28,12 @@ SETTLE_S = 0.15
 
 
 class TwistFollowerContract(FollowerContract):
+    """Of a robot that takes a twist."""
+
     deaf = FollowerState.REFUSING
 
     @staticmethod
-    def command(rig: Rig, level: float) -> RobotCommand:
+    def command(rig: Rig, level: float) -> RobotCommand:  # noqa: ARG004 (as of thrusts)
         return TwistCommand(level * LEVEL, armed=level > 0.0)
 
     @staticmethod
@@ -40,9 +43,7 @@ class TwistFollowerContract(FollowerContract):
         assert sample.twist_in_b[[1, 2, 4, 5]] == pytest.approx(0.0, abs=1e-9)
         return sample.twist_in_b[[0, 3]] / 0.1
 
-    def test_silence_brakes_to_zero_in_time_then_refuses_until_a_new_handshake(
-        self, rig: Rig
-    ) -> None:
+    def test_silence_ends_in_zero_that_only_a_new_handshake_ends(self, rig: Rig) -> None:
         self.ready(rig)
         self.fly(rig, 4.0, 0.5)
         rig.follower.receive()
@@ -53,8 +54,6 @@ class TwistFollowerContract(FollowerContract):
         assert rig.follower.receive()[-1].state == FollowerState.REFUSING
         assert self.given(self.fly(rig, 2.0, 0.5)[-1]).max() < 1e-6
         self.ready(rig)
-
-    test_silence_ramps_to_zero_then_refuses_until_a_new_handshake = None
 
     def test_a_silence_of_a_tenth_of_a_second_is_coasted_through(self, rig: Rig) -> None:
         self.ready(rig)

@@ -1,7 +1,4 @@
-"""What every follower must do: inherit `FollowerContract` and give it a rig.
-
-One whose robot takes a twist inherits `TwistFollowerContract` of `twist_follower_contract.py`.
-"""
+"""What every follower must do; those that keep it, and how, stand in `tests/`."""
 
 from __future__ import annotations
 
@@ -26,11 +23,12 @@ class Rig(Protocol):
     """A follower with its robot, and time that passes when told."""
 
     follower: Follower
-    f_max: float
 
-    def advance(self, dt: float) -> None: ...
+    def advance(self, dt: float) -> None:
+        """Let both live on for `dt` [s], a multiple of 5 ms; the follower's own clock, too."""
 
-    def cut_link(self) -> None: ...
+    def cut_link(self) -> None:
+        """From now on nothing comes through, either way."""
 
 
 def exchange(follower: Follower, command: RobotCommand) -> list[BodySample]:
@@ -40,11 +38,14 @@ def exchange(follower: Follower, command: RobotCommand) -> list[BodySample]:
 
 
 class FollowerContract:
+    """Of a robot that takes thrusts, with at least 2 N each."""
+
     deaf = FollowerState.RAMP
     """Of a robot that has taken nothing for 0.4 s, after thrust."""
 
     @pytest.fixture
     def rig(self) -> Rig:
+        """A new robot that has heard nothing, and its follower: to be given."""
         raise NotImplementedError
 
     @staticmethod
@@ -112,7 +113,7 @@ class FollowerContract:
         assert samples[-1].state == FollowerState.IDLE
         assert self.given(samples[-1]).max() < 1e-2
 
-    def test_silence_ramps_to_zero_then_refuses_until_a_new_handshake(self, rig: Rig) -> None:
+    def test_silence_ends_in_zero_that_only_a_new_handshake_ends(self, rig: Rig) -> None:
         self.ready(rig)
         self.fly(rig, 2.0, 0.2)
         rig.advance(0.450)
