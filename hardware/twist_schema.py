@@ -20,8 +20,10 @@ from hardware.robot_schema import (
 from pipeline.control.twist_margins import LEAST_PHASE_RAD
 from pipeline.robot import TwistDrive
 
+TOLD_ZERO_S = 0.17
+"""After its last command a robot in silence has been told to stand still."""
 LONGEST_STOP_S = 0.11
-"""A robot in silence brakes from 60 ms on, and has been told to stand still within 0.17 s."""
+"""The braking itself; by our own link it begins 60 ms after the last command."""
 
 
 class TwistSection(Section):

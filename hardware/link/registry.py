@@ -12,8 +12,9 @@ from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 
 from hardware.follower import Follower, FollowerError
-from hardware.link import udp
+from hardware.link import robot_end, udp
 from hardware.link.rpit import rpit_follower
+from hardware.link.silence import SilenceTimes
 from hardware.robot_file import COMMANDS, RobotFile
 
 GROUP = "lightleash.followers"
@@ -36,6 +37,8 @@ class LinkKind:
     """Both ends share a key of `lightleash robot key`."""
     takes: tuple[str, ...] = ("thrusts",)
     """Which of `robot_file.COMMANDS` it can carry."""
+    silence: SilenceTimes = robot_end.SILENCE
+    """When the far end does so; of one that does not by itself, what `stopped_by` has to keep."""
 
 
 OWN = {

@@ -64,6 +64,7 @@ from hardware.link.datagram import (
     encode_sample,
     is_later,
 )
+from hardware.link.silence import SilenceTimes
 from hardware.robot_file import RobotFile
 from pipeline.config import HoldConfig
 from pipeline.frames import Array, Triple
@@ -77,6 +78,7 @@ SILENCE_US = 60_000
 RAMP_AFTER_US = 280_000
 BACK_UNTIL_US = 400_000
 """After the last command taken: a radio's short gap ends no flight, a dead process does."""
+SILENCE = SilenceTimes(SILENCE_US / 1e6, RAMP_AFTER_US / 1e6, BACK_UNTIL_US / 1e6)
 NONCES_KEPT = 32
 MAX_SAMPLE_S = 0.05
 """More than that between two samples is a hole, not a motion."""

@@ -8,7 +8,8 @@ from math import inf
 import numpy as np
 
 from hardware.follower import RobotCommand, ThrustCommand, TwistCommand
-from hardware.link.robot_end import SILENCE_US
+from hardware.link.robot_end import SILENCE
+from hardware.link.silence import SilenceTimes
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array, triple, wxyz_from_R
 from pipeline.prediction import Prediction
@@ -25,8 +26,8 @@ from server.protocol.lead_messages import Lead
 
 SERVER_SILENT_S = 0.5
 """Without word from the server for longer, arming is refused."""
-STOOD_STILL_S = 1e-6 * SILENCE_US
-"""Between two ticks: the robot has heard nothing for so long, and coasts."""
+STOOD_STILL_S = SILENCE.coasts_s
+"""Between two ticks, at most: after so long a robot behind our own link coasts."""
 TIME_DECIMALS, THRUST_DECIMALS = 6, 4
 """Of commands in recordings: 1 µs, 0.1 mN. All digits of a float would be three times as long."""
 
@@ -66,12 +67,17 @@ class Controller:
         unfit: str = "",
         too_late: TooLate = never_too_late,
         gains_weak: str = "",
+        silence: SilenceTimes = SILENCE,
     ) -> None:
         """Disarmed, until somebody asks.
 
         `unfit` says why this process may never arm, if so; `too_late` why not with pictures and
         body samples so old [s]; `gains_weak` what its gains lack, which refuses nothing.
+        `silence` is what the robot's kind of link states: a robot that bears less makes control's
+        own stall a shorter one, a patient one none longer.
         """
+        self._deaf_s = silence.coasts_s
+        self._stood_still_s = stood_still_s = min(STOOD_STILL_S, silence.coasts_s)
         self._gains_weak = gains_weak
         self._unfit, self._too_late = unfit, too_late
         self._picture_age, self._body_age = Mean(), Mean()
@@ -83,8 +89,8 @@ class Controller:
         self._t_tick, self._armed = np.inf, False
         self._longest_gap_s = config.failsafe.gap
         silent_s = config.failsafe.silent
-        self._gaps = GapLog({"phone": silent_s, "robot": STOOD_STILL_S, "server": STOOD_STILL_S})
-        self._rate = TickRate(PERIOD_S, STOOD_STILL_S)
+        self._gaps = GapLog({"phone": silent_s, "robot": self._deaf_s, "server": stood_still_s})
+        self._rate = TickRate(PERIOD_S, stood_still_s)
         self._body_samples: list[BodyRow] = []
         self._body_twists: list[BodyRow] = []
         self._commands: list[tuple[float, ...]] = []
@@ -133,7 +139,7 @@ class Controller:
                 requests=requests,
                 refusals=self._why_not(now, robot_reason),
                 fault=self._out_of_time(stall_s) or (robot_reason if self._armed else ""),
-                gap=_stood_still(stall_s, STOOD_STILL_S) or robot_gap,
+                gap=_stood_still(stall_s, self._stood_still_s) or robot_gap,
                 robot_left_s=robot_left_s,
             )
         )
@@ -191,10 +197,10 @@ class Controller:
 
     def _note_gaps(self, output: Output, stall_s: float, robot_gap: str) -> None:
         """Note whose silence it was: while control stood still, nobody else could be heard."""
-        ages, stalled = output.ages, stall_s > STOOD_STILL_S
+        ages, stalled = output.ages, stall_s > self._stood_still_s
         if not robot_gap:
             self._t_robot_gap = output.t
-        deaf_s = STOOD_STILL_S + PERIOD_S + output.t - self._t_robot_gap if robot_gap else 0.0
+        deaf_s = self._deaf_s + PERIOD_S + output.t - self._t_robot_gap if robot_gap else 0.0
         robot_s = max(ages.body_imu, deaf_s)
         silent_s = {
             "phone": 0.0 if stalled else max(ages.operator, ages.phone_imu),

@@ -180,12 +180,14 @@ def run(options: ControlOptions) -> None:
     )
     warm_up()
     granted = realtime.claim()
+    silence = link_kind(robot_file.link.kind).silence
     controller = Controller(
         robot_file.robot,
         config,
         unfit(robot_file, granted, real=options.real),
         too_late(robot_file, options.gains, config),
         weak_gains(options.robot, robot_file, options.gains, options.estimator),
+        silence,
     )
     epoch = next_epoch(options.epochs, unix_ms())
     follower = connect(robot_file, key, epoch)
@@ -194,7 +196,7 @@ def run(options: ControlOptions) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda n, _frame: stopping.append(n))
     try:
-        link = RobotLink(follower, robot_file.robot.blinking_leds)
+        link = RobotLink(follower, robot_file.robot.blinking_leds, silence)
         zero = zero_command(robot_file.robot)
         _loop(controller, follower, link, endpoint, granted, stopping, zero)
     finally:

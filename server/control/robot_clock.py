@@ -17,7 +17,8 @@ from hardware.follower import (
     Refusal,
 )
 from hardware.link.blink_datagram import LASTS_MS
-from hardware.link.robot_end import BACK_UNTIL_US, RAMP_AFTER_US, SILENCE_US
+from hardware.link.robot_end import SILENCE
+from hardware.link.silence import SilenceTimes
 from pipeline.signals import BodyImu
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, Input
@@ -52,17 +53,21 @@ class BodyClock:
 LINGER_S = 0.5
 """A robot that is no longer told to blink ends it by itself."""
 DEAF = "The robot hears nothing for the moment."
-SILENCE_S, RAMP_AFTER_S = 1e-6 * SILENCE_US, 1e-6 * RAMP_AFTER_US
-RAMP_BEGUN_S = 1e-6 * (BACK_UNTIL_US - RAMP_AFTER_US)
-"""A robot that has just begun to ramp takes commands back: so long it may say so."""
 
 
 class RobotLink:
     """The robot's samples on our clock, and what it says against flying."""
 
-    def __init__(self, follower: Follower, blinking_leds: int = 0) -> None:
-        """Begin with nothing received; none of a robot's LEDs blink that can't all be told to."""
-        self._follower = follower
+    def __init__(
+        self, follower: Follower, blinking_leds: int = 0, silence: SilenceTimes = SILENCE
+    ) -> None:
+        """Begin with nothing received; none of a robot's LEDs blink that can't all be told to.
+
+        `silence` is what its kind of link states.
+        """
+        self._follower, self._silence = follower, silence
+        self._ramp_begun_s = silence.back_s - silence.ramps_s
+        """A robot that has just begun to ramp takes commands back: so long it may say so."""
         self._book = book(blinking_leds) if blinking_leds else None
         self._clock = BodyClock()
         self._boot_id: int | None = None
@@ -106,9 +111,9 @@ class RobotLink:
     def _left(self, now: float) -> float:
         """A robot that we don't hear coasts, too: commands must echo its newest samples."""
         deaf_since = self._t_deaf
-        if now - self._t_sample > SILENCE_S:
+        if now - self._t_sample > self._silence.coasts_s:
             deaf_since = min(deaf_since, self._t_sample)
-        return max(0.0, deaf_since + RAMP_AFTER_S - now)
+        return max(0.0, deaf_since + self._silence.ramps_s - now)
 
     def _bear(self, last: BodySample, now: float) -> None:
         """A robot that coasts, or has only just begun to ramp, may come back."""
@@ -116,14 +121,14 @@ class RobotLink:
             self._t_ramp = np.inf
         elif not self._restarted:
             self._t_ramp = min(self._t_ramp, now)
-            if now - self._t_ramp < RAMP_BEGUN_S:
+            if now - self._t_ramp < self._ramp_begun_s:
                 self.reason, self.gap = "", DEAF
         if last.state == FollowerState.COAST:
             self.gap = DEAF
         if last.state not in (FollowerState.COAST, FollowerState.RAMP):
             self._t_deaf = np.inf
         else:
-            self._t_deaf = min(self._t_deaf, now - SILENCE_S)
+            self._t_deaf = min(self._t_deaf, now - self._silence.coasts_s)
 
     def _reason(self, last: BodySample) -> str:
         """A robot that restarts refuses what we go on sending: the restart is what went wrong."""

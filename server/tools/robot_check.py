@@ -18,9 +18,10 @@ from hardware.gain_check import BODIES, controlled, loop_of, report, worst_words
 from hardware.led_layout.margins import margins
 from hardware.led_layout.viewpoints import looks_about
 from hardware.link.registry import link_kind
-from hardware.link.robot_end import SILENCE_US
+from hardware.link.silence import SilenceTimes
 from hardware.robot_file import COMMANDS, RobotFile, load_robot
 from hardware.robot_schema import AXES
+from hardware.twist_schema import TOLD_ZERO_S
 from pipeline.config import TeleopConfig
 from pipeline.control.margins import Sensing, axis_margins
 from pipeline.control.robust_margins import worst_of
@@ -86,15 +87,20 @@ def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     yield from _link(robot_file, state)
 
 
+def _stops(drive: TwistDrive, silence: SilenceTimes) -> RobotFinding:
+    """When a robot that takes a twist has been told to stand still, by its kind of link."""
+    zeroed_s = round(silence.coasts_s + drive.stop_s, 3)
+    follows_s = drive.delay_s + drive.lag_s
+    said = f"told zero {zeroed_s:.2f} s after the last command, its lag of {follows_s:.2f} s beyond"
+    late = zeroed_s > TOLD_ZERO_S
+    return RobotFinding("stops", not late, said + f": {TOLD_ZERO_S} s at most" * late)
+
+
 def _twist(drive: TwistDrive) -> Iterator[RobotFinding]:
-    """How a robot that takes a twist moves, stops, and what its gains bear."""
+    """How a robot that takes a twist moves, and what its gains bear."""
     change = f"{drive.acceleration:.1f} m/s² and {degrees(drive.angular_acceleration):.0f}°/s²"
     said = f"{drive.speed:.2f} m/s and {degrees(drive.rate):.0f}°/s at most, by {change}"
     yield RobotFinding("twist", True, said)
-    zeroed_s = 1e-6 * SILENCE_US + drive.stop_s
-    follows_s = drive.delay_s + drive.lag_s
-    said = f"told zero {zeroed_s:.2f} s after the last command, its lag of {follows_s:.2f} s beyond"
-    yield RobotFinding("stops", True, said)
     phase = phase_left(drive, LATE.latency, LATE.body_age)
     delay_s = phase / max(drive.position_gain, drive.attitude_gain)
     usual = f"with pictures {1e3 * LATE.latency:.0f} ms old"
@@ -172,8 +178,11 @@ def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     lacks = "" if link.takes in kind.takes else f"; it carries {' or '.join(kind.takes)} alone"
     yield RobotFinding("link", not lacks, where + lacks)
     falls = never_upright(robot_file) or never_stops(robot_file)
-    stops = "the robot stops by itself" if kind.stops_in_silence else f"stops: {link.stopped_by}"
+    stops = f"the robot stops by itself, from {1e3 * kind.silence.coasts_s:.0f} ms on"
+    stops = stops if kind.stops_in_silence else f"stops: {link.stopped_by}"
     yield RobotFinding("in silence", not falls, falls or stops)
+    if robot_file.robot.twist is not None:
+        yield _stops(robot_file.robot.twist, kind.silence)
     if kind.keyed:
         has = key_file(state, name).exists()
         lacks = f"no key: `lightleash robot key {name}` (a simulated robot needs none)"

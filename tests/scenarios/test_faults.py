@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from hardware.follower import EXPLANATIONS, FollowerState, Refusal
+from hardware.link.robot_end import SILENCE
 from hardware.robot_file import load_robot
 from hardware.sim.virtual_time_follower import whole
 from pipeline.config import TeleopConfig
 from pipeline.signals import Mode
-from server.control.robot_clock import RAMP_BEGUN_S
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
 
 pytestmark = pytest.mark.slow
@@ -103,7 +103,8 @@ def test_a_robot_that_hears_nothing_ends_the_flight_with_its_reason_when_it_ramp
     loop._script.operator.leaving = True
     entered, _ = after(loop, 0.45)
     loop.follower.to_robot = whole
-    assert 0.28 + RAMP_BEGUN_S <= entered["RAMP"] <= 0.31 + RAMP_BEGUN_S
+    begun = SILENCE.back_s - SILENCE.ramps_s
+    assert 0.28 + begun <= entered["RAMP"] <= 0.31 + begun
     assert loop.trace.left == EXPLANATIONS[Refusal.SILENT]
     entered, thrust = after(loop, 5.0)
     assert "DISARMED" in entered

@@ -1,21 +1,25 @@
 """Links by name: our own, and those of other installed packages."""
 
+import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hardware.follower import FollowerError
 from hardware.link.registry import GROUP, OWN, link_kind
+from hardware.link.silence import SilenceTimes
 from hardware.robot_file import RobotFileError, load_robot, robot_of, robot_path, robot_table
 
 OTHERS = """
 from hardware.link.registry import LinkKind
+from hardware.link.silence import SilenceTimes
 
 def connect(robot_file, key, epoch):
     raise AssertionError("nobody flies here")
 
-LAB = LinkKind(connect, stops_in_silence=False, keyed=False)
+LAB = LinkKind(connect, stops_in_silence=False, keyed=False, silence=SilenceTimes(0.5, 0.5, 0.5))
 NO_KIND = connect
 """
 
@@ -44,6 +48,8 @@ def test_an_installed_package_brings_its_own():
     kind = link_kind("lab")
     assert not kind.stops_in_silence
     assert not kind.keyed
+    assert kind.silence == SilenceTimes(0.5, 0.5, 0.5)
+    assert link_kind("udp").silence == SilenceTimes(0.06, 0.28, 0.4)
 
 
 @pytest.mark.usefixtures("package")
@@ -73,3 +79,20 @@ def test_a_kind_is_a_plain_word(kind):
     table["link"]["kind"] = kind
     with pytest.raises(RobotFileError, match=r"link\.kind"):
         robot_of(table, "lab.toml")
+
+
+def test_the_silence_that_rpits_page_asks_of_a_model_is_what_its_kind_states():
+    page = (Path(__file__).parents[3] / "docs" / "rpit.md").read_text()
+    (rule,) = (line for line in page.splitlines() if line.startswith("4. **Silence.**"))
+    rule += page.split(rule)[1].splitlines()[1]
+    said = [1e-6 * int(one.replace(" ", "")) for one in re.findall(r"(\d+ 000) µs", rule)]
+    silence = link_kind("rpit").silence
+    assert said == pytest.approx([silence.coasts_s, silence.ramps_s, silence.back_s])
+
+
+@pytest.mark.parametrize(
+    "times", [(0.0, 0.1, 0.2), (0.2, 0.1, 0.3), (0.1, 0.3, 0.2), (0.1, 0.2, np.inf), (np.nan,) * 3]
+)
+def test_times_of_a_silence_are_in_order(times):
+    with pytest.raises(ValueError, match="0 < coasts_s ≤ ramps_s ≤ back_s"):
+        SilenceTimes(*times)

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from hardware.follower import RobotCommand
+from hardware.link.robot_end import SILENCE
+from hardware.link.silence import SilenceTimes
 from hardware.robot_file import COMMANDS, load_robot
 from pipeline.config import PERIOD_S, TeleopConfig, VirtualCameraMode
 from pipeline.frames import GRAVITY
@@ -293,9 +295,9 @@ def test_a_robot_that_refuses_after_a_gap_ends_the_flight():
     assert (state.mode, state.reason) == (Mode.RAMP, "The robot ramps.")
 
 
-def refusals_after(pause_s: float) -> tuple[str, ...]:
+def refusals_after(pause_s: float, silence: SilenceTimes = SILENCE) -> tuple[str, ...]:
     """Of a pause that began at 0, where times are exact."""
-    controller = Controller(ROBOT, TeleopConfig())
+    controller = Controller(ROBOT, TeleopConfig(), silence=silence)
     for t in (0.0, pause_s):
         said: list[Input] = [PhoneImu(t, STILL, UP), picture(t), ReadyInput([])]
         said.append(TouchState(t, False, 0))
@@ -306,6 +308,13 @@ def refusals_after(pause_s: float) -> tuple[str, ...]:
 def test_a_pause_that_the_robot_bears_is_no_standing_still():
     assert refusals_after(STOOD_STILL_S) == ("Just recovered: wait a moment.",)
     longer = refusals_after(np.nextafter(STOOD_STILL_S, 1.0))
+    assert longer == ("The server's computer stood still for 0.06 s.",)
+
+
+def test_a_link_that_bears_less_makes_a_pause_a_shorter_one_and_a_patient_link_none_longer():
+    stood = ("The server's computer stood still for 0.04 s.",)
+    assert refusals_after(0.04, SilenceTimes(0.03, 0.05, 0.05)) == stood
+    longer = refusals_after(np.nextafter(STOOD_STILL_S, 1.0), SilenceTimes(0.5, 0.6, 0.7))
     assert longer == ("The server's computer stood still for 0.06 s.",)
 
 

@@ -15,17 +15,21 @@ from hardware.follower import (
     Refusal,
     ThrustCommand,
 )
+from hardware.link.robot_end import SILENCE
+from hardware.link.silence import SilenceTimes
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, RequestInput
 from server.control.robot_clock import (
     DEAF,
     LINGER_S,
-    RAMP_AFTER_S,
-    RAMP_BEGUN_S,
-    SILENCE_S,
     BodyClock,
     RobotLink,
 )
+
+SILENCE_S, RAMP_AFTER_S = SILENCE.coasts_s, SILENCE.ramps_s
+RAMP_BEGUN_S = SILENCE.back_s - SILENCE.ramps_s
+PATIENT = SilenceTimes(coasts_s=0.2, ramps_s=0.5, back_s=0.55)
+"""Of a link that is not ours."""
 
 
 def sample(
@@ -140,6 +144,26 @@ def test_a_robot_that_coasts_or_has_only_just_begun_to_ramp_has_nothing_against_
         told.append((link.reason, link.gap))
     bears, ended, well = ("", DEAF), (silent, ""), ("", "")
     assert told == [bears, bears, bears, ended, well, bears]
+
+
+def test_a_link_that_states_other_times_is_believed() -> None:
+    follower = Script()
+    link = RobotLink(follower, silence=PATIENT)
+    follower.next = [sample(1_000, FollowerState.RUNNING)]
+    link.receive(1.0)
+    link.receive(1.19)
+    assert link.left_s == np.inf
+    link.receive(1.3)
+    assert link.left_s == pytest.approx(0.2)
+    follower.next = [sample(2_000, FollowerState.COAST)]
+    link.receive(2.0)
+    assert link.left_s == pytest.approx(0.3)
+    gaps = []
+    for t in (3.0, 3.04, 3.06):
+        follower.next = [sample(3_000, FollowerState.RAMP, Refusal.SILENT)]
+        link.receive(t)
+        gaps.append(link.gap)
+    assert gaps == [DEAF, DEAF, ""]
 
 
 def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:

@@ -1,12 +1,15 @@
 """`lightleash robot check`: what is wrong with a robot is told by name, and by the exit code."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hardware.authority import authority
 from hardware.dynamics import dynamics_of
+from hardware.link.registry import OWN
+from hardware.link.silence import SilenceTimes
 from hardware.robot_file import load_robot, robot_path
 from server.tools.robot import main
 
@@ -109,3 +112,16 @@ def test_a_robot_that_takes_a_twist_is_judged_by_what_it_has(old, new, against, 
     assert code == bool(against)
     assert "told zero 0.16 s after the last command" in found["stops"]["said"]
     assert "0.50 m/s and 90°/s at most" in found["twist"]["said"]
+
+
+@pytest.mark.slow
+def test_a_link_that_lets_a_silent_robot_move_on_for_long_speaks_against_it(
+    capsys, tmp_path, monkeypatch
+):
+    patient = replace(OWN["udp"], silence=SilenceTimes(0.5, 0.6, 0.6))
+    monkeypatch.setitem(OWN, "udp", patient)
+    code, found = findings(capsys, "twister", tmp_path)
+    assert code == 1
+    assert {what for what, one in found.items() if not one["ok"]} == {"stops"}
+    assert "told zero 0.60 s after the last command" in found["stops"]["said"]
+    assert found["in silence"]["said"] == "the robot stops by itself, from 500 ms on"
