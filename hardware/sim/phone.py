@@ -44,6 +44,9 @@ class PhoneOptions:
     screen_angle_deg: int = 90
     """Landscape."""
     motion_rate_hz: float = 60.0
+    """The motion sensors are read so often ..."""
+    sensor_rate_hz: float = 0.0
+    """... and measure so often: what is read between comes again; 0: whenever they are read."""
     frame_rate_hz: float = 30.0
     motion_delay_s: tuple[float, float] = (0.015, 0.040)
     """Between capture and arrival, evenly spread; nothing overtakes."""
@@ -181,6 +184,10 @@ class VirtualPhone:
         self.lies = FaultyCamera(
             options.camera_fault, camera, lambda t: self.hand.pose(t)[0], options.camera_fault_s
         )
+        self.stands_still = (np.inf, np.inf)
+        """From when to when [s] the motion sensors' last sample is read again and again."""
+        self._read: tuple[float, MotionReading] | None = None
+        """When the last sample was measured [s], and what it says."""
         self.films: Callable[[Camera, float, np.random.Generator], Image] | None = None
         """What it sees at a time [s] in place of LEDs in a room."""
         self._last: tuple[float, Image] | None = None
@@ -205,7 +212,20 @@ class VirtualPhone:
         )
 
     def motion(self, t: float) -> MotionReading:
-        """The reading of the motion sensors at `t` [s]; noise follows the order of the calls."""
+        """What is read of the motion sensors at `t` [s]; noise follows the order of the calls."""
+        measured = self._measured_at(t)
+        if self._read is None or self._read[0] != measured:
+            self._read = measured, self._measure(measured)
+        return self._read[1]
+
+    def _measured_at(self, t: float) -> float:
+        """When the newest sample was measured that can be read at `t` [s]."""
+        since, until = self.stands_still
+        t = min(t, since) if t < until else t
+        rate = self.options.sensor_rate_hz
+        return floor(t * rate) / rate if rate > 0.0 else t
+
+    def _measure(self, t: float) -> MotionReading:
         o, rng = self.options, self._sensor_rng
         omega_in_d = self._R_cd.T @ self.hand.omega_in_c(t) + self._bias_omega
         a_in_d = self._R_cd.T @ self.hand.specific_force_in_c(t) + self._bias_a

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.camera.extrinsics import IDENTITY
+from pipeline.estimation.held_gyroscope import HeldGyroscope
 from pipeline.frames import R_cd
 from pipeline.signals import PhoneImu, TouchState
 from pipeline.timing.clock_synchronisation import ClockSynchronisation
@@ -57,6 +58,7 @@ class Ingest:
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._answered: set[int] = set()
         self._last_motion_t = -np.inf
+        self._gyroscope = HeldGyroscope()
         self._last_touch = -1
         self._pings = 0
         self.clock = ClockSynchronisation()
@@ -135,6 +137,8 @@ class Ingest:
         if t is None or t <= self._last_motion_t:
             return None
         self._last_motion_t = t
+        if self._gyroscope.is_old(t, np.array(motion.rotation_rate)):
+            return None
         return self.extrinsics.in_camera_axes(phone_imu(motion, t, self._phone))
 
     def _dated(self, record: Record, field: str, now: float) -> float | None:

@@ -83,6 +83,8 @@ def stops(name: str, at: float = 0.0, before: Happening | None = None) -> Fault:
 LOST: Final[Times] = {"COAST": COAST_S, "RAMP": RAMP_S}
 RAMPING: Final[Times] = {"RAMP": RAMP_S}
 BLIND: Final[Times] = {"HOLD": 2.7, "RAMP": BLIND_S, "zero": BLIND_S + RAMPED_S}
+ON_THEIR_WAY_S: Final = 0.057
+"""A motion sample is read 0.017 s after the one before, and comes up to 0.04 s later."""
 UNTURNED_S: Final = 0.35
 """A picture that comes again is news until something has turned unevenly: a hand does by then."""
 FROZEN: Final[Times] = {event: by + UNTURNED_S for event, by in BLIND.items()}
@@ -110,10 +112,13 @@ PHONE: Final = (
     ),
     gone("rates are no numbers", "27", motion(tampering.no_number)),
     gone("a force without end", "27", motion(tampering.infinite)),
-    open_ended(
-        "motion sensors stuck",
-        "10",
-        h.tampered_with_memory(lambda: tampering.motion(tampering.stuck())),
+    gone("motion sensors stuck", "9", h.stuck_motion(FOR_EVER), ON_THEIR_WAY_S),
+    borne("motion sensors stuck for 0.1 s", "9", h.stuck_motion(0.1)),
+    borne(
+        "motion sensors stuck for 0.4 s",
+        "9",
+        h.stuck_motion(0.4),
+        {"COAST": ON_THEIR_WAY_S + COAST_S},
     ),
     open_ended("motion sensors' axes turned", "10", motion(tampering.turned_axes)),
     ends("accelerations turned round", "10", motion(tampering.turned_sign), JUMPED),

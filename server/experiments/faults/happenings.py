@@ -115,15 +115,30 @@ def tampered_with_memory(make: Callable[[], Inputs]) -> Happening:
     return happen
 
 
+def _check_pictures(world: FaultyFlight) -> None:
+    """Hold pictures against motion sensors, which have told the truth for `HONEST_S`."""
+    world.loop.checks_rays = True
+    while world.t < HONEST_S:
+        world.advance()
+    world.begin = world.loop.t
+
+
+def stuck_motion(seconds: float) -> Happening:
+    """The phone's motion sensors say the same for so long."""
+
+    def happen(world: FaultyFlight) -> None:
+        _check_pictures(world)
+        world.loop.phone.stands_still = world.begin, world.begin + seconds
+
+    return happen
+
+
 def lying_camera(fault: CameraFault) -> Happening:
     """The phone's camera lies, after it has told the truth for `HONEST_S`."""
 
     def happen(world: FaultyFlight) -> None:
         loop = world.loop
-        loop.checks_rays = True
-        while world.t < HONEST_S:
-            world.advance()
-        world.begin = loop.t
+        _check_pictures(world)
         loop.phone.lies.fault, loop.phone.lies.begin_s = fault, loop.t
 
     return happen

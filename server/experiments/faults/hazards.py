@@ -108,7 +108,13 @@ HAZARDS: Final = (
         "not believed; as 1",
         ("pipeline/vision/test_gating.py",),
     ),
-    Hazard("9", "The phone's motion sensors are silent", "their age", "COAST; RAMP after 1 s"),
+    Hazard(
+        "9",
+        "The phone's motion sensors are silent, or say the same again and again",
+        "their age; a gyroscope in a hand never says the same twice",
+        "a repetition is no sample; COAST; RAMP after 1 s",
+        ("pipeline/estimation/test_held_gyroscope.py",),
+    ),
     Hazard(
         "10",
         "The phone's motion sensors lie",

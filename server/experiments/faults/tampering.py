@@ -99,17 +99,6 @@ def turned_sign(sample: PhoneImu) -> PhoneImu:
     return replace(sample, a_m_cf_in_c=-sample.a_m_cf_in_c)
 
 
-def stuck() -> Change:
-    """Each sample says what the first one said."""
-    first: list[PhoneImu] = []
-
-    def stick(sample: PhoneImu) -> PhoneImu:
-        first.append(sample)
-        return replace(first[0], t=sample.t)
-
-    return stick
-
-
 def stale_touch() -> Inputs:
     """The last touch again and again, with the age that it has."""
     last: list[TouchState] = []
