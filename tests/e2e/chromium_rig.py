@@ -84,12 +84,17 @@ def flight(
     seconds: float,
     meanwhile: Sequence[tuple[float, Callable[[], object]]] = (),
 ) -> Flight:
-    """Lead for so long, or until the robot comes down by itself; tried once."""
+    """Lead a hand's motion for so long, or until the robot comes down by itself; tried once.
+
+    A hand that is taken up at rest means the same place whenever the press arrives, and a place
+    within the robot's reach: taken up late, one led by up to twice what thrusters can hold.
+    """
     began, never, taps = time.monotonic(), "", MOST_TAPS
     distances: list[tuple[float, float]] = []
     with contextlib.closing(FlightLog(server)) as log:
         try:
             taps = lead(phone)
+            phone.play(max(0.0, phone.moves_at - time.monotonic()))
             distances = phone.track(seconds, meanwhile, lambda: log.is_over)
         except TimeoutError as error:
             never = str(error)
@@ -121,8 +126,10 @@ def led_server(
         serving(folder, "--cameras", str(calibrate(folder))) as server,
         browser(executable, **LANDSCAPE) as context,
     ):
-        motion = make_hand(hand, seed=seed, t_start=time.monotonic() + rest_s)
+        moves_at = time.monotonic() + rest_s
+        motion = make_hand(hand, seed=seed, t_start=moves_at)
         leds_in_b = load_robot("ames").robot.leds_in_b
         phone = ChromiumPhone(context, motion, leds_in_b, server.truth_port)
+        phone.moves_at = moves_at
         with contextlib.closing(phone), held():
             yield server, context, phone

@@ -110,6 +110,8 @@ class PlayedPhone(ABC):
     ) -> None:
         """`leds_in_b` (n, 3) [m]; the page's `screen.orientation.angle` [°]."""
         self._hand, self._leds_in_b = hand, leds_in_b
+        self.moves_at = -np.inf
+        """When the hand begins to move [s, monotonic]."""
         self._truth = TruthClient(truth_port, timeout=1.0)
         self._felt = Felt(hand, R_cd(screen_angle_deg).T)
         self._stepped = time.monotonic()

@@ -25,7 +25,7 @@ LEAST_HZ = {"phone_imu": 45.0, "video": 24.0}
 def test_the_robot_follows_by_each_way_does_not_jump_when_it_is_changed_and_stops_on_its_stop(
     chromium: str, tmp_path: Path
 ) -> None:
-    with led_server(chromium, tmp_path, "moving", seed=2, rest_s=4.0) as (server, _, phone):
+    with led_server(chromium, tmp_path, "moving", seed=2, rest_s=15.0) as (server, _, phone):
         refused: list[str] = []
         phone.page.on("console", lambda message: refused.append(message.text))
         start(phone, server)
