@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from server.common.settings import load
+
 ROOT = Path(__file__).resolve().parents[1]
 UNIT = ROOT / "deploy" / "lightleash.service"
 MOST_EXPOSED = 3.0
@@ -56,14 +58,15 @@ def test_under_the_unit_all_that_is_kept_lies_in_its_own_directories(tmp_path):
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
 def test_the_unit_is_correct_and_little_exposed(tmp_path):
     text = UNIT.read_text().replace("/opt/lightleash/bin/lightleash", sys.executable)
-    (tmp_path / UNIT.name).write_text(text)
-    verified = subprocess.run(
-        ["systemd-analyze", "verify", str(tmp_path / UNIT.name)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (verified.returncode, verified.stderr) == (0, "")
+    for name in (UNIT.name, "lightleash@.service", "lightleash@left-arm.service"):
+        (tmp_path / name).write_text(text)
+        verified = subprocess.run(
+            ["systemd-analyze", "verify", str(tmp_path / name)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (verified.returncode, verified.stderr) == (0, "")
     said = subprocess.run(
         ["systemd-analyze", "security", "--offline=true", str(UNIT)],
         capture_output=True,
@@ -73,6 +76,18 @@ def test_the_unit_is_correct_and_little_exposed(tmp_path):
     found = re.search(r"Overall exposure level.*: ([\d.]+)", said)
     assert found, said
     assert float(found[1]) <= MOST_EXPOSED
+
+
+@pytest.mark.parametrize("instance", ["", "left-arm"])
+def test_the_unit_serves_one_robot_and_as_a_template_each_by_its_name(instance):
+    """systemd puts an instance's name in place of %i, and nothing in a unit that is no template."""
+    _, _, *words = unit("ExecStart")[0].replace("%i", instance).split()
+    assert load(words).name == instance
+
+
+def test_a_unit_that_ends_leaves_the_directory_that_others_run_in():
+    assert unit("RuntimeDirectory") == ["lightleash"]
+    assert unit("RuntimeDirectoryPreserve") == ["yes"]
 
 
 def test_control_may_be_on_time_without_a_capability():

@@ -9,7 +9,8 @@ from pathlib import Path
 import msgspec
 
 from pipeline.config import VirtualCameraConfig
-from server.common.runtime import RUN_FILE, runtime_directory
+from server.common.options import add_name_argument
+from server.common.runtime import RUN_FILE, runtime_directory, servers_here
 from server.common.runtime_parameters import RuntimeParameters
 
 DEFAULT_CAMERA = VirtualCameraConfig()
@@ -37,7 +38,7 @@ class Access:
 
 
 def run_of(directory: Path | None = None) -> dict[str, object]:
-    """The run file of the server on this machine.
+    """The run file of the server in `directory`, else of the one here that has no name.
 
     Raises:
         PhoneClientError: there is none, or it makes no sense.
@@ -46,10 +47,18 @@ def run_of(directory: Path | None = None) -> dict[str, object]:
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, object])
     except FileNotFoundError as error:
-        why = "no server is running here: start `lightleash serve`, or name one with --url"
-        raise PhoneClientError(why) from error
+        raise PhoneClientError(_nobody(path)) from error
     except (OSError, msgspec.MsgspecError) as error:
         raise PhoneClientError(f"{path}: not a run file of `lightleash serve`: {error}") from error
+
+
+def _nobody(path: Path) -> str:
+    """Why there is no run file, and where there is one."""
+    others = [name for name, one in servers_here().items() if (one / RUN_FILE).exists()]
+    if not others:
+        return "no server is running here: start `lightleash serve`, or name one with --url"
+    words = (f"--name {name}" if name else "one without --name" for name in others)
+    return f"no server is running in {path.parent}; there is {', '.join(words)}"
 
 
 def running_server(directory: Path | None = None) -> Access:
@@ -78,6 +87,7 @@ def running_server(directory: Path | None = None) -> Access:
 
 def add_access_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that say where the server is."""
+    add_name_argument(parser)
     parser.add_argument("--url", help="of the server; default: the one running here")
     parser.add_argument("--token", help="operator_token of that server's run file; goes with --url")
     parser.add_argument("--ca", type=Path, help="certificate of the server's own authority (PEM)")
@@ -91,8 +101,10 @@ def access_of(arguments: argparse.Namespace) -> Access:
     """
     if (arguments.url is None) != (arguments.token is None):
         raise PhoneClientError("--url and --token go together")
+    if arguments.url is not None and arguments.name:
+        raise PhoneClientError("--name is of a server here: not with --url")
     if arguments.url is None:
-        return running_server()
+        return running_server(runtime_directory(arguments.name))
     if not arguments.url.startswith(("http://", "https://")):
         raise PhoneClientError(f"--url {arguments.url}: allowed: http://… or https://…")
     return Access(arguments.url, arguments.token, ca=arguments.ca)

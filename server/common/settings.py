@@ -10,9 +10,16 @@ from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SecretStr,
+    ValidationError,
+)
 from pydantic_core import ErrorDetails
 from pydantic_settings import (
     BaseSettings,
@@ -22,6 +29,7 @@ from pydantic_settings import (
 
 from pipeline.config import EstimatorName, VirtualCameraMode
 from server.common.roles import Confirm
+from server.common.runtime import own_directory, server_name
 from server.common.runtime_parameters import (
     DEFAULT_KNOBS,
     FASTEST_HZ,
@@ -37,7 +45,7 @@ MOST_GIB = 1e6
 
 
 def state_directory() -> Path:
-    """Where certificates and recordings live."""
+    """Where certificates, keys and recordings live; all of a user's servers share it."""
     base = os.environ.get("XDG_STATE_HOME")
     return (Path(base) if base else Path.home() / ".local" / "state") / "lightleash"
 
@@ -186,6 +194,9 @@ class Settings(BaseSettings):
         cli_implicit_flags=True,
     )
 
+    name: Annotated[str, AfterValidator(server_name)] = Field(
+        "", description="of this server, where several run on one machine"
+    )
     robot: str = Field("ames", description="name or path of a robot file")
     gains: str = Field(GAINS, description="a gain set of the robot file")
     estimator: EstimatorName = Field(
@@ -208,6 +219,11 @@ class Settings(BaseSettings):
     recording: RecordingSettings = Field(default_factory=RecordingSettings)
     pairing: PairingSettings = Field(default_factory=PairingSettings)
     virtual_camera: VirtualCameraSettings = Field(default_factory=VirtualCameraSettings)
+
+    @property
+    def own_state(self) -> Path:
+        """What this server shares with no other one: its audit log and its recordings."""
+        return own_directory(self.state, self.name)
 
     @classmethod
     def settings_customise_sources(
@@ -263,7 +279,7 @@ def load(argv: Sequence[str], file: Path | None = None) -> Settings:
 def _fault(error: ErrorDetails) -> str:
     name = ".".join(map(str, error["loc"]))
     if error["type"] != "extra_forbidden":
-        return f"{name}: {error['msg']}, not {error['input']!r}"
+        return f"{name}: {error['msg'].removeprefix('Value error, ')}, not {error['input']!r}"
     return _unknown(name, list(_names()))
 
 

@@ -14,8 +14,9 @@ from typing import cast, get_args
 import segno
 
 from server.common.access import PhoneClientError, run_of
-from server.common.options import Parser
+from server.common.options import Parser, add_name_argument
 from server.common.roles import Role
+from server.common.runtime import runtime_directory
 
 TIMEOUT_S = 5.0
 
@@ -69,9 +70,11 @@ def main(argv: Sequence[str]) -> int:
         default="operator",
         help="viewer: sees all and may STOP; operator: leads with a phone; supervisor: all",
     )
-    role = cast(Role, parser.parse_args(argv).role)
+    add_name_argument(parser)
+    arguments = parser.parse_args(argv)
+    role = cast(Role, arguments.role)
     try:
-        invitation = invite(run_of(), role)
+        invitation = invite(run_of(runtime_directory(arguments.name)), role)
     except PhoneClientError as error:
         print(f"lightleash invite: {error}", file=sys.stderr)
         return 1

@@ -22,13 +22,17 @@ from hardware.robot_file import COMMANDS, RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
 from server.common.child import PROMPT_NICENESS, Child, die_with, ending, watched
-from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
+from server.common.runtime import (
+    RUN_FILE,
+    BusyError,
+    prepare,
+    runtime_directory,
+)
 from server.common.settings import GAINS, Settings
 from server.process.invite import invite, print_code
+from server.process.ports import listening
 from server.process.robot_key import epoch_file, key_of
 
-BACKLOG = 1_024
-"""Connections that the kernel keeps for a server that is busy or restarts."""
 MAX_DEATHS = 4
 """Of one process before anything worked: better end, with the reason on the screen."""
 POLL_S = 0.05
@@ -41,24 +45,6 @@ NOT_WARM = (
     "control and server start all the same, and compile for themselves, for minutes."
 )
 SECRET_VARIABLE = "_LIGHTLEASH_SECRET"
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """A listening socket; port 0 takes any free one.
-
-    Raises:
-        OSError: the port is taken or the address is not ours.
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    bound = socket.socket(family, socket.SOCK_STREAM)
-    bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        bound.bind((host, port))
-        bound.listen(BACKLOG)
-    except OSError as error:
-        bound.close()
-        raise OSError(f"{host}, port {port}: {error.strerror}; choose another one") from error
-    return bound
 
 
 def free_udp_port() -> int:
@@ -185,17 +171,18 @@ def announce(run: Mapping[str, object]) -> None:
 
     Links are for people at a terminal alone: what goes elsewhere is kept in logs.
     """
+    inviting = "lightleash invite" + (f" --name {run['name']}" if run["name"] else "")
     if sys.stdout.isatty():
         phone, supervisor = invite(run, "operator"), invite(run, "supervisor")
         print_code(phone.url)
         print(f"\nPhone:       {phone.url}")
         print(f"Supervisor:  {supervisor.here}")
-        print(f"Each opens once, within {phone.lives_s / 60:g} minutes; `lightleash invite`, with")
+        print(f"Each opens once, within {phone.lives_s / 60:g} minutes; `{inviting}`, with")
         print("--role viewer or supervisor or without, prints another one.")
         print(f"A warning?   {_without_tls(str(run['https_url']))}/ says how to trust this server.")
     else:
-        print(f"\nPhone:       {run['https_url']}/ by a link of `lightleash invite`")
-        print(f"Supervisor:  {run['http_url']}/supervisor by `lightleash invite --role supervisor`")
+        print(f"\nPhone:       {run['https_url']}/ by a link of `{inviting}`")
+        print(f"Supervisor:  {run['http_url']}/supervisor by `{inviting} --role supervisor`")
     if run["truth_port"]:  # the robot is a simulated one
         print("No phone at hand? Press “Start virtual phone” on the supervisor's page.")
     print("Ctrl-C stops, robot first.", flush=True)
@@ -226,14 +213,13 @@ def _compile() -> None:
 def main(settings: Settings, arguments: Sequence[str]) -> int:
     """Entry of `lightleash serve`; `arguments` are handed on to the server process."""
     os.umask(0o077)  # whatever is written, by the children too, is for this user alone
-    runtime = runtime_directory()
+    runtime = runtime_directory(settings.name)
     try:
         with (
-            prepare(runtime),
-            listen(settings.host, settings.https_port) as https,
-            listen("127.0.0.1", settings.http_port) as http,
+            prepare(runtime, runtime_directory()),
+            listening(settings, print) as sockets,
         ):
-            children = children_of(settings, arguments, runtime, (https, http))
+            children = children_of(settings, arguments, runtime, sockets)
             _compile()
             launcher = Launcher(children, runtime / RUN_FILE)
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

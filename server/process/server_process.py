@@ -81,7 +81,7 @@ def base_url(host: str, port: int) -> str:
 async def serve(settings: Settings, given: LaunchContext) -> None:
     """Serve until SIGTERM or SIGINT."""
     tls = _certificate(settings)
-    audit = Audit(settings.state)
+    audit = Audit(private_directory(settings.own_state))
     members = given.runtime / MEMBERS_FILE
     doors = Doors(given.secret, settings.pairing.confirm, members, audit)
     warming = threading.Thread(target=warm_up, name="warm-up", daemon=True)
@@ -91,7 +91,7 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     view = given.runtime / VIEW_SOCKET
     dashboard = _dashboard(settings, manager, view)
     base = base_url(settings.host, given.https.getsockname()[1])
-    api = Api(manager, tls.authority)
+    api = Api(manager, tls.authority, settings.name)
     people = PeopleApi(manager, doors, base, http_url(given))
     signalling = SignallingEndpoint(manager, settings.rtc, settings.video.bitrate_bps)
     routes = [*people.routes(), *view_routes(view), *signalling.routes()]
@@ -146,7 +146,7 @@ async def _report_ready(
 def _manager(
     settings: Settings, given: LaunchContext, doors: Doors, decoding: Decoding
 ) -> SessionManager:
-    folder = private_directory(private_directory(settings.state) / "recordings")
+    folder = private_directory(settings.own_state / "recordings")
     recover_all(folder)
     asked = settings.recording
     limits = DiskLimits(int(GIB * asked.budget_gib), int(GIB * asked.reserve_gib))
@@ -171,6 +171,7 @@ def _dashboard(settings: Settings, manager: SessionManager, view: Path) -> Dashb
 def _run(settings: Settings, given: LaunchContext, base: str, doors: Doors) -> dict[str, object]:
     """Contents of the run file, for other programs of this user."""
     return {
+        "name": settings.name,
         "http_url": http_url(given),
         "https_url": base,
         "operator_token": doors.operator_token,
@@ -220,7 +221,7 @@ def raise_handles() -> int:
 def _certificate(settings: Settings) -> Certificate:
     if settings.cert is not None and settings.key is not None:
         return Certificate(settings.cert, settings.key, None)
-    return certificate(settings.state, settings.names)
+    return certificate(settings.state, settings.names, settings.own_state)
 
 
 def _metadata(settings: Settings) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import fcntl
 import ipaddress
 import logging
 import socket
@@ -19,11 +20,12 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from server.common.clock import utc
-from server.common.runtime import new_private_file, private_directory
+from server.common.runtime import new_private_file, private_directory, private_opener
 from server.security.tls_limits import authority_limits, general_name, is_permitted
 
 LEAF_DAYS, AUTHORITY_DAYS = 397, 729
 RENEW_DAYS, RENEW_AUTHORITY_DAYS = 30, 60
+AUTHORITY_LOCK = "ca.lock"
 SIOCGIFADDR = 0x8915  # linux/sockios.h
 log = logging.getLogger("lightleash")
 
@@ -63,8 +65,6 @@ def _of_interfaces() -> list[str]:
     """IPv4 addresses of all interfaces, such as a hotspot for the phone; Linux only."""
     if not sys.platform.startswith("linux"):
         return []
-    import fcntl
-
     found: list[str] = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         for _, name in socket.if_nameindex():
@@ -88,15 +88,25 @@ def own_names() -> list[str]:
     return [*own_addresses(), *own_hosts()]
 
 
-def certificate(state: Path, names: Iterable[str] = ()) -> Certificate:
-    """The certificate in `state` for this machine and `names`, made or renewed if it must be.
+def certificate(state: Path, names: Iterable[str] = (), own: Path | None = None) -> Certificate:
+    """The certificate in `own` for this machine and `names`, made or renewed if it must be.
 
-    So is the authority that signs it, with a word in the log if phones trusted another one. It
-    signs for names and addresses of this machine and for private addresses, nothing else.
+    So is the authority in `state` that signs it, with a word in the log if phones trusted another
+    one. It signs for names and addresses of this machine and for private addresses, nothing else.
+    Servers that share `state` share the authority: a phone trusts one, and so all. They must have
+    the same `names`, for which alone it may sign: another list makes another authority.
     """
-    addresses, hosts = own_addresses(), [*own_hosts(), *names]
+    own = private_directory(own or state)
     private_directory(state)
-    paths = {name: state / f"{name}.pem" for name in ("ca", "ca-key", "server", "server-key")}
+    paths = {name: state / f"{name}.pem" for name in ("ca", "ca-key")}
+    paths |= {name: own / f"{name}.pem" for name in ("server", "server-key")}
+    with open(state / AUTHORITY_LOCK, "a", opener=private_opener) as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # two that start at once make one authority
+        return _renewed(paths, names)
+
+
+def _renewed(paths: dict[str, Path], names: Iterable[str]) -> Certificate:
+    addresses, hosts = own_addresses(), [*own_hosts(), *names]
     if not _is_good_authority(paths, [addresses[0], *hosts]):
         if paths["ca"].exists():
             log.warning(

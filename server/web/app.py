@@ -80,8 +80,9 @@ class RecordedAnswer(msgspec.Struct):
 class VirtualPhoneProcess:
     """The virtual phone of the supervisor's button: a process like any other phone."""
 
-    def __init__(self) -> None:
-        """Begin without a process."""
+    def __init__(self, server: str = "") -> None:
+        """Begin without a process; it will lead the robot of the server of that name."""
+        self._server = server
         self._process: subprocess.Popen[bytes] | None = None
 
     @property
@@ -93,6 +94,7 @@ class VirtualPhoneProcess:
         """Start it, unless it runs."""
         if not self.running:
             command = [sys.executable, "-m", "server.virtual_phone.command", "--hand", "demo"]
+            command += ["--name", self._server]
             self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
 
     def stop(self) -> None:
@@ -104,10 +106,10 @@ class VirtualPhoneProcess:
 class Api:
     """The HTTP side: few requests, each small."""
 
-    def __init__(self, manager: SessionManager, authority: Path | None) -> None:
-        """`authority` is the certificate to install on phones."""
+    def __init__(self, manager: SessionManager, authority: Path | None, name: str = "") -> None:
+        """`authority` is the certificate to install on phones, `name` the server's."""
         self._manager, self._authority = manager, authority
-        self.phone = VirtualPhoneProcess()
+        self.phone = VirtualPhoneProcess(name)
         self._reports = LinkReports(now)
         self._t_metrics, self._exposed = -float("inf"), b""
 

@@ -128,7 +128,8 @@ def serve_with_thread(folder: Path) -> None:
     from server.control.controller import Controller
     from server.control.ipc import control_end
     from server.process import server_process
-    from server.process.launcher import free_udp_port, listen
+    from server.process.launcher import free_udp_port
+    from server.process.ports import listen
 
     runtime = folder / "lightleash"
     runtime.mkdir(mode=0o700)

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from server.common.runtime import RUN_FILE
+from server.common.runtime import RUN_FILE, own_directory
 
 START_S = 180.0
 """The kernels may have to be compiled first, on a busy machine."""
@@ -62,27 +62,30 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(folder: Path, *arguments: str) -> Iterator[Serving]:
+def serving(folder: Path, *arguments: str, name: str = "") -> Iterator[Serving]:
     """Start it, wait until it answers, end it: by SIGTERM, which a job in the background hears too.
 
-    A link is enough to lead, unless `arguments` say otherwise.
+    A link is enough to lead, unless `arguments` say otherwise. Several run in one folder, each with
+    a `name` of its own.
     """
     runtime, state = folder / "run", folder / "state"
     for path in (runtime, state):
         path.mkdir(mode=0o700, exist_ok=True)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(runtime), "XDG_STATE_HOME": str(state)}
     command = [sys.executable, "-m", "server", "serve", "--https-port", "0", "--http-port", "0"]
-    command += ["--pairing.confirm", "self"]
-    log = (folder / "serve.log").open("wb")
+    command += ["--pairing.confirm", "self", "--name", name]
+    own = own_directory(runtime / "lightleash", name)
+    printed = folder / f"serve{name and f'-{name}'}.log"
+    log = printed.open("wb")
     process = subprocess.Popen(
         [*command, *arguments], env=environment, stdout=log, stderr=subprocess.STDOUT
     )
     try:
-        run = _run_file(process, runtime / "lightleash" / RUN_FILE, folder)
+        run = _run_file(process, own / RUN_FILE, printed)
         yield Serving(
             process,
-            runtime / "lightleash",
-            state / "lightleash",
+            own,
+            own_directory(state / "lightleash", name),
             *(str(run[k]) for k in ("http_url", "https_url", "operator_token", "supervisor_token")),
             truth_port=int(str(run["truth_port"])),
             environment=environment,
@@ -96,7 +99,7 @@ def serving(folder: Path, *arguments: str) -> Iterator[Serving]:
         log.close()
 
 
-def _run_file(process: subprocess.Popen[bytes], path: Path, folder: Path) -> dict[str, object]:
+def _run_file(process: subprocess.Popen[bytes], path: Path, printed: Path) -> dict[str, object]:
     end = time.monotonic() + START_S
     while time.monotonic() < end and process.poll() is None:
         if path.exists():
@@ -104,4 +107,4 @@ def _run_file(process: subprocess.Popen[bytes], path: Path, folder: Path) -> dic
                 run: dict[str, object] = json.loads(path.read_text())
                 return run
         time.sleep(0.05)
-    raise RuntimeError(f"serve did not start: {(folder / 'serve.log').read_text()}")
+    raise RuntimeError(f"serve did not start: {printed.read_text()}")

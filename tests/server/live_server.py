@@ -15,7 +15,7 @@ from hardware.camera_file import CAMERAS
 from hardware.robot_file import load_robot
 from server.common.settings import RtcSettings, VideoSettings
 from server.control.ipc import ControlStatus, Endpoint, control_end
-from server.process.launcher import listen
+from server.process.ports import listen
 from server.recording.control import Recordings
 from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.least_role import roles_of

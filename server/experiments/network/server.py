@@ -23,7 +23,7 @@ from server.common.settings import RtcSettings, VideoSettings
 from server.control.ipc import control_end
 from server.control.ipc_inputs import Input
 from server.phone.phone_session import PhoneSession
-from server.process.launcher import listen
+from server.process.ports import listen
 from server.protocol.wire import HEADER, MAGIC, Kind
 from server.protocol.wire_records import Record
 from server.recording.control import Recordings

@@ -1,11 +1,18 @@
 """Where a server is: its run file says so, or tells what is wrong with it."""
 
+import argparse
 import json
 
 import pytest
 
-from server.common.access import Access, PhoneClientError, running_server
-from server.common.runtime import RUN_FILE
+from server.common.access import (
+    Access,
+    PhoneClientError,
+    access_of,
+    add_access_arguments,
+    running_server,
+)
+from server.common.runtime import RUN_FILE, runtime_directory
 from server.common.runtime_parameters import RuntimeParameters
 
 BAD_KNOBS = '{"http_url": "http://127.0.0.1:1", "operator_token": "t", "virtual_camera": {"x": 1}}'
@@ -35,6 +42,51 @@ def test_a_broken_run_file_is_named(tmp_path, text):
         running_server(tmp_path)
 
 
-def test_no_run_file_says_how_to_start_a_server(tmp_path):
+@pytest.fixture
+def here(monkeypatch, tmp_path):
+    """Makes a server that runs here, by name."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+    def make(name):
+        directory = runtime_directory(name)
+        directory.mkdir(parents=True, exist_ok=True)
+        run = {"http_url": f"http://127.0.0.1/{name}", "operator_token": "t"}
+        (directory / RUN_FILE).write_text(json.dumps(run))
+
+    return make
+
+
+def asked(*words):
+    parser = argparse.ArgumentParser()
+    add_access_arguments(parser)
+    return access_of(parser.parse_args(words))
+
+
+def test_a_name_leads_to_the_server_of_that_name(here):
+    for name in ("", "left", "right"):
+        here(name)
+    assert asked().url == "http://127.0.0.1/"
+    assert asked("--name", "left").url == "http://127.0.0.1/left"
+    with pytest.raises(PhoneClientError, match="--name is of a server here"):
+        asked("--name", "left", "--url", "http://x", "--token", "t")
+
+
+def test_who_asks_for_a_server_that_is_not_there_reads_which_are(here):
+    here("left")
+    with pytest.raises(PhoneClientError, match=r"there is --name left$"):
+        asked()
+    here("")
+    with pytest.raises(PhoneClientError, match=r"right; there is one without --name, --name left$"):
+        asked("--name", "right")
+
+
+def test_what_can_be_no_name_is_refused_with_what_can(capsys):
+    with pytest.raises(SystemExit):
+        asked("--name", "../left")
+    assert "../left: allowed: up to 24 letters, digits and dashes" in capsys.readouterr().err
+
+
+def test_no_run_file_says_how_to_start_a_server(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(PhoneClientError, match="lightleash serve"):
         running_server(tmp_path)

@@ -93,12 +93,22 @@ def test_lists_grow_with_each_mention():
         ("https_port = ", ["settings.toml"]),
         ('cert = "/c.pem"', ["cert", "key"]),
         ('robot_host = "1.2.3.4"', ["robot_host", "--no-simulate"]),
+        ('name = "left arm"', ["name: allowed: up to 24 letters", "not 'left arm'"]),
     ],
 )
 def test_what_can_not_be_used_is_named_with_what_is_allowed(tmp_path, text, words):
     with pytest.raises(SettingsError) as refusal:
         load([], toml(tmp_path, text))
     assert [word for word in words if word not in str(refusal.value)] == []
+
+
+def test_what_is_a_named_servers_own_lies_apart_and_the_rest_is_shared(tmp_path, monkeypatch):
+    unnamed = load(["--state", str(tmp_path)])
+    assert unnamed.own_state == unnamed.state == tmp_path
+    monkeypatch.setenv("LIGHTLEASH_NAME", "right")
+    assert load(["--state", str(tmp_path)]).own_state == tmp_path / "servers" / "right"
+    left = load(["--state", str(tmp_path), "--name", "left"])
+    assert (left.state, left.own_state) == (tmp_path, tmp_path / "servers" / "left")
 
 
 def test_a_misspelt_variable_is_not_ignored(monkeypatch):

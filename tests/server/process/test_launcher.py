@@ -17,10 +17,12 @@ from server.common.settings import load
 from server.control.process import parse
 from server.process import launcher
 from server.process.invite import Invitation
-from server.process.launcher import SECRET_VARIABLE, Launcher, announce, children_of, listen
+from server.process.launcher import SECRET_VARIABLE, Launcher, announce, children_of
+from server.process.ports import listen
 from server.process.robot_key import key_file
 
 RUN = {
+    "name": "",
     "http_url": "http://127.0.0.1:8080",
     "https_url": "https://192.0.2.2:8443",
     "operator_token": "O" * 22,
@@ -179,6 +181,11 @@ def test_what_is_no_terminal_gets_no_key_but_the_command_that_makes_one(capsys, 
     assert RUN["operator_token"] not in said
     assert RUN["supervisor_token"] not in said
     assert "lightleash invite --role supervisor" in said
+
+
+def test_who_has_several_servers_reads_which_one_a_command_is_for(capsys):
+    announce(RUN | {"name": "left"})
+    assert "`lightleash invite --name left --role supervisor`" in capsys.readouterr().out
 
 
 def test_a_server_that_has_just_died_is_told_of_and_waited_for(tmp_path, capsys, monkeypatch):

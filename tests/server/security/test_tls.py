@@ -56,6 +56,27 @@ def test_it_names_every_address_and_the_names_of_the_settings(tmp_path):
     assert names_of(load(made.cert)) == {*own_names(), "robot.lab"}
 
 
+def test_servers_that_start_at_once_have_one_authority_and_certificates_of_their_own(tmp_path):
+    owns = [tmp_path / "servers" / name for name in ("left", "right", "middle", "other")]
+    made = []
+
+    def start(own):
+        made.append(certificate(tmp_path, ["robots.lab"], own))
+
+    threads = [threading.Thread(target=start, args=(own,)) for own in owns]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {one.authority for one in made} == {tmp_path / "ca.pem"}
+    assert {one.cert.parent for one in made} == set(owns)
+    for one in made:
+        load(one.cert).verify_directly_issued_by(load(one.authority))
+    serials = {load(one.cert).serial_number for one in made}
+    assert len(serials) == len(owns)
+    assert load(certificate(tmp_path, ["robots.lab"], owns[0]).cert).serial_number in serials
+
+
 def test_keys_are_for_nobody_else(tmp_path):
     state = tmp_path / "state"
     made = certificate(state)
