@@ -22,15 +22,11 @@ from hardware.robot_file import COMMANDS, RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
 from server.common.child import PROMPT_NICENESS, Child, die_with, ending, watched
-from server.common.runtime import (
-    RUN_FILE,
-    BusyError,
-    prepare,
-    runtime_directory,
-)
+from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.common.settings import GAINS, Settings
 from server.process.invite import invite, print_code
 from server.process.ports import listening
+from server.process.robot_claim import claimed
 from server.process.robot_key import epoch_file, key_of
 
 MAX_DEATHS = 4
@@ -217,6 +213,7 @@ def main(settings: Settings, arguments: Sequence[str]) -> int:
     try:
         with (
             prepare(runtime, runtime_directory()),
+            claimed(settings),
             listening(settings, print) as sockets,
         ):
             children = children_of(settings, arguments, runtime, sockets)
