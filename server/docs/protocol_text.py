@@ -17,6 +17,7 @@ from server.rtc.signalling_endpoint import OFFERS_HZ, SignallingEndpoint
 from server.security.least_role import roles_of
 from server.security.pairings import CODE_LETTERS, IDLE_S, KEY_BYTES, LINK_S, WAIT_S
 from server.security.security import COOKIE, PAIR_TRIES, PAIR_WINDOW_S
+from server.view.fleet import Fleet
 from server.view.viser_proxy import routes as view_routes
 from server.virtual_phone.phone_client import MAX_IN_FLIGHT
 from server.web.app import Api
@@ -97,6 +98,8 @@ REQUESTS = {
     "GET /api/openapi.json": "these requests and their answers field by field, for programs",
     "POST /api/rtc": 'WebRTC, body `{"session": "…"}`; answers `{"id", "sdp", "ice_servers"}`',
     "POST /api/rtc/answer": 'body `{"id": "…", "sdp": "…"}`: the page\'s answer to that offer',
+    "GET /api/fleet": "the servers of this machine, for their page `/fleet`: name, robot, ports, "
+    "state (live, starting, silent, gone) and of a live one mode, reason, leader, latency, battery",
     "GET /view": "the 3D view's page",
     "GET /view/": "the same",
     "socket /view": "the 3D view's socket (viser's protocol); only a viewpoint may go up",
@@ -115,6 +118,7 @@ def requests() -> str:
     api, people = Api.__new__(Api), PeopleApi.__new__(PeopleApi)  # only asked for their routes
     signalling = SignallingEndpoint.__new__(SignallingEndpoint)
     others = (*people.routes(), *signalling.routes(), *view_routes(Path("nowhere")))
+    others = (*others, *Fleet.__new__(Fleet).routes())
     roles = roles_of((*api.routes(), *others))
     for route in (*api.routes(), *others):
         assert isinstance(route, (Route, WebSocketRoute))
@@ -188,8 +192,8 @@ come from the server's own pages (403): `Origin` is the server's, and requests c
 {requests()}
 
 Bodies up to {MAX_BODY} bytes (an answer's session description: {answer.MAX_BYTES}). Pages (`/`,
-`/supervisor`, `/board`, `/screen`) and their files need no role. Refusals are JSON, as below:
-`code`, `field`, `allowed`.
+`/supervisor`, `/board`, `/screen`, `/fleet`) and their files need no role. Refusals are JSON, as
+below: `code`, `field`, `allowed`.
 
 ## Records
 

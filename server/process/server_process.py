@@ -41,6 +41,7 @@ from server.security.places import limits_for
 from server.security.request_guard import Guard
 from server.security.security import Doors
 from server.security.tls import Certificate, certificate, own_addresses, own_names
+from server.view.fleet import Fleet
 from server.view.screen import Screen
 from server.view.viser_proxy import routes as view_routes
 from server.view.viser_view import Dashboard
@@ -94,7 +95,7 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     api = Api(manager, tls.authority, settings.name)
     people = PeopleApi(manager, doors, base, http_url(given))
     signalling = SignallingEndpoint(manager, settings.rtc, settings.video.bitrate_bps)
-    routes = [*people.routes(), *view_routes(view), *signalling.routes()]
+    routes = [*people.routes(), *view_routes(view), *signalling.routes(), *Fleet().routes()]
     app = make_app(api, PageServer(manager, settings.video), routes)
     admission = Admission(limits_for(raise_handles()))
     hosts = [*own_names(), *settings.names]

@@ -19,7 +19,8 @@ from starlette.routing import BaseRoute
 from server.common.roles import Least, is_enough
 from server.security.pairings import Member
 
-PUBLIC = frozenset(("/", "/supervisor", "/board", "/screen", "/healthz", "/ca.crt", "/api/pair"))
+PAGES = ("/", "/supervisor", "/board", "/screen", "/fleet")
+PUBLIC = frozenset((*PAGES, "/healthz", "/ca.crt", "/api/pair"))
 """For anyone: the pages, and what brings somebody in."""
 PUBLIC_FOLDER, PUBLIC_FILES = "/src", (".js", ".css", ".svg")
 """Of the pages: for anyone to read."""

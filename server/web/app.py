@@ -225,6 +225,7 @@ def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAP
             Route("/supervisor", page_file("supervisor.html")),
             Route("/board", page_file("board.html")),
             Route("/screen", page_file("screen.html")),
+            Route("/fleet", page_file("fleet.html")),
             *api.routes(),
             APIWebSocketRoute("/ws/phone", pages.phone, dependencies=leads),
             APIWebSocketRoute("/ws/video", pages.video, dependencies=leads),

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 
 import pytest
-from playwright.sync_api import BrowserContext, Page, expect
+from playwright.sync_api import BrowserContext, Locator, Page, expect
 
+from tests.e2e.axe import violations
 from tests.e2e.chromium_phone import browser
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import get, mode, processes, reset, status, until
@@ -18,6 +20,12 @@ from tests.e2e.test_serve import get, mode, processes, reset, status, until
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
 WAIT_MS = 30_000
 ROBOTS = {"left": "ames", "right": "twister"}
+SMALLEST_PX = """
+Math.min(...[...document.querySelectorAll('body *')]
+  .filter((one) => [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim()))
+  .map((one) => parseFloat(getComputedStyle(one).fontSize)))
+"""
+"""Of all that is written."""
 
 
 @pytest.fixture(scope="module")
@@ -129,3 +137,104 @@ def test_a_name_that_is_taken_or_none_is_refused_and_the_first_goes_on(
     assert done.returncode == 2
     assert says in done.stderr
     assert mode(left) != ""
+
+
+def card(page: Page, name: str) -> Locator:
+    """What the page of all robots shows of one."""
+    return page.locator(".server", has=page.get_by_role("heading", name=name))
+
+
+def test_the_page_of_all_robots_shows_each_and_can_do_nothing(
+    context: BrowserContext, left: Serving, right: Serving
+) -> None:
+    board = supervising(context, left)
+    expect(board.locator("#mode")).to_have_text("DISARMED", timeout=WAIT_MS)
+    with context.expect_page() as opened:
+        board.click("text=All robots here")
+    page = opened.value
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(f"{request.method} {request.url}"))
+    for name, robot in ROBOTS.items():
+        expect(card(page, name).locator("h2")).to_contain_text(robot, timeout=WAIT_MS)
+        expect(card(page, name).locator("strong")).to_have_text("DISARMED")
+    right.request("POST", "/api/stop")
+    expect(card(page, "right").locator("strong")).to_have_text("STOPPED", timeout=WAIT_MS)
+    expect(card(page, "left").locator("strong")).to_have_text("DISARMED")
+    reset(right)
+    right.request("POST", "/api/virtual-phone")
+    try:
+        expect(card(page, "right").locator("dl")).to_contain_text("virtual", timeout=WAIT_MS)
+        expect(card(page, "right").locator("dl")).to_contain_text(" ms", timeout=WAIT_MS)
+        expect(card(page, "left").locator("dl")).to_contain_text("nobody")
+    finally:
+        right.request("DELETE", "/api/virtual-phone")
+    assert set(asked) - {f"GET {left.http_url}/icon.svg"} == {f"GET {left.http_url}/api/fleet"}
+    assert page.locator("button, input, select, form").count() == 0
+    card(page, "right").locator("a").click()
+    expect(page).to_have_url(f"{right.http_url}/supervisor")
+    for one in (page, board):
+        one.close()
+
+
+def test_who_is_not_let_in_is_told_so_and_shown_nothing(
+    context: BrowserContext, left: Serving
+) -> None:
+    assert context.browser is not None
+    with context.browser.new_context(ignore_https_errors=True) as stranger:
+        page = stranger.new_page()
+        page.goto(f"{left.local_https}/fleet")
+        expect(page.locator("#why")).to_contain_text("pair first", timeout=WAIT_MS)
+        assert page.locator(".server").count() == 0
+
+
+@pytest.mark.parametrize("size", [(412, 915), (1280, 720)])
+def test_it_can_be_read_on_a_phone_and_across_a_room(
+    size: tuple[int, int], context: BrowserContext, left: Serving
+) -> None:
+    board = supervising(context, left)
+    page = context.new_page()
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.goto(f"{left.http_url}/fleet")
+    expect(page.locator(".server")).to_have_count(2, timeout=WAIT_MS)
+    assert page.evaluate(SMALLEST_PX) >= 16.0
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert violations(page) == []
+    for one in (page, board):
+        one.close()
+
+
+def test_a_killed_server_is_gone_and_one_that_was_told_to_end_has_ended(
+    context: BrowserContext, left: Serving
+) -> None:
+    folder = left.runtime.parents[3]
+    board, page = supervising(context, left), context.new_page()
+    page.goto(f"{left.http_url}/fleet")
+    for name, number, title in (
+        ("killed", signal.SIGKILL, "GONE"),
+        ("told", signal.SIGTERM, "ENDED"),
+    ):
+        with serving(folder, "--robot", "twister", name=name) as third:
+            expect(card(page, name).locator("strong")).to_have_text("DISARMED", timeout=WAIT_MS)
+            third.process.send_signal(number)
+            expect(card(page, name).locator("strong")).to_have_text(title, timeout=WAIT_MS)
+        expect(card(page, name).locator("a")).to_be_hidden()
+        expect(card(page, name).locator("dl")).to_have_text("")
+    expect(card(page, "left").locator("strong")).to_have_text("DISARMED")
+    for one in (page, board):
+        one.close()
+
+
+def test_without_an_answer_of_its_own_server_the_page_shows_no_mode(
+    context: BrowserContext, left: Serving
+) -> None:
+    board, page = supervising(context, left), context.new_page()
+    page.goto(f"{left.http_url}/fleet")
+    expect(card(page, "right").locator("strong")).to_have_text("DISARMED", timeout=WAIT_MS)
+    page.route("**/api/fleet", lambda route: route.abort())
+    for name in ROBOTS:
+        expect(card(page, name).locator("strong")).to_have_text("NO WORD", timeout=WAIT_MS)
+    expect(page.locator("#why")).to_have_text("The server of this page does not answer.")
+    page.unroute("**/api/fleet")
+    expect(card(page, "left").locator("strong")).to_have_text("DISARMED", timeout=WAIT_MS)
+    for one in (page, board):
+        one.close()

@@ -89,7 +89,7 @@ def test_a_large_sigma_lies_on_no_other_number(
     page.close()
 
 
-@pytest.mark.parametrize("name", ["index", "supervisor", "screen", "board", "trust"])
+@pytest.mark.parametrize("name", ["index", "supervisor", "screen", "board", "fleet", "trust"])
 def test_everybody_can_use_a_page_as_it_is_written(written: BrowserContext, name: str) -> None:
     page = opened(written, name, (1280, 720))
     assert violations(page) == []

@@ -23,6 +23,7 @@ from server.security.listener import listener
 from server.security.quotas import QUOTAS, Quota, Quotas
 from server.security.request_guard import Guard
 from server.security.security import Doors
+from server.view.fleet import Fleet
 from server.view.viser_proxy import routes as view_routes
 from server.web.app import Api, make_app
 from server.web.people_api import PeopleApi
@@ -62,7 +63,8 @@ class LiveServer:
         pages = PageServer(self.manager, VideoSettings())
         signalling = SignallingEndpoint(self.manager, RtcSettings(), 3_000_000)
         view = view_routes(Path("nowhere"))
-        self.app = make_app(self.api, pages, [*people.routes(), *view, *signalling.routes()])
+        others = [*people.routes(), *view, *signalling.routes(), *Fleet().routes()]
+        self.app = make_app(self.api, pages, others)
         self.roles = roles_of(self.app.routes)
         hosts = ["robot.lan", HOST, "::1"]
         self.guard = Guard(self.app, self.doors, hosts, quotas=quotas, roles=self.roles)

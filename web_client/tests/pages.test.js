@@ -6,7 +6,7 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
 const ROOT = fileURLToPath(new URL('..', import.meta.url));
-const PAGES = ['index.html', 'supervisor.html', 'board.html', 'screen.html', 'trust.html'];
+const PAGES = ['index.html', 'supervisor.html', 'board.html', 'screen.html', 'fleet.html', 'trust.html'];
 
 /** @param {string} path */
 const read = (path) => readFileSync(join(ROOT, path), 'utf8');
@@ -23,7 +23,7 @@ function needed(page) {
   for (const path of found) {
     const text = read(path);
     const names = [
-      ...text.matchAll(/(?:src|href)="((?!#|\.\/"|view\/|screen"|ca\.crt"|\$secure")[^"]+)"/g), ...text.matchAll(/^import .*?from '([^']+)'/gms),
+      ...text.matchAll(/(?:src|href)="((?!#|\.\/"|view\/|screen"|fleet"|ca\.crt"|\$secure")[^"]+)"/g), ...text.matchAll(/^import .*?from '([^']+)'/gms),
       ...text.matchAll(/new URL\('([^']+\.js)'/g),
     ];
     for (const [, name] of names) found.add(join(dirname(path), name ?? ''));
@@ -40,7 +40,7 @@ test('pages have no inline script, style or handler: the policy forbids them', (
 });
 
 test('nothing comes from another host', () => {
-  for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css', 'calibration.css', 'board.css', 'lens.css', 'link.css',
+  for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css', 'calibration.css', 'board.css', 'fleet.css', 'lens.css', 'link.css',
     'pairing.css', 'people.css', 'screen.css', 'sight.css', 'trust.css']) {
     const addresses = read(path).match(/https?:\/\/[\w.-]+/g) ?? [];
     const foreign = addresses.filter((address) => !/localhost|www\.w3\.org|^https:\/\/host$/.test(address));

@@ -47,12 +47,14 @@ MAY = {
 GET, POST, BOTH = ("GET",), ("POST",), ("DELETE", "POST")
 
 TABLE = {
-    **dict.fromkeys(("/", "/supervisor", "/board", "/screen", "/healthz", "/ca.crt"), (READ, ALL)),
+    **dict.fromkeys(("/", "/supervisor", "/board", "/screen", "/fleet"), (READ, ALL)),
+    **dict.fromkeys(("/healthz", "/ca.crt"), (READ, ALL)),
     "/src": (READ, ALL),
     "/api/pair": (POST, ALL),
     "/api/whoami": (GET, OPERATOR),
     "/api/stop": (POST, OPERATOR),
     "/api/link": (GET, OPERATOR),
+    "/api/fleet": (GET, VIEWER),
     "/api/rtc": (POST, OPERATOR),
     "/api/rtc/answer": (POST, OPERATOR),
     "/api/virtual-phone": (BOTH, SUPERVISOR),
