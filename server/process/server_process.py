@@ -96,7 +96,7 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     people = PeopleApi(manager, doors, base, http_url(given))
     signalling = SignallingEndpoint(manager, settings.rtc, settings.video.bitrate_bps)
     routes = [*people.routes(), *view_routes(view), *signalling.routes(), *Fleet().routes()]
-    app = make_app(api, PageServer(manager, settings.video), routes)
+    app = make_app(api, PageServer(manager, settings.video, settings.name), routes)
     admission = Admission(limits_for(raise_handles()))
     hosts = [*own_names(), *settings.names]
     guarded, trust = (

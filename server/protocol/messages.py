@@ -83,6 +83,8 @@ class Welcome(msgspec.Struct, tag="welcome", frozen=True):
     """From which the robot is filmed, for a lens that is focused once."""
     screen_height_m: float | None = None
     """Of the smallest screen that can show the robot; None: no screen can, it is a real one."""
+    name: str = ""
+    """Of this server, by which people tell it from others of its machine; "" without one."""
 
 
 class Refused(msgspec.Struct, tag="refused", frozen=True):

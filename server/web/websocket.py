@@ -124,9 +124,9 @@ class Connection:
 class PageServer:
     """Serves the four kinds of socket."""
 
-    def __init__(self, manager: SessionManager, video: VideoSettings) -> None:
-        """Serve the pages of one robot."""
-        self._manager, self._video = manager, video
+    def __init__(self, manager: SessionManager, video: VideoSettings, name: str = "") -> None:
+        """Serve the pages of one robot; `name` is the server's."""
+        self._manager, self._video, self._name = manager, video, name
 
     async def phone(self, socket: WebSocket) -> None:
         """`/ws/phone`: an operator."""
@@ -208,6 +208,7 @@ class PageServer:
                     you=member.id,
                     distance_m=self._manager.distance_m,
                     screen_height_m=screen.least_height_m if screen is not None else None,
+                    name=self._name,
                 )
             )
         )

@@ -20,6 +20,7 @@ from tests.e2e.test_serve import get, mode, processes, reset, status, until
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
 WAIT_MS = 30_000
 ROBOTS = {"left": "ames", "right": "twister"}
+PERMISSIONS = ["camera", "accelerometer", "gyroscope", "magnetometer"]
 SMALLEST_PX = """
 Math.min(...[...document.querySelectorAll('body *')]
   .filter((one) => [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim()))
@@ -80,15 +81,30 @@ def test_one_browser_is_in_at_both_and_stays_in_at_both(
 ) -> None:
     pages = [supervising(context, one) for one in (left, right)]
     for _ in range(2):
-        for page, robot in zip(pages, ROBOTS.values(), strict=True):
+        for page, (name, robot) in zip(pages, ROBOTS.items(), strict=True):
             expect(page.locator("#mode")).to_have_text("DISARMED", timeout=WAIT_MS)
-            expect(page.locator("#robot")).to_contain_text(robot)
+            expect(page.locator("#robot")).to_have_text(f"{name} · {robot}")
+            expect(page).to_have_title(f"DISARMED · {name}")
             expect(page.locator("#people li")).to_have_count(1)
         for page in pages:
             page.reload()
     assert len({cookie["name"] for cookie in context.cookies()}) == 2
     for page in pages:
         page.close()
+
+
+def test_a_phones_page_says_whose_robot_it_leads(context: BrowserContext, left: Serving) -> None:
+    assert context.browser is not None
+    with context.browser.new_context(
+        ignore_https_errors=True, permissions=PERMISSIONS, viewport={"width": 412, "height": 915}
+    ) as held:
+        phone = held.new_page()
+        phone.goto(f"{left.local_https}/{left.link()}")
+        phone.click("#start")
+        expect(phone.locator("#server")).to_have_text("left", timeout=WAIT_MS)
+        expect(phone.locator("#server")).to_be_visible()
+        expect(phone).to_have_title("left · Lightleash")
+    until(lambda: status(left)["operator"] == "", 20.0, "no phone")
 
 
 def test_what_is_done_at_one_is_not_done_at_the_other(left: Serving, right: Serving) -> None:

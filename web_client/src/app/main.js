@@ -57,6 +57,7 @@ const phone = new Phone({
   identity: () => identity,
   onWelcome: (welcome) => {
     watch.close();
+    view.named(welcome.name);
     void welcomed(welcome);
   },
   onPath: ({ wish }) => choosePath(wish, 'supervisor'),

@@ -18,6 +18,8 @@ export class Alarm {
    */
   constructor(document, signal) {
     this.document = document;
+    /** The server's name, by which one of several pages is told from the others. */
+    this.server = '';
     this.lasting = new Lasting(/** @type {(mode: any) => void} */ (signal), LIMITS);
   }
 
@@ -29,7 +31,7 @@ export class Alarm {
    */
   take(mode, name, flies, now) {
     const isAlarm = ALARMS.includes(mode) || (flies && DEAF.includes(mode));
-    this.document.title = `${isAlarm ? '⚠ ' : ''}${name} · Lightleash`;
+    this.document.title = `${isAlarm ? '⚠ ' : ''}${name} · ${this.server || 'Lightleash'}`;
     if (isAlarm) this.lasting.take(mode, now);
     else this.lasting.over();
   }

@@ -102,6 +102,7 @@ function take(message) {
   const now = clock.now();
   if (message.type === 'welcome') {
     view.screen(message.screen_height_m);
+    view.server = alarm.server = message.name;
     dispatch({ type: 'welcomed' });
   }
   if (message.type === 'status') {

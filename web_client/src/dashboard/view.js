@@ -27,6 +27,8 @@ export class BoardView extends Elements {
   constructor(document, handlers) {
     super(document);
     this.shownEvents = '';
+    /** Its name, or "". */
+    this.server = '';
     for (const what of /** @type {const} */ (['arm', 'disarm', 'reset'])) {
       this.find(what).addEventListener('click', () => handlers.onRequest(what));
     }
@@ -85,7 +87,7 @@ export class BoardView extends Elements {
     const left = board.heard ? board.status?.until_ramp_ms ?? null : null;
     this.text('left', rampWords(left === null ? null : Math.ceil(left / 1000), board.status));
     this.text('reason', board.heard ? board.status?.reason ?? '' : '');
-    this.text('robot', board.status?.robot ?? '–');
+    this.text('robot', [this.server, board.status?.robot ?? '–'].filter(Boolean).join(' · '));
     for (const [what, can] of Object.entries(requests(board))) {
       /** @type {HTMLButtonElement} */ (this.find(what)).disabled = !can;
     }

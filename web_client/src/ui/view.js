@@ -219,6 +219,13 @@ export class View {
     this.text('hold-hint', [words, hint].filter(Boolean).join(' · '));
   }
 
+  /** @param {string} server Name of the server, or "": with several on a machine, whose robot this is. */
+  named(server) {
+    this.show('server', server !== '');
+    this.text('server', server);
+    if (server !== '') this.document.title = `${server} · Lightleash`;
+  }
+
   /**
    * @param {string} id
    * @param {string} text

@@ -79,6 +79,7 @@
  * @property {string} you Id of this page's pairing, as in `people` of a status.
  * @property {number} distance_m From which the robot is filmed, for a lens that is focused once.
  * @property {number | null} screen_height_m Of the smallest screen that can show the robot; null: no screen can, it is a real one.
+ * @property {string} name Of this server, by which people tell it from others of its machine; "" without one.
  */
 
 /**

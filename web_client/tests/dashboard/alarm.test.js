@@ -27,6 +27,14 @@ test('RAMP and LOST sound at once and again while they last, other modes do not'
   assert.equal(title, '⚠ LOST · Lightleash');
 });
 
+test('a page of a server that has a name is told by it among others', () => {
+  const page = { title: '' };
+  const alarm = new Alarm(page, () => {});
+  alarm.server = 'left';
+  alarm.take('TRACK', 'TRACK', true, 0);
+  assert.equal(page.title, 'TRACK · left');
+});
+
 test('a fault that is over is silent, and sounds at once when it comes back', () => {
   const { signals, title } = heard([['RAMP', 0], ['DISARMED', 10], ['DISARMED', 9000], ['RAMP', 9010], ['TRACK', 9020]]);
   assert.deepEqual(signals, ['RAMP', 'RAMP']);
