@@ -18,6 +18,7 @@ from hardware.sim.plant.laser_task import Tube
 from hardware.sim.plant.model import STEP_MS, mjcf
 from hardware.sim.plant.obstacle import Obstacle
 from hardware.sim.plant.touch import ContactForce, ContactForceSensor
+from hardware.sim.plant.vibration import Shaking, Vibration
 from pipeline.frames import Array, R_from_wxyz, wxyz_from_R
 
 SETTLE_MS = 1000
@@ -33,6 +34,8 @@ class PlantOptions:
     """The rounding of the flight controller."""
     imu_rate_hz: float = 200.0
     """How often `imu` is asked: white noise of the density's bandwidth, half of this."""
+    vibration: Vibration | None = None
+    """Of propellers, felt by the body's sensors."""
     obstacle: Obstacle | None = None
     """A tool on the robot and a wall before it."""
     tube: Tube | None = None
@@ -57,6 +60,8 @@ class Plant:
         self._model.dof_damping[3:6] = parameters.air_damping_rotation
         self._data = mujoco.MjData(self._model)
         self._imu = BodyImuErrors(parameters.imu, rng, options)
+        shakes = options.vibration  # by draws of its own: all else stays as it would be
+        self._shaking = Shaking(shakes, rng.spawn(1)[0]) if shakes is not None else None
         self._touch = ContactForceSensor(self._model, self._data) if options.obstacle else None
         thrusters = len(parameters.thruster_torques)
         self._delay_ms = round(1e3 * parameters.delay)
@@ -237,7 +242,11 @@ class Plant:
 
         Each call draws new noise.
         """
-        return self._imu.read(self._data.sensordata[:3], self._data.sensordata[3:6])
+        omega, a = self._data.sensordata[:3], self._data.sensordata[3:6]
+        if self._shaking is not None:
+            by_rate, by_force = self._shaking.added(self.t, self.thrusts)
+            omega, a = omega + by_rate, a + by_force
+        return self._imu.read(omega, a)
 
 
 class BodyImuErrors:
