@@ -340,7 +340,11 @@ class Teleop:
             or self._astray(known),
             block=self._blocked(leashed),
             is_settled=self._is_settled(known, ages),
-            refusals=(*inputs.refusals, *map(MEND.format, self._acting.weak_thrusters)),
+            refusals=(
+                *inputs.refusals,
+                *map(MEND.format, self._acting.weak_thrusters),
+                *self.estimator.refusals,
+            ),
             requests=inputs.requests,
             robot_left_ms=flight_envelope.saturated_ms(inputs.robot_left_s),
             **ages.in_ms(),

@@ -92,5 +92,9 @@ class Estimator(Protocol):
         """Why nobody should fly on it though it gives a state, in words for the operator."""
 
     @property
+    def refusals(self) -> tuple[str, ...]:
+        """Why not to arm on it, in words for people; whoever flies goes on."""
+
+    @property
     def health(self) -> Health:
         """Telemetry."""

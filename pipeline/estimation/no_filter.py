@@ -128,6 +128,11 @@ class NoFilter:
         return ""
 
     @property
+    def refusals(self) -> tuple[str, ...]:
+        """None: it does not watch its sensors."""
+        return ()
+
+    @property
     def health(self) -> Health:
         """Telemetry."""
         fused = sum(count for fusion, count in self.poses.items() if fusion)

@@ -74,6 +74,11 @@ class PaperEkf:
         return ""
 
     @property
+    def refusals(self) -> tuple[str, ...]:
+        """None: it does not watch its sensors."""
+        return ()
+
+    @property
     def health(self) -> Health:
         """Telemetry."""
         x = self._track.now.x

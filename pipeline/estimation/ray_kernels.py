@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 
 from pipeline.camera.lens_kernels import NEAREST_M
-from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_OFFSET, N
+from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_OFFSET
 from pipeline.frames import Array
 from pipeline.signals import Flags
 from pipeline.so3_kernels import kernel, put_exp
@@ -73,23 +73,23 @@ def _unlikelihood(P: Array, H: Array, C: Array, miss: Array) -> float:
 @kernel
 def _fuse_scalar(P: Array, dx: Array, h: Array, miss: float, v: Array) -> float:
     """Fuse miss = h · (error) + unit noise into dx (22,) and P; gives the normalised square."""
-    s, r = 1.0, miss
-    for k in range(N):
+    n, s, r = P.shape[0], 1.0, miss
+    for k in range(n):
         v[k] = 0.0
     for i in range(7):
         hi, row = h[i], TOUCHED[i]
         r -= hi * dx[row]
-        for k in range(N):
+        for k in range(n):
             v[k] += hi * P[row, k]
     for i in range(7):
         s += h[i] * v[TOUCHED[i]]
     gain, scale = r / s, 1.0 / sqrt(s)
-    for k in range(N):
+    for k in range(n):
         dx[k] += gain * v[k]
         v[k] *= scale
-    for i in range(N):
+    for i in range(n):
         vi = v[i]
-        for j in range(N):
+        for j in range(n):
             P[i, j] -= vi * v[j]
     return r * r / s
 
@@ -127,7 +127,8 @@ def fuse_rays(
         miss[i] = tangents[i] - expected
         if use[i] < 0:
             use[i] = 1 if _unlikelihood(P, H[i], covariances[i], miss[i]) <= gate else 0
-    chi2, dx, v, variance = 0.0, np.zeros(N), np.empty(N), P[OFFSET, OFFSET]
+    n, chi2, variance = P.shape[0], 0.0, P[OFFSET, OFFSET]
+    dx, v = np.zeros(n), np.empty(n)
     count, square = 0, 0.0
     for i in range(m):
         if use[i] != 1:
@@ -157,7 +158,7 @@ def correct(x: Array, R: Array, dx: Array) -> None:
     for i in range(3):
         x[i] += dx[i]
         x[3 + i] += dx[6 + i]
-    for k in range(BIASES, N):
+    for k in range(BIASES, dx.shape[0]):
         x[X_OFFSET - OFFSET + k] += dx[k]
     turned = np.empty((3, 3))
     put_exp(dx[3], dx[4], dx[5], turned)
@@ -170,7 +171,7 @@ def is_sound(x: Array, R: Array, P: Array) -> bool:
     for value in x:
         if not abs(value) < 1e6:
             return False
-    for i in range(N):
+    for i in range(P.shape[0]):
         if not 0.0 <= P[i, i] < 1e9:
             return False
     return bool(abs(R[0, 0]) <= 1.001)

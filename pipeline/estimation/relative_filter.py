@@ -13,11 +13,12 @@ from typing import Final
 import numpy as np
 
 from pipeline.estimation.adaptive_noise import AdaptiveNoise
+from pipeline.estimation.aliased_tone import AliasedTone
 from pipeline.estimation.bias_steps import BiasSteps
 from pipeline.estimation.estimator import Fusion, Health
 from pipeline.estimation.misdated_picture import MisdatedPictures
 from pipeline.estimation.out_of_sequence import Checkpoint
-from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET
+from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET, N, X
 from pipeline.estimation.relative_noise import initial_biases
 from pipeline.estimation.relative_start import (
     Learnt,
@@ -27,7 +28,7 @@ from pipeline.estimation.relative_start import (
 )
 from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_imu_sample
-from pipeline.estimation.sensor_doubts import sensor_doubts
+from pipeline.estimation.sensor_doubts import MEND_TONE, aliased_tones, sensor_doubts
 from pipeline.estimation.spot_noise import SpotNoise
 from pipeline.estimation.tones import PICTURES, Tones
 from pipeline.estimator_config import RelativeConfig
@@ -80,7 +81,7 @@ class RelativeFilter:
         self._offset = OffsetMonitor()
         self._adaptive_noise, self._spot_noise = AdaptiveNoise(), SpotNoise()
         self._bias_steps, self._misdated = BiasSteps(self._initial), MisdatedPictures()
-        self._off = Tones(PICTURES)
+        self._off, self._aliased = Tones(PICTURES), AliasedTone()
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
@@ -91,6 +92,7 @@ class RelativeFilter:
         """Remember a sample of the robot, in any order; what can't be used is counted."""
         rate, force = sample.omega_m_bf_in_b, sample.a_m_bf_in_b
         self._remember(self._track.body, sample.t, rate, force)
+        self._aliased.feel(sample.t, rate, force)
 
     def _remember(self, stream: ImuStream, t: float, rate: Array, force: Array) -> None:
         if not is_imu_sample(t, rate, force) or t > self._now + MAX_SLEEP_S:
@@ -126,6 +128,13 @@ class RelativeFilter:
         t = seen.t + float(self._track.newest.x[X_OFFSET])
         if t <= self._track.base.t:
             return Fusion.LATE
+        if self._track.tone is None and self._aliased.tone is not None:
+            # it may have seemed to be one, or to be the phone's
+            self._bias_steps.walks[:] = 0.0
+            self._adaptive_noise = AdaptiveNoise()
+            self._track.walk(self._bias_steps.walks)
+            self._track.doubt_phone(1.0)
+        self._track.sway(self._aliased.tone)
         # gating in this order: a prediction too unsure to gate by is replaced, not corrected; then
         # what the sensors may be off by inflates it, before each LED is gated against it
         predicted = self._track.predicted(min(t, now))
@@ -147,6 +156,7 @@ class RelativeFilter:
         track, C = self._track, seen.pose.covariance
         e, P = _missed(seen.pose, predicted), track.in_picture(predicted)
         self._off.add(seen.t, e[3:], e[:3])
+        self._aliased.miss(seen.t, e, walks=bool(self._bias_steps.walks.any()))
         if variance < ONE_DATE_S**2:
             passing = track.passing(predicted)
             misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
@@ -189,6 +199,8 @@ class RelativeFilter:
         if used:
             self._t_seen = max(self._t_seen, seen.t)
         newest = self._track.newest
+        if self._track.tone is not None:
+            self._aliased.judge(newest.t, *self._track.amplitudes)
         sigma = float(np.sqrt(newest.P[OFFSET, OFFSET]))
         if self._offset.must_begin_again(float(newest.x[X_OFFSET]), sigma, seen.t):
             self._t_start = seen.t  # nothing learnt at a wrong time is worth keeping
@@ -214,7 +226,7 @@ class RelativeFilter:
             self._learnt = None
             return
         newest = self._track.newest
-        self._learnt = newest.x[X_BIASES:].copy(), newest.P[BIASES:, BIASES:].copy()
+        self._learnt = newest.x[X_BIASES:X].copy(), newest.P[BIASES:N, BIASES:N].copy()
 
     def _give_up(self) -> None:
         """Throw the estimate away, keep the samples for the next start."""
@@ -283,6 +295,12 @@ class RelativeFilter:
         return self._offset.complaint
 
     @property
+    def refusals(self) -> tuple[str, ...]:
+        """See `Estimator`: whose samples sway by a vibration, and what to do."""
+        swaying = aliased_tones(self._now, self._aliased.t_sure)
+        return tuple(words + MEND_TONE for words in swaying)
+
+    @property
     def health(self) -> Health:
         """Telemetry."""
         fused = sum(count for fusion, count in self.pictures.items() if fusion)
@@ -314,6 +332,7 @@ class RelativeFilter:
                 self._track.t_clipped.ravel(),
                 self._track.t_vibrating.ravel(),
                 self._off.t_heard,
+                self._aliased.t_sure,
                 self._bias_steps.t_stepped,
                 self._track.body_noise,
                 self._spot_noise.factor,

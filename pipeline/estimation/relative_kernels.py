@@ -4,9 +4,14 @@ State: x (19,) = p, u, four biases in the order of the inputs (ω_b, f_b, ω_c, 
 R (3, 3) beside it. Error state (22): δp, θ, δu, the biases, the offset. Between two pictures only
 the moving part changes, so F (9, 9), G (9, 12) and the noise Q (9, 9) are gathered step by step
 and the covariance is touched once.
+
+While the body's sensors have a tone, both are longer by its amplitudes: of the cosine (6,) in ω_b
+and f_b, and of the sine (6,); G has so many columns more.
 """
 
 from __future__ import annotations
+
+from math import cos, sin
 
 import numpy as np
 
@@ -22,16 +27,29 @@ BIASES, OFFSET = 9, 21
 """First error state of the biases; of the time offset."""
 X, X_BIASES, X_OFFSET = 19, 6, 18
 """Length of x, and where the same stand there."""
+TONE, X_TONE, BODY = N, X, 6
+"""Where a tone's amplitudes stand, if there is one; inputs of the body."""
 MAX_STEP_S = 0.01
 
 
 @kernel
-def gather(F: Array, G: Array, Q: Array, f: Array, g: Array, s: Array, h: float, w: Array) -> None:
+def gather(
+    F: Array,
+    G: Array,
+    Q: Array,
+    f: Array,
+    g: Array,
+    s: Array,
+    h: float,
+    w: Array,
+    swing: tuple[float, float] = (0.0, 0.0),
+) -> None:
     """Put a step (f, g) behind F, G, Q; s (12,) are the noise densities of its inputs [unit²/Hz].
 
-    f is zero but for (p: p θ u), (θ: θ), (u: θ u); w (9, 12) is scratch memory.
+    f is zero but for (p: p θ u), (θ: θ), (u: θ u); w (9, columns of G) is scratch memory. `swing`
+    are cosine and sine of a tone's phase, if G has columns for its amplitudes.
     """
-    for A, n in ((F, MOVING), (G, INPUTS)):
+    for A, n in ((F, MOVING), (G, G.shape[1])):
         _times_step(f, A, n, w)
         for i in range(MOVING):
             for j in range(n):
@@ -39,6 +57,9 @@ def gather(F: Array, G: Array, Q: Array, f: Array, g: Array, s: Array, h: float,
     for i in range(MOVING):
         for j in range(INPUTS):
             G[i, j] += g[i, j]
+        for j in range(INPUTS, G.shape[1]):
+            column = (j - INPUTS) % BODY
+            G[i, j] += g[i, column] * swing[(j - INPUTS) // BODY]
     _times_step(f, Q, MOVING, w)
     for i in range(MOVING):
         for j in range(i + 1):
@@ -78,35 +99,53 @@ def _times_step(f: Array, A: Array, n: int, w: Array) -> None:
 def apply(P: Array, F: Array, G: Array, Q: Array, walks: Array, span: float, w: Array) -> None:
     """Carry P (22, 22) over a transition; walks (13,) densities of biases and offset [unit²/s].
 
-    Inputs are samples *less* biases, so biases act with −G; w (2, 9, 22) is scratch memory.
+    Inputs are samples *less* biases, so biases act with −G; w (2, 9, 22) is scratch memory. Where
+    there is a tone, P, walks and w have 12 more for its amplitudes, which act as biases do.
     """
     U, V = w[0], w[1]
+    n = P.shape[0]
     for i in range(MOVING):  # U = [F −G] P
-        for j in range(N):
+        for j in range(n):
             U[i, j] = 0.0
         for k in range(MOVING):
             fik = F[i, k]
-            for j in range(N):
+            for j in range(n):
                 U[i, j] += fik * P[k, j]
-        for k in range(INPUTS):
-            gik = G[i, k]
-            for j in range(N):
-                U[i, j] -= gik * P[BIASES + k, j]
+        for k in range(G.shape[1]):
+            gik, row = G[i, k], BIASES + k if k < INPUTS else TONE - INPUTS + k
+            for j in range(n):
+                U[i, j] -= gik * P[row, j]
     for i in range(MOVING):
         for j in range(i + 1):
             v = Q[i, j]
             for k in range(MOVING):
                 v += U[i, k] * F[j, k]
-            for k in range(INPUTS):
-                v -= U[i, BIASES + k] * G[j, k]
+            for k in range(G.shape[1]):
+                v -= U[i, BIASES + k if k < INPUTS else TONE - INPUTS + k] * G[j, k]
             V[i, j] = v
     for i in range(MOVING):
         for j in range(i + 1):
             P[i, j] = P[j, i] = V[i, j]
-        for j in range(BIASES, N):
+        for j in range(BIASES, n):
             P[i, j] = P[j, i] = U[i, j]
-    for k in range(N - BIASES):
+    for k in range(n - BIASES):
         P[BIASES + k, BIASES + k] += walks[k] * span
+
+
+@kernel
+def take_errors(
+    t: float, x: Array, tone: tuple[float, float], inputs: Array
+) -> tuple[float, float]:
+    """Take biases and tone off the inputs (12,) at `t`; gives cosine and sine of its phase."""
+    for k in range(INPUTS):
+        inputs[k] -= x[X_BIASES + k]
+    if x.shape[0] == X:
+        return 0.0, 0.0
+    phase = tone[0] * (t - tone[1])
+    along, across = cos(phase), sin(phase)
+    for k in range(BODY):
+        inputs[k] -= along * x[X_TONE + k] + across * x[X_TONE + BODY + k]
+    return along, across
 
 
 @kernel
@@ -125,20 +164,23 @@ def transit(
     noise: Array,
     hand: Array,
     w: Array,
+    tone: tuple[float, float] = (0.0, 0.0),
 ) -> int:
     """Carry x, R from span[0] to span[1] through both IMUs' samples; gather F, G, Q from nothing.
 
     `noise` (2, 4, 2) by (body, phone) and (gyroscope, accelerometer): standard deviation of a
     sample, density by which the truth wanders between and after samples, its drift after the last
     one, full scale. `hand` (n, 6): forecast of `hand_predictor` beyond the phone's last sample;
-    empty: that is held. R_ic (3, 3) goes on gathering the camera's rotation since it. Gives the
-    count of steps.
+    empty: that is held. `tone`: angular rate [rad/s] of the one whose amplitudes x has, and a time
+    at which its phase is nought [s]. R_ic (3, 3) goes on gathering the camera's rotation since the
+    phone's last sample. Gives the count of steps.
     """
     F[:], G[:], Q[:] = 0.0, 0.0, 0.0
     for k in range(MOVING):
         F[k, k] = 1.0
     s, turn_c = np.empty(INPUTS), np.empty((3, 3))
-    inputs, f, g, scratch = np.empty(INPUTS), np.empty((9, 9)), np.empty((9, 12)), np.empty((9, 12))
+    inputs, f, g = np.empty(INPUTS), np.empty((9, 9)), np.empty((9, 12))
+    scratch = np.empty(G.shape)
     ahead, begun = np.empty(6), np.empty(6)
     t, t_end = span
     b = int(np.searchsorted(t_b, t, side="right")) - 1
@@ -167,10 +209,9 @@ def transit(
                     s[6 + k] += (ahead[3 + k] * ahead[3 + k] - begun[3 + k] * begun[3 + k]) / h
                 forecast_at(hand, middle - t_c[last], ahead)
                 inputs[6:9] = ahead[0:3]
-            for k in range(INPUTS):
-                inputs[k] -= x[X_BIASES + k]
+            swing = take_errors(middle, x, tone, inputs)
             step(x, R, inputs, h, w, f, g)
-            gather(F, G, Q, f, g, s, h, scratch)
+            gather(F, G, Q, f, g, s, h, scratch, swing)
             if c == last:
                 put_exp(h * inputs[6], h * inputs[7], h * inputs[8], turn_c)
                 R_ic[:] = R_ic @ turn_c
@@ -185,9 +226,16 @@ def transit(
 
 @kernel
 def inputs_at(
-    t: float, x: Array, t_b: Array, v_b: Array, t_c: Array, v_c: Array, hand: Array
+    t: float,
+    x: Array,
+    t_b: Array,
+    v_b: Array,
+    t_c: Array,
+    v_c: Array,
+    hand: Array,
+    tone: tuple[float, float] = (0.0, 0.0),
 ) -> Array:
-    """The inputs (12,) at time `t`, biases removed."""
+    """The inputs (12,) at time `t`, biases and tone removed."""
     inputs = np.empty(INPUTS)
     b = int(np.searchsorted(t_b, t, side="right")) - 1
     c = int(np.searchsorted(t_c, t, side="right")) - 1
@@ -197,6 +245,5 @@ def inputs_at(
         ahead = np.empty(6)
         forecast_at(hand, t - t_c[c], ahead)
         inputs[6:9] = ahead[0:3]
-    for k in range(INPUTS):
-        inputs[k] -= x[X_BIASES + k]
+    take_errors(t, x, tone, inputs)
     return inputs

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from pipeline.estimation.aliased_tone import WANDERS, Tone
 from pipeline.estimation.full_scale import LOUD, FullScale
 from pipeline.estimation.hand_motion_kernels import WINDOW
 from pipeline.estimation.hand_predictor import HandPredictor
@@ -14,17 +15,20 @@ from pipeline.estimation.out_of_sequence import Checkpoint, OutOfSequence
 from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound, misfit
 from pipeline.estimation.relative_kernels import (
     BIASES,
+    BODY,
     INPUTS,
     MOVING,
     OFFSET,
+    TONE,
     X_OFFSET,
+    X_TONE,
     N,
     X,
     apply,
     inputs_at,
     transit,
 )
-from pipeline.estimation.relative_noise import noise_of, walks_of
+from pipeline.estimation.relative_noise import initial_biases, noise_of, walks_of
 from pipeline.estimation.sample_noise import SampleNoise
 from pipeline.estimation.tones import PHONE, ROBOT, Tones
 from pipeline.estimator_config import RelativeConfig
@@ -34,6 +38,10 @@ from pipeline.signals import Flags, VisionMeasurement
 
 KEPT: Final = 2 * WINDOW
 """Samples up to the base that are still interpolated from, or learnt from."""
+MISLED: Final = (0.05, 0.05, 0.3)
+"""By so much place [m], attitude [rad] and velocity [m/s] may be wrong before a tone is known."""
+AMPLITUDES: Final = 12
+"""Of a tone."""
 BENT: Final = 2
 """The curve through a new sample and those around it changes from so many before it on."""
 
@@ -54,7 +62,10 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         self._configured = self._noise[:, :3].copy()
         self._heard = [SampleNoise(sigmas) for sigmas in self._configured[:, 0]]
         self._tones = [Tones(limits) for limits in (ROBOT, PHONE)]
+        self._initial, self._initial_offset = initial_biases(config), config.initial_offset
         self._gate, self._still = config.gate_chi2, config.offset_still
+        self.tone: Tone | None = None
+        """Whose amplitudes stand behind the rest of the state."""
         self._F, self._G = np.zeros((MOVING, MOVING)), np.zeros((MOVING, INPUTS))
         self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
         self._products = np.zeros((2, MOVING, N))
@@ -106,13 +117,83 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
 
     def moved(self, by: Array) -> None:
         """The sensors' biases are off by so much (4,) about each axis."""
-        variances = np.zeros(N)
+        variances = np.zeros(len(self.base.P))
         variances[BIASES:OFFSET] = np.repeat(by * by, 3)
         self.open(variances)
 
     def walk(self, densities: Array) -> None:
         """Biases walk by `densities` (4,) [unit²/s] more than configured, by sensor."""
         self._walks[:INPUTS] = self._calm[:INPUTS] + np.repeat(densities, 3)
+
+    def begin(self, start: Checkpoint[VisionMeasurement]) -> None:
+        """See `OutOfSequence`; a tone goes on."""
+        super().begin(self._with_tone(start) if self.tone is not None else start)
+
+    def sway(self, tone: Tone | None) -> None:
+        """Let the robot's samples have this tone since the base, or none."""
+        if tone is self.tone:
+            return
+        if self.tone is not None and tone is not None and self.tone.sizes == tone.sizes:
+            self.tone = tone  # followed
+            self._replay_from = min(self._replay_from, self.base.t)
+            return
+        if self.tone is not None:
+            self._resize(0)
+            for one in (*self.checkpoints, self.now, self._frontier):
+                one.x, one.P = one.x[:X].copy(), np.ascontiguousarray(one.P[:N, :N])
+                one.opened = None if one.opened is None else one.opened[:N]
+        self.tone = tone
+        if tone is None:
+            return
+        self._resize(AMPLITUDES)
+        self._walks[N - BIASES :] = WANDERS**2 * self._tone_variances()
+        for one in (*self.checkpoints, self.now, self._frontier):
+            self._with_tone(one)
+        self.base.P[:N, :N] += np.diag(self._misled(tone))
+        self._replay_from = min(self._replay_from, self.base.t)
+
+    def _misled(self, tone: Tone) -> Array:
+        """Variances (22,) by which it may have misled what was known without it."""
+        moving, biases = np.repeat(MISLED, 3), np.repeat(self._initial, 3)
+        biases[:BODY] += np.repeat(tone.sizes, 3)
+        sigmas = np.concatenate((moving, biases, [self._initial_offset]))
+        variances: Array = np.square(sigmas)
+        return variances
+
+    def _resize(self, more: int) -> None:
+        """Make room for so many amplitudes."""
+        self._sizes = X + more, N + more
+        self._G = np.zeros((MOVING, INPUTS + more))
+        self._products = np.zeros((2, MOVING, N + more))
+        walks = np.zeros(N + more - BIASES)
+        walks[: N - BIASES] = self._walks[: N - BIASES]
+        self._walks = walks
+
+    def _tone_variances(self) -> Array:
+        """(12,) of amplitudes that may be as large as they seem."""
+        sizes = (0.0, 0.0) if self.tone is None else self.tone.sizes
+        variances: Array = np.square(np.repeat((*sizes, *sizes), 3))
+        return variances
+
+    def _with_tone(self, one: Checkpoint[VisionMeasurement]) -> Checkpoint[VisionMeasurement]:
+        """The same, with amplitudes of which nothing is known."""
+        x, P = np.zeros(self._sizes[0]), np.zeros((self._sizes[1], self._sizes[1]))
+        x[:X], P[:N, :N] = one.x, one.P
+        np.fill_diagonal(P[N:, N:], self._tone_variances())
+        one.x, one.P = x, P
+        if one.opened is not None:
+            one.opened = np.append(one.opened, np.zeros(AMPLITUDES))
+        return one
+
+    @property
+    def amplitudes(self) -> tuple[Array, Array]:
+        """Of the tone at the newest picture (12,), and their covariance (12, 12)."""
+        newest = self.newest
+        return newest.x[X_TONE:].copy(), newest.P[TONE:, TONE:].copy()
+
+    @property
+    def _key(self) -> tuple[float, float]:
+        return (0.0, 0.0) if self.tone is None else self.tone.key
 
     def misfit(self, here: Checkpoint[VisionMeasurement]) -> tuple[float, int]:
         """χ² of the LEDs fused there about the pose that fits them best; its degrees of freedom."""
@@ -152,7 +233,16 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
     def _inputs(self, here: Checkpoint[VisionMeasurement]) -> Array:
         body, phone, hand = self.body, self.phone, self._hand.forecast
         return np.asarray(
-            inputs_at(here.t, here.x, body.times, body.values, phone.times, phone.values, hand)
+            inputs_at(
+                here.t,
+                here.x,
+                body.times,
+                body.values,
+                phone.times,
+                phone.values,
+                hand,
+                self._key,
+            )
         )
 
     def _fuse(
@@ -195,6 +285,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
             self._noise,
             self._hand.forecast,
             self._steps,
+            self._key,
         )
         apply(here.P, self._F, self._G, self._Q, self._walks, t - here.t, self._products)
         here.t = t

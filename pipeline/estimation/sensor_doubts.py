@@ -21,6 +21,14 @@ SWAYS: Final = (
     "{kind} of the robot or the phone sways where pictures don't: does something vibrate at about"
     " its sample rate?"
 )
+ALIASED: Final = (
+    "{sensor} sways where pictures don't: something shakes it at about a multiple of its sample"
+    " rate."
+)
+MEND_TONE: Final = (
+    " Balance the propellers, or let it filter below half of the rate at which it is read, or read"
+    " it at another one."
+)
 SAID_S: Final = 3.0
 """What happens at once is said for so long."""
 LEARNS_S: Final = 5.0
@@ -37,6 +45,7 @@ def sensor_doubts(
     t_clipped: Array,
     t_vibrating: Array,
     t_swaying: Array,
+    t_aliased: Array,
     t_stepped: Array,
     noise: Array,
     spot_noise: float,
@@ -49,6 +58,7 @@ def sensor_doubts(
         t_clipped: When each sensor last said as much as it can (4,) [s].
         t_vibrating: When it last had a tone (4,) [s].
         t_swaying: When pictures were last off by one in turn and in place (2,) [s].
+        t_aliased: When each of the robot's was last sure to sway by a vibration (2,) [s].
         t_stepped: When its bias last stepped (4,) [s].
         noise: Of the robot's samples, by the configured (2,).
         spot_noise: Factor of the variances of LEDs' rays.
@@ -61,6 +71,7 @@ def sensor_doubts(
     # what is cut off has overtones, too
     shaken = [k for k in since(t_vibrating) if t_vibrating[k] - t_clipped[k] > SAID_S]
     vibrating = [VIBRATES.format(sensor=SENSORS[k]) for k in shaken]
+    aliased = aliased_tones(t, t_aliased)
     swaying = [SWAYS.format(kind=KINDS[k]) for k in since(t_swaying)]
     jumped = since(t_stepped) if t - t_start > LEARNS_S else ()
     kinds = sorted({k % 2 for k in jumped})  # which of the two can hardly be told
@@ -71,4 +82,10 @@ def sensor_doubts(
         if ratio > NOISY
     ]
     inexact = ["LEDs are seen much less exactly than usual."] if spot_noise > INEXACT else []
-    return (*clipped, *vibrating, *swaying, *stepped, *noisy, *inexact)
+    return (*clipped, *vibrating, *aliased, *swaying, *stepped, *noisy, *inexact)
+
+
+def aliased_tones(t: float, t_aliased: Array) -> tuple[str, ...]:
+    """Sentences, one for each of the robot's sensors that swayed lately (2,) [s]."""
+    swaying = zip(ROBOTS, (t - t_aliased).tolist(), strict=True)
+    return tuple(ALIASED.format(sensor=sensor) for sensor, since in swaying if since < SAID_S)

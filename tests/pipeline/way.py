@@ -38,8 +38,11 @@ def forecast_after(phone):
 class Way:
     """A state with its covariance, carried along samples."""
 
-    def __init__(self, body=BODY, phone=PHONE, *, predicts=False):
-        """The phone's last sample is held, or what follows it is predicted."""
+    def __init__(self, body=BODY, phone=PHONE, *, predicts=False, tone=None):
+        """The phone's last sample is held, or what follows it is predicted.
+
+        `tone`: rate [rad/s] and a time without phase [s] of one with amplitudes in the state.
+        """
         self.config, self.body, self.phone = RelativeConfig(), body, phone
         self.predicts, self.full_scale = predicts, np.inf
         self.x, self.R, self.R_ic = np.zeros(X), R_from_rpy(np.array([0.1, -0.2, 0.4])), np.eye(3)
@@ -48,7 +51,13 @@ class Way:
         self.P = np.diag(
             np.repeat((1e-3, 1e-3, 3e-2, 1e-2, 1e-1, 2e-3, 3e-2, 5e-3), (3,) * 7 + (1,)) ** 2
         )
-        self.F, self.G, self.Q = np.empty((9, 9)), np.empty((9, 12)), np.empty((9, 9))
+        self.tone, self.walks = tone or (0.0, 0.0), walks_of(self.config)
+        if tone:
+            self.x = np.append(self.x, np.zeros(12))
+            self.P = np.diag(np.append(self.P.diagonal(), np.full(12, 0.01)))
+            self.walks = np.append(self.walks, np.zeros(12))
+        columns = INPUTS + len(self.P) - N
+        self.F, self.G, self.Q = np.empty((9, 9)), np.empty((9, columns)), np.empty((9, 9))
 
     def go(self, start, stop):
         """The count of steps."""
@@ -67,10 +76,10 @@ class Way:
             noise,
             forecast_after(self.phone) if self.predicts else NOTHING,
             np.empty((13, 3, 3)),
+            self.tone,
         )
-        apply(
-            self.P, self.F, self.G, self.Q, walks_of(self.config), stop - start, np.empty((2, 9, N))
-        )
+        work = np.empty((2, 9, len(self.P)))
+        apply(self.P, self.F, self.G, self.Q, self.walks, stop - start, work)
         return steps
 
     def sigma(self, k):

@@ -13,7 +13,9 @@ from pipeline.estimation.relative_kernels import (
     BIASES,
     INPUTS,
     MOVING,
+    TONE,
     X_BIASES,
+    X_TONE,
     N,
     apply,
     gather,
@@ -122,6 +124,46 @@ def test_the_gathered_jacobians_are_those_of_the_whole_transit():
             other.go(0.2, 0.3)
             ends.append(np.concatenate((other.x[:3], log(way.R.T @ other.R), other.x[3:6])))
         assert np.abs((ends[0] - ends[1]) / (2.0 * e) + way.G[:, k]).max() < 1e-7
+
+
+def test_a_tone_is_taken_off_the_bodys_samples_and_its_amplitudes_act_as_biases_that_swing():
+    tone, sizes = (2.0 * np.pi * 3.0, 0.02), np.array((0.04, -0.03, 0.05, 0.8, -0.5, 0.6) * 2)
+    sizes[6:] *= -0.5
+    phase = tone[0] * (BODY[0] - tone[1])
+    waves = np.cos(phase)[:, None] * sizes[:6] + np.sin(phase)[:, None] * sizes[6:]
+    calm, shaken = Way(), Way((BODY[0], BODY[1] + waves), tone=tone)
+    shaken.x[X_TONE:] = sizes
+    calm.go(0.1, 0.5)
+    shaken.go(0.1, 0.5)
+    assert np.abs(shaken.x[:6] - calm.x[:6]).max() < 1e-4
+    assert np.abs(log(calm.R.T @ shaken.R)).max() < 1e-4
+    inputs = [
+        inputs_at(0.3, way.x, *way.body, *PHONE, NOTHING, way.tone)  # type: ignore[call-arg]
+        for way in (calm, shaken)
+    ]
+    assert np.abs(inputs[0] - inputs[1]).max() < 1e-3
+    e = 1e-6
+    for k in range(12):
+        other = Way(tone=tone)
+        usual = Way(tone=tone)
+        other.x[X_TONE + k] += e
+        other.go(0.1, 0.5)
+        usual.go(0.1, 0.5)
+        moved = np.concatenate(
+            (other.x[:3] - usual.x[:3], log(usual.R.T @ other.R), other.x[3:6] - usual.x[3:6])
+        )
+        np.testing.assert_allclose(-usual.G[:, INPUTS + k], moved / e, rtol=1e-3, atol=1e-5)
+
+
+def test_applying_with_a_tone_is_the_dense_product_too():
+    rng, n = np.random.default_rng(5), N + 12
+    F, G, A = rng.normal(size=(9, 9)), rng.normal(size=(9, 24)), rng.normal(size=(n, n))
+    walks, P, Phi, W = rng.uniform(size=25), A @ A.T, np.eye(n), np.zeros((n, n))
+    Phi[:9, :9], Phi[:9, BIASES : BIASES + 12], Phi[:9, TONE:] = F, -G[:, :12], -G[:, 12:]
+    W[BIASES:, BIASES:] = np.diag(walks * 0.3)
+    dense = Phi @ P @ Phi.T + W
+    apply(P, F, G, np.zeros((9, 9)), walks, 0.3, np.empty((2, 9, n)))
+    assert np.abs(P - dense).max() < 1e-12 * np.abs(dense).max()
 
 
 def test_a_transit_can_be_made_in_pieces():

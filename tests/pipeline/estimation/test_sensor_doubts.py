@@ -78,12 +78,17 @@ def test_a_shaken_phone_is_said_to_be_while_it_is_and_three_seconds_more() -> No
         (
             {"body_fault": ImuFault(tone=(0.0, 3.0), tone_hz=203.0)},
             4.0,
-            "An accelerometer of the robot or the phone sways",
+            "The robot's accelerometer sways",
         ),
         (
             {"body_fault": ImuFault(tone=(0.3, 0.0), tone_hz=206.0)},
             4.0,
-            "A gyroscope of the robot or the phone sways",
+            "The robot's gyroscope sways",
+        ),
+        (
+            {"body_fault": ImuFault(tone=(0.0, 3.0), tone_hz=397.0)},
+            4.0,
+            "The robot's accelerometer sways",
         ),
         (
             {"phone_fault": ImuFault(tone=(0.0, 2.0), tone_hz=62.0), "hand": "filming"},
