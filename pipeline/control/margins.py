@@ -57,6 +57,8 @@ class Sensing:
     """Of a picture, from capture to fusion [s]."""
     body_age: float = 0.005
     """Of the body's IMU sample [s]."""
+    sees: bool = True
+    """False: what of the loop goes by pictures is left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +130,7 @@ class Loop:
     def _measured(self, axis: int, sensing: Sensing) -> tuple[Complex, Complex]:
         """M(s) of place and of speed."""
         frame = self.config.frame_s
-        seen: Complex = _late(sensing.latency) * _hold(frame)
+        seen: Complex = sensing.sees * _late(sensing.latency) * _hold(frame)
         if sensing.estimator == "none":
             rated: Complex = seen * _hold(frame) / (1.0 + self.no_filter.tau * S)
             return seen, rated

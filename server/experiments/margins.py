@@ -14,6 +14,7 @@ from hardware.dynamics import dynamics_of
 from hardware.robot_file import RobotFile, load_robot
 from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
+from pipeline.control.jitter_margins import worst_jitter
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.control.margins import OMEGA, Complex, Loop, Sensing, axis_margins
 from pipeline.control.robust_margins import (
@@ -53,6 +54,10 @@ class MarginRow:
     worst_gain_db: float
     """Up or down, whichever is less."""
     worst_peak: float
+    picture_jitter_ms: float
+    """By how much ages of pictures may vary at any rate, for every body; 0: not judged ..."""
+    body_jitter_ms: float
+    """... and of the body's samples."""
     robust: str
     """Whether these are the margins that engineers ask for."""
 
@@ -70,6 +75,8 @@ COLUMNS = (
     ("worst_phase_deg", "worst °", "{:.0f}"),
     ("worst_gain_db", "worst dB", "{:.1f}"),
     ("worst_peak", "worst peak", "{:.2f}"),
+    ("picture_jitter_ms", "pictures + ms", "{:.0f}"),
+    ("body_jitter_ms", "samples + ms", "{:.0f}"),
     ("robust", "robust", "{}"),
 )
 
@@ -92,6 +99,7 @@ def rows(robot_file: RobotFile, arguments: argparse.Namespace) -> Iterator[Margi
 def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
     """Row of one axis."""
     margins, worst = axis_margins(loop, axis, sensing), worst_margins(loop, axis, sensing)
+    jitter = worst_jitter(loop, axis, sensing)
     return MarginRow(
         gains=gains,
         estimator=sensing.estimator,
@@ -106,6 +114,8 @@ def row(gains: str, loop: Loop, axis: int, sensing: Sensing) -> MarginRow:
         worst_phase_deg=degrees(worst.phase),
         worst_gain_db=20.0 * log10(worst.gain),
         worst_peak=worst.peak,
+        picture_jitter_ms=1e3 * jitter.pictures,
+        body_jitter_ms=1e3 * jitter.body,
         robust="yes" if is_robust(worst) else "no",
     )
 
@@ -186,7 +196,8 @@ def _rule() -> str:
         f"worst: mass and moments x {MASSES[0]:g}-{MASSES[-1]:g}, thrusters' lag x "
         f"{LAGS[0]:g}-{LAGS[-1]:g}, with and without motion that the robot feels wrongly; robust: "
         f"at least {degrees(MIN_PHASE_RAD):.0f}° and {20.0 * log10(MIN_GAIN):.0f} dB, peak of "
-        f"the sensitivity no more than {MAX_PEAK:g}"
+        f"the sensitivity no more than {MAX_PEAK:g}; +: how unevenly late, at any rate (0: not "
+        "judged)"
     )
 
 
