@@ -244,3 +244,20 @@ class Blinking(Protocol):
 
     def blink(self, order: BlinkOrder) -> None:
         """Send `order`; it may be lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotHealth:
+    """What a robot tells of itself beside its samples."""
+
+    battery_v: float | None = None
+    """Voltage of its battery [V]; None: it has none, or does not know."""
+
+
+@runtime_checkable
+class TellsHealth(Protocol):
+    """A `Follower` whose robot may tell how it is."""
+
+    @property
+    def health(self) -> tuple[RobotHealth, float] | None:
+        """What this start of the robot told last, and when that came [s]; None: nothing yet."""

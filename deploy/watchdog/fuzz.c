@@ -1,14 +1,15 @@
 /* Throws anything at the watchdog, mostly with a right MAC, and holds its laws. For a fuzzer:
  *
- *   clang -g -O1 -fsanitize=fuzzer,address,undefined -DLIBFUZZER fuzz.c watchdog.c blink.c attitude.c hmac.c -lm
+ *   clang -g -O1 -fsanitize=fuzzer,address,undefined -DLIBFUZZER fuzz.c watchdog.c blink.c health.c attitude.c hmac.c -lm
  *
  * or alone, with numbers of its own, for so many executions from a seed:
  *
- *   gcc -g -O1 -fsanitize=address,undefined -o fuzz fuzz.c watchdog.c blink.c attitude.c hmac.c -lm
+ *   gcc -g -O1 -fsanitize=address,undefined -o fuzz fuzz.c watchdog.c blink.c health.c attitude.c hmac.c -lm
  *   ./fuzz 1000000 1
  */
 #include "blink.h"
 #include "bytes.h"
+#include "health.h"
 #include "watchdog.h"
 
 #include <math.h>
@@ -80,8 +81,26 @@ static void blink(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint6
            "after ten seconds all LEDs shine");
 }
 
+/* The same 8 bytes as what it measures of itself: five times a second at most, and nothing moves. */
+static void health(const ll_watchdog *w, ll_health *h, const uint8_t *in, int64_t now_us)
+{
+    uint8_t out[LL_HEALTH_BYTES];
+    float volts = NAN;
+    if (in[5] & 1)
+        memcpy(&volts, in, sizeof volts);
+    ll_watchdog before = *w;
+    bool told = h->tells;
+    int64_t since_us = now_us - h->told_us;
+    size_t size = ll_health_due(h, w, volts, now_us, out);
+    demand(memcmp(&before, w, sizeof before) == 0, "telling of its health moves nothing");
+    demand(size == 0 || size == LL_HEALTH_BYTES, "health has its size");
+    demand(size == 0 || since_us >= LL_HEALTH_EVERY_US, "health is told five times a second at most");
+    demand((size > 0) == (h->tells && since_us >= LL_HEALTH_EVERY_US), "what is due is told");
+    demand(told || h->tells == !isnan(volts), "who knows nothing says nothing");
+}
+
 /* One step of 8 bytes: what happens, how much time passes, what is in the datagram. */
-static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *nonce)
+static void step(ll_watchdog *w, ll_health *h, const uint8_t *in, int64_t *now_us, uint64_t *nonce)
 {
     static const int64_t PASSES[8] = {5000, 5000, 5000, 0, 41000, 61000, 300000, 3000000};
     uint8_t data[LL_MAX_BYTES + 1] = {0}, out[LL_MAX_BYTES];
@@ -99,6 +118,7 @@ static void step(ll_watchdog *w, const uint8_t *in, int64_t *now_us, uint64_t *n
     size_t size = ll_sample(w, *now_us, ++*nonce, gyro, acc, thrusts, out);
     demand(size == 92 + 4 * N, "a sample has its size");
     blink(w, in, *now_us, *nonce);
+    health(w, h, in, *now_us);
     memcpy(data, "LLcm\2", 5);
     data[5] = (in[1] & 31) == 31 ? in[2] : N;
     data[6] = in[1] >> 5 & 3;
@@ -135,11 +155,13 @@ static int run(const uint8_t *data, size_t size, bool flies)
 {
     ll_limits limits = {N, F_MAX, 1.0, 2000000, flies ? &GAINS : NULL};
     ll_watchdog w;
+    ll_health h;
     int64_t now_us = 1000000;
     uint64_t nonce = 1000;
+    ll_health_init(&h);
     demand(ll_init(&w, &limits, 7, KEY), "good limits are taken");
     for (; size >= 8; size -= 8, data += 8)
-        step(&w, data, &now_us, &nonce);
+        step(&w, &h, data, &now_us, &nonce);
     return 0;
 }
 
@@ -179,9 +201,11 @@ int main(int argc, char **argv)
     for (long done = 0; done < executions;) {
         ll_limits limits = {N, F_MAX, 1.0, 2000000, done & 1 ? &GAINS : NULL};
         ll_watchdog w;
+        ll_health h;
         int64_t now_us = 1000000;
         uint64_t nonce = 1000;
         unsigned wildness = (unsigned)(state % 12);
+        ll_health_init(&h);
         demand(ll_init(&w, &limits, 7, KEY), "good limits are taken");
         for (int k = 0; k < 999; k++, done++) {
             uint8_t in[8];
@@ -197,11 +221,11 @@ int main(int argc, char **argv)
             if (w.candidate && in[0] == 0x80) {
                 uint32_t saved = w.counter;
                 w.counter = w.candidate_counter;
-                step(&w, in, &now_us, &nonce);
+                step(&w, &h, in, &now_us, &nonce);
                 if (w.candidate)
                     w.counter = saved;
             } else {
-                step(&w, in, &now_us, &nonce);
+                step(&w, &h, in, &now_us, &nonce);
             }
             reached[w.state]++;
         }

@@ -1,17 +1,19 @@
 /* A whole robot around the watchdog, on Linux: 200 Hz, UDP, but no thrusters and no sensors.
  * Put yours where it says YOURS.
  *
- *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c blink.c attitude.c hmac.c -lm
+ *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c blink.c health.c attitude.c hmac.c -lm
  *   ./robot KEY_FILE PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS
  *
  * KEY_FILE is what `lightleash robot key` has made; on a microcontroller the key is in flash.
  */
 #define _GNU_SOURCE
 #include "blink.h"
+#include "health.h"
 #include "watchdog.h"
 
 #include <arpa/inet.h>
 #include <ctype.h>
+#include <math.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -95,6 +97,11 @@ static void sense(float gyro[3], float accelerometer[3])
     accelerometer[2] = 9.80665f;
 }
 
+static float battery_v(void)
+{
+    return NAN; /* YOURS: measure it; NAN if you can't */
+}
+
 typedef struct {
     struct sockaddr_in address;
     int64_t heard_us;
@@ -136,21 +143,29 @@ static void send_to(int fd, const uint8_t *data, size_t size, const struct socka
     sendto(fd, data, size, MSG_DONTWAIT, (const struct sockaddr *)address, sizeof *address);
 }
 
-static void tick(int fd, ll_watchdog *w, const ll_blink *b, recipients *to)
+static void send_all(int fd, const uint8_t *data, size_t size, const recipients *to, int64_t now_us)
+{
+    bool lately = to->control.heard_us && now_us - to->control.heard_us <= FORGET_PEER_US;
+    if (lately)
+        send_to(fd, data, size, &to->control.address);
+    if (to->asking.heard_us && !(lately && same(&to->asking.address, &to->control.address)))
+        send_to(fd, data, size, &to->asking.address);
+}
+
+static void tick(int fd, ll_watchdog *w, const ll_blink *b, ll_health *h, recipients *to)
 {
     float thrusts[LL_MAX_THRUSTERS], gyro[3], accelerometer[3];
-    uint8_t out[LL_MAX_BYTES];
+    uint8_t out[LL_MAX_BYTES], told[LL_HEALTH_BYTES];
     int64_t now_us = clock_us();
     ll_setpoint(w, now_us, thrusts);
     give(thrusts);
     shine(ll_blink_dark(b, now_us));
     sense(gyro, accelerometer);
     size_t size = ll_sample(w, now_us, random_u64(), gyro, accelerometer, thrusts, out);
-    bool lately = to->control.heard_us && now_us - to->control.heard_us <= FORGET_PEER_US;
-    if (lately)
-        send_to(fd, out, size, &to->control.address);
-    if (to->asking.heard_us && !(lately && same(&to->asking.address, &to->control.address)))
-        send_to(fd, out, size, &to->asking.address);
+    send_all(fd, out, size, to, now_us);
+    size = ll_health_due(h, w, battery_v(), now_us, told);
+    if (size > 0)
+        send_all(fd, told, size, to, now_us);
     to->asking.heard_us = 0;
 }
 
@@ -171,7 +186,9 @@ int main(int argc, char **argv)
                         1000 * (int64_t)atoi(argv[6]), NULL};
     ll_watchdog w;
     ll_blink b;
+    ll_health h;
     ll_blink_init(&b);
+    ll_health_init(&h);
     if (!ll_init(&w, &limits, (uint32_t)random_u64(), key)) {
         fprintf(stderr, "F_MAX_N, MAX_RISE_N and RAMP_MS must be finite and above 0\n");
         return 2;
@@ -192,12 +209,12 @@ int main(int argc, char **argv)
         if (wait_us > 0 && poll(&readable, 1, (int)((wait_us + 999) / 1000)) > 0)
             receive(fd, &w, &b, &to);
         if (clock_us() >= next_us) { /* due by the clock, whatever arrives */
-            tick(fd, &w, &b, &to);
+            tick(fd, &w, &b, &h, &to);
             next_us += TICK_US;
         }
     }
     ll_halt(&w);
-    tick(fd, &w, &b, &to);
+    tick(fd, &w, &b, &h, &to);
     close(fd);
     return 0;
 }

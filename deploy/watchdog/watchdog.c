@@ -17,31 +17,12 @@ typedef struct {
     float thrusts[LL_MAX_THRUSTERS];
 } command;
 
-static void write_u32(uint8_t *p, uint32_t value)
-{
-    for (int i = 0; i < 4; i++)
-        p[i] = (uint8_t)(value >> (8 * i));
-}
-
-static void write_u64(uint8_t *p, uint64_t value)
-{
-    write_u32(p, (uint32_t)value);
-    write_u32(p + 4, (uint32_t)(value >> 32));
-}
-
 static float read_f32(const uint8_t *p)
 {
     uint32_t bits = read_u32(p);
     float value;
     memcpy(&value, &bits, sizeof value);
     return value;
-}
-
-static void write_f32(uint8_t *p, float value)
-{
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    write_u32(p, bits);
 }
 
 static bool any(const float *thrusts, int n)

@@ -32,6 +32,8 @@ PATIENCE_US = 100_000
 """Then what was asked is taken for lost, and asked anew."""
 ASK_WHO_EVERY = 40
 """Ticks: it may be armed by a radio, or started anew, at any time."""
+BATTERY_KNOWN_US = 1_000_000
+"""After an answer: four more have been asked for meanwhile."""
 
 _IMU = struct.Struct("<9h")
 _STATUS = struct.Struct("<3HI")
@@ -62,12 +64,17 @@ class Betaflight:
         self._motors: int | None = None
         self.readings: list[ImuReading] = []
         """What has come since somebody last took it away."""
-        self.battery_v: float | None = None
+        self._battery_v: float | None = None
+        self._battery_us = 0
 
     @property
     def damaged(self) -> int:
         """Frames that came with a wrong checksum."""
         return self._parser.damaged
+
+    def battery_v(self, now_us: int) -> float | None:
+        """Voltage of the battery [V]; None: there is none, or it has not been told of lately."""
+        return self._battery_v if now_us - self._battery_us <= BATTERY_KNOWN_US else None
 
     @property
     def unfit(self) -> str:
@@ -157,10 +164,10 @@ class Betaflight:
         *_, flags = _STATUS.unpack_from(payload)
         self._armed = bool(flags & ARMED)
 
-    def _take_battery(self, payload: bytes, _t_us: int) -> None:
+    def _take_battery(self, payload: bytes, t_us: int) -> None:
         # cells, capacity, old volts, mAh, A, state, then volts in hundredths (since MSP API 1.41)
         (centivolts,) = struct.unpack_from("<H", payload, 9)
-        self.battery_v = 0.01 * centivolts if payload[0] else None
+        self._battery_v, self._battery_us = 0.01 * centivolts if payload[0] else None, t_us
 
 
 def _read(reader: Callable[[bytes, int], None], answer: MspAnswer, t_us: int) -> None:

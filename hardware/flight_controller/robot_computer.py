@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hardware.flight_controller.betaflight import Betaflight
+from hardware.follower import RobotHealth
+from hardware.link.health_end import HealthEnd
 from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.robot_file import RobotFile, RobotFileError
 from pipeline.frames import triple
@@ -32,7 +34,7 @@ class RobotComputer:
             raise RobotFileError(robot_file.robot.name, "flight_controller", MISSING)
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self.flight_controller = Betaflight(robot_file.flight_controller, robot_file.robot.f_max)
-        self._nonces = nonces
+        self._nonces, self._health = nonces, HealthEnd(boot_id, key)
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
         """A datagram has come from `peer`."""
@@ -45,16 +47,18 @@ class RobotComputer:
         return self.flight_controller.tick(self.end.setpoint(now_us), now_us)
 
     def feed(self, data: bytes, now_us: int) -> list[bytes]:
-        """The flight controller has said `data`; gives samples for `end.recipients`."""
+        """The flight controller has said `data`; gives what `end.recipients` are to hear."""
         self.flight_controller.feed(data, now_us)
         readings, self.flight_controller.readings = self.flight_controller.readings, []
         thrusts = self.end.setpoint(now_us)
-        return [
+        samples = [
             self.end.sample(
                 one.t_us, self._nonces(), triple(one.omega_in_b), triple(one.a_in_b), thrusts
             )
             for one in readings
         ]
+        health = RobotHealth(self.flight_controller.battery_v(now_us))
+        return [*samples, *self._health.due(health, now_us)]
 
     def shut_down(self) -> bytes:
         """Motors off, for good."""

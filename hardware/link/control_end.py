@@ -4,6 +4,10 @@ A sample is believed if it was made with the robot's key and is newer than the l
 start of the robot. The first one, and the first of another start, must echo a challenge of one of
 our newest commands: so a recording of an earlier session or start is not believed, however many of
 them somebody sends. Within a start the robot's own counter is enough.
+
+What the robot tells of itself (`health_datagram.py`) is believed of the start whose samples are, if
+its own counter is newer and its time no more than `HEALTH_LATE_US` before the newest sample's: a
+recording of before this control process is older than that.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from hardware.follower import (
     BodySample,
     FollowerState,
     RobotCommand,
+    RobotHealth,
     ThrustCommand,
     TwistCommand,
     check_command,
@@ -34,6 +39,8 @@ from hardware.link.datagram import (
     encode_command,
     is_later,
 )
+from hardware.link.health_datagram import MAGIC as HEALTH_MAGIC
+from hardware.link.health_datagram import HealthDatagram, decode_health
 from hardware.robot_file import RobotFile
 from pipeline.config import PERIOD_S
 from pipeline.frames import Array
@@ -41,6 +48,8 @@ from pipeline.robot import TwistDrive
 
 SENT_KEPT = 256
 """Commands remembered: 1.3 s."""
+HEALTH_LATE_US = 500_000
+"""What a link held back for longer is no news of a battery any more."""
 
 
 def random_u64() -> int:
@@ -79,6 +88,10 @@ class ControlEnd:
         """Commands that rose or changed faster than the robot allows and were slowed down."""
         self.dropped = 0
         """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
+        self._health_counter: int | None = None
+        """Of the newest health believed of the robot's present start."""
+        self.health: tuple[RobotHealth, float] | None = None
+        """See `TellsHealth`."""
 
     @classmethod
     def of(
@@ -142,7 +155,13 @@ class ControlEnd:
         return encode_blink(BlinkDatagram(self.epoch, nonce, order), self._key)
 
     def receive(self, data: bytes, now: float) -> BodySample | None:
-        """The sample in `data`; None and counted if it is none, or not to be believed."""
+        """The sample in `data`; None and counted if it is none, or not to be believed.
+
+        None, too, of what the robot tells of itself: that is then `health`.
+        """
+        if data[: len(HEALTH_MAGIC)] == HEALTH_MAGIC:
+            self._hear_health(data, now)
+            return None
         try:
             sample = decode_sample(data, self._key)
         except LinkError:
@@ -158,6 +177,8 @@ class ControlEnd:
         if not ours or not self._is_believed(sample):
             self.dropped += 1
             return None
+        if self._newest is not None and sample.boot_id != self._newest.boot_id:
+            self.health = self._health_counter = None
         self._newest = sample
         return BodySample(
             t_us=sample.t_us,
@@ -176,6 +197,24 @@ class ControlEnd:
         if last is not None and sample.boot_id == last.boot_id:
             return is_later(sample.counter, last.counter)
         return sample.challenge != 0 and sample.challenge in self._challenges
+
+    def _hear_health(self, data: bytes, now: float) -> None:
+        try:
+            said = decode_health(data, self._key)
+        except LinkError:
+            self.dropped += 1
+            return
+        if self._is_health_believed(said):
+            self._health_counter, self.health = said.counter, (said.health, now)
+        else:
+            self.dropped += 1
+
+    def _is_health_believed(self, said: HealthDatagram) -> bool:
+        robot, last = self._newest, self._health_counter
+        if robot is None or said.boot_id != robot.boot_id:
+            return False
+        newer = last is None or is_later(said.counter, last)
+        return newer and robot.t_us - said.t_us <= HEALTH_LATE_US
 
     def _is_outdated(self, robot: SampleDatagram) -> bool:
         """Whether the robot would never again take our epoch."""

@@ -4,9 +4,11 @@
 |---------------------|------------------------------------------------------------------|
 | `datagram.py`       | both datagrams, byte by byte                                     |
 | `blink_datagram.py` | a third one, that tells LEDs to blink                            |
+| `health_datagram.py`| a fourth one, by which the robot tells how it is                 |
 | `control_end.py`    | the control process's end without a socket                       |
 | `robot_end.py`      | the robot's end without a socket: gate, watchdog, ramp           |
-| `blink_end.py`      | the robot's end of it                                            |
+| `blink_end.py`      | the robot's end of blinking                                      |
+| `health_end.py`     | the robot's end of telling how it is                             |
 | `deploy/watchdog/`  | the robot's end in C, for firmware                               |
 | this file           | the socket of the control process                                |
 
@@ -20,7 +22,7 @@ import socket
 import time
 from collections.abc import Callable
 
-from hardware.follower import BlinkOrder, BodySample, FollowerError, RobotCommand
+from hardware.follower import BlinkOrder, BodySample, FollowerError, RobotCommand, RobotHealth
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import MAX_BYTES
 from hardware.robot_file import RobotFile
@@ -69,6 +71,11 @@ class UdpFollower:
     def dropped(self) -> int:
         """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
         return self._end.dropped
+
+    @property
+    def health(self) -> tuple[RobotHealth, float] | None:
+        """See `TellsHealth`."""
+        return self._end.health
 
     def receive(self) -> list[BodySample]:
         """Return what has arrived. See `Follower`."""

@@ -20,6 +20,7 @@ from hardware.link.control_end import random_u64
 from hardware.link.link_key import LinkKeyError, take_key
 from hardware.link.robot_server import RobotServer, arrived, be_punctual, bound
 from hardware.robot_file import COMMANDS, RobotFile, RobotFileError, load_robot
+from hardware.sim.battery import DrainingBattery
 from hardware.sim.simulated import SimulatedRobot
 from hardware.sim.truth import ahead_of, encode_truth
 
@@ -32,7 +33,7 @@ class RobotProcess:
     def __init__(self, robot: SimulatedRobot, listen: Address, truth_port: int | None) -> None:
         """Bound, not running. Port 0 takes any free one."""
         self._robot = robot
-        self.server = RobotServer(robot, listen, lambda t_us: (robot.tick(t_us),))
+        self.server = RobotServer(robot, listen, robot.tick)
         self._truth = bound(("127.0.0.1", truth_port)) if truth_port is not None else None
         if self._truth is not None:
             self.server.watch(self._truth.fileno(), self._answer)
@@ -77,16 +78,20 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--port", type=int, help="of the link; default: the robot file's")
     parser.add_argument("--truth-port", type=int, help="for simulated phones; default: none")
     parser.add_argument("--seed", type=int, default=0, help="of sensor noise and biases")
+    parser.add_argument("--battery-v", type=float, help="it has a battery of so many volts ...")
+    parser.add_argument("--drain-v-min", type=float, default=0.0, help="... less so many a minute")
     return parser.parse_args(argv)
 
 
-def _robot(robot_file: RobotFile, seed: int, key: bytes) -> SimulatedRobot:
+def _robot(robot_file: RobotFile, arguments: argparse.Namespace, key: bytes) -> SimulatedRobot:
+    full_v = arguments.battery_v
     return SimulatedRobot(
         robot_file,
-        seed,
+        arguments.seed,
         boot_id=secrets.randbits(32),
         nonces=random_u64,
         key=key,
+        battery=None if full_v is None else DrainingBattery(full_v, arguments.drain_v_min),
     )
 
 
@@ -96,7 +101,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         robot_file = load_robot(arguments.robot, takes=COMMANDS)
         port = robot_file.link.port if arguments.port is None else arguments.port
-        robot = _robot(robot_file, arguments.seed, take_key(os.environ))
+        robot = _robot(robot_file, arguments, take_key(os.environ))
         process = RobotProcess(robot, (arguments.listen, port), arguments.truth_port)
     except (RobotFileError, LinkKeyError, OSError, OverflowError) as error:
         sys.stderr.write(f"simulated robot: {error}\n")

@@ -8,11 +8,14 @@ from typing import Protocol
 
 import numpy as np
 
+from hardware.follower import RobotHealth
 from hardware.link.blink_end import NO_LED, BlinkEnd
 from hardware.link.datagram import U64
+from hardware.link.health_end import HealthEnd
 from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
+from hardware.sim.battery import DrainingBattery
 from hardware.sim.plant.plant import Plant, PlantOptions
 from hardware.sim.plant.twist_plant import TwistPlant
 from pipeline.frames import Array, triple
@@ -74,8 +77,9 @@ class SimulatedRobot:
         nonces: Nonces,
         key: bytes,
         options: PlantOptions | None = None,
+        battery: DrainingBattery | None = None,
     ) -> None:
-        """Hanging or standing at rest, refusing thrust."""
+        """Hanging or standing at rest, refusing thrust; without a battery it tells of none."""
         robot = robot_file.robot
         rng = np.random.default_rng(seed)
         self.body: SimulatedBody = (
@@ -85,6 +89,7 @@ class SimulatedRobot:
         )
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self._blink = BlinkEnd(key) if robot.blinks else None
+        self.battery, self._health = battery, HealthEnd(boot_id, key)
         self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
         self.dark: deque[int] = deque(maxlen=HISTORY)
@@ -103,19 +108,22 @@ class SimulatedRobot:
         if self._blink is None or not self._blink.receive(data, self.end, now_us):
             self.end.receive(data, peer, now_us)
 
-    def tick(self, now_us: int) -> bytes:
-        """Move on to `now_us`, one tick after the last; gives the sample to be sent."""
+    def tick(self, now_us: int) -> tuple[bytes, ...]:
+        """Move on to `now_us`, one tick after the last; gives the sample, and what else is due."""
         self.body.step(self._setpoint, 1e-6 * TICK_US)
         self._setpoint = self.end.setpoint(now_us)
         self.history.append((now_us, self.body.wxyz_fb, self.body.p_bf_in_f))
         self.dark.append(NO_LED if self._blink is None else self._blink.dark(now_us))
-        return self._sample(now_us, self.body.given)
+        sample = self._sample(now_us, self.body.given)
+        volts = None if self.battery is None else self.battery.volts(1e-6 * now_us)
+        return sample, *self._health.due(RobotHealth(volts), now_us)
 
     def restart(self, robot_file: RobotFile, key: bytes) -> None:
         """Start anew, refusing thrust; the body goes on as it was."""
         self._boot_id += 1
         self.end = RobotEnd(LinkLimits.of(robot_file), self._boot_id, key)
         self._blink = BlinkEnd(key) if robot_file.robot.blinks else None
+        self._health = HealthEnd(self._boot_id, key)
 
     def shut_down(self, now_us: int) -> bytes:
         """Zero, at once; gives the last sample."""

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from hardware.follower import BlinkOrder, BodySample, FollowerError, FollowerState, RobotCommand
+from hardware.follower import (
+    BlinkOrder,
+    BodySample,
+    FollowerError,
+    FollowerState,
+    RobotCommand,
+    RobotHealth,
+)
 from hardware.link.blink_end import NO_LED
 from hardware.link.control_end import ControlEnd
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
+from hardware.sim.battery import DrainingBattery
 from hardware.sim.plant.plant import Plant, PlantOptions
 from hardware.sim.simulated import SimulatedBody, SimulatedRobot, seeded_nonces
 
@@ -33,9 +41,12 @@ class VirtualTimeFollower:
         seed: int = 0,
         epoch: int = 1,
         options: PlantOptions | None = None,
+        battery: DrainingBattery | None = None,
     ) -> None:
         """A robot hanging at rest at time 0, refusing thrust."""
-        self._robot = SimulatedRobot(robot_file, seed, seed + 1, seeded_nonces(seed), KEY, options)
+        self._robot = SimulatedRobot(
+            robot_file, seed, seed + 1, seeded_nonces(seed), KEY, options, battery
+        )
         self._end = ControlEnd.of(robot_file, KEY, epoch, seeded_nonces(seed + 1))
         self.thrusters = self._end.thrusters
         self.connected = True
@@ -70,6 +81,11 @@ class VirtualTimeFollower:
         return self._end.dropped
 
     @property
+    def health(self) -> tuple[RobotHealth, float] | None:
+        """See `TellsHealth`."""
+        return self._end.health
+
+    @property
     def t(self) -> float:
         """Virtual time [s]; the robot's clock shows the same."""
         return 1e-6 * self._now_us
@@ -92,9 +108,9 @@ class VirtualTimeFollower:
         """Let `dt` [s] pass, whole ticks of 5 ms."""
         for _ in range(round(1e6 * dt / TICK_US)):
             self._now_us += TICK_US
-            data = self._robot.tick(self._now_us)
+            said = self._robot.tick(self._now_us)
             if self.connected and self._robot.end.recipients(self._now_us):
-                self._arrived += self.to_control(data)
+                self._arrived += (one for data in said for one in self.to_control(data))
 
     def receive(self) -> list[BodySample]:
         """Return what has arrived. See `Follower`."""

@@ -20,7 +20,7 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from hardware.link import blink_datagram, datagram
+from hardware.link import blink_datagram, datagram, health_datagram
 from server.common import runtime_parameters
 from server.common.options import Parser
 from server.docs.protocol_text import RECORDS, page
@@ -242,7 +242,8 @@ def message_tables() -> str:
 
 def links() -> str:
     """Datagrams of the robot's own link, as their modules tell them."""
-    told = (inspect.cleandoc(module.__doc__ or "") for module in (datagram, blink_datagram))
+    modules = datagram, blink_datagram, health_datagram
+    told = (inspect.cleandoc(module.__doc__ or "") for module in modules)
     return "\n\n".join(told)
 
 

@@ -50,8 +50,9 @@ class SerialRig:
         for _ in range(round(1e6 * dt / TICK_US)):
             self.hear()
             self.now_us += TICK_US
-            data = self.robot.tick(self.now_us)
-            if self.connected and self.robot.end.recipients(self.now_us):
+            for data in self.robot.tick(self.now_us):
+                if not self.connected or not self.robot.end.recipients(self.now_us):
+                    continue
                 escaped = data.replace(b"\xdb", b"\xdb\xdd").replace(b"\xc0", b"\xdb\xdc")
                 if select.select([], [self.radio], [], 0)[1]:
                     os.write(self.radio, escaped + b"\xc0")

@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from hardware.follower import BlinkOrder, FollowerState, Refusal, ThrustCommand
+from hardware.follower import BlinkOrder, FollowerState, Refusal, RobotHealth, ThrustCommand
 from hardware.link.blink_datagram import LASTS_MS, BlinkDatagram, decode_blink, encode_blink
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import (
@@ -23,6 +23,8 @@ from hardware.link.datagram import (
     encode_command,
     encode_sample,
 )
+from hardware.link.health_datagram import MAGIC as HEALTH_MAGIC
+from hardware.link.health_datagram import MOST_V, HealthDatagram, decode_health, encode_health
 from hardware.link.link_key import MAC_BYTES, mac
 from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.link.rpit.structs import decode_con
@@ -131,6 +133,25 @@ def blink_order(data: bytes) -> None:
     assert RobotEnd(LIMITS, 9, KEY).receive(sealed(data), PEER, 10**6) == Refusal.MALFORMED
 
 
+def health_seeds():
+    for volts in (None, 0.0, 11.25, MOST_V):
+        said = HealthDatagram(10**6, 11, 13, RobotHealth(volts))
+        yield encode_health(said, KEY)[:-MAC_BYTES]
+
+
+@target("health", health_seeds, (LinkError,), max_bytes=60, mutants=4000)
+def health(data: bytes) -> None:
+    """The same for what a robot tells of itself, whose voltage is one, or not known."""
+    decoded = decode_health(sealed(data), KEY)
+    volts = decoded.health.battery_v
+    again = encode_health(decoded, KEY)
+    # a NaN may have any bits beside those that make it one
+    assert again[:24] == data[:24] if volts is None else again[: len(data)] == data
+    assert volts is None or 0.0 <= volts <= MOST_V
+    assert 0 <= decoded.t_us < 1 << 60
+    assert RobotEnd(LIMITS, 9, KEY).receive(sealed(data), PEER, 10**6) == Refusal.MALFORMED
+
+
 class RobotRig:
     """A robot's end, and somebody who has its key."""
 
@@ -217,6 +238,8 @@ def control_seeds():
     yield together([b"\1" + one for one in samples])
     yield together([b"\2" + samples[0], b"\3" + samples[1], b"\1" + samples[2]])
     yield together([b"\0" + heard(k) for k in range(1, 8)] + [b"\1" + heard(9)])
+    said = [b"\0" + one for one in health_seeds()]
+    yield together([said[0], b"\0" + heard(1), *said, said[1], b"\0" + heard(2), said[2]])
 
 
 def heard(counter: int, epoch: int = 9) -> bytes:
@@ -241,9 +264,12 @@ def control_end(data: bytes) -> int:
         sent = decode_command(said, KEY)
         assert sent.epoch >= 5
         assert max(sent.thrusts) <= LIMITS.f_max
-        dropped = end.dropped
+        dropped, told = end.dropped, end.health
         heard = end.receive(piece[1:] if piece[:1] == b"\2" else sealed(piece[1:]), now)
-        assert end.dropped == dropped + (heard is None)
+        if end.health is not told and end.health is not None:
+            assert (piece[1:5], end.health[1], heard) == (HEALTH_MAGIC, now, None)
+        else:
+            assert end.dropped == dropped + (heard is None)
         if heard is not None:
             assert np.isfinite(heard.omega_in_b).all()
             assert np.isfinite(heard.a_in_b).all()

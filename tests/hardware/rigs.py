@@ -45,9 +45,9 @@ class LoopbackRig:
         for _ in range(round(1e6 * dt / TICK_US)):
             self.receive()
             self.now_us += TICK_US
-            data = self.robot.tick(self.now_us)
-            for peer in self.robot.end.recipients(self.now_us) if self.connected else ():
-                self.socket.sendto(data, peer)
+            for data in self.robot.tick(self.now_us):
+                for peer in self.robot.end.recipients(self.now_us) if self.connected else ():
+                    self.socket.sendto(data, peer)
 
     def receive(self) -> None:
         while True:

@@ -9,7 +9,7 @@ import pytest
 from hardware.flight_controller import msp
 from hardware.flight_controller.betaflight import Betaflight
 from hardware.flight_controller.robot_computer import RobotComputer
-from hardware.follower import BodySample, FollowerState, ThrustCommand
+from hardware.follower import BodySample, FollowerState, RobotHealth, ThrustCommand
 from hardware.link.control_end import ControlEnd
 from hardware.robot_file import (
     FlightControllerParameters,
@@ -133,10 +133,25 @@ def test_an_answer_that_is_too_short_says_nothing(command):
     assert one.readings == []
 
 
+def battery(cells, centivolts):
+    state = struct.pack("<BHBHhBH", cells, 1500, 160, 0, 0, 0, centivolts)
+    return answer_of(msp.BATTERY_STATE, state)
+
+
 def test_the_battery_is_read_if_there_is_one():
     one = fit()
-    one.feed(answer_of(msp.BATTERY_STATE, struct.pack("<BHBHhBH", 4, 1500, 160, 0, 0, 0, 1605)), 0)
-    assert one.battery_v == pytest.approx(16.05)
+    assert one.battery_v(0) is None
+    one.feed(battery(4, 1605), 0)
+    assert one.battery_v(0) == pytest.approx(16.05)
+    one.feed(battery(0, 0), 5_000)
+    assert one.battery_v(5_000) is None
+
+
+def test_a_voltage_of_a_second_ago_is_not_known_any_more():
+    one = fit()
+    one.feed(battery(4, 1605), 10_000)
+    assert one.battery_v(1_010_000) == pytest.approx(16.05)
+    assert one.battery_v(1_010_001) is None
 
 
 class Rig:
@@ -174,6 +189,18 @@ def test_the_whole_way_from_thrust_to_motors_and_back():
     assert rig.run(0.75, 0.3)[-1] == 8 * [1500]
     assert rig.newest.thrusts == pytest.approx(0.75)
     assert rig.newest.a_in_b[2] == pytest.approx(9.77, abs=0.01)
+
+
+def test_its_battery_reaches_control_while_it_is_told_of():
+    rig = Rig()
+    rig.run(0.0, 0.5)
+    assert rig.control.health is None
+    rig.computer.feed(battery(3, 1150), rig.now_us)
+    rig.run(0.0, 0.5)
+    assert rig.control.health is not None
+    assert rig.control.health[0].battery_v == pytest.approx(11.5)
+    rig.run(0.0, 1.5)
+    assert rig.control.health[0] == RobotHealth()
 
 
 def test_a_flight_controller_that_falls_silent_ends_the_flight_by_the_robots_own_ramp():

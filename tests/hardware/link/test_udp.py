@@ -54,10 +54,10 @@ def test_an_unknown_host_is_an_error_that_names_it():
 
 def test_damaged_repeated_and_overtaken_samples_are_dropped_and_counted(loopback):
     samples = run(loopback, ZERO, 20)
-    good = loopback.robot.tick(loopback.now_us + 5000)
+    (good,) = loopback.robot.tick(loopback.now_us + 5000)
     (peer,) = loopback.robot.end.recipients(loopback.now_us)
     damaged = bytes((good[0] ^ 1, *good[1:]))
-    late = loopback.robot.tick(loopback.now_us + 10000)
+    (late,) = loopback.robot.tick(loopback.now_us + 10000)
     for data in (damaged, late, late, good, b"", b"x" * 2000):
         loopback.socket.sendto(data, peer)
     loopback.follower.receive()

@@ -25,7 +25,7 @@ KEY = bytes(range(16))
 VECTORS = json.loads((Path(__file__).parents[2] / "data" / "link_vectors.json").read_text())
 IDLE, RUNNING, RAMP, _, COAST = FollowerState
 LIMITS = LinkLimits(thrusters=3, f_max=3.0, max_rise=1.0, ramp_us=700_000)
-NAMES = ("watchdog.c", "blink.c", "attitude.c", "hmac.c")
+NAMES = ("watchdog.c", "blink.c", "health.c", "attitude.c", "hmac.c")
 GCC = ("gcc", "-std=c99", "-pedantic", "-O2", "-Wall", "-Wextra", "-Werror", "-Wconversion")
 
 
@@ -110,6 +110,7 @@ def library(tmp_path_factory):
     library = ctypes.CDLL(str(path))
     library.ll_sample.restype = ctypes.c_size_t
     library.ll_init.restype = ctypes.c_bool
+    library.ll_health_due.restype = ctypes.c_size_t
     return library
 
 
