@@ -29,6 +29,7 @@ from hardware.robot_physics import allocation_matrix, faults, led_faults
 from hardware.robot_schema import (
     AXES,
     USUAL_PORTS,
+    BatterySection,
     BodyImuSection,
     FlightControllerSection,
     RobotSchema,
@@ -91,6 +92,14 @@ class FlightControllerParameters:
     acc_per_g: float
 
 
+@dataclass(frozen=True, slots=True)
+class BatteryParameters:
+    """By which voltages the robot's battery is judged."""
+
+    low_v: float
+    empty_v: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotFile:
     """A robot."""
@@ -104,6 +113,8 @@ class RobotFile:
     keeps_attitude_in_ramp: bool
     """The robot itself, without a word from control."""
     flight_controller: FlightControllerParameters | None = None
+    battery: BatteryParameters | None = None
+    """None: its voltage is told as it is, and judged by nobody."""
 
     def reached(self, host: str, port: int, kind: str | None = None) -> RobotFile:
         """The same robot, listening elsewhere, or by another kind of link."""
@@ -283,6 +294,7 @@ def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
         {},
         LinkParameters(link.kind, link.stopped_by or "", link.host, port, 0.0, link.takes),
         keeps_attitude_in_ramp=False,
+        battery=_battery(schema.battery),
     )
 
 
@@ -343,7 +355,12 @@ def _converted(schema: RobotSchema) -> RobotFile:
         link,
         schema.keeps_attitude_in_ramp,
         _flight_controller(schema.flight_controller),
+        _battery(schema.battery),
     )
+
+
+def _battery(section: BatterySection | None) -> BatteryParameters | None:
+    return None if section is None else BatteryParameters(section.low_v, section.empty_v)
 
 
 def _flight_controller(

@@ -169,6 +169,15 @@ class FlightControllerSection(Section):
     acc_per_g: Positive = 512.0
 
 
+class BatterySection(Section):
+    """[battery]: of a robot that tells its voltage."""
+
+    low_v: Annotated[float, Field(gt=0.0, le=1000.0)]
+    """People are told to come to an end."""
+    empty_v: Annotated[float, Field(gt=0.0, le=1000.0)]
+    """Below it the robot is not armed."""
+
+
 class RobotSchema(Section):
     """The file."""
 
@@ -192,6 +201,7 @@ class RobotSchema(Section):
     gains: Annotated[dict[str, GainsSection], Field(min_length=1)]
     link: LinkSection
     flight_controller: FlightControllerSection | None = None
+    battery: BatterySection | None = None
 
 
 def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
@@ -200,6 +210,7 @@ def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
         yield "link.port", f"missing: a link of kind {robot.link.kind!r} has no usual one"
     if robot.flight_controller is not None:
         yield from _miswired(robot.flight_controller, len(robot.thrusters.units))
+    yield from battery_clashes(robot.battery)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     if robot.suspension is not None:
@@ -214,6 +225,12 @@ def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
         yield "stand", "[stand], or [suspension] for a robot that hangs"
     if robot.ramp_s is None:
         yield "ramp_s", "how long a ramp to zero thrust lasts [s]: there is no [suspension]"
+
+
+def battery_clashes(battery: BatterySection | None) -> Iterator[tuple[str, str]]:
+    """The same of [battery]."""
+    if battery is not None and battery.empty_v >= battery.low_v:
+        yield "battery.empty_v", f"less than low_v, {battery.low_v:g} V"
 
 
 def _miswired(section: FlightControllerSection, thrusters: int) -> Iterator[tuple[str, str]]:

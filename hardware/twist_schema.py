@@ -12,10 +12,12 @@ from hardware.robot_schema import (
     AXES,
     USUAL_PORTS,
     Axis,
+    BatterySection,
     BodyImuSection,
     LedSection,
     Section,
     Start,
+    battery_clashes,
 )
 from pipeline.control.twist_margins import LEAST_PHASE_RAD
 from pipeline.robot import TwistDrive
@@ -66,6 +68,7 @@ class TwistRobotSchema(Section):
     body_imu: BodyImuSection
     leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
     link: TwistLinkSection
+    battery: BatterySection | None = None
 
 
 def drive_of(section: TwistSection) -> TwistDrive:
@@ -86,6 +89,7 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     """Keys that contradict each other: (key, what would be allowed)."""
     if robot.link.port is None and robot.link.kind not in USUAL_PORTS:
         yield "link.port", f"missing: a link of kind {robot.link.kind!r} has no usual one"
+    yield from battery_clashes(robot.battery)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     drive = drive_of(robot.twist)

@@ -175,6 +175,19 @@ class VirtualCameraSettings(BaseModel):
         return RuntimeParameters(**self.model_dump())
 
 
+class SimulatedSettings(BaseModel):
+    """What the simulated robot has beside its file."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    battery_v: float | None = Field(
+        default=None, gt=0.0, le=1000.0, description="a battery of so many volts, which it tells"
+    )
+    drain_v_min: float = Field(
+        default=0.0, ge=0.0, le=1000.0, description="how much that falls in a minute"
+    )
+
+
 class Settings(BaseSettings):
     """Start server, control and simulated robot.
 
@@ -219,6 +232,7 @@ class Settings(BaseSettings):
     recording: RecordingSettings = Field(default_factory=RecordingSettings)
     pairing: PairingSettings = Field(default_factory=PairingSettings)
     virtual_camera: VirtualCameraSettings = Field(default_factory=VirtualCameraSettings)
+    simulated: SimulatedSettings = Field(default_factory=SimulatedSettings)
 
     @property
     def own_state(self) -> Path:
@@ -244,6 +258,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "recording": RecordingSettings,
     "pairing": PairingSettings,
     "virtual_camera": VirtualCameraSettings,
+    "simulated": SimulatedSettings,
 }
 Settings.__doc__ = inspect.cleandoc(Settings.__doc__ or "")  # `--help` shows it as it is
 
@@ -273,6 +288,8 @@ def load(argv: Sequence[str], file: Path | None = None) -> Settings:
         raise SettingsError("cert, key: both or neither")
     if settings.simulate and (settings.robot_host or settings.robot_port):
         raise SettingsError("robot_host, robot_port: only with --no-simulate")
+    if not settings.simulate and settings.simulated != SimulatedSettings():
+        raise SettingsError("simulated: only without --no-simulate")
     return settings
 
 

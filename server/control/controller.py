@@ -21,6 +21,7 @@ from server.control.gap_log import GapLog
 from server.control.ipc import BodyRow, ControlStatus
 from server.control.ipc_estimate import EstimateFields, finite
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
+from server.control.robot_health import RobotCondition
 from server.control.tick_rate import TickRate
 from server.protocol.lead_messages import Lead
 
@@ -31,6 +32,9 @@ STOOD_STILL_S = SILENCE.coasts_s
 TIME_DECIMALS, THRUST_DECIMALS = 6, 4
 """Of commands in recordings: 1 µs, 0.1 mN. All digits of a float would be three times as long."""
 
+
+UNTOLD = RobotCondition()
+AT_REST = (Mode.DISARMED, Mode.STOPPED)
 
 TooLate = Callable[[float, float], str]
 
@@ -86,7 +90,8 @@ class Controller:
         self._estimator_name = config.estimator
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
         self._t_ready = self._t_robot_gap = -np.inf
-        self._t_tick, self._armed = np.inf, False
+        self._t_tick, self._mode = np.inf, Mode.DISARMED
+        self._condition = UNTOLD
         self._longest_gap_s = config.failsafe.gap
         silent_s = config.failsafe.silent
         self._gaps = GapLog({"phone": silent_s, "robot": self._deaf_s, "server": stood_still_s})
@@ -110,6 +115,7 @@ class Controller:
         robot_reason: str,
         robot_gap: str = "",
         robot_left_s: float = inf,
+        condition: RobotCondition = UNTOLD,
     ) -> tuple[RobotCommand, Output]:
         """One control period.
 
@@ -120,6 +126,7 @@ class Controller:
             robot_reason: Why the robot itself refuses thrust; empty if it doesn't. Ends a flight.
             robot_gap: Why it does not follow for the moment. Ends no flight, while it is short.
             robot_left_s: Until it ramps down by itself, if it goes on as it is [s].
+            condition: What it tells of itself. Keeps it from being armed; ends no flight.
         """
         phone, seen, operator, requests = self._sort(messages, now)
         for sample in body:
@@ -128,6 +135,7 @@ class Controller:
             )
             if (twist := sample.twist_m_bf_in_b) is not None:
                 self._body_twists.append((sample.t, *triple(twist[:3]), *triple(twist[3:])))
+        self._condition = condition
         stall_s = now - self._t_tick
         output = self.teleop.step(
             Inputs(
@@ -138,12 +146,12 @@ class Controller:
                 operator=operator,
                 requests=requests,
                 refusals=self._why_not(now, robot_reason),
-                fault=self._out_of_time(stall_s) or (robot_reason if self._armed else ""),
+                fault=self._out_of_time(stall_s) or self._robots_fault(robot_reason),
                 gap=_stood_still(stall_s, self._stood_still_s) or robot_gap,
                 robot_left_s=robot_left_s,
             )
         )
-        self._t_tick, self._armed = now, output.failsafe.mode not in (Mode.DISARMED, Mode.STOPPED)
+        self._t_tick, self._mode = now, output.failsafe.mode
         self._note_gaps(output, stall_s, robot_gap)
         for one in seen:
             self._fuse_ms = 1e3 * (now - one.t)
@@ -188,7 +196,13 @@ class Controller:
         if now - self._t_ready > SERVER_SILENT_S:
             return ("The server is silent.",)
         late = self._too_late(self._picture_age.value, self._body_age.value)
-        return (*self._refusals, *(why for why in (robot_reason, self._unfit, late) if why))
+        ours = self._condition.refusal, robot_reason, self._unfit, late
+        return (*self._refusals, *(why for why in ours if why))
+
+    def _robots_fault(self, robot_reason: str) -> str:
+        """What of the robot ends a flight; and what ends waiting for one."""
+        waits = self._mode == Mode.ARMED
+        return "" if self._mode in AT_REST else robot_reason or self._condition.refusal * waits
 
     def _out_of_time(self, stall_s: float) -> str:
         """Said in its own words, or the robot would seem to be what was silent."""
@@ -277,6 +291,7 @@ class Controller:
             body_twists=twists,
             commands=commands,
             gains_weak=self._gains_weak,
+            health=self._condition.fields(flies=self._mode not in (*AT_REST, Mode.ARMED)),
         )
 
 

@@ -20,6 +20,7 @@ from server.common.runtime_parameters import RuntimeParameters
 from server.control.gap_log import GapStatistics
 from server.control.ipc_estimate import EstimateFields
 from server.control.ipc_inputs import Input, decode, encode
+from server.control.robot_health import HealthFields
 from server.protocol.lead_messages import Lead
 
 MAX_DATAGRAM = 16_384
@@ -109,6 +110,8 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """The robot is led to where its thrusters can't hold it."""
     gains_weak: str = ""
     """What gains of the user's own lack if the robot is not as told, in words; refuses nothing."""
+    health: HealthFields | None = None
+    """What the robot tells of itself."""
 
 
 def _has_attitudes(status: ControlStatus) -> bool:

@@ -196,7 +196,8 @@ def run(options: ControlOptions) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda n, _frame: stopping.append(n))
     try:
-        link = RobotLink(follower, robot_file.robot.blinking_leds, silence)
+        leds, battery = robot_file.robot.blinking_leds, robot_file.battery
+        link = RobotLink(follower, leds, silence, battery)
         zero = zero_command(robot_file.robot)
         _loop(controller, follower, link, endpoint, granted, stopping, zero)
     finally:
@@ -221,7 +222,9 @@ def _loop(
         now = schedule.wait()
         cpu = clock.thread_cpu()
         body, inputs = link.receive(now), endpoint.inputs()
-        command, output = controller.tick(now, inputs, body, link.reason, link.gap, link.left_s)
+        command, output = controller.tick(
+            now, inputs, body, link.reason, link.gap, link.left_s, link.condition
+        )
         follower.send(command)
         link.pass_on(inputs, now)
         cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (clock.thread_cpu() - cpu)

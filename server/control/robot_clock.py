@@ -15,13 +15,16 @@ from hardware.follower import (
     Follower,
     FollowerState,
     Refusal,
+    TellsHealth,
 )
 from hardware.link.blink_datagram import LASTS_MS
 from hardware.link.robot_end import SILENCE
 from hardware.link.silence import SilenceTimes
+from hardware.robot_file import BatteryParameters
 from pipeline.signals import BodyImu
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, Input
+from server.control.robot_health import HealthWatch, RobotCondition
 
 
 class BodyClock:
@@ -59,11 +62,15 @@ class RobotLink:
     """The robot's samples on our clock, and what it says against flying."""
 
     def __init__(
-        self, follower: Follower, blinking_leds: int = 0, silence: SilenceTimes = SILENCE
+        self,
+        follower: Follower,
+        blinking_leds: int = 0,
+        silence: SilenceTimes = SILENCE,
+        battery: BatteryParameters | None = None,
     ) -> None:
         """Begin with nothing received; none of a robot's LEDs blink that can't all be told to.
 
-        `silence` is what its kind of link states.
+        `silence` is what its kind of link states, `battery` how its file judges a voltage.
         """
         self._follower, self._silence = follower, silence
         self._ramp_begun_s = silence.back_s - silence.ramps_s
@@ -80,6 +87,8 @@ class RobotLink:
         self._t_sample = -np.inf
         self.left_s = inf
         """Until the robot ramps down by itself, if it goes on as it is [s]."""
+        self._health, self.condition = HealthWatch(battery), RobotCondition()
+        """What it tells of itself."""
 
     def receive(self, now: float) -> list[BodyImu]:
         """The samples that have come since the last call."""
@@ -95,6 +104,9 @@ class RobotLink:
             self._bear(samples[-1], now)
             self._t_sample = now
         self.left_s = self._left(now)
+        if self._boot_id is not None:
+            told = self._follower.health if isinstance(self._follower, TellsHealth) else None
+            self.condition = self._health.hear(told, now)
         return dated
 
     def pass_on(self, messages: Iterable[Input], now: float) -> None:

@@ -146,6 +146,9 @@ def children_of(
         host, port, truth_port = "127.0.0.1", free_udp_port(), free_udp_port()
         simulated = ["hardware.sim.robot", "--robot", settings.robot, "--port", str(port)]
         simulated += ["--truth-port", str(truth_port)]
+        if (full_v := settings.simulated.battery_v) is not None:
+            drain_v_min = settings.simulated.drain_v_min
+            simulated += ["--battery-v", str(full_v), "--drain-v-min", str(drain_v_min)]
         children.append(Child("robot", simulated, shared, oom_score=FLIES))
     control = ["server.control.process", "--runtime", str(runtime), "--robot", settings.robot]
     control += ["--host", host, "--port", str(port), "--gains", settings.gains]

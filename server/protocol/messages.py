@@ -257,6 +257,12 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """The speed that a robot is told that takes a twist ..."""
     told_deg_s: float | None = None
     """... and how fast to turn."""
+    battery: Literal["untold", "unknown", "told", "good", "low", "empty"] = "untold"
+    """The robot's: by the limits of its file; `told` without such. `unknown`: told no more."""
+    battery_v: float | None = None
+    """None unless it is known."""
+    health: list[str] = []
+    """What people must know of the robot's own state, each in words, the gravest first."""
 
 
 FromPage = Hello | Command | Tune | Lead | PathChoice | Calibrate | Log | ScreenSize | ClockAsk

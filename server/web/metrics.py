@@ -44,6 +44,9 @@ def exposition(manager: SessionManager) -> bytes:
         pauses.labels(name).set(value)
     taken = Gauge("lightleash_recordings_bytes", "of those that are finished", registry=registry)
     taken.set(manager.recordings.folder.taken())
+    if status.battery_v is not None:
+        volts = Gauge("lightleash_robot_battery_volts", "as the robot tells", registry=registry)
+        volts.set(status.battery_v)
     if status.error_mm is not None:
         error = Gauge("lightleash_error_metres", "from the reference", registry=registry)
         error.set(1e-3 * status.error_mm)

@@ -88,7 +88,7 @@ class SessionManager:
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
         self._events, self.tally = Events(1e-9 * unix_zero_ns()), Tally()
-        self._last_mode = self._last_complaint = ""
+        self._last_mode = self._last_complaint = self._last_battery = ""
         self._unfit: set[str] = set()
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
@@ -339,6 +339,9 @@ class SessionManager:
         for said in unfit - self._unfit:
             self.log_event(said)
         self._unfit = unfit
+        if status.battery != self._last_battery and status.health:
+            self.log_event(status.health[0])
+        self._last_battery = status.battery
         self._shown = status
         self.tally.see(status)
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):

@@ -12,8 +12,9 @@ from pipeline.robot import Robot
 from pipeline.signals import Mode
 from server.common.clock import now
 from server.control.ipc import ControlStatus
+from server.control.robot_health import HealthFields
 from server.diagnostics.blame import Blame, warnings
-from server.diagnostics.camera_health import health
+from server.diagnostics.camera_health import health as camera_health
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
 from server.phone.phone_session import PhoneSession
@@ -64,6 +65,7 @@ def build(manager: StatusSource) -> Status:
     refusals = [f"{silence}."] if control is None or silence else control.refusals
     detection = phone.detection if phone is not None else None
     found = detection is not None and detection.pose is not None
+    health = _health(control, silence)
     commanded_mm_s, commanded_deg_s = _commanded(None if silence else control)
     return Status(
         mode=mode,
@@ -96,7 +98,7 @@ def build(manager: StatusSource) -> Status:
         events=list(manager.events),
         virtual_camera=_virtual_camera(control),
         estimate=_estimate(control),
-        camera=health(phone.vision.front_end)
+        camera=camera_health(phone.vision.front_end)
         if phone is not None and phone.vision is not None
         else None,
         path_choice=phone.path_choice if phone is not None else None,
@@ -118,6 +120,9 @@ def build(manager: StatusSource) -> Status:
         thrust_limit_n=manager.robot.f_max,
         told_mm_s=commanded_mm_s,
         told_deg_s=commanded_deg_s,
+        battery=health.battery,
+        battery_v=_rounded(health.battery_v, 2),
+        health=health.words,
     )
 
 
@@ -146,6 +151,14 @@ def _silence(control: ControlStatus | None, age: float) -> str:
 
 def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | None:
     return None if value is None or not isfinite(value) else round(scale * value, digits)
+
+
+def _health(control: ControlStatus | None, silence: str) -> HealthFields:
+    """What the robot tells of itself; while control is silent nobody knows more than before."""
+    told = control.health if control is not None else None
+    if told is None or told.battery == "untold":
+        return HealthFields()
+    return HealthFields("unknown") if silence else told
 
 
 def _commanded(control: ControlStatus | None) -> tuple[float | None, float | None]:

@@ -12,6 +12,7 @@ from pipeline.vision.rays import NO_RAYS
 from server.common.runtime_parameters import Tune
 from server.control.ipc import MAX_DATAGRAM, ControlStatus, control_end, expected_of, server_end
 from server.control.ipc_inputs import LARGEST, ReadyInput, RequestInput, encode
+from server.control.robot_health import HealthFields
 from server.protocol.lead_messages import Lead
 from tests.fuzz.target import target
 from tests.pipeline.seeing import rays_at
@@ -59,6 +60,8 @@ def inputs(data: bytes) -> None:
 
 def status_seeds():
     yield msgspec.msgpack.encode(control_status())
+    low = HealthFields("low", 10.4, ["The robot's battery is low."])
+    yield msgspec.msgpack.encode(control_status(health=low))
     pose = {"p_bc_in_c": (2.0, 0.0, 0.0), "R_cb_wxyz": (1.0, 0.0, 0.0, 0.0)}
     known = {"u_bf_in_c": (0.0, 0.0, 0.0), "sigma_p": 0.01, "sigma_theta": 0.01}
     yield msgspec.msgpack.encode(control_status(**pose, **known))

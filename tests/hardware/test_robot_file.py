@@ -10,6 +10,7 @@ from hardware.link.robot_end import LinkLimits
 from hardware.robot_file import (
     COMMANDS,
     ROBOTS,
+    BatteryParameters,
     RobotFileError,
     load_robot,
     robot_of,
@@ -139,6 +140,19 @@ MISTAKES = {
     ),
     "neither": (r"(?ms)^\[suspension\].*?\[air\]", "[air]", "stand", "or [suspension]"),
     "too few thrusters": (r"(?m)(^    \{.*\n){2}\]", "]", "thrusters.units", "at least 7"),
+    "an empty battery above a low one": (
+        r"\[air\]",
+        "[battery]\nlow_v = 10.0\nempty_v = 10.0\n[air]",
+        "battery.empty_v",
+        "less than low_v, 10 V",
+    ),
+    "a battery without end": (
+        r"\[air\]",
+        "[battery]\nlow_v = inf\nempty_v = 10.0\n[air]",
+        "battery.low_v",
+        "finite",
+    ),
+    "half a battery": (r"\[air\]", "[battery]\nlow_v = 10.5\n[air]", "battery.empty_v", "missing"),
     "not TOML": (r"\[body\]", "[body", "", "Expected"),
 }
 
@@ -190,6 +204,12 @@ def test_a_mistake_of_a_robot_that_stands_is_named(changed, mistake):
         changed(pattern, replacement, count=1 if "{" in pattern else 0, robot=robot)
     assert caught.value.key.startswith(key)
     assert allowed in caught.value.allowed
+
+
+def test_a_battery_is_judged_by_what_its_file_says(changed):
+    assert AMES.battery is None
+    with_one = changed(r"\[air\]", "[battery]\nlow_v = 10.5\nempty_v = 9.9\n[air]")
+    assert with_one.battery == BatteryParameters(10.5, 9.9)
 
 
 def test_axes_make_the_mask_of_the_robot(changed):
@@ -301,6 +321,7 @@ TWIST_MISTAKES = {
     "would swing": ("lag_s = 0.03", "lag_s = 0.3", "smaller: .* swing"),
     "misspelt": ("speed_m_s", "sped_m_s", "did you mean 'speed_m_s'"),
     "thrusters": ("[twist] ", "[thrusters]\n[twist] ", "unknown key; allowed here: .*twist"),
+    "a battery": ("[twist] ", "[battery]\nlow_v = 1\nempty_v = 2\n[twist] ", "less than low_v"),
     "no numbers": ("speed_m_s = 0.5", "speed_m_s = nan", "finite"),
     "LEDs in one place": ("[-0.089, 0.053, 0.140]", "[-0.012, -0.084, -0.117]", "from the others"),
 }

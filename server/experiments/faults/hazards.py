@@ -279,6 +279,21 @@ HAZARDS: Final = (
         ("pipeline/test_teleop.py::test_a_robot_tilted_too_far_ends_the_flight",),
     ),
     Hazard(
+        "35",
+        "The robot's battery runs low or empty",
+        "its voltage, as the robot tells it, against `[battery]` of its file",
+        "low: told on both pages, felt, logged; empty: no arming, in flight told urgently, and no "
+        "flight ended: where it comes to rest is for who leads; told no more: unknown, never good",
+        (
+            "server/control/test_robot_health.py::"
+            "test_what_is_told_no_more_is_unknown_and_not_what_it_was",
+            "server/control/test_controller.py::"
+            "test_a_battery_that_runs_empty_in_flight_ends_no_flight_and_is_told_urgently",
+            "e2e/test_robot_health.py::"
+            "test_a_battery_drains_in_flight_is_told_everywhere_and_keeps_the_robot_from_the_next_one",
+        ),
+    ),
+    Hazard(
         "36",
         "The disk is full or slow",
         "the recorder",

@@ -94,6 +94,7 @@ def test_lists_grow_with_each_mention():
         ('cert = "/c.pem"', ["cert", "key"]),
         ('robot_host = "1.2.3.4"', ["robot_host", "--no-simulate"]),
         ('name = "left arm"', ["name: allowed: up to 24 letters", "not 'left arm'"]),
+        ("simulate = false\nsimulated.battery_v = 12", ["simulated", "--no-simulate"]),
     ],
 )
 def test_what_can_not_be_used_is_named_with_what_is_allowed(tmp_path, text, words):

@@ -21,6 +21,7 @@ from pipeline.teleop import Output
 from server.common.runtime_parameters import Tune
 from server.control.controller import (
     STOOD_STILL_S,
+    UNTOLD,
     Controller,
     Mean,
     TooLate,
@@ -29,6 +30,7 @@ from server.control.controller import (
 from server.control.gap_log import MANY, SIDES
 from server.control.ipc import ControlStatus, control_end, expected_of, server_end
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
+from server.control.robot_health import HealthFields, RobotCondition
 from server.control.tick_rate import OVER_S
 from tests.pipeline.seeing import quiver, seen_at
 
@@ -54,6 +56,7 @@ class Rig:
         self.held = False
         self.press = 0
         self.ready: list[str] | None = []
+        self.condition = UNTOLD
 
     def said(self, t: float) -> list[Input]:
         said: list[Input] = []
@@ -79,7 +82,11 @@ class Rig:
             t = 100.0 + 0.005 * self.k
             said = [*self.said(t), *(extra if step == 0 else ())]
             body = [BodyImu(t - 0.003, quiver(t), np.array(UP))]
-            out.append(self.controller.tick(t, said, body, robot_reason, robot_gap))
+            out.append(
+                self.controller.tick(
+                    t, said, body, robot_reason, robot_gap, condition=self.condition
+                )
+            )
         return out
 
     def track(self) -> None:
@@ -159,6 +166,43 @@ def test_a_process_that_is_unfit_never_arms_and_says_why():
     rig = Rig(unfit="No real-time priority.")
     assert rig.run(1.0)[-1][1].refusals == ("No real-time priority.",)
     assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+EMPTY = RobotCondition("empty", 9.8, is_empty=True)
+REFUSED = "The robot's battery is empty (9.8 V): charge it before arming."
+
+
+def test_a_robot_with_an_empty_battery_is_not_armed_and_its_reason_is_told_once():
+    rig = Rig()
+    rig.condition = EMPTY
+    output = rig.run(1.0)[-1][1]
+    assert output.refusals == (REFUSED,)
+    assert rig.status(output).health.words == [REFUSED]
+    assert rig.run(0.05, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.DISARMED
+
+
+@pytest.mark.parametrize("press", [False, True])
+def test_one_that_is_armed_and_waits_is_disarmed_by_it_even_as_somebody_presses(press):
+    rig = Rig()
+    rig.run(1.0)
+    assert rig.run(0.6, [RequestInput("arm")])[-1][1].failsafe.mode == Mode.ARMED
+    rig.condition, rig.held, rig.press = EMPTY, press, rig.press + press
+    failsafe = rig.run(0.005)[-1][1].failsafe
+    assert (failsafe.mode, failsafe.reason) == (Mode.DISARMED, REFUSED)
+
+
+def test_a_battery_that_runs_empty_in_flight_ends_no_flight_and_is_told_urgently():
+    rig = Rig()
+    rig.track()
+    rig.condition = EMPTY
+    command, output = rig.run(3.0)[-1]
+    assert (command.armed, output.failsafe.mode) == (True, Mode.TRACK)
+    said = ["The robot's battery is empty (9.8 V): bring it to rest now."]
+    assert rig.status(output).health == HealthFields("empty", 9.8, said)
+    rig.held = False
+    assert rig.run(0.5)[-1][1].failsafe.mode == Mode.HOLD
+    rig.held, rig.press = True, rig.press + 1
+    assert rig.run(1.0)[-1][1].failsafe.mode == Mode.TRACK
 
 
 def test_what_gains_lack_is_told_and_refuses_nothing():

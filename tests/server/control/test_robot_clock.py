@@ -13,10 +13,12 @@ from hardware.follower import (
     BodySample,
     FollowerState,
     Refusal,
+    RobotHealth,
     ThrustCommand,
 )
 from hardware.link.robot_end import SILENCE
 from hardware.link.silence import SilenceTimes
+from hardware.robot_file import BatteryParameters
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, RequestInput
 from server.control.robot_clock import (
@@ -25,6 +27,7 @@ from server.control.robot_clock import (
     BodyClock,
     RobotLink,
 )
+from server.control.robot_health import RobotCondition
 
 SILENCE_S, RAMP_AFTER_S = SILENCE.coasts_s, SILENCE.ramps_s
 RAMP_BEGUN_S = SILENCE.back_s - SILENCE.ramps_s
@@ -96,6 +99,31 @@ def test_a_robot_that_restarts_has_another_clock() -> None:
     follower.next = [sample(5_000, boot_id=2)]
     (imu,) = link.receive(101.0)
     assert imu.t == pytest.approx(101.0)
+
+
+class Telling(Script):
+    """... and tells of its battery."""
+
+    health: tuple[RobotHealth, float] | None = RobotHealth(9.0), 100.0
+
+
+def test_what_a_robot_tells_is_judged_by_its_file_once_it_has_sent_a_sample() -> None:
+    follower = Telling()
+    link = RobotLink(follower, battery=BatteryParameters(10.5, 9.9))
+    link.receive(100.0)
+    assert link.condition == RobotCondition()
+    follower.next = [sample(50_000_000)]
+    link.receive(100.005)
+    assert link.condition == RobotCondition("empty", 9.0, is_empty=True)
+
+
+def test_of_a_robot_whose_link_carries_nothing_of_it_nothing_is_known() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    follower.next = [sample(50_000_000)]
+    for k in range(1_000):
+        link.receive(100.0 + 0.005 * k)
+    assert link.condition == RobotCondition()
 
 
 def test_samples_of_before_a_restart_that_come_with_those_after_it_do_not_date_them() -> None:

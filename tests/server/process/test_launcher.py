@@ -57,6 +57,13 @@ def test_control_is_led_to_the_simulated_robot(tmp_path, sockets):
     assert server.arguments[-1] == "--x"
 
 
+def test_a_battery_of_the_simulated_robot_is_its_own_and_there_is_none_unasked(tmp_path, sockets):
+    assert "--battery-v" not in children_of(load([]), [], tmp_path, sockets)[0].arguments
+    settings = load(["--simulated.battery-v", "12.6", "--simulated.drain-v-min", "0.5"])
+    robot = children_of(settings, [], tmp_path, sockets)[0]
+    assert (option(robot, "--battery-v"), option(robot, "--drain-v-min")) == ("12.6", "0.5")
+
+
 def test_a_real_robot_is_not_simulated(tmp_path, sockets):
     write_key(key_file(tmp_path, "ames"), new_key())
     words = ["--no-simulate", "--robot-host", "192.0.2.5", "--robot-port", "4000"]

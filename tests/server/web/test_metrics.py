@@ -17,6 +17,7 @@ from hardware.codec import DecodeError
 from pipeline.signals import Mode
 from server import __version__
 from server.common.clock import now
+from server.control.robot_health import HealthFields
 from server.diagnostics.pauses import Stall
 from server.diagnostics.tally import Tally
 from server.media.decoding import Decoding
@@ -68,6 +69,17 @@ def test_lateness_ages_and_the_error_are_told_in_si_units(manager):
     assert found["lightleash_stream_rate_hertz", "body_imu"] == 200.0
     assert 0.0 < found["lightleash_stream_age_seconds", "body_imu"] < 1.0
     assert found["lightleash_stream_dropped_total", "control"] == 4.0
+
+
+def test_the_battery_is_told_while_it_is_known(manager):
+    for health, known in (
+        (None, None),
+        (HealthFields("told", 11.25), 11.25),
+        (HealthFields("low", 10.4, ["Low."]), 10.4),
+        (HealthFields("unknown"), None),
+    ):
+        tell(manager, health=health)
+        assert samples(manager).get(("lightleash_robot_battery_volts",)) == known
 
 
 def test_pictures_that_could_not_be_decoded_are_counted_by_what_became_of_them(manager):

@@ -12,6 +12,7 @@ from pipeline.prediction import Prediction
 from server.common.clock import now
 from server.common.runtime_parameters import Tune
 from server.control.ipc_inputs import ReadyInput, RequestInput
+from server.control.robot_health import HealthFields
 from server.diagnostics.events import EVENTS
 from server.protocol.lead_messages import AS_EVER, Lead
 from server.protocol.messages import Command, Hello, encode_message
@@ -269,6 +270,23 @@ def test_what_is_doubted_of_the_sensors_is_told_and_is_one_event_while_it_lasts(
         house.manager._tick()
         assert msgspec.json.decode(watcher.data[-1])["sensors_doubted"] == doubts
     assert [event.times for event in house.manager.events if event.text == said] == [2]
+
+
+def test_a_battery_that_gets_worse_is_one_event_whatever_its_voltage(house):
+    watcher, shown = Paper(), []
+    house.manager.supervisors.add(watcher)
+    told = (("good", 11.0), ("low", 10.4), ("low", 10.3), ("empty", 9.8), ("empty", 9.7))
+    for level, volts in told:
+        words = [] if level == "good" else [f"The battery is {level} ({volts} V)."]
+        house.control.send(control_status(health=HealthFields(level, volts, words)))
+        house.manager._receive_status()
+        house.manager._tick()
+        status = msgspec.json.decode(watcher.data[-1])
+        shown.append((status["battery"], status["battery_v"]))
+        assert status["health"] == words
+    assert shown == list(told)
+    said = [event.text for event in house.manager.events if "battery" in event.text]
+    assert said == ["The battery is empty (9.8 V).", "The battery is low (10.4 V)."]
 
 
 def test_what_gains_lack_is_one_event(house):

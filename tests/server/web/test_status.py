@@ -14,6 +14,7 @@ from pipeline.signals import Mode
 from pipeline.vision.robot_identity import TWO
 from server.common.clock import now
 from server.common.runtime_parameters import RuntimeParameters
+from server.control.robot_health import HealthFields
 from server.protocol.messages import encode_message
 from server.web import status
 from server.web.status import LOST_S
@@ -46,6 +47,23 @@ def test_control_that_falls_silent_is_lost_whatever_it_said_last(manager):
     assert (shown.mode, shown.ready) == ("LOST", False)
     assert (shown.told_mm_s, shown.told_deg_s) == (None, None)
     assert "Following" not in shown.reason
+
+
+@pytest.mark.parametrize(
+    ("health", "silent_s", "battery"),
+    [
+        (None, 0.0, ("untold", None)),
+        (None, LOST_S + 0.05, ("untold", None)),
+        (HealthFields("good", 11.0), 0.0, ("good", 11.0)),
+        (HealthFields("good", 11.0), LOST_S + 0.05, ("unknown", None)),
+    ],
+)
+def test_while_control_is_silent_a_battery_is_not_known_any_more(
+    manager, health, silent_s, battery
+):
+    tell(manager, t=now() - silent_s, health=health)
+    shown = status.build(manager)
+    assert (shown.battery, shown.battery_v) == battery
 
 
 def test_what_control_says_is_shown_in_the_units_of_screens(manager):

@@ -1,6 +1,6 @@
 /** The mode where nobody looks at the page: in its title, and as sound that lasts as long as the fault. */
 
-/** @import {ShownMode} from '../ui/session_types.js' */
+/** @import {ShownMode, Signal} from '../ui/session_types.js' */
 
 import { Lasting } from '../ui/lasting.js';
 
@@ -14,13 +14,13 @@ const LIMITS = { againMs: 3000, most: 20 };
 export class Alarm {
   /**
    * @param {{ title: string }} document
-   * @param {(mode: ShownMode) => void} signal
+   * @param {(signal: Signal) => void} signal
    */
   constructor(document, signal) {
     this.document = document;
     /** The server's name, by which one of several pages is told from the others. */
     this.server = '';
-    this.lasting = new Lasting(/** @type {(mode: any) => void} */ (signal), LIMITS);
+    this.lasting = new Lasting(signal, LIMITS);
   }
 
   /**
@@ -28,11 +28,14 @@ export class Alarm {
    * @param {string} name For people.
    * @param {boolean} flies As far as the page knows.
    * @param {number} now
+   * @param {boolean} empty It runs on an empty battery.
    */
-  take(mode, name, flies, now) {
+  take(mode, name, flies, now, empty = false) {
     const isAlarm = ALARMS.includes(mode) || (flies && DEAF.includes(mode));
-    this.document.title = `${isAlarm ? '⚠ ' : ''}${name} · ${this.server || 'Lightleash'}`;
+    const warns = isAlarm || empty ? '⚠ ' : '';
+    this.document.title = `${warns}${name} · ${this.server || 'Lightleash'}`;
     if (isAlarm) this.lasting.take(mode, now);
+    else if (empty) this.lasting.take('EMPTY', now);
     else this.lasting.over();
   }
 }

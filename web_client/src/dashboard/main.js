@@ -15,7 +15,7 @@ import { AT_REST, EMPTY, reduce, shownMode } from './model.js';
 import { Feedback } from '../ui/feedback.js';
 import { KnobPanel } from './runtime_parameters.js';
 import { LeadingChoice } from '../ui/leading_choice.js';
-import { modeWords } from '../ui/mode_words.js';
+import { modeWords, runsEmpty } from '../ui/mode_words.js';
 import { ServerTime, WakefulClock, commandOf } from '../wire/command.js';
 import { Link, socketUrl } from '../wire/link.js';
 import { PathSelect } from './path_select.js';
@@ -86,7 +86,7 @@ function dispatch(event) {
     const { problem } = board;
     const mode = shownMode(board);
     const flies = board.status !== null && !AT_REST.includes(board.status.mode);
-    alarm.take(mode, modeWords(mode, board.status)[0], flies, performance.now());
+    alarm.take(mode, modeWords(mode, board.status)[0], flies, performance.now(), runsEmpty(mode, board.status));
     view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
     estimate.render(board);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);

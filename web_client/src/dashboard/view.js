@@ -5,7 +5,7 @@
 /** @import {Status} from '../wire/protocol_types.js' */
 
 import { Elements, write } from './elements.js';
-import { limitWords, modeWords, rampWords } from '../ui/mode_words.js';
+import { healthWords, limitWords, modeWords, rampWords, robotWords } from '../ui/mode_words.js';
 import { age, alarm, gapLine, metres, number, scaleEnd, screenWords, streamName, timeOfDay } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
@@ -87,7 +87,7 @@ export class BoardView extends Elements {
     const left = board.heard ? board.status?.until_ramp_ms ?? null : null;
     this.text('left', rampWords(left === null ? null : Math.ceil(left / 1000), board.status));
     this.text('reason', board.heard ? board.status?.reason ?? '' : '');
-    this.text('robot', [this.server, board.status?.robot ?? '–'].filter(Boolean).join(' · '));
+    this.text('robot', [this.server, robotWords(board.status)].filter(Boolean).join(' · '));
     for (const [what, can] of Object.entries(requests(board))) {
       /** @type {HTMLButtonElement} */ (this.find(what)).disabled = !can;
     }
@@ -117,7 +117,8 @@ export class BoardView extends Elements {
     this.list('refusals', lines);
     this.find('refusals').firstElementChild?.classList.toggle('fine', fine);
     const { mode, sensors_doubted: doubted, thrusters_weak: weak, warnings } = status;
-    this.list('warnings', [...limitWords(status), ...(mode === 'DISARMED' ? [] : weak), ...doubted, ...warnings]);
+    const told = [...healthWords(status), ...limitWords(status)];
+    this.list('warnings', [...told, ...(mode === 'DISARMED' ? [] : weak), ...doubted, ...warnings]);
   }
 
   /** @param {Status} status */

@@ -17,6 +17,7 @@ const SIGNALS = {
   LOST: { vibration: [200, 100, 200, 100, 200], tones: [247, 196, 247, 196] },
   LIMIT: { vibration: [35, 45, 35], tones: [587, 494] },
   WEAK: { vibration: [80, 60, 80, 60, 80], tones: [330, 294, 330] },
+  EMPTY: { vibration: [120, 60, 120, 60, 300], tones: [494, 370, 277, 208] },
   STOP_LOST: { vibration: [400, 100, 400, 100, 400], tones: [196, 175, 196, 175] },
   NO_LINK: { vibration: [200, 100, 200], tones: [247, 196] },
   NO_WORD: { vibration: [200, 100, 200], tones: [247, 196] },

@@ -2,7 +2,7 @@
 
 /** @import {ShownMode, Signal, State} from './session_types.js' */
 
-import { limitWords } from './mode_words.js';
+import { limitWords, runsEmpty } from './mode_words.js';
 import { shownMode } from './session.js';
 
 /** A robot that does not follow, whatever the hand does. @type {readonly ShownMode[]} */
@@ -65,5 +65,6 @@ export function lastingSignal(state) {
   if (state.phase !== 'operating' || state.standby) return null;
   const mode = shownMode(state);
   if (FAULTS.includes(mode)) return mode;
+  if (runsEmpty(mode, state.status)) return 'EMPTY';
   return limitWords(state.status).length > 0 ? 'LIMIT' : null;
 }

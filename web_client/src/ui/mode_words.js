@@ -49,6 +49,34 @@ export function limitWords(status) {
   return status?.at_limit && status.mode === 'TRACK' ? ['At the end of its reach: lead it back.'] : [];
 }
 
+/**
+ * What a robot tells of itself that people must know, beside what keeps it from being armed.
+ * @param {Status | null} status
+ */
+export function healthWords(status) {
+  return (status?.health ?? []).filter((words) => !status?.refusals.includes(words));
+}
+
+/**
+ * Whether the robot is in the air with an empty battery.
+ * @param {ShownMode} mode
+ * @param {Status | null} status
+ */
+export function runsEmpty(mode, status) {
+  return status?.battery === 'empty' && ['TRACK', 'COAST', 'HOLD', 'RAMP'].includes(mode);
+}
+
+/**
+ * The robot's name, and what its battery has.
+ * @param {Status | null} status
+ */
+export function robotWords(status) {
+  if (status === null) return '–';
+  const { robot, battery, battery_v: volts } = status;
+  if (battery === 'untold') return robot;
+  return `${robot} · battery ${volts === null ? 'not known' : `${volts.toFixed(1)} V`}`;
+}
+
 /** On whose side a silence was. @type {Record<string, string>} */
 export const SIDES = { phone: 'phone', robot: 'robot', server: 'computer' };
 

@@ -19,6 +19,8 @@ const NOTICE_MS = 5000;
 const BUSY_MS = 250;
 /** @type {ShownMode[]} */
 const FLYING = ['TRACK', 'COAST', 'HOLD'];
+/** Batteries that people must know of. @type {Status['battery'][]} */
+const WORSE = ['unknown', 'low', 'empty'];
 /** How a STOP ended is told of for at least so long [ms]. */
 const STOP_END_MS = 8000;
 
@@ -65,6 +67,10 @@ export function reduce(state, event) {
   if (outcome.state.phase !== 'operating' || outcome.state.standby) return outcome;
   const mode = shownMode(outcome.state);
   if (mode !== shownMode(state)) return felt(outcome, mode);
+  const battery = outcome.state.status?.battery ?? 'untold';
+  if (battery !== (state.status?.battery ?? 'untold') && WORSE.includes(battery)) {
+    return felt(outcome, battery === 'empty' ? 'EMPTY' : 'WEAK');
+  }
   const known = state.status?.thrusters_weak ?? [];
   const isWeaker = outcome.state.status?.thrusters_weak.some((words) => !known.includes(words));
   return isWeaker ? felt(outcome, 'WEAK') : outcome;

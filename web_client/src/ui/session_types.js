@@ -6,7 +6,7 @@
 
 /** @typedef {Status['mode'] | 'NO_LINK' | 'NO_WORD'} ShownMode */
 
-/** What is felt and heard. @typedef {ShownMode | 'STOP_LOST' | 'WEAK' | 'LIMIT'} Signal */
+/** What is felt and heard. @typedef {ShownMode | 'STOP_LOST' | 'WEAK' | 'LIMIT' | 'EMPTY'} Signal */
 
 /**
  * @typedef {object} Health

@@ -5,7 +5,7 @@
 /** @import {Calibrate} from '../wire/protocol_types.js' */
 /** @import {RequestedPath} from '../video/video_paths.js' */
 
-import { gapWords, limitWords, modeWords, rampWords } from './mode_words.js';
+import { gapWords, healthWords, limitWords, modeWords, rampWords } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
 import { leadWords } from './leading_choice.js';
@@ -166,8 +166,8 @@ export class View {
     // a weak thruster is news in flight; on the ground it stands among the refusals
     const known = (calm ? state.status?.warnings : state.status?.thrusters_weak) ?? [];
     const doubted = state.status?.sensors_doubted ?? [];
-    const limit = limitWords(state.status);
-    this.list('warnings', state.standby ? [] : [...limit, ...known, ...doubted], MOST_WARNINGS);
+    const told = [...healthWords(state.status), ...limitWords(state.status)];
+    this.list('warnings', state.standby ? [] : [...told, ...known, ...doubted], MOST_WARNINGS);
   }
 
   /** @param {{ seconds: number, share: number } | null} left Until RAMP. */

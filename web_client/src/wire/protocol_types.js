@@ -262,6 +262,9 @@
  * @property {number} thrust_limit_n ... and the most that one may be.
  * @property {number | null} told_mm_s The speed that a robot is told that takes a twist ...
  * @property {number | null} told_deg_s ... and how fast to turn.
+ * @property {'untold' | 'unknown' | 'told' | 'good' | 'low' | 'empty'} battery The robot's: by the limits of its file; `told` without such. `unknown`: told no more.
+ * @property {number | null} battery_v null unless it is known.
+ * @property {string[]} health What people must know of the robot's own state, each in words, the gravest first.
  */
 
 /**

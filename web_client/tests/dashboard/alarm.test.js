@@ -1,6 +1,6 @@
 /** The supervisor's alarm: what it says in the title, and how long it sounds. */
 
-/** @import {ShownMode} from '../../src/ui/session_types.js' */
+/** @import {ShownMode, Signal} from '../../src/ui/session_types.js' */
 
 import assert from 'node:assert/strict';
 import test from 'node:test';
@@ -12,7 +12,7 @@ import { Alarm } from '../../src/dashboard/alarm.js';
  */
 function heard(modes, flies = false) {
   const page = { title: '' };
-  /** @type {ShownMode[]} */
+  /** @type {Signal[]} */
   const signals = [];
   const alarm = new Alarm(page, (mode) => signals.push(mode));
   for (const [mode, now] of modes) alarm.take(mode, mode, flies, now);
@@ -48,6 +48,20 @@ test('one that comes back within the time between two sounds is heard at once, t
 test('a server that falls silent is an alarm while a robot is in the air, and none of a page left open', () => {
   assert.deepEqual(heard([['NO_WORD', 0], ['NO_LINK', 100]]).signals, []);
   assert.deepEqual(heard([['NO_WORD', 0], ['NO_LINK', 100]], true).signals, ['NO_WORD', 'NO_LINK']);
+});
+
+test('a robot that runs on an empty battery is an alarm in any mode, after those of the mode', () => {
+  const page = { title: '' };
+  /** @type {Signal[]} */
+  const signals = [];
+  const alarm = new Alarm(page, (signal) => signals.push(signal));
+  for (const [k, mode] of /** @type {ShownMode[]} */ (['TRACK', 'HOLD', 'RAMP']).entries()) {
+    alarm.take(mode, mode, true, 1000 * k, true);
+    assert.equal(page.title, `⚠ ${mode} · Lightleash`);
+  }
+  assert.deepEqual(signals, ['EMPTY', 'RAMP']);
+  alarm.take('DISARMED', 'DISARMED', false, 9000, false);
+  assert.equal(page.title, 'DISARMED · Lightleash');
 });
 
 test('a page that is left alone with a fault falls silent after a minute', () => {

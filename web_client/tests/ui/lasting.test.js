@@ -48,6 +48,18 @@ test('what a change of mode signalled is not signalled twice', () => {
   assert.deepEqual(signals, ['RAMP']);
 });
 
+test('an empty battery is felt while the robot flies, faults before it and the end of its reach after', () => {
+  /** @param {Parameters<typeof statusOf>[0]} parts */
+  const lasting = (parts) =>
+    lastingSignal({ ...INITIAL, phase: 'operating', linked: true, heard: true, status: statusOf({ battery: 'empty', ...parts }) });
+  assert.equal(lasting({ mode: 'TRACK' }), 'EMPTY');
+  assert.equal(lasting({ mode: 'HOLD' }), 'EMPTY');
+  assert.equal(lasting({ mode: 'TRACK', at_limit: true }), 'EMPTY');
+  assert.equal(lasting({ mode: 'RAMP' }), 'RAMP');
+  assert.equal(lasting({ mode: 'DISARMED' }), null);
+  assert.equal(lasting({ mode: 'TRACK', battery: 'low' }), null);
+});
+
 test('a robot at the end of its reach is felt while it follows, and faults before it', () => {
   /** @param {Parameters<typeof statusOf>[0]} parts */
   const lasting = (parts, more = {}) =>

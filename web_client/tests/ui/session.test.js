@@ -7,7 +7,7 @@ import { Problem } from '../../src/wire/problems.js';
 import { endWords } from '../../src/wire/stop.js';
 import { FREE_MS, standbyWords } from '../../src/ui/standby.js';
 import { cardOf, mayGive } from '../../src/ui/handover_card.js';
-import { modeWords, rampWords } from '../../src/ui/mode_words.js';
+import { healthWords, modeWords, rampWords, robotWords } from '../../src/ui/mode_words.js';
 import { holdWords } from '../../src/ui/view.js';
 import { statusOf } from '../fakes.js';
 
@@ -184,6 +184,33 @@ test('a thruster that gives less is felt once, a change of mode before it', () =
   assert.deepEqual(after(...flying, status(weak), status(two)).effects, [{ type: 'feel', mode: 'WEAK' }]);
   assert.deepEqual(after(...flying, status({ ...weak, mode: 'RAMP' })).effects, [{ type: 'feel', mode: 'RAMP' }]);
   assert.deepEqual(after(...flying, status(weak), status({ mode: 'TRACK' })).effects, []);
+});
+
+test('a battery that gets worse is felt once, an empty one by itself', () => {
+  /** @param {import('../../src/wire/protocol_types.js').Status['battery'][]} levels */
+  const felt = (...levels) => after(
+    ...UP, ...levels.map((battery) => status({ mode: 'TRACK', battery })),
+  ).effects;
+  assert.deepEqual(felt('good', 'low'), [{ type: 'feel', mode: 'WEAK' }]);
+  assert.deepEqual(felt('low', 'low'), []);
+  assert.deepEqual(felt('low', 'empty'), [{ type: 'feel', mode: 'EMPTY' }]);
+  assert.deepEqual(felt('good', 'unknown'), [{ type: 'feel', mode: 'WEAK' }]);
+  assert.deepEqual(felt('empty', 'good'), []);
+  assert.deepEqual(felt('untold', 'told'), []);
+});
+
+test('what the robot tells of itself is said once, though it also keeps it from being armed', () => {
+  const empty = "The robot's battery is empty (9.8 V): charge it before arming.";
+  assert.deepEqual(healthWords(statusOf({ health: [empty] })), [empty]);
+  assert.deepEqual(healthWords(statusOf({ health: [empty], refusals: [empty] })), []);
+  assert.deepEqual(healthWords(null), []);
+});
+
+test('the robot is named with what its battery has, and without one alone', () => {
+  assert.equal(robotWords(null), '–');
+  assert.equal(robotWords(statusOf({ robot: 'ames' })), 'ames');
+  assert.equal(robotWords(statusOf({ robot: 'ames', battery: 'told', battery_v: 11.25 })), 'ames · battery 11.3 V');
+  assert.equal(robotWords(statusOf({ robot: 'ames', battery: 'unknown' })), 'ames · battery not known');
 });
 
 test('arming is offered when the server is ready and nobody holds', () => {
