@@ -44,6 +44,7 @@ TABLES: Final = {
         *("reference_x_m", "reference_y_m", "reference_z_m"),
         *("reference_qw", "reference_qx", "reference_qy", "reference_qz"),
         *("error_m", "error_rad", "picture_delay_s", "picture_delay_sigma_s", "saturated"),
+        "battery_v",
     ),
     "episodes": ("end_s", "episode", "task", "keep"),
 }
@@ -115,7 +116,7 @@ def _state(state: RecordedState) -> Sequence[object]:
         *(state.reference_p_in_v or nothing3),
         *(state.reference_R_wxyz or nothing4),
         *(state.error_m, state.error_rad, state.time_offset, state.time_offset_sigma),
-        state.saturated,
+        *(state.saturated, state.battery_v),
         *state.command,
     )
 

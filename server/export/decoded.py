@@ -24,6 +24,7 @@ from pipeline.frames import Triple
 from pipeline.signals import BodyImu, Mode, PhoneImu
 from server.control.ipc import BodyRow
 from server.control.ipc_estimate import EstimateFields
+from server.control.robot_health import HealthFields
 from server.media.image_format import ImageFormat
 from server.phone.ingest import ARRIVAL_S, phone_imu
 from server.protocol.messages import Command, Hello, Log, LoggedEvent, decode_message
@@ -113,6 +114,12 @@ class RecordedState(msgspec.Struct, frozen=True):
     body_samples: list[BodyRow] = []
     commands: list[tuple[float, ...]] = []
     estimate: EstimateFields | None = None
+    health: HealthFields | None = None
+
+    @property
+    def battery_v(self) -> float | None:
+        """As the robot tells [V]."""
+        return self.health.battery_v if self.health is not None else None
 
     @property
     def mode_name(self) -> str:

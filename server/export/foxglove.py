@@ -13,6 +13,7 @@
 | /robot/pose | PoseInFrame: base_link in phone | tick |
 | /robot/odometry | Odometry: the same with its covariance | tick |
 | /robot/state, /robot/command | `schemas.State`, `schemas.Command` | tick |
+| /robot/health | `schemas.Health`, of a robot that tells of itself | tick |
 | /robot/leds | SceneUpdate: LEDs in base_link | once |
 | /log | Log | event |
 | /episodes | Event: from press to release, with task and keep | press |
@@ -235,6 +236,15 @@ class _Film:
                 angular_velocity_in_body_rad_s=_vector(twist[3:]) if twist is not None else None,
             ),
         )
+
+        if (health := state.health) is not None and health.battery != "untold":
+            told = schemas.Health(
+                timestamp=stamp,
+                battery=health.battery,
+                battery_v=health.battery_v,
+                words=health.words,
+            )
+            self._put("/robot/health", t, told)
 
     def _leds(self, t: float) -> SceneEntity:
         size = Vector3(x=LED_M, y=LED_M, z=LED_M)

@@ -12,6 +12,7 @@
 | /robot/velocity | geometry_msgs/Vector3Stamped: in space, in the axes of phone | tick |
 | /robot/thrusters | sensor_msgs/JointState: effort [N] | tick |
 | /robot/twist | geometry_msgs/TwistStamped: told, of a robot that takes one | tick |
+| /robot/battery | sensor_msgs/BatteryState: voltage alone, while the robot tells it | tick |
 | /robot/mode | std_msgs/String | its change |
 | /rosout | rcl_interfaces/Log | event |
 | /episodes | std_msgs/String: JSON with begin_s, end_s (since 1970), task, keep | press |
@@ -22,6 +23,7 @@ The bag's custom data have the robot's and the camera's file.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import nan
 from pathlib import Path
 from typing import Any, Final
 
@@ -253,7 +255,28 @@ class _Bag:
             velocity, kind = self._vector(state.u_bf_in_c), "geometry_msgs/msg/Vector3Stamped"
             header = self._header(t, PHONE)
             self._put("/robot/velocity", t, kind, header=header, vector=velocity)
+        if state.battery_v is not None:
+            self._battery(t, state.battery_v)
         self._command(state)
+
+    def _battery(self, t: float, volts: float) -> None:
+        names = "temperature", "current", "charge", "capacity", "design_capacity", "percentage"
+        unknown = dict.fromkeys(names, nan)
+        states = "power_supply_status", "power_supply_health", "power_supply_technology"
+        self._put(
+            "/robot/battery",
+            t,
+            "sensor_msgs/msg/BatteryState",
+            header=self._header(t, BODY),
+            voltage=volts,
+            **unknown,
+            **dict.fromkeys(states, 0),
+            present=True,
+            cell_voltage=np.zeros(0, dtype=np.float32),
+            cell_temperature=np.zeros(0, dtype=np.float32),
+            location="",
+            serial_number="",
+        )
 
     def _command(self, state: RecordedState) -> None:
         header = self._header(state.t, BODY)

@@ -48,6 +48,7 @@ OWN: Final = {
         "double error_rad, repeated double thrusts_n, bool saturated,"
         "Vector3 velocity_in_body_m_s, Vector3 angular_velocity_in_body_rad_s"
     ),
+    "Health": "Timestamp timestamp, string battery, double battery_v, repeated string words",
     "Touch": "Timestamp timestamp, bool held, bool visible, uint32 press",
 }
 """Fields of each message, numbered from 1 as they stand. What nobody knows is left out."""
@@ -82,4 +83,4 @@ def _class_of(name: str) -> type[Message]:
 
 
 Default().Add(_file())
-Imu, PictureTime, State, Command, Touch = map(_class_of, OWN)
+Imu, PictureTime, State, Command, Health, Touch = map(_class_of, OWN)

@@ -1,6 +1,7 @@
 """Recordings to export: the virtual phone's on a known day, and small ones of other codecs."""
 
 import json
+from itertools import count
 from pathlib import Path
 
 import cv2
@@ -56,6 +57,21 @@ def told_a_twist(folder):
 
     twister = (ROBOTS / "twister.toml").read_text()
     return on_a_known_day(folder, change=change, **{ROBOT_KEY: twister})
+
+
+def with_a_battery(folder):
+    """The same flight, as if its robot told of its battery in the second half of it."""
+    counts = count()
+
+    def change(entry):
+        if entry.topic != STATUS:
+            return entry.data
+        status = json.loads(entry.data)
+        if next(counts) >= 137:
+            status["health"] = ["low", 10.25, ["The robot's battery is low."]]
+        return json.dumps(status).encode()
+
+    return on_a_known_day(folder, change=change)
 
 
 def spot(k):

@@ -13,6 +13,7 @@ from tests.server.export.recordings import (
     film,
     on_a_known_day,
     told_a_twist,
+    with_a_battery,
 )
 
 ZERO = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=ZERO_NS // 1000)
@@ -67,6 +68,11 @@ def test_of_a_robot_that_takes_a_twist_the_states_end_with_what_it_was_told(tmp_
         "told_wx_rad_s", "told_wy_rad_s", "told_wz_rad_s",
     ]  # fmt: skip
     assert tuple(float(cell) for cell in list(states[-1].values())[-6:]) == TWIST_IN_B
+
+
+def test_the_battery_is_in_the_states_while_it_is_told(tmp_path):
+    states = tables(with_a_battery(tmp_path), tmp_path / "out")["states"]
+    assert [row["battery_v"] for row in states] == 137 * [""] + 138 * ["10.25"]
 
 
 def test_without_a_day_the_calendar_is_empty(tmp_path):

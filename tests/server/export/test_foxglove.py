@@ -17,6 +17,7 @@ from tests.server.export.recordings import (
     on_a_known_day,
     spot_at,
     told_a_twist,
+    with_a_battery,
 )
 
 
@@ -123,6 +124,15 @@ def test_a_command_has_thrusts_or_a_twist(flight, tmp_path):
     assert len(twist.thrusts_n) == 0
     told = (*vector(twist.velocity_in_body_m_s), *vector(twist.angular_velocity_in_body_rad_s))
     assert told == TWIST_IN_B
+
+
+def test_a_robot_that_tells_of_itself_has_a_topic_for_it(flight, tmp_path):
+    assert "/robot/health" not in flight.topics
+    told = Export(with_a_battery(tmp_path), tmp_path).topics["/robot/health"]
+    assert len(told) == 138
+    assert {(one.battery, one.battery_v, *one.words) for one in told} == {
+        ("low", 10.25, "The robot's battery is low.")
+    }
 
 
 def vector(v):

@@ -10,7 +10,14 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from server.export.command import main
-from tests.server.export.recordings import TWIST_IN_B, ZERO_NS, film, on_a_known_day, told_a_twist
+from tests.server.export.recordings import (
+    TWIST_IN_B,
+    ZERO_NS,
+    film,
+    on_a_known_day,
+    told_a_twist,
+    with_a_battery,
+)
 
 
 def bag(source, folder, *arguments):
@@ -109,6 +116,14 @@ def test_a_twist_told_is_a_twist_in_the_bodys_axes(tmp_path):
         assert (t, told.header.frame_id) == (stamp_ns(told.header.stamp), "base_link")
         v, omega = told.twist.linear, told.twist.angular
         assert (v.x, v.y, v.z, omega.x, omega.y, omega.z) == TWIST_IN_B
+
+
+def test_the_battery_is_there_while_it_is_told(flight, tmp_path):
+    assert "/robot/battery" not in flight[0]
+    told = bag(with_a_battery(tmp_path), tmp_path)[0]["/robot/battery"]
+    assert len(told) == 138
+    assert {one.voltage for _, one in told} == {10.25}
+    assert all(np.isnan(one.percentage) for _, one in told)
 
 
 def test_what_is_no_h264_becomes_a_compressed_image_and_plain_mcap_reads_the_bag(tmp_path):
