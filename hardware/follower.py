@@ -41,6 +41,21 @@ class FollowerState(IntEnum):
     """No thrust until it has seen zero of a new epoch for half a second."""
     COAST = 4
     """Hears nothing for the moment: keeps its attitude, lets the thrust fade, may come back."""
+    STOPPED_BY_WIRE = 5
+    """Its emergency stop is pressed, or was: no thrust until then and zero of a new epoch."""
+
+
+STOPPED = (FollowerState.REFUSING, FollowerState.STOPPED_BY_WIRE)
+"""Without thrust until zero of a new epoch."""
+
+
+class EStop(IntEnum):
+    """What a robot's emergency stop says: a wire that is closed while nobody presses."""
+
+    NOT_WIRED = 0
+    CLOSED = 1
+    OPEN = 2
+    """Pressed, or the wire is broken."""
 
 
 class Refusal(IntEnum):
@@ -60,6 +75,7 @@ class Refusal(IntEnum):
     RISE = 11
     ZERO_FIRST = 12
     HANDSHAKE = 13
+    WIRE = 14
 
 
 EXPLANATIONS: dict[Refusal, str] = {
@@ -77,6 +93,7 @@ EXPLANATIONS: dict[Refusal, str] = {
     Refusal.RISE: "A command changes faster than the robot allows.",
     Refusal.ZERO_FIRST: "A new control process must begin with zero.",
     Refusal.HANDSHAKE: "The robot is still making sure that it is told zero.",
+    Refusal.WIRE: "The robot's emergency stop was pressed.",
 }
 """For the person who can mend it."""
 
@@ -152,7 +169,7 @@ class BodySample:
     boot_id: int
     """Another one: the robot has restarted, and so has its clock."""
     refusal: Refusal
-    """Why the state is RAMP or REFUSING; else why the newest command was not taken."""
+    """Why the state is RAMP or one of `STOPPED`; else why the newest command was not taken."""
     round_trip_s: float | None
     """From sending the newest accepted command to this sample's arrival [s]; None if unknown."""
     twist_in_b: Array | None = None
@@ -252,6 +269,7 @@ class RobotHealth:
 
     battery_v: float | None = None
     """Voltage of its battery [V]; None: it has none, or does not know."""
+    e_stop: EStop = EStop.NOT_WIRED
 
 
 @runtime_checkable

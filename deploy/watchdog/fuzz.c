@@ -81,7 +81,7 @@ static void blink(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint6
            "after ten seconds all LEDs shine");
 }
 
-/* The same 8 bytes as what it measures of itself: five times a second at most, and nothing moves. */
+/* The same 8 bytes as what it measures of itself: nothing moves by telling it. */
 static void health(const ll_watchdog *w, ll_health *h, const uint8_t *in, int64_t now_us)
 {
     uint8_t out[LL_HEALTH_BYTES];
@@ -90,13 +90,14 @@ static void health(const ll_watchdog *w, ll_health *h, const uint8_t *in, int64_
         memcpy(&volts, in, sizeof volts);
     ll_watchdog before = *w;
     bool told = h->tells;
+    bool news = h->e_stop != w->e_stop;
     int64_t since_us = now_us - h->told_us;
     size_t size = ll_health_due(h, w, volts, now_us, out);
     demand(memcmp(&before, w, sizeof before) == 0, "telling of its health moves nothing");
     demand(size == 0 || size == LL_HEALTH_BYTES, "health has its size");
-    demand(size == 0 || since_us >= LL_HEALTH_EVERY_US, "health is told five times a second at most");
-    demand((size > 0) == (h->tells && since_us >= LL_HEALTH_EVERY_US), "what is due is told");
-    demand(told || h->tells == !isnan(volts), "who knows nothing says nothing");
+    demand((size > 0) == (h->tells && (news || since_us >= LL_HEALTH_EVERY_US)),
+           "health is told five times a second, and an emergency stop at once");
+    demand(told || h->tells == (!isnan(volts) || w->e_stop != LL_NOT_WIRED), "who knows nothing says nothing");
 }
 
 /* One step of 8 bytes: what happens, how much time passes, what is in the datagram. */
@@ -114,6 +115,9 @@ static void step(ll_watchdog *w, ll_health *h, const uint8_t *in, int64_t *now_u
         gyro[in[5] % 3] = in[7] & 1 ? NAN : INFINITY;
     if (in[6] == 252)
         acc[in[5] % 3] = in[7] & 1 ? NAN : -INFINITY;
+    bool pressed = in[6] == 251 || (w->e_stop == LL_OPEN && in[6] % 8 != 0);
+    if (pressed || w->e_stop != LL_NOT_WIRED)
+        ll_wire(w, pressed);
     ll_setpoint(w, *now_us, thrusts);
     size_t size = ll_sample(w, *now_us, ++*nonce, gyro, acc, thrusts, out);
     demand(size == 92 + 4 * N, "a sample has its size");
@@ -146,8 +150,14 @@ static void step(ll_watchdog *w, ll_health *h, const uint8_t *in, int64_t *now_u
         now += thrusts[i];
     }
     demand(now == 0.0f || w->state != LL_REFUSING, "who refuses gives nothing");
+    demand(now == 0.0f || w->state != LL_STOPPED_BY_WIRE, "who is stopped by wire gives nothing");
+    demand(!pressed || (w->state == LL_STOPPED_BY_WIRE && why != LL_NONE),
+           "while the emergency stop is pressed nothing is taken");
+    demand(before != LL_STOPPED_BY_WIRE || w->state == before || w->state == LL_REFUSING,
+           "out of a stop by wire by a handshake alone");
     demand(now <= given * 1.00001f + 1e-6f || why == LL_NONE, "only what is taken adds thrust");
-    demand(now == 0.0f || before != LL_REFUSING, "no thrust without a handshake");
+    demand(now == 0.0f || (before != LL_REFUSING && before != LL_STOPPED_BY_WIRE),
+           "no thrust without a handshake");
 }
 
 #ifdef LIBFUZZER
@@ -196,7 +206,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: %s EXECUTIONS SEED\n", argv[0]);
         return 2;
     }
-    long executions = atol(argv[1]), reached[5] = {0};
+    long executions = atol(argv[1]), reached[6] = {0};
     uint64_t state = 88172645463325252u + (uint64_t)atol(argv[2]);
     for (long done = 0; done < executions;) {
         ll_limits limits = {N, F_MAX, 1.0, 2000000, done & 1 ? &GAINS : NULL};
@@ -210,7 +220,7 @@ int main(int argc, char **argv)
         for (int k = 0; k < 999; k++, done++) {
             uint8_t in[8];
             draw(in, &state, wildness);
-            if (w.state == LL_REFUSING) {
+            if (w.state == LL_REFUSING || w.state == LL_STOPPED_BY_WIRE) {
                 in[4] &= 0x7f; /* zero first, */
                 in[2] = 1;     /* of a later epoch */
                 if (w.candidate)
@@ -230,9 +240,9 @@ int main(int argc, char **argv)
             reached[w.state]++;
         }
     }
-    printf("%ld executions: IDLE %ld, RUNNING %ld, RAMP %ld, REFUSING %ld, COAST %ld\n", executions,
-           reached[0], reached[1], reached[2], reached[3], reached[4]);
-    for (int i = 0; i < 5; i++)
+    printf("%ld executions: IDLE %ld, RUNNING %ld, RAMP %ld, REFUSING %ld, COAST %ld, STOPPED BY WIRE %ld\n",
+           executions, reached[0], reached[1], reached[2], reached[3], reached[4], reached[5]);
+    for (int i = 0; i < 6; i++)
         if (reached[i] == 0)
             return 1;
     return 0;

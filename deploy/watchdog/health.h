@@ -1,6 +1,6 @@
 /* What the robot tells of itself beside its samples, and when: the same bytes as
  * hardware/link/health_datagram.py, the same times as hardware/link/health_end.py. It only reads the watchdog's
- * key and boot id. Leave it out of a robot that knows nothing of its battery.
+ * key, boot id and emergency stop. Leave it out of a robot that knows nothing of itself.
  */
 #ifndef LIGHTLEASH_HEALTH_H
 #define LIGHTLEASH_HEALTH_H
@@ -12,6 +12,7 @@
 
 typedef struct {
     bool tells;
+    ll_e_stop e_stop; /* told last */
     uint32_t counter;
     int64_t told_us;
 } ll_health;

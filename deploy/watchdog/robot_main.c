@@ -2,9 +2,11 @@
  * Put yours where it says YOURS.
  *
  *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c blink.c health.c attitude.c hmac.c -lm
- *   ./robot KEY_FILE PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS
+ *   ./robot KEY_FILE PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS [E_STOP_FILE]
  *
  * KEY_FILE is what `lightleash robot key` has made; on a microcontroller the key is in flash.
+ * E_STOP_FILE is the input of the emergency stop's wire, as /sys/class/gpio/gpio17/value: 1 is closed, anything
+ * else is open, no file too; on a microcontroller a pin with a pull-down, the wire from its supply.
  */
 #define _GNU_SOURCE
 #include "blink.h"
@@ -13,6 +15,7 @@
 
 #include <arpa/inet.h>
 #include <ctype.h>
+#include <fcntl.h>
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
@@ -102,6 +105,16 @@ static float battery_v(void)
     return NAN; /* YOURS: measure it; NAN if you can't */
 }
 
+static bool is_open(const char *e_stop)
+{
+    char said = 0;
+    int fd = open(e_stop, O_RDONLY);
+    bool closed = fd >= 0 && read(fd, &said, 1) == 1 && said == '1';
+    if (fd >= 0)
+        close(fd);
+    return !closed;
+}
+
 typedef struct {
     struct sockaddr_in address;
     int64_t heard_us;
@@ -152,11 +165,13 @@ static void send_all(int fd, const uint8_t *data, size_t size, const recipients 
         send_to(fd, data, size, &to->asking.address);
 }
 
-static void tick(int fd, ll_watchdog *w, const ll_blink *b, ll_health *h, recipients *to)
+static void tick(int fd, ll_watchdog *w, const ll_blink *b, ll_health *h, recipients *to, const char *e_stop)
 {
     float thrusts[LL_MAX_THRUSTERS], gyro[3], accelerometer[3];
     uint8_t out[LL_MAX_BYTES], told[LL_HEALTH_BYTES];
     int64_t now_us = clock_us();
+    if (e_stop)
+        ll_wire(w, is_open(e_stop));
     ll_setpoint(w, now_us, thrusts);
     give(thrusts);
     shine(ll_blink_dark(b, now_us));
@@ -172,8 +187,9 @@ static void tick(int fd, ll_watchdog *w, const ll_blink *b, ll_health *h, recipi
 int main(int argc, char **argv)
 {
     uint8_t key[LL_KEY_BYTES] = {0};
-    if (argc != 7 || atoi(argv[3]) < 1 || atoi(argv[3]) > LL_MAX_THRUSTERS) {
-        fprintf(stderr, "usage: %s KEY_FILE PORT THRUSTERS(1-%d) F_MAX_N MAX_RISE_N RAMP_MS\n",
+    if (argc < 7 || argc > 8 || atoi(argv[3]) < 1 || atoi(argv[3]) > LL_MAX_THRUSTERS) {
+        fprintf(stderr, "usage: %s KEY_FILE PORT THRUSTERS(1-%d) F_MAX_N MAX_RISE_N RAMP_MS "
+                "[E_STOP_FILE]\n",
                 argv[0], LL_MAX_THRUSTERS);
         return 2;
     }
@@ -184,6 +200,7 @@ int main(int argc, char **argv)
     /* YOURS if it flies: in place of NULL the numbers of hardware/attitude_keeper.py */
     ll_limits limits = {(uint8_t)atoi(argv[3]), atof(argv[4]), atof(argv[5]),
                         1000 * (int64_t)atoi(argv[6]), NULL};
+    const char *e_stop = argc == 8 ? argv[7] : NULL;
     ll_watchdog w;
     ll_blink b;
     ll_health h;
@@ -209,12 +226,12 @@ int main(int argc, char **argv)
         if (wait_us > 0 && poll(&readable, 1, (int)((wait_us + 999) / 1000)) > 0)
             receive(fd, &w, &b, &to);
         if (clock_us() >= next_us) { /* due by the clock, whatever arrives */
-            tick(fd, &w, &b, &h, &to);
+            tick(fd, &w, &b, &h, &to, e_stop);
             next_us += TICK_US;
         }
     }
     ll_halt(&w);
-    tick(fd, &w, &b, &h, &to);
+    tick(fd, &w, &b, &h, &to, e_stop);
     close(fd);
     return 0;
 }

@@ -185,9 +185,15 @@ static ll_refusal judge_nonce(const ll_watchdog *w, uint64_t nonce, int64_t now_
     return LL_NONCE;
 }
 
+/* Without thrust until a handshake. */
+static bool is_stopped(const ll_watchdog *w)
+{
+    return w->state == LL_REFUSING || w->state == LL_STOPPED_BY_WIRE;
+}
+
 static ll_refusal judge_thrusts(const ll_watchdog *w, const command *c, int64_t now_us)
 {
-    bool refusing = w->state == LL_REFUSING, rises = false, beyond = false;
+    bool refusing = is_stopped(w), rises = false, beyond = false;
     bool shaking = w->candidate != 0 && c->epoch == w->candidate;
     if (!c->zero && (shaking || (refusing && c->epoch > w->epoch)))
         return LL_ZERO_FIRST;
@@ -219,6 +225,8 @@ static ll_refusal judge(const ll_watchdog *w, const command *c, int64_t now_us)
     for (int i = 0; i < c->thrusters; i++)
         if (!isfinite(c->thrusts[i]))
             return LL_NOT_FINITE;
+    if (w->e_stop == LL_OPEN)
+        return LL_WIRE;
     if (c->zero && c->epoch > w->epoch && c->epoch > w->candidate)
         return LL_NONE; /* newer than who flies and who is in his handshake */
     return judge_thrusts(w, c, now_us);
@@ -269,7 +277,7 @@ static void take(ll_watchdog *w, const command *c, int64_t now_us)
 /* Zero without a fresh nonce: it keeps nothing alive, but it is zero. */
 static void obey_zero(ll_watchdog *w, const command *c, bool newest)
 {
-    if (!c->zero || w->state == LL_REFUSING)
+    if (!c->zero || is_stopped(w))
         return;
     if (c->epoch > w->epoch) {
         if (c->stop && newest)
@@ -317,7 +325,7 @@ ll_refusal ll_receive(ll_watchdog *w, const uint8_t *data, size_t size, int64_t 
     ll_refusal why = judge(w, &c, now_us);
     if (why == LL_NONE) {
         take(w, &c, now_us);
-    } else if (w->state != LL_RAMP) {
+    } else if (w->state != LL_RAMP && w->state != LL_STOPPED_BY_WIRE) {
         w->refusal = why;
         if (why == LL_ZERO_FIRST)
             w->candidate = 0;
@@ -379,6 +387,18 @@ size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyr
 
 void ll_halt(ll_watchdog *w)
 {
+    if (w->state != LL_STOPPED_BY_WIRE) /* which says more */
+        refuse(w);
+    w->candidate = 0;
+}
+
+void ll_wire(ll_watchdog *w, bool open)
+{
+    w->e_stop = open ? LL_OPEN : LL_CLOSED;
+    if (!open)
+        return;
     refuse(w);
+    w->state = LL_STOPPED_BY_WIRE;
+    w->refusal = LL_WIRE;
     w->candidate = 0;
 }

@@ -27,11 +27,13 @@
 #define LL_MEAN_OF 80 /* commands until the mean has forgotten two thirds: 0.4 s */
 #define LL_TO_MEAN_US 100000
 
-typedef enum { LL_IDLE, LL_RUNNING, LL_RAMP, LL_REFUSING, LL_COAST } ll_state;
+typedef enum { LL_IDLE, LL_RUNNING, LL_RAMP, LL_REFUSING, LL_COAST, LL_STOPPED_BY_WIRE } ll_state;
+
+typedef enum { LL_NOT_WIRED, LL_CLOSED, LL_OPEN } ll_e_stop;
 
 typedef enum {
     LL_NONE, LL_STARTED, LL_SILENT, LL_MALFORMED, LL_THRUSTERS, LL_NONCE, LL_STALE, LL_EPOCH,
-    LL_COUNTER, LL_NOT_FINITE, LL_LIMITS, LL_RISE, LL_ZERO_FIRST, LL_HANDSHAKE
+    LL_COUNTER, LL_NOT_FINITE, LL_LIMITS, LL_RISE, LL_ZERO_FIRST, LL_HANDSHAKE, LL_WIRE
 } ll_refusal;
 
 typedef struct {
@@ -48,6 +50,7 @@ typedef struct {
     uint32_t boot_id;
     ll_state state;
     ll_refusal refusal;
+    ll_e_stop e_stop;   /* as `ll_wire` was told last */
     uint64_t epoch;     /* followed now or last, 0 none */
     uint64_t candidate; /* epoch in its handshake, 0 none */
     uint32_t counter, candidate_counter; /* of the newest command taken of either */
@@ -90,5 +93,9 @@ size_t ll_sample(ll_watchdog *w, int64_t now_us, uint64_t nonce, const float gyr
 
 /* Zero at once, then refuse. */
 void ll_halt(ll_watchdog *w);
+
+/* What the emergency stop's wire says: open is pressed, or broken. Tell it before each `ll_setpoint` if the
+ * robot has one. Zero at once, and stopped until it is closed and a new handshake is over. */
+void ll_wire(ll_watchdog *w, bool open);
 
 #endif

@@ -57,7 +57,7 @@ class RobotComputer:
             )
             for one in readings
         ]
-        health = RobotHealth(self.flight_controller.battery_v(now_us))
+        health = RobotHealth(self.flight_controller.battery_v(now_us), self.end.e_stop)
         return [*samples, *self._health.due(health, now_us)]
 
     def shut_down(self) -> bytes:

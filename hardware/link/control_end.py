@@ -18,9 +18,9 @@ from collections.abc import Callable
 import numpy as np
 
 from hardware.follower import (
+    STOPPED,
     BlinkOrder,
     BodySample,
-    FollowerState,
     RobotCommand,
     RobotHealth,
     ThrustCommand,
@@ -218,7 +218,7 @@ class ControlEnd:
 
     def _is_outdated(self, robot: SampleDatagram) -> bool:
         """Whether the robot would never again take our epoch."""
-        refusing = robot.state == FollowerState.REFUSING and robot.epoch != 0
+        refusing = robot.state in STOPPED and robot.epoch != 0
         return refusing and self.epoch <= robot.epoch < U64 - 1  # nothing is later than that
 
     def _renew(self, robot: SampleDatagram) -> None:

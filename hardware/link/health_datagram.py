@@ -7,7 +7,7 @@ Who does not know its magic drops it, which changes nothing.
 |--------|----------|-----------------------------------------------------------------------------|
 | 0      | 4 bytes  | magic `LLhe`                                                                |
 | 4      | u8       | version, 1                                                                  |
-| 5      | u8       | 0                                                                           |
+| 5      | u8       | emergency stop: `EStop`: 0 not wired, 1 closed, 2 open                      |
 | 6      | u16      | 0                                                                           |
 | 8      | u64      | time on the robot's monotonic clock [µs], less than 2^60                    |
 | 16     | u32      | boot id, as in samples                                                      |
@@ -25,7 +25,7 @@ import struct
 from dataclasses import dataclass
 from math import isnan, nan
 
-from hardware.follower import RobotHealth
+from hardware.follower import EStop, RobotHealth
 from hardware.link.datagram import LinkError
 from hardware.link.link_key import MAC_BYTES, is_authentic, mac
 
@@ -52,7 +52,7 @@ def encode_health(said: HealthDatagram, key: bytes) -> bytes:
     body = LAYOUT.pack(
         MAGIC,
         VERSION,
-        0,
+        said.health.e_stop,
         0,
         said.t_us,
         said.boot_id,
@@ -70,13 +70,16 @@ def decode_health(data: bytes, key: bytes) -> HealthDatagram:
     """
     if len(data) != BYTES:
         raise LinkError("health.size", f"{BYTES} bytes")
-    magic, version, zero, zeros, t_us, boot_id, counter, volts = LAYOUT.unpack(data[:-MAC_BYTES])
-    if (magic, version, zero, zeros) != (MAGIC, VERSION, 0, 0):
-        raise LinkError("health.magic, version", f"{MAGIC!r}, {VERSION}, 0, 0")
+    magic, version, e_stop, zero, t_us, boot_id, counter, volts = LAYOUT.unpack(data[:-MAC_BYTES])
+    if (magic, version, zero) != (MAGIC, VERSION, 0):
+        raise LinkError("health.magic, version", f"{MAGIC!r}, {VERSION}, 0")
     if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
         raise LinkError("mac", "made with the robot's key")
     if t_us >= 1 << 60:
         raise LinkError("health.time", "0 to 2^60 µs")
     if not (isnan(volts) or 0.0 <= volts <= MOST_V):
         raise LinkError("health.battery", f"0 to {MOST_V:g} V, or NaN")
-    return HealthDatagram(t_us, boot_id, counter, RobotHealth(None if isnan(volts) else volts))
+    if e_stop >= len(EStop):
+        raise LinkError("health.e_stop", f"0 to {len(EStop) - 1}")
+    health = RobotHealth(None if isnan(volts) else volts, EStop(e_stop))
+    return HealthDatagram(t_us, boot_id, counter, health)

@@ -25,6 +25,27 @@ This is the reference for a real robot's firmware; `deploy/watchdog/` is the sam
 5. Samples go to whoever sent the last command that was taken. A datagram newer (by epoch, then
    counter) than any heard since the start is answered by one sample, which has the nonce that its
    sender needs to go on. Nobody else gets any.
+6. A robot may have an emergency stop: a wire that is closed while nobody presses, read before each
+   set-point. Open, it is zero at once and in every state, and nothing is taken; closed again, the
+   robot stays stopped until zero of a later epoch begins its handshake. So whoever closes the wire
+   starts nothing: control has to be armed anew.
+
+These are the edges between states; `tests/hardware/link/test_robot_end_search.py` searches
+for others:
+
+| from                 | to              | when                                                    |
+|----------------------|-----------------|---------------------------------------------------------|
+| REFUSING             | IDLE            | the end of a handshake                                  |
+| IDLE                 | RUNNING         | thrust                                                  |
+| RUNNING              | IDLE            | zero                                                    |
+| IDLE, RUNNING        | COAST           | silence                                                 |
+| COAST                | IDLE, RUNNING   | the same epoch's next command                           |
+| COAST, RUNNING       | RAMP            | longer silence; zero of a later epoch                   |
+| RAMP                 | RUNNING         | thrust of the same epoch, early and before a later one's|
+| IDLE, COAST          | REFUSING        | silence or a later epoch's zero, no thrust; STOP; halt  |
+| RUNNING, RAMP        | REFUSING        | end of the ramp; zero of the epoch in it; STOP; halt    |
+| any other            | STOPPED_BY_WIRE | the wire is open                                        |
+| STOPPED_BY_WIRE      | REFUSING        | closed, zero of a later epoch                           |
 
 Epochs grow with the wall clock and never fall back (`server/control/robot_epoch.py`), so that
 `later` is later and what somebody has recorded is always old news:
@@ -52,7 +73,7 @@ from math import isfinite
 import numpy as np
 
 from hardware.attitude_keeper import AttitudeGains, AttitudeKeeper
-from hardware.follower import FollowerState, Refusal
+from hardware.follower import STOPPED, EStop, FollowerState, Refusal
 from hardware.given_thrusts import GivenThrusts
 from hardware.given_twist import GivenTwist
 from hardware.link.datagram import (
@@ -156,6 +177,8 @@ class RobotEnd:
         """Epoch and counter of the newest command heard, taken or not."""
         self._challenge = 0
         self._peer: Peer | None = None
+        self.e_stop = EStop.NOT_WIRED
+        """As `wire` was told last."""
         self._asking: Peer | None = None
         self._answered: Peer | None = None
 
@@ -173,7 +196,7 @@ class RobotEnd:
         if why == Refusal.NONE:
             self._peer, self._heard_us = peer, now_us
             self._take(command, now_us)
-        elif self.state != FollowerState.RAMP:
+        elif self.state not in (FollowerState.RAMP, FollowerState.STOPPED_BY_WIRE):
             self.refusal = why
             if why == Refusal.ZERO_FIRST:
                 self._candidate = 0
@@ -195,8 +218,17 @@ class RobotEnd:
 
     def halt(self) -> None:
         """Zero at once, then refuse: the robot is being switched off."""
-        self._refuse()
+        if self.state != FollowerState.STOPPED_BY_WIRE:  # which says more
+            self._refuse()
         self._candidate = 0
+
+    def wire(self, *, is_open: bool) -> None:
+        """What the emergency stop's wire says; to be told before each `setpoint`, if it exists."""
+        self.e_stop = EStop.OPEN if is_open else EStop.CLOSED
+        if is_open:
+            self._refuse()
+            self.state, self.refusal = FollowerState.STOPPED_BY_WIRE, Refusal.WIRE
+            self._candidate = 0
 
     def sample(
         self, now_us: int, nonce: int, omega_in_b: Triple, a_in_b: Triple, given: Array
@@ -292,6 +324,8 @@ class RobotEnd:
             return Refusal.STALE
         if not all(map(isfinite, command.values)):
             return Refusal.NOT_FINITE
+        if self.e_stop == EStop.OPEN:
+            return Refusal.WIRE
         if self._is_later_zero(command):
             return Refusal.NONE
         return self._judge_values(command, now_us)
@@ -306,7 +340,7 @@ class RobotEnd:
         return newer and not any(command.values)
 
     def _judge_values(self, command: CommandDatagram, now_us: int) -> Refusal:
-        limits, refusing = self._limits, self.state == FollowerState.REFUSING
+        limits, refusing = self._limits, self.state in STOPPED
         values = np.array(command.values)
         meant = bool(values.any())
         shaking = command.epoch == self._candidate != 0
@@ -359,7 +393,7 @@ class RobotEnd:
 
     def _obey_zero(self, command: CommandDatagram, newest: bool) -> None:
         """Rule 4: zero without a fresh nonce, which is not taken otherwise."""
-        if any(command.values) or self.state == FollowerState.REFUSING:
+        if any(command.values) or self.state in STOPPED:
             return
         if command.epoch > self._epoch:
             if command.stop and newest:

@@ -15,7 +15,9 @@ import signal
 import socket
 import sys
 from collections.abc import Sequence
+from functools import partial
 
+from hardware.follower import EStop
 from hardware.link.control_end import random_u64
 from hardware.link.link_key import LinkKeyError, take_key
 from hardware.link.robot_server import RobotServer, arrived, be_punctual, bound
@@ -79,13 +81,16 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--truth-port", type=int, help="for simulated phones; default: none")
     parser.add_argument("--seed", type=int, default=0, help="of sensor noise and biases")
     parser.add_argument("--battery-v", type=float, help="it has a battery of so many volts ...")
+    parser.add_argument(
+        "--e-stop", action="store_true", help="it has one: SIGUSR1 presses, SIGUSR2 releases it"
+    )
     parser.add_argument("--drain-v-min", type=float, default=0.0, help="... less so many a minute")
     return parser.parse_args(argv)
 
 
 def _robot(robot_file: RobotFile, arguments: argparse.Namespace, key: bytes) -> SimulatedRobot:
     full_v = arguments.battery_v
-    return SimulatedRobot(
+    robot = SimulatedRobot(
         robot_file,
         arguments.seed,
         boot_id=secrets.randbits(32),
@@ -93,6 +98,16 @@ def _robot(robot_file: RobotFile, arguments: argparse.Namespace, key: bytes) -> 
         key=key,
         battery=None if full_v is None else DrainingBattery(full_v, arguments.drain_v_min),
     )
+    if arguments.e_stop:
+        robot.e_stop = EStop.CLOSED
+        for number, said in ((signal.SIGUSR1, EStop.OPEN), (signal.SIGUSR2, EStop.CLOSED)):
+            signal.signal(number, partial(_pull, robot, said))
+    return robot
+
+
+def _pull(robot: SimulatedRobot, said: EStop, *_signal: object) -> None:
+    """Somebody presses or releases the emergency stop."""
+    robot.e_stop = said
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hardware.follower import RobotHealth
+from hardware.follower import EStop, RobotHealth
 from hardware.link.blink_end import NO_LED, BlinkEnd
 from hardware.link.datagram import U64
 from hardware.link.health_end import HealthEnd
@@ -90,6 +90,8 @@ class SimulatedRobot:
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self._blink = BlinkEnd(key) if robot.blinks else None
         self.battery, self._health = battery, HealthEnd(boot_id, key)
+        self.e_stop = EStop.NOT_WIRED
+        """Of its wire; whoever sets this presses or releases it."""
         self.history: deque[tuple[int, Array, Array]] = deque(maxlen=HISTORY)
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
         self.dark: deque[int] = deque(maxlen=HISTORY)
@@ -111,12 +113,14 @@ class SimulatedRobot:
     def tick(self, now_us: int) -> tuple[bytes, ...]:
         """Move on to `now_us`, one tick after the last; gives the sample, and what else is due."""
         self.body.step(self._setpoint, 1e-6 * TICK_US)
+        if self.e_stop != EStop.NOT_WIRED:
+            self.end.wire(is_open=self.e_stop == EStop.OPEN)
         self._setpoint = self.end.setpoint(now_us)
         self.history.append((now_us, self.body.wxyz_fb, self.body.p_bf_in_f))
         self.dark.append(NO_LED if self._blink is None else self._blink.dark(now_us))
         sample = self._sample(now_us, self.body.given)
         volts = None if self.battery is None else self.battery.volts(1e-6 * now_us)
-        return sample, *self._health.due(RobotHealth(volts), now_us)
+        return sample, *self._health.due(RobotHealth(volts, self.end.e_stop), now_us)
 
     def restart(self, robot_file: RobotFile, key: bytes) -> None:
         """Start anew, refusing thrust; the body goes on as it was."""

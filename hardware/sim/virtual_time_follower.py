@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from hardware.follower import (
     BlinkOrder,
     BodySample,
+    EStop,
     FollowerError,
     FollowerState,
     RobotCommand,
@@ -94,6 +95,10 @@ class VirtualTimeFollower:
     def dark(self) -> int:
         """The LED that is dark now, −1: none."""
         return self._robot.dark[-1] if self._robot.dark else NO_LED
+
+    def press_e_stop(self, *, pressed: bool) -> None:
+        """Open or close the wire of its emergency stop; without a call it has none."""
+        self._robot.e_stop = EStop.OPEN if pressed else EStop.CLOSED
 
     @property
     def state(self) -> FollowerState:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hardware.follower import (
     EXPLANATIONS,
+    STOPPED,
     Blinking,
     BlinkOrder,
     BodySample,
@@ -73,6 +74,7 @@ class RobotLink:
         `silence` is what its kind of link states, `battery` how its file judges a voltage.
         """
         self._follower, self._silence = follower, silence
+        self._tells = follower if isinstance(follower, TellsHealth) else None
         self._ramp_begun_s = silence.back_s - silence.ramps_s
         """A robot that has just begun to ramp takes commands back: so long it may say so."""
         self._book = book(blinking_leds) if blinking_leds else None
@@ -105,7 +107,7 @@ class RobotLink:
             self._t_sample = now
         self.left_s = self._left(now)
         if self._boot_id is not None:
-            told = self._follower.health if isinstance(self._follower, TellsHealth) else None
+            told = self._tells.health if self._tells is not None else None
             self.condition = self._health.hear(told, now)
         return dated
 
@@ -144,7 +146,8 @@ class RobotLink:
 
     def _reason(self, last: BodySample) -> str:
         """A robot that restarts refuses what we go on sending: the restart is what went wrong."""
-        if last.state not in (FollowerState.RAMP, FollowerState.REFUSING):
+        if last.state not in (FollowerState.RAMP, *STOPPED):
             self._restarted = False
             return ""
-        return EXPLANATIONS[Refusal.STARTED if self._restarted else last.refusal]
+        is_wire = last.state == FollowerState.STOPPED_BY_WIRE
+        return EXPLANATIONS[Refusal.STARTED if self._restarted and not is_wire else last.refusal]

@@ -19,6 +19,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--at", required=True, metavar="PORT", help="/dev/ttyACM0, or tcp:HOST:PORT")
     add("--key", type=Path, required=True, metavar="FILE", help="of `lightleash robot key`")
     add("--listen", default="0.0.0.0", metavar="ADDRESS", help="of the link; default: all")
+    add(
+        "--e-stop",
+        type=Path,
+        metavar="FILE",
+        help="input of the emergency stop's wire, like /sys/class/gpio/gpio17/value: 1 is closed",
+    )
     add("--port", type=int, help="of the link; default: the robot file's")
 
 
@@ -34,4 +40,4 @@ def run(arguments: argparse.Namespace) -> int:
     robot_file = load_robot(arguments.robot)
     port = robot_file.link.port if arguments.port is None else arguments.port
     listen = (arguments.listen, port)
-    return process.run(robot_file, read_key(arguments.key), arguments.at, listen)
+    return process.run(robot_file, read_key(arguments.key), arguments.at, listen, arguments.e_stop)

@@ -62,10 +62,9 @@ def start(arguments: Sequence[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
 
 
-def simulated_robot() -> RealTimeRig:
-    process = start(
-        (sys.executable, "-m", "hardware.sim.robot", "--port", "0", "--truth-port", "0")
-    )
+def simulated_robot(*options: str) -> RealTimeRig:
+    command = (sys.executable, "-m", "hardware.sim.robot", "--port", "0", "--truth-port", "0")
+    process = start((*command, *options))
     assert process.stdout
     ready = process.stdout.readline().split()
     assert ready[0] == "ready"
@@ -84,13 +83,13 @@ def compiled_watchdog(directory: Path) -> Path:
     return program
 
 
-def watchdog_robot(program: Path) -> RealTimeRig:
+def watchdog_robot(program: Path, *options: str) -> RealTimeRig:
     """A robot in C, with the key and limits of the AMES."""
     key_file, port = program.with_name("robot.key"), free_port()
     write_key(key_file, KEY, force=True)
     ramp_ms = round(1e3 * AMES.robot.ramp_s)
     numbers = (port, 8, AMES.robot.f_max, AMES.link.max_rise, ramp_ms)
-    rig = RealTimeRig(start((str(program), str(key_file), *map(str, numbers))), port)
+    rig = RealTimeRig(start((str(program), str(key_file), *map(str, numbers), *options)), port)
     rig.advance(0.05)
     return rig
 

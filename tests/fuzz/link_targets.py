@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from hardware.follower import BlinkOrder, FollowerState, Refusal, RobotHealth, ThrustCommand
+from hardware.follower import BlinkOrder, EStop, FollowerState, Refusal, RobotHealth, ThrustCommand
 from hardware.link.blink_datagram import LASTS_MS, BlinkDatagram, decode_blink, encode_blink
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import (
@@ -134,8 +134,8 @@ def blink_order(data: bytes) -> None:
 
 
 def health_seeds():
-    for volts in (None, 0.0, 11.25, MOST_V):
-        said = HealthDatagram(10**6, 11, 13, RobotHealth(volts))
+    for volts, e_stop in ((None, 2), (0.0, 1), (11.25, 0), (MOST_V, 2)):
+        said = HealthDatagram(10**6, 11, 13, RobotHealth(volts, EStop(e_stop)))
         yield encode_health(said, KEY)[:-MAC_BYTES]
 
 

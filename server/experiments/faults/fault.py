@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from hardware.follower import FollowerState
+from hardware.follower import STOPPED, FollowerState
 from pipeline.signals import Mode
 from server.experiments.gaps.flight import GapFlight
 
@@ -127,7 +127,7 @@ class _Watch:
         if mode != self._mode:
             first.setdefault(mode.name, t)
         self._mode = mode
-        if follower.state in (FollowerState.COAST, FollowerState.RAMP, FollowerState.REFUSING):
+        if follower.state in (FollowerState.COAST, FollowerState.RAMP, *STOPPED):
             first.setdefault("robot", t)
         self._thrust_n = float(np.abs(plant.thrusts).max())
         if self._thrust_n < ZERO_N:

@@ -8,7 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.follower import FollowerState, Refusal, RobotHealth, TellsHealth
+from hardware.follower import (
+    EStop,
+    FollowerState,
+    Refusal,
+    RobotHealth,
+    TellsHealth,
+    ThrustCommand,
+)
 from hardware.link.control_end import HEALTH_LATE_US
 from hardware.link.datagram import LinkError, decode_command, decode_sample
 from hardware.link.health_datagram import BYTES, HealthDatagram, decode_health, encode_health
@@ -35,6 +42,8 @@ class CHealthEnd:
         library.ll_health_init(self.memory)
 
     def due(self, health, now_us):
+        if health.e_stop != EStop.NOT_WIRED:
+            self.watchdog.wire(is_open=health.e_stop == EStop.OPEN)
         volts, now = health.battery_v, ctypes.c_int64(now_us)
         volts = ctypes.c_float(math.nan if volts is None else volts)
         out = ctypes.create_string_buffer(BYTES)
@@ -43,8 +52,9 @@ class CHealthEnd:
 
 
 @pytest.mark.parametrize("volts", [None, 0.0, 11.25, 1000.0])
-def test_what_is_told_comes_out_as_it_went_in(volts):
-    said = replace(SAID, health=RobotHealth(volts))
+@pytest.mark.parametrize("e_stop", EStop)
+def test_what_is_told_comes_out_as_it_went_in(volts, e_stop):
+    said = replace(SAID, health=RobotHealth(volts, e_stop))
     assert len(encode_health(said, KEY)) == BYTES
     assert decode_health(encode_health(said, KEY), KEY) == said
 
@@ -52,7 +62,7 @@ def test_what_is_told_comes_out_as_it_went_in(volts):
 def test_the_bytes_are_those_that_other_firmware_is_tested_with():
     vector = VECTORS["health"]
     for told in vector["told"]:
-        health = RobotHealth(told["battery_v"])
+        health = RobotHealth(told["battery_v"], EStop(told["e_stop"]))
         said = HealthDatagram(told["t_us"], told["boot_id"], told["counter"], health)
         assert encode_health(said, bytes.fromhex(vector["key"])).hex() == told["bytes"]
 
@@ -69,6 +79,13 @@ def test_not_a_byte_of_it_may_differ(at):
 def test_a_voltage_that_cannot_be_is_refused_and_says_what_is_allowed(volts):
     with pytest.raises(LinkError, match="0 to 1000 V, or NaN"):
         decode_health(encode_health(replace(SAID, health=RobotHealth(volts)), KEY), KEY)
+
+
+def test_a_state_of_the_emergency_stop_that_is_none_is_refused():
+    body = bytearray(encode_health(SAID, KEY)[:-16])
+    body[5] = len(EStop)
+    with pytest.raises(LinkError, match=r"health\.e_stop: 0 to 2"):
+        decode_health(bytes(body) + mac(KEY, bytes(body)), KEY)
 
 
 def test_no_end_takes_it_for_a_sample_or_a_command():
@@ -98,15 +115,32 @@ def test_it_tells_five_times_a_second_and_goes_on_when_it_knows_no_more():
     assert [one.health.battery_v for one in said] == 5 * [12.0] + 5 * [None]
 
 
+def test_an_emergency_stop_is_told_at_once_when_it_is_pressed_and_when_it_is_released():
+    pressed = range(115_000, 150_000)
+    said = told(
+        HealthEnd(BOOT_ID, KEY),
+        0.4,
+        lambda t_us: RobotHealth(None, EStop.OPEN if t_us in pressed else EStop.CLOSED),
+    )
+    assert [(one.t_us, one.health.e_stop) for one in said] == [
+        (0, EStop.CLOSED),
+        (115_000, EStop.OPEN),
+        (150_000, EStop.CLOSED),
+        (350_000, EStop.CLOSED),
+    ]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_c_and_python_tell_the_same_at_the_same_times(library, seed):
-    rnd, now_us, said = random.Random(seed), 0, 0
+    rnd, now_us, said, e_stop = random.Random(seed), 0, 0, EStop.NOT_WIRED
     python, c = HealthEnd(BOOT_ID, KEY), CHealthEnd(library, BOOT_ID)
     for _ in range(1_000):
         now_us += rnd.choice((5_000, 5_000, 195_000, 199_999, 200_000, -20_000))
         volts = rnd.choice((None, None, float(np.float32(rnd.uniform(0.0, 60.0)))))
-        due = python.due(RobotHealth(volts), now_us)
-        assert due == c.due(RobotHealth(volts), now_us)
+        if rnd.random() < 0.05:
+            e_stop = rnd.choice((EStop.CLOSED, EStop.OPEN))
+        due = python.due(RobotHealth(volts, e_stop), now_us)
+        assert due == c.due(RobotHealth(volts, e_stop), now_us)
         said += len(due)
     assert 100 < said < 900
 
@@ -192,6 +226,34 @@ def test_the_simulated_battery_reaches_control_and_drains():
     assert len(volts) == 9  # the first went before anybody had spoken to the robot
     assert np.diff(volts) == pytest.approx(-6.0 / 60.0 * 0.2, abs=1e-5)
     assert follower.dropped == 0
+
+
+def test_an_emergency_stop_stops_the_robot_tells_control_and_lets_it_begin_anew_when_closed():
+    follower = VirtualTimeFollower(load_robot("ames"))
+    follower.press_e_stop(pressed=False)
+
+    def run(seconds, thrust=0.0):
+        for _ in range(round(seconds / 0.005)):
+            follower.advance()
+            samples = follower.receive()
+            follower.send(ThrustCommand(np.full(8, thrust), armed=thrust > 0.0))
+        return samples[-1]
+
+    assert run(1.0).state == FollowerState.IDLE
+    assert run(0.2, 0.5).state == FollowerState.RUNNING
+    assert follower.health[0].e_stop == EStop.CLOSED
+    follower.press_e_stop(pressed=True)
+    assert run(0.015, 0.5).state == FollowerState.STOPPED_BY_WIRE
+    assert follower.health[0].e_stop == EStop.OPEN
+    epoch = follower.epoch
+    assert run(7.0, 0.5).refusal == Refusal.WIRE  # and samples still come
+    assert follower.epoch == epoch
+    run(1.0)
+    assert follower.epoch == epoch + 1
+    follower.press_e_stop(pressed=False)
+    assert run(0.4).state == FollowerState.REFUSING
+    assert run(0.2).state == FollowerState.IDLE
+    assert run(0.2, 0.5).state == FollowerState.RUNNING
 
 
 def test_without_a_battery_it_tells_of_none():

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hardware.follower import ROUNDING, FollowerState, Refusal
+from hardware.follower import ROUNDING, EStop, FollowerState, Refusal
 from hardware.link.datagram import CommandDatagram, decode_sample, encode_command
 from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import load_robot
@@ -757,3 +757,86 @@ def test_thrust_is_always_within_limits_and_never_without_a_fresh_handshake(shak
         if state == FollowerState.REFUSING:
             assert thrust.max() == 0.0
         before = thrust.max()
+
+
+@pytest.mark.parametrize("silence_us", [5_000, 70_000, 300_000])
+def test_the_wire_opened_in_flight_is_zero_at_once_and_tells_why(flying, silence_us):
+    flying.tick(silence_us)
+    flying.end.wire(is_open=True)
+    assert flying.thrust == 0.0
+    said = flying.tick()
+    assert (said.state, said.refusal) == (FollowerState.STOPPED_BY_WIRE, Refusal.WIRE)
+
+
+def test_while_the_wire_is_open_nobody_is_taken_and_who_speaks_hears_why(flying):
+    flying.end.wire(is_open=True)
+    for epoch in (5, 6):
+        for thrust in (0.0, 1.0):
+            flying.tick()
+            assert flying.send(flying.command(thrust, thrust, epoch=epoch)) == Refusal.WIRE
+            flying.counter += 1
+            assert PEER in flying.served()
+            assert flying.tick().state == FollowerState.STOPPED_BY_WIRE
+
+
+def test_after_the_wire_is_closed_the_process_that_flew_gives_no_thrust_any_more(flying):
+    flying.end.wire(is_open=True)
+    flying.tick()
+    flying.end.wire(is_open=False)
+    for _ in range(200):
+        flying.tick()
+        assert flying.send(flying.command(1.0, 1.0)) == Refusal.EPOCH
+        assert flying.send(flying.command()) == Refusal.EPOCH
+        assert flying.thrust == 0.0
+    said = flying.tick()
+    assert (said.state, said.refusal) == (FollowerState.STOPPED_BY_WIRE, Refusal.WIRE)
+
+
+def test_a_later_epoch_has_it_after_a_whole_handshake_with_the_wire_closed(flying):
+    flying.end.wire(is_open=True)
+    flying.epoch = 6
+    for _ in range(150):
+        flying.tick()
+        assert flying.send(flying.command()) == Refusal.WIRE
+    flying.end.wire(is_open=False)
+    since_us = flying.now_us + 5_000
+    for _ in flying.ticks_until(FollowerState.IDLE):
+        flying.tick()
+        assert flying.send(flying.command()) == Refusal.NONE
+    assert flying.now_us - since_us == 500_000
+    flying.fly()
+
+
+def test_the_wire_opened_in_a_handshake_begins_it_again(flying):
+    flying.end.wire(is_open=True)
+    flying.end.wire(is_open=False)
+    flying.epoch = 6
+    for _ in range(90):
+        flying.tick()
+        assert flying.send(flying.command()) == Refusal.NONE
+    flying.end.wire(is_open=True)
+    flying.end.wire(is_open=False)
+    since_us = flying.now_us + 5_000
+    for _ in flying.ticks_until(FollowerState.IDLE):
+        flying.tick()
+        flying.send(flying.command())
+    assert flying.now_us - since_us == 500_000
+
+
+def test_a_robot_whose_wire_is_closed_flies_as_one_without():
+    one, other = Bench(), Bench()
+    for bench in (one, other):
+        bench.shake_hands()
+    for thrust in (0.0, 0.7, 1.5, 0.2):
+        other.end.wire(is_open=False)
+        assert one.tick() == other.tick()
+        told = [bench.send(bench.command(thrust, thrust)) for bench in (one, other)]
+        assert told == [Refusal.NONE, Refusal.NONE]
+        assert one.thrust == other.thrust
+    assert (one.end.e_stop, other.end.e_stop) == (EStop.NOT_WIRED, EStop.CLOSED)
+
+
+def test_a_robot_switched_off_while_it_is_stopped_by_wire_says_so_to_the_end(flying):
+    flying.end.wire(is_open=True)
+    flying.end.halt()
+    assert flying.tick().state == FollowerState.STOPPED_BY_WIRE

@@ -23,7 +23,7 @@ from tests.hardware.test_attitude_keeper import asymmetric, turned
 SOURCE = Path(__file__).parents[3] / "deploy" / "watchdog"
 KEY = bytes(range(16))
 VECTORS = json.loads((Path(__file__).parents[2] / "data" / "link_vectors.json").read_text())
-IDLE, RUNNING, RAMP, _, COAST = FollowerState
+IDLE, RUNNING, RAMP, _, COAST, WIRE = FollowerState
 LIMITS = LinkLimits(thrusters=3, f_max=3.0, max_rise=1.0, ramp_us=700_000)
 NAMES = ("watchdog.c", "blink.c", "health.c", "attitude.c", "hmac.c")
 GCC = ("gcc", "-std=c99", "-pedantic", "-O2", "-Wall", "-Wextra", "-Werror", "-Wconversion")
@@ -98,6 +98,9 @@ class CRobotEnd:
 
     def halt(self):
         self.library.ll_halt(self.memory)
+
+    def wire(self, *, is_open):
+        self.library.ll_wire(self.memory, ctypes.c_bool(is_open))
 
 
 @pytest.fixture(scope="module")
@@ -201,8 +204,16 @@ def hold_against_each_other(library, seed, limits, seen):
     traffic = Traffic(seed, limits.thrusters)
     python, c = RobotEnd(limits, 77, KEY), CRobotEnd(library, limits, 77)
     now_us = 10_000_000
+    is_open = wired = False
     for nonce in range(1, 2500):
         now_us += traffic.step_us()
+        rare = 0.02 if python.state in (COAST, RAMP) else 0.002
+        if traffic.often(0.05 if is_open else rare):
+            is_open, wired = not is_open, True
+            seen |= {(python.state, WIRE)} if is_open else set()
+        if wired:
+            python.wire(is_open=is_open)
+            c.wire(is_open=is_open)
         omega = tuple(float(v) for v in (0.3 * np.sin(nonce / PERIODS)).astype(np.float32))
         if traffic.often(0.002):
             omega = (*omega[:2], traffic.random.choice((math.nan, math.inf, -math.inf)))
@@ -235,6 +246,7 @@ def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, limits):
     assert seen >= {*FollowerState}
     assert seen >= {(state, FollowerState.RUNNING) for state in (COAST, RAMP, RUNNING, IDLE)}
     assert seen >= {(taken, answered) for taken in (True, False) for answered in (True, False)}
+    assert seen >= {(state, WIRE) for state in (RUNNING, RAMP, WIRE)}  # others: the search
     others = {Refusal.NONE, Refusal.STARTED, Refusal.HANDSHAKE}
     others |= {Refusal.RISE} if limits is FLIES else set()  # from 0 to full in two commands
     assert seen >= {("answer", why) for why in Refusal if why not in others}

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from hardware.follower import (
     EXPLANATIONS,
+    STOPPED,
     BlinkOrder,
     BodySample,
     FollowerState,
@@ -99,6 +100,17 @@ def test_a_robot_that_restarts_has_another_clock() -> None:
     follower.next = [sample(5_000, boot_id=2)]
     (imu,) = link.receive(101.0)
     assert imu.t == pytest.approx(101.0)
+
+
+def test_a_robot_that_restarted_with_its_emergency_stop_pressed_says_that_of_both() -> None:
+    follower = Script()
+    link = RobotLink(follower)
+    follower.next = [
+        sample(50_000_000),
+        sample(5_000, FollowerState.STOPPED_BY_WIRE, Refusal.WIRE, boot_id=2),
+    ]
+    link.receive(101.0)
+    assert link.reason == EXPLANATIONS[Refusal.WIRE]
 
 
 class Telling(Script):
@@ -206,7 +218,7 @@ def test_what_it_has_against_flying_is_told_until_it_has_nothing() -> None:
             link.receive(1.0 + RAMP_BEGUN_S)
             follower.next = [sample(1_000, state, refusal)]
             link.receive(1.0 + RAMP_BEGUN_S)
-            refuses = state in (FollowerState.RAMP, FollowerState.REFUSING)
+            refuses = state in (FollowerState.RAMP, *STOPPED)
             assert link.reason == (EXPLANATIONS[refusal] if refuses else "")
     follower.next = []
     before = link.reason
