@@ -6,7 +6,15 @@ from math import isfinite
 
 import numpy as np
 
-from hardware.follower import BlinkOrder, EStop, FollowerState, Refusal, RobotHealth, ThrustCommand
+from hardware.follower import (
+    STOPPED,
+    BlinkOrder,
+    EStop,
+    FollowerState,
+    Refusal,
+    RobotHealth,
+    ThrustCommand,
+)
 from hardware.link.blink_datagram import LASTS_MS, BlinkDatagram, decode_blink, encode_blink
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import (
@@ -36,7 +44,7 @@ PEER, STRANGER = ("control", 1), ("stranger", 2)
 STILL = (0.0, 0.0, 0.0)
 LIMITS = LinkLimits(thrusters=2, f_max=3.0, max_rise=1.0, ramp_us=500_000, handshake_us=20_000)
 MOVING = (FollowerState.RUNNING, FollowerState.COAST, FollowerState.RAMP)
-FORGED, SEALED, PATCHED, HONEST, TICK = range(5)
+FORGED, SEALED, PATCHED, HONEST, TICK, PULL = range(6)
 """What a piece does: first byte; the second is how many milliseconds later."""
 
 
@@ -185,9 +193,21 @@ class RobotRig:
     def step(self, piece: bytes) -> None:
         kind, dt_ms = (piece + b"\0\0")[:2]
         self.tick(dt_ms)
-        if kind % 5 != TICK:
+        if kind % 6 == PULL:
+            self.pull(piece[2:3] == b"\1")
+        elif kind % 6 != TICK:
             self.heard += 1
-            self.hear(kind % 5, piece[2:])
+            self.hear(kind % 6, piece[2:])
+
+    def pull(self, is_open: bool) -> None:
+        """Somebody presses its emergency stop, or releases it."""
+        before = self.end.state
+        self.end.wire(is_open=is_open)
+        if is_open:
+            assert self.end.state == FollowerState.STOPPED_BY_WIRE
+            assert not any(self.thrusts()), "thrust though it is stopped by wire"
+        else:
+            assert self.end.state == before, "closing the wire moves nothing"
 
     def hear(self, kind: int, rest: bytes) -> None:
         before, state = self.thrusts(), self.end.state
@@ -205,7 +225,8 @@ class RobotRig:
         if why == Refusal.NONE:
             self.taken_us = self.now_us
         after = self.thrusts()
-        if why != Refusal.NONE or state == FollowerState.REFUSING:
+        assert why != Refusal.NONE or self.end.e_stop != EStop.OPEN, "taken while it is pressed"
+        if why != Refusal.NONE or state in STOPPED:
             assert all(a <= b for a, b in zip(after, before, strict=True)), "refused, gives thrust"
 
 
@@ -217,6 +238,9 @@ def robot_seeds():
     flight = [piece(HONEST, rest=bytes([level])) for level in (50, 90, 120, 90)]
     yield together([*start, *flight, piece(TICK, 80), piece(TICK, 250), *start, *flight])
     yield together([*start, *flight, piece(TICK, 80), *flight])
+    pressed, released = piece(PULL, rest=b"\1"), piece(PULL, rest=b"\0")
+    later = piece(PATCHED, 5, b"\0\x08\x09")  # zero of another process
+    yield together([released, *start, *flight, pressed, *flight, later, released, later])
     yield together([*start, *flight, piece(PATCHED, 5, b"\0\6\2")])  # flags: stop
     yield together([*start, piece(PATCHED, 5, b"\0\x08\x09"), *start])  # a later epoch
     yield together([*start, *flight, piece(SEALED, 5, next(iter(command_seeds())))])
