@@ -186,6 +186,9 @@ class SimulatedSettings(BaseModel):
     drain_v_min: float = Field(
         default=0.0, ge=0.0, le=1000.0, description="how much that falls in a minute"
     )
+    e_stop: bool = Field(
+        default=False, description="an emergency stop: SIGUSR1 presses, SIGUSR2 releases it"
+    )
 
 
 class Settings(BaseSettings):

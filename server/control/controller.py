@@ -196,13 +196,14 @@ class Controller:
         if now - self._t_ready > SERVER_SILENT_S:
             return ("The server is silent.",)
         late = self._too_late(self._picture_age.value, self._body_age.value)
-        ours = self._condition.refusal, robot_reason, self._unfit, late
+        ours = *self._condition.refusals, robot_reason, self._unfit, late
         return (*self._refusals, *(why for why in ours if why))
 
     def _robots_fault(self, robot_reason: str) -> str:
         """What of the robot ends a flight; and what ends waiting for one."""
-        waits = self._mode == Mode.ARMED
-        return "" if self._mode in AT_REST else robot_reason or self._condition.refusal * waits
+        waiting = self._condition.refusals if self._mode == Mode.ARMED else ()
+        why = (robot_reason, *waiting)
+        return "" if self._mode in AT_REST else next(filter(None, why), "")
 
     def _out_of_time(self, stall_s: float) -> str:
         """Said in its own words, or the robot would seem to be what was silent."""

@@ -25,7 +25,7 @@ from hardware.robot_file import BatteryParameters
 from pipeline.signals import BodyImu
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, Input
-from server.control.robot_health import HealthWatch, RobotCondition
+from server.control.robot_health import PRESSED, HealthWatch, RobotCondition
 
 
 class BodyClock:
@@ -109,6 +109,8 @@ class RobotLink:
         if self._boot_id is not None:
             told = self._tells.health if self._tells is not None else None
             self.condition = self._health.hear(told, now)
+            if self.reason == EXPLANATIONS[Refusal.WIRE] and self.condition.e_stop == "pressed":
+                self.reason = PRESSED  # the same, as it is now
         return dated
 
     def pass_on(self, messages: Iterable[Input], now: float) -> None:

@@ -237,12 +237,14 @@ class _Film:
             ),
         )
 
-        if (health := state.health) is not None and health.battery != "untold":
+        health = state.health
+        if health is not None and (health.battery, health.e_stop) != ("untold", "untold"):
             told = schemas.Health(
                 timestamp=stamp,
                 battery=health.battery,
                 battery_v=health.battery_v,
                 words=health.words,
+                e_stop=health.e_stop,
             )
             self._put("/robot/health", t, told)
 

@@ -48,7 +48,8 @@ OWN: Final = {
         "double error_rad, repeated double thrusts_n, bool saturated,"
         "Vector3 velocity_in_body_m_s, Vector3 angular_velocity_in_body_rad_s"
     ),
-    "Health": "Timestamp timestamp, string battery, double battery_v, repeated string words",
+    "Health": "Timestamp timestamp, string battery, double battery_v, repeated string words,"
+    "string e_stop",
     "Touch": "Timestamp timestamp, bool held, bool visible, uint32 press",
 }
 """Fields of each message, numbered from 1 as they stand. What nobody knows is left out."""

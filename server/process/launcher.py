@@ -149,6 +149,7 @@ def children_of(
         if (full_v := settings.simulated.battery_v) is not None:
             drain_v_min = settings.simulated.drain_v_min
             simulated += ["--battery-v", str(full_v), "--drain-v-min", str(drain_v_min)]
+        simulated += ["--e-stop"] * settings.simulated.e_stop
         children.append(Child("robot", simulated, shared, oom_score=FLIES))
     control = ["server.control.process", "--runtime", str(runtime), "--robot", settings.robot]
     control += ["--host", host, "--port", str(port), "--gains", settings.gains]

@@ -261,6 +261,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """The robot's: by the limits of its file; `told` without such. `unknown`: told no more."""
     battery_v: float | None = None
     """None unless it is known."""
+    e_stop: Literal["untold", "unknown", "released", "pressed"] = "untold"
+    """The emergency stop on the robot. `unknown`: told no more."""
     health: list[str] = []
     """What people must know of the robot's own state, each in words, the gravest first."""
 

@@ -47,6 +47,9 @@ def exposition(manager: SessionManager) -> bytes:
     if status.battery_v is not None:
         volts = Gauge("lightleash_robot_battery_volts", "as the robot tells", registry=registry)
         volts.set(status.battery_v)
+    if status.e_stop in ("pressed", "released"):
+        stop = Gauge("lightleash_robot_e_stop_pressed", "1: it is", registry=registry)
+        stop.set(status.e_stop == "pressed")
     if status.error_mm is not None:
         error = Gauge("lightleash_error_metres", "from the reference", registry=registry)
         error.set(1e-3 * status.error_mm)

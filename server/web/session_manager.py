@@ -20,6 +20,7 @@ from server.common.clock import now, unix_zero_ns
 from server.common.runtime_parameters import Tune
 from server.control.ipc import ControlStatus, server_end
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
+from server.control.robot_health import HealthFields
 from server.diagnostics.blame import Blame
 from server.diagnostics.events import Events
 from server.diagnostics.meter import Meter
@@ -88,7 +89,8 @@ class SessionManager:
         self.status: ControlStatus | None = None
         self.control_meter = Meter()
         self._events, self.tally = Events(1e-9 * unix_zero_ns()), Tally()
-        self._last_mode = self._last_complaint = self._last_battery = ""
+        self._last_mode = self._last_complaint = ""
+        self._last_health = HealthFields()
         self._unfit: set[str] = set()
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
@@ -339,9 +341,7 @@ class SessionManager:
         for said in unfit - self._unfit:
             self.log_event(said)
         self._unfit = unfit
-        if status.battery != self._last_battery and status.health:
-            self.log_event(status.health[0])
-        self._last_battery = status.battery
+        self._log_health(self.status.health if self.status is not None else None)
         self._shown = status
         self.tally.see(status)
         if paused := self.pauses.tick(status.mode not in AT_REST, idle=self.phone is None):
@@ -358,6 +358,17 @@ class SessionManager:
         self._show_picture()
         self._ask_key()
         self._calibration.send(self.phone, self.status)
+
+    def _log_health(self, health: HealthFields | None) -> None:
+        """A battery or an emergency stop that has changed, once, whatever the voltage."""
+        said = health or HealthFields()
+        for now_is, was, words in (
+            (said.battery, self._last_health.battery, said.battery_words),
+            (said.e_stop, self._last_health.e_stop, said.e_stop_words),
+        ):
+            if now_is != was and words:
+                self.log_event(words)
+        self._last_health = said
 
     def broadcast(self, message: ToPage) -> None:
         """To every page."""

@@ -122,6 +122,7 @@ def build(manager: StatusSource) -> Status:
         told_deg_s=commanded_deg_s,
         battery=health.battery,
         battery_v=_rounded(health.battery_v, 2),
+        e_stop=health.e_stop,
         health=health.words,
     )
 
@@ -156,9 +157,14 @@ def _rounded(value: float | None, digits: int, scale: float = 1.0) -> float | No
 def _health(control: ControlStatus | None, silence: str) -> HealthFields:
     """What the robot tells of itself; while control is silent nobody knows more than before."""
     told = control.health if control is not None else None
-    if told is None or told.battery == "untold":
+    if told is None:
         return HealthFields()
-    return HealthFields("unknown") if silence else told
+    if not silence:
+        return told
+    return HealthFields(
+        battery="untold" if told.battery == "untold" else "unknown",
+        e_stop="untold" if told.e_stop == "untold" else "unknown",
+    )
 
 
 def _commanded(control: ControlStatus | None) -> tuple[float | None, float | None]:

@@ -4,17 +4,31 @@ from __future__ import annotations
 
 import contextlib
 import json
+import signal
 import urllib.request
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from hardware.robot_file import ROBOTS
+from hardware.sim.truth import TruthClient
+from server.control.robot_health import PRESSED
 from server.recording.reader import read
 from server.recording.writer import STATUS
 from tests.e2e.serving import Serving, serving
-from tests.e2e.test_serve import flight, kill, mode, status, until
+from tests.e2e.test_serve import (
+    ANSWER_S,
+    RAMP_S,
+    ZERO_N,
+    flight,
+    kill,
+    mode,
+    status,
+    thrust,
+    until,
+)
 
 pytestmark = pytest.mark.e2e
 FULL_V, LOW_V, EMPTY_V, DRAIN_V_MIN = 11.4, 10.5, 9.9, 2.7
@@ -28,7 +42,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     limits = f"[battery]\nlow_v = {LOW_V}\nempty_v = {EMPTY_V}\n\n[link]"
     robot.write_text((ROBOTS / "ames.toml").read_text().replace("\n[link]", f"\n{limits}"))
     battery = ("--simulated.battery-v", str(FULL_V), "--simulated.drain-v-min", str(DRAIN_V_MIN))
-    with serving(folder, "--robot", str(robot), *battery) as running:
+    with serving(folder, "--robot", str(robot), *battery, "--simulated.e-stop") as running:
         until(lambda: mode(running) == "DISARMED", 20.0, "DISARMED")
         yield running
 
@@ -93,3 +107,31 @@ def test_a_battery_drains_in_flight_is_told_everywhere_and_keeps_the_robot_from_
     said = str(status(server)["events"])
     assert "battery is low" in said
     assert "battery is empty" in said
+
+
+@pytest.mark.flight
+def test_an_emergency_stop_pressed_in_flight_stops_it_is_named_and_must_be_released_and_armed(
+    server: Serving,
+) -> None:
+    kill(server, "robot")  # for a full battery
+    until(lambda: battery(server) == "good", 20.0, "a full battery")
+    with (
+        closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth,
+        flight(server) as phone,
+    ):
+        kill(server, "robot", signal.SIGUSR1)
+        until(lambda: thrust(truth) < ZERO_N, 1.0, "no thrust")
+        phone.send_signal(signal.SIGSTOP)  # it would arm again
+        try:
+            until(lambda: status(server)["e_stop"] == "pressed", 2.0, "the pages know")
+            assert status(server)["health"] == [PRESSED]
+            until(lambda: mode(server) == "DISARMED", RAMP_S, "DISARMED")
+            assert PRESSED in str(status(server)["refusals"])
+            assert PRESSED in str(status(server)["events"])
+            kill(server, "robot", signal.SIGUSR2)
+            until(lambda: PRESSED not in str(status(server)["refusals"]), 2.0, "released")
+            assert mode(server) == "DISARMED"
+            assert thrust(truth) < ZERO_N
+        finally:
+            phone.send_signal(signal.SIGCONT)
+        until(lambda: mode(server) == "TRACK", 30.0, "TRACK, armed anew by its phone")

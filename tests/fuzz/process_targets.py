@@ -60,7 +60,7 @@ def inputs(data: bytes) -> None:
 
 def status_seeds():
     yield msgspec.msgpack.encode(control_status())
-    low = HealthFields("low", 10.4, ["The robot's battery is low."])
+    low = HealthFields("low", 10.4, "The robot's battery is low.", "pressed", "It is.")
     yield msgspec.msgpack.encode(control_status(health=low))
     pose = {"p_bc_in_c": (2.0, 0.0, 0.0), "R_cb_wxyz": (1.0, 0.0, 0.0, 0.0)}
     known = {"u_bf_in_c": (0.0, 0.0, 0.0), "sigma_p": 0.01, "sigma_theta": 0.01}

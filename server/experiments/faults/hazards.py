@@ -313,6 +313,21 @@ HAZARDS: Final = (
         ),
     ),
     Hazard(
+        "38a",
+        "The emergency stop on the robot is pressed, or its wire breaks",
+        "the robot, by its wire, before each set-point",
+        "no thrust at once by the robot's own end, whoever says what; RAMP, named on both pages; "
+        "no arming while it is pressed; released, nothing begins: it must be armed anew",
+        (
+            "hardware/link/test_robot_end_search.py::"
+            "test_every_state_is_reached_by_the_documented_edges_and_no_others",
+            "e2e/test_e_stop_process.py::"
+            "test_pressed_in_flight_it_stops_and_released_it_needs_another_handshake",
+            "e2e/test_robot_health.py::"
+            "test_an_emergency_stop_pressed_in_flight_stops_it_is_named_and_must_be_released_and_armed",
+        ),
+    ),
+    Hazard(
         "39",
         "Surprises at the start: a held button, wishes in flight",
         "edges",

@@ -30,7 +30,7 @@ from server.control.controller import (
 from server.control.gap_log import MANY, SIDES
 from server.control.ipc import ControlStatus, control_end, expected_of, server_end
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput
-from server.control.robot_health import HealthFields, RobotCondition
+from server.control.robot_health import PRESSED, HealthFields, RobotCondition
 from server.control.tick_rate import OVER_S
 from tests.pipeline.seeing import quiver, seen_at
 
@@ -197,12 +197,33 @@ def test_a_battery_that_runs_empty_in_flight_ends_no_flight_and_is_told_urgently
     rig.condition = EMPTY
     command, output = rig.run(3.0)[-1]
     assert (command.armed, output.failsafe.mode) == (True, Mode.TRACK)
-    said = ["The robot's battery is empty (9.8 V): bring it to rest now."]
+    said = "The robot's battery is empty (9.8 V): bring it to rest now."
     assert rig.status(output).health == HealthFields("empty", 9.8, said)
     rig.held = False
     assert rig.run(0.5)[-1][1].failsafe.mode == Mode.HOLD
     rig.held, rig.press = True, rig.press + 1
     assert rig.run(1.0)[-1][1].failsafe.mode == Mode.TRACK
+
+
+def test_while_the_emergency_stop_is_pressed_it_is_not_armed_and_the_reason_is_told_once():
+    rig = Rig()
+    rig.condition = RobotCondition(e_stop="pressed")
+    output = rig.run(1.0, robot_reason=PRESSED)[-1][1]
+    assert output.refusals == (PRESSED,)
+    assert rig.status(output).health.words == [PRESSED]
+    assert rig.run(0.05, [RequestInput("arm")], PRESSED)[-1][1].failsafe.mode == Mode.DISARMED
+    rig.condition = RobotCondition(e_stop="released")
+    assert rig.run(1.0)[-1][1].refusals == ()
+
+
+def test_a_flight_that_the_emergency_stop_ends_must_be_armed_anew():
+    rig = Rig()
+    rig.track()
+    rig.condition = RobotCondition(e_stop="pressed")
+    failsafe = rig.run(0.005, robot_reason=PRESSED)[-1][1].failsafe
+    assert (failsafe.mode, failsafe.reason) == (Mode.RAMP, PRESSED)
+    rig.condition = RobotCondition(e_stop="released")
+    assert rig.run(4.0)[-1][1].failsafe.mode == Mode.DISARMED
 
 
 def test_what_gains_lack_is_told_and_refuses_nothing():

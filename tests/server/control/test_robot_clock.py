@@ -12,6 +12,7 @@ from hardware.follower import (
     STOPPED,
     BlinkOrder,
     BodySample,
+    EStop,
     FollowerState,
     Refusal,
     RobotHealth,
@@ -28,7 +29,7 @@ from server.control.robot_clock import (
     BodyClock,
     RobotLink,
 )
-from server.control.robot_health import RobotCondition
+from server.control.robot_health import PRESSED, RobotCondition
 
 SILENCE_S, RAMP_AFTER_S = SILENCE.coasts_s, SILENCE.ramps_s
 RAMP_BEGUN_S = SILENCE.back_s - SILENCE.ramps_s
@@ -117,6 +118,17 @@ class Telling(Script):
     """... and tells of its battery."""
 
     health: tuple[RobotHealth, float] | None = RobotHealth(9.0), 100.0
+
+
+def test_a_stop_by_wire_is_named_as_it_is_while_it_lasts_and_as_it_was_after() -> None:
+    follower = Telling()
+    link = RobotLink(follower)
+    was = EXPLANATIONS[Refusal.WIRE]
+    for t, e_stop, said in ((100.0, EStop.OPEN, PRESSED), (100.1, EStop.CLOSED, was)):
+        follower.health = RobotHealth(None, e_stop), t
+        follower.next = [sample(50_000_000, FollowerState.STOPPED_BY_WIRE, Refusal.WIRE)]
+        link.receive(100.1)
+        assert link.reason == said
 
 
 def test_what_a_robot_tells_is_judged_by_its_file_once_it_has_sent_a_sample() -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from hardware.follower import RobotHealth
+from hardware.follower import EStop, RobotHealth
 from hardware.robot_file import BatteryParameters
 from server.control.robot_health import (
+    PRESSED,
     RECOVERED,
     SAG_S,
     STALE_S,
+    UNKNOWN_STOP,
     BatteryLevel,
     HealthWatch,
     RobotCondition,
@@ -26,9 +28,11 @@ class Robot:
         self.watch, self.t = HealthWatch(limits), 0.0
         self.told: tuple[RobotHealth, float] | None = None
 
-    def tells(self, volts: float | None, seconds: float) -> RobotCondition:
+    def tells(
+        self, volts: float | None, seconds: float, e_stop: EStop = EStop.NOT_WIRED
+    ) -> RobotCondition:
         for _ in range(round(seconds / EVERY_S)):
-            self.told = RobotHealth(volts), self.t
+            self.told = RobotHealth(volts, e_stop), self.t
             condition = self.silent(EVERY_S)
         return condition
 
@@ -42,13 +46,13 @@ class Robot:
 def test_of_a_robot_that_tells_nothing_and_whose_file_says_nothing_nothing_is_said():
     condition = Robot(limits=None).silent(10.0)
     assert condition == RobotCondition("untold", None)
-    assert (condition.refusal, condition.fields(flies=True).words) == ("", [])
+    assert (condition.refusals, condition.fields(flies=True).words) == ((), [])
 
 
 def test_a_voltage_without_limits_is_told_and_not_called_good():
     condition = Robot(limits=None).tells(3.0, 2.0)
     assert (condition.battery, condition.battery_v) == ("told", 3.0)
-    assert (condition.refusal, condition.fields(flies=True).words) == ("", [])
+    assert (condition.refusals, condition.fields(flies=True).words) == ((), [])
 
 
 LEVELS: list[tuple[float, BatteryLevel]] = [
@@ -60,7 +64,7 @@ LEVELS: list[tuple[float, BatteryLevel]] = [
 def test_its_level_is_what_the_limits_say(volts: float, level: BatteryLevel):
     condition = Robot().tells(volts, 1.0)
     assert (condition.battery, condition.battery_v) == (level, pytest.approx(volts))
-    assert bool(condition.refusal) == (level == "empty")
+    assert bool(condition.refusals) == (level == "empty")
 
 
 def test_words_give_the_voltage_and_what_to_do_in_flight_and_on_the_ground():
@@ -72,8 +76,8 @@ def test_words_give_the_voltage_and_what_to_do_in_flight_and_on_the_ground():
     assert empty.fields(flies=True).words == [
         "The robot's battery is empty (9.7 V): bring it to rest now."
     ]
-    assert empty.fields(flies=False).words == [empty.refusal]
-    assert empty.refusal == "The robot's battery is empty (9.7 V): charge it before arming."
+    assert empty.fields(flies=False).words == list(empty.refusals)
+    assert empty.refusals == ("The robot's battery is empty (9.7 V): charge it before arming.",)
 
 
 def test_a_voltage_that_sags_for_a_moment_is_not_empty_and_one_that_stays_down_is_soon():
@@ -87,7 +91,7 @@ def test_a_voltage_that_sags_for_a_moment_is_not_empty_and_one_that_stays_down_i
 def test_an_emptied_battery_that_recovers_at_rest_is_not_good_again_before_it_is_charged():
     robot = Robot()
     robot.tells(9.8, 1.0)
-    assert robot.tells(10.5, 60.0).refusal
+    assert robot.tells(10.5, 60.0).refusals
     assert robot.tells(10.5 * RECOVERED - 0.01, 60.0).battery == "empty"
     assert robot.tells(10.5 * RECOVERED + 0.01, 60.0).battery == "good"
     robot.tells(10.3, 10.0)
@@ -100,7 +104,7 @@ def test_what_is_told_no_more_is_unknown_and_not_what_it_was():
     assert robot.silent(STALE_S - EVERY_S - TICK_S).battery == "good"
     condition = robot.silent(3.0 * TICK_S)
     assert condition.battery == "unknown"
-    assert condition.refusal == ""
+    assert condition.refusals == ()
     fields = condition.fields(flies=True)
     assert fields.battery_v is None
     assert fields.words == ["The robot does not tell how its battery is."]
@@ -119,7 +123,7 @@ def test_one_that_was_empty_stays_so_while_nobody_knows():
     condition = robot.silent(60.0)
     assert condition.battery == "unknown"
     said = "The robot's battery was empty when last told of (9.7 V): charge it before arming."
-    assert (condition.refusal, condition.fields(flies=False).words) == (said, [said])
+    assert (condition.refusals, condition.fields(flies=False).words) == ((said,), [said])
 
 
 def test_a_robot_whose_file_has_limits_and_that_tells_nothing_is_said_so_soon():
@@ -132,5 +136,31 @@ def test_a_robot_that_has_restarted_is_judged_anew():
     robot = Robot()
     robot.tells(9.7, 1.0)
     robot.told = None
-    assert not robot.silent(TICK_S).refusal
+    assert not robot.silent(TICK_S).refusals
     assert robot.tells(12.0, EVERY_S).battery == "good"
+
+
+def test_an_emergency_stop_is_told_refuses_while_pressed_and_is_unknown_when_told_no_more():
+    robot = Robot(limits=None)
+    released = robot.tells(None, 1.0, EStop.CLOSED)
+    assert (released.e_stop, released.refusals) == ("released", ())
+    assert released.fields(flies=True).words == []
+    pressed = robot.tells(None, EVERY_S, EStop.OPEN)
+    assert (pressed.e_stop, pressed.refusals) == ("pressed", (PRESSED,))
+    assert pressed.fields(flies=False).words == [PRESSED]
+    unknown = robot.silent(STALE_S + TICK_S)
+    assert (unknown.e_stop, unknown.refusals) == ("unknown", ())
+    assert unknown.fields(flies=False).words == [UNKNOWN_STOP]
+
+
+def test_the_emergency_stop_is_said_before_the_battery():
+    condition = Robot().tells(9.7, 1.0, EStop.OPEN)
+    assert condition.fields(flies=False).words == list(condition.refusals)
+    assert [PRESSED in words for words in condition.refusals] == [True, False]
+
+
+def test_a_robot_that_has_restarted_has_told_nothing_of_its_emergency_stop():
+    robot = Robot(limits=None)
+    robot.tells(None, 1.0, EStop.CLOSED)
+    robot.told = None
+    assert robot.silent(STALE_S + 1.0).e_stop == "untold"

@@ -68,7 +68,7 @@ def with_a_battery(folder):
             return entry.data
         status = json.loads(entry.data)
         if next(counts) >= 137:
-            status["health"] = ["low", 10.25, ["The robot's battery is low."]]
+            status["health"] = ["low", 10.25, "The robot's battery is low.", "released", ""]
         return json.dumps(status).encode()
 
     return on_a_known_day(folder, change=change)

@@ -130,8 +130,8 @@ def test_a_robot_that_tells_of_itself_has_a_topic_for_it(flight, tmp_path):
     assert "/robot/health" not in flight.topics
     told = Export(with_a_battery(tmp_path), tmp_path).topics["/robot/health"]
     assert len(told) == 138
-    assert {(one.battery, one.battery_v, *one.words) for one in told} == {
-        ("low", 10.25, "The robot's battery is low.")
+    assert {(one.battery, one.battery_v, one.e_stop, *one.words) for one in told} == {
+        ("low", 10.25, "released", "The robot's battery is low.")
     }
 
 

@@ -58,7 +58,10 @@ def test_control_is_led_to_the_simulated_robot(tmp_path, sockets):
 
 
 def test_a_battery_of_the_simulated_robot_is_its_own_and_there_is_none_unasked(tmp_path, sockets):
-    assert "--battery-v" not in children_of(load([]), [], tmp_path, sockets)[0].arguments
+    plain = children_of(load([]), [], tmp_path, sockets)[0].arguments
+    assert {"--battery-v", "--e-stop"}.isdisjoint(plain)
+    settings = load(["--simulated.e-stop"])
+    assert "--e-stop" in children_of(settings, [], tmp_path, sockets)[0].arguments
     settings = load(["--simulated.battery-v", "12.6", "--simulated.drain-v-min", "0.5"])
     robot = children_of(settings, [], tmp_path, sockets)[0]
     assert (option(robot, "--battery-v"), option(robot, "--drain-v-min")) == ("12.6", "0.5")

@@ -75,11 +75,17 @@ def test_the_battery_is_told_while_it_is_known(manager):
     for health, known in (
         (None, None),
         (HealthFields("told", 11.25), 11.25),
-        (HealthFields("low", 10.4, ["Low."]), 10.4),
+        (HealthFields("low", 10.4, "Low."), 10.4),
         (HealthFields("unknown"), None),
     ):
         tell(manager, health=health)
         assert samples(manager).get(("lightleash_robot_battery_volts",)) == known
+
+
+def test_the_emergency_stop_is_told_while_it_is_known(manager):
+    for e_stop, known in (("untold", None), ("released", 0), ("pressed", 1), ("unknown", None)):
+        tell(manager, health=HealthFields(e_stop=e_stop))
+        assert samples(manager).get(("lightleash_robot_e_stop_pressed",)) == known
 
 
 def test_pictures_that_could_not_be_decoded_are_counted_by_what_became_of_them(manager):

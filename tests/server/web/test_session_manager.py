@@ -277,16 +277,31 @@ def test_a_battery_that_gets_worse_is_one_event_whatever_its_voltage(house):
     house.manager.supervisors.add(watcher)
     told = (("good", 11.0), ("low", 10.4), ("low", 10.3), ("empty", 9.8), ("empty", 9.7))
     for level, volts in told:
-        words = [] if level == "good" else [f"The battery is {level} ({volts} V)."]
+        words = "" if level == "good" else f"The battery is {level} ({volts} V)."
         house.control.send(control_status(health=HealthFields(level, volts, words)))
         house.manager._receive_status()
         house.manager._tick()
         status = msgspec.json.decode(watcher.data[-1])
         shown.append((status["battery"], status["battery_v"]))
-        assert status["health"] == words
+        assert status["health"] == [words] * bool(words)
     assert shown == list(told)
     said = [event.text for event in house.manager.events if "battery" in event.text]
     assert said == ["The battery is empty (9.8 V).", "The battery is low (10.4 V)."]
+
+
+def test_an_emergency_stop_is_one_event_each_time_it_is_pressed_and_no_battery_s(house):
+    watcher, low = Paper(), ("low", 10.4, "The battery is low.")
+    house.manager.supervisors.add(watcher)
+    for e_stop in ("released", "pressed", "pressed", "released", "pressed"):
+        words = "It is pressed." if e_stop == "pressed" else ""
+        house.control.send(control_status(health=HealthFields(*low, e_stop, words)))
+        house.manager._receive_status()
+        house.manager._tick()
+        status = msgspec.json.decode(watcher.data[-1])
+        assert status["e_stop"] == e_stop
+        assert status["health"] == [words] * bool(words) + ["The battery is low."]
+    times = {event.text: event.times for event in house.manager.events}
+    assert (times["It is pressed."], times["The battery is low."]) == (2, 1)
 
 
 def test_what_gains_lack_is_one_event(house):

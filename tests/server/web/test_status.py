@@ -66,6 +66,21 @@ def test_while_control_is_silent_a_battery_is_not_known_any_more(
     assert (shown.battery, shown.battery_v) == battery
 
 
+@pytest.mark.parametrize(
+    ("e_stop", "silent_s", "shown"),
+    [
+        ("untold", LOST_S + 0.05, "untold"),
+        ("pressed", 0.0, "pressed"),
+        ("released", LOST_S + 0.05, "unknown"),
+    ],
+)
+def test_while_control_is_silent_an_emergency_stop_is_not_known_any_more(
+    manager, e_stop, silent_s, shown
+):
+    tell(manager, t=now() - silent_s, health=HealthFields(e_stop=e_stop))
+    assert status.build(manager).e_stop == shown
+
+
 def test_what_control_says_is_shown_in_the_units_of_screens(manager):
     tell(
         manager,

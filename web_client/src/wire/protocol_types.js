@@ -264,6 +264,7 @@
  * @property {number | null} told_deg_s ... and how fast to turn.
  * @property {'untold' | 'unknown' | 'told' | 'good' | 'low' | 'empty'} battery The robot's: by the limits of its file; `told` without such. `unknown`: told no more.
  * @property {number | null} battery_v null unless it is known.
+ * @property {'untold' | 'unknown' | 'released' | 'pressed'} e_stop The emergency stop on the robot. `unknown`: told no more.
  * @property {string[]} health What people must know of the robot's own state, each in words, the gravest first.
  */
 
