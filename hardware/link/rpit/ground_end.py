@@ -19,6 +19,7 @@ from __future__ import annotations
 import secrets
 
 from hardware.follower import BodySample, RobotCommand
+from hardware.link.address import ANYBODY
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import LinkError, SampleDatagram
 from hardware.link.robot_end import Peer
@@ -26,7 +27,6 @@ from hardware.link.rpit.structs import WHOLE, decode_con, encode_mes
 
 KEEPS_PEER_S = 1.0
 """As long as the block itself waits for a mes before it says something again."""
-ANYBODY = "0.0.0.0"  # no address of anybody's, so free to mean it
 
 
 def random_whole() -> int:

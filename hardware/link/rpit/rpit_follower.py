@@ -16,15 +16,15 @@ says who stops it (`stopped_by`).
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable
 
 from hardware.follower import BodySample, FollowerError, RobotCommand, ThrustCommand
+from hardware.link.address import ANYBODY, address_of
 from hardware.link.control_end import ControlEnd
 from hardware.link.robot_end import Peer
 from hardware.link.robot_server import bound
-from hardware.link.rpit.ground_end import ANYBODY, GroundEnd, random_whole
+from hardware.link.rpit.ground_end import GroundEnd, random_whole
 from hardware.link.rpit.structs import STRUCT, WHOLE
 from hardware.robot_file import RobotFile
 
@@ -128,18 +128,7 @@ def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> RpitFollower:
     if not 0 < epoch < WHOLE - 1:
         raise FollowerError(f"epoch {epoch}", f"1 to {WHOLE - 2}: is this machine's clock right?")
     link = robot_file.link
-    host = _address_of(link.host)
+    host = address_of(link.host, "whoever speaks first")
     here = host if host.startswith("127.") else ANYBODY
     end = GroundEnd(ControlEnd.of(robot_file, NO_KEY, epoch, random_whole), host)
     return RpitFollower((here, link.port), end)
-
-
-def _address_of(host: str) -> str:
-    try:
-        found = socket.getaddrinfo(host, None, socket.AF_INET, socket.SOCK_DGRAM)
-    except OSError as error:
-        what = f"robot at {host}: {error}"
-        raise FollowerError(
-            what, f"its IPv4 address, or {ANYBODY}: whoever speaks first"
-        ) from error
-    return str(found[0][4][0])

@@ -8,8 +8,9 @@ import struct
 import pytest
 
 from hardware.follower import ThrustCommand
+from hardware.link.address import ANYBODY
 from hardware.link.control_end import ControlEnd
-from hardware.link.rpit.ground_end import ANYBODY, GroundEnd, RobotsAddress, random_whole
+from hardware.link.rpit.ground_end import GroundEnd, RobotsAddress, random_whole
 from hardware.robot_file import load_robot
 from tests.hardware.link.rpit.lab_robot import Model
 

@@ -10,9 +10,9 @@ import pytest
 
 from hardware.contract import FollowerContract, exchange
 from hardware.follower import FollowerError, FollowerState, ThrustCommand
+from hardware.link.address import ANYBODY
 from hardware.link.registry import link_kind
 from hardware.link.robot_server import bound
-from hardware.link.rpit.ground_end import ANYBODY
 from hardware.robot_file import load_robot, robot_of, robot_path, robot_table
 from tests.hardware.link.rpit.lab_robot import RUNNING, Block, Model
 from tests.hardware.link.rpit.rpit_rig import BOOT_ID, LOCALHOST, RpitRig, bad_line
