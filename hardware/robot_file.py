@@ -31,13 +31,14 @@ from hardware.robot_schema import (
     USUAL_PORTS,
     BatterySection,
     BodyImuSection,
+    Direction,
     FlightControllerSection,
     RobotSchema,
     Stand,
     Suspension,
     clashes,
 )
-from hardware.twist_schema import TwistRobotSchema, drive_of, twist_clashes
+from hardware.twist_schema import Ros2Section, TwistRobotSchema, drive_of, twist_clashes
 from pipeline.frames import GRAVITY, Array
 from pipeline.gains import Gains
 from pipeline.robot import Robot
@@ -61,6 +62,21 @@ class RobotFileError(ValueError):
         self.file, self.key, self.allowed = file, key, allowed
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Ros2Parameters:
+    """Where a base of ROS 2 listens and speaks: whole names of its topics, with a stroke before."""
+
+    domain: int
+    command: str
+    frame: str
+    """Of the header of a TwistStamped; "": it takes a Twist."""
+    imu: str
+    R_bi: Array
+    """(3, 3) from the axes of its motion sensors to the body's."""
+    odometry: str
+    """"": it tells none."""
+
+
 @dataclass(frozen=True, slots=True)
 class LinkParameters:
     """How the robot is reached, where it listens and what it takes."""
@@ -76,6 +92,8 @@ class LinkParameters:
     """How much more a thruster may be told than one command before [N]."""
     takes: str = "thrusts"
     """One of `COMMANDS`."""
+    ros2: Ros2Parameters | None = None
+    """Of a link of that kind."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -292,7 +310,15 @@ def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
         plant,
         StartParameters(start.distance_m, start.above_m, start.lift_m),
         {},
-        LinkParameters(link.kind, link.stopped_by or "", link.host, port, 0.0, link.takes),
+        LinkParameters(
+            link.kind,
+            link.stopped_by or "",
+            link.host,
+            port,
+            0.0,
+            link.takes,
+            _ros2(link.ros2),
+        ),
         keeps_attitude_in_ramp=False,
         battery=_battery(schema.battery),
     )
@@ -368,16 +394,37 @@ def _flight_controller(
 ) -> FlightControllerParameters | None:
     if section is None:
         return None
-    rows = [
-        (-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])]
-        for axis in section.imu_axes
-    ]
     return FlightControllerParameters(
         tuple(section.motors),
         section.thrust_exponent,
-        np.array(rows),
+        _R_bi(section.imu_axes),
         section.gyro_per_deg_s,
         section.acc_per_g,
+    )
+
+
+def _R_bi(imu_axes: list[Direction]) -> Array:
+    rows = [
+        (-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])] for axis in imu_axes
+    ]
+    return np.array(rows)
+
+
+def _ros2(section: Ros2Section | None) -> Ros2Parameters | None:
+    if section is None or section.imu is None:
+        return None
+    below = "/" + "".join(f"{part}/" for part in section.namespace.split("/") if part)
+
+    def whole(name: str) -> str:
+        return name if name[0] == "/" else below + name
+
+    return Ros2Parameters(
+        domain=section.domain,
+        command=whole(section.command),
+        frame=section.frame if section.stamped else "",
+        imu=whole(section.imu),
+        R_bi=_R_bi(section.imu_axes),
+        odometry=whole(section.odometry) if section.odometry is not None else "",
     )
 
 

@@ -131,7 +131,7 @@ class GainsSection(Section):
     """[N s/m, N m s/rad]."""
 
 
-USUAL_PORTS = {"rpit": 31415}
+USUAL_PORTS = {"ros2": 7400, "rpit": 31415}
 """UDP ports of kinds of links that have one which everybody uses."""
 
 
@@ -236,13 +236,14 @@ def battery_clashes(battery: BatterySection | None) -> Iterator[tuple[str, str]]
 def _miswired(section: FlightControllerSection, thrusters: int) -> Iterator[tuple[str, str]]:
     if len(section.motors) != thrusters or len(set(section.motors)) < thrusters:
         yield "flight_controller.motors", f"{thrusters} different numbers, one for each thruster"
-    if sorted(axis[-1] for axis in section.imu_axes) != ["x", "y", "z"]:
-        yield "flight_controller.imu_axes", "each of x, y, z once, with or without a minus"
-    elif not _is_right_handed(section.imu_axes):
-        yield "flight_controller.imu_axes", "a right-handed system: turn one minus"
+    if fault := axes_fault(section.imu_axes):
+        yield "flight_controller.imu_axes", fault
 
 
-def _is_right_handed(axes: list[Direction]) -> bool:
+def axes_fault(axes: list[Direction]) -> str:
+    """What would be allowed in place of three directions that are no right-handed system, or ""."""
     letters = "".join(axis[-1] for axis in axes)
+    if sorted(letters) != ["x", "y", "z"]:
+        return "each of x, y, z once, with or without a minus"
     is_even, minuses = letters in "xyzxy", sum(axis[0] == "-" for axis in axes)
-    return is_even == (minuses % 2 == 0)
+    return "" if is_even == (minuses % 2 == 0) else "a right-handed system: turn one minus"

@@ -14,9 +14,11 @@ from hardware.robot_schema import (
     Axis,
     BatterySection,
     BodyImuSection,
+    Direction,
     LedSection,
     Section,
     Start,
+    axes_fault,
     battery_clashes,
 )
 from pipeline.control.twist_margins import LEAST_PHASE_RAD
@@ -44,6 +46,38 @@ class TwistSection(Section):
     attitude_gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)]
 
 
+ROS_NAME = r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
+RosName = Annotated[str, Field(pattern=f"^{ROS_NAME}$", max_length=200)]
+"""Of a topic: below the namespace, unless it begins with a stroke."""
+
+
+NO_IMU = (
+    "topic of the base's sensor_msgs/Imu: the estimate needs a gyroscope and an accelerometer on"
+    " the body, and none here does without"
+)
+
+
+class Ros2Section(Section):
+    """[link.ros2]: where a base of ROS 2 listens and speaks; see `link/ros2/`."""
+
+    domain: Annotated[int, Field(ge=0, le=232)] = 0
+    """ROS_DOMAIN_ID of the base."""
+    namespace: Annotated[str, Field(pattern=f"^(/|{ROS_NAME})$", max_length=200)] = "/"
+    command: RosName = "cmd_vel"
+    """geometry_msgs/Twist, or TwistStamped if ..."""
+    stamped: bool = False
+    frame: Annotated[str, Field(pattern=r"^[!-~]{1,100}$")] = "base_link"
+    """... in the header of a TwistStamped."""
+    imu: RosName | None = None
+    """sensor_msgs/Imu, of the body; nobody is led without, see `NO_IMU`."""
+    imu_axes: Annotated[
+        list[Direction], Field(min_length=3, max_length=3, default_factory=lambda: ["x", "y", "z"])
+    ]
+    """Along which axis of its motion sensors each of the body's lies."""
+    odometry: RosName | None = None
+    """nav_msgs/Odometry; without it the robot's own twist is taken to be what it was told."""
+
+
 class TwistLinkSection(Section):
     """[link] of a robot that takes a twist."""
 
@@ -52,6 +86,7 @@ class TwistLinkSection(Section):
     stopped_by: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     host: Annotated[str, Field(min_length=1, max_length=253)]
     port: Annotated[int, Field(ge=1, le=65535)] | None = None
+    ros2: Ros2Section | None = None
 
 
 class TwistRobotSchema(Section):
@@ -90,6 +125,7 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     if robot.link.port is None and robot.link.kind not in USUAL_PORTS:
         yield "link.port", f"missing: a link of kind {robot.link.kind!r} has no usual one"
     yield from battery_clashes(robot.battery)
+    yield from _ros2_clashes(robot.link)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     drive = drive_of(robot.twist)
@@ -103,3 +139,16 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     for key in ("position_gain_per_s", "attitude_gain_per_s"):
         if drive.phase_margin(getattr(robot.twist, key)) < LEAST_PHASE_RAD:
             yield f"twist.{key}", "smaller: with this delay and lag it would swing"
+
+
+def _ros2_clashes(link: TwistLinkSection) -> Iterator[tuple[str, str]]:
+    if link.kind != "ros2":
+        if link.ros2 is not None:
+            yield "link.ros2", f"only with kind = 'ros2', not {link.kind!r}"
+        return
+    if link.port is not None:
+        yield "link.port", "none with kind = 'ros2': DDS takes its ports by link.ros2.domain"
+    if link.ros2 is None or link.ros2.imu is None:
+        yield "link.ros2.imu", NO_IMU
+    elif fault := axes_fault(link.ros2.imu_axes):
+        yield "link.ros2.imu_axes", fault

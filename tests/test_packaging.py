@@ -51,14 +51,16 @@ def test_lock_file_names_no_host(path):
     )
 
 
-def test_pictures_are_an_extra_that_development_brings():
+@pytest.mark.parametrize(("extra", "name"), [("plots", "matplotlib"), ("ros2", "cyclonedds")])
+def test_what_only_some_need_is_an_extra_that_development_brings(extra, name):
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    plots = project["project"]["optional-dependencies"]["plots"]
-    assert [one for one in plots if one.startswith("matplotlib")] == plots
-    assert set(plots) <= set(project["dependency-groups"]["test"])
+    brought = project["project"]["optional-dependencies"][extra]
+    assert [one for one in brought if one.startswith(name)] == brought
+    tested = [one for one in project["dependency-groups"]["test"] if isinstance(one, str)]
+    assert set(brought) <= {one.partition(";")[0] for one in tested}
     core, dev = (path.read_text() for path in LOCKS)
-    assert "matplotlib" not in core
-    assert re.search(r"^matplotlib==", dev, flags=re.MULTILINE)
+    assert name not in core
+    assert re.search(rf"^{name}==", dev, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize("path", LOCKS, ids=lambda path: path.name)

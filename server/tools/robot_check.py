@@ -37,6 +37,7 @@ LATE = Sensing("relative", latency=0.100, body_age=0.010)
 """Of a phone's pictures and the body's samples, at a good network's later end."""
 LEAST_FORCE_PER_WEIGHT, LEAST_REACH_M = 0.05, 0.05
 """Below, a robot hardly answers."""
+NOBODY_ASKED = "none here: whoever is on its network can lead it, or pose as it (SECURITY.md)"
 VIEWS, FOCAL_PX, NOISE_PX = 40, 914.0, 0.1
 """A phone at 720p."""
 
@@ -174,7 +175,8 @@ def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     except FollowerError as error:
         yield RobotFinding("link", False, str(error))
         return
-    where = f"{link.kind} to {link.host}, port {link.port}: {link.takes}"
+    where = f"port {link.port}" if link.ros2 is None else f"domain {link.ros2.domain}"
+    where = f"{link.kind} to {link.host}, {where}: {link.takes}"
     lacks = "" if link.takes in kind.takes else f"; it carries {' or '.join(kind.takes)} alone"
     yield RobotFinding("link", not lacks, where + lacks)
     falls = never_upright(robot_file) or never_stops(robot_file)
@@ -187,3 +189,5 @@ def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
         has = key_file(state, name).exists()
         lacks = f"no key: `lightleash robot key {name}` (a simulated robot needs none)"
         yield RobotFinding("key", has or link.host == "127.0.0.1", "kept" if has else lacks)
+    else:
+        yield RobotFinding("key", True, NOBODY_ASKED)

@@ -53,6 +53,14 @@ def test_one_behind_rpits_block_which_stops_nothing_is_armed_only_if_its_file_sa
     assert unfit(replace(ames, link=said), GRANTED, real=True) == ""
 
 
+def test_a_base_of_ros_2_is_armed_only_if_its_file_says_who_stops_it():
+    twister = load_robot("twister", takes=COMMANDS)
+    ros2 = replace(twister, link=replace(twister.link, kind="ros2"))
+    assert unfit(ros2, GRANTED, real=True) == STOPPED_BY_NOBODY
+    said = replace(twister.link, kind="ros2", stopped_by="cmd_vel_timeout = 0.06 s, tried")
+    assert unfit(replace(twister, link=said), GRANTED, real=True) == ""
+
+
 @pytest.mark.parametrize("name", ["ames", "quadrotor", "ground", "screen", "twister"])
 def test_nobody_is_told_each_time_what_gains_of_this_project_lack(name: str) -> None:
     robot_file = load_robot(name, takes=COMMANDS)

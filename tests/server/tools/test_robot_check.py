@@ -70,6 +70,7 @@ def test_who_stops_a_robot_in_silence_is_said(capsys, tmp_path):
     code, found = findings(capsys, changed(tmp_path, ("[link] ", link)), tmp_path)
     assert code == 0
     assert found["in silence"]["said"] == "stops: a relay on the battery"
+    assert "whoever is on its network can lead it" in found["key"]["said"]
 
 
 def test_authority_is_what_thrusts_within_their_limits_give_and_no_more():
@@ -112,6 +113,35 @@ def test_a_robot_that_takes_a_twist_is_judged_by_what_it_has(old, new, against, 
     assert code == bool(against)
     assert "told zero 0.16 s after the last command" in found["stops"]["said"]
     assert "0.50 m/s and 90°/s at most" in found["twist"]["said"]
+
+
+ROS2 = """
+[link]
+takes = "twist"
+kind = "ros2"
+host = "127.0.0.1"
+{}
+[link.ros2]
+imu = "imu"
+domain = 7
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("stopped_by", "against"),
+    [("", {"in silence"}), ('stopped_by = "cmd_vel_timeout, tried"', set())],
+)
+def test_of_a_base_of_ros_2_it_is_said_who_stops_it_and_that_nobody_is_asked(
+    stopped_by, against, capsys, tmp_path
+):
+    body, _ = robot_path("twister").read_text().split("[link]")
+    (tmp_path / "base.toml").write_text(body + ROS2.format(stopped_by))
+    code, found = findings(capsys, tmp_path / "base.toml", tmp_path)
+    assert {what for what, one in found.items() if not one["ok"]} == against
+    assert code == bool(against)
+    assert found["link"]["said"] == "ros2 to 127.0.0.1, domain 7: twist"
+    assert "whoever is on its network can lead it" in found["key"]["said"]
 
 
 @pytest.mark.slow

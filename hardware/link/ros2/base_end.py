@@ -1,0 +1,209 @@
+"""A base of ROS 2 without a socket: who it is, what is believed of it, and what it is told.
+
+Nobody can be told apart by DDS as ROS uses it: there is no key, and no message answers another. So
+the gate and the watchdog that our own link has on the robot (`robot_end.py`) stand here, before the
+topic. Whatever control says goes through them, and what they give is what the base is told:
+
+* The gate takes a command only if control has just had a sample of the base's motion sensors. A
+  base that isn't heard any more is told to stand still, from 60 ms on, within its accelerations,
+  and goes on being told zero. So is one whose samples arrive 40 ms later than the quickest ones.
+* A new control process, and a base whose driver has restarted, begins with half a second of zero.
+* The first who publishes samples that can be is the base, until he has been silent for a second;
+  what others publish is dropped. The same of odometry.
+
+What it can't do is stop a base when this process or its network dies: the base itself has to, see
+`docs/ros2.md`, so that its robot file says who does (`stopped_by`). Nor does anybody answer: a
+round trip is from a command that the gate took to the next sample of the base.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hardware.follower import BodySample, RobotCommand
+from hardware.link.control_end import ControlEnd, random_u64
+from hardware.link.link_key import new_key
+from hardware.link.robot_end import LinkLimits, RobotEnd
+from hardware.robot_file import RobotFile, Ros2Parameters
+from pipeline.frames import Array, Triple, triple
+
+KEEPS_WRITER_S = 1.0
+"""So long nobody else is heard in place of one who has fallen silent."""
+CLOCK_SET_S = 1.0
+"""A stamp that is farther from where the last one lets it be: that clock has been set anew."""
+QUICKEST_OF = 200
+"""Samples of which the quickest dates the newest; `BodyClock` of the server does the same."""
+ODOMETRY_LASTS_S = 0.1
+"""With an older one nothing is known of how the base moves, and its samples are not believed."""
+MOST = 1e4
+"""Nothing that a robot measures is more [rad/s, m/s², m/s]."""
+HERE = ("here", 0)
+
+
+@dataclass(frozen=True, slots=True)
+class HeardImu:
+    """A message of the base's motion sensors."""
+
+    writer: int
+    """Whose."""
+    stamp_us: int
+    """Of its header [µs], 0: not dated."""
+    omega_in_i: Triple
+    """[rad/s]."""
+    a_in_i: Triple
+    """Specific force [m/s²]."""
+    measures_both: bool
+    """Neither is missing, by its covariances."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeardOdometry:
+    """The twist of a message of its odometry."""
+
+    writer: int
+    twist_in_b: tuple[float, float, float, float, float, float]
+    """[m/s, rad/s]."""
+
+
+class FirstWriter:
+    """Keeps to one of those who publish. Times are [s], monotonic."""
+
+    def __init__(self) -> None:
+        """Nobody yet."""
+        self.writer: int | None = None
+        self._heard = 0.0
+
+    def admits(self, writer: int, now: float) -> bool:
+        """Whether this one is, or now becomes, the one; of who said something that can be."""
+        is_other = self.writer not in (None, writer)
+        if is_other and now - self._heard <= KEEPS_WRITER_S:
+            return False
+        self.writer, self._heard = writer, now
+        return True
+
+
+class StampClock:
+    """Dates stamps on our clock: the quickest of the last ones took no time. Times are [s]."""
+
+    def __init__(self) -> None:
+        """No stamp yet."""
+        self._excess: deque[float] = deque(maxlen=QUICKEST_OF)
+        self._last = (-1.0, -1.0)
+        """Stamp and arrival."""
+
+    def is_set_anew(self, stamp: float, now: float) -> bool:
+        """Whether that is no time that the clock can have come to since the last stamp."""
+        if not self._excess:
+            return False
+        passed, went = now - self._last[1], stamp - self._last[0]
+        return went < -CLOCK_SET_S or went > passed + CLOCK_SET_S
+
+    def dated(self, stamp: float, now: float) -> float | None:
+        """When that was on our clock; None: not after the last one."""
+        if self._excess and stamp <= self._last[0]:
+            return None
+        self._last = stamp, now
+        self._excess.append(now - stamp)
+        return stamp + min(self._excess)
+
+
+class BaseEnd:
+    """Turns commands into twists, and messages of a base into samples. Times are [s], monotonic."""
+
+    def __init__(self, robot_file: RobotFile, topics: Ros2Parameters, epoch: int) -> None:
+        """Nothing said, nothing heard."""
+        self._limits, self._key = LinkLimits.of(robot_file), new_key()
+        self._control = ControlEnd.of(robot_file, self._key, epoch)
+        self._R_bi, self._has_odometry = topics.R_bi, bool(topics.odometry)
+        self._imu_writer, self._odometry_writer = FirstWriter(), FirstWriter()
+        self._twist_in_b, self._twist_at = np.zeros(6), -np.inf
+        self._boot_id = secrets.randbits(31)
+        self._dropped = 0
+        self._begin()
+
+    @property
+    def epoch(self) -> int:
+        """Under which commands are given; a new one after the gate has gone to zero by itself."""
+        return self._control.epoch
+
+    @property
+    def dropped(self) -> int:
+        """Messages that were not the base's, not to be believed, repeated or overtaken."""
+        return self._dropped + self._control.dropped
+
+    def drop(self) -> None:
+        """Something came that could not be read."""
+        self._dropped += 1
+
+    def command(self, command: RobotCommand, now: float) -> Array:
+        """The twist (6,) in b [m/s, rad/s] that the base is to be told.
+
+        Raises:
+            FollowerError: a command no robot may be told.
+        """
+        now_us = _us(now)
+        self._gate.receive(self._control.command(command, now), HERE, now_us)
+        return self._gate.setpoint(now_us)
+
+    def zero(self) -> RobotCommand:
+        """Nothing, disarmed."""
+        return self._control.zero()
+
+    def hear(self, heard: HeardImu | HeardOdometry, now: float) -> BodySample | None:
+        """The sample that comes of a message; None if none does."""
+        if isinstance(heard, HeardImu):
+            return self._hear_imu(heard, now)
+        if _can_be(*heard.twist_in_b) and self._odometry_writer.admits(heard.writer, now):
+            self._twist_in_b, self._twist_at = np.array(heard.twist_in_b), now
+        else:
+            self._dropped += 1
+        return None
+
+    def _hear_imu(self, heard: HeardImu, now: float) -> BodySample | None:
+        before = self._imu_writer.writer
+        can_be = heard.measures_both and heard.stamp_us > 0
+        can_be = can_be and _can_be(*heard.omega_in_i, *heard.a_in_i)
+        if not can_be or not self._imu_writer.admits(heard.writer, now):
+            self._dropped += 1
+            return None
+        stamp = 1e-6 * heard.stamp_us
+        is_other = before not in (None, heard.writer)
+        if is_other or self._clock.is_set_anew(stamp, now):
+            self._begin()
+        dated = self._clock.dated(stamp, now)
+        if dated is None or not self._knows_its_twist(now):
+            self._dropped += 1
+            return None
+        return self._sample(heard, min(dated, now), now)
+
+    def _begin(self) -> None:
+        """With a base that has just started, for all we know."""
+        self._boot_id += 1
+        self._gate = RobotEnd(self._limits, self._boot_id, self._key)
+        self._clock = StampClock()
+
+    def _knows_its_twist(self, now: float) -> bool:
+        return not self._has_odometry or now - self._twist_at <= ODOMETRY_LASTS_S
+
+    def _sample(self, heard: HeardImu, dated: float, now: float) -> BodySample | None:
+        omega_in_b = self._R_bi @ np.array(heard.omega_in_i)
+        a_in_b = self._R_bi @ np.array(heard.a_in_i)
+        moves = self._twist_in_b if self._has_odometry else self._gate.setpoint(_us(now))
+        data = self._gate.sample(
+            _us(dated), random_u64(), triple(omega_in_b), triple(a_in_b), moves
+        )
+        sample = self._control.receive(data, now)
+        return None if sample is None else replace(sample, t_us=heard.stamp_us)
+
+
+def _us(t: float) -> int:
+    return round(1e6 * t)
+
+
+def _can_be(*values: float) -> bool:
+    """Whether they are numbers, and no larger than anything that is measured."""
+    return all(abs(value) < MOST for value in values)

@@ -1,0 +1,188 @@
+"""The topics of a base of ROS 2, by Cyclone DDS, with the qualities of service of ROS's defaults.
+
+A command is reliable and volatile, as ROS publishes by default, so that every subscription matches;
+only the newest is kept, for an older one that comes again is worse than none. What the base says is
+read as ROS's sensors are: best effort, which matches who publishes reliably, too.
+
+The robot file's `host` is where the base is looked for: 0.0.0.0 by multicast on all of the network,
+as ROS does by default, 127.* on this machine alone, else that address without multicast. Who else
+may be heard it does not say. What CYCLONEDDS_URI of the environment sets is kept beside it.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from cyclonedds.core import DDSException
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+from hardware.follower import FollowerError
+from hardware.link.address import ANYBODY, address_of
+from hardware.link.ros2.base_end import HeardImu, HeardOdometry
+from hardware.link.ros2.messages import (
+    UNREADABLE,
+    RosHeader,
+    RosImu,
+    RosOdometry,
+    RosTime,
+    RosTwist,
+    RosTwistStamped,
+    RosVector3,
+)
+from hardware.robot_file import Ros2Parameters
+from pipeline.frames import Array, Triple
+
+MOST_MESSAGES = 128
+"""Of a topic, taken at once; what came before is overwritten."""
+NS_PER_S, NS_PER_US = 1_000_000_000, 1_000
+MISSING = -1.0  # what begins the covariance of something that is not measured
+AS_ROS = Policy.DataRepresentation(use_cdrv0_representation=True)
+TELLS = Qos(
+    Policy.Reliability.Reliable(0), Policy.Durability.Volatile, Policy.History.KeepLast(1), AS_ROS
+)
+HEARS = Qos(
+    Policy.Reliability.BestEffort,
+    Policy.Durability.Volatile,
+    Policy.History.KeepLast(MOST_MESSAGES),
+    AS_ROS,
+)
+ALONE = (
+    "<General><AllowMulticast>false</AllowMulticast>{interface}</General><Discovery>"
+    "<SPDPInterval>1s</SPDPInterval><InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
+    '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="{host}"/></Peers></Discovery>'
+)
+"""Each second, for ever: the base may start after us."""
+LOOPBACK = '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>'
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What Cyclone DDS gives back once nobody holds it any more, in this order."""
+
+    writer: DataWriter[Any]
+    imu: DataReader[Any]
+    odometry: DataReader[Any] | None
+    participant: DomainParticipant
+    domain: Domain
+
+
+class RosPorts:
+    """A participant of a domain: one topic out, one or two in."""
+
+    def __init__(
+        self, topics: Ros2Parameters, host: str, wall_ns: Callable[[], int] = time.time_ns
+    ) -> None:
+        """Listens, says nothing yet. `wall_ns` is the time in ROS's headers.
+
+        Raises:
+            FollowerError: no such address, or DDS can't be had on this machine's network.
+        """
+        self._frame, self._wall_ns = topics.frame, wall_ns
+        settings = _settings(address_of(host, "found by multicast"))
+        try:
+            self._opened: Opened | None = _open(topics, settings)
+        except (DDSException, UnicodeEncodeError) as error:
+            what = f"DDS domain {topics.domain} (link.ros2.domain), robot at {host}: {error}"
+            allowed = "a network that is up, CYCLONEDDS_URI unset or right, one link to a domain"
+            raise FollowerError(what, allowed) from error
+
+    def heard(self) -> Iterator[HeardImu | HeardOdometry | None]:
+        """What has arrived, odometry first; None for each that can't be read."""
+        assert self._opened is not None
+        if self._opened.odometry is not None:
+            for taken in _taken(self._opened.odometry):
+                yield None if taken is None else _odometry(*taken)
+        for taken in _taken(self._opened.imu):
+            yield None if taken is None else _imu(*taken)
+
+    def tell(self, twist_in_b: Array) -> bool:
+        """Publish a twist (6,) [m/s, rad/s]; False: nobody listens, or the way is down."""
+        assert self._opened is not None
+        writer, values = self._opened.writer, twist_in_b.tolist()
+        twist = RosTwist(RosVector3(*values[:3]), RosVector3(*values[3:]))
+        try:
+            writer.write(self._headed(twist) if self._frame else twist)
+        except DDSException:  # the way is down or full
+            return False
+        return bool(writer.get_publication_matched_status().current_count)
+
+    def close(self) -> None:
+        """Leave the domain; may be called twice."""
+        self._opened = None
+
+    def _headed(self, twist: RosTwist) -> RosTwistStamped:
+        sec, nanosec = divmod(self._wall_ns(), NS_PER_S)
+        return RosTwistStamped(RosHeader(RosTime(sec, nanosec), self._frame), twist)
+
+
+def _settings(address: str) -> str:
+    """Of Cyclone DDS, for a base at that address: what the environment says, and ours."""
+    ours = ""
+    if address != ANYBODY:
+        interface = LOOPBACK if ipaddress.ip_address(address).is_loopback else ""
+        alone = ALONE.format(interface=interface, host=address)
+        ours = f"<CycloneDDS><Domain>{alone}</Domain></CycloneDDS>"
+    return ",".join(filter(None, (os.environ.get("CYCLONEDDS_URI", ""), ours)))
+
+
+def _open(topics: Ros2Parameters, settings: str) -> Opened:
+    domain = Domain(topics.domain, settings)
+    participant = DomainParticipant(topics.domain)
+
+    def topic(name: str, message: type[Any]) -> Topic[Any]:
+        return Topic(participant, f"rt{name}", message)
+
+    told = topic(topics.command, RosTwistStamped if topics.frame else RosTwist)
+    imu = DataReader(participant, topic(topics.imu, RosImu), qos=HEARS)
+    odometry = None
+    if topics.odometry:
+        odometry = DataReader(participant, topic(topics.odometry, RosOdometry), qos=HEARS)
+    return Opened(DataWriter(participant, told, qos=TELLS), imu, odometry, participant, domain)
+
+
+def _taken(reader: DataReader[Any]) -> Iterator[tuple[int, Any] | None]:
+    """Writers and messages, one by one: one that can't be read takes no other with it."""
+    for _ in range(MOST_MESSAGES):
+        try:
+            taken = reader.take(1)
+        except UNREADABLE:
+            yield None
+            continue
+        except DDSException:  # the way is down
+            return
+        if not taken:
+            return
+        info = taken[0].sample_info
+        if info.valid_data:  # else: somebody has left
+            yield info.publication_handle, taken[0]
+
+
+def _imu(writer: int, message: RosImu) -> HeardImu:
+    stamp = message.header.stamp
+    gyro, acc = message.angular_velocity_covariance, message.linear_acceleration_covariance
+    return HeardImu(
+        writer,
+        (stamp.sec * NS_PER_S + stamp.nanosec) // NS_PER_US,
+        _vector(message.angular_velocity),
+        _vector(message.linear_acceleration),
+        measures_both=MISSING not in (gyro[0], acc[0]),
+    )
+
+
+def _odometry(writer: int, message: RosOdometry) -> HeardOdometry:
+    twist = message.twist.twist
+    values = (*_vector(twist.linear), *_vector(twist.angular))
+    return HeardOdometry(writer, values)
+
+
+def _vector(vector: RosVector3) -> Triple:
+    return vector.x, vector.y, vector.z

@@ -1,0 +1,105 @@
+"""A base that ROS 2 drives: `[link] kind = "ros2"`, registered as other packages register theirs.
+
+Each command goes out as a twist, with control's own 200 Hz: zero, too, for most bases stop by
+themselves when they hear nothing, but some never do. So the link says zero when it is given back,
+and a base is armed only if its robot file says who stops it when not even that is heard.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from hardware.follower import BodySample, FollowerError, RobotCommand
+from hardware.link.registry import LinkKind
+from hardware.link.ros2.base_end import BaseEnd
+from hardware.robot_file import RobotFile
+
+if TYPE_CHECKING:
+    from hardware.link.ros2.ports import RosPorts
+
+STOP_REPEATS = 5
+"""As by our own link; a reliable subscription asks again for the last one."""
+MISSING = "`pip install 'lightleash[ros2]'`, where Cyclone DDS has a wheel: docs/ros2.md"
+
+
+class Ros2Follower:
+    """A base on the topics of ROS 2."""
+
+    thrusters = 0
+
+    def __init__(
+        self, ports: RosPorts, end: BaseEnd, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Ready; says nothing yet."""
+        self._ports, self._end, self._clock = ports, end, clock
+        self._closed = False
+        self.lost = 0
+        """Commands known to have gone nowhere: nobody listens, or the way is down."""
+
+    @property
+    def epoch(self) -> int:
+        """Under which commands are given; a new one after the gate has gone to zero by itself."""
+        return self._end.epoch
+
+    @property
+    def dropped(self) -> int:
+        """Messages that were not the base's, unreadable, repeated, overtaken or not to be."""
+        return self._end.dropped
+
+    def receive(self) -> list[BodySample]:
+        """Return what has arrived. See `Follower`."""
+        self._check_open()
+        samples: list[BodySample] = []
+        for heard in self._ports.heard():
+            if heard is None:
+                self._end.drop()
+            elif (sample := self._end.hear(heard, self._clock())) is not None:
+                samples.append(sample)
+        return samples
+
+    def send(self, command: RobotCommand) -> None:
+        """See `Follower`."""
+        self._check_open()
+        self._send(command)
+
+    def stop(self) -> None:
+        """Zero, several times."""
+        for _ in range(0 if self._closed else STOP_REPEATS):
+            self._send(self._end.zero())
+
+    def close(self) -> None:
+        """Close. See `Follower`.
+
+        Not without a word: a base carries itself, and nobody falls by zero.
+        """
+        self.stop()
+        self._closed = True
+        self._ports.close()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise FollowerError("the link is closed", "an open one")
+
+    def _send(self, command: RobotCommand) -> None:
+        self.lost += not self._ports.tell(self._end.command(command, self._clock()))
+
+
+def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> Ros2Follower:
+    """Link to the robot of a robot file. A `Connect` of `registry.py`.
+
+    Raises:
+        FollowerError: no Cyclone DDS, no such host, no network, or another link in its domain.
+    """
+    try:
+        from hardware.link.ros2.ports import RosPorts
+    except ImportError as error:
+        raise FollowerError(f"link.kind = 'ros2': {error}", MISSING) from error
+    topics = robot_file.link.ros2
+    if topics is None:
+        raise FollowerError("link.kind = 'ros2'", "[link.ros2] in the robot file")
+    return Ros2Follower(RosPorts(topics, robot_file.link.host), BaseEnd(robot_file, topics, epoch))
+
+
+KIND = LinkKind(connect, stops_in_silence=False, keyed=False, takes=("twist",))

@@ -1,0 +1,94 @@
+"""A simulated base behind real DDS, both in this process and in virtual time, and who leads it."""
+
+from __future__ import annotations
+
+import itertools
+import os
+
+from hardware.link.ros2.base_end import BaseEnd
+from hardware.link.ros2.ports import RosPorts
+from hardware.link.ros2.ros2_follower import Ros2Follower
+from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
+from tests.hardware.link.ros2.lab_base import LabBase, twister
+
+LOCALHOST = "127.0.0.1"
+STAMP_AHEAD_S = 1_700_000_000.0
+"""Of the base's clock before ours."""
+TWISTER = load_robot("twister", takes=COMMANDS)
+BELOW = f"/test_{os.getpid()}"
+"""Tests of other processes may be in the same domain, but not under the same names."""
+_domains = itertools.cycle(range(20, 100))
+"""Those that Linux keeps ports for."""
+
+
+def new_domain() -> int:
+    """One that this process has long left."""
+    return next(_domains)
+
+
+def ros2_robot(**changes):
+    """The simulated robot that takes a twist, behind ROS 2, in a domain of its own."""
+    table = robot_table(robot_path("twister"))
+    section = {"domain": new_domain(), "namespace": BELOW, "imu": "imu", "odometry": "odom"}
+    section |= changes
+    section = {key: value for key, value in section.items() if value is not None}
+    link = {"kind": "ros2", "takes": "twist", "host": LOCALHOST, "ros2": section}
+    return robot_of(table | {"link": link}, "ros2.toml")
+
+
+class Ros2Rig:
+    def __init__(self, robot_file=None, seed: int = 0, **base) -> None:
+        self.robot_file = robot_file or ros2_robot()
+        self.now = 50.0
+        """On our clock, which is another than the base's [s]."""
+        self.topics = self.robot_file.link.ros2
+        self.follower = self.leader(1)
+        self.body, drive = twister(seed)
+        self.base = LabBase(self.topics.domain, self.body, drive, **{"below": BELOW} | base)
+
+    def leader(self, epoch: int) -> Ros2Follower:
+        """A control process's end; its domain is new, and ends with it."""
+        ports = RosPorts(self.topics, LOCALHOST, lambda: round(1e9 * (self.now + STAMP_AHEAD_S)))
+        end = BaseEnd(self.robot_file, self.topics, epoch)
+        return Ros2Follower(ports, end, lambda: self.now)
+
+    @property
+    def stamp(self) -> float:
+        return self.now + STAMP_AHEAD_S
+
+    def advance(self, dt: float) -> None:
+        for _ in range(round(dt / 0.005)):
+            self.now += 0.005
+            self.base.step(self.now, self.stamp)
+
+    def cut_link(self) -> None:
+        self.base.connected = False
+
+    def close(self) -> None:
+        self.follower.close()
+
+
+class Ros2Flight(Ros2Rig):
+    """The same as a follower, for a flight in virtual time."""
+
+    dark = -1
+    """None of its LEDs."""
+    thrusters = 0
+
+    @property
+    def t(self) -> float:
+        return self.now - 50.0
+
+    @property
+    def epoch(self) -> int:
+        return self.follower.epoch
+
+    @property
+    def dropped(self) -> int:
+        return self.follower.dropped
+
+    def receive(self):
+        return self.follower.receive()
+
+    def send(self, command) -> None:
+        self.follower.send(command)

@@ -1,0 +1,179 @@
+"""A base of ROS 2 by real DDS, in virtual time: the contract, and what DDS alone can go wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cyclonedds", reason="NOT TESTED: pip install 'lightleash[ros2]'")
+
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.topic import Topic
+
+from hardware.contract import TwistFollowerContract, exchange
+from hardware.follower import FollowerError, FollowerState, TwistCommand
+from hardware.link.address import ANYBODY
+from hardware.link.registry import connect
+from hardware.link.ros2.messages import RosImu
+from tests.hardware.link.ros2.lab_base import DEFAULT, Imu, imu_message, odometry_message
+from tests.hardware.link.ros2.ros2_rig import BELOW, Ros2Rig, ros2_robot
+
+FORWARD = TwistCommand(np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.5]), armed=True)
+KEY = bytes(16)
+
+
+@pytest.fixture
+def rig():
+    rig = Ros2Rig()
+    yield rig
+    rig.close()
+
+
+class TestContract(TwistFollowerContract):
+    @pytest.fixture
+    def rig(self, rig):
+        return rig
+
+
+class TestContractOfTwistStamped(TwistFollowerContract):
+    @pytest.fixture
+    def rig(self):
+        rig = Ros2Rig(ros2_robot(stamped=True), stamped=True)
+        yield rig
+        rig.close()
+
+
+def lead(rig, seconds, command=FORWARD):
+    samples = []
+    for _ in range(round(seconds / 0.005)):
+        samples += exchange(rig.follower, command)
+        rig.advance(0.005)
+    return samples
+
+
+def running(rig):
+    lead(rig, 0.7, TwistCommand.zero())
+    samples = lead(rig, 0.4)
+    assert samples[-1].state == FollowerState.RUNNING
+    rig.base.taken.clear()
+    return rig
+
+
+def test_each_command_comes_once_and_as_it_was_given(rig):
+    running(rig)
+    lead(rig, 1.0)
+    assert len(rig.base.taken) == 200
+    assert all((twist == FORWARD.twist_in_b).all() for _, _, twist in rig.base.taken)
+    assert rig.follower.lost == 0
+
+
+def test_a_header_has_the_time_at_which_it_was_said():
+    rig = Ros2Rig(ros2_robot(stamped=True), stamped=True)
+    running(rig)
+    lead(rig, 0.1)
+    for now, stamp, _ in rig.base.taken:
+        assert stamp == pytest.approx(now - 0.005 + rig.stamp - rig.now, abs=1e-6)
+    rig.close()
+
+
+def test_stopped_the_last_words_are_zeros(rig):
+    running(rig)
+    lead(rig, 0.2)
+    taken = len(rig.base.taken)
+    rig.follower.stop()
+    rig.base.listen(rig.now)
+    last = [twist for _, _, twist in rig.base.taken[taken:]]
+    assert last
+    assert not np.any(last)
+
+
+def test_commands_that_nobody_listens_to_are_counted_and_nobody_is_ready():
+    rig = Ros2Rig(below="/elsewhere")
+    samples = lead(rig, 0.5, TwistCommand.zero())
+    assert samples == []
+    assert rig.follower.lost == 100
+    rig.close()
+
+
+def test_a_base_without_odometry_and_with_an_imu_turned_is_led_the_same():
+    rig = Ros2Rig(ros2_robot(odometry=None, imu_axes=["y", "-x", "z"]), odometry=False)
+    running(rig)
+    sample = lead(rig, 0.3)[-1]
+    assert sample.twist_in_b == pytest.approx(FORWARD.twist_in_b)
+    assert sample.a_in_b[2] == pytest.approx(9.8, abs=1.0)
+    rig.close()
+
+
+def test_an_imu_that_has_no_gyroscope_is_none(rig):
+    rig.base.connected = False
+    for _ in range(20):
+        rig.advance(0.005)
+        rig.base.odometry.write(odometry_message(rig.stamp, 6 * [0.0]))
+        rig.base.imu.write(imu_message(rig.stamp, 3 * [0.0], [0.0, 0.0, 9.8], gyro_missing=True))
+        assert exchange(rig.follower, TwistCommand.zero()) == []
+    assert rig.follower.dropped >= 19
+
+
+def stranger(rig):
+    """Somebody else's publisher of the same topic, who may write before, between, after."""
+    participant = DomainParticipant(rig.topics.domain)
+    return DataWriter(participant, Topic(participant, f"rt{BELOW}/imu", Imu), qos=DEFAULT)
+
+
+def test_who_else_publishes_the_topic_is_not_believed(rig):
+    other = stranger(rig)
+    running(rig)
+    dropped, samples = rig.follower.dropped, []
+    for _ in range(100):
+        other.write(imu_message(rig.stamp + 0.001, [3.0, 0.0, 0.0], [0.0, 0.0, 9.8]))
+        samples += lead(rig, 0.005)
+    assert max(abs(sample.omega_in_b[0]) for sample in samples) < 2.0
+    assert samples[-1].state == FollowerState.RUNNING
+    assert rig.follower.dropped == dropped + 100
+
+
+def test_what_can_not_be_read_takes_nothing_else_with_it(rig, monkeypatch):
+    running(rig)
+    read = RosImu.deserialize
+    damaged = [0]
+
+    def reads(data, *arguments, **words):
+        damaged[0] += 1
+        return read(data[:40] if damaged[0] % 2 else data, *arguments, **words)
+
+    monkeypatch.setattr(RosImu, "deserialize", reads)
+    dropped = rig.follower.dropped
+    samples = lead(rig, 0.5)
+    assert rig.follower.dropped == dropped + 50
+    assert len(samples) == 50
+    assert samples[-1].state == FollowerState.RUNNING
+
+
+def test_two_links_in_one_domain_of_a_process_are_refused_by_name(rig):
+    with pytest.raises(FollowerError, match=r"link\.ros2\.domain"):
+        connect(rig.robot_file, KEY, 2)
+
+
+def test_after_it_has_gone_the_domain_is_free_again():
+    robot_file = ros2_robot()
+    for epoch in range(1, 4):
+        connect(robot_file, KEY, epoch).close()
+
+
+def test_a_host_that_nobody_knows_is_named():
+    link = replace(ros2_robot().link, host="no-such-host.invalid")
+    with pytest.raises(FollowerError, match=r"no-such-host\.invalid.*found by multicast"):
+        connect(replace(ros2_robot(), link=link), KEY, 1)
+
+
+def test_settings_that_cyclone_dds_does_not_read_are_named(monkeypatch):
+    monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>")
+    with pytest.raises(FollowerError, match="CYCLONEDDS_URI"):
+        connect(ros2_robot(), KEY, 1)
+
+
+def test_it_may_be_looked_for_by_multicast():
+    connect(ros2_robot().reached(ANYBODY, 7400), KEY, 1).close()
