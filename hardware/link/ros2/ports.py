@@ -4,9 +4,10 @@ A command is reliable and volatile, as ROS publishes by default, so that every s
 only the newest is kept, for an older one that comes again is worse than none. What the base says is
 read as ROS's sensors are: best effort, which matches who publishes reliably, too.
 
-The robot file's `host` is where the base is looked for: 0.0.0.0 by multicast on all of the network,
-as ROS does by default, 127.* on this machine alone, else that address without multicast. Who else
-may be heard it does not say. What CYCLONEDDS_URI of the environment sets is kept beside it.
+The robot file's `host` is where the base is looked for: 0.0.0.0 by multicast, as ROS does by
+default, 127.* on this machine's loopback alone, any other address there, too, where no multicast
+may come. Who else may be heard it does not say. What CYCLONEDDS_URI of the environment sets is kept
+beside it.
 """
 
 from __future__ import annotations
@@ -56,12 +57,12 @@ HEARS = Qos(
     AS_ROS,
 )
 ALONE = (
-    "<General><AllowMulticast>false</AllowMulticast>{interface}</General><Discovery>"
+    "<General><AllowMulticast>spdp</AllowMulticast>{interface}</General><Discovery>"
     "<SPDPInterval>1s</SPDPInterval><InitialLocatorPruneDelay>inf</InitialLocatorPruneDelay>"
     '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="{host}"/></Peers></Discovery>'
 )
 """Each second, for ever: the base may start after us."""
-LOOPBACK = '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>'
+LOOPBACK = '<Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,8 +32,8 @@ FORWARD = TwistCommand(np.array([0.25, *5 * (0.0,)]), armed=True)
 class Base:
     """The process, which starts after the link to it."""
 
-    def __init__(self, domain):
-        words = ["--domain", str(domain), "--below", BELOW]
+    def __init__(self, domain, *options):
+        words = ["--domain", str(domain), "--below", BELOW, *options]
         module = "tests.hardware.link.ros2.lab_base"
         self.process = subprocess.Popen(
             [sys.executable, "-m", module, *words],
@@ -80,11 +80,13 @@ def test_what_is_told_comes_in_order_once_and_to_the_last_word(monkeypatch, per_
     assert forward[-1] == 0.3
 
 
-def test_a_base_that_starts_later_is_found_led_and_told_zero_by_the_last_word(monkeypatch):
+@pytest.mark.parametrize("options", [(), ("--multicast",)])
+def test_a_base_that_starts_later_is_found_led_and_told_zero_by_the_last_word(monkeypatch, options):
     monkeypatch.setenv("CYCLONEDDS_URI", LOSSY.format(20))
     robot_file = ros2_robot()
     follower = connect(robot_file, bytes(16), 1)
-    base, states, forward = Base(robot_file.link.ros2.domain), [FollowerState.REFUSING], 0
+    base = Base(robot_file.link.ros2.domain, *options)
+    states, forward = [FollowerState.REFUSING], 0
     for _ in patiently():
         states += [sample.state for sample in follower.receive()]
         goes = states[-1] in (FollowerState.IDLE, FollowerState.RUNNING)
