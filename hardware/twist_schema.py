@@ -75,7 +75,7 @@ class Ros2Section(Section):
     ]
     """Along which axis of its motion sensors each of the body's lies."""
     odometry: RosName | None = None
-    """nav_msgs/Odometry; without it the robot's own twist is taken to be what it was told."""
+    """nav_msgs/Odometry; without it the robot is taken to move as told, after its delay and lag."""
 
 
 class TwistLinkSection(Section):

@@ -21,6 +21,7 @@ from __future__ import annotations
 import secrets
 from collections import deque
 from dataclasses import dataclass, replace
+from math import exp
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from hardware.link.link_key import new_key
 from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.robot_file import RobotFile, Ros2Parameters
 from pipeline.frames import Array, Triple, triple
+from pipeline.robot import TwistDrive
 
 KEEPS_WRITER_S = 1.0
 """So long nobody else is heard in place of one who has fallen silent."""
@@ -111,11 +113,53 @@ class StampClock:
         return stamp + min(self._excess)
 
 
+class PresumedTwist:
+    """How a base moves that doesn't say so: as told, after its delay and lag. Times are [s].
+
+    Zero at once (STOP) takes it longer, by its own limits; then nobody leads it by this.
+    """
+
+    def __init__(self, drive: TwistDrive) -> None:
+        """At rest."""
+        self._lag_s, self._delay_s = drive.lag_s, drive.delay_s
+        self._on_their_way: deque[tuple[float, Array]] = deque()
+        self._told = self._halfway = self._moves = np.zeros(6)
+        self._last = 0.0
+
+    def tell(self, twist_in_b: Array, now: float) -> None:
+        """It is told a twist (6,)."""
+        self._on_their_way.append((now + self._delay_s, twist_in_b))
+        self._move(now)
+
+    def at(self, now: float) -> Array:
+        """Its twist (6,) now: two equal lags behind each other, as `TwistPlant` has."""
+        self._move(now)
+        return self._moves
+
+    def _move(self, now: float) -> None:
+        while self._on_their_way and self._on_their_way[0][0] <= now:
+            begins, told = self._on_their_way.popleft()
+            self._pass_until(begins)
+            self._told = told
+        self._pass_until(now)
+
+    def _pass_until(self, t: float) -> None:
+        """The exact motion for a twist that stays."""
+        lags = max(0.0, t - self._last) / (0.5 * self._lag_s)
+        halfway, moves = self._halfway - self._told, self._moves - self._told
+        self._moves = self._told + exp(-lags) * (moves + lags * halfway)
+        self._halfway = self._told + exp(-lags) * halfway
+        self._last = max(self._last, t)
+
+
 class BaseEnd:
     """Turns commands into twists, and messages of a base into samples. Times are [s], monotonic."""
 
     def __init__(self, robot_file: RobotFile, topics: Ros2Parameters, epoch: int) -> None:
         """Nothing said, nothing heard."""
+        drive = robot_file.robot.twist
+        assert drive is not None  # it takes a twist
+        self._presumed = PresumedTwist(drive)
         self._limits, self._key = LinkLimits.of(robot_file), new_key()
         self._control = ControlEnd.of(robot_file, self._key, epoch)
         self._R_bi, self._has_odometry = topics.R_bi, bool(topics.odometry)
@@ -147,7 +191,9 @@ class BaseEnd:
         """
         now_us = _us(now)
         self._gate.receive(self._control.command(command, now), HERE, now_us)
-        return self._gate.setpoint(now_us)
+        told = self._gate.setpoint(now_us)
+        self._presumed.tell(told, now)
+        return told
 
     def zero(self) -> RobotCommand:
         """Nothing, disarmed."""
@@ -192,7 +238,7 @@ class BaseEnd:
     def _sample(self, heard: HeardImu, dated: float, now: float) -> BodySample | None:
         omega_in_b = self._R_bi @ np.array(heard.omega_in_i)
         a_in_b = self._R_bi @ np.array(heard.a_in_i)
-        moves = self._twist_in_b if self._has_odometry else self._gate.setpoint(_us(now))
+        moves = self._twist_in_b if self._has_odometry else self._presumed.at(now)
         data = self._gate.sample(
             _us(dated), random_u64(), triple(omega_in_b), triple(a_in_b), moves
         )

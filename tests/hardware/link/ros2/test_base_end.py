@@ -17,6 +17,7 @@ from hardware.link.ros2.base_end import (
     HeardOdometry,
 )
 from hardware.robot_file import COMMANDS, Ros2Parameters, load_robot
+from hardware.sim.plant.twist_plant import TwistPlant
 from hardware.twist_schema import TOLD_ZERO_S
 
 TWISTER = load_robot("twister", takes=COMMANDS)
@@ -119,11 +120,18 @@ def test_one_whose_odometry_falls_silent_soon_is_none_that_is_heard(led):
     assert not np.any(led.told[round(silent_s / PERIOD_S) :])
 
 
-def test_without_odometry_it_is_taken_to_move_as_it_was_told():
+def test_without_odometry_it_is_taken_to_move_as_the_simulated_one_does():
     led = Led(replace(TOPICS, odometry=""))
     led.has_odometry = False
-    led.ticks(0.7).ticks(0.3, MOVING)
-    assert led.samples[-1].twist_in_b == pytest.approx(MOVING)
+    led.ticks(0.7)
+    plant = TwistPlant(DRIVE, TWISTER.plant.imu, np.random.default_rng(0))
+    for twist in (MOVING, 0.1 * MOVING, -MOVING):
+        led.ticks(0.3, twist)
+        for told, sample in zip(led.told, led.samples, strict=True):
+            within = DRIVE.acceleration * PERIOD_S  # a tick, at its hardest
+            assert sample.twist_in_b == pytest.approx(plant.twist_in_b, abs=within)
+            plant.step(told, PERIOD_S)
+        assert sample.twist_in_b == pytest.approx(twist, abs=1e-3)
 
 
 def test_samples_that_are_late_carry_no_command(led):
