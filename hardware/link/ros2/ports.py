@@ -1,8 +1,8 @@
 """The topics of a base of ROS 2, by Cyclone DDS, with the qualities of service of ROS's defaults.
 
 A command is reliable and volatile, as ROS publishes by default, so that every subscription matches;
-only the newest is kept, for an older one that comes again is worse than none. What the base says is
-read as ROS's sensors are: best effort, which matches who publishes reliably, too.
+but only the newest is kept, and not for long, for one that comes again later is worse than none.
+What the base says is read as ROS's sensors are: best effort, which matches who publishes reliably.
 
 The robot file's `host` is where the base is looked for: 0.0.0.0 by multicast, as ROS does by
 default, 127.* on this machine's loopback alone, any other address there, too, where no multicast
@@ -47,8 +47,15 @@ MOST_MESSAGES = 128
 NS_PER_S, NS_PER_US = 1_000_000_000, 1_000
 MISSING = -1.0  # what begins the covariance of something that is not measured
 AS_ROS = Policy.DataRepresentation(use_cdrv0_representation=True)
+LASTS_NS = 40_000_000
+"""A command that was lost is not sent again later: if control then hangs, it would be obeyed anew.
+As old as one that our own link's robot takes; readers count from its arrival, not by clocks."""
 TELLS = Qos(
-    Policy.Reliability.Reliable(0), Policy.Durability.Volatile, Policy.History.KeepLast(1), AS_ROS
+    Policy.Reliability.Reliable(0),
+    Policy.Durability.Volatile,
+    Policy.History.KeepLast(1),
+    Policy.Lifespan(LASTS_NS),
+    AS_ROS,
 )
 HEARS = Qos(
     Policy.Reliability.BestEffort,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hardware.link.ros2.ports import RosPorts
 
 STOP_REPEATS = 5
-"""As by our own link; a reliable subscription asks again for the last one."""
+"""As by our own link."""
 MISSING = "`pip install 'lightleash[ros2]'`, where Cyclone DDS has a wheel: docs/ros2.md"
 
 

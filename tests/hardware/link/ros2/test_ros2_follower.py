@@ -11,15 +11,18 @@ pytest.importorskip("cyclonedds", reason="NOT TESTED: pip install 'lightleash[ro
 
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy
 from cyclonedds.topic import Topic
 
 from hardware.contract import TwistFollowerContract, exchange
 from hardware.follower import FollowerError, FollowerState, TwistCommand
 from hardware.link.address import ANYBODY
 from hardware.link.registry import connect
+from hardware.link.robot_end import LinkLimits
 from hardware.link.ros2.messages import RosImu
+from hardware.link.ros2.ports import TELLS
 from tests.hardware.link.ros2.lab_base import DEFAULT, Imu, imu_message, odometry_message
-from tests.hardware.link.ros2.ros2_rig import BELOW, Ros2Rig, ros2_robot
+from tests.hardware.link.ros2.ros2_rig import BELOW, TWISTER, Ros2Rig, ros2_robot
 
 FORWARD = TwistCommand(np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.5]), armed=True)
 KEY = bytes(16)
@@ -150,6 +153,11 @@ def test_what_can_not_be_read_takes_nothing_else_with_it(rig, monkeypatch):
     assert rig.follower.dropped == dropped + 50
     assert len(samples) == 50
     assert samples[-1].state == FollowerState.RUNNING
+
+
+def test_a_command_that_was_lost_comes_no_later_than_one_of_our_own_link_is_taken():
+    assert TELLS[Policy.Lifespan].lifespan == 1000 * LinkLimits.of(TWISTER).max_age_us
+    assert TELLS[Policy.History.KeepLast].depth == 1
 
 
 def test_two_links_in_one_domain_of_a_process_are_refused_by_name(rig):
