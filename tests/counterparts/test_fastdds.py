@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-pytest.importorskip("cyclonedds", reason="NOT TESTED: pip install 'lightleash[ros2]'")
+pytest.importorskip("cyclonedds", reason="NO CYCLONE DDS: pip install 'lightleash[ros2]'")
 
 from hardware.follower import FollowerState, TwistCommand
 from hardware.link.address import ANYBODY

@@ -31,7 +31,7 @@ def test_its_robot_file_can_be_flown_and_says_who_stops_it(capsys, tmp_path):
 def test_the_simulated_base_is_led_in_a_circle_and_stopped(tmp_path):
     """As it comes, but for names of its own and this machine alone: others may try it, too."""
     lab_base = pytest.importorskip(
-        "tests.hardware.link.ros2.lab_base", reason="NOT TESTED: pip install 'lightleash[ros2]'"
+        "tests.hardware.link.ros2.lab_base", reason="NO CYCLONE DDS: pip install 'lightleash[ros2]'"
     )
     folder = shutil.copytree(FOLDER, tmp_path / "example")
     text = (folder / "base.toml").read_text()

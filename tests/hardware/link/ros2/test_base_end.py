@@ -236,6 +236,9 @@ def test_a_clock_that_is_set_begins_anew(led, by):
 
 def test_a_pause_of_the_network_sets_no_clock(led):
     boot_id = led.samples[-1].boot_id
+    led.now += 3.0  # all is lost
+    led.ticks(0.1)
+    assert led.samples[-1].boot_id == boot_id
     led.now += 3.0
     for k in range(600):  # all at once
         led.late = 3.0 - PERIOD_S * k

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-pytest.importorskip("cyclonedds", reason="NOT TESTED: pip install 'lightleash[ros2]'")
+pytest.importorskip("cyclonedds", reason="NO CYCLONE DDS: pip install 'lightleash[ros2]'")
 
 from hardware.robot_file import COMMANDS, load_robot
 from pipeline.config import TeleopConfig

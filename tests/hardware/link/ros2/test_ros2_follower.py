@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-pytest.importorskip("cyclonedds", reason="NOT TESTED: pip install 'lightleash[ros2]'")
+pytest.importorskip("cyclonedds", reason="NO CYCLONE DDS: pip install 'lightleash[ros2]'")
 
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -166,9 +166,10 @@ def test_two_links_in_one_domain_of_a_process_are_refused_by_name(rig):
 
 
 def test_after_it_has_gone_the_domain_is_free_again():
-    robot_file = ros2_robot()
+    robot_file, kept = ros2_robot(), []
     for epoch in range(1, 4):
-        connect(robot_file, KEY, epoch).close()
+        kept.append(connect(robot_file, KEY, epoch))
+        kept[-1].close()
 
 
 def test_a_host_that_nobody_knows_is_named():
