@@ -227,8 +227,9 @@ class VirtualTimeSimulation:
         """What the control process does in a tick, and what its status leads to."""
         inbox, self._inbox = list(filter(is_believable, self.tamper(self._inbox))), []
         samples = self._link.receive(self.t)
+        link = self._link
         command, output = self.controller.tick(
-            self.t, inbox, samples, self._link.reason, self._link.gap, self._link.left_s
+            self.t, inbox, samples, link.reason, link.gap, link.left_s, link.condition
         )
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._frame_pipeline.front_end.add_prediction(self.controller.expected(output))
