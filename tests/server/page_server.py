@@ -2,6 +2,7 @@
 
 import json
 
+from msgspec import structs
 from websockets.asyncio.server import serve
 
 from server.common.access import Access
@@ -15,7 +16,7 @@ JPEG = b"\xff\xd8" + bytes(30)
 
 
 def status(mode):
-    fields = dict.fromkeys(Status.__struct_fields__)
+    fields = dict.fromkeys(field.name for field in structs.fields(Status) if field.required)
     numbers = dict.fromkeys(("leds", "phones", "supervisors", "time_ms", "thrust_limit_n"), 0)
     texts = dict.fromkeys(
         ("robot", "operator", "video_path", "recording", "realtime", "reason"), ""
