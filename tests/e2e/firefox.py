@@ -11,10 +11,11 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from websockets.sync.client import ClientConnection, connect
 
+Pointer = Literal["touch", "mouse"]
 START_S = 60.0
 ANSWER_S = 60.0
 PREFS = {
@@ -56,15 +57,18 @@ class FirefoxError(Exception):
     """What Firefox answers when it can't do as it is told."""
 
 
-class Firefox:
-    """One tab."""
+class Session:
+    """With the whole browser."""
 
     def __init__(self, socket: ClientConnection) -> None:
-        """Opens a session in it; certificates of our own authority are taken."""
+        """Opens it; certificates of our own authority are taken."""
         self._socket, self._count = socket, 0
         self.command("session.new", capabilities={"alwaysMatch": {"acceptInsecureCerts": True}})
-        tree = self.command("browsingContext.getTree")
-        self._tab = tree["contexts"][0]["context"]
+
+    def tabs(self) -> list[str]:
+        """Their ids, in the order they were opened."""
+        tree = self.command("browsingContext.getTree", maxDepth=0)
+        return [str(one["context"]) for one in tree["contexts"]]
 
     def command(self, method: str, **params: Any) -> dict[str, Any]:
         """Do something, and wait until it is done.
@@ -82,6 +86,26 @@ class Firefox:
                 raise FirefoxError(f"{method}: {answer['error']}: {answer['message']}")
             result: dict[str, Any] = answer["result"]
             return result
+
+
+class Firefox:
+    """One tab."""
+
+    def __init__(self, session: Session, tab: str) -> None:
+        """`tab` is its id."""
+        self.session, self._tab = session, tab
+
+    def command(self, method: str, **params: Any) -> dict[str, Any]:
+        """Do something in the browser, and wait until it is done; see `Session`."""
+        return self.session.command(method, **params)
+
+    def to_front(self) -> None:
+        """Show it, and hide the others."""
+        self.command("browsingContext.activate", context=self._tab)
+
+    def close(self) -> None:
+        """The tab, not the browser."""
+        self.command("browsingContext.close", context=self._tab)
 
     def before_each_page(self, script: str) -> None:
         """Run a script before those of every page."""
@@ -113,15 +137,15 @@ class Firefox:
             raise FirefoxError(answer["exceptionDetails"]["text"])
         return json.loads(answer["result"]["value"])
 
-    def touch(self, *actions: dict[str, object]) -> None:
-        """What a finger does."""
-        finger = {"type": "pointer", "id": "finger", "parameters": {"pointerType": "touch"}}
+    def act(self, pointer: Pointer, *actions: dict[str, object]) -> None:
+        """What a finger or a mouse does."""
+        source = {"type": "pointer", "id": pointer, "parameters": {"pointerType": pointer}}
         self.command(
-            "input.performActions", context=self._tab, actions=[{**finger, "actions": actions}]
+            "input.performActions", context=self._tab, actions=[{**source, "actions": actions}]
         )
 
-    def press(self, selector: str) -> None:
-        """Put the finger on the middle of an element that rests, and leave it there.
+    def press(self, selector: str, pointer: Pointer = "touch") -> None:
+        """Press the middle of an element that rests, and stay there.
 
         Raises:
             FirefoxError: it moves on, or something lies over it.
@@ -131,19 +155,20 @@ class Firefox:
             if time.monotonic() > end:
                 raise FirefoxError(f"{selector} does not come to rest in {REST_S:g} s")
         x, y = map(round, middle)
-        self.touch(
+        self.act(
+            pointer,
             {"type": "pointerMove", "x": x, "y": y, "duration": 0},
             {"type": "pointerDown", "button": 0},
         )
 
-    def release(self) -> None:
-        """Take it off."""
-        self.touch({"type": "pointerUp", "button": 0})
+    def release(self, pointer: Pointer = "touch") -> None:
+        """Press no more."""
+        self.act(pointer, {"type": "pointerUp", "button": 0})
 
-    def tap(self, selector: str) -> None:
-        """Touch an element shortly."""
-        self.press(selector)
-        self.release()
+    def tap(self, selector: str, pointer: Pointer = "touch") -> None:
+        """Press an element shortly."""
+        self.press(selector, pointer)
+        self.release(pointer)
 
 
 @contextlib.contextmanager
@@ -160,7 +185,8 @@ def firefox(executable: str, **prefs: object) -> Iterator[Firefox]:
     try:
         url = f"{_address(process, profile / 'firefox.log')}/session"
         with connect(url, compression=None, max_size=None, proxy=None) as socket:
-            yield Firefox(socket)
+            session = Session(socket)
+            yield Firefox(session, session.tabs()[0])
     finally:
         process.terminate()
         try:

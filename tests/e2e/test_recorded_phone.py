@@ -14,12 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page
 
 from hardware.sim.truth import TruthClient
-from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import calibrate
-from tests.e2e.firefox import Firefox, firefox
+from tests.e2e.clicked_page import ClickedPage, clicked_page
 from tests.e2e.flight_log import Flight, FlightLog, to_its_end
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import ANSWER_S, ZERO_N, mode, status, thrust, until
@@ -28,8 +26,6 @@ from tests.machine import slowness
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 RECORDING = Path(__file__).parents[1] / "data" / "chromium.mcap"
-NO_3D, NO_WEBGL = ("--disable-3d-apis",), {"webgl.disabled": True}
-"""Without a graphics card the robot's view would take a processor."""
 CONNECTED_S, ARMED_S, PRESSED_S, DONE_S = 30.0, 5.0, 3.0, 3.0
 STILL_M, MOVED_M = 0.0005, 0.003
 """How far the robot gets while nobody leads it, and how far that hand leads it at least."""
@@ -64,46 +60,28 @@ class Socket(Supervisor):
         self._log.request(what)
 
 
-class ChromiumPage(Supervisor):
-    """The page's buttons, in Chromium."""
+class ByPage(Supervisor):
+    """The page's buttons."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: ClickedPage) -> None:
         self._page = page
 
     def request(self, what: str) -> None:
-        until(lambda: self._page.is_enabled(f"#{what}"), ARMED_S, f"{what} can be clicked")
+        is_possible = f"document.querySelector('#{what}').disabled === false"
+        until(lambda: bool(self._page.evaluate(is_possible)), ARMED_S, f"{what} can be clicked")
         self._page.click(f"#{what}")
-
-
-class FirefoxPage(Supervisor):
-    """The page's buttons, in Firefox."""
-
-    def __init__(self, tab: Firefox) -> None:
-        self._tab = tab
-
-    def request(self, what: str) -> None:
-        is_possible = f"!document.querySelector('#{what}').disabled"
-        until(lambda: self._tab.evaluate(is_possible), ARMED_S, f"{what} can be clicked")
-        self._tab.tap(f"#{what}")
 
 
 @pytest.fixture(params=["socket", "chromium", "firefox"])
 def supervisor(request: pytest.FixtureRequest, server: Serving) -> Iterator[Supervisor]:
-    address = f"{server.http_url}/supervisor{server.link('supervisor')}"
-    with contextlib.ExitStack() as stack:
-        if request.param == "chromium":
-            executable = request.getfixturevalue("chromium")
-            page = stack.enter_context(browser(executable, flags=NO_3D)).new_page()
-            page.goto(address)
-            page.wait_for_selector("#stop:enabled")
-            yield ChromiumPage(page)
-        elif request.param == "firefox":
-            tab = stack.enter_context(firefox(request.getfixturevalue("firefox_path"), **NO_WEBGL))
-            tab.open(address)
-            yield FirefoxPage(tab)
-        else:
-            log = stack.enter_context(contextlib.closing(FlightLog(server)))
+    if request.param == "socket":
+        with contextlib.closing(FlightLog(server)) as log:
             yield Socket(log, server)
+        return
+    path = {"chromium": "chromium", "firefox": "firefox_path"}[request.param]
+    with clicked_page(request.param, request.getfixturevalue(path)) as page:
+        page.open(f"{server.http_url}/supervisor{server.link('supervisor')}")
+        yield ByPage(page)
 
 
 @contextlib.contextmanager
