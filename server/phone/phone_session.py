@@ -34,7 +34,7 @@ from server.phone.sensor_check import SensorCheck
 from server.phone.sight import SIGHT_S, sight
 from server.phone.vision_thread import VisionThread
 from server.protocol.calibration_messages import Calibrate, Calibration
-from server.protocol.messages import Hello
+from server.protocol.messages import VIRTUAL_DEVICE, Hello
 from server.protocol.sight_messages import Sight
 from server.protocol.video_path_messages import PathChoice
 from server.protocol.wire import WireError
@@ -241,18 +241,22 @@ class PhoneSession:
         picture, self.vision.thumbnail = self.vision.thumbnail, None
         return picture if wanted else None
 
-    def refusals(self, now: float) -> list[str]:
-        """Refusals: what this phone still lacks, in words for the person who can mend it."""
+    def refusals(self, now: float, busy: str = "") -> list[str]:
+        """Refusals: what this phone still lacks, in words for the person who can mend it.
+
+        `busy` is said in place of what a busy computer of the server may have kept from coming.
+        """
         clock = self.ingest.clock
         if not clock.ready:
             reason = clock.reason or "The phone's clock is not known yet."
-            return [f"{reason} Wait a moment."]
+            return [f"{reason} Wait a moment.", *([busy] if busy else [])]
         why: list[str] = []
         faults: list[str] = []
         if not self.ingest.visible:
             why.append("The page on the phone is hidden: bring it to the front.")
         if self.meters["phone_imu"].age(now) > STALE_S:
-            why.append("The phone's motion sensors are silent: allow them in the browser.")
+            fact, do = "The phone's motion sensors are silent", "allow them in the browser"
+            why += self._silent(self.meters["phone_imu"].age(now), fact, do, busy)
         else:
             faults = self._check.faults()
             why += faults
@@ -261,15 +265,33 @@ class PhoneSession:
         elif self.camera_problem:
             why.append(f"The camera is not calibrated: {self.camera_problem}.")
         elif self.meters["video"].age(now) > STALE_S:
-            why.append("No pictures from the phone: allow the camera in the browser.")
+            fact, do = "No pictures from the phone", "allow the camera in the browser"
+            why += self._silent(self.meters["video"].age(now), fact, do, busy)
         elif self.vision is not None and self.vision.failed:
             why.append(self.vision.failed)
         elif self.meters["pose"].age(now) > STALE_S and not faults:
-            found = self.detection.reason if self.detection is not None else ""
-            why.append(f"The robot is not seen. {found}".strip())
+            why += self._not_seen(now, busy)
         if not faults and self.vision is not None and self.vision.front_end.complaint:
             why.append(self.vision.front_end.complaint)
-        return why
+        return list(dict.fromkeys(why))
+
+    def _silent(self, age_s: float, fact: str, do: str, busy: str) -> list[str]:
+        """Why a stream is silent, and what to `do` about it if that is a person's to mend.
+
+        What ever came has its permission, and a virtual phone needs none.
+        """
+        if self.device == VIRTUAL_DEVICE:
+            return [busy or f"{fact}: wait a moment."]
+        if busy and age_s < inf:
+            return [busy]
+        return [f"{fact}: {do}.", *([busy] if busy else [])]
+
+    def _not_seen(self, now: float, busy: str) -> list[str]:
+        """Why there is no pose, though there are pictures."""
+        if busy and (self.detection is None or now - self.detection.t > STALE_S):
+            return [busy]
+        found = self.detection.reason if self.detection is not None else ""
+        return [f"The robot is not seen. {found}".strip()]
 
     def calibrate(self, request: Calibrate) -> None:
         """Begin to calibrate the camera that films now, or leave that and look again.

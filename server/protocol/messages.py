@@ -25,6 +25,8 @@ Text = Annotated[str, Meta(max_length=200)]
 AgeMs = Annotated[int, Meta(ge=0, le=3_600_000)]
 ServerMs = Annotated[int, Meta(ge=0, le=2**53)]
 Side = Annotated[int, Meta(ge=16, le=4096)]
+VIRTUAL_DEVICE = "lightleash-virtual-phone"
+"""What a virtual phone calls itself."""
 
 
 class Hello(msgspec.Struct, tag="hello", forbid_unknown_fields=True, frozen=True):

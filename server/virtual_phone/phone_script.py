@@ -11,11 +11,11 @@ from hardware.codec import Encoder
 from hardware.sim.phone import BodyHistory, VirtualPhone
 from hardware.sim.reference_trajectory import ReferenceTrajectory, missed_by
 from pipeline.config import VirtualCameraConfig
-from server.protocol.messages import Command
+from server.protocol.messages import VIRTUAL_DEVICE, Command
 from server.protocol.wire import Kind
 from server.protocol.wire_records import Codec, Motion, Picture, Pong, Record, Touch
 
-DEVICE = "lightleash-virtual-phone"
+DEVICE = VIRTUAL_DEVICE
 TOUCH_S = 1.0 / 30.0
 RELEASED_S = 0.3
 """Between a press that changed nothing and the next."""

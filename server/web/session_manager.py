@@ -23,6 +23,7 @@ from server.control.ipc_inputs import Input, ReadyInput, RequestInput
 from server.control.robot_health import HealthFields
 from server.diagnostics.blame import Blame
 from server.diagnostics.events import Events
+from server.diagnostics.load import Load
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
 from server.diagnostics.tally import Tally
@@ -95,7 +96,7 @@ class SessionManager:
         self._shown: Status | None = None
         self.last_thumbnail: Picture | None = None
         """What the phone saw, for the 3D view."""
-        self.blame = Blame()
+        self.blame, self.load = Blame(), Load()
         self.pauses = Pauses(on_stall=self.blame.stalled)
         self.unready = ""
         """What the server itself has against arming."""
@@ -104,14 +105,15 @@ class SessionManager:
         """Serve until cancelled."""
         loop = asyncio.get_running_loop()
         loop.add_reader(self._control.fileno(), self._receive_status)
-        watching = asyncio.create_task(self.pauses.watch())
+        watching = [asyncio.create_task(one.watch()) for one in (self.pauses, self.load)]
         try:
             while True:
                 await asyncio.sleep(TICK_S)
                 self._tick()
                 await self.handover.expire()
         finally:
-            watching.cancel()
+            for task in watching:
+                task.cancel()
             self.pauses.close()
             loop.remove_reader(self._control.fileno())
             if self.phone is not None:
@@ -316,7 +318,7 @@ class SessionManager:
             return [self.unready]
         if self.phone is None:
             return ["No phone is connected: scan the code, or start the virtual phone."]
-        lacks = self.phone.refusals(now())
+        lacks = self.phone.refusals(now(), self.load.words)
         if lacks and self.screen is not None and self.screen.why:
             lacks.append(self.screen.why)
         return lacks

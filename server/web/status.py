@@ -13,13 +13,15 @@ from pipeline.signals import Mode
 from server.common.clock import now
 from server.control.ipc import ControlStatus
 from server.control.robot_health import HealthFields
-from server.diagnostics.blame import Blame, warnings
+from server.diagnostics.blame import Blame, refusals, warnings
 from server.diagnostics.camera_health import health as camera_health
+from server.diagnostics.load import Load
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
 from server.phone.phone_session import PhoneSession
 from server.protocol.lead_messages import LeadingStatus
 from server.protocol.messages import (
+    VIRTUAL_DEVICE,
     Estimate,
     GapCount,
     LoggedEvent,
@@ -46,6 +48,7 @@ class StatusSource(Protocol):
     recordings: Recordings
     pauses: Pauses
     blame: Blame
+    load: Load
     people: People
 
     @property
@@ -62,7 +65,11 @@ def build(manager: StatusSource) -> Status:
     t, control, phone = now(), manager.status, manager.phone
     mode, silence = mode_of(manager, t)
     gaps = manager.blame.gaps(control, t) if control is not None else {}
-    refusals = [f"{silence}."] if control is None or silence else control.refusals
+    lacks = (
+        [f"{silence}."]
+        if control is None or silence
+        else refusals(control.refusals, manager.load.words)
+    )
     detection = phone.detection if phone is not None else None
     found = detection is not None and detection.pose is not None
     health = _health(control, silence)
@@ -72,8 +79,8 @@ def build(manager: StatusSource) -> Status:
         reason=f"{silence}; the robot stops by its own watchdog."
         if control is None or silence
         else _reason(manager, control, t),
-        ready=not refusals,
-        refusals=list(refusals),
+        ready=not lacks,
+        refusals=lacks,
         robot=manager.robot.name,
         operator=phone.device if phone is not None else "",
         video_path=phone.video_path if phone is not None else "",
@@ -106,7 +113,10 @@ def build(manager: StatusSource) -> Status:
         until_ramp_ms=_rounded(control.until_ramp_s, 0, 1e3) if control and not silence else None,
         resumes=control is not None and control.resumes,
         gaps={side: GapCount(one.count, 1e3 * one.longest_s) for side, one in gaps.items()},
-        warnings=[*warnings(gaps), *([UNSAVED] if manager.people.doors.is_unsaved else [])],
+        warnings=[
+            *warnings(gaps, manager.load.advice),
+            *([UNSAVED] if manager.people.doors.is_unsaved else []),
+        ],
         sensors_doubted=control.estimate.doubts
         if control is not None and control.estimate is not None
         else [],
@@ -129,8 +139,13 @@ def build(manager: StatusSource) -> Status:
 
 def _reason(manager: StatusSource, control: ControlStatus, t: float) -> str:
     """Control's reason; why the camera sees no robot is what the phone's pictures tell."""
-    reason, phone = manager.blame.reason(control, t), manager.phone
-    if reason == ROBOT_LOST and phone is not None and phone.detection is not None:
+    phone = manager.phone
+    if phone is None:
+        return manager.blame.reason(control, t, manager.load.advice)
+    picture_age_s = phone.meters["video"].age(t)
+    starved = phone.device == VIRTUAL_DEVICE and manager.load.is_busy
+    reason = manager.blame.reason(control, t, manager.load.advice, picture_age_s, starved)
+    if reason == ROBOT_LOST and phone.detection is not None:
         return f"{reason} {phone.detection.reason}".strip()
     return reason
 

@@ -73,8 +73,8 @@ class Rig:
             self.synchronise_once()
             self.say(FLAT)
 
-    def why(self) -> list[str]:
-        return self.phone.refusals(self.t)
+    def why(self, busy: str = "") -> list[str]:
+        return self.phone.refusals(self.t, busy)
 
 
 @pytest.fixture
@@ -98,6 +98,29 @@ def test_each_thing_that_lacks_is_told_to_the_person_who_can_mend_it(rig):
     assert rig.why() == ["The page on the phone is hidden: bring it to the front.", pictures]
     rig.t += STALE_S + 0.1
     assert motion in rig.why()
+
+
+def test_on_a_busy_computer_nobody_is_asked_for_a_permission_that_was_given(rig):
+    busy = "The server's computer is too busy."
+    assert rig.why(busy)[-1] == busy
+    rig.synchronise()
+    motion, also, pictures = rig.why(busy)
+    assert also == busy
+    assert "allow them" in motion
+    assert "allow the camera" in pictures
+    rig.settle()
+    rig.t += STALE_S + 0.1
+    assert rig.why(busy) == [busy, pictures]
+
+
+def test_a_virtual_phone_is_asked_for_no_permission():
+    rig = Rig(DEVICE)
+    rig.synchronise()
+    motion, pictures = rig.why()
+    assert motion.endswith("silent: wait a moment.")
+    assert pictures == "No pictures from the phone: wait a moment."
+    assert rig.why("too busy") == ["too busy"]
+    rig.phone.close()
 
 
 def test_a_camera_without_a_calibration_is_told_as_long_as_it_films(rig):

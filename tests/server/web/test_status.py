@@ -14,7 +14,10 @@ from pipeline.signals import Mode
 from pipeline.vision.robot_identity import TWO
 from server.common.clock import now
 from server.common.runtime_parameters import RuntimeParameters
+from server.control.gap_log import MANY, SIDES, GapStatistics
 from server.control.robot_health import HealthFields
+from server.diagnostics.blame import TOO_BUSY
+from server.diagnostics.meter import Meter
 from server.protocol.messages import encode_message
 from server.web import status
 from server.web.status import LOST_S
@@ -113,9 +116,25 @@ def test_what_control_says_is_shown_in_the_units_of_screens(manager):
     ],
 )
 def test_why_the_camera_has_lost_the_robot_is_told(manager, monkeypatch, reason, seen, shown):
-    phone = SimpleNamespace(detection=SimpleNamespace(reason=seen))
+    eyes = SimpleNamespace(reason=seen)
+    phone = SimpleNamespace(detection=eyes, meters={"video": Meter()}, device="a phone")
     monkeypatch.setattr(manager, "phone", phone)
     assert status._reason(manager, control_status(mode=Mode.HOLD, reason=reason), now()) == shown
+
+
+def test_a_busy_computer_is_told_in_the_reason_in_what_refuses_and_in_warnings(manager):
+    said, waits = "No word from the phone.", "Let go of the button before arming."
+    gaps = {side: GapStatistics(MANY * (side == "server"), 0.3) for side in SIDES}
+    tell(manager, mode=Mode.RAMP, reason=said, refusals=[said, waits], gaps=gaps)
+    manager.load.is_busy, manager.load.advice = True, "Close chromium."
+    manager.blame.stalled(now(), 0.5)
+    shown = status.build(manager)
+    assert shown.reason == f"{TOO_BUSY} Close chromium."
+    assert shown.refusals == ["The server's computer is too busy. Close chromium.", waits]
+    (warning,) = shown.warnings
+    assert "Close chromium." in warning
+    manager.load.is_busy = False
+    assert status.build(manager).refusals == [said, waits]
 
 
 def test_a_robot_that_takes_a_twist_has_its_speeds_told(manager):

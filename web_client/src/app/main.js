@@ -189,6 +189,9 @@ function perform(effect) {
       feedback.signal(effect.mode);
       lasting.felt(effect.mode, performance.now());
       break;
+    case 'tell':
+      phone.log(effect.text);
+      break;
     case 'calibrate':
       phone.calibrate(effect.what);
       break;

@@ -285,7 +285,8 @@ function ticked(state, now) {
   const next = { ...state, heard, notice, tickedMs: now, freeMs, led: state.led && !isLed({ ...state, heard }) };
   if (now - freeMs > (next.led ? AGAIN_MS : FREE_MS)) return to({ ...next, freeMs: now }, { type: 'ask_lead' });
   if (away > BUSY_MS && state.linked && FLYING.includes(shownMode(state)) && notice === null) {
-    return to(noticed(next, `This phone was too busy for ${(away / 1000).toFixed(1)} s: close other apps.`, now), { type: 'touch' });
+    const text = `This phone was too busy for ${(away / 1000).toFixed(1)} s: close other apps, end power saving, let it cool down.`;
+    return to(noticed(next, text, now), { type: 'touch' }, { type: 'tell', text });
   }
   return state.linked ? to(next, { type: 'touch' }) : to(next);
 }

@@ -67,7 +67,7 @@
 /**
  * @typedef {{ type: 'touch' } | { type: 'command', what: 'arm' | 'disarm' | 'stop', ageMs: number }
  *   | { type: 'post_stop', ageMs: number } | { type: 'feel', mode: Signal } | { type: 'close_link' } | { type: 'stand_by' } | { type: 'ask_lead' }
- *   | { type: 'calibrate', what: Calibrate['what'] }} Effect
+ *   | { type: 'calibrate', what: Calibrate['what'] } | { type: 'tell', text: string }} Effect
  */
 
 /** @typedef {{ state: State, effects: Effect[] }} Outcome */

@@ -305,9 +305,11 @@ test('a page that was too busy says so, for it was no link; one that was hidden 
   /** @param {...Event} more */
   const notice = (...more) => after(...UP, status({ mode: 'TRACK' }), { type: 'tick', now: 100 }, ...more).state.notice?.text;
   assert.equal(notice({ type: 'tick', now: 350 }), undefined);
-  assert.equal(notice({ type: 'tick', now: 500 }), 'This phone was too busy for 0.4 s: close other apps.');
+  assert.equal(notice({ type: 'tick', now: 500 }), 'This phone was too busy for 0.4 s: close other apps, end power saving, let it cool down.');
   assert.equal(notice({ type: 'visibility', visible: false }, { type: 'visibility', visible: true }, { type: 'tick', now: 9000 }),
     undefined);
+  const { state, effects } = after(...UP, status({ mode: 'TRACK' }), { type: 'tick', now: 100 }, { type: 'tick', now: 500 });
+  assert.deepEqual(effects.find(({ type }) => type === 'tell'), { type: 'tell', text: state.notice?.text }, 'to the supervisor, too');
 });
 
 test('gaps are told by their number and the side of most of them', () => {
