@@ -46,14 +46,15 @@ class Look:
     """Of all processors together [ticks]."""
     idle: int
     processes: Mapping[int, Process]
+    """Empty: not asked for."""
 
 
-def look(t: float, proc: Path = PROC) -> Look:
+def look(t: float, proc: Path = PROC, *, by_process: bool = True) -> Look:
     """Read it. Raises OSError where nothing is told."""
     with (proc / "stat").open(encoding="ascii") as file:
         times = [int(word) for word in file.readline().split()[1:9]]  # guests are in user and nice
     processes = {}
-    for folder in proc.iterdir():
+    for folder in proc.iterdir() if by_process else ():
         if folder.name.isdigit():
             with contextlib.suppress(OSError):  # it has ended
                 processes[int(folder.name)] = _process(
@@ -129,7 +130,8 @@ class Load:
         with contextlib.closing(RunQueue()) as waited, contextlib.suppress(OSError):
             t, before = now(), waited()
             while True:
-                seen = await asyncio.to_thread(look, now(), self._proc)
+                # a machine of a thousand processes is read through only while it is busy
+                seen = await asyncio.to_thread(look, now(), self._proc, by_process=self.is_busy)
                 t_now, after = now(), waited()
                 share = (after - before) / (t_now - t) if t_now > t else 0.0
                 self.take(seen, share)
@@ -144,5 +146,6 @@ class Load:
         idle = idle_share(former, seen)
         self.is_busy = idle < IDLE_SHARE or waited_share > WAITED_SHARE
         if self.is_busy:
-            taking = takers(former, seen, self._own, self._processors)
+            is_known = former.processes and seen.processes
+            taking = takers(former, seen, self._own, self._processors) if is_known else []
             self.advice = advice(taking)
