@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections import Counter
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
+from pathlib import Path
 
 # Before NumPy is loaded: threads of linear algebra that wait for each other burn the processor of
 # whoever tests beside them; a law of 0.6 s took 30 s of it.
@@ -25,6 +27,14 @@ IS_CI = bool(os.environ.get("CI"))
 settings.register_profile("default", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if IS_CI else "default")
+
+
+@pytest.fixture
+def runtime_base(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """XDG_RUNTIME_DIR of a test's own: pytest's folders can be too long for a socket's path."""
+    with tempfile.TemporaryDirectory(prefix="ll-") as folder:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
+        yield Path(folder)
 
 
 @pytest.hookimpl(wrapper=True)

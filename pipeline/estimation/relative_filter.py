@@ -91,16 +91,21 @@ class RelativeFilter:
     def add_body_imu(self, sample: BodyImu) -> None:
         """Remember a sample of the robot, in any order; what can't be used is counted."""
         rate, force = sample.omega_m_bf_in_b, sample.a_m_bf_in_b
-        self._remember(self._track.body, sample.t, rate, force)
-        self._aliased.feel(sample.t, rate, force)
+        is_used = self._remember(self._track.body, sample.t, rate, force)
+        if is_used and self._config.body_steps:  # what is told shakes nothing
+            self._aliased.feel(sample.t, rate, force)
 
-    def _remember(self, stream: ImuStream, t: float, rate: Array, force: Array) -> None:
+    def _remember(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
+        """Whether it can be used."""
         if not is_imu_sample(t, rate, force) or t > self._now + MAX_SLEEP_S:
             self.samples_invalid += 1
         elif self._started and t <= self._track.base.t:
             self.samples_late += 1
         elif not self._track.insert(stream, t, rate, force):
             self.samples_duplicate += 1
+        else:
+            return True
+        return False
 
     def add_seen(self, seen: VisionMeasurement, now: float) -> Fusion:
         """Fuse the LEDs of a picture when it was taken; tells, and counts, what became of it."""

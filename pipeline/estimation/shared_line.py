@@ -34,6 +34,8 @@ ABOVE: Final = 9.0
 """Times the power of its background; a picture's has that by chance now and then, both never."""
 LEAST: Final = np.array((0.01, 0.1))
 """Amplitude [rad/s, m/s²] that is worth it."""
+NOTHING: Final = 1e-18
+"""Power [rad²/s², m²/s⁴, m², rad²] of a background that has none: what is simulated is exact."""
 VAIN_S: Final = 10.0
 """What was tried in vain is not found again for so long."""
 
@@ -94,7 +96,7 @@ class SharedLines:
     ) -> Line | None:
         hz = np.arange(1.0, fastest_hz * window_s + 5.0, STEP) / window_s
         powers = _powers(*self._missed.since(t - window_s), hz)
-        missed = (powers / np.median(powers, axis=0)).max(axis=1)
+        missed = (powers / np.maximum(np.median(powers, axis=0), NOTHING)).max(axis=1)
         if missed.max() < ABOVE and not felt_alone:
             return None
         felt = self._felt.since(t - window_s)
@@ -150,7 +152,8 @@ def _above(lines: Array, hz: Array, beside_hz: Array) -> Array:
     sides = hz[:, None] + beside_hz
     around = [np.interp(sides, hz, line, left=0.0).max(axis=1) for line in lines.T]
     peaks = lines >= np.maximum(np.roll(lines, 1, axis=0), np.roll(lines, -1, axis=0))
-    return np.where(peaks & (lines > LEAST**2), lines / np.stack(around, axis=1), 0.0)
+    background = np.maximum(np.stack(around, axis=1), NOTHING)
+    return np.where(peaks & (lines > LEAST**2), lines / background, 0.0)
 
 
 def _powers(times: Array, values: Array, hz: Array) -> Array:

@@ -195,6 +195,18 @@ def test_lies_of_every_kind_leave_it_finite(world, arriving, seed):
     assert flight.error(flight.to(3.95)) < 0.04  # doubt fades in seconds
 
 
+@pytest.mark.parametrize("k", range(len([*bad_samples(0.0)])))
+def test_what_looks_for_vibrations_never_hears_a_sample_that_is_none(world, arriving, k):
+    flight = Flight(world, arriving)
+    flight.to(2.0)
+    heard = flight.filter._aliased._lines
+    before = heard._t_bin, heard._count, heard._sum.copy()
+    bad = [*bad_samples(1.99)][k]
+    (flight.filter.add_body_imu if isinstance(bad, BodyImu) else flight.filter.add_phone_imu)(bad)
+    assert (heard._t_bin, heard._count) == before[:2]
+    np.testing.assert_array_equal(heard._sum, before[2])
+
+
 def test_warming_up_compiles_all_there_is(world, arriving):
     warm_up()
     kernels: list[Any] = [ray_kernels.fuse_rays, ray_kernels.is_sound, relative_kernels.transit]

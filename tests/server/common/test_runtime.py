@@ -18,9 +18,8 @@ from server.common.runtime import (
 
 
 @pytest.fixture(autouse=True)
-def base(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    return tmp_path / "lightleash"
+def base(runtime_base):
+    return runtime_base / "lightleash"
 
 
 @pytest.mark.parametrize("name", ["", "left", "7", "arm-2", "L" * LONGEST_NAME])
@@ -54,9 +53,9 @@ def test_who_looks_whether_a_server_runs_keeps_none_from_starting(base):
             assert is_running(directory)
 
 
-def test_a_directory_that_leads_elsewhere_is_no_server_here(base, tmp_path):
+def test_a_directory_that_leads_elsewhere_is_no_server_here(base):
     prepare(runtime_directory("left"), base).close()
-    other = tmp_path / "other"
+    other = base.parent / "other"
     prepare(other).close()
     (base / "servers" / "right").symlink_to(other)
     (base / "servers" / "not a name").mkdir()
@@ -65,9 +64,9 @@ def test_a_directory_that_leads_elsewhere_is_no_server_here(base, tmp_path):
         prepare(runtime_directory("right"), base)
 
 
-def test_a_base_that_leads_elsewhere_is_not_taken_for_a_server_in_it(base, tmp_path):
-    (tmp_path / "other").mkdir()
-    base.symlink_to(tmp_path / "other")
+def test_a_base_that_leads_elsewhere_is_not_taken_for_a_server_in_it(base):
+    (base.parent / "other").mkdir()
+    base.symlink_to(base.parent / "other")
     with pytest.raises(BusyError, match="somebody else"):
         prepare(runtime_directory("left"), base)
 

@@ -12,10 +12,7 @@ from server.common.settings import load
 from server.process import ports
 from server.process.ports import listen, listening
 
-
-@pytest.fixture(autouse=True)
-def base(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+pytestmark = pytest.mark.usefixtures("runtime_base")
 
 
 @pytest.fixture

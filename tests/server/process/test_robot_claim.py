@@ -22,8 +22,8 @@ def test_a_second_server_of_a_real_robot_is_refused_and_told_who_has_it(tmp_path
         claimed(left).__enter__()
 
 
+@pytest.mark.usefixtures("runtime_base")
 def test_serve_ends_in_one_line_before_anything_starts(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     monkeypatch.setattr(launcher, "children_of", lambda *_: pytest.fail("something starts"))
     words = ["--no-simulate", "--state", str(tmp_path), "--https-port", "0", "--http-port", "0"]
     with claimed(load(words)):

@@ -66,9 +66,8 @@ def other():
 
 
 @pytest.fixture
-def launched(monkeypatch, tmp_path):
+def launched(runtime_base):
     """Writes what a launcher and its server leave in their directory; `runs` holds its lock."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with ExitStack() as stack:
 
         def make(name, port=1, key=KEY, runs=True, serves=True):
