@@ -29,6 +29,8 @@ WANDERS: Final = 0.1
 """Share of its size by which an amplitude changes in a second."""
 GONE_S: Final = 3.0
 """Not sure for so long: it is over."""
+SLOWEST_HZ, FASTER_HZ = 0.15, 12.0
+"""One that seems to be slower, or faster, by being followed is none."""
 SHARE: Final = 0.5
 """Of what its frequency seems to be off is corrected at once."""
 OF: Final = tuple(np.r_[k : k + 3, k + 6 : k + 9] for k in (0, 3))
@@ -87,12 +89,16 @@ class AliasedTone:
         self._t_look = t
         line = self._lines.find(t, felt_alone=walks)
         if line is not None:
-            self.tone = Tone(line.hz, t, line.sizes)
+            rate, force = np.maximum(line.sizes, 0.1 * LEAST).tolist()  # exact sensors have none
+            self.tone = Tone(line.hz, t, (rate, force))
             self._t_tried, self._before = t, None
 
     def judge(self, t: float, z: Array, P: Array) -> None:
         """Is it there, by its amplitudes (12,) and their covariance (12, 12) at `t` [s]?"""
         if self.tone is None:
+            return
+        if not SLOWEST_HZ <= self.tone.hz <= FASTER_HZ:
+            self._give_up(t, self.tone)
             return
         judged = self._t_tried + max(TRIAL_S, TRIAL_CYCLES / self.tone.hz)
         for sensor, own in enumerate(OF):
@@ -101,10 +107,13 @@ class AliasedTone:
             if chi2 > SURE and size > LEAST[sensor] and t > judged:
                 self.t_sure[sensor] = t
         if t > judged and t - float(self.t_sure.max()) > GONE_S:
-            self._lines.tried_in_vain(t, self.tone.hz)
-            self.tone = None
+            self._give_up(t, self.tone)
         elif t - self._t_look >= EVERY_S:
             self._follow(self.tone, t, z)
+
+    def _give_up(self, t: float, tone: Tone) -> None:
+        self._lines.tried_in_vain(t, tone.hz)
+        self.tone = None
 
     def _follow(self, tone: Tone, t: float, z: Array) -> None:
         """Amplitudes that turn on tell of another frequency."""
