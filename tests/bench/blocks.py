@@ -115,6 +115,8 @@ def make(block: Block) -> int:
     done = subprocess.run(
         ["bash", "-c", block.command], cwd=ROOT, check=False, stdout=subprocess.PIPE, text=True
     )
+    if not done.stdout.strip():
+        raise BlockError(f"{block.name}: nothing printed, exit code {done.returncode}; not written")
     print(done.stdout)
     block.page.write_text(replaced(block.page.read_text(), block.name, done.stdout, commit))
     return done.returncode
