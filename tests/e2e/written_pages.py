@@ -15,8 +15,8 @@ CLIENT = Path(__file__).parents[2] / "web_client"
 
 
 @contextmanager
-def written_pages(chromium: str) -> Iterator[BrowserContext]:
-    """A browser that finds them at `ORIGIN`."""
+def written_pages(chromium: str, flags: tuple[str, ...] = ()) -> Iterator[BrowserContext]:
+    """A browser that finds them at `ORIGIN`, with further `flags`."""
 
     def answer(route: Route) -> None:
         path = CLIENT / route.request.url.removeprefix(ORIGIN)
@@ -25,7 +25,7 @@ def written_pages(chromium: str) -> Iterator[BrowserContext]:
         else:
             route.abort()
 
-    with browser(chromium) as context:
+    with browser(chromium, flags=flags) as context:
         context.route("**/*", answer)
         yield context
 

@@ -1,0 +1,187 @@
+"""What stands on the pages in each of their states; scripts do not run. As pictures to look at:
+
+python -m tests.e2e.page_states folder
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from playwright.sync_api import BrowserContext, Page
+
+from tests.e2e.conftest import find_chromium
+from tests.e2e.written_pages import opened, written_pages
+
+PHONES = ((360, 640), (412, 915), (915, 412), (667, 375))
+TABLET, DESKTOP, LAPTOP = (820, 1180), (1280, 720), (1440, 900)
+LETTERS_PX = (16, 32)
+"""The usual size, and 200 % of it."""
+
+OPERATING = """
+const show = (...ids) => ids.forEach((id) => { document.getElementById(id).hidden = false; });
+const hide = (...ids) => ids.forEach((id) => { document.getElementById(id).hidden = true; });
+const text = (id, words) => { document.getElementById(id).textContent = words; };
+const list = (id, lines, kind = '') => document.getElementById(id).replaceChildren(...lines.map(
+  (line) => Object.assign(document.createElement('li'), {textContent: line, className: kind})));
+const mode = (name, meaning, reason) => {
+  document.getElementById('status').dataset.mode = name;
+  text('mode', name);
+  text('meaning', meaning);
+  text('reason', reason);
+};
+const health = () => Object.entries({leds: '5', path: 'WebSocket', gaps: '12 computer',
+  fps: '30 fps', imu: '200 Hz', rtt: '142 ms', kbps: '3.1 Mb/s'})
+  .forEach(([id, words]) => text(`h-${id}`, words));
+const operate = () => { hide('welcome'); show('operate', 'lead', 'full'); health(); };
+const BUSY = 'The server\\'s computer is too busy. chromium takes the most of it: close what is '
+  + 'not needed; a laptop wants its charger.';
+"""
+"""Short words for what the page's modules do."""
+PHONE = {
+    "start": "show('start', 'name-field'); text('host', 'robot.local'); text('step', 'Ready.');",
+    "problem": """show('problem', 'reload', 'last-stop', 'last-stop-words');
+      text('problem-title', 'The browser can’t use the motion sensors');
+      list('problem-steps', ['Reload the page.', 'Allow motion sensors in the settings.']);
+      text('last-stop-words', 'STOP was refused: a supervisor has ended this pairing.');""",
+    "pairing": "show('pairing', 'start'); text('match', 'KWRT');",
+    "refused": """operate(); mode('DISARMED', 'Thrusters are off', 'Not armed.');
+      list('refusals', [BUSY, 'Let go of the button before arming.']); show('calibrate');
+      list('warnings', ['The server\\'s computer stood still 9 times in a minute.']);
+      text('hold-hint', 'Arm first');""",
+    "ready": """operate(); mode('DISARMED', 'Thrusters are off', 'Not armed.');
+      show('handover-start', 'link-check-start');""",
+    "moving": """operate(); mode('TRACK', 'The robot follows you', 'Following the phone.');
+      document.getElementById('hold').dataset.look = 'moving'; show('toward');
+      text('toward', 'Closer, and to the left'); text('wish', 'Disarm');
+      text('hold-title', 'Moving'); text('hold-hint', '0.5 × your way · Let go to keep still');""",
+    "waiting": """operate(); mode('HOLD', 'The robot keeps still', BUSY);
+      document.getElementById('hold').dataset.look = 'again'; show('left', 'notice', 'lens');
+      show('lens-0', 'lens-1'); document.getElementById('lens').dataset.tone = 'hint';
+      text('lens-text', 'The camera focuses by itself: the lens is not as it was calibrated.');
+      text('left-s', '12 s'); text('hold-title', 'Let go and press again');
+      text('hold-hint', 'Thrust fades in 12 s');
+      text('notice', 'This phone was too busy for 0.6 s: close other apps.');""",
+    "stopped": "operate(); mode('STOPPED', 'Thrust is off', 'STOP was pressed.');",
+    "calibrating": """operate(); document.getElementById('operate').classList.add('calibrating');
+      show('calibration', 'calibration-leave', 'calibration-go');
+      document.getElementById('calibration').dataset.verdict = '';
+      text('calibration-title', 'Film the board: 12 of 20');
+      text('board-url', 'robot.local/board');
+      text('calibration-hint', 'Tilt the phone to the left.');
+      document.getElementById('calibration-tasks').innerHTML = ['Corners', 'Tilts', 'Distances',
+        'Turns'].map((one) => `<div><dt>${one}</dt><dd><progress value=".4"></progress></dd></div>`)
+        .join('');
+      list('calibration-lines', ['Brighter light would help.'], 'advice');""",
+    "checking": """operate(); document.getElementById('operate').classList.add('checking');
+      show('link-check', 'link-check-leave', 'link-check-go');
+      document.getElementById('link-check').dataset.grade = 'fair';
+      text('link-check-title', 'Usable: the robot will wait for the network now and then.');
+      text('link-check-hint', 'Listened for 20 s.');
+      list('link-check-lines', ['The robot would follow 97.3 % of the time.', 'Round trip 12 ms.']);
+      list('link-check-advice', ['Keep the phone awake and on its charger.']);""",
+    "handing": """operate(); document.getElementById('operate').classList.add('handing');
+      show('handover', 'handover-leave', 'handover-take'); text('handover-title', 'Hand over');
+      text('handover-hint', 'Who shall lead?');
+      document.getElementById('handover-people').innerHTML = ['Anna', 'Bert'].map(
+        (one) => `<button class="calibrate quiet-deed">${one}</button>`).join('');""",
+    "asked": """show('start');
+      text('choice-title', 'This browser is paired already: it supervises');
+      text('choice-text', 'With the link that you opened it only watches and may STOP.');
+      document.getElementById('choice').showModal();""",
+}
+"""By state of the phone page: how it is brought about."""
+FIGURES = """
+const rows = (id, tag, all) => { document.getElementById(id).innerHTML = all.map(
+  (cells) => `<${tag}>${cells}</${tag}>`).join(''); };
+const figures = (id, all) => rows(id, 'div', all.map(
+  ([name, value]) => `<dt>${name}</dt><dd>${value}</dd>`));
+const STAGES = ['capture to arrival', 'waiting', 'decode', 'detect', 'associate', 'solve',
+  'to control', 'control'];
+const fill = () => {
+  text('robot', 'ames (simulated)'); text('operator', 'Android 412x915@2.6 / camera 0');
+  figures('figures', [['Error', '12.3<small>mm</small>'], ['Turned', '0.12<small>°</small>'],
+    ['σ', '12.3<small>mm</small>'], ['Distance', '2.50<small>m</small>'], ['Lights', '5'],
+    ['Misfit', '0.34<small>px</small>']]);
+  figures('stages', STAGES.map((name) => [name, '12.3'])); text('scale', '150 ms');
+  figures('thrusts', [1, 2, 3, 4, 5, 6, 7, 8].map((n) => [n, '1.23 N']));
+  figures('control', ['p50', 'p99', 'p99.9', 'Missed', 'Server pause']
+    .map((name) => [name, name === 'Missed' ? '123' : '0.12<small>ms</small>']));
+  figures('estimate', ['NIS / dof', 'Age', 'Rejected', 'Fused', 'Dropped', 'Late', 'Offset',
+    'σ offset', 'σ pos.', 'σ att.'].map((name) => [name, '12.3<small>ms</small>']));
+  figures('biases', ['Robot', 'Robot', 'Phone', 'Phone'].map((name) => [name, '0.01 0.02 0.03']));
+  rows('streams', 'tr', ['Operator', 'Phone motion', 'Video', 'Pose', 'Robot motion', 'Control']
+    .map((name) => `<td>${name}</td><td>142 ms</td><td></td><td>200 Hz</td><td>0</td>`));
+  rows('events', 'li', [1, 2, 3].map(
+    () => '<time>12:34:56</time><span>TRACK: Following the phone.</span><small>× 14</small>'));
+  rows('people', 'li', ['Anna', 'Bert'].map((name) => `<b class="clip">${name}</b>
+    <span class="quiet">may lead · 3 min</span><button class="button slim">Give lead</button>
+    <button class="button slim">Revoke</button>`));
+  text('total', '87 ms light to command'); text('gaps', 'Gaps in a minute: phone 3, computer 9.');
+  text('url', 'https://192.168.178.42:8443/#k=AbCdEfGhIjKlMnOpQrSt'); text('ready', '2 to mend');
+  document.querySelectorAll('output').forEach((one) => { one.textContent = '+2.5 Hz/(rad/s)'; });
+  text('crowd', 'phones 1 · supervisors 2'); text('recording', '2026-07-01T12-34-56');
+};
+"""
+SUPERVISOR = {
+    "refused": """fill(); mode('DISARMED', 'Thrusters are off', 'Not armed.');
+      show('invite', 'lead');
+      list('refusals', [BUSY, 'Let go of the button before arming.']);
+      list('warnings', ['The server\\'s computer stood still 9 times in a minute.']);""",
+    "flying": """fill(); mode('HOLD', 'The robot keeps still', BUSY);
+      show('screen', 'saturated');
+      text('left', 'Thrust fades in 3 s');""",
+    "asking": """fill(); show('asking', 'notice'); text('notice', 'Not done: id: of a paired page');
+      rows('asking', 'li', [`<span><b>Anna</b> (10.0.0.7) asks to lead. Do these letters stand on
+      that phone? </span><strong class="match">KWRT</strong><button class="button slim confirm">
+      Confirm</button><button class="button slim">Deny</button>`]);""",
+    "blocked": """show('blocked', 'last-stop', 'last-stop-words'); hide('board');
+      text('problem-title', 'The server has been updated'); text('last-stop-words', 'STOPPED');
+      list('problem-steps', ['Reload this page.']);""",
+}
+"""By state of the supervisor's."""
+STATES = {
+    **{("index", name): f"{OPERATING}{script}" for name, script in PHONE.items()},
+    **{
+        ("supervisor", name): f"{OPERATING}{FIGURES}{script}" for name, script in SUPERVISOR.items()
+    },
+    ("screen", "setup"): "",
+    ("screen", "shows"): """document.getElementById('setup').hidden = true;
+      document.getElementById('why').textContent = 'Hold the phone still.';""",
+    ("board", "ruler"): "",
+    ("trust", "help"): "",
+}
+"""By page and state."""
+
+
+def letters(px: int) -> tuple[str, ...]:
+    """Chromium's flags for somebody who has set letters of this size."""
+    return (f"--blink-settings=defaultFontSize={px}",)
+
+
+def shown(context: BrowserContext, name: str, state: str, size: tuple[int, int]) -> Page:
+    """A page in one of its states."""
+    page = opened(context, name, size)
+    page.evaluate(f"() => {{ {STATES[name, state]} }}")
+    return page
+
+
+def main() -> None:
+    """A picture of each state, at each size of screen and of letters."""
+    target, executable = Path(sys.argv[1]), find_chromium()
+    if executable is None:
+        sys.exit("no Chromium found: apt-get install chromium")
+    target.mkdir(parents=True, exist_ok=True)
+    for px in LETTERS_PX:
+        with written_pages(executable, letters(px)) as context:
+            for name, state in STATES:
+                sizes = PHONES if name == "index" else (PHONES[0], TABLET, DESKTOP, LAPTOP)
+                for width, height in sizes:
+                    page = shown(context, name, state, (width, height))
+                    file = f"{name}-{state}-{width}x{height}-{100 * px // LETTERS_PX[0]}.png"
+                    page.screenshot(path=target / file, full_page=name != "index")
+                    page.close()
+
+
+if __name__ == "__main__":
+    main()
