@@ -145,6 +145,7 @@ STATES = {
     **{
         ("supervisor", name): f"{OPERATING}{FIGURES}{script}" for name, script in SUPERVISOR.items()
     },
+    ("fleet", "written"): "",
     ("screen", "setup"): "",
     ("screen", "shows"): """document.getElementById('setup').hidden = true;
       document.getElementById('why').textContent = 'Hold the phone still.';""",

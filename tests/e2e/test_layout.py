@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import BrowserContext
 
 from tests.e2e.axe import violations
+from tests.e2e.page_states import DESKTOP, PHONES, STATES, shown
 from tests.e2e.written_pages import opened
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
@@ -89,8 +90,11 @@ def test_a_large_sigma_lies_on_no_other_number(
     page.close()
 
 
-@pytest.mark.parametrize("name", ["index", "supervisor", "screen", "board", "fleet", "trust"])
-def test_everybody_can_use_a_page_as_it_is_written(written: BrowserContext, name: str) -> None:
-    page = opened(written, name, (1280, 720))
-    assert violations(page) == []
-    page.close()
+@pytest.mark.parametrize(("name", "state"), STATES)
+def test_everybody_can_use_a_page_in_each_state(
+    written: BrowserContext, name: str, state: str
+) -> None:
+    for size in (PHONES[1], PHONES[2], DESKTOP):
+        page = shown(written, name, state, size)
+        assert violations(page) == [], size
+        page.close()
