@@ -5,6 +5,8 @@
 /** @import {Platform} from '../wire/problems.js' */
 /** @import {ShownMode} from '../ui/session_types.js' */
 
+import { isAtRest } from '../ui/mode_words.js';
+
 /** @typedef {'adjust' | 'automatic'} Deed */
 /** @typedef {{ tone: 'fault' | 'hint' | 'note', text: string, deeds: { deed: Deed, label: string }[] }} LensWords */
 
@@ -53,7 +55,7 @@ const BY_HAND = {
  * @returns {LensWords | null}
  */
 export function lensWords({ camera, mode, lacks, steps, manual, leds }) {
-  const waiting = mode === 'DISARMED' || mode === 'STOPPED';
+  const waiting = isAtRest(mode);
   if (camera?.complaint && !waiting) return { tone: 'fault', text: camera.complaint, deeds: [] };
   if (camera !== null && camera.hint !== '') {
     /** @type {{ deed: Deed, label: string }[]} */

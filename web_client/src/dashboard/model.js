@@ -4,6 +4,7 @@
 /** @import {ShownMode} from '../ui/session_types.js' */
 /** @import {StopAnswer} from '../wire/stop.js' */
 
+import { isAtRest } from '../ui/mode_words.js';
 import { GIVE_UP_MS } from '../wire/command.js';
 import { Problem } from '../wire/problems.js';
 import { endOf, endWords, hasStopped, weigh } from '../wire/stop.js';
@@ -14,8 +15,6 @@ export const REMEMBERED = 200;
 /** A place that is less sure than this is none, and no other could be read beside it. */
 const NOWHERE_MM = 1000;
 const NOTICE_MS = 5000;
-/** With the robot there nobody need be told any more that STOP did not reach it. @type {Status['mode'][]} */
-export const AT_REST = ['DISARMED', 'STOPPED'];
 
 /**
  * @typedef {{ errorMm: number | null, errorDeg: number | null, sigmaMm: number | null,
@@ -110,7 +109,8 @@ function heardFrom(board, status, now) {
     statusAtMs: now,
     heard: true,
     stopping: board.stopping && status.mode !== 'STOPPED',
-    notice: board.notice?.untilMs === Infinity && AT_REST.includes(status.mode) ? null : board.notice,
+    // of a robot at rest nobody need be told any more that STOP did not reach it
+    notice: board.notice?.untilMs === Infinity && isAtRest(status.mode) ? null : board.notice,
     history: [...board.history.slice(1 - REMEMBERED), sample],
   };
 }

@@ -3,6 +3,7 @@
 /** @import {Fetch} from '../wire/pairing.js' */
 /** @import {State} from './session_types.js' */
 
+import { isAtRest } from './mode_words.js';
 import { ask } from '../wire/pairing.js';
 import { shownMode } from './session.js';
 import { leadOf } from './standby.js';
@@ -104,9 +105,8 @@ function others({ status, you }) {
 /** Whether this phone leads, and may hand over. @param {State} state */
 export function mayGive(state) {
   const mode = shownMode(state);
-  const calm = mode === 'DISARMED' || mode === 'STOPPED';
   const free = state.calibration === null || state.calibration.phase === 'needed';
-  return state.linked && calm && free && others(state).length > 0;
+  return state.linked && isAtRest(mode) && free && others(state).length > 0;
 }
 
 /**

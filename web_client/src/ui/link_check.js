@@ -4,6 +4,7 @@
 /** @import {LinkReport} from '../wire/protocol_types.js' */
 /** @import {State} from './session_types.js' */
 
+import { isAtRest } from './mode_words.js';
 import { refusalOf } from '../wire/pairing.js';
 import { shownMode } from './session.js';
 
@@ -78,7 +79,7 @@ export class LinkCheck {
   /** @param {State} state */
   mayBegin(state) {
     const mode = shownMode(state);
-    return state.linked && (mode === 'DISARMED' || mode === 'STOPPED' || mode === 'LOST')
+    return state.linked && (isAtRest(mode) || mode === 'LOST')
       && (state.calibration === null || state.calibration.phase === 'needed');
   }
 

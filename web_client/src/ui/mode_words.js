@@ -21,6 +21,14 @@ const MODE_WORDS = {
 const TWIST_MEANINGS = { DISARMED: 'Told to stand still', RAMP: 'It comes to rest', STOPPED: 'Told to stand still' };
 
 /**
+ * Whether a robot in this mode rests, as far as is known: it is neither flown nor armed.
+ * @param {ShownMode} mode
+ */
+export function isAtRest(mode) {
+  return mode === 'DISARMED' || mode === 'STOPPED';
+}
+
+/**
  * What a mode is called, and what it means for the robot that there is.
  * @param {ShownMode} mode
  * @param {Status | null} status

@@ -5,7 +5,7 @@
 /** @import {Calibrate} from '../wire/protocol_types.js' */
 /** @import {RequestedPath} from '../video/video_paths.js' */
 
-import { gapWords, healthWords, limitWords, modeWords, rampWords } from './mode_words.js';
+import { gapWords, healthWords, isAtRest, limitWords, modeWords, rampWords } from './mode_words.js';
 import { CalibrationView } from './calibration_view.js';
 import { attachHold } from './hold_button.js';
 import { leadWords } from './leading_choice.js';
@@ -148,8 +148,7 @@ export class View {
     this.requestButton.disabled = !enabled;
     this.find('stop').classList.toggle('asked', state.stopping);
     this.hold(state, mode);
-    const calm = mode === 'DISARMED' || mode === 'STOPPED';
-    this.calibration.render(state.calibration, calm, Boolean(state.status?.camera?.complaint));
+    this.calibration.render(state.calibration, isAtRest(mode), Boolean(state.status?.camera?.complaint));
   }
 
   /**
