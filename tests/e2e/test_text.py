@@ -49,7 +49,8 @@ CUT = f"""
     for (let box = one; box !== null; box = box.parentElement) {{
       const style = getComputedStyle(box);
       if (may(box, style)) return false;
-      if (box !== root && style.overflowX === 'visible' && box.tagName !== 'BUTTON') continue;
+      const holds = style.overflowX !== 'visible' || style.borderLeftStyle !== 'none';
+      if (box !== root && !holds && box.tagName !== 'BUTTON') continue;
       const {{left, right, top, bottom}} = box === root ? screen : box.getBoundingClientRect();
       if (words.some((word) => word.left < left - 1 || word.right > right + 1
         || word.top < top - 2 || word.bottom > bottom + 2)) return true;
@@ -60,7 +61,7 @@ CUT = f"""
     .map(name);
 }}
 """
-"""Whose letters leave the screen, a button, or a box that hides what leaves it."""
+"""Whose letters leave the screen, a button, a frame, or a box that hides what leaves it."""
 PARTS = [
     *(f"#{one}" for one in ("status", "notice", "lens", "calibration", "link-check", "handover")),
     *(".tools", ".toward", ".health", "button.wish", ".controls .stop", "button.hold"),
