@@ -23,7 +23,7 @@ TO_MIDDLE = """
 (selector) => {
   const one = document.querySelector(selector);
   one?.scrollIntoView({block: 'center'});
-  return one !== null;
+  return one?.checkVisibility() === true;
 }
 """
 CHOOSE = """
@@ -122,7 +122,7 @@ class FirefoxPage(ClickedPage):
         end = time.monotonic() + COME_S
         while not self.evaluate(f"({TO_MIDDLE})({json.dumps(selector)})"):
             if time.monotonic() > end:
-                raise TimeoutError(f"no {selector}")
+                raise TimeoutError(f"no {selector} is shown")
             time.sleep(0.05)
         self._tab.tap(selector, "mouse")
 

@@ -25,7 +25,7 @@ class Idler(VirtualOperator):
 
 async def play() -> None:
     """Until it is ended."""
-    arguments = make_parser().parse_args(["--hand", "still"])
+    arguments = make_parser().parse_args(["--hand", "still", "--fps", "15"])
     access = access_of(arguments)
     robot_file = load_robot(access.robot, takes=COMMANDS)
     script = make_script(arguments, robot_file, access.truth_port)
