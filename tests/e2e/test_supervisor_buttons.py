@@ -251,8 +251,11 @@ def open_others(clicks: Clicks) -> None:
     with clicks.follow("screen") as screen:
         screen.click("#start")
         until(lambda: has_event(server, shown), SOON_S, "a screen")
+    answered = "performance.getEntriesByType('navigation')[0].responseStatus === 200"
+    with clicks.follow("fleet") as fleet:
+        until(lambda: bool(fleet.evaluate(answered)), SOON_S, "the fleet")
+        assert fleet.evaluate("location.pathname") == "/fleet"
     with clicks.follow("alone") as view:
-        answered = "performance.getEntriesByType('navigation')[0].responseStatus === 200"
         until(lambda: bool(view.evaluate(answered)), SOON_S, "the view")
         assert view.evaluate("location.pathname") == "/view/"
     assert status(server)["supervisors"] == 1
