@@ -10,6 +10,7 @@
 | `blink_end.py`      | the robot's end of blinking                                      |
 | `health_end.py`     | the robot's end of telling how it is                             |
 | `deploy/watchdog/`  | the robot's end in C, for firmware                               |
+| `link_follower.py`  | what this follower has in common with those of other links       |
 | this file           | the socket of the control process                                |
 
 The robot listens on a port and answers the first command of a new control process, of zero thrust;
@@ -25,15 +26,14 @@ from collections.abc import Callable
 from hardware.follower import BlinkOrder, BodySample, FollowerError, RobotCommand, RobotHealth
 from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import MAX_BYTES
+from hardware.link.link_follower import LinkFollower
 from hardware.robot_file import RobotFile
 
 MAX_SAMPLES = 256
 """Taken at once; the rest waits for the next call."""
-STOP_REPEATS = 5
-"""Nobody hears whether it has come: on a line that loses half, one in 32 is not heard."""
 
 
-class UdpFollower:
+class UdpFollower(LinkFollower[ControlEnd]):
     """A robot at the other end of the network."""
 
     def __init__(
@@ -48,8 +48,8 @@ class UdpFollower:
         Raises:
             FollowerError: no such host.
         """
+        super().__init__(end, clock)
         self.thrusters = end.thrusters
-        self._end, self._clock = end, clock
         try:
             family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         except OSError as error:
@@ -58,19 +58,6 @@ class UdpFollower:
         self._socket = socket.socket(family, kind)
         self._socket.setblocking(False)
         self._socket.connect(address)  # from here on the kernel drops whatever others send
-        self._closed = False
-        self.lost = 0
-        """Commands known to have gone nowhere: nobody listens, or a full queue."""
-
-    @property
-    def epoch(self) -> int:
-        """Under which commands are sent; a new one after the robot has gone to zero by itself."""
-        return self._end.epoch
-
-    @property
-    def dropped(self) -> int:
-        """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
-        return self._end.dropped
 
     @property
     def health(self) -> tuple[RobotHealth, float] | None:
@@ -83,24 +70,10 @@ class UdpFollower:
         samples = (self._end.receive(data, self._clock()) for data in self._arrived())
         return [sample for sample in samples if sample is not None]
 
-    def send(self, command: RobotCommand) -> None:
-        """See `Follower`."""
-        self._check_open()
-        self._send(command)
-
-    def stop(self) -> None:
-        """Zero, several times."""
-        for _ in range(0 if self._closed else STOP_REPEATS):
-            self._send(self._end.zero())
-
     def close(self) -> None:
         """Close. See `Follower`."""
         self._closed = True
         self._socket.close()
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise FollowerError("the link is closed", "an open one")
 
     def blink(self, order: BlinkOrder) -> None:
         """See `Blinking`."""

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from hardware.follower import BodySample, FollowerError, RobotCommand
+from hardware.link.link_follower import LinkFollower
 from hardware.link.registry import LinkKind
 from hardware.link.ros2.base_end import BaseEnd
 from hardware.robot_file import RobotFile
@@ -19,12 +20,10 @@ from hardware.robot_file import RobotFile
 if TYPE_CHECKING:
     from hardware.link.ros2.ports import RosPorts
 
-STOP_REPEATS = 5
-"""As by our own link."""
 MISSING = "`pip install 'lightleash[ros2]'`, where Cyclone DDS has a wheel: docs/ros2.md"
 
 
-class Ros2Follower:
+class Ros2Follower(LinkFollower[BaseEnd]):
     """A base on the topics of ROS 2."""
 
     thrusters = 0
@@ -33,20 +32,8 @@ class Ros2Follower:
         self, ports: RosPorts, end: BaseEnd, clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Ready; says nothing yet."""
-        self._ports, self._end, self._clock = ports, end, clock
-        self._closed = False
-        self.lost = 0
-        """Commands known to have gone nowhere: nobody listens, or the way is down."""
-
-    @property
-    def epoch(self) -> int:
-        """Under which commands are given; a new one after the gate has gone to zero by itself."""
-        return self._end.epoch
-
-    @property
-    def dropped(self) -> int:
-        """Messages that were not the base's, unreadable, repeated, overtaken or not to be."""
-        return self._end.dropped
+        super().__init__(end, clock)
+        self._ports = ports
 
     def receive(self) -> list[BodySample]:
         """Return what has arrived. See `Follower`."""
@@ -59,16 +46,6 @@ class Ros2Follower:
                 samples.append(sample)
         return samples
 
-    def send(self, command: RobotCommand) -> None:
-        """See `Follower`."""
-        self._check_open()
-        self._send(command)
-
-    def stop(self) -> None:
-        """Zero, several times."""
-        for _ in range(0 if self._closed else STOP_REPEATS):
-            self._send(self._end.zero())
-
     def close(self) -> None:
         """Close. See `Follower`.
 
@@ -77,10 +54,6 @@ class Ros2Follower:
         self.stop()
         self._closed = True
         self._ports.close()
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise FollowerError("the link is closed", "an open one")
 
     def _send(self, command: RobotCommand) -> None:
         self.lost += not self._ports.tell(self._end.command(command, self._clock()))

@@ -88,6 +88,10 @@ class GroundEnd:
         """Packets that were not the robot's, damaged, repeated, overtaken or of before we spoke."""
         return self._dropped + self._end.dropped
 
+    def zero(self) -> RobotCommand:
+        """Nothing, disarmed."""
+        return self._end.zero()
+
     def command(self, command: RobotCommand, now: float) -> bytes:
         """The mes for `command`.
 

@@ -19,9 +19,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from hardware.follower import BodySample, FollowerError, RobotCommand, ThrustCommand
+from hardware.follower import BodySample, FollowerError, RobotCommand
 from hardware.link.address import ANYBODY, address_of
 from hardware.link.control_end import ControlEnd
+from hardware.link.link_follower import LinkFollower
 from hardware.link.robot_end import Peer
 from hardware.link.robot_server import bound
 from hardware.link.rpit.ground_end import GroundEnd, random_whole
@@ -30,12 +31,10 @@ from hardware.robot_file import RobotFile
 
 MAX_CONS = 256
 """Taken at once; the rest waits for the next call."""
-STOP_REPEATS = 5
-"""Nobody hears whether it has come: on a line that loses half, one in 32 is not heard."""
 NO_KEY = b""  # nobody shares one here
 
 
-class RpitFollower:
+class RpitFollower(LinkFollower[GroundEnd]):
     """A robot that speaks to a port of ours."""
 
     def __init__(
@@ -49,32 +48,19 @@ class RpitFollower:
         Raises:
             FollowerError: somebody else listens there.
         """
+        super().__init__(end, clock)
         self.thrusters = end.thrusters
-        self._end, self._clock = end, clock
         try:
             self._socket = bound(address)
         except OSError as error:
             what = f"port {address[1]} of {address[0]}: {error}"
             raise FollowerError(what, "a free UDP port (link.port) for RPIt's client") from error
-        self._closed = False
-        self.lost = 0
-        """Commands known to have gone nowhere: nobody has spoken yet, or the way is down."""
 
     @property
     def port(self) -> int:
         """Where we listen."""
         port: int = self._socket.getsockname()[1]
         return port
-
-    @property
-    def epoch(self) -> int:
-        """Under which commands are sent; a new one after the robot has gone to zero by itself."""
-        return self._end.epoch
-
-    @property
-    def dropped(self) -> int:
-        """Packets that were not the robot's, damaged, repeated, overtaken or of before we spoke."""
-        return self._end.dropped
 
     def receive(self) -> list[BodySample]:
         """Return what has arrived. See `Follower`."""
@@ -89,24 +75,10 @@ class RpitFollower:
             samples += [sample] if sample is not None else []
         return samples
 
-    def send(self, command: RobotCommand) -> None:
-        """See `Follower`."""
-        self._check_open()
-        self._send(command)
-
-    def stop(self) -> None:
-        """Zero thrust, several times."""
-        for _ in range(0 if self._closed else STOP_REPEATS):
-            self._send(ThrustCommand.zero(self.thrusters))
-
     def close(self) -> None:
         """Close. See `Follower`."""
         self._closed = True
         self._socket.close()
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise FollowerError("the link is closed", "an open one")
 
     def _send(self, command: RobotCommand) -> None:
         data = self._end.command(command, self._clock())

@@ -9,6 +9,7 @@ from hardware.link.ros2.base_end import BaseEnd
 from hardware.link.ros2.ports import RosPorts
 from hardware.link.ros2.ros2_follower import Ros2Follower
 from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
+from tests.hardware.link.flight import FollowerFlight
 from tests.hardware.link.ros2.lab_base import LabBase, twister
 
 LOCALHOST = "127.0.0.1"
@@ -68,27 +69,5 @@ class Ros2Rig:
         self.follower.close()
 
 
-class Ros2Flight(Ros2Rig):
+class Ros2Flight(FollowerFlight, Ros2Rig):
     """The same as a follower, for a flight in virtual time."""
-
-    dark = -1
-    """None of its LEDs."""
-    thrusters = 0
-
-    @property
-    def t(self) -> float:
-        return self.now - 50.0
-
-    @property
-    def epoch(self) -> int:
-        return self.follower.epoch
-
-    @property
-    def dropped(self) -> int:
-        return self.follower.dropped
-
-    def receive(self):
-        return self.follower.receive()
-
-    def send(self, command) -> None:
-        self.follower.send(command)

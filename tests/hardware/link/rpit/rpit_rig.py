@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hardware.follower import BodySample, ThrustCommand
 from hardware.link.control_end import ControlEnd
 from hardware.link.rpit.ground_end import GroundEnd, random_whole
 from hardware.link.rpit.rpit_follower import NO_KEY, RpitFollower
 from hardware.robot_file import RobotFile
 from hardware.sim.plant.plant import Plant
+from tests.hardware.link.flight import FollowerFlight
 from tests.hardware.link.rpit.lab_robot import LabRobot, Model
 
 LOCALHOST = "127.0.0.1"
@@ -50,33 +50,8 @@ class RpitRig:
         self.robot.close()
 
 
-class RpitFlight(RpitRig):
+class RpitFlight(FollowerFlight, RpitRig):
     """The same as a follower, for a flight in virtual time."""
-
-    dark = -1
-    """None of its LEDs."""
-
-    @property
-    def thrusters(self) -> int:
-        return self.follower.thrusters
-
-    @property
-    def t(self) -> float:
-        return self.now - 50.0
-
-    @property
-    def epoch(self) -> int:
-        return self.follower.epoch
-
-    @property
-    def dropped(self) -> int:
-        return self.follower.dropped
-
-    def receive(self) -> list[BodySample]:
-        return self.follower.receive()
-
-    def send(self, command: ThrustCommand) -> None:
-        self.follower.send(command)
 
 
 def bad_line(rng):
