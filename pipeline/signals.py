@@ -228,6 +228,10 @@ class Mode(IntEnum):
     COAST = 6
 
 
+AT_REST = (Mode.DISARMED, Mode.STOPPED)
+"""Without thrust."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TouchState:
     """What the page's main thread last said, judged by what is certain of its age."""

@@ -21,7 +21,7 @@ from pipeline.control.thruster_health import ThrusterHealth
 from pipeline.control.tracking import Situation, Tracking
 from pipeline.frames import Array
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, Mode, VirtualView
+from pipeline.signals import AT_REST, BodyImu, Mode, VirtualView
 
 TUMBLED: Final = cos(radians(60.0))
 """Cosine of the lean from which a robot in the air falls, whatever its thrusters do: as autopilots
@@ -158,7 +158,7 @@ class ThrustActing:
                 self._station.v_in_f,
                 self._tracking.constant_force_in_f,
             )
-        if mode in (Mode.DISARMED, Mode.STOPPED, Mode.ARMED):
+        if mode in (*AT_REST, Mode.ARMED):
             self._tracking.reset()
         self._tumbled = False
         # a supervisor's reset: somebody has looked at the robot

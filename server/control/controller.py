@@ -14,7 +14,15 @@ from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.frames import Array, triple, wxyz_from_R
 from pipeline.prediction import Prediction
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, Mode, PhoneImu, Requests, TouchState, VisionMeasurement
+from pipeline.signals import (
+    AT_REST,
+    BodyImu,
+    Mode,
+    PhoneImu,
+    Requests,
+    TouchState,
+    VisionMeasurement,
+)
 from pipeline.teleop import Inputs, Output, Teleop
 from server.common.runtime_parameters import RuntimeParameters, Tune, turned
 from server.control.gap_log import GapLog
@@ -31,11 +39,7 @@ STOOD_STILL_S = SILENCE.coasts_s
 """Between two ticks, at most: after so long a robot behind our own link coasts."""
 TIME_DECIMALS, THRUST_DECIMALS = 6, 4
 """Of commands in recordings: 1 µs, 0.1 mN. All digits of a float would be three times as long."""
-
-
 UNTOLD = RobotCondition()
-AT_REST = (Mode.DISARMED, Mode.STOPPED)
-
 TooLate = Callable[[float, float], str]
 
 

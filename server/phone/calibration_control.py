@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.signals import Mode
+from pipeline.signals import AT_REST
 from server.control.ipc import ControlStatus
 from server.phone.phone_session import PhoneSession
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.messages import encode_message
 from server.protocol.wire import WireError
-
-CALM = (Mode.DISARMED, Mode.STOPPED)
 
 
 class CalibrationControl:
@@ -50,4 +48,4 @@ class CalibrationControl:
 
 
 def _is_calm(control: ControlStatus | None) -> bool:
-    return control is not None and control.mode in CALM
+    return control is not None and control.mode in AT_REST

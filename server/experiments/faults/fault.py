@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from hardware.follower import STOPPED, FollowerState
-from pipeline.signals import Mode
+from pipeline.signals import AT_REST, Mode
 from server.experiments.gaps.flight import GapFlight
 
 ZERO_N: Final = 0.02
@@ -101,7 +101,7 @@ def suffer(flight: GapFlight, fault: Fault, seed: int) -> FaultOutcome:
     while world.t < fault.watch_s and watch.goes_on():
         mode = world.advance()
         watch.look(mode)
-        if mode in (Mode.RAMP, Mode.DISARMED, Mode.STOPPED):
+        if mode in (Mode.RAMP, *AT_REST):
             flight.person.leaving = True  # nobody presses anew, whatever is shown
     return watch.outcome(seed)
 

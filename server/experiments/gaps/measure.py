@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pipeline.config import PERIOD_S
 from pipeline.frames import Array
-from pipeline.signals import Mode
+from pipeline.signals import AT_REST, Mode
 from server.experiments.gaps.flight import Case, FlightLog
 
 WINDOW_TICKS: Final = 20
@@ -20,7 +20,7 @@ WINDOW_TICKS: Final = 20
 0.01 m/s."""
 RELEASE_S: Final = 1.0
 """After a gap, in which the reference's speed counts as that of its release."""
-ENDED: Final = (Mode.RAMP, Mode.DISARMED, Mode.STOPPED)
+ENDED: Final = (Mode.RAMP, *AT_REST)
 WAITING: Final = (Mode.COAST, Mode.HOLD)
 
 
