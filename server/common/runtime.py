@@ -26,7 +26,7 @@ MEMBERS_FILE = "members.json"
 """Who has paired, for as long as the run."""
 LAUNCH_FILE = "launch.json"
 """What the launcher tells before its server can: `Launch`. One that was killed leaves it behind."""
-SERVERS, LOCK_FILE, PORTS_LOCK = "servers", "lock", "ports.lock"
+SERVERS, LOCK_FILE = "servers", "lock"
 LONGEST_NAME = 24
 """Characters: with them a socket's path still fits in most places (`MOST_PATH_BYTES`)."""
 NAME = re.compile(rf"[A-Za-z0-9](?:[A-Za-z0-9-]{{0,{LONGEST_NAME - 2}}}[A-Za-z0-9])?")
@@ -120,9 +120,9 @@ def _lock(file: IO[str]) -> bool:
 
 
 @contextmanager
-def ports_lock(base: Path) -> Iterator[None]:
-    """While it lasts no other server that shares `base` chooses its ports."""
-    with (base / PORTS_LOCK).open("w") as lock:
+def one_at_a_time(lock_file: Path) -> Iterator[None]:
+    """While it lasts no other process is in here with the same file; waits until nobody is."""
+    with open(lock_file, "a", opener=private_opener) as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 

@@ -14,7 +14,7 @@ from server.common.runtime import (
     Launch,
     is_running,
     launch_of,
-    ports_lock,
+    one_at_a_time,
     runtime_directory,
     servers_here,
     write_private,
@@ -23,6 +23,8 @@ from server.common.settings import Settings
 
 BACKLOG = 1_024
 """Connections that the kernel keeps for a server that is busy or restarts."""
+PORTS_LOCK = "ports.lock"
+"""Of those who share the runtime directory one chooses at a time."""
 MOST_TRIED = 32
 """Ports after a wished one: more servers than one machine flies robots."""
 HERE = "127.0.0.1"
@@ -60,7 +62,7 @@ def listening(
         OSError: a port is taken.
     """
     directory = runtime_directory(settings.name)
-    with ports_lock(runtime_directory()):
+    with one_at_a_time(runtime_directory() / PORTS_LOCK):
         owners = owners_of_ports(settings.name)
         https = _listen(settings, "https_port", settings.host, owners, say)
         try:

@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from server.common.clock import utc
-from server.common.runtime import new_private_file, private_directory, private_opener
+from server.common.runtime import new_private_file, one_at_a_time, private_directory
 from server.security.tls_limits import authority_limits, general_name, is_permitted
 
 LEAF_DAYS, AUTHORITY_DAYS = 397, 729
@@ -100,8 +100,7 @@ def certificate(state: Path, names: Iterable[str] = (), own: Path | None = None)
     private_directory(state)
     paths = {name: state / f"{name}.pem" for name in ("ca", "ca-key")}
     paths |= {name: own / f"{name}.pem" for name in ("server", "server-key")}
-    with open(state / AUTHORITY_LOCK, "a", opener=private_opener) as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # two that start at once make one authority
+    with one_at_a_time(state / AUTHORITY_LOCK):  # two that start at once make one authority
         return _renewed(paths, names)
 
 
