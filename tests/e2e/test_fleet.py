@@ -168,6 +168,7 @@ def test_the_page_of_all_robots_shows_each_and_can_do_nothing(
     with context.expect_page() as opened:
         board.click("text=All robots here")
     page = opened.value
+    page.wait_for_load_state("load")  # its own files are asked for until then
     asked: list[str] = []
     page.on("request", lambda request: asked.append(f"{request.method} {request.url}"))
     for name, robot in ROBOTS.items():
