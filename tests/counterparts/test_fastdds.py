@@ -15,10 +15,15 @@ from hardware.link.registry import connect
 from hardware.link.ros2.base_end import HeardImu, HeardOdometry
 from hardware.link.ros2.ports import RosPorts
 from tests.counterparts.fastdds_base import FastDdsBase, NoFastDdsError, program
-from tests.hardware.link.ros2.ros2_rig import BELOW, LOCALHOST, ros2_robot
+from tests.hardware.link.ros2.ros2_rig import (
+    BELOW,
+    LOCALHOST,
+    PATIENCE_S,
+    patiently,
+    ros2_robot,
+)
 
 pytestmark = pytest.mark.counterpart
-PATIENCE_S = 20.0
 SAYS = (0.125, -0.25, 0.0, 0.5, -1.5, 9.75)
 """Gyroscope and accelerometer of a base at rest."""
 FIRST = (1e-4, *5 * (0.0,))
@@ -31,14 +36,6 @@ def built():
         return program()
     except NoFastDdsError as error:
         pytest.skip(str(error))
-
-
-def patiently():
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        time.sleep(0.005)
-        yield
-    raise AssertionError(f"not within {PATIENCE_S} s")
 
 
 def told(base):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import time
 
 from hardware.link.ros2.base_end import BaseEnd
 from hardware.link.ros2.ports import RosPorts
@@ -18,6 +19,7 @@ STAMP_AHEAD_S = 1_700_000_000.0
 TWISTER = load_robot("twister", takes=COMMANDS)
 BELOW = f"/test_{os.getpid()}"
 """Tests of other processes may be in the same domain, but not under the same names."""
+PATIENCE_S = 20.0
 _domains = itertools.cycle(range(20, 100))
 """Those that Linux keeps ports for."""
 
@@ -25,6 +27,15 @@ _domains = itertools.cycle(range(20, 100))
 def new_domain() -> int:
     """One that this process has long left."""
     return next(_domains)
+
+
+def patiently():
+    """Again and again, while the other side may yet do it."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        time.sleep(0.005)
+        yield
+    raise AssertionError(f"not within {PATIENCE_S} s")
 
 
 def ros2_robot(**changes):

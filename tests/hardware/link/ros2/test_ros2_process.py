@@ -17,7 +17,13 @@ from hardware.follower import FollowerState, TwistCommand
 from hardware.link.registry import connect
 from hardware.link.ros2.base_end import HeardOdometry
 from hardware.link.ros2.ports import RosPorts
-from tests.hardware.link.ros2.ros2_rig import BELOW, LOCALHOST, ros2_robot
+from tests.hardware.link.ros2.ros2_rig import (
+    BELOW,
+    LOCALHOST,
+    PATIENCE_S,
+    patiently,
+    ros2_robot,
+)
 
 pytestmark = pytest.mark.e2e
 LOSSY = (
@@ -25,7 +31,6 @@ LOSSY = (
     "</Domain></CycloneDDS>"
 )
 """Of a thousand packets that Cyclone DDS would send."""
-PATIENCE_S = 20.0
 FORWARD = TwistCommand(np.array([0.25, *5 * (0.0,)]), armed=True)
 
 
@@ -48,14 +53,6 @@ class Base:
         self.process.terminate()
         out, _ = self.process.communicate(timeout=PATIENCE_S)
         return np.array([twist for _, twist in json.loads(out)["taken"]])
-
-
-def patiently():
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        time.sleep(0.005)
-        yield
-    raise AssertionError(f"not within {PATIENCE_S} s")
 
 
 @pytest.mark.parametrize("per_mille", [0, 100])
