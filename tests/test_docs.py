@@ -83,6 +83,15 @@ def test_every_equation_from_1_to_24_has_a_home() -> None:
     assert numbers == set(range(1, 25))
 
 
+ONE_SCREEN, LINE = 50, 160  # lines, and characters of one
+
+
+def test_the_changelog_stays_on_one_screen() -> None:
+    lines = (ROOT / "CHANGELOG.md").read_text().splitlines()
+    assert len(lines) <= ONE_SCREEN
+    assert max(map(len, lines)) <= LINE, "a screen's lines are not longer"
+
+
 def test_the_readme_s_table_of_commands_is_the_command_line_s() -> None:
     table = (ROOT / "README.md").read_text().split("## Commands")[1].split("```")[0]
     rows = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
