@@ -140,12 +140,11 @@ class ComplianceConfig:
 class LeashConfig:
     """How near to the end of its reach a robot that hangs may be led."""
 
-    enabled: bool = False
-    """Off: what it does to a robot that touches something is not measured yet. That the robot is
-    led beyond its reach is told nevertheless."""
-    kept: float = 0.1
+    enabled: bool = True
+    """Else it is only told that the robot is led beyond its reach."""
+    kept: float = 0.15
     """Share of each thruster's largest thrust that no place may take up: it is left for control."""
-    free: float = 0.85
+    free: float = 0.9
     """Share of the reach within which the leash changes nothing, to the bit."""
 
     def __post_init__(self) -> None:

@@ -164,7 +164,7 @@ class Teleop:
         if self._failsafe.mode == Mode.TRACK:
             self._follow_back()
         error = self._error(known)  # Eq. (14)-(19)
-        leashed = self._leashed(known, error)
+        leashed = self._leashed(known, error, inputs.t)
         ages = Ages(
             inputs.t - self._operator.t,
             inputs.t - self._t_seen,
@@ -174,12 +174,12 @@ class Teleop:
         # the machine decides by this period's error, the leash left aside: a robot far from where
         # it is led ends the flight all the same. The mode holds for these thrusts already: whoever
         # lets go gets no thrust of tracking any more
-        judged = self._judge(inputs, known, error, leashed, ages)
+        judged = self._judge(inputs, known, error, ages)
         before = self._failsafe.mode
         self._failsafe = failsafe.step(self._failsafe, judged, dt_ms, self._limits)
         if self._failsafe.mode != before:
             known, error = self._change_mode(before, known, leashed, bool(judged.doubt))
-            leashed = self._leashed(known, error)
+            leashed = self._leashed(known, error, inputs.t)
         # last, what was given: feed-forward takes it off the next period's specific force
         share = failsafe.ceiling(self._failsafe, self._limits)
         acted = self._acting.act(known, leashed, self._moment(inputs.t), share)
@@ -309,20 +309,21 @@ class Teleop:
         error = pose_error(known.view, self._reference, self._robot.axes)
         return self._acting.led(error, known.view, self._leading)
 
-    def _leashed(self, known: Situation | None, error: PoseError | None) -> Leashed | None:
+    def _leashed(
+        self, known: Situation | None, error: PoseError | None, t: float
+    ) -> Leashed | None:
         """The error that is to vanish: to where the robot can be held."""
         if known is None or error is None:
             return None
-        if self._reference is None or self._failsafe.mode != Mode.TRACK:
+        if self._failsafe.mode != Mode.TRACK:
             return Leashed(error)
-        return self._acting.leashed(error, known.view, self._reference)
+        return self._acting.leashed(error, known.view, self._moment(t))
 
     def _judge(
         self,
         inputs: Inputs,
         known: Situation | None,
         error: PoseError | None,
-        leashed: Leashed | None,
         ages: Ages,
     ) -> failsafe.FailsafeInputs:
         limits, is_tracking = self._config.envelope, self._failsafe.mode == Mode.TRACK
@@ -338,7 +339,7 @@ class Teleop:
             or self._monitor.jumped
             or self._lie
             or self._astray(known),
-            block=self._blocked(leashed),
+            block=self._blocked(),
             is_settled=self._is_settled(known, ages),
             refusals=(
                 *inputs.refusals,
@@ -366,14 +367,12 @@ class Teleop:
         sigma_p = known.relative.sigma_p
         return resumption.is_settled(self._config.resumption, sigma_p, ages.pose, gap_s)
 
-    def _blocked(self, leashed: Leashed | None) -> str:
+    def _blocked(self) -> str:
         """Why it must not go on by a share: its place is wrong, and it would bounce."""
-        if self._failsafe.mode != Mode.TRACK or not self._acting.is_pushed:
+        pushed = self._failsafe.mode == Mode.TRACK and self._acting.is_pushed
+        if not pushed or not self._leading.needs_place:
             return ""
-        if self._leading.needs_place:
-            return "It touches something: lead by all of the motion."
-        is_held = leashed is not None and leashed.shares_in_f is not None
-        return "It touches something at the end of its reach." if is_held else ""
+        return "It touches something: lead by all of the motion."
 
     def _change_mode(
         self, before: Mode, known: Situation | None, leashed: Leashed | None, in_doubt: bool

@@ -79,7 +79,7 @@ class Acting(Protocol):
     def led(self, error: PoseError, view: VirtualView, leading: Leading, /) -> PoseError:
         """The error to where `leading` has the robot."""
 
-    def leashed(self, error: PoseError, view: VirtualView, reference: Reference, /) -> Leashed:
+    def leashed(self, error: PoseError, view: VirtualView, now: Moment, /) -> Leashed:
         """The error to where the robot can be held."""
 
     def start_place(self) -> None:

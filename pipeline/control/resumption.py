@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.config import ResumptionConfig
 from pipeline.control import low_pass
 from pipeline.control.pid import Reference
-from pipeline.frames import exp, log
+from pipeline.frames import Array, exp, log
 from pipeline.signals import RelativeState
 
 
@@ -37,9 +37,15 @@ def toward(
     config: ResumptionConfig, reference: Reference, led_to: Reference, h: float
 ) -> Reference:
     """The reference after another `h` [s] on its way to `led_to`; no faster than is allowed."""
-    share = low_pass.share(h / config.settle_s)
     offset_in_v = led_to.p_rv_in_v - reference.p_rv_in_v
     turn = log(reference.R_vr.T @ led_to.R_vr)
-    way = min(share, h * config.max_speed_m_s / max(float(np.linalg.norm(offset_in_v)), 1e-9))
+    way = way_gone(config, offset_in_v, h)
+    share = low_pass.share(h / config.settle_s)
     part = min(share, h * config.max_rate_rad_s / max(float(np.linalg.norm(turn)), 1e-9))
     return Reference(reference.p_rv_in_v + way * offset_in_v, reference.R_vr @ exp(part * turn))
+
+
+def way_gone(config: ResumptionConfig, offset: Array, h: float) -> float:
+    """Share of an offset (3,) [m] that is gone after `h` [s]; no faster than is allowed."""
+    share = low_pass.share(h / config.settle_s)
+    return min(share, h * config.max_speed_m_s / max(float(np.linalg.norm(offset)), 1e-9))

@@ -13,8 +13,8 @@ from pipeline.control.acting import Acted, Moment
 from pipeline.control.actuation import Actuation
 from pipeline.control.hold import Hold
 from pipeline.control.leading import Leading, led
-from pipeline.control.leash import Leashed, leash_of
-from pipeline.control.pid import PoseError, Reference
+from pipeline.control.leash import Leashed, LeashedBody, leash_of
+from pipeline.control.pid import PoseError
 from pipeline.control.place import SuspendedPlace
 from pipeline.control.station import StationKeeping
 from pipeline.control.thruster_health import ThrusterHealth
@@ -45,7 +45,7 @@ class ThrustActing:
         self._stays, self._hangs, self._in_doubt = self._can_stay, robot.hangs, False
         self._flies, self._tumbled = robot.needs_tilt, False
         self._place = SuspendedPlace(robot)
-        self._leash = leash_of(robot, config.leash)
+        self._leash = leash_of(robot, config.leash, config.resumption)
         self._force_in_b = self._mean_force_in_f = np.zeros(3)
         self._told_in_b = np.zeros(6)
 
@@ -112,17 +112,19 @@ class ThrustActing:
             return error
         return led(error, view, shares_in_f, self._place.x_in_f, self._place.v_in_f)
 
-    def leashed(self, error: PoseError, view: VirtualView, reference: Reference) -> Leashed:
+    def leashed(self, error: PoseError, view: VirtualView, now: Moment) -> Leashed:
         """The error to where its thrusters can hold the robot."""
-        if self._leash is None:
+        if self._leash is None or now.reference is None:
             return Leashed(error)
-        R_fv, place = view.R_fv, self._place
-        R_fr = R_fv @ reference.R_vr
-        return self._leash.hold(error, R_fv, R_fr, place.from_rest_in_f, place.v_in_f)
+        R_fr, place = view.R_fv @ now.reference.R_vr, self._place
+        body = LeashedBody(place.from_rest_in_f, place.v_in_f, place.is_known)
+        return self._leash.hold(error, view.R_fv, R_fr, body, now.h)
 
     def start_place(self) -> None:
         """A press: from here its way counts."""
         self._place.start()
+        if self._leash is not None:
+            self._leash.start()
 
     def start(self, known: Situation, from_rest: bool) -> None:
         """Begin to track, from rest or from the force that was held."""

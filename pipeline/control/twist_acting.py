@@ -30,7 +30,7 @@ from pipeline.control import low_pass
 from pipeline.control.acting import Acted, Moment
 from pipeline.control.leading import Leading
 from pipeline.control.leash import Leashed
-from pipeline.control.pid import PoseError, Reference
+from pipeline.control.pid import PoseError
 from pipeline.control.tracking import Situation
 from pipeline.frames import Array, cross
 from pipeline.robot import Robot, TwistDrive
@@ -78,7 +78,7 @@ class TwistActing:
         """The error as it is: `leading.suits` leads such a robot by all of the motion."""
         return error
 
-    def leashed(self, error: PoseError, _view: VirtualView, _reference: Reference) -> Leashed:
+    def leashed(self, error: PoseError, _view: VirtualView, _now: Moment) -> Leashed:
         """The error as it is: its reach is not known."""
         return Leashed(error)
 

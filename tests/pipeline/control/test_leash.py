@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
-from pipeline.config import LeashConfig
-from pipeline.control.leash import Leash, leash_of
+from pipeline.config import LeashConfig, ResumptionConfig
+from pipeline.control.leash import Leash, Leashed, LeashedBody, leash_of
 from pipeline.control.pid import PoseError
 from pipeline.control.reach import ThrustReach
 from pipeline.frames import Array, exp
 
 AMES = load_robot("ames").robot
-CONFIG = LeashConfig(enabled=True)
+CONFIG, RESUMPTION = LeashConfig(), ResumptionConfig()
 R_FV, R_FR = exp(np.array([0.1, -0.2, 0.5])), exp(np.array([0.05, 0.1, -0.3]))
 X_IN_F, V_IN_F = np.array([0.03, -0.04, 0.02]), np.array([0.1, 0.2, -0.05])
+BODY, H = LeashedBody(X_IN_F, V_IN_F, is_known=True), 0.005
+TOUCHED = BODY._replace(is_known=False)
 TURN, TURN_RATE = np.array([0.1, 0.0, 0.2]), np.array([0.0, 0.3, 0.1])
 AWAY = np.random.default_rng(3).normal(size=(30, 3))
 
@@ -31,7 +33,7 @@ def error_to(x_r_in_f: Array, v_r_in_f: Array) -> PoseError:
 def led_to(leash: Leash, x_r_in_f: Array, v_r_in_f: Array | None = None) -> tuple[Array, Array]:
     """(Place, velocity) in f that the leash makes of a reference's."""
     v_r_in_f = np.zeros(3) if v_r_in_f is None else v_r_in_f
-    error = leash.hold(error_to(x_r_in_f, v_r_in_f), R_FV, R_FR, X_IN_F, V_IN_F).error
+    error = leash.hold(error_to(x_r_in_f, v_r_in_f), R_FV, R_FR, BODY, H).error
     return X_IN_F + R_FV @ error.e_p_in_v, V_IN_F + R_FV @ error.e_p_rate_in_v
 
 
@@ -41,18 +43,18 @@ def taken(x_in_f: Array) -> float:
 
 
 def test_within_reach_the_error_is_the_same_object() -> None:
-    leash = Leash(AMES, CONFIG)
+    leash = Leash(AMES, CONFIG, RESUMPTION)
     for away in AWAY:
         near = 0.999 * CONFIG.free / taken(away) * away
         error = error_to(near, np.zeros(3))
-        held = leash.hold(error, R_FV, R_FR, X_IN_F, V_IN_F)
+        held = leash.hold(error, R_FV, R_FR, BODY, H)
         assert held.error is error
         assert held.shares_in_f is None
         assert not held.at_limit
 
 
 def test_beyond_it_the_robot_is_led_to_the_border_the_same_way_however_far() -> None:
-    leash = Leash(AMES, CONFIG)
+    leash = Leash(AMES, CONFIG, RESUMPTION)
     for away in AWAY:
         border = away / taken(away)
         for times in (1.0, 1.2, 3.0, 20.0):
@@ -63,54 +65,111 @@ def test_beyond_it_the_robot_is_led_to_the_border_the_same_way_however_far() -> 
 
 
 def test_it_says_that_it_is_at_its_limit_as_the_reference_leaves_the_reach() -> None:
-    leash = Leash(AMES, CONFIG)
+    leash = Leash(AMES, CONFIG, RESUMPTION)
     for away in AWAY:
         border = away / taken(away)
         for times, said in ((0.99, False), (1.01, True)):
             error = error_to(times * border, np.zeros(3))
-            assert leash.hold(error, R_FV, R_FR, X_IN_F, V_IN_F).at_limit is said
+            assert leash.hold(error, R_FV, R_FR, BODY, H).at_limit is said
 
 
 @pytest.mark.parametrize("times", [0.5, 0.9, 1.0, 1.5])
 def test_its_velocity_and_shares_are_what_differences_of_its_places_say(times: float) -> None:
-    leash, step = Leash(AMES, CONFIG), 1e-6
+    leash, step = Leash(AMES, CONFIG, RESUMPTION), 1e-6
     for away, v_r_in_f in zip(AWAY, AWAY[::-1], strict=True):
         x_r_in_f = times / taken(away) * away
         ahead, _ = led_to(leash, x_r_in_f + step * v_r_in_f)
         behind, _ = led_to(leash, x_r_in_f - step * v_r_in_f)
         differences = (ahead - behind) / (2.0 * step)
         np.testing.assert_allclose(led_to(leash, x_r_in_f, v_r_in_f)[1], differences, atol=1e-6)
-        held = leash.hold(error_to(x_r_in_f, v_r_in_f), R_FV, R_FR, X_IN_F, V_IN_F)
+        held = leash.hold(error_to(x_r_in_f, v_r_in_f), R_FV, R_FR, BODY, H)
         shares_in_f = np.eye(3) if held.shares_in_f is None else held.shares_in_f
         np.testing.assert_allclose(shares_in_f @ v_r_in_f, differences, atol=1e-6)
 
 
+def offset(held: Leashed, x_r_in_f: Array) -> Array:
+    """What was taken off a reference (3,) [m]."""
+    x_l_in_f: Array = X_IN_F + R_FV @ held.error.e_p_in_v
+    return x_l_in_f - x_r_in_f
+
+
+def test_while_something_else_pushes_the_hand_leads_by_all_of_its_motion() -> None:
+    """What it has taken off by then stays taken off, wherever the push seems to put the robot."""
+    for away in AWAY:
+        leash = Leash(AMES, CONFIG, RESUMPTION)
+        border = away / taken(away)
+        at_touch = offset(
+            leash.hold(error_to(1.2 * border, V_IN_F), R_FV, R_FR, BODY, H), 1.2 * border
+        )
+        assert np.linalg.norm(at_touch) > 0.01
+        for times in (1.2, 0.3, 5.0):
+            error = error_to(times * border, 2.0 * V_IN_F)
+            held = leash.hold(error, R_FV, R_FR, TOUCHED, H)
+            np.testing.assert_allclose(offset(held, times * border), at_touch, atol=1e-12)
+            assert held.error.e_p_rate_in_v is error.e_p_rate_in_v
+            assert held.shares_in_f is None
+            assert held.at_limit is (times > 1.0)
+
+
+def test_what_touches_within_reach_is_led_as_without_a_leash() -> None:
+    leash, error = Leash(AMES, CONFIG, RESUMPTION), error_to(0.2 * AWAY[0], V_IN_F)
+    assert leash.hold(error, R_FV, R_FR, TOUCHED, H).error is error
+
+
+@pytest.mark.parametrize("times", [0.5, 2.0])
+def test_once_the_push_is_over_the_leash_is_gone_back_to_no_faster_than_after_a_gap(
+    times: float,
+) -> None:
+    for away in AWAY:
+        leash = Leash(AMES, CONFIG, RESUMPTION)
+        border = away / taken(away)
+        leash.hold(error_to(1.2 * border, V_IN_F), R_FV, R_FR, BODY, H)
+        before = leash.hold(error_to(times * border, V_IN_F), R_FV, R_FR, TOUCHED, H)
+        at = offset(before, times * border)
+        for _ in range(800):
+            held = leash.hold(error_to(times * border, V_IN_F), R_FV, R_FR, BODY, H)
+            then, at = at, offset(held, times * border)
+            assert np.linalg.norm(at - then) <= 1.001 * H * RESUMPTION.max_speed_m_s
+        wanted = Leash(AMES, CONFIG, RESUMPTION)
+        held = wanted.hold(error_to(times * border, V_IN_F), R_FV, R_FR, BODY, H)
+        np.testing.assert_allclose(at, offset(held, times * border), atol=1e-12)
+
+
+def test_another_press_takes_nothing_off() -> None:
+    leash, border = Leash(AMES, CONFIG, RESUMPTION), AWAY[0] / taken(AWAY[0])
+    leash.hold(error_to(1.5 * border, V_IN_F), R_FV, R_FR, BODY, H)
+    leash.start()
+    error = error_to(0.5 * border, V_IN_F)
+    assert leash.hold(error, R_FV, R_FR, TOUCHED, H).error is error
+    assert leash.hold(error, R_FV, R_FR, BODY, H).error is error
+
+
 def test_it_lets_turns_alone() -> None:
-    held = Leash(AMES, CONFIG).hold(error_to(AWAY[0], V_IN_F), R_FV, R_FR, X_IN_F, V_IN_F)
+    held = Leash(AMES, CONFIG, RESUMPTION).hold(error_to(AWAY[0], V_IN_F), R_FV, R_FR, BODY, H)
     assert held.error.e_eta_in_b is TURN
     assert held.error.e_eta_rate_in_b is TURN_RATE
 
 
 @pytest.mark.parametrize("name", ["quadrotor", "ground"])
 def test_what_hangs_from_nothing_has_no_leash(name: str) -> None:
-    assert leash_of(load_robot(name).robot, CONFIG) is None
+    assert leash_of(load_robot(name).robot, CONFIG, RESUMPTION) is None
 
 
 def test_who_does_not_ask_for_one_is_told_of_the_end_of_its_reach_and_held_nowhere() -> None:
-    leash = leash_of(AMES, LeashConfig())
+    leash = leash_of(AMES, LeashConfig(enabled=False), RESUMPTION)
     assert leash is not None
     for away in AWAY:
         for times, said in ((0.99, False), (1.01, True), (20.0, True)):
             error = error_to(times / taken(away) * away, np.zeros(3))
-            held = leash.hold(error, R_FV, R_FR, X_IN_F, V_IN_F)
+            held = leash.hold(error, R_FV, R_FR, BODY, H)
             assert (held.error is error, held.shares_in_f, held.at_limit) == (True, None, said)
 
 
 def test_without_any_reach_nothing_is_told_and_no_leash_can_be_asked_for() -> None:
     weak = replace(AMES, f_max=1.001 * AMES.f_min)
-    assert leash_of(weak, LeashConfig()) is None
+    assert leash_of(weak, LeashConfig(enabled=False), RESUMPTION) is None
     with pytest.raises(ValueError, match="reach"):
-        leash_of(weak, CONFIG)
+        leash_of(weak, CONFIG, RESUMPTION)
 
 
 @pytest.mark.parametrize("name", ["kept", "free"])
