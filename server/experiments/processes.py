@@ -16,8 +16,8 @@ from multiprocessing import active_children, get_context
 from threading import current_thread, main_thread
 from typing import Final, TypeVar
 
-AHEAD: Final = 2
-"""Jobs given out for each hand."""
+from server.common.cluster.workers import AHEAD
+
 ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 Job = TypeVar("Job")
 Result = TypeVar("Result")

@@ -1,4 +1,4 @@
-"""`lightleash replay`: a recorded phone again, over a real websocket or offline."""
+"""`lightleash replay`: a recorded phone again, by a websocket or offline; many by a cluster."""
 
 from __future__ import annotations
 
@@ -6,17 +6,22 @@ import argparse
 import asyncio
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from server.common.access import Access, PhoneClientError, access_of, add_access_arguments
 from server.common.clock import now
+from server.common.cluster.workers import local_cluster
+from server.common.errors import InputError
 from server.common.options import Parser
+from server.common.ranges import whole
 from server.protocol.messages import Command, Status
 from server.protocol.wire_records import Picture, Pong, Record, Touch
 from server.recording.reader import Recording, device_of, read, recover
 from server.recording.writer import RecordingError
 from server.replay.dates import Timed, timed
+from server.replay.many import SUMMARY, ReplayResults, recordings_in, replay_all
 from server.replay.offline import run_offline
 from server.virtual_phone.phone_client import PhoneClient
 from server.virtual_phone.phone_script import SYNCHRONISED_PONGS
@@ -24,6 +29,8 @@ from server.virtual_phone.phone_script import SYNCHRONISED_PONGS
 PHONE_CLOCK_OFFSET_S = 1000.0
 """Of the replayed phone's clock: any will do, the server must find it."""
 DEVICE = "lightleash-replay"
+LOCAL, REPLAYS = "local", Path("replays")
+"""Name of a cluster of this machine alone; where tables of many recordings go."""
 
 
 class Replay:
@@ -132,22 +139,33 @@ def _speed(text: str) -> float:
 
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="lightleash replay", description=__doc__)
-    parser.add_argument("recording", type=Path)
+    several = "recording; with --scheduler several, or folders of them"
+    parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help=several)
     parser.add_argument("--speed", type=_speed, default=1.0, help="times as fast as recorded")
     parser.add_argument("--offline", action="store_true", help="through the pipeline, no server")
-    parser.add_argument("--out", type=Path, help="CSV of what the pipeline saw; with --offline")
+    out = "CSV of what the pipeline saw, with --offline; folder of them, with --scheduler"
+    parser.add_argument("--out", type=Path, help=f"{out} (default: {REPLAYS})")
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help=f"offline by a Dask cluster, or by one of this machine: {LOCAL}",
+    )
+    parser.add_argument(
+        "--workers", type=whole(1, 1024), help=f"of --scheduler {LOCAL}; default: one a core"
+    )
     parser.add_argument("--recover", action="store_true", help="rescue a file never closed; only")
     add_access_arguments(parser)
     return parser
 
 
 def _run(arguments: argparse.Namespace) -> str:
-    """Do what is asked; gives a line about it."""
+    """Do what is asked of one recording; gives a line about it."""
+    path: Path = arguments.recordings[0]
     if arguments.recover:
-        return f"recovered: {recover(arguments.recording)}"
-    recording = read(arguments.recording)
+        return f"recovered: {recover(path)}"
+    recording = read(path)
     if arguments.offline:
-        out = arguments.out or arguments.recording.with_suffix(".csv")
+        out = arguments.out or path.with_suffix(".csv")
         return f"{out}: {run_offline(recording, out)}"
     played = asyncio.run(play(recording, access_of(arguments), arguments.speed))
     modes = ", ".join(sorted(played.modes)) or "none"
@@ -157,13 +175,52 @@ def _run(arguments: argparse.Namespace) -> str:
     )
 
 
+def _run_all(arguments: argparse.Namespace) -> int:
+    """Replay all recordings by a cluster; the exit code is 1 if one of them failed."""
+    recordings = recordings_in(arguments.recordings)
+    out = arguments.out or REPLAYS
+    results = ReplayResults(out, recordings)
+    with (
+        local_cluster(arguments.workers)
+        if arguments.scheduler == LOCAL
+        else nullcontext(arguments.scheduler)
+    ) as address:
+        started = now()
+        replay_all(recordings, address, results)
+        took_s = now() - started
+    sys.stdout.write(
+        f"{len(recordings)} recordings, {results.failed} failed; {results.cpu_s:.1f} CPU-seconds"
+        f" in {took_s:.1f} s\nwritten: {out}/{SUMMARY} and a table of each\n"
+    )
+    return 1 if results.failed else 0
+
+
+def _check(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """Refuse options that don't belong together."""
+    if not arguments.scheduler:
+        if len(arguments.recordings) > 1:
+            parser.error("several recordings: allowed with --scheduler alone")
+        if arguments.workers:
+            parser.error(f"--workers: allowed with --scheduler {LOCAL} alone")
+        return
+    if arguments.workers and arguments.scheduler != LOCAL:
+        parser.error(f"--workers: a cluster has its own; allowed with --scheduler {LOCAL} alone")
+    if arguments.recover:
+        parser.error("--recover: not with --scheduler")
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run the command; gives the exit status."""
+    parser = _parser()
+    arguments = parser.parse_args(argv)
+    _check(parser, arguments)
     try:
-        sys.stdout.write(_run(_parser().parse_args(argv)) + "\n")
+        if arguments.scheduler:
+            return _run_all(arguments)
+        sys.stdout.write(_run(arguments) + "\n")
     except KeyboardInterrupt:
         return 130
-    except (RecordingError, PhoneClientError, OSError) as error:
+    except (RecordingError, PhoneClientError, InputError, OSError) as error:
         sys.stderr.write(f"lightleash replay: {error}\n")
         return 1
     return 0

@@ -9,7 +9,9 @@ from __future__ import annotations
 import csv
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 from pipeline.config import PERIOD_S, TeleopConfig
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, TouchState
@@ -170,6 +172,34 @@ class Offline:
         """What else is made of a picture: nothing."""
 
 
+@dataclass(slots=True)
+class ReplayCounts:
+    """What was in a recording so far."""
+
+    pictures: int = 0
+    found: int = 0
+    """In how many of them the robot was."""
+    refused: int = 0
+    """Records."""
+
+
+def write_table(recording: Recording, file: TextIO, counts: ReplayCounts) -> None:
+    """Write the CSV into `file`, and count as it goes.
+
+    Raises:
+        RecordingError: the recording can't be used.
+        OSError: the CSV can't be written.
+    """
+    offline = Offline(recording)
+    writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    for row in offline.rows():
+        writer.writerow(row)
+        counts.pictures += 1
+        counts.found += row["found"] == "1"
+    counts.refused = offline.refused
+
+
 def run_offline(recording: Recording, out: Path) -> str:
     """Write the CSV; gives a line about it.
 
@@ -177,13 +207,8 @@ def run_offline(recording: Recording, out: Path) -> str:
         RecordingError: the recording can't be used.
         OSError: the CSV can't be written.
     """
-    pictures = found = 0
-    offline = Offline(recording)
+    counts = ReplayCounts()
     with out.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        for row in offline.rows():
-            writer.writerow(row)
-            pictures += 1
-            found += row["found"] == "1"
-    return f"{pictures} pictures, the robot found in {found}, {offline.refused} records refused"
+        write_table(recording, file, counts)
+    found, refused = counts.found, counts.refused
+    return f"{counts.pictures} pictures, the robot found in {found}, {refused} records refused"

@@ -10,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 
 from server.common.clock import now
+from server.common.errors import InputError
 from server.common.progress import progress_bar
 from server.common.ranges import whole
 from server.experiments.processes import cores
@@ -50,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         folder = arguments.out or arguments.file.with_suffix("")
         with SweepResults(folder, sweep, arguments.mix) as results:
             return _flown(sweep, results, folder, arguments)
-    except SweepError as error:
+    except (SweepError, InputError) as error:
         print(f"lightleash experiments sweep: {error}", file=sys.stderr)
         return 2
 

@@ -17,9 +17,9 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
+from server.common.cluster.provenance import other, versions
 from server.experiments.sweep import summary
 from server.experiments.sweep.errors import SweepError
-from server.experiments.sweep.provenance import other, versions
 from server.experiments.sweep.sweep_file import Sweep
 from server.simulation.session import FIGURES, Figures, SessionOutcome
 

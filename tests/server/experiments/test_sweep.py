@@ -16,8 +16,9 @@ import pytest
 
 from hardware.robot_file import ROBOTS
 from pipeline.config import TeleopConfig
+from server.common.cluster import provenance
 from server.experiments import main
-from server.experiments.sweep import command, provenance, results, workers
+from server.experiments.sweep import command, results, workers
 from server.experiments.sweep.errors import SweepError
 from server.experiments.sweep.results import SweepResults
 from server.experiments.sweep.sweep_file import Sweep, examples, read
