@@ -79,6 +79,16 @@ class RecordingFolder:
             self._removed.append(oldest)
         return ""
 
+    @property
+    def reserve_bytes(self) -> int:
+        """What they leave of the disk."""
+        return self._limits.reserve_bytes
+
+    def free_bytes(self) -> int:
+        """What is left of the disk."""
+        there = next(path for path in (self.path, *self.path.parents) if path.exists())
+        return shutil.disk_usage(there).free
+
     def taken(self) -> int:
         """Bytes of all that are finished."""
         return sum(one.size for one in self._finished())
@@ -98,8 +108,7 @@ class RecordingFolder:
     def _excess(self, taken: int, coming_free: int = 0) -> str:
         """Which limit is passed by recordings of so many bytes, in words, or ""."""
         budget, reserve = self._limits.budget_bytes, self._limits.reserve_bytes
-        there = next(path for path in (self.path, *self.path.parents) if path.exists())
-        left = shutil.disk_usage(there).free + coming_free
+        left = self.free_bytes() + coming_free
         if left < reserve:
             return f"only {left >> 20} MB are left on the disk"
         if budget and taken > budget:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import radians
+from typing import get_args
 
 from prometheus_client import CollectorRegistry, Gauge, generate_latest
 from prometheus_client.core import CounterMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from pipeline.signals import Mode
+from server.control.robot_health import BatteryLevel
 from server.media.decoding import Decoding
 from server.protocol.messages import Estimate, Status
+from server.recording.control import Recordings
 from server.web.session_manager import SessionManager
 from server.web.status import build
 
@@ -42,8 +45,12 @@ def exposition(manager: SessionManager) -> bytes:
     )
     for name, value in status.server.items():
         pauses.labels(name).set(value)
-    taken = Gauge("lightleash_recordings_bytes", "of those that are finished", registry=registry)
-    taken.set(manager.recordings.folder.taken())
+    _recordings(manager.recordings, registry)
+    battery = Gauge(
+        "lightleash_robot_battery", "1 for what is known of it", ["level"], registry=registry
+    )
+    for level in get_args(BatteryLevel):
+        battery.labels(level).set(level == status.battery)
     if status.battery_v is not None:
         volts = Gauge("lightleash_robot_battery_volts", "as the robot tells", registry=registry)
         volts.set(status.battery_v)
@@ -56,6 +63,18 @@ def exposition(manager: SessionManager) -> bytes:
     if status.estimate is not None:
         _estimate(status.estimate, status, registry)
     return generate_latest(manager.tally.registry) + generate_latest(registry)
+
+
+def _recordings(recordings: Recordings, registry: CollectorRegistry) -> None:
+    """What they take, and whether there is room for another one."""
+    folder = recordings.folder
+    for name, words, value in (
+        ("bytes", "of those that are finished", folder.taken()),
+        ("disk_free_bytes", "left of the disk they lie on", folder.free_bytes()),
+        ("reserve_bytes", "what they leave of it", folder.reserve_bytes),
+        ("impossible", "1: nothing can be recorded; /healthz says why", bool(recordings.why_not())),
+    ):
+        Gauge(f"lightleash_recordings_{name}", words, registry=registry).set(value)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import signal
-from pathlib import Path
 
 import pytest
-import yaml
 from msgspec.structs import replace
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -22,11 +19,10 @@ from server.diagnostics.pauses import Stall
 from server.diagnostics.tally import Tally
 from server.media.decoding import Decoding
 from server.protocol.messages import Stream
+from server.recording.folder import RESERVE_BYTES, DiskLimits, RecordingFolder
 from server.web.metrics import exposition
 from server.web.status import build
 from tests.server.house import control_status, estimate_fields, house_in
-
-ALERTS = Path(__file__).parents[3] / "deploy" / "alerts.yaml"
 
 
 @pytest.fixture
@@ -120,19 +116,18 @@ def test_what_a_server_saw_is_counted_and_latencies_are_kept_while_pictures_come
     assert found[("process_open_fds",)] > 0.0
 
 
-def test_alerts_speak_of_figures_that_are_told(manager):
-    tell(manager, estimate=estimate_fields())
-    manager.tally.see(build(manager))
-    told = {name for name, *_ in samples(manager)} | {"up", "lightleash_latency_seconds_bucket"}
-    rules = [
-        rule for group in yaml.safe_load(ALERTS.read_text())["groups"] for rule in group["rules"]
-    ]
-    assert len(rules) >= 5
-    for rule in rules:
-        named = set(re.findall(r"\b(?:up|(?:lightleash|process)_\w+)", rule["expr"]))
-        assert named
-        assert named <= told, rule["alert"]
-        assert rule["annotations"]["summary"].endswith(".")
+def test_room_for_recordings_and_the_level_of_the_battery_are_told(manager):
+    tell(manager, health=HealthFields("empty", 9.9, "Empty."))
+    found = samples(manager)
+    assert found["lightleash_robot_battery", "empty"] == 1.0
+    levels = [value for (name, *_), value in found.items() if name == "lightleash_robot_battery"]
+    assert sum(levels) == 1.0
+    assert found[("lightleash_recordings_disk_free_bytes",)] > 0.0
+    assert found[("lightleash_recordings_reserve_bytes",)] == RESERVE_BYTES
+    assert found[("lightleash_recordings_impossible",)] == 0.0
+    full = DiskLimits(reserve_bytes=1 << 60)
+    manager.recordings.folder = RecordingFolder(manager.recordings.folder.path, full)
+    assert samples(manager)[("lightleash_recordings_impossible",)] == 1.0
 
 
 def test_pauses_of_the_server_are_told(manager):
