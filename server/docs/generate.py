@@ -62,6 +62,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     lead_messages.LeadingStatus,
     camera_messages.CameraHealth,
     people_messages.Person,
+    messages.EpisodeStatus,
     messages.Status,
     people_messages.Deed,
     link_messages.LinkReport,

@@ -92,6 +92,9 @@ REQUESTS = {
     "POST /api/invite": 'body `{"role": "operator"}` or viewer: a link that opens once, as QR code',
     "GET /api/status": "the last `Status`",
     "GET /api/link": "how it will be to fly with the operator's link: `?seconds=` of the last 60",
+    "POST /api/task": 'body `{"text": "…"}`: what the next presses are for, as recordings keep it',
+    "POST /api/episode": 'body `{"press": N, "keep": false}`: nobody should learn from the newest '
+    "press of the recording that runs; with `true` somebody should",
     "GET /ca.crt": "the authority to install on phones",
     "GET /healthz": "200, or 503 with `reasons`: control is silent, nothing can be recorded",
     "GET /metrics": "Prometheus",

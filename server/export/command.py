@@ -72,13 +72,13 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("recording", type=Path)
     parser.add_argument("--to", choices=FORMATS, default="foxglove")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="made if missing")
-    parser.add_argument("--task", default="", help="what the episodes are for, in words")
+    parser.add_argument("--task", default="", help="what episodes are for that name none")
     parser.add_argument(
         "--discard",
         type=_numbers,
         default=frozenset(),
         metavar="N,N",
-        help="episodes nobody should learn from, from 0",
+        help="others nobody should learn from, from 0",
     )
     return parser
 
@@ -87,7 +87,7 @@ def _run(arguments: argparse.Namespace) -> str:
     """Do what is asked; gives lines about it."""
     write, suffix = FORMATS[arguments.to]()
     decoded = DecodedRecording(read(arguments.recording))
-    found = list(episodes(decoded.items(), arguments.task, arguments.discard))
+    found = episodes(decoded.items(), arguments.task, arguments.discard)
     place: Path = arguments.out / f"{arguments.recording.stem}{suffix}"
     if place.exists():
         raise FileExistsError(f"{place} is there already: name another --out")

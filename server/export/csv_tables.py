@@ -16,10 +16,11 @@ from typing import Final
 
 from pipeline.signals import BodyImu, PhoneImu
 from server.export.decoded import (
+    DatedNote,
     DatedPicture,
     DatedTouch,
     DecodedRecording,
-    Item,
+    Happening,
     LogLine,
     RecordedState,
 )
@@ -77,14 +78,15 @@ def write(decoded: DecodedRecording, episodes: Sequence[Episode], folder: Path) 
             cells = (episode.t_end, episode.number, episode.task, episode.keep)
             add("episodes", episode.t_begin, cells)
         for item in decoded.items():
-            add(*_row(item))
+            if not isinstance(item, DatedNote):  # stands in what was said of its episode
+                add(*_row(item))
     for key, name in FILES.items():
         if text := decoded.recording.metadata.get(key):
             (folder / name).write_text(text)
     return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
-def _row(item: Item) -> tuple[str, float, Sequence[object]]:
+def _row(item: Happening) -> tuple[str, float, Sequence[object]]:
     """Table, time [s] and cells."""
     match item:
         case DatedPicture(t, sigma, t_received, sequence, picture):

@@ -31,8 +31,10 @@ from server.protocol.messages import Command, Hello, Log, LoggedEvent, decode_me
 from server.protocol.people_messages import Deed
 from server.protocol.wire import WireError, decode
 from server.protocol.wire_records import Motion, Picture, Record, Touch
+from server.recording.episodes import EpisodeNote, decode_note
 from server.recording.reader import Entry, Recording, device_of
 from server.recording.writer import (
+    EPISODES,
     PHONE_MESSAGES,
     PHONE_RECORDS,
     SERVER_MESSAGES,
@@ -49,6 +51,8 @@ TWIST_NAMES = (
     *("told_wx_rad_s", "told_wy_rad_s", "told_wz_rad_s"),
 )
 """Of a twist told, velocity and angular rate in the body's axes."""
+_SENSELESS = msgspec.MsgspecError, UnicodeDecodeError, RecursionError
+"""What is raised of JSON that is none, or of another kind."""
 ALARMING = (Mode.COAST, Mode.RAMP, Mode.STOPPED)
 UNTOLD_OFFSET_S = RelativeConfig().initial_offset
 """Standard deviation of a stamp's delay before the estimator has found it."""
@@ -137,7 +141,16 @@ class RecordedState(msgspec.Struct, frozen=True):
         return self.estimate.time_offset_sigma if self.estimate is not None else None
 
 
-Item = DatedPicture | PhoneImu | BodyImu | RecordedState | DatedTouch | LogLine
+@dataclass(frozen=True, slots=True)
+class DatedNote:
+    """What somebody said of an episode."""
+
+    t: float
+    note: EpisodeNote
+
+
+Happening = DatedPicture | PhoneImu | BodyImu | RecordedState | DatedTouch | LogLine
+Item = Happening | DatedNote
 
 
 class DecodedRecording:
@@ -209,7 +222,7 @@ class _Decoding:
 
     def items(self) -> Iterator[Item]:
         recording = self._decoded.recording
-        topics = (PHONE_RECORDS, PHONE_MESSAGES, SERVER_MESSAGES, STATUS)
+        topics = (PHONE_RECORDS, PHONE_MESSAGES, SERVER_MESSAGES, STATUS, EPISODES)
         for entry in recording.entries(*topics):
             match entry.topic:
                 case "phone/records":
@@ -222,6 +235,9 @@ class _Decoding:
                         yield from self._message(entry)
                 case "server/messages":
                     yield from self._logged(entry)
+                case "supervisor/episodes":
+                    with suppress(*_SENSELESS):  # or one of a later version
+                        yield DatedNote(entry.t, decode_note(entry.data))
                 case _:
                     yield from self._control(entry)
 
@@ -261,7 +277,7 @@ class _Decoding:
     def _logged(self, entry: Entry) -> Iterator[Item]:
         try:
             message = _to_page.decode(entry.data)
-        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        except _SENSELESS:
             return  # of another kind or version: nothing to log
         if isinstance(message, Deed):
             words = (message.who or "server", message.what, message.why)
@@ -276,7 +292,7 @@ class _Decoding:
     def _control(self, entry: Entry) -> Iterator[Item]:
         try:
             state = _state.decode(entry.data)
-        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        except _SENSELESS as error:
             what = f"holds a status that can't be read: {error}"
             raise RecordingError(self._decoded.recording.path, what, "record anew") from error
         for t, *values in state.body_samples:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
-from server.export.decoded import DatedTouch, Item
+from server.export.decoded import DatedNote, DatedTouch, Item
+from server.recording.episodes import TaskNote, VerdictNote
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +27,30 @@ class Episode:
 
 def episodes(
     items: Iterable[Item], task: str = "", discard: frozenset[int] = frozenset()
-) -> Iterator[Episode]:
-    """Each of them; `discard` numbers those that nobody should learn from."""
-    number, begun, last = 0, None, 0.0
+) -> list[Episode]:
+    """Each of them, with what the recording says of it.
+
+    `task` is for those it names none for; `discard` numbers others nobody should learn from.
+    """
+    found: list[Episode] = []
+    presses: list[int] = []
+    held: DatedTouch | None = None
+    said = ""
     for item in items:
-        if not isinstance(item, DatedTouch):
-            continue
-        last, held = item.t, item.held and item.visible
-        if begun is not None and not (held and item.press == begun.press):
-            yield Episode(number, begun.t, last, task, number not in discard)
-            number, begun = number + 1, None
-        if begun is None and held:
-            begun = item
-    if begun is not None:
-        yield Episode(number, begun.t, last, task, number not in discard)
+        match item:
+            case DatedTouch():
+                holds = item.held and item.visible
+                if held is not None:
+                    found[-1] = replace(found[-1], t_end=item.t)
+                    held = held if holds and item.press == held.press else None
+                if held is None and holds:
+                    held, number = item, len(found)
+                    keep = number not in discard
+                    found.append(Episode(number, item.t, item.t, said or task, keep))
+                    presses.append(item.press)
+            case DatedNote(note=TaskNote(text)):
+                said = text
+            case DatedNote(note=VerdictNote(press, keep)) if press in presses:
+                newest = len(presses) - 1 - presses[::-1].index(press)
+                found[newest] = replace(found[newest], keep=keep and newest not in discard)
+    return found

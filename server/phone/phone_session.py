@@ -93,6 +93,8 @@ class PhoneSession:
         self._check = SensorCheck()
         self.link = LinkLog(clock())
         """What came when, lately."""
+        self.pressed: TouchState | None = None
+        """The newest word of a finger that holds."""
 
     def silent_for(self, now: float) -> float:
         """Time since its last sign of life [s]; hello was the first."""
@@ -125,6 +127,7 @@ class PhoneSession:
                     self.vision.front_end.doubts_gravity = self._check.doubts_gravity
             case TouchState() as operator:
                 self.meters["operator"].tick(now, operator.t)
+                self.pressed = operator if operator.held else self.pressed
                 self._to_control(operator)
             case EncodedFrame() as frame:
                 self._see(frame, now)

@@ -174,6 +174,15 @@ class LoggedEvent(msgspec.Struct, frozen=True):
     """How often, as far as it is remembered."""
 
 
+class EpisodeStatus(msgspec.Struct, frozen=True):
+    """From a press to its release."""
+
+    press: int
+    """Which, as its phone counts."""
+    keep: bool
+    """Nobody has discarded it."""
+
+
 class Status(msgspec.Struct, tag="status", frozen=True):
     """Server → page, 10 Hz: the truth about the robot, on every screen."""
 
@@ -267,6 +276,10 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """The emergency stop on the robot. `unknown`: told no more."""
     health: list[str] = []
     """What people must know of the robot's own state, each in words, the gravest first."""
+    task: str = ""
+    """What the next presses are for, as recordings keep it."""
+    episode: EpisodeStatus | None = None
+    """Of the newest press since the recording began; None without."""
 
 
 FromPage = Hello | Command | Tune | Lead | PathChoice | Calibrate | Log | ScreenSize | ClockAsk

@@ -5,9 +5,12 @@ from __future__ import annotations
 from math import inf
 from pathlib import Path
 
+from pipeline.signals import TouchState
 from server.common import clock
 from server.control.ipc import ControlStatus
+from server.protocol.messages import EpisodeStatus
 from server.protocol.wire import HEADER, KEY_FLAG, Kind
+from server.recording.episodes import LARGEST_PRESS, TaskNote, VerdictNote
 from server.recording.folder import DiskLimits, RecordingFolder
 from server.recording.writer import CAMERA_KEY, DEVICE_KEY, Direction, Recorder
 
@@ -28,6 +31,10 @@ class Recordings:
         self._knows_camera = True
         self.failure = ""
         """Why the last recording ended by itself, or ""."""
+        self.task = ""
+        """What the next presses are for, also in later recordings; "" is nothing in particular."""
+        self._discarded: set[int] = set()
+        self._t_started = inf
 
     @property
     def name(self) -> str:
@@ -47,7 +54,33 @@ class Recordings:
             self.failure = ""
             self._has_key, self._t_asked = False, -inf
             self._knows_camera = bool(camera_text)
+            self._discarded.clear()
+            self._t_started = clock.now()
+            if self.task:
+                self.say_task(self.task, self._t_started)
         return self.name
+
+    def say_task(self, text: str, t: float) -> None:
+        """What presses after `t` [s] are for."""
+        self.task = text
+        if self._recorder is not None:
+            self._recorder.note(TaskNote(text), t)
+
+    def judge(self, pressed: TouchState, keep: bool, t: float) -> None:
+        """Whether somebody should learn from the episode of a finger that held, in this recording.
+
+        A `TouchState` tells presses of one phone from another's, a recording by their order.
+        """
+        if self._recorder is not None:
+            (self._discarded.discard if keep else self._discarded.add)(pressed.press)
+            self._recorder.note(VerdictNote(pressed.press & LARGEST_PRESS, keep), t)
+
+    def episode(self, pressed: TouchState | None) -> EpisodeStatus | None:
+        """The episode of the newest finger that held; None if that was before the recording."""
+        if self._recorder is None or pressed is None or pressed.t < self._t_started:
+            return None
+        keep = pressed.press not in self._discarded
+        return EpisodeStatus(pressed.press & LARGEST_PRESS, keep)
 
     def learn(self, device: str, camera_text: str) -> None:
         """The phone and its camera, if the recording began before there was one.

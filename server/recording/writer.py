@@ -7,6 +7,7 @@ The bytes recorded are the bytes of the wire. Channels, with log times on the se
 | phone/records, server/records | `lightleash` (`server.protocol.wire`) | binary, both ways |
 | phone/messages, server/messages | json (`server.protocol.messages`) | text, both ways |
 | control/status | json | `ControlStatus`, with the samples of the robot's motion sensors |
+| supervisor/episodes | json (`server.recording.episodes`) | tasks, and which to discard |
 
 Publish time is the sender's own clock for records, else the log time. Metadata has the calendar's
 time at 0 of the server's clock, for both clocks together say what day it was. A file is called
@@ -35,18 +36,21 @@ from server.common import clock
 from server.common.runtime import new_private_file
 from server.control.ipc import ControlStatus
 from server.protocol.wire import HEADER, VERSION
+from server.recording.episodes import EpisodeNote
 from server.recording.folder import RecordingFolder
 
 Direction = Literal["phone", "server"]
 PHONE_RECORDS, SERVER_RECORDS = "phone/records", "server/records"
 PHONE_MESSAGES, SERVER_MESSAGES = "phone/messages", "server/messages"
 STATUS = "control/status"
+EPISODES = "supervisor/episodes"
 ENCODINGS = {
     PHONE_RECORDS: "lightleash",
     SERVER_RECORDS: "lightleash",
     PHONE_MESSAGES: "json",
     SERVER_MESSAGES: "json",
     STATUS: "json",
+    EPISODES: "json",
 }
 METADATA = "lightleash"
 """Name of our metadata: of several later ones add to the first."""
@@ -142,6 +146,10 @@ class Recorder:
     def status(self, status: ControlStatus, t: float) -> None:
         """Keep a status of the control process."""
         self._put(_Item(STATUS, t, status))
+
+    def note(self, note: EpisodeNote, t: float) -> None:
+        """Keep what somebody says of an episode."""
+        self._put(_Item(EPISODES, t, msgspec.json.encode(note)))
 
     def learn(self, metadata: dict[str, str]) -> None:
         """Keep what is only known now: it counts for the whole recording."""

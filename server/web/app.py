@@ -24,8 +24,9 @@ from server.diagnostics.link_log import KEPT_S
 from server.diagnostics.link_reports import LinkReports
 from server.protocol.command_age import refuse_old
 from server.protocol.link_messages import LinkReport
-from server.protocol.messages import Command, Status
+from server.protocol.messages import Command, EpisodeStatus, Status
 from server.protocol.wire import WireError
+from server.recording.episodes import TaskNote
 from server.recording.writer import RecordingError
 from server.security.least_role import (
     RefusedRequest,
@@ -123,6 +124,8 @@ class Api:
             ApiRoute(phone, self._stop_virtual_phone, methods=["DELETE"], status_code=202),
             ApiRoute(recording, self._start_recording, methods=post, status_code=202),
             ApiRoute(recording, self._stop_recording, methods=["DELETE"]),
+            ApiRoute("/api/task", self._say_task, methods=post, status_code=202),
+            ApiRoute("/api/episode", self._judge, methods=post, status_code=202),
             ApiRoute(
                 "/api/status", self._status, dependencies=watches, response_model=Reply[Status]
             ),
@@ -175,6 +178,25 @@ class Api:
         said = f"Recorded: {recorder.path}"
         self._manager.log_event(f"{said}; {lacks}." if lacks else said)
         return RecordedAnswer(str(recorder.path))
+
+    async def _say_task(self, asked: Asked[TaskNote], by: Supervisor) -> Reply[TaskNote]:
+        """Say what the next presses are for, in this recording and those that follow."""
+        if not (asked.text == "" or asked.text.isprintable()):
+            raise RefusedRequest(400, "text", "a line of text")
+        self._manager.people.note("task", by, asked.text)
+        self._manager.recordings.say_task(asked.text, now())
+        return asked
+
+    async def _judge(self, asked: Asked[EpisodeStatus], by: Supervisor) -> Reply[EpisodeStatus]:
+        """Discard an episode of the running recording, or keep it again."""
+        phone, recordings = self._manager.phone, self._manager.recordings
+        pressed = phone.pressed if phone is not None else None
+        episode = recordings.episode(pressed)
+        if pressed is None or episode is None or episode.press != asked.press:
+            raise RefusedRequest(409, "press", "the newest one of the recording that runs")
+        self._manager.people.note("keep" if asked.keep else "discard", by, str(asked.press))
+        recordings.judge(pressed, asked.keep, now())
+        return asked
 
     async def _status(self) -> Response:
         """What every screen shows."""

@@ -134,6 +134,8 @@ def build(manager: StatusSource) -> Status:
         battery_v=_rounded(health.battery_v, 2),
         e_stop=health.e_stop,
         health=health.words,
+        task=manager.recordings.task,
+        episode=manager.recordings.episode(phone.pressed if phone is not None else None),
     )
 
 

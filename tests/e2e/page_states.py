@@ -121,6 +121,7 @@ const fill = () => {
   text('url', 'https://192.168.178.42:8443/#k=AbCdEfGhIjKlMnOpQrSt'); text('ready', '2 to mend');
   document.querySelectorAll('output').forEach((one) => { one.textContent = '+2.5 Hz/(rad/s)'; });
   text('crowd', 'phones 1 · supervisors 2'); text('recording', '2026-07-01T12-34-56');
+  text('press', 'discarded 12'); text('verdict', 'Keep');
 };
 """
 SUPERVISOR = {
@@ -129,7 +130,7 @@ SUPERVISOR = {
       list('refusals', [BUSY, 'Let go of the button before arming.']);
       list('warnings', ['The server\\'s computer stood still 9 times in a minute.']);""",
     "flying": """fill(); mode('HOLD', 'The robot keeps still', BUSY);
-      show('screen', 'saturated');
+      show('screen', 'saturated', 'episode');
       text('left', 'Thrust fades in 3 s');""",
     "asking": """fill(); show('asking', 'notice'); text('notice', 'Not done: id: of a paired page');
       rows('asking', 'li', [`<span><b>Anna</b> (10.0.0.7) asks to lead. Do these letters stand on

@@ -14,6 +14,7 @@ from server.protocol.wire_records import Codec, Motion, Picture, Record, Touch
 from server.recording.folder import RecordingFolder
 from server.recording.reader import read
 from server.recording.writer import (
+    EPISODES,
     ROBOT_KEY,
     STATUS,
     UNIX_ZERO_KEY,
@@ -30,8 +31,11 @@ SIZE = 320, 240
 TWIST_IN_B = (0.03, 0.0, -0.04, 0.0, 0.0, 0.5)
 
 
-def on_a_known_day(folder, source=FLIGHT, change=lambda entry: entry.data, **metadata):
-    """The same items, or changed ones, in a file that knows the calendar."""
+def on_a_known_day(folder, source=FLIGHT, change=lambda entry: entry.data, notes=(), **metadata):
+    """The same items, or changed ones, in a file that knows the calendar.
+
+    `notes` are further ones, of episodes: (t [s], bytes) each.
+    """
     recording = read(source)
     path = folder / source.name
     with path.open("wb") as file:
@@ -40,6 +44,8 @@ def on_a_known_day(folder, source=FLIGHT, change=lambda entry: entry.data, **met
         for entry in recording.entries():
             ns = round(1e9 * entry.t)
             writer.add_message(channels[entry.topic], ns, change(entry), ns)
+        for t, data in notes:
+            writer.add_message(channels[EPISODES], round(1e9 * t), data, round(1e9 * t))
         finish_file(writer, file)
     return path
 

@@ -26,8 +26,14 @@ from tests.server.export.recordings import (
     told_a_twist,
 )
 
-RELEASED_S, DISCARDED = (3.0, 4.2), 1
+RELEASED_S = 3.0, 4.2
 """The finger leaves for 50 ms at each of these times."""
+TASKS = ["follow", "put it back"]
+"""Of the first, which nobody named, and of the last."""
+SAID = [
+    (4.0, b'{"type":"task","text":"put it back"}'),
+    (4.1, b'{"type":"verdict","press":2,"keep":false}'),
+]
 
 
 def three_presses(entry):
@@ -64,8 +70,8 @@ class Dataset:
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flight")
-    source = on_a_known_day(folder, change=three_presses)
-    words = ["--to", "lerobot", "--out", str(folder), "--task", "follow", "--discard", "1"]
+    source = on_a_known_day(folder, change=three_presses, notes=SAID)
+    words = ["--to", "lerobot", "--out", str(folder), "--task", "follow"]
     assert main([str(source), *words]) == 0
     return Dataset(folder / "virtual_phone.lerobot")
 
@@ -94,8 +100,9 @@ def test_rows_pictures_and_episodes_fit_together(flight):
         first = episode["videos/observation.images.phone/from_timestamp"]
         asked = [first + row["timestamp"] for row in rows]  # as LeRobot looks for its pictures
         assert asked == pytest.approx(flight.times[begin:end], abs=1e-4)
-        assert episode["tasks"] == ["follow"]
-    assert flight.tasks.to_pydict() == {"task_index": [0], "task": ["follow"]}
+        assert episode["tasks"] == [TASKS[k]]
+        assert {row["task_index"] for row in rows} == {k}
+    assert flight.tasks.to_pydict() == {"task_index": [0, 1], "task": TASKS}
     assert json.loads(flight.tasks.schema.metadata[b"pandas"])["index_columns"] == ["task"]
 
 

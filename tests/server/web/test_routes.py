@@ -59,6 +59,8 @@ TABLE = {
     "/api/rtc/answer": (POST, OPERATOR),
     "/api/virtual-phone": (BOTH, SUPERVISOR),
     "/api/recording": (BOTH, SUPERVISOR),
+    "/api/task": (POST, SUPERVISOR),
+    "/api/episode": (POST, SUPERVISOR),
     "/api/invite": (POST, SUPERVISOR),
     "/api/people/confirm": (POST, SUPERVISOR),
     "/api/people/deny": (POST, SUPERVISOR),

@@ -10,6 +10,7 @@ import { Alarm } from './alarm.js';
 import { browserOf } from '../app/browser.js';
 import { BoardView } from './view.js';
 import { ChoiceCard } from '../ui/choice_card.js';
+import { EpisodePanel } from './episode.js';
 import { EstimatePanel } from './estimate.js';
 import { EMPTY, reduce, shownMode } from './model.js';
 import { Feedback } from '../ui/feedback.js';
@@ -69,6 +70,7 @@ const knobs = new KnobPanel(document, (tune) => void link.sendMessage(tune), () 
 const leading = new LeadingChoice(document, (lead) => void link.sendMessage(lead), () => performance.now());
 const path = new PathSelect(document, (choice) => void link.sendMessage(choice), () => performance.now());
 const estimate = new EstimatePanel(document);
+const episode = new EpisodePanel(document, (path, body) => void request('POST', path, body));
 const choice = new ChoiceCard(document);
 const feedback = new Feedback(window.navigator, window.AudioContext, true);
 const alarm = new Alarm(document, (mode) => feedback.signal(mode));
@@ -89,6 +91,7 @@ function dispatch(event) {
     alarm.take(mode, modeWords(mode, board.status)[0], flies, performance.now(), runsEmpty(mode, board.status));
     view.render(board, problem === null ? null : adviceFor(problem, platform, window.location.port));
     estimate.render(board);
+    episode.take(board.heard ? board.status : null);
     knobs.take(board.heard ? board.status?.virtual_camera ?? null : null);
     path.take(board.heard ? board.status?.path_choice ?? null : null);
     leading.take(board.heard ? board.status?.leading ?? null : null, role !== 'supervisor');

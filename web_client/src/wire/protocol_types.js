@@ -217,6 +217,13 @@
  */
 
 /**
+ * From a press to its release.
+ * @typedef {object} EpisodeStatus
+ * @property {number} press Which, as its phone counts.
+ * @property {boolean} keep Nobody has discarded it.
+ */
+
+/**
  * Server → page, 10 Hz: the truth about the robot, on every screen.
  * @typedef {object} Status
  * @property {'status'} type
@@ -266,6 +273,8 @@
  * @property {number | null} battery_v null unless it is known.
  * @property {'untold' | 'unknown' | 'released' | 'pressed'} e_stop The emergency stop on the robot. `unknown`: told no more.
  * @property {string[]} health What people must know of the robot's own state, each in words, the gravest first.
+ * @property {string} task What the next presses are for, as recordings keep it.
+ * @property {EpisodeStatus | null} episode Of the newest press since the recording began; null without.
  */
 
 /**
