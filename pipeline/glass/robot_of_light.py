@@ -18,7 +18,8 @@ from pipeline.frames import Array, R_from_wxyz
 from pipeline.glass.display_lag import SWEEP_SHARE, DisplayLag, DisplayLagMeter
 from pipeline.glass.eye import Eye, EyeTracker
 from pipeline.glass.lag_tracker import LagTracker
-from pipeline.glass.lens_meter import TILT, GlassCorners, LensMeter
+from pipeline.glass.lens_meter import SPREAD_S, TILT, GlassCorners, GlassViews, LensMeter
+from pipeline.glass.turn_meter import HeldTurning, TurnMeter
 from pipeline.glass.window import Glass, Hanging, pierced, seen_through
 from pipeline.signals import PhoneImu, VisionMeasurement
 
@@ -55,6 +56,20 @@ class Lights:
     """(k, n, 2) of each LED on the glass [m], right and up; NaN where there is none."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class GlassSeen:
+    """What one camera has shown of one glass so far."""
+
+    lag: DisplayLag | None
+    """From drawing to the date of the picture that shows it: what dates are wrong by is in it."""
+    t_lag: float
+    """Of the picture that said so last [s]."""
+    views: GlassViews
+    """For the focal length."""
+    held: HeldTurning | None
+    """What share of its trembling pictures hide."""
+
+
 def least_height(leds_in_b: Array) -> float:
     """Of a glass that these LEDs (n, 3) fit [m]."""
     return LEAST_PER_HEIGHT * float(np.ptp(leds_in_b[:, 2]))
@@ -73,6 +88,9 @@ class RobotOfLight:
         """None: the lens is calibrated, or was measured."""
         self.lag: DisplayLag | None = None
         """Of the display, once it is measured; followed from then on."""
+        self._t_lag = -np.inf
+        self._views: GlassViews | None = None
+        self._turns = TurnMeter()
         self.eye: Eye | None = None
         """At the last step."""
 
@@ -83,25 +101,41 @@ class RobotOfLight:
         self._meter = DisplayLagMeter(SWEEP_SHARE * self.glass.width_m)
         self._tracker = LagTracker()
         self._lens = LensMeter(camera, self.glass) if is_guessed else None
+        self._turns = TurnMeter()
+        self._views = GlassViews(camera, self.glass, SPREAD_S)
 
     def lens_of(self, camera: Camera) -> SimpleLens | None:
         """What a camera that was guessed truly has, once it is measured."""
         meter = self._lens
         return meter.lens if meter is not None and meter.camera is camera else None
 
+    @property
+    def seen(self) -> GlassSeen | None:
+        """What the camera in use has shown of the glass; any thread may ask."""
+        views = self._views
+        if views is None:
+            return None
+        return GlassSeen(self.lag, self._t_lag, views, self._turns.held())
+
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """The phone has moved."""
         self._eye.add_phone_imu(sample)
+        self._turns.add_phone_imu(sample)
 
     def add_corners(self, corners: GlassCorners) -> None:
         """The phone has seen corners of fiducials."""
         if self._lens is not None:
             self._lens.add_corners(corners)
+        if self._views is not None:
+            self._views.add(corners)
 
     def add_seen(self, seen: VisionMeasurement, lights_in_c: Array, now: float) -> None:
         """The phone has seen the glass, and lights in directions (n, 3), the brightest first."""
         self._eye.add_seen(seen, now)
-        if seen.pose is None or not len(lights_in_c):
+        if seen.pose is None:
+            return
+        self._turns.add_pose(seen.pose)
+        if not len(lights_in_c):
             return
         R_gc = seen.pose.R_cb.T
         places = seen_through(-R_gc @ seen.pose.p_bc_in_c, lights_in_c @ R_gc.T)
@@ -109,18 +143,20 @@ class RobotOfLight:
             self._measure(seen.t, places)
         else:
             self._tracker.add_seen(seen.t, places[self.glass.has(places)])
-            self._follow(self.lag)
+            self._follow(self.lag, seen.t)
 
     def _measure(self, t: float, places: Array) -> None:
         """Take where a light sweeps, clear of the fiducials: it outshines all on the glass."""
         shown = places[self.glass.has(places)]
         if len(shown) and abs(shown[0, 1]) < 0.5 * self.glass.tile_m:
             self._meter.add_position(t, float(shown[0, 0]))
-            self.lag = self._meter.lag()
+            self.lag, self._t_lag = self._meter.lag(), t
 
-    def _follow(self, lag: DisplayLag) -> None:
+    def _follow(self, lag: DisplayLag, t: float) -> None:
         """Correct a lag that the robot's own lights deny."""
         error = self._tracker.error()
+        if error is not None:
+            self._t_lag = t
         if error is not None and abs(error.value) > SURE * error.sigma:
             step = min(max(error.value, -CORRECTED_S), CORRECTED_S)
             self.lag = DisplayLag(lag.value - step, error.sigma)

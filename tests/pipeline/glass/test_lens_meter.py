@@ -1,11 +1,11 @@
-"""Lens of a phone without a calibration: found where the glass shows it, and nowhere else."""
+"""Lens of a phone, by a glass: found, or found wrong, where the glass shows it and nowhere else."""
 
 import numpy as np
 import pytest
 
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.frames import R_from_rpy
-from pipeline.glass.lens_meter import VIEWS, GlassCorners, LensMeter
+from pipeline.glass.lens_meter import SPREAD_S, VIEWS, GlassCorners, GlassViews, LensMeter
 from pipeline.glass.window import Glass
 
 GLASS = Glass(0.53, 0.30)
@@ -52,7 +52,7 @@ def test_a_glass_at_right_angles_tells_no_lens_until_the_phone_is_tilted():
     assert meter.lens is None
     tilted = filmed(SimpleLens(0.68), 15.0, views=1)
     for k in range(2 * VIEWS):
-        view = tilted._views[0]
+        view = tilted._views.kept[0]
         meter.add_corners(GlassCorners(100.0 + 0.11 * k, view.numbers, view.pixels))
     assert found_by(meter).focal == pytest.approx(0.68, rel=0.05)
 
@@ -75,17 +75,47 @@ def test_neighbours_and_halves_of_the_glass_do_not_count():
         meter.add_corners(GlassCorners(0.001 * k, np.arange(16), pixels))
         meter.add_corners(GlassCorners(1.0 + k, np.arange(8), pixels[:8]))
     assert meter.lens is None
-    assert len(meter._views) == 1
+    assert len(meter._views.kept) == 1
 
 
 def test_a_phone_that_is_not_tilted_costs_a_trial_now_and_then_only(monkeypatch):
     trials = []
-    measured = LensMeter._measured
+    measured = GlassViews.lens
 
-    def counted(meter):
-        trials.append(meter)
-        return measured(meter)
+    def counted(views):
+        trials.append(views)
+        return measured(views)
 
-    monkeypatch.setattr(LensMeter, "_measured", counted)
+    monkeypatch.setattr(GlassViews, "lens", counted)
     filmed(SimpleLens(0.68), 0.0, hold_deg=0.2, views=VIEWS + 20)
     assert len(trials) == 5
+
+
+def checked(seconds=30.0, longer=1.0, tilt_deg=12.0, larger_glass=1.0, seed=0):
+    """What a glass says of a calibrated camera whose focal length is `longer` in truth."""
+    rng, known = np.random.default_rng(seed), SimpleLens(0.78, -0.03).camera(1280, 720)
+    true = SimpleLens(0.78 * longer, -0.03).camera(1280, 720)
+    views = GlassViews(known, Glass(0.53 * larger_glass, 0.30 * larger_glass), SPREAD_S)
+    for k in range(int(10 * seconds)):
+        hand = np.deg2rad(2.0) * rng.normal(size=3)
+        R_cg = R_from_rpy(np.array([0.0, -np.deg2rad(tilt_deg), 0.0]) + hand)
+        in_c = np.array([0.6, 0.0, 0.0]) + 0.01 * rng.normal(size=3) + GLASS.fiducials() @ R_cg.T
+        pixels = true.pixels(in_c) + NOISE_PX * rng.normal(size=(16, 2))
+        views.add(GlassCorners(0.1 * k, np.arange(16), pixels))
+    return views.focal_error()
+
+
+@pytest.mark.parametrize("longer", [0.95, 1.0, 1.04])
+@pytest.mark.parametrize("larger_glass", [0.95, 1.0])
+def test_a_focal_length_is_held_against_its_calibration_whatever_the_glass_is_said_to_measure(
+    longer, larger_glass
+):
+    for seed in range(5):
+        found = checked(longer=longer, larger_glass=larger_glass, seed=seed)
+        assert found.sigma < 0.007
+        assert abs(found.value - (longer - 1.0)) < 3.0 * found.sigma
+
+
+def test_a_focal_length_is_not_judged_by_few_views_nor_by_a_glass_at_right_angles():
+    assert checked(seconds=5.0) is None
+    assert checked(tilt_deg=0.0) is None
