@@ -28,14 +28,14 @@ class Series:
 
 
 class LinkLog:
-    """Remembers a minute."""
+    """Remembers a minute, or all of a recording."""
 
-    def __init__(self, now: float) -> None:
+    def __init__(self, now: float, kept_s: float = KEPT_S, most: int | None = MOST) -> None:
         """Begin empty at `now` [s]."""
-        self._begin = now
-        self._asked: deque[float] = deque(maxlen=MOST)
+        self._begin, self._kept_s = now, kept_s
+        self._asked: deque[float] = deque(maxlen=most)
         self._kinds = {
-            kind: deque[Arrival](maxlen=MOST) for kind in ("answers", "motion", "pictures")
+            kind: deque[Arrival](maxlen=most) for kind in ("answers", "motion", "pictures")
         }
 
     def asked(self, now: float) -> None:
@@ -48,7 +48,7 @@ class LinkLog:
 
     def series(self, now: float, seconds: float) -> Series:
         """The last `seconds`, or since the beginning if that was later."""
-        begin = max(self._begin, now - min(seconds, KEPT_S))
+        begin = max(self._begin, now - min(seconds, self._kept_s))
         return Series(
             begin,
             now,

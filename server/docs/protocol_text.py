@@ -95,6 +95,8 @@ REQUESTS = {
     "POST /api/task": 'body `{"text": "…"}`: what the next presses are for, as recordings keep it',
     "POST /api/episode": 'body `{"press": N, "keep": false}`: nobody should learn from the newest '
     "press of the recording that runs; with `true` somebody should",
+    "GET /api/check": "what the leading phone shows of itself, line by line, for the page `/check`:"
+    " `?seconds=` of the last 300 for what heat does, and of the last 60 for all else",
     "GET /ca.crt": "the authority to install on phones",
     "GET /healthz": "200, or 503 with `reasons`: control is silent, nothing can be recorded",
     "GET /metrics": "Prometheus",
@@ -195,8 +197,8 @@ come from the server's own pages (403): `Origin` is the server's, and requests c
 {requests()}
 
 Bodies up to {MAX_BODY} bytes (an answer's session description: {answer.MAX_BYTES}). Pages (`/`,
-`/supervisor`, `/board`, `/screen`, `/fleet`) and their files need no role. Refusals are JSON, as
-below: `code`, `field`, `allowed`.
+`/supervisor`, `/board`, `/screen`, `/fleet`, `/check`) and their files need no role. Refusals are
+JSON, as below: `code`, `field`, `allowed`.
 
 ## Records
 

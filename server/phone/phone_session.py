@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -16,14 +16,22 @@ from hardware.codec import Decoder
 from pipeline.camera.extrinsics import IDENTITY
 from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
+from pipeline.estimation.sensor_doubts import PHONES
 from pipeline.robot import Robot
 from pipeline.signals import BodyImu, PhoneImu, TouchState
 from pipeline.vision.detection import Detection
 from pipeline.vision_config import GatesConfig
 from server.control.ipc import ControlStatus, expected_of
 from server.control.ipc_inputs import Input
+from server.diagnostics import camera_health
 from server.diagnostics.link_log import LinkLog
 from server.diagnostics.meter import Meter
+from server.diagnostics.phone_check.phone_watch import (
+    PhoneFacts,
+    PhoneSeries,
+    PhoneWatch,
+    look_of,
+)
 from server.media.decoding import MakeDecoder
 from server.media.image_format import ImageFormat
 from server.phone.calibration_session import CalibrationSession
@@ -95,6 +103,9 @@ class PhoneSession:
         """What came when, lately."""
         self.pressed: TouchState | None = None
         """The newest word of a finger that holds."""
+        self._watch = PhoneWatch(self.link)
+        self._doubts: Sequence[str] = ()
+        """What control says against motion sensors."""
 
     def silent_for(self, now: float) -> float:
         """Time since its last sign of life [s]; hello was the first."""
@@ -116,6 +127,7 @@ class PhoneSession:
             case PhoneImu() as sample if isinstance(record.body, Motion):
                 self.meters["phone_imu"].tick(now, sample.t)
                 self.link.came("motion", sample.t, now)
+                self._watch.add_motion(sample)
                 self._to_control(sample)
                 self._check.add_imu(sample.t, record.body)
                 if self._screen is not None:
@@ -143,6 +155,7 @@ class PhoneSession:
     def add_status(self, status: ControlStatus) -> None:
         """What control says of the robot, for eyes and tests."""
         self._check.add_status(status)
+        self._doubts = status.estimate.doubts if status.estimate is not None else ()
         if self.vision is not None:
             front_end, rows = self.vision.front_end, np.array(status.body_samples).reshape(-1, 7)
             front_end.add_prediction(expected_of(status))
@@ -159,6 +172,8 @@ class PhoneSession:
     def _see(self, frame: EncodedFrame, now: float) -> None:
         self.meters["video"].tick(now, frame.t)
         self.link.came("pictures", frame.t, now)
+        self._watch.add_picture(frame.t, now, frame.picture)
+        self._watch.count(self.vision.undecodable if self.vision is not None else 0)
         shape = ImageFormat.of(frame.picture)
         may_guess = self.camera_problem != "" and self.wizard is None and self._films_screen
         if self._guessed is not None and self._screen is not None:
@@ -234,7 +249,26 @@ class PhoneSession:
             **took,
         }
         self._check.add_detection(detection)
+        self._watch.add_look(look_of(detection, camera, self._robot.leds_in_b))
         self.detection = detection
+
+    def series(self, now: float, seconds: float) -> PhoneSeries:
+        """What its check is made of: its last `seconds`, as far as they are kept."""
+        vision = self.vision
+        complaint = vision.front_end.complaint if vision is not None else self.camera_problem
+        doubts = (words for words in self._doubts if words.startswith(PHONES))
+        facts = PhoneFacts(
+            device=self.device,
+            since=self._greeted,
+            clock=self.ingest.clock,
+            axes=self._check.axes,
+            camera=vision.front_end.camera if vision is not None else None,
+            is_calibrated=self.camera_text != "",
+            health=camera_health.health(vision.front_end) if vision is not None else None,
+            complaints=tuple(filter(None, (*self._check.faults(), complaint, *doubts))),
+            glass=self._screen.seen if self._screen is not None else None,
+        )
+        return self._watch.series(now, seconds, facts)
 
     def thumbnail(self, wanted: bool) -> npt.NDArray[np.uint8] | None:
         """The next small picture (h, w, 3) RGB of what the camera sees, if anyone `wanted` it."""

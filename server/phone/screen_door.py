@@ -7,6 +7,7 @@ from typing import Protocol
 
 from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
+from pipeline.glass.robot_of_light import GlassSeen
 from pipeline.signals import Image, PhoneImu
 from pipeline.vision.detection import Detection
 from server.protocol.screen_messages import ScreenLights, ScreenSize
@@ -29,6 +30,10 @@ class ScreenDoor(Protocol):
     @property
     def why(self) -> str:
         """What is wrong with what the phone sees of it, in words, or ""."""
+
+    @property
+    def seen(self) -> GlassSeen | None:
+        """What the phone's camera has shown of it; None: nothing yet, or there is none."""
 
     def enter(self, show: Show) -> bool:
         """Take the place; False while another screen has it."""

@@ -11,6 +11,7 @@ from pipeline.estimator_config import GravityTestConfig
 from pipeline.frames import Array
 from pipeline.vision.detection import Detection
 from server.control.ipc import ControlStatus
+from server.diagnostics.phone_check.figures import Axes
 from server.protocol.wire_records import Motion
 
 MAX_WAITING = 64
@@ -47,6 +48,13 @@ class SensorCheck:
     def doubts_gravity(self) -> bool:
         """Poses that gravity denies are wanted as well."""
         return self._test.doubts_up
+
+    @property
+    def axes(self) -> Axes:
+        """Which axes agree with the pictures."""
+        if self._test.doubts_up:
+            return "unknown"
+        return "all" if self._test.rates_known and not self._test.faults() else "up"
 
     def faults(self) -> list[str]:
         """Faults, in words for who holds the phone."""

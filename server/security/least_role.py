@@ -19,7 +19,7 @@ from starlette.routing import BaseRoute
 from server.common.roles import Least, is_enough
 from server.security.pairings import Member
 
-PAGES = ("/", "/supervisor", "/board", "/screen", "/fleet")
+PAGES = ("/", "/supervisor", "/board", "/screen", "/fleet", "/check")
 PUBLIC = frozenset((*PAGES, "/healthz", "/ca.crt", "/api/pair"))
 """For anyone: the pages, and what brings somebody in."""
 PUBLIC_FOLDER, PUBLIC_FILES = "/src", (".js", ".css", ".svg")

@@ -17,7 +17,13 @@ from pipeline.camera.simple_lens import SimpleLens
 from pipeline.frames import Array
 from pipeline.glass import window
 from pipeline.glass.display_lag import SWEEP_SHARE
-from pipeline.glass.robot_of_light import STEP_S, Lights, RobotOfLight, least_height
+from pipeline.glass.robot_of_light import (
+    STEP_S,
+    GlassSeen,
+    Lights,
+    RobotOfLight,
+    least_height,
+)
 from pipeline.signals import Image, PhoneImu
 from pipeline.vision.detection import Detection
 from server.common.clock import now
@@ -69,6 +75,11 @@ class Screen:
     def why(self) -> str:
         """What is wrong with what the phone sees of it, in words, or ""."""
         return self._thread.why if self._thread is not None else ""
+
+    @property
+    def seen(self) -> GlassSeen | None:
+        """What the phone's camera has shown of it; None: nothing yet, or there is none."""
+        return self._thread.seen if self._thread is not None else None
 
     def enter(self, show: Show) -> bool:
         """Take the place; False while another screen has it."""
@@ -145,6 +156,11 @@ class LightsThread:
     def lens_of(self, camera: Camera) -> SimpleLens | None:
         """What a camera that was guessed truly has, once it is measured."""
         return self._robot.lens_of(camera)
+
+    @property
+    def seen(self) -> GlassSeen | None:
+        """What the camera that was told of last has shown."""
+        return self._robot.seen
 
     def add(self, news: PhoneImu | GlassLook | NewCamera) -> None:
         """Motion, or a look at the glass; any thread may say it."""

@@ -6,6 +6,7 @@ import asyncio
 import subprocess
 import sys
 from collections.abc import Sequence
+from functools import partial
 from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated
@@ -18,10 +19,15 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 
+from pipeline.config import FailsafeConfig
 from server import __version__
 from server.common.clock import now
+from server.diagnostics.link_check import check
 from server.diagnostics.link_log import KEPT_S
-from server.diagnostics.link_reports import LinkReports
+from server.diagnostics.phone_check.phone_watch import LONG_S
+from server.diagnostics.phone_check.report import CheckAnswer, answer_of
+from server.diagnostics.reports import Reports
+from server.phone.phone_session import PhoneSession
 from server.protocol.command_age import refuse_old
 from server.protocol.link_messages import LinkReport
 from server.protocol.messages import Command, EpisodeStatus, Status
@@ -45,6 +51,7 @@ from server.web.status import ModeName, mode_of
 from server.web.typed_routes import ApiRoute, Asked, Reply
 from server.web.websocket import PageServer
 
+RULES = FailsafeConfig()
 METRICS_S = 1.0
 """So old they may be: they cost some milliseconds."""
 NO_TELEMETRY = TelemetryConfig(tracing=False, metrics=False, logs=False, auto_configure=False)
@@ -111,7 +118,8 @@ class Api:
         """`authority` is the certificate to install on phones, `name` the server's."""
         self._manager, self._authority = manager, authority
         self.phone = VirtualPhoneProcess(name)
-        self._reports = LinkReports(now)
+        self._links = Reports(now, partial(check, rules=RULES))
+        self._checks = Reports(now, answer_of)
         self._t_metrics, self._exposed = -float("inf"), b""
 
     def routes(self) -> Sequence[BaseRoute]:
@@ -130,6 +138,9 @@ class Api:
                 "/api/status", self._status, dependencies=watches, response_model=Reply[Status]
             ),
             ApiRoute("/api/link", self._link, dependencies=watches),
+            ApiRoute(
+                "/api/check", self._check, dependencies=watches, response_model=Reply[CheckAnswer]
+            ),
             ApiRoute("/metrics", self._metrics, dependencies=watches),
             ApiRoute("/api/openapi.json", _openapi, dependencies=[Depends(supervisor)]),
             Route("/ca.crt", self._certificate),
@@ -206,10 +217,21 @@ class Api:
         self, seconds: Annotated[float, Query(gt=0.0, le=KEPT_S, allow_inf_nan=False)] = KEPT_S
     ) -> Reply[LinkReport]:
         """How it will be to fly with the operator's link, by its last `seconds`."""
+        return await self._links.of(self._phone().link, seconds)
+
+    async def _check(
+        self, seconds: Annotated[float, Query(gt=0.0, le=LONG_S, allow_inf_nan=False)] = LONG_S
+    ) -> Response:
+        """What the leading phone shows of itself, by its last `seconds`."""
+        answer = await self._checks.of(self._phone(), seconds)
+        # by msgspec, which writes null for what nothing tells
+        return Response(msgspec.json.encode(answer), media_type="application/json")
+
+    def _phone(self) -> PhoneSession:
         phone = self._manager.phone
         if phone is None:
             raise RefusedRequest(409, "phone", "while a phone leads: scan the code first")
-        return await self._reports.of(phone.link, seconds)
+        return phone
 
     async def _metrics(self) -> Response:
         """For Prometheus."""
@@ -248,6 +270,7 @@ def make_app(api: Api, pages: PageServer, others: Sequence[BaseRoute]) -> FastAP
             Route("/board", page_file("board.html")),
             Route("/screen", page_file("screen.html")),
             Route("/fleet", page_file("fleet.html")),
+            Route("/check", page_file("check.html")),
             *api.routes(),
             APIWebSocketRoute("/ws/phone", pages.phone, dependencies=leads),
             APIWebSocketRoute("/ws/video", pages.video, dependencies=leads),

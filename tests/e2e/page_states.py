@@ -141,6 +141,40 @@ SUPERVISOR = {
       list('problem-steps', ['Reload this page.']);""",
 }
 """By state of the supervisor's."""
+CHECKED = """
+const LINES = [['Pictures', '30.0 a second of 1280x720, H264, 2937 kbit/s, evenly within 0.4 ms',
+    'good', ''],
+  ['Lost pictures', '10.0 %', 'poor',
+    'Try another way of pictures, a better network, or close other apps on the phone.'],
+  ['Axes of motion', 'up is where pictures have it; turns are unknown', 'unknown',
+    'Turn the phone about all its axes, the robot in sight.'],
+  ['Light to server', '167 ms from its drawing, 1 in 20 over 185, 1 in 100 over 187', 'fair',
+    'If it stays too long: a quicker screen, a 5 GHz Wi-Fi or a cable.'],
+  ['LEDs in the picture', 'exact to 0.25 px (each: 0.33, 0.28, 0.25, 0.34, 0.20)', 'fair',
+    'Hold the phone more quietly, focus on the robot, allow more kbit/s.']];
+const MARKS = {good: '✓ good', fair: '! fair', poor: '✕ poor', unknown: '? unknown'};
+const lines = () => document.getElementById('lines').replaceChildren(...LINES.map(
+  ([what, value, grade, advice]) => Object.assign(document.createElement('li'), {
+    className: 'line', innerHTML: `<h3 class="what">${what}</h3>
+      <span class="grade">${MARKS[grade]}</span><p class="value">${value}</p>
+      <p class="advice">${advice}</p>`})));
+const grades = () => [...document.querySelectorAll('.line')].forEach(
+  (line, i) => { line.dataset.grade = LINES[i][2]; });
+"""
+CHECK = {
+    "running": """lines(); grades(); hide('minute', 'long'); show('bar', 'enough');
+      document.getElementById('bar').value = 0.4; text('title', 'Listening: 36 s left');
+      text('hint', 'Android 412x915@2.6 / camera 0, 24 s');""",
+    "waiting": """hide('minute', 'long'); show('bar', 'enough');
+      text('title', 'Waiting for a phone');
+      document.getElementById('enough').disabled = true;
+      text('hint', 'Nothing is heard: phone: while a phone leads: scan the code first');""",
+    "told": """lines(); grades(); show('save-page', 'save-json');
+      document.getElementById('run').dataset.grade = 'poor';
+      text('title', '✕ Not yet: mend what is poor first.');
+      text('hint', 'Android 412x915@2.6 / camera 0, 60 s');""",
+}
+"""By state of the phone check's page."""
 STATES = {
     **{("index", name): f"{OPERATING}{script}" for name, script in PHONE.items()},
     **{
@@ -150,6 +184,8 @@ STATES = {
     ("screen", "setup"): "",
     ("screen", "shows"): """document.getElementById('setup').hidden = true;
       document.getElementById('why').textContent = 'Hold the phone still.';""",
+    ("check", "ready"): "",
+    **{("check", name): f"{OPERATING}{CHECKED}{script}" for name, script in CHECK.items()},
     ("board", "ruler"): "",
     ("trust", "help"): "",
 }

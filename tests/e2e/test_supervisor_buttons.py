@@ -255,6 +255,9 @@ def open_others(clicks: Clicks) -> None:
     with clicks.follow("fleet") as fleet:
         until(lambda: bool(fleet.evaluate(answered)), SOON_S, "the fleet")
         assert fleet.evaluate("location.pathname") == "/fleet"
+    with clicks.follow("check") as check:
+        until(lambda: bool(check.evaluate(answered)), SOON_S, "the check")
+        assert check.evaluate("location.pathname") == "/check"
     with clicks.follow("alone") as view:
         until(lambda: bool(view.evaluate(answered)), SOON_S, "the view")
         assert view.evaluate("location.pathname") == "/view/"

@@ -6,7 +6,7 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
 const ROOT = fileURLToPath(new URL('..', import.meta.url));
-const PAGES = ['index.html', 'supervisor.html', 'board.html', 'screen.html', 'fleet.html', 'trust.html'];
+const PAGES = ['index.html', 'supervisor.html', 'board.html', 'screen.html', 'fleet.html', 'check.html', 'trust.html'];
 
 /** @param {string} path */
 const read = (path) => readFileSync(join(ROOT, path), 'utf8');
@@ -23,7 +23,7 @@ function needed(page) {
   for (const path of found) {
     const text = read(path);
     const names = [
-      ...text.matchAll(/(?:src|href)="((?!#|\.\/"|view\/|screen"|fleet"|ca\.crt"|\$secure")[^"]+)"/g), ...text.matchAll(/^import .*?from '([^']+)'/gms),
+      ...text.matchAll(/(?:src|href)="((?!#|\.\/"|view\/|screen"|fleet"|check"|ca\.crt"|\$secure")[^"]+)"/g), ...text.matchAll(/^import .*?from '([^']+)'/gms),
       ...text.matchAll(/new URL\('([^']+\.js)'/g),
     ];
     for (const [, name] of names) found.add(join(dirname(path), name ?? ''));
@@ -40,7 +40,7 @@ test('pages have no inline script, style or handler: the policy forbids them', (
 });
 
 test('nothing comes from another host', () => {
-  for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css', 'calibration.css', 'board.css', 'fleet.css', 'lens.css', 'link.css',
+  for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css', 'calibration.css', 'board.css', 'check.css', 'fleet.css', 'lens.css', 'link.css',
     'pairing.css', 'people.css', 'screen.css', 'sight.css', 'trust.css']) {
     const addresses = read(path).match(/https?:\/\/[\w.-]+/g) ?? [];
     const foreign = addresses.filter((address) => !/localhost|www\.w3\.org|^https:\/\/host$/.test(address));
@@ -69,12 +69,13 @@ test('every element the views look for is in their page', () => {
       'src/ui/handover_card.js', 'src/ui/sight_overlay.js', 'src/ui/leading_choice.js'],
     ['board.html', 'src/app/board.js'],
     ['screen.html', 'src/screen/main.js'],
+    ['check.html', 'src/check/main.js'],
     ['supervisor.html', 'src/dashboard/view.js', 'src/dashboard/phone_card.js', 'src/dashboard/runtime_parameters.js',
       'src/dashboard/path_select.js', 'src/dashboard/people_card.js', 'src/dashboard/main.js', 'src/ui/choice_card.js', 'src/ui/leading_choice.js'],
   ]) {
     const ids = new Set([...read(page ?? '').matchAll(/\sid="([^"]+)"/g)].map(([, id]) => id));
     for (const view of views) {
-      const wanted = [...read(view).matchAll(/(?:find|text|show|data|list|figure|graph|row|listen|input|place)\('([a-z][\w-]*)'/g)];
+      const wanted = [...read(view).matchAll(/(?:find|text|show|data|list|figure|graph|row|listen|input|place|onClick)\('([a-z][\w-]*)'/g)];
       assert.ok(wanted.length > 0);
       for (const [, id] of wanted) assert.ok(ids.has(id), `${view} looks for #${id} in ${page}`);
     }

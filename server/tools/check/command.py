@@ -7,20 +7,18 @@ something is poor, 2 if the recording can't be used.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from msgspec import to_builtins
+import msgspec
 
 from server.common.options import Parser
-from server.common.text import plain
+from server.diagnostics.phone_check.report import html_of, report_of
+from server.diagnostics.phone_check.verdicts import CheckLine
 from server.recording.reader import read
 from server.recording.writer import RecordingError
-from server.tools.check.page import TITLES, page
 from server.tools.check.recorded_phone import RecordedPhone
-from server.tools.check.verdicts import CheckLine, verdicts, worst
 
 POOR, REFUSED = 1, 2
 """Exit codes."""
@@ -46,16 +44,13 @@ def main(argv: list[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     try:
         found = RecordedPhone(read(arguments.recording)).figures()
-        lines = verdicts(found)
-        grade = worst(lines)
-        print(f"{found.device}, {found.seconds:.0f} s\n{text_of(lines)}\n\n{TITLES[grade]}")
+        report = report_of(found)
+        print(f"{found.device}, {found.seconds:.0f} s\n{text_of(report.lines)}\n\n{report.title}")
         if arguments.html is not None:
-            arguments.html.write_text(str(page(found, lines)), encoding="utf-8")
+            arguments.html.write_text(html_of(report), encoding="utf-8")
         if arguments.json is not None:
-            report = plain(to_builtins({"grade": grade, "lines": lines, "figures": found}))
-            text = json.dumps(report, indent=1, ensure_ascii=False, allow_nan=False)
-            arguments.json.write_text(text, encoding="utf-8")
+            arguments.json.write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=1))
     except (RecordingError, OSError) as error:
         print(f"lightleash check: {error}", file=sys.stderr)
         return REFUSED
-    return POOR if grade == "poor" else 0
+    return POOR if report.grade == "poor" else 0

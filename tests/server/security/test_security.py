@@ -30,7 +30,7 @@ OWN = {"Origin": BASE, "X-Lightleash": "1"}
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS")
 STYLES = (
     *("style", "phone", "supervisor", "calibration", "lens", "board"),
-    *("pairing", "people", "screen", "link", "sight", "trust", "fleet"),
+    *("pairing", "people", "screen", "link", "sight", "trust", "fleet", "check"),
 )
 PICTURES = ("icon", "lead", "board")
 FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICTURES)}
@@ -100,7 +100,7 @@ def test_nothing_but_pages_their_files_and_pairing_opens_without_a_role(rig):
         for method in METHODS
         if rig.client.request(method, path, headers=OWN).status_code not in (401, 403, 404, 405)
     }
-    public = {"/", "/supervisor", "/board", "/screen", "/fleet", "/healthz", *FILES}
+    public = {"/", "/supervisor", "/board", "/screen", "/fleet", "/check", "/healthz", *FILES}
     readable = {(method, path) for path in public for method in ("GET", "HEAD")}
     assert opened == readable | {("POST", "/api/pair")}  # which answers 400: no link
 

@@ -246,6 +246,19 @@ def test_a_link_is_judged_while_a_phone_leads(client):
     assert (answer.status_code, answer.json()["field"]) == (409, "phone")
 
 
+@pytest.mark.parametrize("seconds", ["0", "-1", "301", "nan", "inf", "five", ""])
+def test_a_phone_is_checked_over_no_time_that_is_not_kept(client, seconds):
+    answer = client.get(f"/api/check?seconds={seconds}")
+    assert (answer.status_code, answer.json()["field"]) == (400, "seconds")
+
+
+def test_a_phone_is_checked_while_one_leads_and_nobody_can_change_a_check(client):
+    answer = client.get("/api/check?seconds=300")
+    assert (answer.status_code, answer.json()["field"]) == (409, "phone")
+    for method in ("POST", "PUT", "DELETE"):
+        assert client.request(method, "/api/check").status_code == 405
+
+
 def test_every_refusal_is_json_that_names_what_is_allowed(client):
     for path in ("/api/status", "/metrics"):
         answer = client.get(path, headers={"Authorization": ""})

@@ -33,7 +33,7 @@ def files_of(page: str, client: TestClient) -> list[str]:
 
 @pytest.mark.parametrize(
     ("page", "script"),
-    [("/", "app"), ("/supervisor", "dashboard"), ("/screen", "screen")],
+    [("/", "app"), ("/supervisor", "dashboard"), ("/screen", "screen"), ("/check", "check")],
 )
 def test_a_page_weighs_less_than_100_kb_and_its_second_visit_nothing(
     client: TestClient, page: str, script: str

@@ -47,13 +47,14 @@ MAY = {
 GET, POST, BOTH = ("GET",), ("POST",), ("DELETE", "POST")
 
 TABLE = {
-    **dict.fromkeys(("/", "/supervisor", "/board", "/screen", "/fleet"), (READ, ALL)),
+    **dict.fromkeys(("/", "/supervisor", "/board", "/screen", "/fleet", "/check"), (READ, ALL)),
     **dict.fromkeys(("/healthz", "/ca.crt"), (READ, ALL)),
     "/src": (READ, ALL),
     "/api/pair": (POST, ALL),
     "/api/whoami": (GET, OPERATOR),
     "/api/stop": (POST, OPERATOR),
     "/api/link": (GET, OPERATOR),
+    "/api/check": (GET, VIEWER),
     "/api/fleet": (GET, VIEWER),
     "/api/rtc": (POST, OPERATOR),
     "/api/rtc/answer": (POST, OPERATOR),

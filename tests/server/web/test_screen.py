@@ -17,6 +17,7 @@ class Door:
     """A screen's place that remembers what it was told."""
 
     why = ""
+    seen = None
 
     def __init__(self):
         self.show, self.size = None, None

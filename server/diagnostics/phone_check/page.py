@@ -7,14 +7,14 @@ from typing import Final
 from markupsafe import Markup
 
 from server.common.markup import document, element
-from server.tools.check.recorded_phone import PhoneFigures
-from server.tools.check.verdicts import CheckLine, worst
+from server.diagnostics.phone_check.figures import PhoneFigures
+from server.diagnostics.phone_check.verdicts import CheckLine, worst
 
 TITLES: Final = {
     "good": "Good: nothing speaks against leading a robot with this phone.",
     "fair": "Usable, with what is said below.",
     "poor": "Not yet: mend what is poor first.",
-    "unknown": "Too little was recorded to say anything.",
+    "unknown": "Nothing speaks against it so far, but not all is known yet.",
 }
 STYLE: Final = """
 :root { color-scheme: light dark; }
@@ -36,7 +36,7 @@ def page(found: PhoneFigures, lines: list[CheckLine]) -> Markup:
     body = (
         element("h1", title),
         element("p", TITLES[worst(lines)]),
-        element("p", f"{found.seconds:.0f} s recorded, {found.pictures} pictures."),
+        element("p", f"{found.seconds:.0f} s, {found.pictures} pictures."),
         element("table", head, element("tbody", *map(_row, lines))),
     )
     return document(title, STYLE, [element("main", *body)])

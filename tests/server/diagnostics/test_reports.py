@@ -10,7 +10,7 @@ import pytest
 from pipeline.config import FailsafeConfig
 from server.diagnostics.link_check import check
 from server.diagnostics.link_log import LinkLog
-from server.diagnostics.link_reports import LASTS_S, MAX_KEPT, LinkReports
+from server.diagnostics.reports import LASTS_S, MAX_KEPT, Reports
 
 
 class Judge:
@@ -19,7 +19,7 @@ class Judge:
     def __init__(self, runner):
         self.runner = runner
         self.t, self.judged, self.threads, self.at_once = 100.0, 0, set(), 0
-        self.reports = LinkReports(lambda: self.t, self)
+        self.reports = Reports(lambda: self.t, self)
         self.log = LinkLog(0.0)
 
     def __call__(self, series):

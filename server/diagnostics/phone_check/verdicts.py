@@ -8,13 +8,23 @@ from math import isnan
 from typing import Final
 
 from pipeline.frames import GRAVITY
+from pipeline.glass.display_lag import LEAST_LAG_S, MOST_LAG_S
+from pipeline.glass.robot_of_light import LOOK
+from server.diagnostics.phone_check.figures import Axes, GlassFigures, PhoneFigures
 from server.protocol.link_messages import Grade
-from server.tools.check.recorded_phone import PhoneFigures
 
 ORDER: Final[tuple[Grade, ...]] = ("good", "unknown", "fair", "poor")
 """From best to worst; what nobody knows spoils nothing."""
 SURE: Final = 2.0
 """Standard deviations."""
+AGES_MS: Final = (120.0, 200.0)
+"""Of pictures at p95: good up to the one, fair up to the other."""
+LAGS_MS: Final = (50.0, 1e3 * MOST_LAG_S)
+"""Of a screen; beyond the latter nobody can lead by it."""
+MINUTE_S: Final = 60.0
+CALIBRATE: Final = (
+    "Calibrate this camera at this lens and size, and switch zoom and stabilisation off."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +43,7 @@ def verdicts(found: PhoneFigures) -> list[CheckLine]:
         *_pictures(found),
         *_motion(found),
         *_camera(found),
+        *(_glass(found, found.glass) if found.glass is not None else ()),
         *_robot(found),
         CheckLine("Link", found.link.title, found.link.grade, " ".join(found.link.advice)),
         *(CheckLine("It was said", words, "poor") for words in found.complaints),
@@ -90,14 +101,16 @@ def _pictures(found: PhoneFigures) -> Iterator[CheckLine]:
             "Age of pictures",
             f"{p50:.0f} ms from capture to the server, 1 in 20 over {p95:.0f}, "
             f"1 in 100 over {p99:.0f}",
-            _low(p95, 120.0, 200.0),
+            _low(p95, *AGES_MS),
             "Use a 5 GHz Wi-Fi or a cable; the robot follows as late as its pictures are old.",
         )
-    if not isnan(found.slower_pct):
+    if not isnan(found.end_hz):
+        slower_pct = 100.0 * (1.0 - found.end_hz / found.begin_hz)
         yield _line(
-            "After a while",
-            f"{found.slower_pct:.0f} % fewer pictures at the end than at the beginning",
-            _low(found.slower_pct, 5.0, 20.0),
+            "Heat",
+            f"{found.begin_hz:.1f} pictures a second at the beginning, {found.end_hz:.1f} "
+            f"{found.long_s / MINUTE_S:.0f} minutes later",
+            _low(slower_pct, 5.0, 20.0),
             "The phone is hot or saves power: out of its case, out of the sun, on its charger.",
         )
 
@@ -112,6 +125,14 @@ def _motion(found: PhoneFigures) -> Iterator[CheckLine]:
         ),
         "Allow motion sensors, keep the page in front, close other apps, leave power saving.",
     )
+    axes: dict[Axes, tuple[str, Grade]] = {
+        "unknown": ("unknown", "unknown"),
+        "up": ("up is where pictures have it; turns are unknown", "unknown"),
+        "all": ("as in the pictures", "good"),
+    }
+    words, grade = axes[found.axes]
+    advice = "" if grade == "good" else "Turn the phone about all its axes, the robot in sight."
+    yield CheckLine("Axes of motion", words, grade, advice)
     yield _line(
         "Gyroscope at rest",
         f"{found.gyro_bias_deg_s:.2f} °/s",
@@ -127,7 +148,8 @@ def _motion(found: PhoneFigures) -> Iterator[CheckLine]:
     )
     yield _line(
         "Clock",
-        f"{found.clock_ppm:+.0f} ppm, shortest round trip {found.round_trip_ms:.1f} ms",
+        f"runs {found.clock_ppm:+.0f} ppm fast, known to {found.clock_error_ms:.1f} ms, "
+        f"shortest round trip {found.round_trip_ms:.1f} ms",
         _low(abs(found.clock_ppm), 100.0, 300.0),
         "Its clock runs oddly: times are followed, but are a little worse.",
     )
@@ -141,7 +163,7 @@ def _camera(found: PhoneFigures) -> Iterator[CheckLine]:
     camera = found.camera
     if camera is None or camera.time_offset_ms is None or camera.larger_percent is None:
         yield CheckLine(
-            "Camera beside gyroscope",
+            "Gyroscope beside pictures",
             "unknown",
             "unknown",
             "Move the phone for half a minute with the robot in the picture.",
@@ -159,20 +181,60 @@ def _camera(found: PhoneFigures) -> Iterator[CheckLine]:
         "Lens",
         f"things look {larger:+.1f} ± {sigma:.1f} % larger than calibrated",
         _low(abs(larger) - SURE * sigma, 1.0, 3.0),
-        "Calibrate this camera at this lens and size, and switch zoom and stabilisation off.",
+        CALIBRATE,
     )
-    held, sigma = camera.held_percent or 0.0, camera.held_sigma_percent or 0.0
-    yield _line(
-        "Stabilisation",
-        f"hides {held:.0f} ± {sigma:.0f} % of the phone's turning",
-        _low(abs(held) - SURE * sigma, 3.0, 15.0),
-        "Switch stabilisation off, in the browser's camera settings or by another lens.",
-    )
+    if found.glass is None:
+        yield _stabilisation(camera.held_percent or 0.0, camera.held_sigma_percent or 0.0)
     yield _line(
         "Exposure",
         f"{camera.exposure_ms:.1f} ms" if camera.exposure_ms is not None else "not seen",
         "fair" if camera.hint else "good",
         camera.advice,
+    )
+
+
+def _stabilisation(held_pct: float, sigma_pct: float) -> CheckLine:
+    return _line(
+        "Stabilisation",
+        f"hides {held_pct:.0f} ± {sigma_pct:.0f} % of the phone's turning",
+        _low(held_pct - SURE * sigma_pct, 3.0, 15.0),  # what turns too much is not steadied
+        "Turn the phone a little. Switch stabilisation off, in the browser's camera settings or by "
+        "another lens.",
+    )
+
+
+def _glass(found: PhoneFigures, glass: GlassFigures) -> Iterator[CheckLine]:
+    yield _line(
+        "Screen's delay",
+        f"{glass.lag_ms:.1f} ± {glass.lag_sigma_ms:.1f} ms",
+        "poor" if glass.lag_ms < 1e3 * LEAST_LAG_S else _low(glass.lag_ms, *LAGS_MS),
+        f"{LOOK} If it stays too long: the screen's game mode, or another screen.",
+    )
+    p50, p95, p99 = glass.light_ms
+    good, fair = (age + lag for age, lag in zip(AGES_MS, LAGS_MS, strict=True))
+    if found.by_arrival:
+        value, worst_ms = f"{p50:.0f} ms in the middle; how it scatters is unknown", p50
+    else:
+        value = f"{p50:.0f} ms from its drawing, 1 in 20 over {p95:.0f}, 1 in 100 over {p99:.0f}"
+        worst_ms = p95
+    yield _line(
+        "Light to server",
+        value,
+        _low(worst_ms, good, fair),
+        f"{LOOK} If it stays too long: a quicker screen, a 5 GHz Wi-Fi or a cable.",
+    )
+    yield _stabilisation(glass.held_pct, glass.held_sigma_pct)
+    focal = f"{found.focal_px:.0f} px"
+    if not found.is_calibrated:
+        is_looking = not isnan(found.focal_px)
+        value = f"not calibrated; taken for {focal}" if is_looking else "unknown"
+        yield CheckLine("Focal length", value, "fair" if is_looking else "unknown", CALIBRATE)
+        return
+    yield _line(
+        "Focal length",
+        f"{glass.focal_pct:+.1f} ± {glass.focal_sigma_pct:.1f} % beside the calibrated {focal}",
+        _low(abs(glass.focal_pct) - SURE * glass.focal_sigma_pct, 1.0, 3.0),
+        f"Lean the phone by 10° before the screen for half a minute. If it stays: {CALIBRATE}",
     )
 
 
@@ -183,9 +245,12 @@ def _robot(found: PhoneFigures) -> Iterator[CheckLine]:
         _high(found.found_pct, 95.0, 80.0),
         "Keep all LEDs in the picture; dim other lights, or expose shorter.",
     )
+    each = ", ".join(f"{dot:.2f}" for dot in found.dots_px)
+    by = "the codec and the screen" if found.glass is not None else "the codec"
+    codec = "" if isnan(found.codec_pct) else f"; {found.codec_pct:.0f} % of its square by {by}"
     yield _line(
         "LEDs in the picture",
-        f"exact to {found.noise_px:.2f} px",
+        f"exact to {found.noise_px:.2f} px (each: {each}){codec}",
         _low(found.noise_px, 0.15, 0.4),
         "Hold the phone more quietly, focus on the robot, allow more kbit/s.",
     )

@@ -1,0 +1,86 @@
+"""A phone that had time to show everything, before a screen, and is fine."""
+
+from __future__ import annotations
+
+from server.diagnostics.phone_check.figures import GlassFigures, PhoneFigures
+from server.protocol.camera_messages import CameraHealth
+from server.protocol.link_messages import LinkReport
+
+GLASS = GlassFigures(
+    lag_ms=40.0,
+    lag_sigma_ms=0.5,
+    light_ms=(100.0, 120.0, 130.0),
+    focal_pct=0.2,
+    focal_sigma_pct=0.3,
+    held_pct=1.0,
+    held_sigma_pct=0.5,
+)
+CAMERA = CameraHealth(
+    complaint="",
+    hint="",
+    advice="",
+    exposure_ms=4.0,
+    readout_ms=15.0,
+    readout_learnt=True,
+    readout_sigma_ms=0.5,
+    time_offset_ms=1.0,
+    time_offset_sigma_ms=1.0,
+    larger_percent=0.1,
+    larger_sigma_percent=0.2,
+    held_percent=1.0,
+    held_sigma_percent=1.0,
+)
+LINK = LinkReport(
+    grade="good",
+    title="The robot would follow.",
+    lines=[],
+    advice=[],
+    seconds=60.0,
+    follows=1.0,
+    waits=0,
+    ends=0,
+    sides={},
+    gaps={},
+    longest_ms=30.0,
+    rtt_ms=12.0,
+    rtt_p95_ms=20.0,
+    lost=0.0,
+    motion_hz=60.0,
+    picture_hz=30.0,
+    picture_age_ms=60.0,
+    picture_gap_ms=40.0,
+)
+FINE = PhoneFigures(
+    device="A phone",
+    seconds=60.0,
+    size="1280x720",
+    codec="H264",
+    kbit_s=3000.0,
+    pictures=1800,
+    picture_hz=30.0,
+    jitter_ms=1.0,
+    lost_pct=0.0,
+    by_arrival=False,
+    age_ms=(60.0, 80.0, 90.0),
+    begin_hz=30.0,
+    end_hz=29.9,
+    long_s=300.0,
+    motion_hz=60.0,
+    motion_silence_ms=30.0,
+    axes="all",
+    gyro_bias_deg_s=0.2,
+    gravity_m_s2=9.81,
+    clock_ppm=20.0,
+    clock_error_ms=2.0,
+    round_trip_ms=5.0,
+    found_pct=99.0,
+    noise_px=0.08,
+    dots_px=(0.07, 0.08, 0.08, 0.09, 0.08),
+    codec_pct=40.0,
+    focal_px=998.0,
+    is_calibrated=True,
+    camera=CAMERA,
+    complaints=(),
+    link=LINK,
+    glass=GLASS,
+)
