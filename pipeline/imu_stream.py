@@ -19,10 +19,13 @@ MAX_GAP_S: Final = 0.1
 class ImuStream:
     """Samples sorted by time, in preallocated arrays."""
 
-    def __init__(self, capacity: int = CAPACITY) -> None:
-        """Make room for `capacity` samples; when it is full, the older half is forgotten."""
+    def __init__(self, capacity: int = CAPACITY, more: int = 0) -> None:
+        """Make room for `capacity` samples; when it is full, the older half is forgotten.
+
+        `more`: numbers that a sample has beside rate and force.
+        """
         self._times = np.zeros(capacity)
-        self._values = np.zeros((capacity, 6))
+        self._values = np.zeros((capacity, 6 + more))
         self._wxyz = np.zeros((capacity, 4))
         self._first = self._stop = self._turned = 0
         self._gap_end = np.inf
@@ -40,10 +43,10 @@ class ImuStream:
 
     @property
     def values(self) -> Array:
-        """(n, 6) angular rate [rad/s] and specific force [m/s²]."""
+        """(n, 6 or more) angular rate [rad/s], specific force [m/s²], and what is beside them."""
         return self._values[self._first : self._stop]
 
-    def insert(self, t: float, rate: Array, force: Array) -> bool:
+    def insert(self, t: float, rate: Array, force: Array, more: Array | None = None) -> bool:
         """Put a sample of `t` [s] where it belongs; False: one of that time is there."""
         if self._stop == len(self._times):
             self._make_room()
@@ -56,7 +59,9 @@ class ImuStream:
                 array[i + 1 : self._stop + 1] = array[i : self._stop]
             self._turned = min(self._turned, i)
         self._times[i] = t
-        self._values[i, :3], self._values[i, 3:] = rate, force
+        self._values[i, :3], self._values[i, 3:6] = rate, force
+        if more is not None:
+            self._values[i, 6:] = more
         self._stop += 1
         self.newest = max(self.newest, t)
         return True

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from pipeline.frames import GRAVITY, Array
 
+LATE_S = 0.1
+"""On its way a measured twist may be so long."""
 ONE_AXIS = 1e-3
 """Forces that share an axis but for this are all along it."""
 
@@ -62,6 +64,33 @@ class TwistDrive:
         return v > self.speed * rounding or omega > self.rate * rounding
 
 
+@dataclass(frozen=True, slots=True)
+class ToldMotion:
+    """How a robot without motion sensors says how its body moves, and how wrong that may be."""
+
+    is_measured: bool
+    """By its wheels or joints; else it moves as told, for all that anybody knows."""
+    is_level: bool
+    """Its z axis is up; else the phone says where that is."""
+    tilt: float
+    """How far from level it may stand [rad]."""
+    interval_s: float
+    """Between two measured twists."""
+    noise_v: float
+    """Of one of them [m/s] ..."""
+    noise_omega: float
+    """... and of its angular rate [rad/s]."""
+    slip: float
+    """Share of its twist by which it may move otherwise, for a while."""
+    unlike_s: float
+    """By so much its delay and lag together may differ from those of its drive."""
+
+    @property
+    def lasts_s(self) -> float:
+        """So old a measured twist may be and still tell how it moves."""
+        return 2.5 * self.interval_s + LATE_S
+
+
 def _halves(twist: Array) -> tuple[Array, Array]:
     return twist[:3], twist[3:]
 
@@ -108,6 +137,8 @@ class Robot:
     twist: TwistDrive | None = None
     """Of a robot that takes a twist: it has no thrusters (m = 0), and who drives it carries it, so
     that mass and inertia count for nothing."""
+    motion: ToldMotion | None = None
+    """Of one that has no motion sensors on its body: its twist stands for them."""
 
     @property
     def blinking_leds(self) -> int:

@@ -44,7 +44,8 @@ class BodyImu:
     """Accelerometer (3,) [m/s²]: specific force, +9.8 up at rest."""
     twist_m_bf_in_b: Array | None = None
     """(6,) velocity and angular rate in f as the robot itself measures them [m/s, rad/s], of one
-    that takes a twist."""
+    that takes a twist. One without motion sensors (`Robot.motion`) has nothing else: the others are
+    made of it, the specific force zeros where nobody knows which way is up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -104,7 +104,7 @@ class Teleop:
 
     def __init__(self, robot: Robot, config: TeleopConfig, period: float = PERIOD_S) -> None:
         """For one robot; `period` [s] is what the first `step` counts for."""
-        self.estimator = make_estimator(config, robot.leds_in_b)
+        self.estimator = make_estimator(config, robot.leds_in_b, robot.motion)
         self.attitude, self._bridge = Attitude(), GyroBridge()
         self._config, self._robot = config, robot
         self._h, self._t_step, self._stood_still = period, np.nan, False
@@ -124,7 +124,7 @@ class Teleop:
         self._phone: int | None = None
         self._t_met = -np.inf
         self._body = BodyImu(-np.inf, np.zeros(3), np.zeros(3))
-        self._monitor = SensorMonitor()
+        self._monitor = SensorMonitor(of_body=robot.motion is None)
         self._reference: Reference | None = None
         self._led_to: Reference | None = None
         self._leading = self.next_leading = PLAIN

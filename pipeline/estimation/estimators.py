@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
+from typing import Final, get_args
 
 import numpy as np
 
@@ -14,16 +14,31 @@ from pipeline.estimation.no_filter import NoFilter
 from pipeline.estimation.paper_ekf import PaperEkf
 from pipeline.estimation.relative_filter import RelativeFilter
 from pipeline.frames import GRAVITY, Array
+from pipeline.robot import ToldMotion
 from pipeline.signals import BodyImu, LedRays, PhoneImu, RelativePose, VisionMeasurement
 
+NEEDS_SENSORS: Final = (
+    "'paper' needs motion sensors on the robot's body, and this one has none: 'relative' or 'none'"
+)
 
-def make_estimator(config: TeleopConfig, leds_in_b: Array) -> Estimator:
-    """The one that `config.estimator` names, for a robot with `leds_in_b` (n, 3) [m]."""
+
+def make_estimator(
+    config: TeleopConfig, leds_in_b: Array, motion: ToldMotion | None = None
+) -> Estimator:
+    """The one that `config.estimator` names, for a robot with `leds_in_b` (n, 3) [m].
+
+    `motion` of one without motion sensors on its body.
+
+    Raises:
+        ValueError: one that can't do without them.
+    """
     if config.estimator == "none":
         return NoFilter(config.no_filter)
     if config.estimator == "paper":
+        if motion is not None:
+            raise ValueError(f"estimator: {NEEDS_SENSORS}")
         return PaperEkf(config.ekf)
-    return RelativeFilter(config.relative, leds_in_b)
+    return RelativeFilter(config.relative, leds_in_b, motion)
 
 
 def warm_up() -> None:

@@ -17,21 +17,21 @@ EXCESS, EXCESS_S = 0.25, 0.1
 
 @kernel
 def sample_at(times: Array, values: Array, i: int, t: float, out: Array) -> float:
-    """Sample (6,) at `t`, between samples i and i + 1, or the last one; gives how far beyond it."""
-    n = times.shape[0]
+    """Sample (n,) at `t`, between samples i and i + 1, or the last one; gives how far beyond it."""
+    n, width = times.shape[0], out.shape[0]
     if i < 0:
-        out[:] = values[0]
+        out[:] = values[0, :width]
         return float(times[0] - t)
     if i < n - 1:
         share = (t - times[i]) / (times[i + 1] - times[i])
-        for k in range(6):
+        for k in range(width):
             out[k] = values[i, k] + share * (values[i + 1, k] - values[i, k])
         if i >= 1 and i + 2 < n and times[i + 2] - times[i - 1] < MAX_GAP_S:
             near = APART * (times[i + 1] - times[i])
             if times[i] - times[i - 1] >= near and times[i + 2] - times[i + 1] >= near:
                 _bend(times, values, i, t, out)
         return 0.0
-    for k in range(6):
+    for k in range(width):
         out[k] = values[i, k]
     return float(t - times[i])
 
@@ -44,7 +44,7 @@ def _bend(times: Array, values: Array, i: int, t: float, out: Array) -> None:
     """
     t0, t1, t2, t3 = times[i], times[i + 1], times[i - 1], times[i + 2]
     square = (t - t0) * (t - t1)
-    for k in range(6):
+    for k in range(out.shape[0]):
         d01 = (values[i + 1, k] - values[i, k]) / (t1 - t0)
         d12 = (values[i - 1, k] - values[i + 1, k]) / (t2 - t1)
         d23 = (values[i + 2, k] - values[i - 1, k]) / (t3 - t2)
@@ -56,7 +56,7 @@ def _bend(times: Array, values: Array, i: int, t: float, out: Array) -> None:
 def put_noise(
     times: Array, values: Array, i: int, t: float, beyond: float, noise: Array, h: float, s: Array
 ) -> None:
-    """Densities (6,) of a sample's noise at `t`, and of what the samples don't say of the truth.
+    """Densities (n,) of a sample's noise at `t`, and of what the samples don't say of the truth.
 
     Between two samples the truth leaves the straight line like a Brownian bridge; beyond the last
     one it walks away, and may go on in a direction that nobody has seen. A sample at full scale
@@ -69,7 +69,7 @@ def put_noise(
         far = max(0.0, min(t - times[i], times[i + 1] - t) - NEAR_S)
     elif i > 0:
         period = min(times[i] - times[i - 1], MAX_GAP_S)
-    for k in range(6):
+    for k in range(s.shape[0]):
         white, rough, drift = noise[0, k // 3], noise[1, k // 3], noise[2, k // 3]
         s[k] = white * white * max(period, h)
         s[k] += rough * rough * (period * period / 12.0 + far * far)

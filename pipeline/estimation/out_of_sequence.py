@@ -115,12 +115,14 @@ class OutOfSequence(ABC, Generic[Measurement]):
         self.checkpoints = [start]
         self._replay_from = -inf
 
-    def insert(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
+    def insert(
+        self, stream: ImuStream, t: float, rate: Array, force: Array, more: Array | None = None
+    ) -> bool:
         """Remember a sample of `body` or `phone`; False: it was there already."""
         times = stream.times
         i = (len(times) if t > stream.newest else int(np.searchsorted(times, t))) - self._bent
         before = float(times[i]) if i >= 0 else -inf
-        if not stream.insert(t, rate, force):
+        if not stream.insert(t, rate, force, more):
             return False
         self._replay_from = min(self._replay_from, before)
         return True

@@ -7,7 +7,9 @@ believe: where to start, which pictures to refuse, when to begin again, and how 
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -30,10 +32,11 @@ from pipeline.estimation.relative_track import RelativeTrack
 from pipeline.estimation.sanity import is_believable, is_imu_sample
 from pipeline.estimation.sensor_doubts import MEND_TONE, aliased_tones, sensor_doubts
 from pipeline.estimation.spot_noise import SpotNoise
+from pipeline.estimation.told_motion import for_body
 from pipeline.estimation.tones import PICTURES, Tones
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, log
-from pipeline.imu_stream import ImuStream
+from pipeline.robot import ToldMotion
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, RelativeState, VisionMeasurement
 from pipeline.so3_kernels import largest_sigma
 from pipeline.timing.offset_watch import OffsetMonitor
@@ -53,9 +56,15 @@ NIS_PICTURES: Final = 30
 class RelativeFilter:
     """Relative pose and motion at any time from LED rays and two IMUs."""
 
-    def __init__(self, config: RelativeConfig, leds_in_b: Array) -> None:
-        """Knows nothing until the first picture with a pose and samples of both IMUs near it."""
-        self._config, self._leds_in_b = config, leds_in_b
+    def __init__(
+        self, config: RelativeConfig, leds_in_b: Array, motion: ToldMotion | None = None
+    ) -> None:
+        """Knows nothing until the first picture with a pose and samples of both sides near it.
+
+        `motion` is how a robot without motion sensors on its body tells its own.
+        """
+        self._motion, self._leds_in_b = motion, leds_in_b
+        self._config = config = for_body(config, motion)
         self._initial = initial_biases(config)
         if not config.body_steps:
             self._initial[:2] = 0.0
@@ -72,7 +81,7 @@ class RelativeFilter:
 
     def reset(self) -> None:
         """Forget everything but the counts."""
-        self._track = RelativeTrack(self._config, self._leds_in_b)
+        self._track = RelativeTrack(self._config, self._leds_in_b, self._motion)
         self._started = False
         self._learnt: Learnt | None = None
         self._recent: deque[float] = deque(maxlen=64)
@@ -85,23 +94,25 @@ class RelativeFilter:
 
     def add_phone_imu(self, sample: PhoneImu) -> None:
         """Remember a sample of the phone, in any order; what can't be used is counted."""
-        rate, force = sample.omega_m_cf_in_c, sample.a_m_cf_in_c
-        self._remember(self._track.phone, sample.t, rate, force)
+        t, rate, force = sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c
+        insert = partial(self._track.insert, self._track.phone, t, rate, force)
+        self._remember(t, rate, force, insert)
 
     def add_body_imu(self, sample: BodyImu) -> None:
         """Remember a sample of the robot, in any order; what can't be used is counted."""
         rate, force = sample.omega_m_bf_in_b, sample.a_m_bf_in_b
-        is_used = self._remember(self._track.body, sample.t, rate, force)
+        insert = partial(self._track.insert_body, sample)
+        is_used = self._remember(sample.t, rate, force, insert)
         if is_used and self._config.body_steps:  # what is told shakes nothing
             self._aliased.feel(sample.t, rate, force)
 
-    def _remember(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
+    def _remember(self, t: float, rate: Array, force: Array, insert: Callable[[], bool]) -> bool:
         """Whether it can be used."""
         if not is_imu_sample(t, rate, force) or t > self._now + MAX_SLEEP_S:
             self.samples_invalid += 1
         elif self._started and t <= self._track.base.t:
             self.samples_late += 1
-        elif not self._track.insert(stream, t, rate, force):
+        elif not insert():
             self.samples_duplicate += 1
         else:
             return True
@@ -270,7 +281,7 @@ class RelativeFilter:
             t=t,
             p_bc_in_c=here.x[0:3].copy(),
             R_cb=here.R.copy(),
-            u_bf_in_c=here.x[3:6].copy(),
+            u_bf_in_c=here.x[3:6] + track.told_velocity(here),
             omega_bf_in_b=inputs[0:3],
             omega_cf_in_c=inputs[6:9],
             R_ic=here.R_ic.copy(),
@@ -341,6 +352,7 @@ class RelativeFilter:
                 self._bias_steps.t_stepped,
                 self._track.body_noise,
                 self._spot_noise.factor,
+                of_body=self._motion is None,
             ),
         )
 

@@ -5,6 +5,10 @@ R (3, 3) beside it. Error state (22): δp, θ, δu, the biases, the offset. Betw
 the moving part changes, so F (9, 9), G (9, 12) and the noise Q (9, 9) are gathered step by step
 and the covariance is touched once.
 
+Of a body without motion sensors, samples say beside rates and the force at rest (6,) its velocity
+(3,) in b and how far each of the three is doubted (3,), as square roots of noise densities:
+`told_velocity_kernels` says what u is then.
+
 While the body's sensors have a tone, both are longer by its amplitudes: of the cosine (6,) in ω_b
 and f_b, and of the sine (6,); G has so many columns more.
 """
@@ -18,6 +22,7 @@ import numpy as np
 from pipeline.estimation.gravity_free_kernels import step
 from pipeline.estimation.hand_motion_kernels import PREDICTED_S, forecast_at
 from pipeline.estimation.imu_interpolation_kernels import put_noise, sample_at
+from pipeline.estimation.told_velocity_kernels import doubt, move
 from pipeline.frames import Array
 from pipeline.so3_kernels import kernel, put_exp
 
@@ -30,6 +35,8 @@ X, X_BIASES, X_OFFSET = 19, 6, 18
 TONE, X_TONE, BODY = N, X, 6
 """Where a tone's amplitudes stand, if there is one; inputs of the body."""
 MAX_STEP_S = 0.01
+SAID, TOLD = 9, 12
+"""Of a body without motion sensors: numbers that it says, and those of a sample with its doubts."""
 
 
 @kernel
@@ -168,12 +175,12 @@ def transit(
 ) -> int:
     """Carry x, R from span[0] to span[1] through both IMUs' samples; gather F, G, Q from nothing.
 
-    `noise` (2, 4, 2) by (body, phone) and (gyroscope, accelerometer): standard deviation of a
-    sample, density by which the truth wanders between and after samples, its drift after the last
-    one, full scale. `hand` (n, 6): forecast of `hand_predictor` beyond the phone's last sample;
-    empty: that is held. `tone`: angular rate [rad/s] of the one whose amplitudes x has, and a time
-    at which its phase is nought [s]. R_ic (3, 3) goes on gathering the camera's rotation since the
-    phone's last sample. Gives the count of steps.
+    `noise` (2, 4, 3) by (body, phone) and (gyroscope, accelerometer, velocity): standard deviation
+    of a sample, density by which the truth wanders between and after samples, its drift after the
+    last one, full scale. `hand` (n, 6): forecast of `hand_predictor` beyond the phone's last
+    sample; empty: that is held. `tone`: angular rate [rad/s] of the one whose amplitudes x has, and
+    a time at which its phase is nought [s]. R_ic (3, 3) goes on gathering the camera's rotation
+    since the phone's last sample. Gives the count of steps.
     """
     F[:], G[:], Q[:] = 0.0, 0.0, 0.0
     for k in range(MOVING):
@@ -181,6 +188,8 @@ def transit(
     s, turn_c = np.empty(INPUTS), np.empty((3, 3))
     inputs, f, g = np.empty(INPUTS), np.empty((9, 9)), np.empty((9, 12))
     scratch = np.empty(G.shape)
+    is_told, said = v_b.shape[1] == TOLD, np.zeros(v_b.shape[1])
+    of_body = np.empty(SAID if is_told else BODY)
     ahead, begun = np.empty(6), np.empty(6)
     t, t_end = span
     b = int(np.searchsorted(t_b, t, side="right")) - 1
@@ -196,8 +205,12 @@ def transit(
             until = min(until, t_c[c + 1])
         h, middle = until - t, 0.5 * (t + until)
         if h > 0.0:
-            beyond = sample_at(t_b, v_b, b, middle, inputs[0:6])
-            put_noise(t_b, v_b, b, middle, beyond, noise[0], h, s[0:6])
+            beyond = sample_at(t_b, v_b, b, middle, said)
+            put_noise(t_b, v_b, b, middle, beyond, noise[0], h, of_body)
+            if is_told:
+                for k in range(SAID):
+                    of_body[k] += said[SAID + k // 3] ** 2
+            inputs[0:6], s[0:6] = said[0:6], of_body[0:6]
             beyond = sample_at(t_c, v_c, c, middle, inputs[6:12])
             put_noise(t_c, v_c, c, middle, beyond, noise[1], h, s[6:12])
             if c == last and hand.shape[0] > 0:
@@ -211,7 +224,11 @@ def transit(
                 inputs[6:9] = ahead[0:3]
             swing = take_errors(middle, x, tone, inputs)
             step(x, R, inputs, h, w, f, g)
+            if is_told:
+                move(x, R, inputs, said[6:9], h, w, f, g)
             gather(F, G, Q, f, g, s, h, scratch, swing)
+            if is_told:
+                doubt(Q, R, of_body[6:9], h)
             if c == last:
                 put_exp(h * inputs[6], h * inputs[7], h * inputs[8], turn_c)
                 R_ic[:] = R_ic @ turn_c

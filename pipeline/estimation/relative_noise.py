@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 
+DRIFT_V: Final = 1.0
+"""How fast the truth leaves a velocity that is held [m/s²]: of robots that say theirs."""
+
 
 def noise_of(c: RelativeConfig) -> Array:
-    """Noise densities (2, 4, 2) of both IMUs' samples, as `relative_kernels.transit` takes them."""
-    body = ((c.sigma_omega_b, c.sigma_f_b), (0.0, c.rough_f_b), (c.drift_omega_b, c.drift_f_b))
-    phone = ((c.sigma_omega_c, c.sigma_f_c), (0.0, c.rough_f_c), (c.drift_omega_c, c.drift_f_c))
-    unknown = (np.inf, np.inf)
+    """Noise densities (2, 4, 3) of both sides' samples, as `relative_kernels.transit` takes them.
+
+    Of a velocity: what its samples don't say of themselves.
+    """
+    body = (
+        (c.sigma_omega_b, c.sigma_f_b, 0.0),
+        (0.0, c.rough_f_b, 0.0),
+        (c.drift_omega_b, c.drift_f_b, DRIFT_V),
+    )
+    phone = (
+        (c.sigma_omega_c, c.sigma_f_c, 0.0),
+        (0.0, c.rough_f_c, 0.0),
+        (c.drift_omega_c, c.drift_f_c, 0.0),
+    )
+    unknown = (np.inf, np.inf, np.inf)
     return np.array(((*body, unknown), (*phone, unknown)))
 
 

@@ -11,6 +11,7 @@ from pipeline.estimation.aliased_tone import WANDERS, Tone
 from pipeline.estimation.full_scale import LOUD, FullScale
 from pipeline.estimation.hand_motion_kernels import WINDOW
 from pipeline.estimation.hand_predictor import HandPredictor
+from pipeline.estimation.imu_interpolation_kernels import sample_at
 from pipeline.estimation.out_of_sequence import Checkpoint, OutOfSequence
 from pipeline.estimation.ray_kernels import TOUCHED, fuse_rays, is_sound, misfit
 from pipeline.estimation.relative_kernels import (
@@ -19,6 +20,7 @@ from pipeline.estimation.relative_kernels import (
     INPUTS,
     MOVING,
     OFFSET,
+    TOLD,
     TONE,
     X_OFFSET,
     X_TONE,
@@ -30,16 +32,19 @@ from pipeline.estimation.relative_kernels import (
 )
 from pipeline.estimation.relative_noise import initial_biases, noise_of, walks_of
 from pipeline.estimation.sample_noise import SampleNoise
+from pipeline.estimation.told_motion import ToldTwist, ToldVertical
 from pipeline.estimation.tones import PHONE, ROBOT, Tones
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array, cross
 from pipeline.imu_stream import ImuStream
-from pipeline.signals import Flags, VisionMeasurement
+from pipeline.robot import ToldMotion
+from pipeline.signals import BodyImu, Flags, VisionMeasurement
 
 KEPT: Final = 2 * WINDOW
 """Samples up to the base that are still interpolated from, or learnt from."""
 MISLED: Final = (0.05, 0.05, 0.3)
 """By so much place [m], attitude [rad] and velocity [m/s] may be wrong before a tone is known."""
+NOTHING_TOLD: Final = np.zeros(3)
 AMPLITUDES: Final = 12
 """Of a tone."""
 BENT: Final = 2
@@ -49,9 +54,18 @@ BENT: Final = 2
 class RelativeTrack(OutOfSequence[VisionMeasurement]):
     """State x (19,), attitude R and covariance P (22, 22) at any time since the base."""
 
-    def __init__(self, config: RelativeConfig, leds_in_b: Array) -> None:
-        """Take the noise as configured; LEDs (n, 3) [m]."""
+    def __init__(
+        self, config: RelativeConfig, leds_in_b: Array, motion: ToldMotion | None = None
+    ) -> None:
+        """Take the noise as configured; LEDs (n, 3) [m]; `motion` of a body that tells its own.
+
+        The config is then that of `told_motion.for_body`.
+        """
         super().__init__(X, N, MOVING, BENT, KEPT)
+        self._told = self._vertical = None
+        if motion is not None:
+            self._told, self._vertical = ToldTwist(motion), ToldVertical(motion)
+            self.body = ImuStream(more=TOLD - BODY)
         self._leds_in_b = np.ascontiguousarray(leds_in_b)
         self._walks, self._calm = walks_of(config), walks_of(config)
         self._hand, self._phone_factor = HandPredictor(config.hand), 1.0
@@ -60,7 +74,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         """When each sensor last said as much as it can, by device [s]."""
         self._noise = noise_of(config)
         self._configured = self._noise[:, :3].copy()
-        self._heard = [SampleNoise(sigmas) for sigmas in self._configured[:, 0]]
+        self._heard = [SampleNoise(sigmas) for sigmas in self._configured[:, 0, :2]]
         self._tones = [Tones(limits) for limits in (ROBOT, PHONE)]
         self._initial, self._initial_offset = initial_biases(config), config.initial_offset
         self._gate, self._still = config.gate_chi2, config.offset_still
@@ -70,9 +84,22 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         self._Q, self._steps = np.zeros((MOVING, MOVING)), np.zeros((13, 3, 3))
         self._products = np.zeros((2, MOVING, N))
 
-    def insert(self, stream: ImuStream, t: float, rate: Array, force: Array) -> bool:
+    def insert_body(self, sample: BodyImu) -> bool:
+        """Remember a sample of the robot; False: it was there, or lacks what such a robot tells."""
+        if self._told is None or self._vertical is None:
+            return self.insert(self.body, sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+        twist_in_b = sample.twist_m_bf_in_b
+        if twist_in_b is None or not bool(np.isfinite(twist_in_b).all()):
+            return False
+        force = self._vertical.force(sample.t, twist_in_b[3:])
+        more = np.concatenate((twist_in_b[:3], self._told.doubts(sample.t, twist_in_b)))
+        return super().insert(self.body, sample.t, twist_in_b[3:], force, more)
+
+    def insert(
+        self, stream: ImuStream, t: float, rate: Array, force: Array, more: Array | None = None
+    ) -> bool:
         """Remember a sample of `body` or `phone`, of whose hand it tells; False: it was there."""
-        if not super().insert(stream, t, rate, force):
+        if not super().insert(stream, t, rate, force, more):
             return False
         if stream is self.phone:
             self._hand.follow(stream)
@@ -91,7 +118,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
     @property
     def body_noise(self) -> Array:
         """(2,) how far samples of the robot's sensors scatter, by the configured noise."""
-        noise: Array = self._heard[0].levels[:, 0] / self._configured[0, 0]
+        noise: Array = self._heard[0].levels[:, 0] / self._configured[0, 0, :2]
         return noise
 
     @property
@@ -110,7 +137,7 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         noise = self._noise[device]
         noise[:3] = self._configured[device]
         white, rough = self._heard[device].levels.T
-        noise[0] = np.maximum(noise[0], white)
+        noise[0, :2] = np.maximum(noise[0, :2], white)
         if device:  # a robot's samples are near enough for all that it does
             noise[1, 1] = max(noise[1, 1], rough[1])
             noise[:3] *= sqrt(self._phone_factor)
@@ -126,7 +153,9 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         self._walks[:INPUTS] = self._calm[:INPUTS] + np.repeat(densities, 3)
 
     def begin(self, start: Checkpoint[VisionMeasurement]) -> None:
-        """See `OutOfSequence`; a tone goes on."""
+        """See `OutOfSequence`; a tone goes on, and a vertical that was not known is learnt."""
+        if self._vertical is not None:
+            self._vertical.learn(start.t, start.R, self.phone, self.body)
         super().begin(self._with_tone(start) if self.tone is not None else start)
 
     def sway(self, tone: Tone | None) -> None:
@@ -207,7 +236,9 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         leds, inputs = self._leds_in_b[rays.led], self._inputs(here)
         tangents = np.array(rays.tangents, dtype=np.float64, order="C")
         C = np.array(rays.covariances, dtype=np.float64, order="C")
-        return float(misfit(here.x, here.R, inputs, leds, ahead, tangents, C, use)), freedoms
+        x = here.x.copy()
+        x[3:6] += self.told_velocity(here)
+        return float(misfit(x, here.R, inputs, leds, ahead, tangents, C, use)), freedoms
 
     def in_picture(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """P (6, 6) of the pose in a picture stamped for the time of `here`: that is doubted too.
@@ -222,9 +253,18 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
     def passing(self, here: Checkpoint[VisionMeasurement]) -> Array:
         """(6,) how the pose passes there: ṗ in c [m/s], the attitude's rate in b [rad/s]."""
         inputs, p = self._inputs(here), here.x[0:3]
-        return np.concatenate(
-            (here.x[3:6] - cross(inputs[6:9], p), inputs[0:3] - here.R.T @ inputs[6:9])
-        )
+        u = here.x[3:6] + self.told_velocity(here)
+        return np.concatenate((u - cross(inputs[6:9], p), inputs[0:3] - here.R.T @ inputs[6:9]))
+
+    def told_velocity(self, here: Checkpoint[VisionMeasurement]) -> Array:
+        """(3,) in c [m/s] of a body that tells its own, which x has not; zeros of another."""
+        if self._told is None:
+            return NOTHING_TOLD
+        times, said = self.body.times, np.empty(TOLD)
+        last = int(np.searchsorted(times, here.t, side="right")) - 1
+        sample_at(times, self.body.values, last, here.t, said)
+        told: Array = here.R @ said[6:9]
+        return told
 
     def inputs_now(self) -> Array:
         """(12,) ω_b, f_b, ω_c, f_c at the time of `now`, biases removed."""
@@ -248,8 +288,9 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
     def _fuse(
         self, here: Checkpoint[VisionMeasurement], seen: VisionMeasurement, use: Flags
     ) -> float:
-        rays = seen.rays
-        return float(
+        rays, told = seen.rays, self.told_velocity(here)
+        here.x[3:6] += told  # LEDs pass by all of it
+        chi2 = float(
             fuse_rays(
                 here.x,
                 here.R,
@@ -264,6 +305,8 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
                 use,
             )
         )
+        here.x[3:6] -= told
+        return chi2
 
     def _is_sound(self, here: Checkpoint[VisionMeasurement]) -> bool:
         return bool(is_sound(here.x, here.R, here.P))

@@ -17,10 +17,13 @@ SENSORS: Final = (*ROBOTS, *PHONES)
 """In the order of the filter's biases."""
 KINDS: Final = ("A gyroscope", "An accelerometer")
 VIBRATES: Final = "{sensor} feels a vibration, as of a propeller or a motor."
+EITHER, THE_PHONE = "the robot or the phone", "the phone"
+"""Whose a sensor is: of a robot without motion sensors, the phone's alone."""
 SWAYS: Final = (
-    "{kind} of the robot or the phone sways where pictures don't: does something vibrate at about"
-    " its sample rate?"
+    "{kind} of {whose} sways where pictures don't: does something vibrate at about its sample rate?"
 )
+STEPPED: Final = "{kind} of {whose} seems to have another bias{or_else}."
+OR_ELSE: Final = ", or the robot moves otherwise than it says"
 ALIASED: Final = (
     "{sensor} sways where pictures don't: something shakes it at about a multiple of its sample"
     " rate."
@@ -49,6 +52,8 @@ def sensor_doubts(
     t_stepped: Array,
     noise: Array,
     spot_noise: float,
+    *,
+    of_body: bool = True,
 ) -> tuple[str, ...]:
     """Sentences, one for each doubt at `t` [s].
 
@@ -62,7 +67,9 @@ def sensor_doubts(
         t_stepped: When its bias last stepped (4,) [s].
         noise: Of the robot's samples, by the configured (2,).
         spot_noise: Factor of the variances of LEDs' rays.
+        of_body: The robot has motion sensors on its body.
     """
+    whose, or_else = (EITHER, "") if of_body else (THE_PHONE, OR_ELSE)
 
     def since(t_last: Array) -> list[int]:
         return np.flatnonzero(t - t_last < SAID_S).tolist()
@@ -72,10 +79,10 @@ def sensor_doubts(
     shaken = [k for k in since(t_vibrating) if t_vibrating[k] - t_clipped[k] > SAID_S]
     vibrating = [VIBRATES.format(sensor=SENSORS[k]) for k in shaken]
     aliased = aliased_tones(t, t_aliased)
-    swaying = [SWAYS.format(kind=KINDS[k]) for k in since(t_swaying)]
+    swaying = [SWAYS.format(kind=KINDS[k], whose=whose) for k in since(t_swaying)]
     jumped = since(t_stepped) if t - t_start > LEARNS_S else ()
     kinds = sorted({k % 2 for k in jumped})  # which of the two can hardly be told
-    stepped = [f"{KINDS[k]} of the robot or the phone seems to have another bias." for k in kinds]
+    stepped = [STEPPED.format(kind=KINDS[k], whose=whose, or_else=or_else) for k in kinds]
     noisy = [
         f"{sensor} is much noisier than usual."
         for sensor, ratio in zip(ROBOTS, noise, strict=True)

@@ -11,8 +11,9 @@ from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 class SensorMonitor:
     """Of phone and robot, in words for people; feed it every measurement."""
 
-    def __init__(self) -> None:
-        """Nothing measured."""
+    def __init__(self, *, of_body: bool = True) -> None:
+        """Nothing measured; `of_body`: the robot has motion sensors on its body."""
+        self._has_body = of_body
         self._frozen_imu = FrozenImu()
         self._of_phone, self._of_body = AccelerometerCheck(), AccelerometerCheck()
         self._repeated = RepeatedPicture()
@@ -29,6 +30,8 @@ class SensorMonitor:
     def add_body_imu(self, sample: BodyImu) -> None:
         """Take a sample of the robot."""
         self._repeated.add_imu(sample)
+        if not self._has_body:
+            return
         self._of_body.add(sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
         self._frozen_imu.add(sample)
 

@@ -34,9 +34,11 @@ from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, X_BIASES, X_OFFSET
 from pipeline.estimation.relative_start import Learnt, can_start, first_checkpoint
 from pipeline.estimation.relative_track import RelativeTrack
+from pipeline.estimation.told_motion import for_body
 from pipeline.estimator_config import RelativeConfig
 from pipeline.frames import Array
 from pipeline.imu_stream import ImuStream
+from pipeline.robot import ToldMotion
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, VisionMeasurement
 from pipeline.vision.camera_lies import SHIFTED, CameraLie, is_far, named, scaled
 from pipeline.vision.check_noise import CheckNoise
@@ -109,10 +111,11 @@ class Missed:
 class PictureCheck:
     """Samples and pictures come from one thread, each sort in the order of its arrival."""
 
-    def __init__(self, leds_in_b: Array) -> None:
-        """Of a robot with LEDs (n, 3) [m]; nothing known."""
-        self._config, self._leds_in_b = RelativeConfig(gate_chi2=UNGATED), leds_in_b
-        self._track = RelativeTrack(self._config, leds_in_b)
+    def __init__(self, leds_in_b: Array, motion: ToldMotion | None = None) -> None:
+        """Of a robot with LEDs (n, 3) [m]; nothing known. `motion`: it has no motion sensors."""
+        self._config = for_body(RelativeConfig(gate_chi2=UNGATED), motion)
+        self._leds_in_b = leds_in_b
+        self._track = RelativeTrack(self._config, leds_in_b, motion)
         self._knows = False
         self._learnt: Learnt | None = None
         """Of the motion sensors, while the camera told the truth."""
@@ -142,7 +145,7 @@ class PictureCheck:
         if isinstance(sample, PhoneImu):
             track.insert(track.phone, sample.t, sample.omega_m_cf_in_c, sample.a_m_cf_in_c)
         else:
-            track.insert(track.body, sample.t, sample.omega_m_bf_in_b, sample.a_m_bf_in_b)
+            track.insert_body(sample)
 
     def believed(self, seen: VisionMeasurement) -> VisionMeasurement:
         """The same with what is believed of it: nothing, or all, as sure as one may be."""
@@ -321,7 +324,7 @@ def _bent(stream: ImuStream, t: float, usual: float) -> float:
 
     What shakes quicker than it is sampled predicts less.
     """
-    bends = np.diff(_lately(stream, t)[:, 3:], 2, axis=0)
+    bends = np.diff(_lately(stream, t)[:, 3:6], 2, axis=0)
     return max(1.0, float(np.square(bends).mean()) / usual) if len(bends) else 1.0
 
 
@@ -329,7 +332,7 @@ def _is_deaf(stream: ImuStream, t: float) -> bool:
     """Whether samples lately are missing or misdated, or are clipped: shaken beyond the range."""
     since, until = np.searchsorted(stream.times, (t - LAG_S, t))
     since = max(since - 1, 0)
-    values, apart = stream.values[since:until], np.diff(stream.times[since:until])
+    values, apart = stream.values[since:until, :6], np.diff(stream.times[since:until])
     if len(apart) == 0:
         return True
     is_clipped = ((np.diff(values, axis=0) == 0.0) & (np.abs(values[1:]) > EXTREME)).any()

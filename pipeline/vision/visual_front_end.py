@@ -20,6 +20,7 @@ from pipeline.camera.line_delay import LineDelay
 from pipeline.frames import Array
 from pipeline.imu_stream import CAPACITY, ImuStreams
 from pipeline.prediction import Prediction, PredictionHistory
+from pipeline.robot import ToldMotion
 from pipeline.signals import (
     BodyImu,
     Frame,
@@ -62,13 +63,19 @@ class VisualFrontEnd:
         clock: Callable[[], float] = lambda: 0.0,
         *,
         blinks: bool = False,
+        motion: ToldMotion | None = None,
     ) -> None:
-        """LEDs (n, 3) [m]; `clock` only times the stages; the robot `blinks` codes when told to."""
+        """LEDs (n, 3) [m]; `clock` only times the stages; the robot `blinks` codes when told to.
+
+        `motion` of one without motion sensors: by that alone it is not told from its twins.
+        """
         self.camera = camera
         self._gates, self._clock, self._leds_in_b = gates, clock, leds_in_b
         self._waiting: deque[PhoneImu | BodyImu] = deque(maxlen=CAPACITY)
         imus = ImuStreams()
-        self._vision = Vision(camera, leds_in_b, imus=imus, blinks=blinks)
+        self._vision = Vision(
+            camera, leds_in_b, imus=imus if motion is None else None, blinks=blinks
+        )
         self._phone, self._body = ImuBuffer(imus.phone), ImuBuffer(imus.body)
         self._predictions, self._stamps = PredictionHistory(), CameraImuDelay(imus)
         self.monitor, self.readout = (
@@ -76,7 +83,7 @@ class VisualFrontEnd:
             LineDelay(camera.readout_s),
         )
         self.exposure, self.repeats = ExposureMonitor(camera.focal_px), RepeatedFrames()
-        self.check = PictureCheck(leds_in_b)
+        self.check = PictureCheck(leds_in_b, motion)
         self.doubts_gravity = False
         """The phone's gravity is yet to be tested: look again without it where it finds nothing."""
         self._t_doubt = -np.inf

@@ -33,7 +33,9 @@ class FramePipeline(FrameDecoder):
         """`clock` only times the stages; `make` says where pictures are decoded."""
         super().__init__(camera.width, camera.height, make)
         self.camera, self._clock = camera, clock
-        self.front_end = VisualFrontEnd(camera, robot.leds_in_b, gates, clock, blinks=robot.blinks)
+        self.front_end = VisualFrontEnd(
+            camera, robot.leds_in_b, gates, clock, blinks=robot.blinks, motion=robot.motion
+        )
         self._blink = BlinkChoice() if robot.blinks else None
         self.blink_request: BlinkInput | None = None
         """What the robot is to be told to blink, by the newest picture."""
