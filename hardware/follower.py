@@ -14,6 +14,9 @@ from pipeline.robot import Robot, TwistDrive
 ROUNDING = 1.0 + 1e-6
 """Commands travel as float32: by this factor they may be larger than they were."""
 
+NOT_MEASURED = -1.0
+"""Age of a twist that nobody measured [s]."""
+
 
 class FollowerError(RuntimeError):
     """A follower can't do what it was asked.
@@ -174,6 +177,10 @@ class BodySample:
     """From sending the newest accepted command to this sample's arrival [s]; None if unknown."""
     twist_in_b: Array | None = None
     """(6,) as the robot measures it [m/s, rad/s], of one that takes a twist: it has no thrusts."""
+    twist_age_s: float | None = None
+    """Of a robot without motion sensors, whose gyroscope and accelerometer say zeros here: how long
+    before `t_us` that twist was measured [s]; `NOT_MEASURED`: it is what the robot was told. None:
+    it has motion sensors."""
 
 
 class Follower(Protocol):

@@ -25,6 +25,23 @@ class BodyImuParameters:
     """[m/s²]."""
 
 
+NO_SENSORS = BodyImuParameters(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Of a body that has none: nobody asks them."""
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryParameters:
+    """How a robot measures its own twist by wheels or joints."""
+
+    interval_s: float
+    latency_s: float
+    """From measuring to being sent."""
+    noise_v: float
+    """Of one measured twist [m/s] ..."""
+    noise_omega: float
+    """... and its angular rate [rad/s]."""
+
+
 @dataclass(frozen=True, slots=True)
 class SuspensionParameters:
     """An elastic cable from an anchor straight above."""
@@ -92,3 +109,7 @@ class PlantParameters:
     delay: float
     """From command to thruster [s]."""
     imu: BodyImuParameters
+    odometry: OdometryParameters | None = None
+    """In place of motion sensors, of a robot that has none and measures its twist."""
+    slip: float = 0.0
+    """Share of its twist by which its body moves otherwise than its wheels, for a while."""

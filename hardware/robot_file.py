@@ -19,7 +19,9 @@ from pydantic import BaseModel, ValidationError
 
 from hardware.dynamics import restoring_in_f
 from hardware.plant_parameters import (
+    NO_SENSORS,
     BodyImuParameters,
+    OdometryParameters,
     PlantParameters,
     StandParameters,
     StartParameters,
@@ -38,10 +40,17 @@ from hardware.robot_schema import (
     Suspension,
     clashes,
 )
-from hardware.twist_schema import Ros2Section, TwistRobotSchema, drive_of, twist_clashes
+from hardware.twist_schema import (
+    MotionSection,
+    Ros2Section,
+    TwistRobotSchema,
+    drive_of,
+    motion_of,
+    twist_clashes,
+)
 from pipeline.frames import GRAVITY, Array
 from pipeline.gains import Gains
-from pipeline.robot import Robot
+from pipeline.robot import Robot, ToldMotion
 
 COMMANDS = ("thrusts", "twist")
 """What robots are told, by `[link] takes`."""
@@ -71,6 +80,7 @@ class Ros2Parameters:
     frame: str
     """Of the header of a TwistStamped; "": it takes a Twist."""
     imu: str
+    """"": it has none."""
     R_bi: Array
     """(3, 3) from the axes of its motion sensors to the body's."""
     odometry: str
@@ -274,6 +284,7 @@ def _keys_at(schema: type[BaseModel], where: tuple[int | str, ...]) -> list[str]
 
 def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
     link, start, drive = schema.link, schema.start, drive_of(schema.twist)
+    motion = motion_of(schema.motion) if schema.motion is not None else None
     nowhere = np.zeros((0, 3))
     plant = PlantParameters(
         mass=0.0,
@@ -288,7 +299,9 @@ def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
         f_max=0.0,
         lag=drive.lag_s,
         delay=drive.delay_s,
-        imu=_imu(schema.body_imu),
+        imu=NO_SENSORS if schema.body_imu is None else _imu(schema.body_imu),
+        odometry=_odometry(schema.motion, motion),
+        slip=motion.slip if motion is not None else 0.0,
     )
     robot = Robot(
         name=schema.name,
@@ -303,6 +316,7 @@ def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
         ramp_s=drive.stop_s,
         blinks=schema.blinks,
         twist=drive,
+        motion=motion,
     )
     port = link.port or USUAL_PORTS[link.kind]
     return RobotFile(
@@ -317,7 +331,7 @@ def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
             port,
             0.0,
             link.takes,
-            _ros2(link.ros2),
+            _ros2(link.ros2) if link.kind == "ros2" else None,
         ),
         keeps_attitude_in_ramp=False,
         battery=_battery(schema.battery),
@@ -410,9 +424,8 @@ def _R_bi(imu_axes: list[Direction]) -> Array:
     return np.array(rows)
 
 
-def _ros2(section: Ros2Section | None) -> Ros2Parameters | None:
-    if section is None or section.imu is None:
-        return None
+def _ros2(section: Ros2Section | None) -> Ros2Parameters:
+    section = section or Ros2Section.model_validate({})
     below = "/" + "".join(f"{part}/" for part in section.namespace.split("/") if part)
 
     def whole(name: str) -> str:
@@ -422,7 +435,7 @@ def _ros2(section: Ros2Section | None) -> Ros2Parameters | None:
         domain=section.domain,
         command=whole(section.command),
         frame=section.frame if section.stamped else "",
-        imu=whole(section.imu),
+        imu=whole(section.imu) if section.imu is not None else "",
         R_bi=_R_bi(section.imu_axes),
         odometry=whole(section.odometry) if section.odometry is not None else "",
     )
@@ -448,6 +461,16 @@ def _stand(section: Stand | None) -> StandParameters | None:
     if section is None:
         return None
     return StandParameters(np.array(section.feet_in_body_m), section.friction)
+
+
+def _odometry(
+    section: MotionSection | None, motion: ToldMotion | None
+) -> OdometryParameters | None:
+    if section is None or motion is None or not motion.is_measured:
+        return None
+    return OdometryParameters(
+        motion.interval_s, section.latency_s, motion.noise_v, motion.noise_omega
+    )
 
 
 def _imu(section: BodyImuSection) -> BodyImuParameters:

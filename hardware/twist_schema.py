@@ -22,7 +22,7 @@ from hardware.robot_schema import (
     battery_clashes,
 )
 from pipeline.control.twist_margins import LEAST_PHASE_RAD
-from pipeline.robot import TwistDrive
+from pipeline.robot import ToldMotion, TwistDrive
 
 TOLD_ZERO_S = 0.17
 """After its last command a robot in silence has been told to stand still."""
@@ -46,15 +46,44 @@ class TwistSection(Section):
     attitude_gain_per_s: Annotated[float, Field(gt=0.0, le=20.0)]
 
 
+class MotionSection(Section):
+    """[motion]: of a robot without motion sensors on its body; what it says of how it moves."""
+
+    twist: Literal["measured", "commanded"]
+    """Measured by its wheels or joints; else nobody does, and it is taken to move as told."""
+    stands_level: bool
+    """Its z axis is up, within ..."""
+    tilt_deg: Annotated[float, Field(ge=0.1, le=15.0)] = 2.0
+    rate_hz: Annotated[float, Field(ge=5.0, le=200.0)] | None = None
+    """How often it measures."""
+    latency_s: Annotated[float, Field(ge=0.0, le=0.1)] = 0.02
+    """From measuring to being sent, of a simulated robot; a real one says when it measured."""
+    noise_m_s: Annotated[float, Field(ge=0.0, le=0.5)] = 0.01
+    """Of one measured twist ..."""
+    noise_deg_s: Annotated[float, Field(ge=0.0, le=30.0)] = 0.5
+    slip_share: Annotated[float, Field(ge=0.0, le=0.5)] | None = None
+    """Share of its twist by which it moves otherwise for half a second: wheels on a floor. Usually
+    `SLIP`."""
+    unlike_s: Annotated[float, Field(ge=0.0, le=0.3)] | None = None
+    """By how much its delay and lag may be others than [twist] says; usually `UNLIKE_S`."""
+
+
+SLIP = {"measured": 0.03, "commanded": 0.1}
+UNLIKE_S = {"measured": 0.03, "commanded": 0.06}
+"""Who measures knows better."""
+
 ROS_NAME = r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*"
 RosName = Annotated[str, Field(pattern=f"^{ROS_NAME}$", max_length=200)]
 """Of a topic: below the namespace, unless it begins with a stroke."""
 
 
 NO_IMU = (
-    "topic of the base's sensor_msgs/Imu: the estimate needs a gyroscope and an accelerometer on"
-    " the body, and none here does without"
+    "topic of the base's sensor_msgs/Imu, a gyroscope and an accelerometer, which [body_imu] says"
+    " that it has; a base without them says in [motion] what it tells instead"
 )
+NO_SENSORS = "missing: [body_imu], or [motion] of a robot without motion sensors on its body"
+NO_MOTION = "only without [body_imu]: motion sensors tell more"
+LEVEL = "false: it is led about {axis}, so it does not stand level"
 
 
 class Ros2Section(Section):
@@ -69,7 +98,7 @@ class Ros2Section(Section):
     frame: Annotated[str, Field(pattern=r"^[!-~]{1,100}$")] = "base_link"
     """... in the header of a TwistStamped."""
     imu: RosName | None = None
-    """sensor_msgs/Imu, of the body; nobody is led without, see `NO_IMU`."""
+    """sensor_msgs/Imu, of the body; only of a base with [motion] there is none."""
     imu_axes: Annotated[
         list[Direction], Field(min_length=3, max_length=3, default_factory=lambda: ["x", "y", "z"])
     ]
@@ -100,7 +129,8 @@ class TwistRobotSchema(Section):
     blinks: bool = False
     start: Start = Start()
     twist: TwistSection
-    body_imu: BodyImuSection
+    body_imu: BodyImuSection | None = None
+    motion: MotionSection | None = None
     leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
     link: TwistLinkSection
     battery: BatterySection | None = None
@@ -120,12 +150,28 @@ def drive_of(section: TwistSection) -> TwistDrive:
     )
 
 
+def motion_of(section: MotionSection) -> ToldMotion:
+    """The section in SI."""
+    slip, unlike_s = section.slip_share, section.unlike_s
+    return ToldMotion(
+        is_measured=section.twist == "measured",
+        is_level=section.stands_level,
+        tilt=radians(section.tilt_deg),
+        interval_s=1.0 / section.rate_hz if section.rate_hz is not None else 0.0,
+        noise_v=section.noise_m_s,
+        noise_omega=radians(section.noise_deg_s),
+        slip=SLIP[section.twist] if slip is None else slip,
+        unlike_s=UNLIKE_S[section.twist] if unlike_s is None else unlike_s,
+    )
+
+
 def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     """Keys that contradict each other: (key, what would be allowed)."""
     if robot.link.port is None and robot.link.kind not in USUAL_PORTS:
         yield "link.port", f"missing: a link of kind {robot.link.kind!r} has no usual one"
     yield from battery_clashes(robot.battery)
-    yield from _ros2_clashes(robot.link)
+    yield from _motion_clashes(robot)
+    yield from _ros2_clashes(robot.link, robot.motion)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     drive = drive_of(robot.twist)
@@ -141,14 +187,40 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
             yield f"twist.{key}", "smaller: with this delay and lag it would swing"
 
 
-def _ros2_clashes(link: TwistLinkSection) -> Iterator[tuple[str, str]]:
+def _motion_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
+    motion = robot.motion
+    if motion is None:
+        if robot.body_imu is None:
+            yield "body_imu", NO_SENSORS
+        return
+    if robot.body_imu is not None:
+        yield "motion", NO_MOTION
+    tilting = [axis for axis in robot.axes if axis in ("roll", "pitch")]
+    if motion.stands_level and tilting:
+        yield "motion.stands_level", LEVEL.format(axis=" and ".join(tilting))
+    if motion.twist == "measured" and motion.rate_hz is None:
+        yield "motion.rate_hz", "missing: how often it measures its twist"
+    if motion.twist == "commanded" and motion.rate_hz is not None:
+        yield "motion.rate_hz", "only with twist = 'measured'"
+
+
+def _ros2_clashes(
+    link: TwistLinkSection, motion: MotionSection | None
+) -> Iterator[tuple[str, str]]:
     if link.kind != "ros2":
         if link.ros2 is not None:
             yield "link.ros2", f"only with kind = 'ros2', not {link.kind!r}"
         return
     if link.port is not None:
         yield "link.port", "none with kind = 'ros2': DDS takes its ports by link.ros2.domain"
-    if link.ros2 is None or link.ros2.imu is None:
+    topics = link.ros2 or Ros2Section.model_validate({})
+    if motion is None and topics.imu is None:
         yield "link.ros2.imu", NO_IMU
-    elif fault := axes_fault(link.ros2.imu_axes):
+    elif motion is not None and topics.imu is not None:
+        yield "link.ros2.imu", "none of a base with [motion], which has no motion sensors"
+    elif fault := axes_fault(topics.imu_axes):
         yield "link.ros2.imu_axes", fault
+    if motion is not None and (motion.twist == "measured") != (topics.odometry is not None):
+        is_measured = motion.twist == "measured"
+        allowed = "missing: topic of the nav_msgs/Odometry that" if is_measured else "none where"
+        yield "link.ros2.odometry", f"{allowed} motion.twist = {motion.twist!r}"

@@ -69,17 +69,19 @@ class ControlEnd:
         key: bytes,
         challenges: Callable[[], int] = random_u64,
         twist: TwistDrive | None = None,
+        *,
+        tells_motion: bool = False,
     ) -> None:
         """Begin with a robot: thrusters give up to `f_max`, rise by `max_rise` per command [N].
 
-        One that takes a `twist` has no thrusters.
+        One that takes a `twist` has no thrusters, and one that `tells_motion` no motion sensors.
         `epoch` must be later than that of every control process the robot has followed.
         """
         self.thrusters, self.epoch = thrusters, epoch
         self._f_max, self._max_rise = f_max, max_rise
         self._key, self._new_challenge = key, challenges
         self._counter = 0
-        self._twist = twist
+        self._twist, self._tells_motion = twist, tells_motion
         self._last = self._zero()
         self._sent_at = [0.0] * SENT_KEPT
         self._challenges = [0] * SENT_KEPT
@@ -103,8 +105,16 @@ class ControlEnd:
     ) -> ControlEnd:
         """Control end for the robot of a robot file."""
         robot = robot_file.robot
-        max_rise = robot_file.link.max_rise
-        return cls(robot.A.shape[1], robot.f_max, max_rise, epoch, key, challenges, robot.twist)
+        return cls(
+            robot.A.shape[1],
+            robot.f_max,
+            robot_file.link.max_rise,
+            epoch,
+            key,
+            challenges,
+            robot.twist,
+            tells_motion=robot.motion is not None,
+        )
 
     def command(self, command: RobotCommand, now: float) -> bytes:
         """The datagram for `command`.
@@ -174,6 +184,7 @@ class ControlEnd:
         ours = len(sample.thrusts) == self.thrusters and bool(sample.twist_in_b) == bool(
             self._twist
         )
+        ours = ours and (sample.twist_age_s is not None) == self._tells_motion
         if not ours or not self._is_believed(sample):
             self.dropped += 1
             return None
@@ -190,6 +201,7 @@ class ControlEnd:
             refusal=sample.refusal,
             round_trip_s=self._round_trip(sample, now),
             twist_in_b=np.array(sample.twist_in_b) if sample.twist_in_b else None,
+            twist_age_s=sample.twist_age_s,
         )
 
     def _is_believed(self, sample: SampleDatagram) -> bool:

@@ -41,6 +41,10 @@ and in place of the thrusts its twist: velocity [m/s] and angular rate [rad/s] o
 axes of b; commanded in a command, measured in a sample. `deploy/watchdog/` does not know them and
 refuses them as malformed.
 
+Samples of such a robot without motion sensors have the magic `LLto`, and in place of gyroscope and
+accelerometer how long before the time of the sample its twist was measured (f32 [s], 0 to 10; −1:
+nobody measured it, it is what the robot was told) and five zeros.
+
 Both directions have the same key (`link_key.py`), one per robot; the magic under the MAC tells them
 apart, so that neither end believes its own words thrown back. What a robot must do with commands is
 in `robot_end.py`, and in C in `deploy/watchdog/`; what control believes is in `control_end.py`.
@@ -53,13 +57,16 @@ from dataclasses import dataclass
 from functools import cache
 from math import isfinite
 
-from hardware.follower import FollowerState, Refusal
+from hardware.follower import NOT_MEASURED, FollowerState, Refusal
 from hardware.link.link_key import MAC_BYTES, is_authentic, mac
 from pipeline.frames import Triple
 
 VERSION = 2  # of these datagrams
 COMMAND_MAGIC, SAMPLE_MAGIC = b"LLcm", b"LLsm"
 TWIST_COMMAND_MAGIC, TWIST_SAMPLE_MAGIC = b"LLtc", b"LLts"
+ODOMETRY_MAGIC = b"LLto"
+"""Of a sample of a robot that takes a twist and has no motion sensors."""
+OLDEST_TWIST_S = 10.0
 TWIST_VALUES = 6
 MAX_THRUSTERS = 16  # of any robot
 COMMAND_OVERHEAD, SAMPLE_OVERHEAD = 36 + MAC_BYTES, 76 + MAC_BYTES  # bytes
@@ -68,6 +75,8 @@ MAX_BYTES = SAMPLE_OVERHEAD + 4 * MAX_THRUSTERS
 ARMED, STOP = 1, 2
 """Bits of a command's flags."""
 Values = tuple[float, ...]
+NOTHING_FELT = (0.0,) * 6
+"""By gyroscope and accelerometer, where there are none."""
 U32, U64 = 1 << 32, 1 << 64
 """Where counters and epochs go round."""
 
@@ -132,6 +141,8 @@ class SampleDatagram:
     """[N]; none of a robot that takes a twist ..."""
     twist_in_b: tuple[float, ...] = ()
     """... which says here how it moves (6,) [m/s, rad/s]."""
+    twist_age_s: float | None = None
+    """Of one without motion sensors; see `BodySample`."""
 
 
 @cache
@@ -164,8 +175,12 @@ def encode_command(command: CommandDatagram, key: bytes) -> bytes:
 def encode_sample(sample: SampleDatagram, key: bytes) -> bytes:
     """Encode a sample."""
     values = sample.twist_in_b or sample.thrusts
+    magic = TWIST_SAMPLE_MAGIC if sample.twist_in_b else SAMPLE_MAGIC
+    felt = (*sample.omega_in_b, *sample.a_in_b)
+    if sample.twist_age_s is not None:
+        magic, felt = ODOMETRY_MAGIC, (sample.twist_age_s, *NOTHING_FELT[1:])
     body = _sample_layout(len(values)).pack(
-        TWIST_SAMPLE_MAGIC if sample.twist_in_b else SAMPLE_MAGIC,
+        magic,
         VERSION,
         len(values),
         sample.state,
@@ -177,8 +192,7 @@ def encode_sample(sample: SampleDatagram, key: bytes) -> bytes:
         sample.boot_id,
         sample.counter,
         sample.accepted,
-        *sample.omega_in_b,
-        *sample.a_in_b,
+        *felt,
         *values,
     )
     return body + mac(key, body)
@@ -190,7 +204,8 @@ def decode_command(data: bytes, key: bytes) -> CommandDatagram:
     Raises:
         LinkError: not a command of this version, not made with the key, or with unknown flags.
     """
-    is_twist, count = _checked(data, key, (COMMAND_MAGIC, TWIST_COMMAND_MAGIC), COMMAND_OVERHEAD)
+    magics = COMMAND_MAGIC, (TWIST_COMMAND_MAGIC,)
+    is_twist, count = _checked(data, key, *magics, COMMAND_OVERHEAD)
     fields = _command_layout(count).unpack(data[:-MAC_BYTES])
     flags, epoch, nonce, challenge, counter = fields[3:8]
     if flags & ~(ARMED | STOP):
@@ -207,7 +222,8 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         LinkError: not a sample of this version, not made with the key, or with a value that
             can't be.
     """
-    is_twist, count = _checked(data, key, (SAMPLE_MAGIC, TWIST_SAMPLE_MAGIC), SAMPLE_OVERHEAD)
+    magics = SAMPLE_MAGIC, (TWIST_SAMPLE_MAGIC, ODOMETRY_MAGIC)
+    is_twist, count = _checked(data, key, *magics, SAMPLE_OVERHEAD)
     fields = _sample_layout(count).unpack(data[:-MAC_BYTES])
     state, refusal, t_us, nonce, challenge, epoch, boot_id, counter, accepted = fields[3:12]
     values = fields[12:]
@@ -218,6 +234,13 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
     if not all(map(isfinite, values)):
         raise LinkError("sample.gyroscope, accelerometer, thrusts", "finite numbers")
     thrusts, twist_in_b = _thrusts_or_twist(values[6:], is_twist)
+    felt, age_s = values[0:6], None
+    if data[:4] == ODOMETRY_MAGIC:
+        age_s, felt = felt[0], NOTHING_FELT
+        if values[1:6] != NOTHING_FELT[1:] or not (
+            0.0 <= age_s <= OLDEST_TWIST_S or age_s == NOT_MEASURED
+        ):
+            raise LinkError("sample.twist_age", f"0 to {OLDEST_TWIST_S:g} s or −1, then zeros")
     return SampleDatagram(
         state=FollowerState(state),
         refusal=Refusal(refusal),
@@ -228,10 +251,11 @@ def decode_sample(data: bytes, key: bytes) -> SampleDatagram:
         boot_id=boot_id,
         counter=counter,
         accepted=accepted,
-        omega_in_b=values[0:3],
-        a_in_b=values[3:6],
+        omega_in_b=felt[0:3],
+        a_in_b=felt[3:6],
         thrusts=thrusts,
         twist_in_b=twist_in_b,
+        twist_age_s=age_s,
     )
 
 
@@ -241,12 +265,13 @@ def _thrusts_or_twist(values: Values, is_twist: bool) -> tuple[Values, Values]:
 
 
 def _checked(
-    data: bytes, key: bytes, magics: tuple[bytes, bytes], overhead: int
+    data: bytes, key: bytes, of_thrusts: bytes, of_twists: tuple[bytes, ...], overhead: int
 ) -> tuple[bool, int]:
     """(Whether it is of a twist, how many values) of an authentic datagram.
 
-    `magics` are those for thrusts and for a twist; `overhead` is its size without its values.
+    By the magic of thrusts and those of a twist; `overhead` is its size without its values.
     """
+    magics = of_thrusts, *of_twists
     if not overhead < len(data) <= MAX_BYTES:
         raise LinkError("size", f"{overhead + 4} to {overhead + 4 * MAX_THRUSTERS} bytes")
     if data[:4] not in magics:
@@ -256,7 +281,7 @@ def _checked(
     thrusters = data[5]
     if not 1 <= thrusters <= MAX_THRUSTERS or len(data) != overhead + 4 * thrusters:
         raise LinkError("thrusters", f"1 to {MAX_THRUSTERS}, agreeing with the size")
-    is_twist = data[:4] == magics[1]
+    is_twist = data[:4] in of_twists
     if is_twist and thrusters != TWIST_VALUES:
         raise LinkError("values", f"{TWIST_VALUES} of a twist")
     if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):

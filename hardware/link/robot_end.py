@@ -231,11 +231,18 @@ class RobotEnd:
             self._candidate = 0
 
     def sample(
-        self, now_us: int, nonce: int, omega_in_b: Triple, a_in_b: Triple, given: Array
+        self,
+        now_us: int,
+        nonce: int,
+        omega_in_b: Triple,
+        a_in_b: Triple,
+        given: Array,
+        twist_age_s: float | None = None,
     ) -> bytes:
         """The next datagram for `recipients`; `nonce` is random and not 0.
 
-        `given` are the thrusts (m,) that are set, or the twist (6,) in b that is measured.
+        `given` are the thrusts (m,) that are set, or the twist (6,) in b that is measured, by a
+        robot without motion sensors `twist_age_s` ago (see `BodySample`).
         """
         self._advance(now_us)
         if self._keeper is not None:
@@ -260,6 +267,7 @@ class RobotEnd:
                 a_in_b=a_in_b,
                 thrusts=() if self._limits.twist else tuple(given.tolist()),
                 twist_in_b=tuple(given.tolist()) if self._limits.twist else (),
+                twist_age_s=twist_age_s,
             ),
             self._key,
         )

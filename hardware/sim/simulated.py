@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hardware.follower import EStop, RobotHealth
+from hardware.follower import NOT_MEASURED, EStop, RobotHealth
 from hardware.link.blink_end import NO_LED, BlinkEnd
 from hardware.link.datagram import U64
 from hardware.link.health_end import HealthEnd
@@ -16,10 +16,13 @@ from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.battery import DrainingBattery
+from hardware.sim.plant.odometry import Odometry
 from hardware.sim.plant.plant import Plant, PlantOptions
 from hardware.sim.plant.twist_plant import TwistPlant
 from pipeline.frames import Array, triple
 
+NO_FORCE = (0.0, 0.0, 0.0)
+"""Of motion sensors that there are not."""
 HISTORY = 50
 """Poses remembered: 0.25 s."""
 
@@ -83,7 +86,7 @@ class SimulatedRobot:
         robot = robot_file.robot
         rng = np.random.default_rng(seed)
         self.body: SimulatedBody = (
-            TwistPlant(robot.twist, robot_file.plant.imu, rng, options)
+            TwistPlant(robot.twist, robot_file.plant.imu, rng, options, robot_file.plant.slip)
             if robot.twist is not None
             else Plant(robot_file.plant, rng, options)
         )
@@ -96,6 +99,8 @@ class SimulatedRobot:
         """(robot time [µs], wxyz_fb (4,), p_bf_in_f (3,) [m]) of the last ticks, oldest first."""
         self.dark: deque[int] = deque(maxlen=HISTORY)
         """The LED that was dark then, −1: none."""
+        self._tells_motion, odometry = robot.motion is not None, robot_file.plant.odometry
+        self._odometry = Odometry(odometry, robot.axes, rng) if odometry is not None else None
         self._nonces, self._boot_id = nonces, boot_id
         self._setpoint = self.end.setpoint(0)
 
@@ -136,5 +141,11 @@ class SimulatedRobot:
         return self._sample(now_us, self._setpoint)
 
     def _sample(self, now_us: int, given: Array) -> bytes:
-        omega, a = self.body.imu()
-        return self.end.sample(now_us, self._nonces(), triple(omega), triple(a), given)
+        nonce = self._nonces()
+        if not self._tells_motion:
+            omega, a = self.body.imu()
+            return self.end.sample(now_us, nonce, triple(omega), triple(a), given)
+        given, age_s = self._setpoint, NOT_MEASURED
+        if self._odometry is not None:
+            given, age_s = self._odometry.read(now_us, self.body.given)
+        return self.end.sample(now_us, nonce, NO_FORCE, NO_FORCE, given, age_s)

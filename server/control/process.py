@@ -27,7 +27,7 @@ from hardware.robot_file import COMMANDS, RobotFile, is_shipped, load_robot
 from pipeline.config import PERIOD_S, EstimatorName, TeleopConfig, VirtualCameraConfig
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.control.twist_margins import twist_refusal
-from pipeline.estimation.estimators import warm_up
+from pipeline.estimation.estimators import NEEDS_SENSORS, warm_up
 from server.common import clock
 from server.common.clock import unix_ms
 from server.common.options import Parser
@@ -37,6 +37,7 @@ from server.control.controller import Controller, TooLate
 from server.control.ipc import Endpoint, control_end
 from server.control.robot_clock import RobotLink
 from server.control.robot_epoch import next_epoch
+from server.control.told_body import ToldBody
 
 STATUS_EVERY = 4
 """Ticks: 50 Hz."""
@@ -102,8 +103,10 @@ def teleop_config(
     """The default configuration with a gain set of the robot file.
 
     Raises:
-        SystemExit: no such gain set; says which there are.
+        SystemExit: no such gain set, or no estimator for this robot; says which there are.
     """
+    if robot_file.robot.motion is not None and estimator == "paper":
+        raise SystemExit(f"estimator: {NEEDS_SENSORS}")
     if robot_file.robot.twist is not None:  # its gains stand in its drive
         return replace(TeleopConfig(), virtual_camera=virtual_camera, estimator=estimator)
     if gains not in robot_file.gains:
@@ -197,7 +200,8 @@ def run(options: ControlOptions) -> None:
         signal.signal(number, lambda n, _frame: stopping.append(n))
     try:
         leds, battery = robot_file.robot.blinking_leds, robot_file.battery
-        link = RobotLink(follower, leds, silence, battery)
+        told = ToldBody.of(robot_file.robot)
+        link = RobotLink(follower, leds, silence, battery, told)
         zero = zero_command(robot_file.robot)
         _loop(controller, follower, link, endpoint, granted, stopping, zero)
     finally:
@@ -225,7 +229,7 @@ def _loop(
         command, output = controller.tick(
             now, inputs, body, link.reason, link.gap, link.left_s, link.condition
         )
-        follower.send(command)
+        link.send(command)
         link.pass_on(inputs, now)
         cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (clock.thread_cpu() - cpu)
         if schedule.ticks % LATENESS_EVERY == 0:

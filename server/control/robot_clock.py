@@ -16,6 +16,7 @@ from hardware.follower import (
     Follower,
     FollowerState,
     Refusal,
+    RobotCommand,
     TellsHealth,
 )
 from hardware.link.blink_datagram import LASTS_MS
@@ -26,6 +27,7 @@ from pipeline.signals import BodyImu
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, Input
 from server.control.robot_health import PRESSED, HealthWatch, RobotCondition
+from server.control.told_body import UNTOLD, ToldBody
 
 
 class BodyClock:
@@ -68,11 +70,14 @@ class RobotLink:
         blinking_leds: int = 0,
         silence: SilenceTimes = SILENCE,
         battery: BatteryParameters | None = None,
+        told: ToldBody | None = None,
     ) -> None:
         """Begin with nothing received; none of a robot's LEDs blink that can't all be told to.
 
-        `silence` is what its kind of link states, `battery` how its file judges a voltage.
+        `silence` is what its kind of link states, `battery` how its file judges a voltage; `told`
+        is the body of a robot without motion sensors.
         """
+        self._told = told
         self._follower, self._silence = follower, silence
         self._tells = follower if isinstance(follower, TellsHealth) else None
         self._ramp_begun_s = silence.back_s - silence.ramps_s
@@ -105,6 +110,11 @@ class RobotLink:
             self.reason, self.gap = self._reason(samples[-1]), ""
             self._bear(samples[-1], now)
             self._t_sample = now
+        if self._told is not None:
+            bodies = map(self._told.hear, samples, (imu.t for imu in dated))
+            dated = [body for body in bodies if body is not None]
+            if samples and not dated:
+                self.gap = self.gap or UNTOLD
         self.left_s = self._left(now)
         if self._boot_id is not None:
             told = self._tells.health if self._tells is not None else None
@@ -112,6 +122,16 @@ class RobotLink:
             if self.reason == EXPLANATIONS[Refusal.WIRE] and self.condition.e_stop == "pressed":
                 self.reason = PRESSED  # the same, as it is now
         return dated
+
+    def send(self, command: RobotCommand) -> None:
+        """Tell the robot `command`.
+
+        Raises:
+            FollowerError: see `Follower.send`.
+        """
+        if self._told is not None:
+            self._told.tell(command)
+        self._follower.send(command)
 
     def pass_on(self, messages: Iterable[Input], now: float) -> None:
         """Tell the robot to go on blinking, if it can and one of the server's messages says so."""

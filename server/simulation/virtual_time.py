@@ -39,6 +39,7 @@ from server.control.controller import Controller, never_too_late
 from server.control.ipc_inputs import Input, ReadyInput, RequestInput, is_believable
 from server.control.process import too_late
 from server.control.robot_clock import RobotLink
+from server.control.told_body import ToldBody
 from server.phone.frame_pipeline import FramePipeline
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.wire import WireError, decode, encode
@@ -159,7 +160,9 @@ class VirtualTimeSimulation:
         self._frame_pipeline = FramePipeline(camera, robot_file.robot, config.gates)
         self._ingest = self._new_ingest()
         self._vision_model = make_vision_model(robot_file, scene, self._script)
-        self._link = RobotLink(self.follower, robot_file.robot.blinking_leds)
+        robot = robot_file.robot
+        told = ToldBody.of(robot)
+        self._link = RobotLink(self.follower, robot.blinking_leds, told=told)
         self._poses: deque[tuple[float, Array, Array]] = deque(maxlen=120)
         self._dark: deque[int] = deque(maxlen=120)
         """The LED that the robot kept dark with each pose."""
@@ -233,7 +236,7 @@ class VirtualTimeSimulation:
         )
         if self._ticks % EVERY_TICKS["status"] == 0:
             self._frame_pipeline.front_end.add_prediction(self.controller.expected(output))
-        self.follower.send(command)
+        self._link.send(command)
         self._link.pass_on(inbox, self.t)
         self._add_imu(*samples)
         request = self._script.operator.see(output.failsafe.mode.name, not output.refusals, self.t)

@@ -26,7 +26,7 @@ from pipeline.config import TeleopConfig
 from pipeline.control.margins import Sensing, axis_margins
 from pipeline.control.robust_margins import worst_of
 from pipeline.control.twist_margins import LEAST_PHASE_RAD, phase_left
-from pipeline.robot import TwistDrive
+from pipeline.robot import ToldMotion, TwistDrive
 from server.common.settings import state_directory
 from server.control.process import never_stops, never_upright
 from server.process.robot_key import key_file
@@ -37,6 +37,9 @@ LATE = Sensing("relative", latency=0.100, body_age=0.010)
 """Of a phone's pictures and the body's samples, at a good network's later end."""
 LEAST_FORCE_PER_WEIGHT, LEAST_REACH_M = 0.05, 0.05
 """Below, a robot hardly answers."""
+UNTOLD_VERTICAL = (
+    "which way is up only the phone knows, whose own axes no picture can then confirm before arming"
+)
 NOBODY_ASKED = "none here: whoever is on its network can lead it, or pose as it (SECURITY.md)"
 VIEWS, FOCAL_PX, NOISE_PX = 40, 914.0, 0.1
 """A phone at 720p."""
@@ -81,6 +84,7 @@ def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     """All of them, the robot's body first, then its LEDs, its link at the end."""
     if robot_file.robot.twist is not None:
         yield from _twist(robot_file.robot.twist)
+        yield _motion(robot_file.robot.motion)
     else:
         yield from _thrust(robot_file)
         yield from _gains(robot_file)
@@ -95,6 +99,18 @@ def _stops(drive: TwistDrive, silence: SilenceTimes) -> RobotFinding:
     said = f"told zero {zeroed_s:.2f} s after the last command, its lag of {follows_s:.2f} s beyond"
     late = zeroed_s > TOLD_ZERO_S
     return RobotFinding("stops", not late, said + f": {TOLD_ZERO_S} s at most" * late)
+
+
+def _motion(motion: ToldMotion | None) -> RobotFinding:
+    """What tells how the body of a robot that takes a twist moves."""
+    if motion is None:
+        return RobotFinding("motion", True, "by a gyroscope and an accelerometer on its body")
+    said = "taken to move as told, which nobody measures"
+    if motion.is_measured:
+        said = f"by its twist, {1.0 / motion.interval_s:.0f} times a second"
+    wrong = f"± {100.0 * motion.slip:.0f} %, {1e3 * motion.unlike_s:.0f} ms"
+    up = "it stands level" if motion.is_level else UNTOLD_VERTICAL
+    return RobotFinding("motion", True, f"no motion sensors: {said} ({wrong}); {up}")
 
 
 def _twist(drive: TwistDrive) -> Iterator[RobotFinding]:

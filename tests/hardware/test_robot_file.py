@@ -86,7 +86,7 @@ def test_its_leds_are_on_the_cameras_side_at_arms_length_and_not_in_a_plane():
     assert np.linalg.svd(leds - leds.mean(axis=0), compute_uv=False)[-1] > 0.1
 
 
-@pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground", "twister"])
+@pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground", "twister", "rover"])
 def test_every_number_says_what_it_rests_on(robot):
     text = (ROBOTS / f"{robot}.toml").read_text(encoding="utf-8")
     for line in text[: text.index("[body_imu]")].splitlines():
@@ -335,3 +335,43 @@ def test_a_mistake_of_a_robot_that_takes_a_twist_is_named(tmp_path, mistake):
     (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(RobotFileError, match=allowed):
         load_robot(tmp_path / "changed.toml", takes=COMMANDS)
+
+
+MOTION_MISTAKES = {
+    "nothing of its motion": ("[motion]", "[motions]", "unknown key; did you mean 'motion'"),
+    "sensors as well": (
+        "[start]",
+        "[body_imu]\ngyro_noise_deg_s_rthz = 0.0\nacc_noise_ug_rthz = 0.0\ngyro_bias_deg_s = 0.0\n"
+        "acc_bias_mg = 0.0\ngyro_step_deg_s = 0.0\nacc_step_mg = 0.0\n[start]",
+        r"motion: only without \[body_imu\]",
+    ),
+    "level, and led about x": ('"yaw"]', '"yaw", "roll"]', "motion.stands_level: false: .*roll"),
+    "measured at no rate": ("rate_hz = 20.0", "", "motion.rate_hz: missing"),
+    "commanded at a rate": ('"measured"', '"commanded"', "motion.rate_hz: only with .*'measured'"),
+    "known by a guess": ('"measured"', '"guessed"', "motion.twist: .*'measured' or 'commanded'"),
+    "no word of the vertical": ("stands_level", "stands_levl", "did you mean 'stands_level'"),
+    "measured too seldom": ("rate_hz = 20.0", "rate_hz = 2.0", "motion.rate_hz: .*5"),
+    "a hill": ("tilt_deg = 2.0", "tilt_deg = 40.0", "motion.tilt_deg: .*15"),
+}
+
+
+@pytest.mark.parametrize("mistake", MOTION_MISTAKES)
+def test_a_mistake_in_what_a_robot_tells_of_its_motion_is_named(tmp_path, mistake):
+    old, new, allowed = MOTION_MISTAKES[mistake]
+    text = robot_path("rover").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(RobotFileError, match=allowed):
+        load_robot(tmp_path / "changed.toml", takes=COMMANDS)
+
+
+def test_a_robot_that_takes_a_twist_has_motion_sensors_or_says_what_it_tells(tmp_path):
+    table = robot_table(robot_path("rover"))
+    del table["motion"]
+    with pytest.raises(RobotFileError, match=r"body_imu: missing: \[body_imu\], or \[motion\]"):
+        robot_of(table, "rover")
+    told = robot_of(table | {"motion": {"twist": "commanded", "stands_level": True}}, "rover")
+    measured = load_robot("rover", takes=COMMANDS).robot.motion
+    assert told.plant.odometry is None
+    assert told.robot.motion.slip > measured.slip
+    assert told.robot.motion.unlike_s > measured.unlike_s

@@ -7,6 +7,7 @@ import pytest
 
 from hardware.contract import TwistFollowerContract, exchange
 from hardware.follower import FollowerError, Refusal, ThrustCommand, TwistCommand
+from hardware.link.control_end import ControlEnd
 from hardware.link.datagram import (
     CommandDatagram,
     LinkError,
@@ -17,7 +18,7 @@ from hardware.link.datagram import (
 from hardware.link.link_key import mac
 from hardware.link.registry import connect, link_kind
 from hardware.link.robot_end import SILENCE_US, LinkLimits, RobotEnd
-from hardware.robot_file import COMMANDS, load_robot
+from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
 from hardware.sim.plant.plant import PlantOptions
 from hardware.sim.plant.twist_plant import TwistPlant
 from hardware.sim.virtual_time_follower import KEY, VirtualTimeFollower
@@ -29,10 +30,26 @@ DRIVE = TWISTER.robot.twist
 PEER = ("here", 0)
 
 
+def told_twister():
+    table = robot_table(robot_path("twister"))
+    del table["body_imu"]
+    return robot_of(
+        table | {"motion": {"twist": "commanded", "stands_level": False}}, "told twister"
+    )
+
+
 class TestInVirtualTime(TwistFollowerContract):
     @pytest.fixture
     def rig(self):
         return LockstepRig(TWISTER)
+
+
+class TestToldInVirtualTime(TwistFollowerContract):
+    """Of one without motion sensors, which says what it was told."""
+
+    @pytest.fixture
+    def rig(self):
+        return LockstepRig(told_twister())
 
 
 class TestByUdp(TwistFollowerContract):
@@ -203,3 +220,15 @@ def test_a_robot_that_has_thrusters_drops_the_samples_of_one_that_has_none():
     follower.advance()
     assert exchange(follower, TwistCommand.zero()) == []
     assert follower.dropped >= dropped + len(heard)
+
+
+def test_samples_of_a_robot_with_other_senses_than_its_file_says_are_not_its_own():
+    """Each end has its own file: zeros are no gravity, and gravity is no age."""
+    for ours, theirs in ((told_twister(), TWISTER), (TWISTER, told_twister())):
+        follower = VirtualTimeFollower(theirs)
+        follower._end = ControlEnd.of(ours, KEY, 1)
+        for _ in range(20):
+            follower.send(TwistCommand.zero())
+            follower.advance()
+            assert follower.receive() == []
+        assert follower.dropped > 10

@@ -21,7 +21,6 @@ from __future__ import annotations
 import secrets
 from collections import deque
 from dataclasses import dataclass, replace
-from math import exp
 
 import numpy as np
 
@@ -29,9 +28,9 @@ from hardware.follower import BodySample, RobotCommand
 from hardware.link.control_end import ControlEnd, random_u64
 from hardware.link.link_key import new_key
 from hardware.link.robot_end import LinkLimits, RobotEnd
+from hardware.presumed_twist import PresumedTwist
 from hardware.robot_file import RobotFile, Ros2Parameters
 from pipeline.frames import Array, Triple, triple
-from pipeline.robot import TwistDrive
 
 KEEPS_WRITER_S = 1.0
 """So long nobody else is heard in place of one who has fallen silent."""
@@ -111,45 +110,6 @@ class StampClock:
         self._last = stamp, now
         self._excess.append(now - stamp)
         return stamp + min(self._excess)
-
-
-class PresumedTwist:
-    """How a base moves that doesn't say so: as told, after its delay and lag. Times are [s].
-
-    Zero at once (STOP) takes it longer, by its own limits; then nobody leads it by this.
-    """
-
-    def __init__(self, drive: TwistDrive) -> None:
-        """At rest."""
-        self._lag_s, self._delay_s = drive.lag_s, drive.delay_s
-        self._on_their_way: deque[tuple[float, Array]] = deque()
-        self._told = self._halfway = self._moves = np.zeros(6)
-        self._last = 0.0
-
-    def tell(self, twist_in_b: Array, now: float) -> None:
-        """It is told a twist (6,)."""
-        self._on_their_way.append((now + self._delay_s, twist_in_b))
-        self._move(now)
-
-    def at(self, now: float) -> Array:
-        """Its twist (6,) now: two equal lags behind each other, as `TwistPlant` has."""
-        self._move(now)
-        return self._moves
-
-    def _move(self, now: float) -> None:
-        while self._on_their_way and self._on_their_way[0][0] <= now:
-            begins, told = self._on_their_way.popleft()
-            self._pass_until(begins)
-            self._told = told
-        self._pass_until(now)
-
-    def _pass_until(self, t: float) -> None:
-        """The exact motion for a twist that stays."""
-        lags = max(0.0, t - self._last) / (0.5 * self._lag_s)
-        halfway, moves = self._halfway - self._told, self._moves - self._told
-        self._moves = self._told + exp(-lags) * (moves + lags * halfway)
-        self._halfway = self._told + exp(-lags) * halfway
-        self._last = max(self._last, t)
 
 
 class BaseEnd:

@@ -2,13 +2,16 @@
 
 The twist told is held within speeds and accelerations of the robot's file, delayed, and followed by
 two equal lags behind each other, which never overshoot. World axes f as in `plant.py`: the start
-is R_fb = I, p_bf_in_f = 0, at rest. Whatever carries it is strong enough: there are no forces.
+is R_fb = I, p_bf_in_f = 0, at rest. Whatever carries it is strong enough: there are no forces. Its
+wheels or joints follow so; its body does but for a slip, a share that wanders, and not at all where
+something blocks it.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from math import exp as exponential
+from math import sqrt
 
 import numpy as np
 
@@ -18,6 +21,8 @@ from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
 from pipeline.frames import GRAVITY, Array, cross, exp, wxyz_from_R
 from pipeline.robot import TwistDrive
 
+SLIP_S = 1.0
+"""Time constant of a slip."""
 UP_IN_F = np.array([0.0, 0.0, GRAVITY])
 
 
@@ -30,8 +35,9 @@ class TwistPlant:
         imu: BodyImuParameters,
         rng: np.random.Generator,
         options: PlantOptions | None = None,
+        slip: float = 0.0,
     ) -> None:
-        """At rest."""
+        """At rest; `slip` is the share's standard deviation."""
         self._drive = drive
         self._imu = BodyImuErrors(imu, rng, options or PlantOptions())
         h = 1e-3 * STEP_MS
@@ -41,6 +47,12 @@ class TwistPlant:
         self._commanded = self._allowed = self._halfway = np.zeros(6)
         self.twist_in_b: Array = np.zeros(6)
         """Velocity and angular rate in f, in b (6,) [m/s, rad/s]."""
+        self.wheels_in_b: Array = np.zeros(6)
+        """The same as its wheels or joints turn."""
+        self.is_blocked = self.wheels_spin = False
+        """A wall holds the body; then its wheels stand, too, or spin as they are told."""
+        self._slips, self._slip_rng = slip, rng.spawn(1)[0] if slip > 0.0 else rng
+        self._slip: Array = slip * self._slip_rng.normal(size=6) if slip > 0.0 else np.zeros(6)
         self.twist_rate_in_b: Array = np.zeros(6)
         """Its derivative as numbers in b (6,) [m/s², rad/s²]."""
         self.R_fb: Array = np.eye(3)
@@ -62,7 +74,15 @@ class TwistPlant:
         self._allowed = self._drive.toward(self._allowed, self._commanded, h)
         self._halfway = self._halfway + share * (self._allowed - self._halfway)
         before = self.twist_in_b
-        self.twist_in_b = before + share * (self._halfway - before)
+        if self.is_blocked and not self.wheels_spin:
+            self._halfway = self.wheels_in_b = np.zeros(6)
+        self.wheels_in_b = self.wheels_in_b + share * (self._halfway - self.wheels_in_b)
+        if self._slips > 0.0:
+            fresh = sqrt(2.0 * h / SLIP_S) * self._slips * self._slip_rng.normal(size=6)
+            self._slip = (1.0 - h / SLIP_S) * self._slip + fresh
+        self.twist_in_b = (1.0 - self._slip) * self.wheels_in_b
+        if self.is_blocked:
+            self.twist_in_b = np.zeros(6)
         self.twist_rate_in_b = (self.twist_in_b - before) / h
         mean = 0.5 * (before + self.twist_in_b)
         self.p_bf_in_f = self.p_bf_in_f + h * (self.R_fb @ mean[:3])
@@ -89,8 +109,8 @@ class TwistPlant:
 
     @property
     def given(self) -> Array:
-        """What it reports of itself: its twist (6,)."""
-        return self.twist_in_b
+        """What it reports of itself: its twist (6,), by wheels or joints."""
+        return self.wheels_in_b
 
     @property
     def thrusts(self) -> Array:

@@ -2,6 +2,7 @@
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hardware.follower import EXPLANATIONS, FollowerState, Refusal
+from hardware.follower import EXPLANATIONS, NOT_MEASURED, FollowerState, Refusal
 from hardware.link.datagram import (
     MAX_BYTES,
     CommandDatagram,
@@ -168,3 +169,42 @@ def test_later_is_later_round_the_corner_and_never_both_ways(a, ahead):
 def test_every_refusal_has_words_for_a_person():
     assert set(EXPLANATIONS) == set(Refusal)
     assert all(text.endswith((".", "?")) for why, text in EXPLANATIONS.items() if why)
+
+
+TOLD = SampleDatagram(
+    state=FollowerState.RUNNING,
+    refusal=Refusal.NONE,
+    t_us=1,
+    nonce=2,
+    challenge=3,
+    epoch=4,
+    boot_id=5,
+    counter=6,
+    accepted=7,
+    omega_in_b=(0.0, 0.0, 0.0),
+    a_in_b=(0.0, 0.0, 0.0),
+    thrusts=(),
+    twist_in_b=(0.5, 0.0, 0.0, 0.0, 0.0, 0.25),
+    twist_age_s=0.0625,
+)
+
+
+@pytest.mark.parametrize("age_s", [0.0, 0.0625, 10.0, NOT_MEASURED])
+def test_a_robot_without_motion_sensors_says_how_old_its_twist_is(age_s):
+    sample = replace(TOLD, twist_age_s=age_s)
+    data = encode_sample(sample, KEY)
+    assert data[:4] == b"LLto"
+    assert decode_sample(data, KEY) == sample
+
+
+@pytest.mark.parametrize("age_s", [-0.5, 10.5, -2.0, 1e9])
+def test_no_twist_is_of_the_future_or_of_long_ago(age_s):
+    with pytest.raises(LinkError, match="twist_age"):
+        decode_sample(encode_sample(replace(TOLD, twist_age_s=age_s), KEY), KEY)
+
+
+def test_who_has_no_motion_sensors_says_nothing_by_them():
+    body = bytearray(encode_sample(TOLD, KEY)[:-16])
+    struct.pack_into("<f", body, 72, 9.8)
+    with pytest.raises(LinkError, match="then zeros"):
+        decode_sample(bytes(body) + mac(KEY, bytes(body)), KEY)

@@ -155,3 +155,24 @@ def test_a_link_that_lets_a_silent_robot_move_on_for_long_speaks_against_it(
     assert {what for what, one in found.items() if not one["ok"]} == {"stops"}
     assert "told zero 0.60 s after the last command" in found["stops"]["said"]
     assert found["in silence"]["said"] == "the robot stops by itself, from 500 ms on"
+
+
+def test_what_tells_of_a_body_without_motion_sensors_is_said(capsys, tmp_path):
+    code, found = findings(capsys, "rover", tmp_path)
+    assert code == 0
+    assert found["motion"]["said"].startswith("no motion sensors: by its twist, 20 times a second")
+    text = robot_path("rover").read_text()
+    for old, new in (
+        ('twist = "measured"', 'twist = "commanded"'),
+        ("rate_hz = 20.0", ""),
+        ("stands_level = true", "stands_level = false"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "told.toml").write_text(text)
+    code, found = findings(capsys, tmp_path / "told.toml", tmp_path)
+    assert code == 0
+    assert "which nobody measures" in found["motion"]["said"]
+    assert "only the phone knows" in found["motion"]["said"]
+    _, found = findings(capsys, "twister", tmp_path)
+    assert found["motion"]["said"] == "by a gyroscope and an accelerometer on its body"
