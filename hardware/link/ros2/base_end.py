@@ -4,12 +4,16 @@ Nobody can be told apart by DDS as ROS uses it: there is no key, and no message 
 the gate and the watchdog that our own link has on the robot (`robot_end.py`) stand here, before the
 topic. Whatever control says goes through them, and what they give is what the base is told:
 
-* The gate takes a command only if control has just had a sample of the base's motion sensors. A
-  base that isn't heard any more is told to stand still, from 60 ms on, within its accelerations,
+* The gate takes a command only if control has just had a sample of the base's motion sensors, or,
+  of a base that has none, its odometry is as fresh as its file says it comes. A base that isn't
+  heard any more is told to stand still, from 60 ms on, within its accelerations,
   and goes on being told zero. So is one whose samples arrive 40 ms later than the quickest ones.
 * A new control process, and a base whose driver has restarted, begins with half a second of zero.
 * The first who publishes samples that can be is the base, until he has been silent for a second;
   what others publish is dropped. The same of odometry.
+
+A base that says nothing at all (`twist = "commanded"`) is taken to be there while somebody listens
+to what it is told; that its driver hangs nobody notices but the pictures.
 
 What it can't do is stop a base when this process or its network dies: the base itself has to, see
 `docs/ros2.md`, so that its robot file says who does (`stopped_by`). Nor does anybody answer: a
@@ -24,7 +28,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hardware.follower import BodySample, RobotCommand
+from hardware.follower import NOT_MEASURED, BodySample, RobotCommand
 from hardware.link.control_end import ControlEnd, random_u64
 from hardware.link.link_key import new_key
 from hardware.link.robot_end import LinkLimits, RobotEnd
@@ -43,6 +47,8 @@ ODOMETRY_LASTS_S = 0.1
 MOST = 1e4
 """Nothing that a robot measures is more [rad/s, m/s², m/s]."""
 HERE = ("here", 0)
+NOTHING = (0.0, 0.0, 0.0)
+"""By motion sensors that a base has not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +74,8 @@ class HeardOdometry:
     writer: int
     twist_in_b: tuple[float, float, float, float, float, float]
     """[m/s, rad/s]."""
+    stamp_us: int = 0
+    """Of its header [µs], 0: not dated."""
 
 
 class FirstWriter:
@@ -125,6 +133,7 @@ class BaseEnd:
         self._R_bi, self._has_odometry = topics.R_bi, bool(topics.odometry)
         self._imu_writer, self._odometry_writer = FirstWriter(), FirstWriter()
         self._twist_in_b, self._twist_at = np.zeros(6), -np.inf
+        self._motion, self._t_measured = robot_file.robot.motion, -np.inf
         self._boot_id = secrets.randbits(31)
         self._dropped = 0
         self._begin()
@@ -163,11 +172,40 @@ class BaseEnd:
         """The sample that comes of a message; None if none does."""
         if isinstance(heard, HeardImu):
             return self._hear_imu(heard, now)
+        before = self._odometry_writer.writer
         if _can_be(*heard.twist_in_b) and self._odometry_writer.admits(heard.writer, now):
-            self._twist_in_b, self._twist_at = np.array(heard.twist_in_b), now
+            self._hear_odometry(heard, before not in (None, heard.writer), now)
         else:
             self._dropped += 1
         return None
+
+    def beat(self, now: float) -> BodySample | None:
+        """A sample of a base without motion sensors, whenever control asks; None: it has some.
+
+        None, too, while its odometry is silent.
+        """
+        if self._motion is None:
+            return None
+        told, age_s = self._gate.setpoint(_us(now)), NOT_MEASURED
+        if self._motion.is_measured:
+            told, age_s = self._twist_in_b, now - self._t_measured
+            if age_s > self._motion.lasts_s:
+                return None
+        data = self._gate.sample(_us(now), random_u64(), NOTHING, NOTHING, told, age_s)
+        return self._control.receive(data, now)
+
+    def _hear_odometry(self, heard: HeardOdometry, is_other: bool, now: float) -> None:
+        stamp, dated = 1e-6 * heard.stamp_us, now
+        if self._motion is not None and heard.stamp_us > 0:
+            if is_other or self._clock.is_set_anew(stamp, now):
+                self._begin()
+            on_ours = self._clock.dated(stamp, now)
+            if on_ours is None:
+                self._dropped += 1
+                return
+            dated = min(on_ours, now)
+        self._twist_in_b, self._twist_at = np.array(heard.twist_in_b), now
+        self._t_measured = dated
 
     def _hear_imu(self, heard: HeardImu, now: float) -> BodySample | None:
         before = self._imu_writer.writer

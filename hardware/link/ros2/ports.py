@@ -77,14 +77,14 @@ class Opened:
     """What Cyclone DDS gives back once nobody holds it any more, in this order."""
 
     writer: DataWriter[Any]
-    imu: DataReader[Any]
+    imu: DataReader[Any] | None
     odometry: DataReader[Any] | None
     participant: DomainParticipant
     domain: Domain
 
 
 class RosPorts:
-    """A participant of a domain: one topic out, one or two in."""
+    """A participant of a domain: one topic out, two, one or none in."""
 
     def __init__(
         self, topics: Ros2Parameters, host: str, wall_ns: Callable[[], int] = time.time_ns
@@ -109,8 +109,9 @@ class RosPorts:
         if self._opened.odometry is not None:
             for taken in _taken(self._opened.odometry):
                 yield None if taken is None else _odometry(*taken)
-        for taken in _taken(self._opened.imu):
-            yield None if taken is None else _imu(*taken)
+        if self._opened.imu is not None:
+            for taken in _taken(self._opened.imu):
+                yield None if taken is None else _imu(*taken)
 
     def tell(self, twist_in_b: Array) -> bool:
         """Publish a twist (6,) [m/s, rad/s]; False: nobody listens, or the way is down."""
@@ -150,8 +151,9 @@ def _open(topics: Ros2Parameters, settings: str) -> Opened:
         return Topic(participant, f"rt{name}", message)
 
     told = topic(topics.command, RosTwistStamped if topics.frame else RosTwist)
-    imu = DataReader(participant, topic(topics.imu, RosImu), qos=HEARS)
-    odometry = None
+    imu = odometry = None
+    if topics.imu:
+        imu = DataReader(participant, topic(topics.imu, RosImu), qos=HEARS)
     if topics.odometry:
         odometry = DataReader(participant, topic(topics.odometry, RosOdometry), qos=HEARS)
     return Opened(DataWriter(participant, told, qos=TELLS), imu, odometry, participant, domain)
@@ -175,11 +177,10 @@ def _taken(reader: DataReader[Any]) -> Iterator[tuple[int, Any] | None]:
 
 
 def _imu(writer: int, message: RosImu) -> HeardImu:
-    stamp = message.header.stamp
     gyro, acc = message.angular_velocity_covariance, message.linear_acceleration_covariance
     return HeardImu(
         writer,
-        (stamp.sec * NS_PER_S + stamp.nanosec) // NS_PER_US,
+        _stamp_us(message.header),
         _vector(message.angular_velocity),
         _vector(message.linear_acceleration),
         measures_both=MISSING not in (gyro[0], acc[0]),
@@ -189,7 +190,11 @@ def _imu(writer: int, message: RosImu) -> HeardImu:
 def _odometry(writer: int, message: RosOdometry) -> HeardOdometry:
     twist = message.twist.twist
     values = (*_vector(twist.linear), *_vector(twist.angular))
-    return HeardOdometry(writer, values)
+    return HeardOdometry(writer, values, _stamp_us(message.header))
+
+
+def _stamp_us(header: RosHeader) -> int:
+    return (header.stamp.sec * NS_PER_S + header.stamp.nanosec) // NS_PER_US
 
 
 def _vector(vector: RosVector3) -> Triple:

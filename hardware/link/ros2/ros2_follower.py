@@ -34,6 +34,8 @@ class Ros2Follower(LinkFollower[BaseEnd]):
         """Ready; says nothing yet."""
         super().__init__(end, clock)
         self._ports = ports
+        self._is_heard = False
+        """Somebody listened to the newest command."""
 
     def receive(self) -> list[BodySample]:
         """Return what has arrived. See `Follower`."""
@@ -44,6 +46,8 @@ class Ros2Follower(LinkFollower[BaseEnd]):
                 self._end.drop()
             elif (sample := self._end.hear(heard, self._clock())) is not None:
                 samples.append(sample)
+        if self._is_heard and (sample := self._end.beat(self._clock())) is not None:
+            samples.append(sample)
         return samples
 
     def close(self) -> None:
@@ -56,7 +60,8 @@ class Ros2Follower(LinkFollower[BaseEnd]):
         self._ports.close()
 
     def _send(self, command: RobotCommand) -> None:
-        self.lost += not self._ports.tell(self._end.command(command, self._clock()))
+        self._is_heard = self._ports.tell(self._end.command(command, self._clock()))
+        self.lost += not self._is_heard
 
 
 def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> Ros2Follower:

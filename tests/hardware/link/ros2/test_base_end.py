@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hardware.follower import FollowerState, Refusal, TwistCommand
+from hardware.follower import NOT_MEASURED, FollowerState, Refusal, TwistCommand
 from hardware.link.robot_end import LinkLimits
 from hardware.link.ros2.base_end import (
     KEEPS_WRITER_S,
@@ -16,7 +16,14 @@ from hardware.link.ros2.base_end import (
     HeardImu,
     HeardOdometry,
 )
-from hardware.robot_file import COMMANDS, Ros2Parameters, load_robot
+from hardware.robot_file import (
+    COMMANDS,
+    Ros2Parameters,
+    load_robot,
+    robot_of,
+    robot_path,
+    robot_table,
+)
 from hardware.sim.plant.twist_plant import TwistPlant
 from hardware.twist_schema import TOLD_ZERO_S
 
@@ -251,3 +258,61 @@ def test_a_pause_of_the_network_sets_no_clock(led):
 def test_each_process_and_each_start_has_another_boot_id():
     ids = {Led().ticks(0.1).samples[-1].boot_id for _ in range(20)}
     assert len(ids) == 20
+
+
+def told(**motion):
+    table = robot_table(robot_path("twister"))
+    del table["body_imu"]
+    return robot_of(table | {"motion": {"stands_level": False} | motion}, "told")
+
+
+class LedWithoutSensors:
+    """Its odometry comes ten times a second, if at all."""
+
+    def __init__(self, robot_file):
+        self.motion = robot_file.robot.motion
+        topics = replace(TOPICS, imu="", odometry="/odom" if self.motion.is_measured else "")
+        self.end, self.now = BaseEnd(robot_file, topics, 1), 10.0
+        self.speaks = self.motion.is_measured
+
+    def ticks(self, seconds, twist_in_b=(0.0,) * 6):
+        told, samples, twist = [], [], np.array(twist_in_b)
+        for _ in range(round(seconds / PERIOD_S)):
+            self.now += PERIOD_S
+            if self.speaks and round(self.now / PERIOD_S) % 20 == 0:
+                stamp_us = round(1e6 * (self.now - 0.02 + 1000.0))
+                said = HeardOdometry(BASE, tuple(0.5 * MOVING), stamp_us)
+                assert self.end.hear(said, self.now) is None
+            if (sample := self.end.beat(self.now)) is not None:
+                samples.append(sample)
+            command = TwistCommand(twist, armed=bool(twist.any()))
+            told.append(self.end.command(command, self.now))
+        return told, samples
+
+
+def test_a_base_without_motion_sensors_is_led_by_its_odometry_and_told_to_stand_without():
+    led = LedWithoutSensors(told(twist="measured", rate_hz=10.0))
+    led.ticks(0.8)
+    moved, samples = led.ticks(0.5, MOVING)
+    assert (moved[-1] == MOVING).all()
+    assert samples[-1].state == FollowerState.RUNNING
+    assert samples[-1].twist_in_b == pytest.approx(0.5 * MOVING)
+    assert min(s.twist_age_s for s in samples) >= 0.0
+    assert max(s.twist_age_s for s in samples) < 0.125
+    led.speaks = False
+    silent, _ = led.ticks(1.0, MOVING)
+    bound = led.motion.lasts_s + FRESH_S + TOLD_ZERO_S
+    assert not np.any(silent[round(bound / PERIOD_S) :])
+
+
+def test_a_base_that_says_nothing_is_led_by_what_it_was_told():
+    led = LedWithoutSensors(told(twist="commanded"))
+    led.ticks(0.7)
+    moved, samples = led.ticks(0.5, MOVING)
+    assert (moved[-1] == MOVING).all()
+    assert samples[-1].twist_in_b == pytest.approx(MOVING)
+    assert {s.twist_age_s for s in samples} == {NOT_MEASURED}
+
+
+def test_one_with_motion_sensors_says_nothing_without_them(led):
+    assert led.end.beat(led.now) is None

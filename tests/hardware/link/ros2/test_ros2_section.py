@@ -45,6 +45,37 @@ def test_names_are_below_the_namespace_unless_they_begin_with_a_stroke(namespace
     assert topics.R_bi.tolist() == [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
 
 
+MEASURED = {"twist": "measured", "rate_hz": 20.0, "stands_level": False}
+COMMANDED = {"twist": "commanded", "stands_level": False}
+
+
+def without_sensors(section, motion):
+    table = robot_table(robot_path("twister"))
+    del table["body_imu"]
+    link = {"kind": "ros2", "takes": "twist", "host": "127.0.0.1", "ros2": section}
+    return robot_of(table | {"link": link, "motion": motion}, "x")
+
+
+def test_a_base_without_motion_sensors_has_its_odometry_or_nothing_at_all():
+    topics = without_sensors({"odometry": "odom"}, MEASURED).link.ros2
+    assert (topics.imu, topics.odometry) == ("", "/odom")
+    topics = without_sensors({}, COMMANDED).link.ros2
+    assert (topics.imu, topics.odometry, topics.command) == ("", "", "/cmd_vel")
+
+
+@pytest.mark.parametrize(
+    ("section", "motion", "words"),
+    [
+        ({"imu": "imu", "odometry": "odom"}, MEASURED, r"link\.ros2\.imu: none of a base with"),
+        ({}, MEASURED, r"link\.ros2\.odometry: missing: .*'measured'"),
+        ({"odometry": "odom"}, COMMANDED, r"link\.ros2\.odometry: none where .*'commanded'"),
+    ],
+)
+def test_topics_that_do_not_fit_what_it_tells_are_named(section, motion, words):
+    with pytest.raises(RobotFileError, match=words):
+        without_sensors(section, motion)
+
+
 MISTAKES: dict[str, tuple] = {
     "no motion sensors": ({}, {}, r"link\.ros2\.imu: .*gyroscope and an accelerometer"),
     "no section": (None, {}, r"link\.ros2\.imu: .*gyroscope and an accelerometer"),
