@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import exp as exponential
+from math import hypot, sqrt
 from typing import Final
 
 import numpy as np
@@ -41,7 +42,7 @@ STEADY: Final = 1e-3
 BY_PHONE: Final = 0.5
 """Of a vertical by a hand's accelerometer over `AVERAGED_S` [m/s²]."""
 WANDERS: Final = 5e-3
-"""Of that vertical, carried on by twists [m/s²/√s]."""
+"""Of that vertical, carried on by twists, beside what the noise of their turns makes [m/s²/√s]."""
 AVERAGED_S: Final = 0.1
 UP: Final = np.array([0.0, 0.0, 1.0])
 
@@ -50,6 +51,7 @@ def for_body(config: RelativeConfig, motion: ToldMotion | None) -> RelativeConfi
     """The filter's numbers for a robot: without biases of sensors that it does not have."""
     if motion is None:
         return config
+    noise = motion.noise_omega * sqrt(motion.interval_s) if motion.is_measured else 0.0
     return replace(
         config,
         sigma_omega_b=STEADY,
@@ -59,7 +61,7 @@ def for_body(config: RelativeConfig, motion: ToldMotion | None) -> RelativeConfi
         walk_omega_b=1e-6,
         initial_omega_b=1e-5,
         initial_f_b=GRAVITY * motion.tilt if motion.is_level else BY_PHONE,
-        walk_f_b=config.walk_f_b if motion.is_level else WANDERS,
+        walk_f_b=config.walk_f_b if motion.is_level else hypot(WANDERS, GRAVITY * noise),
         body_steps=False,
     )
 

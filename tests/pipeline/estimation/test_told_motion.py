@@ -82,6 +82,17 @@ def test_no_sensors_that_it_does_not_have_are_learnt_or_blamed():
     assert all("the robot or the phone" in words for words in sensor_doubts(*arguments))
 
 
+def test_a_vertical_that_turns_carry_on_wanders_as_their_noise_makes_it():
+    hangs = replace(MEASURED, is_level=False, noise_omega=0.05)
+    rng, runs, seconds = np.random.default_rng(5), 200, 4.0
+    turned = np.zeros(runs)
+    for _ in range(round(seconds / hangs.interval_s)):
+        turned += hangs.interval_s * hangs.noise_omega * rng.normal(size=runs)
+    wanders = GRAVITY * float(np.std(turned)) / np.sqrt(seconds)
+    assert for_body(RelativeConfig(), hangs).walk_f_b == pytest.approx(wanders, rel=0.15)
+    assert for_body(RelativeConfig(), MEASURED).walk_f_b == RelativeConfig().walk_f_b
+
+
 def test_a_twist_that_stays_is_no_sensor_that_is_stuck():
     stuck, told = SensorMonitor(), SensorMonitor(of_body=False)
     for k in range(100):
