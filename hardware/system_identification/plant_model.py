@@ -175,7 +175,7 @@ class PlantModel:
         omega = flight.omega_in_b
         turned = wrench[:, 3:] + np.cross(arm, pulled_in_b) - plant.air_rotation * omega
         turned -= np.cross(omega, omega * plant.inertia)
-        return np.hstack((off, self._alpha - self._cut(turned / plant.inertia)))
+        return np.hstack((off, self._alpha - self._cut(_as_differences(turned / plant.inertia))))
 
     def _pulled(self, plant: SpecificPlant, pushed_in_f: Array) -> tuple[Array, Array]:
         """What of the acceleration is left (k, 3), and the cable's pull (n, 3) in b [m/s²].
@@ -217,3 +217,13 @@ def _moved(force: Array, poles: tuple[float, float, float]) -> Array:
     numerators = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
     filters = [bilinear(numerator, poles, fs=1.0 / PERIOD_S) for numerator in numerators]
     return np.array([lfilter(b, a, force) for b, a in filters])
+
+
+def _as_differences(alpha: Array) -> Array:
+    """Angular acceleration (n, 3) as differences of a rate give it: its mean over two periods.
+
+    By Simpson's rule; without it thrusters seem to lag by what the differences smear.
+    """
+    smeared = alpha.copy()
+    smeared[1:-1] = (alpha[:-2] + 4.0 * alpha[1:-1] + alpha[2:]) / 6.0
+    return smeared
