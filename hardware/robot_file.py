@@ -33,8 +33,8 @@ from hardware.robot_schema import (
     USUAL_PORTS,
     BatterySection,
     BodyImuSection,
-    Direction,
     FlightControllerSection,
+    R_from_axes,
     RobotSchema,
     Stand,
     Suspension,
@@ -411,17 +411,10 @@ def _flight_controller(
     return FlightControllerParameters(
         tuple(section.motors),
         section.thrust_exponent,
-        _R_bi(section.imu_axes),
+        R_from_axes(section.imu_axes),
         section.gyro_per_deg_s,
         section.acc_per_g,
     )
-
-
-def _R_bi(imu_axes: list[Direction]) -> Array:
-    rows = [
-        (-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])] for axis in imu_axes
-    ]
-    return np.array(rows)
 
 
 def _ros2(section: Ros2Section | None) -> Ros2Parameters:
@@ -436,7 +429,7 @@ def _ros2(section: Ros2Section | None) -> Ros2Parameters:
         command=whole(section.command),
         frame=section.frame if section.stamped else "",
         imu=whole(section.imu) if section.imu is not None else "",
-        R_bi=_R_bi(section.imu_axes),
+        R_bi=R_from_axes(section.imu_axes),
         odometry=whole(section.odometry) if section.odometry is not None else "",
     )
 

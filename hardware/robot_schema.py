@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Literal, get_args
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from pipeline.frames import Array
 
 Axis = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 AXES: tuple[Axis, ...] = get_args(Axis)
@@ -238,6 +241,12 @@ def _miswired(section: FlightControllerSection, thrusters: int) -> Iterator[tupl
         yield "flight_controller.motors", f"{thrusters} different numbers, one for each thruster"
     if fault := axes_fault(section.imu_axes):
         yield "flight_controller.imu_axes", fault
+
+
+def R_from_axes(axes: list[Direction]) -> Array:
+    """R_bi (3, 3), of sensors along whose axes those of b lie."""
+    rows = [(-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])] for axis in axes]
+    return np.array(rows)
 
 
 def axes_fault(axes: list[Direction]) -> str:

@@ -16,6 +16,7 @@ import socket
 import sys
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 
 from hardware.follower import EStop
 from hardware.link.control_end import random_u64
@@ -23,6 +24,7 @@ from hardware.link.link_key import LinkKeyError, take_key
 from hardware.link.robot_server import RobotServer, arrived, be_punctual, bound
 from hardware.robot_file import COMMANDS, RobotFile, RobotFileError, load_robot
 from hardware.sim.battery import DrainingBattery
+from hardware.sim.plant.built import AsBuilt, as_built
 from hardware.sim.simulated import SimulatedRobot
 from hardware.sim.truth import ahead_of, encode_truth
 
@@ -84,20 +86,27 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--e-stop", action="store_true", help="it has one: SIGUSR1 presses, SIGUSR2 releases it"
     )
+    parser.add_argument(
+        "--built", type=Path, metavar="FILE.json", help="how it is not as its file says (AsBuilt)"
+    )
     parser.add_argument("--drain-v-min", type=float, default=0.0, help="... less so many a minute")
     return parser.parse_args(argv)
 
 
 def _robot(robot_file: RobotFile, arguments: argparse.Namespace, key: bytes) -> SimulatedRobot:
     full_v = arguments.battery_v
+    built = AsBuilt() if arguments.built is None else as_built(arguments.built)
     robot = SimulatedRobot(
-        robot_file,
+        built.of(robot_file),
         arguments.seed,
         boot_id=secrets.randbits(32),
         nonces=random_u64,
         key=key,
+        options=built.options(),
         battery=None if full_v is None else DrainingBattery(full_v, arguments.drain_v_min),
     )
+    if arguments.built is not None:
+        robot.plant.thruster_health[:] = built.thrust_gains(robot_file.robot.A.shape[1])
     if arguments.e_stop:
         robot.e_stop = EStop.CLOSED
         for number, said in ((signal.SIGUSR1, EStop.OPEN), (signal.SIGUSR2, EStop.CLOSED)):
@@ -118,7 +127,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         port = robot_file.link.port if arguments.port is None else arguments.port
         robot = _robot(robot_file, arguments, take_key(os.environ))
         process = RobotProcess(robot, (arguments.listen, port), arguments.truth_port)
-    except (RobotFileError, LinkKeyError, OSError, OverflowError) as error:
+    except (RobotFileError, LinkKeyError, OSError, OverflowError, ValueError) as error:
         sys.stderr.write(f"simulated robot: {error}\n")
         return 2
     for number in (signal.SIGTERM, signal.SIGINT):

@@ -36,6 +36,8 @@ class PlantOptions:
     """How often `imu` is asked: white noise of the density's bandwidth, half of this."""
     vibration: Vibration | None = None
     """Of propellers, felt by the body's sensors."""
+    R_sb: Array | None = None
+    """(3, 3) from b to the axes in which its sensors give samples; None: to those of b."""
     obstacle: Obstacle | None = None
     """A tool on the robot and a wall before it."""
     tube: Tube | None = None
@@ -61,6 +63,7 @@ class Plant:
         self._data = mujoco.MjData(self._model)
         self._imu = BodyImuErrors(parameters.imu, rng, options)
         shakes = options.vibration  # by draws of its own: all else stays as it would be
+        self._R_sb = options.R_sb
         self._shaking = Shaking(shakes, rng.spawn(1)[0]) if shakes is not None else None
         self._touch = ContactForceSensor(self._model, self._data) if options.obstacle else None
         thrusters = len(parameters.thruster_torques)
@@ -246,6 +249,8 @@ class Plant:
         if self._shaking is not None:
             by_rate, by_force = self._shaking.added(self.t, self.thrusts)
             omega, a = omega + by_rate, a + by_force
+        if self._R_sb is not None:
+            omega, a = self._R_sb @ omega, self._R_sb @ a
         return self._imu.read(omega, a)
 
 
