@@ -61,8 +61,15 @@ def identify(known: PlantParameters, flights: Sequence[FlightRecord]) -> Identif
             f"the longest flight without a gap lasted {longest:.0f} s: fly for {LEAST_S:.0f} s"
             " and more, better a minute"
         )
-    models = [PlantModel(known, flight) for flight in usable]
-    start = SpecificPlant.of(known, LINK_S)
+    return identify_sampled(known, usable, SpecificPlant.of(known, LINK_S))
+
+
+def identify_sampled(
+    known: PlantParameters, flights: Sequence[SampledFlight], start: SpecificPlant
+) -> IdentifiedPlant:
+    """The same of flights that are sampled evenly, beginning the search at `start`."""
+    thrusters = len(known.thruster_torques)
+    models = [PlantModel(known, flight) for flight in flights]
     scales, noise = start.scales, NOISE
     found = start.packed / scales
 
@@ -84,17 +91,17 @@ def identify(known: PlantParameters, flights: Sequence[FlightRecord]) -> Identif
     own = np.square([model.noise(known.imu) for model in models]).mean(axis=0)
     return IdentifiedPlant(
         SpecificPlant.unpacked(found * scales, thrusters),
-        _sandwich(solved.jac, solved.fun) * np.outer(scales, scales),
-        PERIOD_S * sum(len(flight.commands) for flight in usable),
+        sandwich(solved.jac, solved.fun) * np.outer(scales, scales),
+        PERIOD_S * sum(len(flight.commands) for flight in flights),
         explained=1.0 - np.maximum(np.square(left).mean(axis=0) - own, 0.0) / variance,
         noise=np.minimum(own / variance, 1.0),
     )
 
 
-def _sandwich(jacobian: Array, residuals: Array) -> Array:
-    """Covariance of a fit whose residuals are alike within blocks of `BLOCK_S` (White 1980)."""
+def sandwich(jacobian: Array, residuals: Array, block_s: float = BLOCK_S) -> Array:
+    """Covariance of a fit whose residuals are alike within blocks of `block_s` [s] (White 1980)."""
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
-    rows = 6 * round(BLOCK_S / (EVERY * PERIOD_S))
+    rows = 6 * round(block_s / (EVERY * PERIOD_S))
     blocks = np.array_split(np.arange(len(residuals)), max(len(residuals) // rows, 2))
     scores = np.array([jacobian[block].T @ residuals[block] for block in blocks])
     middle = scores.T @ scores * (len(blocks) / (len(blocks) - 1.0))
