@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import tomlkit
@@ -43,6 +43,22 @@ def with_numbers(text: str, numbers: Mapping[str, Value], comments: Mapping[str,
         wanted[section][name] = value
         document[section][name] = _item(value, comments[key])
     return _verified(document, wanted, ", ".join(numbers))
+
+
+def with_thrusters_reordered(text: str, order: Sequence[int], comment: str) -> str:
+    """The text with its thrusters in another order: the first is the one that was `order[0]`, ...
+
+    Raises:
+        RobotTextError: they stand in no [thrusters] table.
+    """
+    document, wanted = tomlkit.parse(text), tomllib.loads(text)
+    units = wanted["thrusters"]["units"]
+    wanted["thrusters"]["units"] = [units[k] for k in order]
+    for place, k in enumerate(order):
+        if k != place:
+            document["thrusters"]["units"][place].update(units[k])
+    document.add(tomlkit.comment(comment))
+    return _verified(document, wanted, "thrusters.units")
 
 
 def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool = False) -> str:

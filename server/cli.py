@@ -24,8 +24,10 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   experiments  measure the loop, as tables and pictures
   bench        how well it sees: right, exact, honest, fast; against stated goals
   calibrate    a camera: lens, readout time and motion sensors, from a film of a board
-  robot        check: can it be flown; leds: can its LEDs be told apart, and would others be;
-               key: make its key; onboard: its own computer, before a flight controller
+  robot        check: can it be flown; leds: can its LEDs be told apart, and
+               would others be; key: make its key; bring-up: which thruster is which, by pulses;
+               identify: what is it, by flights; onboard: its own computer, before a flight
+               controller
   tune         find a robot's gains for a measured latency, under stated margins
   survey       where the LEDs are, from a film of the robot at rest
   warm         compile what must be fast, once; `serve` does so by itself

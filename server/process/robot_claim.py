@@ -11,6 +11,7 @@ from __future__ import annotations
 import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from hardware.robot_file import COMMANDS, load_robot
 from server.common.runtime import BusyError, private_directory, private_opener
@@ -31,7 +32,18 @@ def claimed(settings: Settings) -> Iterator[None]:
         yield
         return
     robot = load_robot(settings.robot, takes=COMMANDS).robot.name
-    file = private_directory(settings.state / ROBOTS) / f"{robot}.lock"
+    with claimed_robot(settings.state, robot, words_for(settings.name)):
+        yield
+
+
+@contextmanager
+def claimed_robot(state: Path, robot: str, by: str) -> Iterator[None]:
+    """The real robot of that name is ours while it lasts; `by` says who we are.
+
+    Raises:
+        BusyError: another one of this state directory has it; says which.
+    """
+    file = private_directory(state / ROBOTS) / f"{robot}.lock"
     with open(file, "a+", encoding="utf-8", opener=private_opener) as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -42,6 +54,6 @@ def claimed(settings: Settings) -> Iterator[None]:
                 "give another robot a file with a name of its own"
             ) from error
         lock.truncate(0)
-        lock.write(words_for(settings.name))
+        lock.write(by)
         lock.flush()
         yield

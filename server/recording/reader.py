@@ -130,8 +130,8 @@ def _reader(stream: IO[bytes]) -> SeekingReader:
     return SeekingReader(stream, validate_crcs=True, record_size_limit=MAX_MCAP_RECORD_BYTES)
 
 
-def read(path: Path) -> Recording:
-    """Open a recording.
+def read(path: Path, *, led: bool = True) -> Recording:
+    """Open a recording; `led` by a phone, or of a robot alone.
 
     Raises:
         RecordingError: no MCAP file, never closed, damaged, of another version, or without a phone.
@@ -152,7 +152,7 @@ def read(path: Path) -> Recording:
         if summary is None or statistics is None:
             raise RecordingError(path, "has no summary", "`lightleash replay --recover`")
         phone = [id for id, c in summary.channels.items() if c.topic == PHONE_RECORDS]
-        if not any(statistics.channel_message_counts.get(id) for id in phone):
+        if led and not any(statistics.channel_message_counts.get(id) for id in phone):
             raise RecordingError(path, "holds no stream of a phone", "name another recording")
         first, last = statistics.message_start_time, statistics.message_end_time
         return Recording(path, metadata, 1e-9 * first, 1e-9 * last)

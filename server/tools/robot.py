@@ -12,9 +12,12 @@ from hardware.robot_file import RobotFileError
 from hardware.robot_text import RobotTextError
 from hardware.system_identification.fit import IdentificationError
 from server.common.options import Parser
+from server.common.runtime import BusyError
 from server.process import robot_key
 from server.recording.writer import RecordingError
 from server.tools import onboard, robot_check
+from server.tools.bring_up import command as bring_up
+from server.tools.bring_up.pulses import BringUpError
 from server.tools.identify import command as identify
 from server.tools.led_layout import command as leds
 from server.tools.led_layout.files import OutError
@@ -22,6 +25,7 @@ from server.tools.led_layout.files import OutError
 KINDS = {
     "check": robot_check,
     "leds": leds,
+    "bring-up": bring_up,
     "identify": identify,
     "key": robot_key,
     "onboard": onboard,
@@ -49,6 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         IdentificationError,
         RecordingError,
         RobotTextError,
+        BringUpError,
+        BusyError,
         OSError,
     ) as error:
         print(f"lightleash robot {arguments.name}: {error}", file=sys.stderr)

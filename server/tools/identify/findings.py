@@ -196,22 +196,25 @@ def objections(identified: IdentifiedPlant) -> list[str]:
 
 
 def file_numbers(
-    known: PlantParameters, numbers: Sequence[FoundNumber]
+    known: PlantParameters, numbers: Sequence[FoundNumber], by: str = "robot identify"
 ) -> tuple[Mapping[str, Value], Mapping[str, str]]:
-    """Numbers for a robot file by key, a comment on each: all told ones but thrusters' shares."""
+    """Numbers for a robot file by key, a comment on each: all told ones but thrusters' shares.
+
+    `by` is what found them.
+    """
     values: dict[str, Value] = {}
     comments: dict[str, str] = {}
     told = {one.key: one for one in numbers if one.is_told}
     for key, one in told.items():
         if key.count(".") == 1:
             values[key] = _rounded(one.found)
-            comments[key] = f"robot identify: ± {one.half_95:.2g}"
+            comments[key] = f"{by}: ± {one.half_95:.2g}"
     inertia = [told.get(f"body.inertia_kg_m2.{i}") for i in range(3)]
     if any(inertia):
         moments = zip(inertia, known.inertia.tolist(), strict=True)
         values["body.inertia_kg_m2"] = [_rounded(one.found if one else old) for one, old in moments]
         halves = ", ".join(f"± {one.half_95:.1g}" if one else "not told" for one in inertia)
-        comments["body.inertia_kg_m2"] = f"robot identify: {halves}"
+        comments["body.inertia_kg_m2"] = f"{by}: {halves}"
     return values, comments
 
 

@@ -12,6 +12,7 @@ from hardware.system_identification.imu_attitude import attitude_by_imu
 from tests.hardware.system_identification.pulses import pulsed
 
 KNOWN = load_robot("ames").plant
+pytestmark = pytest.mark.slow
 
 
 @cache
