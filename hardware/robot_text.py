@@ -45,6 +45,13 @@ def with_numbers(text: str, numbers: Mapping[str, Value], comments: Mapping[str,
     return _verified(document, wanted, ", ".join(numbers))
 
 
+def with_name(text: str, name: str) -> str:
+    """The text of a robot file with another name."""
+    document, wanted = tomlkit.parse(text), tomllib.loads(text)
+    document["name"] = wanted["name"] = name
+    return _verified(document, wanted, "name")
+
+
 def with_thrusters_reordered(text: str, order: Sequence[int], comment: str) -> str:
     """The text with its thrusters in another order: the first is the one that was `order[0]`, ...
 

@@ -24,7 +24,7 @@ usage: lightleash COMMAND [OPTIONS]      (COMMAND --help tells its options)
   experiments  measure the loop, as tables and pictures
   bench        how well it sees: right, exact, honest, fast; against stated goals
   calibrate    a camera: lens, readout time and motion sensors, from a film of a board
-  robot        check: can it be flown; leds: can its LEDs be told apart, and
+  robot        new: a first file; check: can it be flown; leds: can its LEDs be told apart, and
                would others be; key: make its key; bring-up: which thruster is which, by pulses;
                identify: what is it, by flights; onboard: its own computer, before a flight
                controller

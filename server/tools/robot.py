@@ -21,8 +21,10 @@ from server.tools.bring_up.pulses import BringUpError
 from server.tools.identify import command as identify
 from server.tools.led_layout import command as leds
 from server.tools.led_layout.files import OutError
+from server.tools.new_robot import command as new_robot
 
 KINDS = {
+    "new": new_robot,
     "check": robot_check,
     "leds": leds,
     "bring-up": bring_up,

@@ -1,0 +1,1 @@
+"""`lightleash robot new`: a first robot file, asked for."""
