@@ -9,6 +9,7 @@ import pytest
 
 from hardware.robot_file import load_robot
 from hardware.system_identification.imu_attitude import attitude_by_imu
+from pipeline.frames import exp
 from tests.hardware.system_identification.pulses import pulsed
 
 KNOWN = load_robot("ames").plant
@@ -20,11 +21,15 @@ def hanging(seed):
     return pulsed(KNOWN, 0.3, seed=seed)
 
 
+@pytest.mark.parametrize("beside_deg", [0.0, 3.0])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_bias_of_the_accelerometer_is_no_tilt(seed):
+def test_a_bias_of_the_accelerometer_is_no_tilt_and_a_tilt_no_bias(seed, beside_deg):
+    """Turning about the vertical tells them apart."""
     _, omega, force, R_fb = hanging(seed)
-    seen = attitude_by_imu(omega, force, KNOWN.imu)
-    off = np.arccos(np.clip(np.einsum("nj,nj->n", seen.R_fs[:, 2], R_fb[:, 2]), -1.0, 1.0))
+    R_bs = exp(np.radians((beside_deg, 0.0, 0.0)))
+    seen = attitude_by_imu(omega @ R_bs, force @ R_bs, KNOWN.imu)
+    up, true = seen.R_fs[:, 2], (R_fb @ R_bs)[:, 2]
+    off = np.arccos(np.clip(np.einsum("nj,nj->n", up, true), -1.0, 1.0))
     assert np.degrees(off.max()) < 0.15
     tilt_by_bias = np.arctan2(np.linalg.norm(force[:400].mean(axis=0)[:2]), 9.81)
     assert off.max() < 0.25 * tilt_by_bias
