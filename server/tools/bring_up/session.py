@@ -6,6 +6,7 @@ import gc
 import os
 import queue
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -131,12 +132,13 @@ class _Told:
 @contextmanager
 def punctual() -> Iterator[str]:
     """Real time as control asks for, while it lasts; gives what was granted."""
-    scheduler = os.sched_getscheduler(0), os.sched_getparam(0)
+    before = (os.sched_getscheduler(0), os.sched_getparam(0)) if sys.platform == "linux" else None
     granted = realtime.claim()
     try:
         yield granted
     finally:
-        os.sched_setscheduler(0, *scheduler)
+        if before is not None:  # elsewhere nothing was granted
+            os.sched_setscheduler(0, *before)
         gc.enable()
         gc.unfreeze()
 
