@@ -21,13 +21,13 @@ from server.experiments import processes
 from server.experiments.forked import forked
 from tests.told_flight import Led
 
-FIRST_SEED = 3000
+FIRST_SEED = 4000
 SETTLED_S = 4.0
 GAPS_S = (0.5, 1.0, 2.0)
 MOST_RATIO = 2.0
 """RMS error to that of the same robot with motion sensors."""
-BAND = (4.0, 7.4)
-"""Of ANEES(6)."""
+BAND = (4.7, 7.4)
+"""Of ANEES(6), as of all estimates; below, it believes itself less than it could."""
 HOW = ("sensors", "measured", "commanded")
 
 
