@@ -16,8 +16,6 @@ from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulat
 
 LAG_UNTOLD_S = 0.06
 """By so much more than its file says a robot lags that measures nothing."""
-SLIPS = 0.03
-"""Of a robot with sensors: as much as one whose twist is measured."""
 
 
 def robot(name: str) -> RobotFile:
@@ -44,8 +42,6 @@ class Led:
         if name.endswith("commanded"):
             slow = replace(drive, lag_s=drive.lag_s + LAG_UNTOLD_S)
             truth = replace(truth, robot=replace(truth.robot, twist=slow))
-        if name.endswith("sensors"):  # it slips, too
-            truth = replace(truth, plant=replace(truth.plant, slip=SLIPS))
         scene = SimulationOptions(hand="filming", seed=seed, led_noise_px=0.1, gains="phone")
         follower = VirtualTimeFollower(truth, seed)
         self.loop = VirtualTimeSimulation(robot_file, TeleopConfig(), scene, follower=follower)

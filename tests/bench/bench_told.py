@@ -5,7 +5,7 @@
 A base and an arm's tip follow a hand that films, in virtual time by LEDs' rays 60-120 ms late: with
 a gyroscope and accelerometer on the body, by a twist measured 20 times a second, 20 ms late, with
 noise, and by what they were told alone, which they follow 60 ms more slowly than anybody knows;
-bodies slip. Then no picture comes for a while. Judged from 4 s on, by seeds on which nothing was
+the latter two slip. Then no picture comes for a while. Judged from 4 s on, by seeds on which nothing was
 tuned.
 """
 
@@ -25,7 +25,7 @@ FIRST_SEED = 4000
 SETTLED_S = 4.0
 GAPS_S = (0.5, 1.0, 2.0)
 MOST_RATIO = 2.0
-"""RMS error to that of the same robot with motion sensors."""
+"""RMS error to that of the same robot with motion sensors and the same seed; of all seeds."""
 BAND = (4.7, 7.4)
 """Of ANEES(6), as of all estimates; below, it believes itself less than it could."""
 HOW = ("sensors", "measured", "commanded")
@@ -42,7 +42,7 @@ def hidden(seconds, flight):
 
 
 def fly(seconds, job):
-    """(Squared errors of following [m²], ANEES, largest error per gap [m], flights ended)."""
+    """(Seed, squared errors of following and of the estimate [m²], ANEES, gaps [m], ended)."""
     name, seed = job
     flight = Led(name, seed).fly(SETTLED_S).forget().fly(seconds - SETTLED_S)
     rows = np.array(flight.loop.trace.error_in_f)
@@ -50,7 +50,7 @@ def fly(seconds, job):
     estimate = float(np.mean(np.square(flight.off)))
     gaps = [forked(partial(hidden, gap, flight)) for gap in GAPS_S]
     ended = (flight.loop.trace.left != "") + sum(not goes_on for _, goes_on in gaps)
-    return squares, estimate, nees, [off for off, _ in gaps], ended
+    return seed, squares, estimate, nees, [off for off, _ in gaps], ended
 
 
 def main():
@@ -62,29 +62,33 @@ def main():
     seeds = range(FIRST_SEED, FIRST_SEED + arguments.seeds)
     gaps = "".join(f"{f'{gap:g} s':>9}" for gap in GAPS_S)
     print(f"{arguments.seeds} seeds; largest error without pictures for{gaps}")
-    print(f"{'':<20}  RMS mm  ratio  estimate mm   NEES      mm       mm       mm  ended")
+    print(f"{'':<20}  RMS mm  median  worst  estimate mm   NEES      mm       mm       mm  ended")
     verdicts = []
     for base in ("rover", "twister"):
-        usual = np.nan
+        usual: dict[int, float] = {}
         for how in HOW:
             jobs = [(f"{base}-{how}", seed) for seed in seeds]
             done = processes.each(partial(fly, arguments.seconds), jobs, workers=arguments.workers)
-            squares, estimates, nees, offs, ended = zip(*done, strict=True)
+            flown, squares, estimates, nees, offs, ended = zip(*sorted(done), strict=True)
             rms = 1e3 * float(np.sqrt(np.mean(squares)))
-            usual = rms if how == "sensors" else usual
+            each = dict(zip(flown, np.sqrt(squares).tolist(), strict=True))
+            usual = usual or each
+            ratios = [each[seed] / usual[seed] for seed in flown]
             worst = "".join(f"{1e3 * off:9.1f}" for off in np.max(offs, axis=0))
-            anees, ratio = float(np.mean(nees)), rms / usual
+            anees, median, worst_ratio = float(np.mean(nees)), np.median(ratios), max(ratios)
             estimate = 1e3 * float(np.sqrt(np.mean(estimates)))
             print(
-                f"{f'{base}, {how}':<20}{rms:8.2f}{ratio:7.2f}{estimate:13.2f}{anees:7.2f}"
+                f"{f'{base}, {how}':<20}{rms:8.2f}{median:8.2f}{worst_ratio:7.2f}{estimate:13.2f}{anees:7.2f}"
                 f"{worst}{sum(ended):7}",
                 flush=True,
             )
             if how != "sensors":
-                verdicts.append((ratio <= MOST_RATIO, BAND[0] <= anees <= BAND[1], not sum(ended)))
+                verdicts.append(
+                    (worst_ratio <= MOST_RATIO, BAND[0] <= anees <= BAND[1], not sum(ended))
+                )
     print()
     words = (
-        f"ratio no more than {MOST_RATIO:g}",
+        f"each ratio no more than {MOST_RATIO:g}",
         f"ANEES(6) from {BAND[0]:g} to {BAND[1]:g}",
         "no flight ended",
     )
