@@ -5,8 +5,8 @@
 A base and an arm's tip follow a hand that films, in virtual time by LEDs' rays 60-120 ms late: with
 a gyroscope and accelerometer on the body, by a twist measured 20 times a second, 20 ms late, with
 noise, and by what they were told alone, which they follow 60 ms more slowly than anybody knows;
-the latter two slip. Then no picture comes for a while. Judged from 4 s on, by seeds on which nothing was
-tuned.
+the latter two slip. Then no picture comes for a while. Judged from 4 s on, by seeds on which
+nothing was tuned.
 """
 
 import argparse
@@ -78,8 +78,8 @@ def main():
             anees, median, worst_ratio = float(np.mean(nees)), np.median(ratios), max(ratios)
             estimate = 1e3 * float(np.sqrt(np.mean(estimates)))
             print(
-                f"{f'{base}, {how}':<20}{rms:8.2f}{median:8.2f}{worst_ratio:7.2f}{estimate:13.2f}{anees:7.2f}"
-                f"{worst}{sum(ended):7}",
+                f"{f'{base}, {how}':<20}{rms:8.2f}{median:8.2f}{worst_ratio:7.2f}{estimate:13.2f}"
+                f"{anees:7.2f}{worst}{sum(ended):7}",
                 flush=True,
             )
             if how != "sensors":
