@@ -78,8 +78,9 @@ def main():
             anees, median, worst_ratio = float(np.mean(nees)), np.median(ratios), max(ratios)
             estimate = 1e3 * float(np.sqrt(np.mean(estimates)))
             print(
-                f"{f'{base}, {how}':<20}{rms:8.2f}{median:8.2f}{worst_ratio:7.2f}{estimate:13.2f}"
-                f"{anees:7.2f}{worst}{sum(ended):7}",
+                f"{f'{base}, {how}':<20}{rms:8.2f}{median:8.2f}{worst_ratio:7.2f}"
+                f"{estimate:13.2f}{anees:7.2f}"
+                f"{worst}{sum(ended):7}",
                 flush=True,
             )
             if how != "sensors":
