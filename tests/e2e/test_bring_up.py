@@ -68,10 +68,13 @@ def bring_up(rig: RealTimeRig, folder: Path, *options: str) -> subprocess.Popen[
 def until(process: subprocess.Popen[str], word: str) -> None:
     """Read what it says until a line has `word`."""
     assert process.stdout
+    said = ""
     for line in process.stdout:
+        said += line
         if word in line:
             return
-    pytest.fail(f"it never said {word!r}")
+    process.communicate(timeout=PATIENCE_S)
+    pytest.fail(f"it never said {word!r}, but: {said}")
 
 
 def states(folder: Path) -> list[RecordedState]:

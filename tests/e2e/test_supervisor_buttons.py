@@ -161,6 +161,13 @@ def has_event(server: Serving, beginning: str) -> bool:
     return any(event["text"].startswith(beginning) for event in events)
 
 
+def kept(server: Serving) -> object:
+    """Whether somebody should learn from the newest press."""
+    told = status(server)["episode"]
+    assert isinstance(told, dict)
+    return told["keep"]
+
+
 def enter(clicks: Clicks) -> None:
     clicks.page.open(f"{clicks.server.http_url}/supervisor{clicks.server.link('supervisor')}")
     clicks.until_page(COME.format("supervisor"))
@@ -173,6 +180,10 @@ def fly_and_record(clicks: Clicks) -> None:
     clicks.click("virtual", lambda: "virtual" in str(status(server)["operator"]))
     until(lambda: mode(server) == "TRACK", READY_S, "TRACK")
     clicks.click("record", lambda: status(server)["recording"] != "")
+    clicks.until_page(SHOWN.format("#episode"))
+    clicks.choose("task", "a cup", lambda: status(server)["task"] == "a cup")
+    clicks.until_page("!document.querySelector('#verdict').disabled")
+    clicks.click("verdict", lambda: not kept(server))
     clicks.until_page(SHOWN.format("#picture"))
     ask(server, "Carla")  # perhaps by the code that the page has: it needs another one
     invites = said(server, "invite")
