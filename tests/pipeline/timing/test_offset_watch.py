@@ -29,10 +29,18 @@ def test_without_a_coarse_one_it_must_be_near_none_as_far_as_it_is_sure(
 def test_one_that_the_coarse_one_refutes_begins_again_and_soon_after_complains() -> None:
     watch = OffsetMonitor()
     watch.coarse = StampOffset(0.08, 0.002)
-    assert not watch.must_begin_again(0.07, 1e-3, 1.0)
+    assert not watch.must_begin_again(0.073, 1e-3, 1.0)
     assert watch.must_begin_again(0.0, 1.0, 2.0)  # however unsure of itself it is
     assert watch.complaint == ""
     assert watch.must_begin_again(0.0, 1e-3, 3.0)
     assert watch.complaint == DRIFTING
     assert not watch.must_begin_again(0.08, 1e-3, 4.0)
     assert watch.complaint == ""
+
+
+@pytest.mark.parametrize(("value", "begins"), [(-0.0135, True), (-0.007, False), (0.01, False)])
+def test_what_a_phone_at_rest_was_wrongly_sure_of_is_not_kept(value: float, begins: bool) -> None:
+    """As found: learnt while hardly anything moved, and sure of to 0.3 ms."""
+    watch = OffsetMonitor()
+    watch.coarse = StampOffset(0.0012, 0.0023)
+    assert watch.must_begin_again(value, 3e-4, 4.0) is begins
