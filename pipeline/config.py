@@ -140,8 +140,9 @@ class ComplianceConfig:
 class LeashConfig:
     """How near to the end of its reach a robot that hangs may be led."""
 
-    enabled: bool = True
-    """Else it is only told that the robot is led beyond its reach."""
+    enabled: bool = False
+    """Off: a push that stays is taken for a place after some seconds, and given way to. That the
+    robot is led beyond its reach is told nevertheless."""
     kept: float = 0.15
     """Share of each thruster's largest thrust that no place may take up: it is left for control."""
     free: float = 0.9

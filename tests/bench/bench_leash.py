@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from pipeline.config import TeleopConfig
+from pipeline.config import LeashConfig, TeleopConfig
 from pipeline.signals import Mode
 from server.common.options import Parser
 from server.common.progress import progress_bar
@@ -31,8 +31,8 @@ FIRST_SEED: Final = 1000
 
 
 def flown(seed: int) -> BeyondFlight:
-    """One hand, led as it is shipped."""
-    return beyond(seed, TeleopConfig())
+    """One hand, on the leash."""
+    return beyond(seed, TeleopConfig(leash=LeashConfig(enabled=True)))
 
 
 def spread(values: list[float], unit: str) -> str:

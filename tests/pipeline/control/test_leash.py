@@ -15,7 +15,7 @@ from pipeline.control.reach import ThrustReach
 from pipeline.frames import Array, exp
 
 AMES = load_robot("ames").robot
-CONFIG, RESUMPTION = LeashConfig(), ResumptionConfig()
+CONFIG, RESUMPTION = LeashConfig(enabled=True), ResumptionConfig()
 R_FV, R_FR = exp(np.array([0.1, -0.2, 0.5])), exp(np.array([0.05, 0.1, -0.3]))
 X_IN_F, V_IN_F = np.array([0.03, -0.04, 0.02]), np.array([0.1, 0.2, -0.05])
 BODY, H = LeashedBody(X_IN_F, V_IN_F, is_known=True), 0.005
@@ -156,7 +156,7 @@ def test_what_hangs_from_nothing_has_no_leash(name: str) -> None:
 
 
 def test_who_does_not_ask_for_one_is_told_of_the_end_of_its_reach_and_held_nowhere() -> None:
-    leash = leash_of(AMES, LeashConfig(enabled=False), RESUMPTION)
+    leash = leash_of(AMES, LeashConfig(), RESUMPTION)
     assert leash is not None
     for away in AWAY:
         for times, said in ((0.99, False), (1.01, True), (20.0, True)):
@@ -167,7 +167,7 @@ def test_who_does_not_ask_for_one_is_told_of_the_end_of_its_reach_and_held_nowhe
 
 def test_without_any_reach_nothing_is_told_and_no_leash_can_be_asked_for() -> None:
     weak = replace(AMES, f_max=1.001 * AMES.f_min)
-    assert leash_of(weak, LeashConfig(enabled=False), RESUMPTION) is None
+    assert leash_of(weak, LeashConfig(), RESUMPTION) is None
     with pytest.raises(ValueError, match="reach"):
         leash_of(weak, CONFIG, RESUMPTION)
 
