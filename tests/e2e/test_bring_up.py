@@ -20,7 +20,7 @@ from server.process.robot_key import key_file
 from server.recording.reader import read
 from tests.e2e.robot_rig import KEY, RealTimeRig, simulated_robot
 
-pytestmark = pytest.mark.e2e
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]  # real time: a gap of 60 ms begins it anew
 BUILT = """{"order": [1, 2, 4, 3, 5, 6, 7, 8], "mass_kg": 3.1, "lag_s": 0.035,
 "vibration": {"hz": 63.0, "rate_rad_s": 0.02, "force_m_s2": 0.5}}"""
 PATIENCE_S = 120.0
