@@ -8,13 +8,13 @@ from hardware.follower import (
     BlinkOrder,
     BodySample,
     EStop,
-    FollowerError,
     FollowerState,
     RobotCommand,
     RobotHealth,
 )
 from hardware.link.blink_end import NO_LED
 from hardware.link.control_end import ControlEnd
+from hardware.link.link_follower import LinkFollower
 from hardware.link.robot_server import TICK_US
 from hardware.robot_file import RobotFile
 from hardware.sim.battery import DrainingBattery
@@ -33,7 +33,7 @@ def whole(data: bytes) -> Sequence[bytes]:
     return (data,)
 
 
-class VirtualTimeFollower:
+class VirtualTimeFollower(LinkFollower[ControlEnd]):
     """The same bytes, gate, watchdog and plant as over UDP; time passes only in `advance`."""
 
     def __init__(
@@ -48,7 +48,9 @@ class VirtualTimeFollower:
         self._robot = SimulatedRobot(
             robot_file, seed, seed + 1, seeded_nonces(seed), KEY, options, battery
         )
-        self._end = ControlEnd.of(robot_file, KEY, epoch, seeded_nonces(seed + 1))
+        self._now_us = 0
+        end = ControlEnd.of(robot_file, KEY, epoch, seeded_nonces(seed + 1))
+        super().__init__(end, lambda: self.t)
         self.thrusters = self._end.thrusters
         self.connected = True
         """False: the link loses everything, both ways."""
@@ -57,9 +59,7 @@ class VirtualTimeFollower:
         self.to_control: Tamper = whole
         """... and of a sample's."""
         self._robot_file = robot_file
-        self._now_us = 0
         self._arrived: list[bytes] = []
-        self._closed = False
 
     @property
     def plant(self) -> Plant:
@@ -70,16 +70,6 @@ class VirtualTimeFollower:
     def body(self) -> SimulatedBody:
         """The truth of any robot."""
         return self._robot.body
-
-    @property
-    def epoch(self) -> int:
-        """Under which commands are sent; a new one after the robot has gone to zero by itself."""
-        return self._end.epoch
-
-    @property
-    def dropped(self) -> int:
-        """Datagrams that were not the robot's, repeated, overtaken or of an earlier session."""
-        return self._end.dropped
 
     @property
     def health(self) -> tuple[RobotHealth, float] | None:
@@ -121,34 +111,20 @@ class VirtualTimeFollower:
         """Return what has arrived. See `Follower`."""
         self._check_open()
         arrived, self._arrived = self._arrived, []
-        samples = (self._end.receive(data, self.t) for data in arrived)
+        samples = (self._end.receive(data, self._clock()) for data in arrived)
         return [sample for sample in samples if sample is not None]
-
-    def send(self, command: RobotCommand) -> None:
-        """See `Follower`."""
-        self._check_open()
-        self._send(command)
 
     def blink(self, order: BlinkOrder) -> None:
         """See `Blinking`."""
         self._check_open()
         self._post(self._end.blink(order))
 
-    def stop(self) -> None:
-        """Zero."""
-        if not self._closed:
-            self._send(self._end.zero())
-
     def close(self) -> None:
         """Close. See `Follower`."""
         self._closed = True
 
-    def _check_open(self) -> None:
-        if self._closed:
-            raise FollowerError("the link is closed", "an open one")
-
     def _send(self, command: RobotCommand) -> None:
-        self._post(self._end.command(command, self.t))
+        self._post(self._end.command(command, self._clock()))
 
     def _post(self, data: bytes) -> None:
         if self.connected:
