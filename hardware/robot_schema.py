@@ -249,6 +249,12 @@ def R_from_axes(axes: list[Direction]) -> Array:
     return np.array(rows)
 
 
+def axes_from_R(R_bi: Array) -> list[str]:
+    """`Direction`s of sensors that are turned by right angles (3, 3): back from `R_from_axes`."""
+    which = np.abs(R_bi).argmax(axis=1).tolist()
+    return ["-" * int(row[k] < 0.0) + "xyz"[k] for row, k in zip(R_bi, which, strict=True)]
+
+
 def axes_fault(axes: list[Direction]) -> str:
     """What would be allowed in place of three directions that are no right-handed system, or ""."""
     letters = "".join(axis[-1] for axis in axes)

@@ -9,9 +9,8 @@ eight exchanged thrusters.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import permutations, product
 from typing import Final
 
 import numpy as np
@@ -23,6 +22,7 @@ from hardware.robot_physics import allocation_matrix
 from hardware.system_identification.imu_attitude import ImuAttitude
 from hardware.system_identification.thrust_response import thrust_response
 from pipeline.config import PERIOD_S
+from pipeline.estimation.rate_axes import WAYS
 from pipeline.frames import Array
 
 BAND_HZ: Final = (1.0, 10.0)
@@ -45,6 +45,9 @@ LEAST_AHEAD: Final = 0.15
 """Of the best explanation before the next, likewise."""
 LEAST_UPRIGHT: Final = 0.9
 """Cosine of how far from upright sensors may be that are said to sit so."""
+
+TURNS: Final = WAYS[np.linalg.det(WAYS) > 0.0]
+"""(24, 3, 3) by right angles."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,10 +89,15 @@ class Sorting:
         return not np.array_equal(self.R_bs, np.eye(3))
 
     @property
+    def is_but_for_plugs(self) -> bool:
+        """Whether all is as the file says, or thrusters have changed places and nothing else."""
+        odd = self.reversed or self.silent or self.unclear
+        return not (odd or self.is_turned or self.is_ambiguous)
+
+    @property
     def is_as_told(self) -> bool:
         """Whether all is as the file says."""
-        odd = self.swapped or self.reversed or self.silent or self.unclear
-        return not (odd or self.is_turned or self.is_ambiguous)
+        return self.is_but_for_plugs and not self.swapped
 
     def built(self, known: PlantParameters) -> tuple[Array, Array, Array]:
         """Positions (m, 3), directions (m, 3) and torques (m,) in the order that was found."""
@@ -153,11 +161,7 @@ def sort(known: PlantParameters, felt: Sequence[Felt | None], up_in_s: Array) ->
     told = columns / np.linalg.norm(columns, axis=0)
     up = up_in_s / np.linalg.norm(up_in_s)
     ranked = sorted(
-        (
-            _judged(known, felt, told, arm, R_bs)
-            for R_bs in _turns()
-            if R_bs[2] @ up > LEAST_UPRIGHT
-        ),
+        (_judged(known, felt, told, arm, R_bs) for R_bs in TURNS if R_bs[2] @ up > LEAST_UPRIGHT),
         key=lambda one: one[0],
         reverse=True,
     )
@@ -206,12 +210,3 @@ def _wrench(known: PlantParameters, felt: Felt | None, arm: float, R_bs: Array) 
 def _nothing(thrusters: int) -> Sorting:
     everything = tuple(range(thrusters))
     return Sorting(np.eye(3), everything, (), (), everything, is_ambiguous=True)
-
-
-def _turns() -> Iterator[Array]:
-    """All 24 rotations (3, 3) by right angles."""
-    for order in permutations(range(3)):
-        for signs in product((1.0, -1.0), repeat=3):
-            R = np.eye(3)[list(order)] * np.array(signs)[:, None]
-            if np.linalg.det(R) > 0.0:
-                yield R

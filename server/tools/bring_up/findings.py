@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from hardware.plant_parameters import PlantParameters
+from hardware.robot_schema import axes_from_R
 from hardware.system_identification.fit import (
     LINK_S,
     IdentificationError,
@@ -78,9 +79,7 @@ class BroughtUp:
     @property
     def is_sound(self) -> bool:
         """Whether numbers may go into a file: nothing but plugs is exchanged."""
-        sorting = self.sorting
-        odd = sorting.reversed or sorting.silent or sorting.unclear or sorting.is_turned
-        return not (odd or sorting.is_ambiguous) and self.identified is not None
+        return self.sorting.is_but_for_plugs and self.identified is not None
 
 
 def brought_up(known: PlantParameters, states: Iterable[State]) -> BroughtUp:
@@ -175,7 +174,7 @@ def _named(
 def _wrong(sorting: Sorting) -> Iterable[str]:
     """What is built another way than the file says, and what to do."""
     if sorting.is_turned:
-        axes = ", ".join(f'"{axis}"' for axis in axes_of(sorting.R_bs))
+        axes = ", ".join(f'"{axis}"' for axis in axes_from_R(sorting.R_bs))
         yield (
             f"The motion sensors sit turned: along their axes {axes} lie the body's x, y, z. Turn"
             " them, or tell the robot's own computer (imu_axes in the file, else its firmware)."
@@ -212,15 +211,6 @@ def _askew(off: Array, off_95: Array) -> Iterable[str]:
             f"The motion sensors sit {degrees(angle):.0f}° beside the body's axes (about x, y, z by"
             f" {turns}): straighten them, or the positions and directions of thrusters in the file."
         )
-
-
-def axes_of(R_bs: Array) -> list[str]:
-    """`imu_axes` of a robot file for sensors that are turned by right angles."""
-    names = []
-    for row in R_bs:
-        k = int(np.abs(row).argmax())
-        names.append(("-" if row[k] < 0.0 else "") + "xyz"[k])
-    return names
 
 
 def periods(numbers: list[FoundNumber]) -> list[str]:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
+from hardware.robot_schema import R_from_axes, axes_from_R
 from hardware.sim.plant.built import AsBuilt
 from hardware.system_identification.imu_attitude import attitude_by_imu
-from hardware.system_identification.thruster_sorting import Felt, felt_of, sort
+from hardware.system_identification.thruster_sorting import TURNS, Felt, felt_of, sort
 from tests.hardware.system_identification.pulses import pulsed
 
 KNOWN = load_robot("ames").plant
@@ -98,3 +99,10 @@ def test_who_is_built_by_the_file_gets_its_own_thrusters_back(robot):
     assert found.is_as_told
     for mine, theirs in zip(found.built(known), (known.thruster_positions_in_b,), strict=False):
         np.testing.assert_array_equal(mine, theirs)
+
+
+def test_there_are_24_turns_by_right_angles_and_a_robot_file_can_say_each() -> None:
+    assert len(TURNS) == len(np.unique(TURNS, axis=0)) == 24
+    for R_bs in TURNS:
+        np.testing.assert_array_equal(R_from_axes(axes_from_R(R_bs)), R_bs)
+        assert np.linalg.det(R_bs) == pytest.approx(1.0)
