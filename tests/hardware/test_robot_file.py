@@ -315,6 +315,15 @@ def test_a_robot_that_takes_a_twist_is_refused_where_only_thrusts_are_known():
     assert (drive.speed, drive.rate) == (0.5, pytest.approx(np.pi / 2))
 
 
+def is_named(tmp_path, robot, old, new, allowed):
+    """The shipped `robot` with a mistake `new` in place of `old` is refused by what is allowed."""
+    text = robot_path(robot).read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(RobotFileError, match=allowed):
+        load_robot(tmp_path / "changed.toml", takes=COMMANDS)
+
+
 TWIST_MISTAKES = {
     "brakes too late": ("acceleration_m_s2 = 5.0", "acceleration_m_s2 = 4.0", "4.55 or more"),
     "turns too long": ("deg_s2 = 1000.0", "deg_s2 = 800.0", "818 or more"),
@@ -329,12 +338,7 @@ TWIST_MISTAKES = {
 
 @pytest.mark.parametrize("mistake", TWIST_MISTAKES)
 def test_a_mistake_of_a_robot_that_takes_a_twist_is_named(tmp_path, mistake):
-    old, new, allowed = TWIST_MISTAKES[mistake]
-    text = robot_path("twister").read_text(encoding="utf-8")
-    assert old in text
-    (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(RobotFileError, match=allowed):
-        load_robot(tmp_path / "changed.toml", takes=COMMANDS)
+    is_named(tmp_path, "twister", *TWIST_MISTAKES[mistake])
 
 
 MOTION_MISTAKES = {
@@ -357,12 +361,7 @@ MOTION_MISTAKES = {
 
 @pytest.mark.parametrize("mistake", MOTION_MISTAKES)
 def test_a_mistake_in_what_a_robot_tells_of_its_motion_is_named(tmp_path, mistake):
-    old, new, allowed = MOTION_MISTAKES[mistake]
-    text = robot_path("rover").read_text(encoding="utf-8")
-    assert old in text
-    (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(RobotFileError, match=allowed):
-        load_robot(tmp_path / "changed.toml", takes=COMMANDS)
+    is_named(tmp_path, "rover", *MOTION_MISTAKES[mistake])
 
 
 def test_a_robot_that_takes_a_twist_has_motion_sensors_or_says_what_it_tells(tmp_path):
