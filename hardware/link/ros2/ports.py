@@ -87,7 +87,11 @@ class RosPorts:
     """A participant of a domain: one topic out, two, one or none in."""
 
     def __init__(
-        self, topics: Ros2Parameters, host: str, wall_ns: Callable[[], int] = time.time_ns
+        self,
+        topics: Ros2Parameters,
+        host: str,
+        wall_ns: Callable[[], int] = time.time_ns,
+        tells: Qos = TELLS,
     ) -> None:
         """Listens, says nothing yet. `wall_ns` is the time in ROS's headers.
 
@@ -97,7 +101,7 @@ class RosPorts:
         self._frame, self._wall_ns = topics.frame, wall_ns
         settings = _settings(address_of(host, "found by multicast"))
         try:
-            self._opened: Opened | None = _open(topics, settings)
+            self._opened: Opened | None = _open(topics, settings, tells)
         except (DDSException, UnicodeEncodeError) as error:
             what = f"DDS domain {topics.domain} (link.ros2.domain), robot at {host}: {error}"
             allowed = "a network that is up, CYCLONEDDS_URI unset or right, one link to a domain"
@@ -143,7 +147,7 @@ def _settings(address: str) -> str:
     return ",".join(filter(None, (os.environ.get("CYCLONEDDS_URI", ""), ours)))
 
 
-def _open(topics: Ros2Parameters, settings: str) -> Opened:
+def _open(topics: Ros2Parameters, settings: str, tells: Qos) -> Opened:
     domain = Domain(topics.domain, settings)
     participant = DomainParticipant(topics.domain)
 
@@ -156,7 +160,7 @@ def _open(topics: Ros2Parameters, settings: str) -> Opened:
         imu = DataReader(participant, topic(topics.imu, RosImu), qos=HEARS)
     if topics.odometry:
         odometry = DataReader(participant, topic(topics.odometry, RosOdometry), qos=HEARS)
-    return Opened(DataWriter(participant, told, qos=TELLS), imu, odometry, participant, domain)
+    return Opened(DataWriter(participant, told, qos=tells), imu, odometry, participant, domain)
 
 
 def _taken(reader: DataReader[Any]) -> Iterator[tuple[int, Any] | None]:

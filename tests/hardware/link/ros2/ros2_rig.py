@@ -6,8 +6,10 @@ import itertools
 import os
 import time
 
+from cyclonedds.qos import Policy, Qos
+
 from hardware.link.ros2.base_end import BaseEnd
-from hardware.link.ros2.ports import RosPorts
+from hardware.link.ros2.ports import TELLS, RosPorts
 from hardware.link.ros2.ros2_follower import Ros2Follower
 from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
 from tests.hardware.link.flight import FollowerFlight
@@ -16,6 +18,9 @@ from tests.hardware.link.ros2.lab_base import LabBase, twister
 LOCALHOST = "127.0.0.1"
 STAMP_AHEAD_S = 1_700_000_000.0
 """Of the base's clock before ours."""
+TIMELESS = Qos(Policy.Lifespan(2**63 - 1), base=TELLS)
+"""DDS counts a command's life on the wall, where a pause of the machine between a command and the
+base's turn to listen is no time at all."""
 TWISTER = load_robot("twister", takes=COMMANDS)
 BELOW = f"/test_{os.getpid()}"
 """Tests of other processes may be in the same domain, but not under the same names."""
@@ -49,18 +54,19 @@ def ros2_robot(**changes):
 
 
 class Ros2Rig:
-    def __init__(self, robot_file=None, seed: int = 0, **base) -> None:
+    def __init__(self, robot_file=None, seed: int = 0, tells: Qos = TIMELESS, **base) -> None:
         self.robot_file = robot_file or ros2_robot()
         self.now = 50.0
         """On our clock, which is another than the base's [s]."""
         self.topics = self.robot_file.link.ros2
+        self._tells = tells
         self.follower = self.leader(1)
         self.body, drive = twister(seed)
         self.base = LabBase(self.topics.domain, self.body, drive, **{"below": BELOW} | base)
 
     def leader(self, epoch: int) -> Ros2Follower:
         """A control process's end; its domain is new, and ends with it."""
-        ports = RosPorts(self.topics, LOCALHOST, lambda: round(1e9 * (self.now + STAMP_AHEAD_S)))
+        ports = RosPorts(self.topics, LOCALHOST, lambda: round(1e9 * self.stamp), self._tells)
         end = BaseEnd(self.robot_file, self.topics, epoch)
         return Ros2Follower(ports, end, lambda: self.now)
 

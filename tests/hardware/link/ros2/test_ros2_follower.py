@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from hardware.link.robot_end import LinkLimits
 from hardware.link.ros2.messages import RosImu
 from hardware.link.ros2.ports import TELLS
 from tests.hardware.link.ros2.lab_base import DEFAULT, Imu, imu_message, odometry_message
-from tests.hardware.link.ros2.ros2_rig import BELOW, TWISTER, Ros2Rig, ros2_robot
+from tests.hardware.link.ros2.ros2_rig import BELOW, TIMELESS, TWISTER, Ros2Rig, ros2_robot
 
 FORWARD = TwistCommand(np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.5]), armed=True)
 KEY = bytes(16)
@@ -158,6 +159,17 @@ def test_what_can_not_be_read_takes_nothing_else_with_it(rig, monkeypatch):
 def test_a_command_that_was_lost_comes_no_later_than_one_of_our_own_link_is_taken():
     assert TELLS[Policy.Lifespan].lifespan == 1000 * LinkLimits.of(TWISTER).max_age_us
     assert TELLS[Policy.History.KeepLast].depth == 1
+
+
+@pytest.mark.parametrize(("tells", "comes"), [(TELLS, 0), (TIMELESS, 1)])
+def test_the_wall_alone_makes_a_command_old(tells, comes):
+    """Why virtual time is led without: a collection of garbage is such a pause."""
+    rig = running(Ros2Rig(tells=tells))
+    exchange(rig.follower, FORWARD)
+    time.sleep(1.5e-9 * TELLS[Policy.Lifespan].lifespan)
+    rig.base.listen(rig.now)
+    assert len(rig.base.taken) == comes
+    rig.close()
 
 
 def test_two_links_in_one_domain_of_a_process_are_refused_by_name(rig):
