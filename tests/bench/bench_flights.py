@@ -169,10 +169,11 @@ def main() -> int:
         one = flown_by(way, executable, told.seconds, kept)
         rows.append(_row(way, one))
         seen = f"{rows[-1].rms_mm:.1f} mm RMS, load {os.getloadavg()[0]:.1f}"
-        print(f"{way} {n + 1}, {seen}: {one.account()}", flush=True)
+        print(f"{way} {n + 1}, {seen}: {one.account()}", file=sys.stderr, flush=True)
         for pause in sorted(pauses(one.said), key=lambda one: -one.s)[:TOLD]:
-            print(f"  {pause.words(one.said[0].t, one.holes)}", flush=True)
-    print(f"\n{flights(COLUMNS, rows)}")
+            words = pause.words(one.said[0].t, one.holes)
+            print(f"  {words}", file=sys.stderr, flush=True)
+    print(f"{flights(COLUMNS, rows)}")
     judgement = list(goals(rows))
     for met, words in judgement:
         print(f"{'met   ' if met else 'MISSED'}  {words}")

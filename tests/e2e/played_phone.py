@@ -234,14 +234,17 @@ class PlayedPhone(ABC):
         seconds: float,
         meanwhile: Iterable[tuple[float, Callable[[], object]]] = (),
         is_over: Callable[[], bool] = lambda: False,
+        rest_s: float = 0.0,
     ) -> list[tuple[float, float]]:
         """Play while the button is held: (time [s], distance from where the hand means it [m]).
 
-        `meanwhile` is what to do when, in order; no longer than until it `is_over`.
+        Times count from `rest_s` from now, when the hand begins to move. `meanwhile` is what to do
+        when, in order; no longer than until it `is_over`.
         """
         waiting = deque(meanwhile)
         hand, body = self.step()
-        started = before = time.monotonic()
+        before = time.monotonic()
+        started = before + rest_s
         intent = ReferenceTrajectory(VirtualCameraConfig(), hand, body)
         distances: list[tuple[float, float]] = []
         while (now := time.monotonic()) < started + seconds and not is_over():
