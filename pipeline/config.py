@@ -140,13 +140,20 @@ class ComplianceConfig:
 class LeashConfig:
     """How near to the end of its reach a robot that hangs may be led."""
 
-    enabled: bool = False
-    """Off: a push that stays is taken for a place after some seconds, and given way to. That the
-    robot is led beyond its reach is told nevertheless."""
+    enabled: bool = True
+    """Else it is only told that the robot is led beyond its reach."""
     kept: float = 0.15
-    """Share of each thruster's largest thrust that no place may take up: it is left for control."""
-    free: float = 0.9
+    """Share of each thruster's largest thrust that no place may take up for long: it is left for
+    control."""
+    lent: float = 0.13
+    """How much of that share one may that is passed through ..."""
+    stays_s: float = 0.6
+    """... for so long [s]: a hand that moves as the thrusters can follow is not held."""
+    free: float = 0.95
     """Share of the reach within which the leash changes nothing, to the bit."""
+    nears_s: float = 0.2
+    """The leash looks so far ahead [s]: a robot that comes to its border at the speed of a hand is
+    braked before, by what its thrusters can."""
 
     def __post_init__(self) -> None:
         """Refuse shares that are none.
@@ -158,6 +165,12 @@ class LeashConfig:
             value = getattr(self, name)
             if not 0.0 <= value < 1.0:
                 raise ValueError(f"leash.{name} is {value}: from 0 to below 1")
+        if not 0.0 <= self.lent <= self.kept:
+            raise ValueError(f"leash.lent is {self.lent}: from 0 to leash.kept, {self.kept}")
+        for name in ("nears_s", "stays_s"):
+            value = getattr(self, name)
+            if not 0.05 <= value <= 5.0:
+                raise ValueError(f"leash.{name} is {value}: from 0.05 to 5 s")
 
 
 @dataclass(frozen=True, slots=True)

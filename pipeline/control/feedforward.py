@@ -77,6 +77,7 @@ class FeedForward:
         p_rv_in_v: Array,
         h: float,
         shares_in_f: Array | None = None,
+        brakes_in_f: Array | None = None,
     ) -> Array:
         """Force and torque in b (6,) [N, N m] after another `h` [s].
 
@@ -87,6 +88,7 @@ class FeedForward:
             p_rv_in_v: Where the robot should be, constant in v [m].
             h: Since the last call [s].
             shares_in_f: (3, 3), of its acceleration, if the robot is to go only these.
+            brakes_in_f: (3,) [m/s²], by which it is to be accelerated beside.
         """
         quick = low_pass.share(2.0 * pi * self._config.low_pass_hz * h)
         turning_in_v = self._turning(view.omega_vf_in_v, p_rv_in_v, quick, h)
@@ -98,6 +100,8 @@ class FeedForward:
         once = once + quick * (a_in_f - slow - once)
         self._a_in_f = once, twice + quick * (once - twice)
         a_r_in_f = self._a_in_f[1] if shares_in_f is None else shares_in_f @ self._a_in_f[1]
+        if brakes_in_f is not None:
+            a_r_in_f = a_r_in_f + brakes_in_f
         R_bf = view.R_vb.T @ view.R_fv.T
         torque_in_b = self._J * (view.R_vb.T @ self.omega_rate_v_in_v)
         self.inertial_in_b = np.concatenate((R_bf @ (self._m * a_r_in_f), torque_in_b))

@@ -117,7 +117,7 @@ class ThrustActing:
         if self._leash is None or now.reference is None:
             return Leashed(error)
         R_fr, place = view.R_fv @ now.reference.R_vr, self._place
-        body = LeashedBody(place.from_rest_in_f, place.v_in_f, place.is_known)
+        body = LeashedBody(place.from_rest_in_f, place.v_in_f, place.is_steady)
         return self._leash.hold(error, view.R_fv, R_fr, body, now.h)
 
     def start_place(self) -> None:
@@ -187,7 +187,7 @@ class ThrustActing:
             turned_in_b, omega_in_b = self._tracking.body_ahead(omega_bf_in_b)
             shares_in_f = _shares_in_f(leashed, now.leading)
             wrench_in_b = self._tracking.wrench(  # Eq. (20)
-                known, reference, leashed.error, now.h, shares_in_f
+                known, reference, leashed.error, now.h, shares_in_f, leashed.brakes_in_f
             )
             accelerometer_bias_in_b = now.body.a_m_bf_in_b - known.relative.f_bf_in_b
             self._hold.learn(omega_m_bf_in_b - omega_bf_in_b, accelerometer_bias_in_b, now.h)

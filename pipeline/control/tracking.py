@@ -75,15 +75,23 @@ class Tracking:
         error: PoseError,
         h: float,
         shares_in_f: Array | None = None,
+        brakes_in_f: Array | None = None,
     ) -> Array:
         """Force and torque in b (6,) [N, N m], `h` [s] after the last. Eq. (20).
 
-        `shares_in_f` (3, 3) of the reference's motion are to be gone; None: all of it.
+        `shares_in_f` (3, 3) of the reference's motion are to be gone, None: all of it; beside, it
+        is to be accelerated by `brakes_in_f` (3,) [m/s²].
         """
         ahead_in_b = np.zeros(6)
         if self._looks_ahead:
             ahead_in_b = self._ahead.wrench(
-                now.relative, now.R_fc, now.view, reference.p_rv_in_v, h, shares_in_f
+                now.relative,
+                now.R_fc,
+                now.view,
+                reference.p_rv_in_v,
+                h,
+                shares_in_f,
+                brakes_in_f,
             )
             if not self._robot.needs_tilt:
                 ahead_in_b = ahead_in_b * self._robot.axes

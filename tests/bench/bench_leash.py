@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
-from pipeline.config import LeashConfig, TeleopConfig
+from pipeline.config import TeleopConfig
 from pipeline.signals import Mode
 from server.common.options import Parser
 from server.common.progress import progress_bar
@@ -32,7 +32,7 @@ FIRST_SEED: Final = 1000
 
 def flown(seed: int) -> BeyondFlight:
     """One hand, on the leash."""
-    return beyond(seed, TeleopConfig(leash=LeashConfig(enabled=True)))
+    return beyond(seed, TeleopConfig())
 
 
 def spread(values: list[float], unit: str) -> str:

@@ -18,10 +18,15 @@ AMES = load_robot("ames").robot
 CONFIG, RESUMPTION = LeashConfig(enabled=True), ResumptionConfig()
 R_FV, R_FR = exp(np.array([0.1, -0.2, 0.5])), exp(np.array([0.05, 0.1, -0.3]))
 X_IN_F, V_IN_F = np.array([0.03, -0.04, 0.02]), np.array([0.1, 0.2, -0.05])
-BODY, H = LeashedBody(X_IN_F, V_IN_F, is_known=True), 0.005
-TOUCHED = BODY._replace(is_known=False)
+BODY, H = LeashedBody(X_IN_F, V_IN_F, is_steady=True), 0.005
+TOUCHED = BODY._replace(is_steady=False)
 TURN, TURN_RATE = np.array([0.1, 0.0, 0.2]), np.array([0.0, 0.3, 0.1])
+ZERO = np.zeros(3)
 AWAY = np.random.default_rng(3).normal(size=(30, 3))
+
+
+LEAST_BORDER = (1.0 - CONFIG.kept) / (1.0 - CONFIG.kept + CONFIG.lent)
+"""Of what may be passed through."""
 
 
 def error_to(x_r_in_f: Array, v_r_in_f: Array) -> PoseError:
@@ -30,16 +35,29 @@ def error_to(x_r_in_f: Array, v_r_in_f: Array) -> PoseError:
     return PoseError(*way, TURN, TURN_RATE)
 
 
-def led_to(leash: Leash, x_r_in_f: Array, v_r_in_f: Array | None = None) -> tuple[Array, Array]:
-    """(Place, velocity) in f that the leash makes of a reference's."""
-    v_r_in_f = np.zeros(3) if v_r_in_f is None else v_r_in_f
-    error = leash.hold(error_to(x_r_in_f, v_r_in_f), R_FV, R_FR, BODY, H).error
-    return X_IN_F + R_FV @ error.e_p_in_v, V_IN_F + R_FV @ error.e_p_rate_in_v
+def settled(leash: Leash, x_r_in_f: Array, body: LeashedBody = BODY) -> Leashed:
+    """What it makes of a reference that has been there for long [m]."""
+    for _ in range(round(15.0 * CONFIG.stays_s / H)):
+        held = leash.hold(error_to(x_r_in_f, np.zeros(3)), R_FV, R_FR, body, H)
+    return held
+
+
+def place_of(held: Leashed) -> Array:
+    """Where a robot is led (3,) [m]."""
+    place: Array = X_IN_F + R_FV @ held.error.e_p_in_v
+    return place
+
+
+def velocity_of(held: Leashed) -> Array:
+    """How fast it is led (3,) [m/s]."""
+    velocity: Array = V_IN_F + R_FV @ held.error.e_p_rate_in_v
+    return velocity
 
 
 def taken(x_in_f: Array) -> float:
-    reach = ThrustReach(AMES, CONFIG.kept * AMES.f_max)
-    return reach.taken(R_FR.T @ (AMES.stiffness_in_f * x_in_f))[0]
+    """Of the reach that it is held in for long."""
+    reach = ThrustReach(AMES, (CONFIG.kept - CONFIG.lent) * AMES.f_max)
+    return reach.taken(R_FR.T @ (AMES.stiffness_in_f * x_in_f))[0] / LEAST_BORDER
 
 
 def test_within_reach_the_error_is_the_same_object() -> None:
@@ -57,11 +75,12 @@ def test_beyond_it_the_robot_is_led_to_the_border_the_same_way_however_far() -> 
     leash = Leash(AMES, CONFIG, RESUMPTION)
     for away in AWAY:
         border = away / taken(away)
+        leash.start()
         for times in (1.0, 1.2, 3.0, 20.0):
-            place, _ = led_to(leash, times * border)
+            place = place_of(settled(leash, times * border))
             np.testing.assert_allclose(np.cross(place, border), np.zeros(3), atol=1e-12)
-            assert CONFIG.free < taken(place) < 1.0 + 1e-12
-        assert taken(place) == pytest.approx(1.0, abs=1e-6)
+            assert CONFIG.free < taken(place) < 1.0 + 1e-4
+        assert taken(place) == pytest.approx(1.0, abs=1e-4)
 
 
 def test_it_says_that_it_is_at_its_limit_as_the_reference_leaves_the_reach() -> None:
@@ -73,18 +92,42 @@ def test_it_says_that_it_is_at_its_limit_as_the_reference_leaves_the_reach() -> 
             assert leash.hold(error, R_FV, R_FR, BODY, H).at_limit is said
 
 
-@pytest.mark.parametrize("times", [0.5, 0.9, 1.0, 1.5])
-def test_its_velocity_and_shares_are_what_differences_of_its_places_say(times: float) -> None:
-    leash, step = Leash(AMES, CONFIG, RESUMPTION), 1e-6
-    for away, v_r_in_f in zip(AWAY, AWAY[::-1], strict=True):
-        x_r_in_f = times / taken(away) * away
-        ahead, _ = led_to(leash, x_r_in_f + step * v_r_in_f)
-        behind, _ = led_to(leash, x_r_in_f - step * v_r_in_f)
-        differences = (ahead - behind) / (2.0 * step)
-        np.testing.assert_allclose(led_to(leash, x_r_in_f, v_r_in_f)[1], differences, atol=1e-6)
-        held = leash.hold(error_to(x_r_in_f, v_r_in_f), R_FV, R_FR, BODY, H)
-        shares_in_f = np.eye(3) if held.shares_in_f is None else held.shares_in_f
-        np.testing.assert_allclose(shares_in_f @ v_r_in_f, differences, atol=1e-6)
+def approached(speed_m_s: float, way_in_f: Array) -> list[Leashed]:
+    """What is made of a reference that goes out from the robot's rest, and back after 2 s."""
+    leash, held = Leash(AMES, CONFIG, RESUMPTION), []
+    for k in range(round(8.0 / H)):
+        t = k * H
+        out = t < 2.0
+        x_r_in_f = speed_m_s * (t if out else max(0.0, 4.0 - t)) * way_in_f
+        v_r_in_f = (1.0 if out else -1.0) * speed_m_s * way_in_f if t < 4.0 else np.zeros(3)
+        held.append(leash.hold(error_to(x_r_in_f, v_r_in_f), R_FV, R_FR, BODY, H))
+    return held
+
+
+@pytest.mark.parametrize("speed_m_s", [0.1, 0.3, 0.5])
+def test_a_fast_reference_is_braked_before_the_border(speed_m_s: float) -> None:
+    for away in AWAY[:6]:
+        way = away / np.linalg.norm(away)
+        held = approached(speed_m_s, way)
+        far = np.array([taken(place_of(one)) for one in held])
+        v = np.array([velocity_of(one) @ way for one in held])
+        assert far.max() < 1.0 / LEAST_BORDER + 1.2 * H * speed_m_s * taken(way)  # a period's way
+        assert np.abs(np.diff(v[: round(2.0 / H)])).max() / H < 1.1 * speed_m_s / CONFIG.nears_s
+        assert held[-1].error.e_p_in_v == pytest.approx(error_to(ZERO, ZERO).e_p_in_v, abs=2e-4)
+
+
+@pytest.mark.parametrize("speed_m_s", [0.1, 0.3, 0.5])
+def test_its_velocity_and_acceleration_are_what_differences_of_its_places_say(
+    speed_m_s: float,
+) -> None:
+    for away in AWAY[:6]:
+        held = approached(speed_m_s, away / np.linalg.norm(away))
+        p, v = (np.array([of(one) for one in held]) for of in (place_of, velocity_of))
+        brakes = np.array([ZERO if one.brakes_in_f is None else one.brakes_in_f for one in held])
+        span = slice(1, round(2.0 / H) - 1)
+        assert np.diff(p, axis=0)[span] / H == pytest.approx(v[1:][span], abs=1e-6)
+        most = 0.15 + 0.06 * speed_m_s / CONFIG.nears_s  # by the border, which draws in
+        assert np.diff(v, axis=0)[span] / H == pytest.approx(brakes[1:][span], abs=most)
 
 
 def offset(held: Leashed, x_r_in_f: Array) -> Array:
@@ -98,9 +141,7 @@ def test_while_something_else_pushes_the_hand_leads_by_all_of_its_motion() -> No
     for away in AWAY:
         leash = Leash(AMES, CONFIG, RESUMPTION)
         border = away / taken(away)
-        at_touch = offset(
-            leash.hold(error_to(1.2 * border, V_IN_F), R_FV, R_FR, BODY, H), 1.2 * border
-        )
+        at_touch = offset(settled(leash, 1.2 * border), 1.2 * border)
         assert np.linalg.norm(at_touch) > 0.01
         for times in (1.2, 0.3, 5.0):
             error = error_to(times * border, 2.0 * V_IN_F)
@@ -123,16 +164,16 @@ def test_once_the_push_is_over_the_leash_is_gone_back_to_no_faster_than_after_a_
     for away in AWAY:
         leash = Leash(AMES, CONFIG, RESUMPTION)
         border = away / taken(away)
-        leash.hold(error_to(1.2 * border, V_IN_F), R_FV, R_FR, BODY, H)
+        settled(leash, 1.2 * border)
         before = leash.hold(error_to(times * border, V_IN_F), R_FV, R_FR, TOUCHED, H)
         at = offset(before, times * border)
-        for _ in range(800):
-            held = leash.hold(error_to(times * border, V_IN_F), R_FV, R_FR, BODY, H)
+        for _ in range(2000):
+            held = leash.hold(error_to(times * border, ZERO), R_FV, R_FR, BODY, H)
             then, at = at, offset(held, times * border)
             assert np.linalg.norm(at - then) <= 1.001 * H * RESUMPTION.max_speed_m_s
         wanted = Leash(AMES, CONFIG, RESUMPTION)
-        held = wanted.hold(error_to(times * border, V_IN_F), R_FV, R_FR, BODY, H)
-        np.testing.assert_allclose(at, offset(held, times * border), atol=1e-12)
+        held = settled(wanted, times * border)
+        np.testing.assert_allclose(at, offset(held, times * border), atol=1e-4)
 
 
 def test_another_press_takes_nothing_off() -> None:
@@ -156,7 +197,7 @@ def test_what_hangs_from_nothing_has_no_leash(name: str) -> None:
 
 
 def test_who_does_not_ask_for_one_is_told_of_the_end_of_its_reach_and_held_nowhere() -> None:
-    leash = leash_of(AMES, LeashConfig(), RESUMPTION)
+    leash = leash_of(AMES, LeashConfig(enabled=False), RESUMPTION)
     assert leash is not None
     for away in AWAY:
         for times, said in ((0.99, False), (1.01, True), (20.0, True)):
@@ -167,7 +208,7 @@ def test_who_does_not_ask_for_one_is_told_of_the_end_of_its_reach_and_held_nowhe
 
 def test_without_any_reach_nothing_is_told_and_no_leash_can_be_asked_for() -> None:
     weak = replace(AMES, f_max=1.001 * AMES.f_min)
-    assert leash_of(weak, LeashConfig(), RESUMPTION) is None
+    assert leash_of(weak, LeashConfig(enabled=False), RESUMPTION) is None
     with pytest.raises(ValueError, match="reach"):
         leash_of(weak, CONFIG, RESUMPTION)
 
@@ -177,3 +218,26 @@ def test_without_any_reach_nothing_is_told_and_no_leash_can_be_asked_for() -> No
 def test_shares_that_are_none_are_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"leash.{name}"):
         LeashConfig(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["nears_s", "stays_s"])
+@pytest.mark.parametrize("value", [0.0, -1.0, 6.0, np.nan])
+def test_times_that_are_none_are_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"leash.{name}"):
+        LeashConfig(**{name: value})
+
+
+@pytest.mark.parametrize("value", [-0.1, 0.2, np.nan])
+def test_no_more_is_lent_than_is_kept(value: float) -> None:
+    with pytest.raises(ValueError, match=r"leash\.lent"):
+        LeashConfig(lent=value)
+
+
+def test_what_is_only_passed_through_is_not_held() -> None:
+    leash, border = Leash(AMES, CONFIG, RESUMPTION), AWAY[0] / taken(AWAY[0])
+    for k in range(round(3.0 / H)):
+        beyond = 1.05 if k % 100 < 20 else 0.8  # a tenth of a second, each half
+        held = leash.hold(error_to(beyond * border, ZERO), R_FV, R_FR, BODY, H)
+        assert np.linalg.norm(offset(held, beyond * border)) < 0.002
+    stayed = offset(settled(leash, 1.05 * border), 1.05 * border)
+    assert np.linalg.norm(stayed) > 0.008

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 def test_a_hand_beyond_reach_leaves_the_robot_at_the_border_with_thrust_to_spare(
     seed: int,
 ) -> None:
-    flight = beyond(seed, TeleopConfig(leash=LeashConfig(enabled=True)))
+    flight = beyond(seed, TeleopConfig())
     assert flight.left == ""
     assert flight.modes == {Mode.TRACK}
     assert flight.at_f_max_s <= MOST_AT_LIMIT_S
@@ -26,6 +26,6 @@ def test_a_hand_beyond_reach_leaves_the_robot_at_the_border_with_thrust_to_spare
 
 
 def test_without_the_leash_the_same_hand_keeps_a_thruster_at_its_limit_and_is_told() -> None:
-    flight = beyond(0, TeleopConfig(), stay_s=2.0)
+    flight = beyond(0, TeleopConfig(leash=LeashConfig(enabled=False)), stay_s=2.0)
     assert flight.at_f_max_s > MOST_AT_LIMIT_S
     assert flight.told_late_s <= TOLD_S
