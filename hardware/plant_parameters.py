@@ -82,6 +82,34 @@ class StartParameters:
     """How far the hand rises to take off [m]."""
 
 
+@dataclass(frozen=True, slots=True)
+class PlantIntervals:
+    """Half widths of 95 % intervals; None: as no flight told it, or of another value."""
+
+    mass: float | None = None
+    """[kg]."""
+    inertia: tuple[float | None, float | None, float | None] = (None, None, None)
+    """[kg m²]."""
+    length: float | None = None
+    """Of the suspension [m], as the next three."""
+    stiffness: float | None = None
+    """[N/m]."""
+    damping: float | None = None
+    """[N s/m]."""
+    hook_above_com: float | None = None
+    """[m]."""
+    air_damping: float | None = None
+    """[N s/m]."""
+    air_damping_rotation: float | None = None
+    """[N m s]."""
+    lag: float | None = None
+    """[s]."""
+    delay: float | None = None
+    """[s]."""
+    outdated: tuple[str, ...] = ()
+    """Keys of the robot file with another value than the one that was identified."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlantParameters:
     """Rigid body of a simulated robot, and what carries it: a suspension or a stand."""
@@ -113,3 +141,5 @@ class PlantParameters:
     """In place of motion sensors, of a robot that has none and measures its twist."""
     slip: float = 0.0
     """Share of its twist by which its body moves otherwise than its wheels, for a while."""
+    intervals: PlantIntervals = PlantIntervals()
+    """Of what was identified."""

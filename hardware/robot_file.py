@@ -22,6 +22,7 @@ from hardware.plant_parameters import (
     NO_SENSORS,
     BodyImuParameters,
     OdometryParameters,
+    PlantIntervals,
     PlantParameters,
     StandParameters,
     StartParameters,
@@ -34,6 +35,8 @@ from hardware.robot_schema import (
     BatterySection,
     BodyImuSection,
     FlightControllerSection,
+    IdentifiedSuspension,
+    Interval,
     R_from_axes,
     RobotSchema,
     Stand,
@@ -357,6 +360,7 @@ def _converted(schema: RobotSchema) -> RobotFile:
         lag=schema.thrusters.lag_s,
         delay=schema.thrusters.delay_s,
         imu=_imu(schema.body_imu),
+        intervals=_intervals(schema),
     )
     stiffness_in_f, damping_in_f = restoring_in_f(plant)
     robot = Robot(
@@ -397,6 +401,46 @@ def _converted(schema: RobotSchema) -> RobotFile:
         _flight_controller(schema.flight_controller),
         _battery(schema.battery),
     )
+
+
+def _intervals(schema: RobotSchema) -> PlantIntervals:
+    """Those of numbers that are still what was identified; a changed one has none."""
+    body, told, thrusters = schema.body, schema.identified, schema.thrusters
+    outdated = []
+
+    def half(key: str, interval: Interval | None, value: float) -> float | None:
+        if interval is None or interval.found == value:
+            return None if interval is None else interval.half_95
+        outdated.append(key)
+        return None
+
+    air, cable = schema.air, schema.suspension
+    roll, pitch, yaw = body.inertia_kg_m2
+    inertia = (
+        half("body.inertia_kg_m2.0", told.body.inertia_roll_kg_m2, roll),
+        half("body.inertia_kg_m2.1", told.body.inertia_pitch_kg_m2, pitch),
+        half("body.inertia_kg_m2.2", told.body.inertia_yaw_kg_m2, yaw),
+    )
+    found = PlantIntervals(
+        mass=half("body.mass_kg", told.body.mass_kg, body.mass_kg),
+        inertia=inertia,
+        air_damping=half("air.damping_n_s_m", told.air.damping_n_s_m, air.damping_n_s_m),
+        air_damping_rotation=half("air.damping_n_m_s", told.air.damping_n_m_s, air.damping_n_m_s),
+        lag=half("thrusters.lag_s", told.thrusters.lag_s, thrusters.lag_s),
+        delay=half("thrusters.delay_s", told.thrusters.delay_s, thrusters.delay_s),
+    )
+    if cable is not None:
+        of = told.suspension or IdentifiedSuspension()
+        found = replace(
+            found,
+            length=half("suspension.length_m", of.length_m, cable.length_m),
+            stiffness=half("suspension.stiffness_n_m", of.stiffness_n_m, cable.stiffness_n_m),
+            damping=half("suspension.damping_n_s_m", of.damping_n_s_m, cable.damping_n_s_m),
+            hook_above_com=half(
+                "suspension.hook_above_com_m", of.hook_above_com_m, cable.hook_above_com_m
+            ),
+        )
+    return replace(found, outdated=tuple(outdated))
 
 
 def _battery(section: BatterySection | None) -> BatteryParameters | None:

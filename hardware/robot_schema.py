@@ -181,6 +181,66 @@ class BatterySection(Section):
     """Below it the robot is not armed."""
 
 
+class Interval(Section):
+    """What flights told of a number of the file, as long as it is still that one."""
+
+    found: NotNegative
+    half_95: NotNegative
+    """Half of its 95 % interval."""
+
+
+class NarrowInterval(Interval):
+    """Of a number that can't be 0."""
+
+    @model_validator(mode="after")
+    def _without_zero(self) -> NarrowInterval:
+        if self.half_95 >= self.found:
+            raise ValueError(f"half_95 below found, {self.found:g}: this can't be 0")
+        return self
+
+
+class IdentifiedBody(Section):
+    """[identified.body]."""
+
+    mass_kg: NarrowInterval | None = None
+    inertia_roll_kg_m2: NarrowInterval | None = None
+    """The first of [body] inertia_kg_m2 ..."""
+    inertia_pitch_kg_m2: NarrowInterval | None = None
+    inertia_yaw_kg_m2: NarrowInterval | None = None
+
+
+class IdentifiedSuspension(Section):
+    """[identified.suspension]."""
+
+    length_m: NarrowInterval | None = None
+    stiffness_n_m: NarrowInterval | None = None
+    damping_n_s_m: Interval | None = None
+    hook_above_com_m: Interval | None = None
+
+
+class IdentifiedAir(Section):
+    """[identified.air]."""
+
+    damping_n_s_m: Interval | None = None
+    damping_n_m_s: Interval | None = None
+
+
+class IdentifiedThrusters(Section):
+    """[identified.thrusters]."""
+
+    lag_s: NarrowInterval | None = None
+    delay_s: Interval | None = None
+
+
+class IdentifiedSection(Section):
+    """[identified]: intervals of numbers that stand in the sections of these names."""
+
+    body: IdentifiedBody = IdentifiedBody()
+    suspension: IdentifiedSuspension | None = None
+    air: IdentifiedAir = IdentifiedAir()
+    thrusters: IdentifiedThrusters = IdentifiedThrusters()
+
+
 class RobotSchema(Section):
     """The file."""
 
@@ -205,6 +265,7 @@ class RobotSchema(Section):
     link: LinkSection
     flight_controller: FlightControllerSection | None = None
     battery: BatterySection | None = None
+    identified: IdentifiedSection = IdentifiedSection()
 
 
 def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
@@ -216,6 +277,8 @@ def clashes(robot: RobotSchema) -> Iterator[tuple[str, str]]:
     yield from battery_clashes(robot.battery)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
+    if robot.suspension is None and robot.identified.suspension is not None:
+        yield "identified.suspension", "only with [suspension]"
     if robot.suspension is not None:
         if robot.stand is not None:
             yield "stand", "only without [suspension]: a robot hangs or stands"

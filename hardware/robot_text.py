@@ -14,6 +14,8 @@ from pipeline.gains import Gains
 
 NAME: Final = re.compile(r"[a-z0-9_-]{1,32}")
 Value = float | list[float]
+Interval = tuple[float, float]
+"""A number and half of its 95 % interval."""
 
 
 class RobotTextError(ValueError):
@@ -42,14 +44,48 @@ def with_numbers(text: str, numbers: Mapping[str, Value], comments: Mapping[str,
             raise RobotTextError(key, "not in the file")
         wanted[section][name] = value
         document[section][name] = _item(value, comments[key])
-    return _verified(document, wanted, ", ".join(numbers))
+    return _verified(tomlkit.dumps(document), wanted, ", ".join(numbers))
+
+
+def with_intervals(text: str, intervals: Mapping[str, Interval], comment: str) -> str:
+    """The text of a robot file with [identified] tables at its end, each line with the `comment`.
+
+    What they said of other numbers stays, comments included.
+
+    Args:
+        text: Of the file.
+        intervals: By key, `section.name`.
+        comment: What found them.
+
+    Raises:
+        RobotTextError: [identified] is written in a way in which that can't be said.
+    """
+    line_end, wanted = _line_end(text), tomllib.loads(text)
+    document = tomlkit.parse(text)
+    before = document.pop("identified", {})
+    comments = {
+        f"{section}.{name}": item.trivia.comment
+        for section, table in before.items()
+        for name, item in table.items()
+    } | dict.fromkeys(intervals, f"# {comment}")
+    sections = wanted.setdefault("identified", {})
+    for key, (found, half_95) in intervals.items():
+        section, name = key.split(".")
+        sections.setdefault(section, {})[name] = {"found": found, "half_95": half_95}
+    lines = [tomlkit.dumps(document).rstrip()]
+    for section, numbers in sections.items():
+        lines += ["", f"[identified.{section}]"]
+        for name, said in numbers.items():
+            pair = ", ".join(f"{key} = {value!r}" for key, value in said.items())
+            lines.append(f"{name} = {{ {pair} }}  {comments[f'{section}.{name}']}".rstrip())
+    return _verified(line_end.join(lines) + line_end, wanted, "identified")
 
 
 def with_name(text: str, name: str) -> str:
     """The text of a robot file with another name."""
     document, wanted = tomlkit.parse(text), tomllib.loads(text)
     document["name"] = wanted["name"] = name
-    return _verified(document, wanted, "name")
+    return _verified(tomlkit.dumps(document), wanted, "name")
 
 
 def with_thrusters_reordered(text: str, order: Sequence[int], comment: str) -> str:
@@ -65,7 +101,7 @@ def with_thrusters_reordered(text: str, order: Sequence[int], comment: str) -> s
         if k != place:
             document["thrusters"]["units"][place].update(units[k])
     document.add(tomlkit.comment(comment))
-    return _verified(document, wanted, "thrusters.units")
+    return _verified(tomlkit.dumps(document), wanted, "thrusters.units")
 
 
 def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool = False) -> str:
@@ -84,7 +120,7 @@ def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool
         others = ", ".join(sets)
         raise RobotTextError(field, f"is there already; allowed: --replace, or none of {others}")
     rows = {"Kp": gains.Kp.tolist(), "Ki": gains.Ki.tolist(), "Kd": gains.Kd.tolist()}
-    line_end = "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
+    line_end = _line_end(text)
     document = tomlkit.parse(text if text.endswith("\n") or not text else text + line_end)
     there = document.get("gains", tomlkit.table(is_super_table=True))
     if not isinstance(there, Table):
@@ -99,7 +135,12 @@ def with_gains(text: str, name: str, gains: Gains, comment: str, overwrite: bool
             there.append(name, table)
             document["gains"] = there
     sets[name] = rows
-    return _verified(document, wanted, field)
+    return _verified(tomlkit.dumps(document), wanted, field)
+
+
+def _line_end(text: str) -> str:
+    """As the first line's."""
+    return "\r\n" if text.partition("\n")[0].endswith("\r") else "\n"
 
 
 def _item(value: Value, comment: str) -> Item:
@@ -132,13 +173,12 @@ def _add(gains: Table, name: str, table: Table, line_end: str) -> None:
     table.value.body.extend(between)
 
 
-def _verified(document: tomlkit.TOMLDocument, wanted: dict[str, Any], field: str) -> str:
+def _verified(text: str, wanted: dict[str, Any], field: str) -> str:
     """The text, which says what is `wanted`, however unusually the file is written.
 
     Raises:
         RobotTextError: it doesn't.
     """
-    text = tomlkit.dumps(document)
     try:
         is_good = tomllib.loads(text) == wanted
     except tomllib.TOMLDecodeError:

@@ -1,6 +1,8 @@
 """Robot files: the default one is right, and each mistake is named with its place."""
 
 import re
+import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +20,10 @@ from hardware.robot_file import (
     robot_table,
 )
 from hardware.robot_physics import positive_null_vector
+from hardware.robot_text import with_intervals
 from pipeline import gains as sets
 from pipeline.frames import GRAVITY
+from tests.hardware.identified_robots import identified, intervals_of
 
 AMES, QUADROTOR, GROUND = (load_robot(name) for name in ("ames", "quadrotor", "ground"))
 TEXT = (ROBOTS / "ames.toml").read_text(encoding="utf-8")
@@ -153,6 +157,56 @@ MISTAKES = {
         "finite",
     ),
     "half a battery": (r"\[air\]", "[battery]\nlow_v = 10.5\n[air]", "battery.empty_v", "missing"),
+    **{
+        what: (r"\[air\]", f"[identified.{said}\n[air]", f"identified.{key}", allowed)
+        for what, (said, key, allowed) in {
+            "an endless interval": (
+                "body]\nmass_kg = { found = 3.5, half_95 = inf }",
+                "body.mass_kg.half_95",
+                "finite",
+            ),
+            "an interval that is none": (
+                "thrusters]\nlag_s = { found = 0.025, half_95 = nan }",
+                "thrusters.lag_s.half_95",
+                "finite",
+            ),
+            "an interval below 0": (
+                "thrusters]\ndelay_s = { found = 0.015, half_95 = -0.001 }",
+                "thrusters.delay_s.half_95",
+                "greater than or equal to 0",
+            ),
+            "an interval with a mass of 0 in it": (
+                "body]\nmass_kg = { found = 3.5, half_95 = 3.5 }",
+                "body.mass_kg",
+                "half_95 below found, 3.5",
+            ),
+            "an interval of nobody knows what": (
+                "body]\nmass_kg = { half_95 = 0.1 }",
+                "body.mass_kg.found",
+                "missing",
+            ),
+            "a misspelt interval": (
+                "body]\nmass_kg = { found = 3.5, half95 = 0.1 }",
+                "body.mass_kg.half95",
+                "did you mean 'half_95'",
+            ),
+            "an interval of a number that is none": (
+                "body]\nmas_kg = { found = 3.5, half_95 = 0.1 }",
+                "body.mas_kg",
+                "did you mean 'mass_kg'",
+            ),
+            "an interval of no section": (
+                "bodi]\nmass_kg = { found = 3.5, half_95 = 0.1 }",
+                "bodi",
+                "did you mean 'body'",
+            ),
+            "text for an interval": (
+                'body]\nmass_kg = { found = 3.5, half_95 = "0.1" }',
+                "body.mass_kg.half_95",
+                "number",
+            ),
+        }.items()
+    },
     "not TOML": (r"\[body\]", "[body", "", "Expected"),
 }
 
@@ -193,6 +247,13 @@ OTHERS_MISTAKES = {
         "tips",
     ),
     "uneven feet": ("ground", r"0\.22, -0\.1\]", "0.22, -0.2]", "stand.feet", "at one height"),
+    "an interval of a cable without one": (
+        "quadrotor",
+        r"\[air\]",
+        "[identified.suspension]\nlength_m = { found = 1.0, half_95 = 0.1 }\n[air]",
+        "identified.suspension",
+        "only with [suspension]",
+    ),
     "a word in the stand": ("ground", "friction =", "friktion =", "stand.frik", "mean 'friction'"),
 }
 
@@ -204,6 +265,21 @@ def test_a_mistake_of_a_robot_that_stands_is_named(changed, mistake):
         changed(pattern, replacement, count=1 if "{" in pattern else 0, robot=robot)
     assert caught.value.key.startswith(key)
     assert allowed in caught.value.allowed
+
+
+def test_a_number_that_was_changed_since_it_was_identified_has_no_interval(changed):
+    found = identified("ames", 0.1)
+    assert found.plant.intervals.outdated == ()
+    text = with_intervals(TEXT, intervals_of(TEXT, 0.1), "for tests")
+    by_hand = text.replace("mass_kg = 3.5", "mass_kg = 3.6").replace("[0.05, 0.05", "[0.05, 0.06")
+    told = robot_of(tomllib.loads(by_hand), "by hand").plant.intervals
+    assert told.outdated == ("body.inertia_kg_m2.1", "body.mass_kg")
+    assert told == replace(
+        found.plant.intervals,
+        mass=None,
+        inertia=(found.plant.intervals.inertia[0], None, found.plant.intervals.inertia[2]),
+        outdated=told.outdated,
+    )
 
 
 def test_a_battery_is_judged_by_what_its_file_says(changed):

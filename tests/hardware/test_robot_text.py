@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import ROBOTS, load_robot, robot_of, robot_table
-from hardware.robot_text import RobotTextError, with_gains, with_numbers
+from hardware.robot_text import RobotTextError, with_gains, with_intervals, with_numbers
 from pipeline.gains import Gains
+from tests.hardware.identified_robots import identified, intervals_of, robot_text
 
 NUMBERS = {
     "body.mass_kg": 3.117,
@@ -96,6 +97,53 @@ def test_a_number_over_several_lines_becomes_one():
     text = "[body]\ninertia_kg_m2 = [\n  1.0, 1.0, 1.0,\n]\nmass_kg = 1.0\n"
     written = with_numbers(text, {"body.inertia_kg_m2": [2.0] * 3}, {"body.inertia_kg_m2": "new"})
     assert written == "[body]\ninertia_kg_m2 = [2.0, 2.0, 2.0]  # new\nmass_kg = 1.0\n"
+
+
+@pytest.mark.parametrize("name", ["ames", "quadrotor", "ground", "screen"])
+def test_intervals_are_read_as_they_were_written_and_nothing_else_changes(name):
+    text = robot_text(name)
+    written = with_intervals(text, intervals_of(text, 0.03), "by a flight")
+    assert written.startswith(text.rstrip() + "\n\n[identified.body]\nmass_kg = { found = ")
+    plant, found = robot_of(tomllib.loads(text), name).plant, identified(name, 0.03).plant
+    told = found.intervals
+    assert told.outdated == ()
+    assert told.mass == pytest.approx(0.03 * plant.mass)
+    assert told.inertia == pytest.approx((0.03 * plant.inertia).tolist())
+    assert (told.lag, told.delay) == pytest.approx((0.03 * plant.lag, 0.03 * plant.delay))
+    air = plant.air_damping, plant.air_damping_rotation
+    assert (told.air_damping, told.air_damping_rotation) == pytest.approx(
+        tuple(0.03 * one for one in air)
+    )
+    if (cable := plant.suspension) is not None:
+        assert (told.length, told.stiffness) == pytest.approx(
+            (0.03 * cable.length, 0.03 * cable.stiffness)
+        )
+        assert (told.damping, told.hook_above_com) == pytest.approx(
+            (0.03 * cable.damping, 0.03 * cable.hook_above_com)
+        )
+    else:
+        assert (told.length, told.stiffness, told.damping, told.hook_above_com) == (None,) * 4
+
+
+def test_intervals_of_numbers_that_are_not_told_again_stay():
+    once = with_intervals(AMES, {"body.mass_kg": (3.5, 0.1), "air.damping_n_s_m": (1.5, 0.4)}, "a")
+    twice = with_intervals(
+        once, {"body.mass_kg": (3.6, 0.2), "thrusters.lag_s": (0.025, 1e-5)}, "b"
+    )
+    assert twice[len(AMES.rstrip()) :] == (
+        "\n\n[identified.body]\nmass_kg = { found = 3.6, half_95 = 0.2 }  # b\n"
+        "\n[identified.air]\ndamping_n_s_m = { found = 1.5, half_95 = 0.4 }  # a\n"
+        "\n[identified.thrusters]\nlag_s = { found = 0.025, half_95 = 1e-05 }  # b\n"
+    )
+    assert twice == with_intervals(twice, {"body.mass_kg": (3.6, 0.2)}, "b")
+
+
+def test_intervals_stand_behind_all_else_and_lines_end_as_they_did():
+    text = "[identified.body]\r\nmass_kg = { found = 1.0, half_95 = 0.5 }\r\n\r\n[x]\r\ny = 1\r\n"
+    assert with_intervals(text, {"body.mass_kg": (1.0, 0.25)}, "new") == (
+        "[x]\r\ny = 1\r\n\r\n[identified.body]\r\n"
+        "mass_kg = { found = 1.0, half_95 = 0.25 }  # new\r\n"
+    )
 
 
 GAINS = Gains(np.arange(6.0), np.arange(6.0) + 0.5, np.full(6, 0.125))

@@ -22,7 +22,12 @@ from hardware.follower import Follower
 from hardware.link.link_key import new_key
 from hardware.link.registry import connect, link_kind
 from hardware.robot_file import RobotFile, is_shipped, load_robot, robot_of, robot_path
-from hardware.robot_text import RobotTextError, with_numbers, with_thrusters_reordered
+from hardware.robot_text import (
+    RobotTextError,
+    with_intervals,
+    with_numbers,
+    with_thrusters_reordered,
+)
 from pipeline.config import PERIOD_S
 from server.common import clock
 from server.common.ranges import number
@@ -49,7 +54,7 @@ from server.tools.bring_up.pulses import (
     PulseProgramme,
 )
 from server.tools.identify.command import COLUMNS, PER_MASS
-from server.tools.identify.findings import file_numbers
+from server.tools.identify.findings import file_intervals, file_numbers
 
 HELP = "Which thruster is which, and what is the robot? It hangs, and gives short pulses."
 UNKNOWN_ROPE: Final = """\
@@ -241,4 +246,5 @@ def written(text: str, found: BroughtUp, record: str) -> str:
         text = with_thrusters_reordered(text, found.sorting.order, said)
     values, comments = file_numbers(found.known, found.numbers, "robot bring-up")
     comments = {key: f"{comment} (95 %), by {record}" for key, comment in comments.items()}
-    return with_numbers(text, values, comments)
+    text = with_numbers(text, values, comments)
+    return with_intervals(text, file_intervals(found.numbers), f"robot bring-up, {record}")

@@ -11,13 +11,19 @@ from dataclasses import asdict
 from pathlib import Path
 
 from hardware.robot_file import ROBOTS, load_robot, robot_of, robot_path
-from hardware.robot_text import RobotTextError, with_numbers
+from hardware.robot_text import RobotTextError, with_intervals, with_numbers
 from hardware.system_identification.fit import IdentificationError, IdentifiedPlant, identify
 from server.common.text import table
 from server.export.decoded import DecodedRecording, RecordedState
 from server.recording.reader import read
 from server.recording.writer import ROBOT_KEY
-from server.tools.identify.findings import FoundNumber, file_numbers, found_numbers, objections
+from server.tools.identify.findings import (
+    FoundNumber,
+    file_intervals,
+    file_numbers,
+    found_numbers,
+    objections,
+)
 from server.tools.identify.recorded_flights import flights_of
 
 HELP = "What are a robot's mass, inertia, suspension, lag and thrusters, by recorded flights?"
@@ -69,6 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     if out is not None and not against:
         text = _text(arguments.robot, recordings[0])
         text = with_numbers(text, *file_numbers(robot_file.plant, numbers))
+        text = with_intervals(text, file_intervals(numbers), "robot identify")
         robot_of(tomllib.loads(text), str(out))  # nothing is written that can't be loaded
         out.write_text(text, encoding="utf-8", newline="")
         where = sys.stderr if arguments.json else sys.stdout  # JSON stands alone

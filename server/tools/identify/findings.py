@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from hardware.plant_parameters import PlantParameters
-from hardware.robot_text import Value
+from hardware.robot_text import Interval, Value
 from hardware.system_identification.fit import IdentifiedPlant
 from hardware.system_identification.plant_model import SpecificPlant
 from pipeline.frames import GRAVITY, Array
@@ -34,6 +34,10 @@ LEAST_THRUST: Final = 0.1
 MOST_WRONG: Final = 2
 """Thrusters that fail at once; more, and one that is not known makes the others look wrong."""
 AXES: Final = ("x", "y", "z", "roll", "pitch", "yaw")
+MOMENTS: Final = {
+    f"body.inertia_kg_m2.{i}": f"body.inertia_{axis}_kg_m2" for i, axis in enumerate(AXES[3:])
+}
+"""Keys of their intervals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,6 +220,15 @@ def file_numbers(
         halves = ", ".join(f"± {one.half_95:.1g}" if one else "not told" for one in inertia)
         comments["body.inertia_kg_m2"] = f"{by}: {halves}"
     return values, comments
+
+
+def file_intervals(numbers: Sequence[FoundNumber]) -> dict[str, Interval]:
+    """Intervals for a robot file's [identified] by key: of all told numbers that it has."""
+    return {
+        MOMENTS.get(one.key, one.key): (_rounded(one.found), float(f"{one.half_95:.3g}"))
+        for one in numbers
+        if one.is_told and "." in one.key
+    }
 
 
 def _rounded(value: float) -> float:

@@ -13,7 +13,7 @@ from hardware.system_identification.plant_model import SpecificPlant
 from pipeline.config import PERIOD_S, TeleopConfig
 from server.control.process import STATUS_EVERY, teleop_config
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
-from server.tools.identify.findings import file_numbers, found_numbers, objections
+from server.tools.identify.findings import file_intervals, file_numbers, found_numbers, objections
 from server.tools.identify.recorded_flights import flights_of
 from server.tools.robot import main
 from tests.data.record_flight import record_flight
@@ -55,6 +55,9 @@ def test_they_go_into_a_copy_of_the_file_that_can_be_flown(recording, capsys, tm
     assert f"lightleash robot check {out}" in said
     assert load_robot(out).plant.mass == pytest.approx(3.5, rel=0.04)
     assert "# robot identify: ± " in out.read_text()
+    told = load_robot(out).plant.intervals
+    assert told.outdated == ()
+    assert f"# robot identify: ± {told.mass:.2g}\n" in out.read_text()
     assert main(["identify", str(recording), "--out", str(out)]) == 2
     assert "allowed: a new path ending in .toml" in capsys.readouterr().err
 
@@ -105,6 +108,15 @@ def test_what_a_flight_did_not_tell_stays_out_of_the_file():
     assert moments[1] == KNOWN.inertia[1]
     assert "not told" in comments["body.inertia_kg_m2"]
     assert not any(key.startswith("thruster ") for key in values)
+    intervals = file_intervals(numbers)
+    assert "body.inertia_pitch_kg_m2" not in intervals
+    assert intervals["body.inertia_roll_kg_m2"][0] == moments[0]
+    by_key = {one.key: one for one in numbers}
+    for key, (value, half_95) in intervals.items():
+        if "inertia" not in key:
+            assert value == values[key]
+            assert half_95 == pytest.approx(by_key[key].half_95, rel=0.005)
+    assert len(intervals) == sum(one.is_told for one in numbers) - 8  # without thrusters
 
 
 def test_weak_thrusters_make_a_robot_heavy():
