@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hardware.plant_parameters import PlantParameters
 from pipeline.control.dynamics import Dynamics
+from pipeline.control.uncertainty import (
+    ASSUMED_LAG,
+    ASSUMED_MASS,
+    LAG_SINCE,
+    MASS_SINCE,
+    Factors,
+    Uncertainty,
+)
 from pipeline.frames import GRAVITY, Array
 from pipeline.robot import Robot
 
@@ -41,4 +51,37 @@ def dynamics_of(robot: Robot, plant: PlantParameters) -> Dynamics:
         lag=plant.lag,
         delay=plant.delay,
         needs_tilt=robot.needs_tilt,
+        uncertainty=uncertainty_of(plant),
     )
+
+
+def uncertainty_of(plant: PlantParameters) -> Uncertainty:
+    """Which bodies the robot may be, by the intervals of what was identified."""
+    told, cable = plant.intervals, plant.suspension
+    roll, pitch, yaw = (
+        _inertia(half, value)
+        for half, value in zip(told.inertia, plant.inertia.tolist(), strict=True)
+    )
+    lag, delay = ASSUMED_LAG, 0.0
+    if told.lag is not None and told.delay is not None:
+        lag, delay = replace(LAG_SINCE, interval=told.lag / plant.lag), told.delay
+    stiffness, damping = np.zeros(6), np.full(6, told.air_damping_rotation or 0.0)
+    damping[:3] = told.air_damping or 0.0
+    if cable is not None:
+        weight, hook = plant.mass * GRAVITY, told.hook_above_com or 0.0
+        stiffness[:2] = weight / cable.length * (told.length or 0.0) / cable.length
+        stiffness[2] = told.stiffness or 0.0
+        stiffness[3:5] = weight * hook * (1.0 + (2.0 * cable.hook_above_com + hook) / cable.length)
+        damping[2] += told.damping or 0.0
+    return Uncertainty(
+        mass=_inertia(told.mass, plant.mass),
+        moments=(roll, pitch, yaw),
+        lag=lag,
+        delay=delay,
+        stiffness=tuple(stiffness.tolist()),
+        damping=tuple(damping.tolist()),
+    )
+
+
+def _inertia(half: float | None, value: float) -> Factors:
+    return ASSUMED_MASS if half is None else replace(MASS_SINCE, interval=half / value)

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from hardware.dynamics import dynamics_of
+from hardware.dynamics import dynamics_of, uncertainty_of
 from hardware.robot_file import RobotFile
 from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
@@ -20,8 +20,6 @@ from pipeline.gains import Gains
 
 USUAL: Final = Sensing("relative", latency=0.090)
 """Pictures of a phone by a good network are 0.06 to 0.12 s old when they are fused."""
-BODIES: Final = "with any mass ± 30 %, lag × 0.7-1.5"
-"""Of what the robot's file says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +40,11 @@ class GainReport:
         for axis, margins in self.axes.items():
             who[MarginGoals().lacking(margins)].append(AXES[axis])
         return "; ".join(f"{', '.join(axes)}: {words}" for words, axes in who.items() if words)
+
+
+def bodies_words(robot_file: RobotFile) -> str:
+    """Of which bodies, beside the one that its file tells, margins are the worst."""
+    return f"with any {uncertainty_of(robot_file.plant).words}"
 
 
 def worst_words(worst: AxisMargins) -> str:

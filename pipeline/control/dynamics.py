@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipeline.control.uncertainty import ASSUMED, Uncertainty
 from pipeline.frames import Array
 
 
@@ -23,3 +24,5 @@ class Dynamics:
     """From command to thruster [s]."""
     needs_tilt: bool = False
     """x and y are forced by turning the thrust with the roll and pitch loops."""
+    uncertainty: Uncertainty = ASSUMED
+    """By how much the robot may be another one."""

@@ -2,7 +2,8 @@
 
 How old pictures may be is worked out once, for every gain set, estimator and age of the body's
 samples; a question in flight costs microseconds. The robot as its file tells it must keep margins;
-one that is heavier, lighter, slower or faster than told (`robust_margins`) must not be unstable.
+one that is heavier, lighter, slower or faster than told (`robust_margins`) must not be unstable, by
+the intervals of what was identified, else by what is assumed of any robot (`uncertainty`).
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ BODY_AGES_S: Final = tuple(0.0025 * k for k in range(1, 33))
 RESOLUTION_S: Final = 0.002
 NEVER: Final = -1.0  # no age [s]
 OTHER_BODY: Final = (
-    "With gains {gains!r} a robot with a mass ± 30 % or thrusters' lag × 0.7-1.5 of what its file"
-    " says could become unstable"
+    "With gains {gains!r} a robot with a {of_body} or thrusters' {of_thrusters} of what its file"
+    " says{assumed} could become unstable"
 )
 KINDS: Final[tuple[EstimatorName, ...]] = ("relative", "none")
 """`paper` bears what `relative` bears: both fuse a picture when it was taken."""
@@ -56,7 +57,7 @@ class LatencyGuard:
         sets: Mapping[str, Gains],
         config: TeleopConfig,
     ) -> None:
-        """Works everything out: some tenths of a second of CPU time.
+        """Works everything out: some tenths of a second of CPU time, thrice that if identified.
 
         Args:
             dynamics: Of the robot.
@@ -67,6 +68,12 @@ class LatencyGuard:
         self._axes = [int(axis) for axis in np.flatnonzero(axes)]
         feedforward = config.feedforward if config.feedforward.enabled else None
         self._margins = config.margins
+        doubt = dynamics.uncertainty
+        self._other_body = {
+            "of_body": doubt.of_body,
+            "of_thrusters": doubt.of_thrusters,
+            "assumed": "" if doubt.is_identified else " (assumed)",
+        }
         loop = Loop(dynamics, config.gains, config.margins, config.no_filter, feedforward)
         self.bearable: dict[tuple[str, EstimatorName], Bearable] = {}
         """Of the robot as told ..."""
@@ -96,7 +103,7 @@ class LatencyGuard:
         if latency <= in_all or not self._margins.enforced:
             return ""
         if latency <= allowed:
-            wrong = OTHER_BODY.format(gains=chosen)
+            wrong = OTHER_BODY.format(gains=chosen, **self._other_body)
         elif allowed == NEVER and estimator != "none":
             wrong = f"The robot's motion is felt {1e3 * body_age:.0f} ms late"
             wrong += f", too late for gains {chosen!r}"

@@ -210,7 +210,7 @@ def alike(loop: Loop, axis: int) -> tuple[float, ...]:
 def _numbers(loop: Loop, axis: int) -> tuple[float, ...]:
     d, gains = loop.dynamics, loop.gains
     rows = (d.inertia, d.damping, d.stiffness, gains.Kp, gains.Ki, gains.Kd)
-    return tuple(float(row[axis]) for row in rows)
+    return tuple(float(row[axis]) for row in rows) + d.uncertainty.of_axis(axis)
 
 
 def is_stable(loop: Loop, axis: int, sensing: Sensing) -> bool:

@@ -1,9 +1,10 @@
 """Margins over what nobody has measured: the body's mass, its thrusters' lag, what it feels.
 
-Control believes the robot file; the body may be another. Each margin is the worst of all bodies,
-and of both assumptions on what the robot's IMU feels: all of its motion, or all but a share that
-only the camera mends (`MarginsConfig.unfelt`). Neither is the safer one: what is felt wrongly
-comes back late, and where all is felt the pull that feed-forward balances acts in full.
+Control believes the robot file; the body may be another, within its `Dynamics.uncertainty`. Each
+margin is the worst of all bodies, and of both assumptions on what the robot's IMU feels: all of its
+motion, or all but a share that only the camera mends (`MarginsConfig.unfelt`). Neither is the safer
+one: what is felt wrongly comes back late, and where all is felt the pull that feed-forward balances
+acts in full.
 """
 
 from __future__ import annotations
@@ -14,12 +15,11 @@ from itertools import product
 from math import degrees, log10, pi
 from typing import Final
 
+import numpy as np
+
+from pipeline.control.dynamics import Dynamics
 from pipeline.control.margins import AxisMargins, Loop, Sensing, axis_margins
 
-MASSES: Final = (0.7, 1.0, 1.3)
-"""Times the mass and the moments of inertia that control was told; the suspension as it is."""
-LAGS: Final = (0.7, 1.0, 1.5)
-"""Times the thrusters' lag."""
 MIN_PHASE_RAD: Final = pi / 6.0
 MIN_GAIN: Final = 2.0
 """6 dB, up and down."""
@@ -90,7 +90,24 @@ def _db(gain: float) -> float:
 def bodies(loop: Loop) -> Iterator[Loop]:
     """The loop around every body that the robot may be, as told among them."""
     nominal = loop.dynamics
-    for mass, lag, unfelt in product(MASSES, LAGS, (0.0, loop.config.unfelt)):
-        dynamics = replace(nominal, inertia=mass * nominal.inertia, lag=lag * nominal.lag)
+    for dynamics, unfelt in product(_dynamics(nominal), (0.0, loop.config.unfelt)):
         config = replace(loop.config, unfelt=unfelt)
         yield replace(loop, dynamics=dynamics, config=config, nominal=nominal)
+
+
+def _dynamics(told: Dynamics) -> Iterator[Dynamics]:
+    """Those of every body: the corners of what was identified, a grid of what is assumed."""
+    doubt = told.uncertainty
+    if doubt.is_identified:
+        yield told  # which no corner is
+    damping = np.maximum(told.damping - np.array(doubt.damping), 0.0)
+    ranges = doubt.inertias(told.needs_tilt), doubt.thrusters(), doubt.stiffnesses()
+    for inertia, (lag, delay), stiffness in product(*ranges):
+        yield replace(
+            told,
+            inertia=inertia * told.inertia,
+            lag=lag * told.lag,
+            delay=max(told.delay + delay, 0.0),
+            stiffness=np.maximum(told.stiffness + stiffness, 0.0),
+            damping=damping,
+        )

@@ -20,7 +20,7 @@ import numpy as np
 
 from hardware.dynamics import dynamics_of
 from hardware.follower import Follower, RobotCommand, zero_command
-from hardware.gain_check import BODIES, report
+from hardware.gain_check import bodies_words, report
 from hardware.link.link_key import LinkKeyError, take_key
 from hardware.link.registry import SIMULATED, connect, link_kind
 from hardware.robot_file import COMMANDS, RobotFile, is_shipped, load_robot
@@ -139,7 +139,8 @@ def weak_gains(robot: str, robot_file: RobotFile, gains: str, estimator: Estimat
     if robot_file.robot.twist is not None or estimator == "none" or is_shipped(robot):
         return ""
     lacking = report(robot_file, robot_file.gains[gains]).lacking
-    return WEAK.format(gains=gains, bodies=BODIES, lacking=lacking) if lacking else ""
+    bodies = bodies_words(robot_file)
+    return WEAK.format(gains=gains, bodies=bodies, lacking=lacking) if lacking else ""
 
 
 def unfit(robot_file: RobotFile, granted: str, *, real: bool) -> str:

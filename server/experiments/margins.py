@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.dynamics import dynamics_of
+from hardware.dynamics import dynamics_of, uncertainty_of
 from hardware.robot_file import RobotFile, load_robot
 from hardware.robot_schema import AXES
 from pipeline.config import TeleopConfig
@@ -18,8 +18,6 @@ from pipeline.control.jitter_margins import worst_jitter
 from pipeline.control.latency_guard import LatencyGuard
 from pipeline.control.margins import OMEGA, Complex, Loop, Sensing, axis_margins
 from pipeline.control.robust_margins import (
-    LAGS,
-    MASSES,
     MAX_PEAK,
     MIN_GAIN,
     MIN_PHASE_RAD,
@@ -182,22 +180,29 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     )
     found = list(rows(robot_file, arguments))
     print(text.table(COLUMNS, found))
-    print(_rule())
+    print(rule(robot_file))
     arming = list(verdicts(robot_file, arguments))
     print("\n".join(arming))
     return ExperimentReport(
-        {"margins": [row_values(one) for one in found], "arming": arming},
+        {
+            "margins": [row_values(one) for one in found],
+            "bodies": uncertainty_of(robot_file.plant).words,
+            "arming": arming,
+        },
         draw=lambda folder: (draw(found, folder / "margins.png"),),
     )
 
 
-def _rule() -> str:
+def rule(robot_file: RobotFile) -> str:
+    """Of which bodies margins are the worst, and what is asked of them."""
+    doubt, outdated = uncertainty_of(robot_file.plant), robot_file.plant.intervals.outdated
+    assumed = "" if doubt.is_identified else ", moments as mass, assumed"
+    changed = f" (not what was identified: {', '.join(outdated)})" if outdated else ""
     return (
-        f"worst: mass and moments x {MASSES[0]:g}-{MASSES[-1]:g}, thrusters' lag x "
-        f"{LAGS[0]:g}-{LAGS[-1]:g}, with and without motion that the robot feels wrongly; robust: "
-        f"at least {degrees(MIN_PHASE_RAD):.0f}° and {20.0 * log10(MIN_GAIN):.0f} dB, peak of "
-        f"the sensitivity no more than {MAX_PEAK:g}; +: how unevenly late, at any rate (0: not "
-        "judged)"
+        f"worst: {doubt.words}{assumed}{changed}, with and without motion that the robot feels "
+        f"wrongly; robust: at least {degrees(MIN_PHASE_RAD):.0f}° and "
+        f"{20.0 * log10(MIN_GAIN):.0f} dB, peak of the sensitivity no more than {MAX_PEAK:g}; "
+        "+: how unevenly late, at any rate (0: not judged)"
     )
 
 

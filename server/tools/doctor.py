@@ -149,7 +149,7 @@ def cameras() -> Iterator[Finding]:
 
 def gains() -> Iterator[Finding]:
     """What gains of the chosen robot lack if it is not quite as its file says."""
-    from hardware.gain_check import BODIES, report, worst_words
+    from hardware.gain_check import bodies_words, report, worst_words
     from hardware.robot_file import COMMANDS, RobotFileError, load_robot
     from server.common.settings import SettingsError, load
 
@@ -169,7 +169,8 @@ def gains() -> Iterator[Finding]:
     what, said = f"gains {chosen.gains} of {chosen.robot}", worst_words(found.worst)
     advice = f"less than is usual: {found.lacking}; `lightleash tune` finds others"
     grade = POOR if found.lacking else GOOD
-    yield Finding(grade, what, f"{said} {BODIES}", advice if found.lacking else "")
+    said += f" {bodies_words(robot_file)}"
+    yield Finding(grade, what, said, advice if found.lacking else "")
 
 
 def _phone(parser: Parser, arguments: argparse.Namespace) -> int:

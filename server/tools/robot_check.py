@@ -14,7 +14,7 @@ import numpy as np
 from hardware.authority import authority
 from hardware.dynamics import dynamics_of
 from hardware.follower import FollowerError
-from hardware.gain_check import BODIES, controlled, loop_of, report, worst_words
+from hardware.gain_check import bodies_words, controlled, loop_of, report, worst_words
 from hardware.led_layout.margins import margins
 from hardware.led_layout.viewpoints import looks_about
 from hardware.link.registry import link_kind
@@ -88,6 +88,9 @@ def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     else:
         yield from _thrust(robot_file)
         yield from _gains(robot_file)
+        if outdated := robot_file.plant.intervals.outdated:
+            said = f"{', '.join(outdated)}: not what was identified, so assumed as of any robot"
+            yield RobotFinding("identified", True, said)
     yield _leds(robot_file)
     yield from _link(robot_file, state)
 
@@ -152,7 +155,7 @@ def _gains(robot_file: RobotFile) -> Iterator[RobotFinding]:
         ok = kept and report(robot_file, gains, LATE).worst.stable
         sound += ok
         said = f"margins {1e3 * told.delay:.0f} ms, {degrees(told.phase):.0f}°; "
-        said += f"{worst_words(found.worst)} {BODIES}"
+        said += f"{worst_words(found.worst)} {bodies_words(robot_file)}"
         if not ok:
             said += ": refused" if kept else ": too little to fly"
         elif found.lacking:

@@ -18,7 +18,7 @@ from typing import Any, Final, cast, get_args
 
 import numpy as np
 
-from hardware.gain_check import controlled, loop_of
+from hardware.gain_check import bodies_words, controlled, loop_of
 from hardware.gain_tuning import TuningError, tuned
 from hardware.robot_file import (
     RobotFile,
@@ -85,7 +85,8 @@ def _tuned(arguments: argparse.Namespace) -> str:
     found = tuned(loop, controlled(robot_file), _sensing(arguments), _goals(arguments))
     base = base if base != name else f"{base} before"
     loops, sensing = {base: loop, name: replace(loop, gains=found)}, _sensing(arguments)
-    print(f"{robot_file.robot.name}: pictures {arguments.latency_ms:g} ms late")
+    late = f"pictures {arguments.latency_ms:g} ms late"
+    print(f"{robot_file.robot.name}: {late}; margins {bodies_words(robot_file)}")
     print(table.table(loops, controlled(robot_file), sensing), flush=True)
     if not _flies(robot_table(path), {base: before, name: found}, arguments):
         raise TuningFlightError(f"{name} does not fly here: nothing is written")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hardware.dynamics import dynamics_of
-from hardware.robot_file import load_robot
+from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import EstimatorName, MarginsConfig, TeleopConfig
 from pipeline.control import latency_guard
 from pipeline.control.latency_guard import (
@@ -22,10 +22,11 @@ from pipeline.control.latency_guard import (
 )
 from pipeline.control.margins import UNSTABLE, AxisMargins, Loop, Sensing, axis_margins
 from pipeline.control.robust_margins import worst_margins
+from tests.hardware.identified_robots import identified
 
 
-def guard(robot: str = "ames", config: TeleopConfig | None = None) -> LatencyGuard:
-    robot_file = load_robot(robot)
+def guard(robot: str | RobotFile = "ames", config: TeleopConfig | None = None) -> LatencyGuard:
+    robot_file = load_robot(robot) if isinstance(robot, str) else robot
     axes = robot_file.robot.axes | robot_file.robot.wrench_axes
     dynamics = dynamics_of(robot_file.robot, robot_file.plant)
     return LatencyGuard(dynamics, axes, robot_file.gains, config or TeleopConfig())
@@ -52,6 +53,18 @@ def test_what_only_the_robot_as_told_bears_is_refused_and_the_reason_is_the_othe
     why = ames.refusal("paper_without_ekf", "relative", latency, age)
     assert "a mass ± 30 % or thrusters' lag × 0.7-1.5" in why
     assert "Would do: gains 'phone', or gains 'paper_with_ekf'." in why
+
+
+def test_what_was_identified_decides_what_is_refused_and_the_reason_says_so(
+    ames: LatencyGuard,
+) -> None:
+    flown = "paper_without_ekf", "relative", 0.09, 0.005
+    assert "of what its file says (assumed) could become unstable" in ames.refusal(*flown)
+    assert guard(identified("ames", 0.02)).refusal(*flown) == ""
+    why = guard(identified("ames", 0.29)).refusal(*flown)
+    assert "a robot with a mass × 0.60-1.48 (identified ± 29 %), suspension (identified)" in why
+    assert "or thrusters' lag × 0.57-1.61 (identified ± 29 %), delay ± 4.3 ms of what" in why
+    assert "assumed" not in why
 
 
 @pytest.mark.parametrize("robot", ["ames", "quadrotor", "ground"])

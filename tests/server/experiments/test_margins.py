@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from hardware.robot_text import with_intervals
 from server.experiments import main
+from tests.hardware.identified_robots import intervals_of, robot_text
 
 
 def test_it_prints_every_axis_and_what_arming_says(capsys: pytest.CaptureFixture[str]) -> None:
@@ -32,6 +34,22 @@ def test_it_says_what_is_left_where_the_body_is_not_as_told(
     assert [robust[axis] for axis in ("roll", "pitch", "yaw")] == ["yes"] * 3
     assert [robust[axis] for axis in "xyz"] == ["no"] * 3
     assert "at least 30° and 6 dB" in told
+
+
+def test_it_says_which_bodies_are_meant_and_what_was_changed_since_it_was_identified(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert main(["margins", "ground", "--estimator", "relative"]) == 0
+    assert "worst: mass ± 30 %, lag × 0.7-1.5, moments as mass, assumed" in capsys.readouterr().out
+    text = robot_text("ground")
+    text = with_intervals(text, intervals_of(text, 0.03), "for tests")
+    robot = tmp_path / "mine.toml"
+    for delay, changed in ((0.01, ""), (0.012, " (not what was identified: thrusters.delay_s)")):
+        robot.write_text(text.replace("delay_s = 0.01 ", f"delay_s = {delay} "))
+        assert main(["margins", str(robot), "--estimator", "relative"]) == 0
+        lag = "× 0.7-1.5 (assumed)" if changed else "× 0.78-1.29 (identified ± 3 %), delay ± 0.3 ms"
+        said = f"worst: mass × 0.82-1.18 (identified ± 3 %), lag {lag}{changed}, with and without"
+        assert said in capsys.readouterr().out
 
 
 def _phases(row: list[str]) -> tuple[str, str]:

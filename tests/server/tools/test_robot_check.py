@@ -11,7 +11,9 @@ from hardware.dynamics import dynamics_of
 from hardware.link.registry import OWN
 from hardware.link.silence import SilenceTimes
 from hardware.robot_file import load_robot, robot_path
+from hardware.robot_text import with_intervals
 from server.tools.robot import main
+from tests.hardware.identified_robots import intervals_of, robot_text
 
 
 def findings(capsys, robot, tmp_path):
@@ -36,6 +38,22 @@ def test_margins_of_a_body_that_is_not_as_told_are_said_and_what_it_would_lose_i
     assert "less than is usual: x, y: 25.3° of phase" in found["gains phone"]["said"]
     assert found["gains paper_without_ekf"]["said"].endswith(": refused")
     assert found["any gains"]["said"].startswith("2 of 3 sets")
+
+
+@pytest.mark.slow
+def test_what_was_identified_is_said_and_what_was_changed_since(capsys, tmp_path):
+    text = robot_text("ames")
+    text = with_intervals(text, intervals_of(text, 0.03), "for tests")
+    robot = tmp_path / "mine.toml"
+    robot.write_text(text)
+    code, found = findings(capsys, robot, tmp_path)
+    assert (code, "identified" in found) == (0, False)
+    assert "with any mass × 0.82-1.18 (identified ± 3 %)" in found["gains phone"]["said"]
+    robot.write_text(text.replace("mass_kg = 3.5 ", "mass_kg = 3.6 "))
+    code, found = findings(capsys, robot, tmp_path)
+    assert "mass ± 30 % (assumed), moments × 0.82-1.18" in found["gains phone"]["said"]
+    assert (code, found["identified"]["ok"]) == (0, True)
+    assert found["identified"]["said"].startswith("body.mass_kg: not what was identified")
 
 
 def changed(tmp_path, *changes):

@@ -15,7 +15,9 @@ from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from hardware.system_identification.fit import IdentificationError
 from pipeline.frames import GRAVITY
 from server.control.robot_clock import RobotLink
+from server.experiments import main
 from server.tools.bring_up import session
+from server.tools.bring_up.command import written
 from server.tools.bring_up.findings import brought_up
 from server.tools.bring_up.pulses import PulseProgramme
 
@@ -64,6 +66,32 @@ def test_a_robot_that_flies_is_told_its_thrusters_while_it_hangs(said, words):
     assert all(word in found.against[k] for k, word in enumerate(words))
     assert found.identified is None
     assert not found.is_sound
+
+
+@pytest.mark.slow
+def test_margins_are_those_of_the_intervals_in_the_file_that_a_bring_up_writes(tmp_path, capsys):
+    ames = load_robot("ames")
+    found = brought_up(ames.plant, brought(ames, {}))
+    text = written((ROBOTS / "ames.toml").read_text(), found, "ames-1.mcap")
+    assert "}  # robot bring-up, ames-1.mcap" in text
+    mine, bare = tmp_path / "mine.toml", tmp_path / "bare.toml"
+    mine.write_text(text)
+    bare.write_text(text.partition("[identified.")[0])
+    told = load_robot(mine).plant.intervals
+    assert told.outdated == ()
+    assert None not in (told.mass, *told.inertia, told.length, told.stiffness, told.lag, told.delay)
+    worst = {}
+    for robot in (mine, bare):
+        assert main(["margins", str(robot), "--gains", "phone", "--estimator", "relative"]) == 0
+        said = capsys.readouterr().out
+        assert ("(identified ± " in said) == (robot == mine)
+        assert ("mass ± 30 %, lag × 0.7-1.5, moments as mass, assumed" in said) != (robot == mine)
+        rows = [line.split() for line in said.splitlines() if line.startswith("phone")]
+        worst[robot] = [(float(row[-6]), float(row[-5])) for row in rows]
+    assert len(worst[mine]) == 6
+    for narrow, assumed in zip(worst[mine], worst[bare], strict=True):
+        assert narrow[0] > assumed[0]
+        assert narrow[1] > assumed[1]
 
 
 @pytest.mark.slow
