@@ -1,16 +1,9 @@
 /** The phone's two links and what travels on them: who we are, motion, touch, pictures, requests. */
 
-/** @import {Calibrate, Command, Hello, PathChoice, Sight, ToPage, Welcome} from '../wire/protocol_types.js' */
+/** @import {Calibrate, Command, Hello, ToPage, Welcome} from '../wire/protocol_types.js' */
 /** @import {Motion, Received, Touch} from '../wire/protocol.js' */
-/** @import {Surroundings as LinkSurroundings} from '../wire/link.js' */
-/** @import {Event} from '../ui/session_types.js' */
+/** @import {FastRecords, Ping, Surroundings} from './phone_types.js' */
 /** @import {VideoSender} from '../video/video.js' */
-/** @import {WakefulClock} from '../wire/command.js' */
-
-/**
- * A faster way for records that may be lost.
- * @typedef {{ readonly isHeard: boolean, send(record: ArrayBuffer): void }} FastRecords
- */
 
 import { nowUs } from '../wire/clock.js';
 import { ServerTime, commandOf } from '../wire/command.js';
@@ -20,23 +13,6 @@ import { Kind, MAX_RECORD_BYTES, VERSION, encodeMotion, encodePong, encodeTouch 
 const LOG_EVERY_MS = 200;
 /** An older touch is not said again: whatever makes them may have stopped. */
 const NEWEST_TOUCH_MS = 100;
-
-/** @typedef {{ sequence: number, tUs: number, nonce: bigint }} Ping */
-/** @typedef {{ device: string, sensors: string, video: string }} Identity */
-
-/**
- * @typedef {object} Surroundings
- * @property {string} base Address of the page.
- * @property {{ now(): number }} performance
- * @property {WakefulClock} clock Of what people ask for and are told.
- * @property {LinkSurroundings} links
- * @property {(event: Event) => void} dispatch
- * @property {() => Identity} identity
- * @property {(welcome: Welcome) => void} onWelcome
- * @property {(choice: PathChoice) => void} onPath A supervisor's.
- * @property {(sight: Sight) => void} onSight
- * @property {() => void} onUnwelcome A connection ended before the server welcomed us.
- */
 
 export class Phone {
   /** @param {Surroundings} surroundings */

@@ -1,14 +1,6 @@
 /** From an opened page to a phone that is known, allowed its sensors, and connected. */
 
-/** @import {CameraFeed} from '../camera/camera_feed.js' */
-/** @import {ChoiceCard} from '../ui/choice_card.js' */
-/** @import {Feedback} from '../ui/feedback.js' */
-/** @import {Imu} from '../motion/imu.js' */
-/** @import {Fetch} from '../wire/pairing.js' */
-/** @import {PairingCard} from '../ui/pairing_card.js' */
-/** @import {Phone} from './phone.js' */
-/** @import {Event} from '../ui/session_types.js' */
-/** @import {VideoSender} from '../video/video.js' */
+/** @import {StartSurroundings} from './phone_types.js' */
 
 import { USUAL, deviceName } from '../camera/camera.js';
 import { stayAwake } from '../ui/display.js';
@@ -16,24 +8,8 @@ import { requestMotionPermission } from '../motion/imu.js';
 import { becomeKnown, exclusion, tokenOf } from '../wire/pairing.js';
 import { Problem, problemOf } from '../wire/problems.js';
 
-/**
- * @typedef {object} Surroundings
- * @property {Window} window
- * @property {{ now(): number }} performance
- * @property {Fetch} fetchHere
- * @property {(event: Event) => void} dispatch
- * @property {{ device: string, sensors: string, video: string }} identity What the phone says of itself; filled in here.
- * @property {Feedback} feedback
- * @property {CameraFeed} camera
- * @property {VideoSender} video
- * @property {Imu} imu
- * @property {PairingCard} pairing
- * @property {ChoiceCard} choice
- * @property {Phone} phone
- */
-
 export class Start {
-  /** @param {Surroundings} surroundings */
+  /** @param {StartSurroundings} surroundings */
   constructor(surroundings) {
     this.surroundings = surroundings;
     /** When the motion sensors were begun; not yet: Infinity [ms]. */

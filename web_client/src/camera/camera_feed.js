@@ -1,6 +1,6 @@
 /** The camera from permission to frames, and again after it was taken away. */
 
-/** @import {OnFrame, ProcessorClass, Source} from './frame_source.js' */
+/** @import {OnFrame, ProcessorClass, Source} from './frame_types.js' */
 /** @import {ScreenAngle} from '../wire/protocol.js' */
 /** @import {Wanted} from './camera.js' */
 

@@ -1,6 +1,6 @@
 /** A link that lets this browser do less than it may already: what is given up is asked before, not told after. */
 
-/** @import {Less} from '../wire/pairing.js' */
+/** @import {Less} from '../wire/pairing_types.js' */
 
 const MAY = { viewer: 'watches and may STOP', operator: 'may lead with a phone', supervisor: 'supervises' };
 

@@ -72,4 +72,19 @@
 
 /** @typedef {{ state: State, effects: Effect[] }} Outcome */
 
+/**
+ * What people ask for.
+ * @typedef {object} Requests
+ * @property {() => void} onStart
+ * @property {() => void} onReload
+ * @property {() => void} onPress
+ * @property {() => void} onRelease
+ * @property {() => void} onStop
+ * @property {() => void} onRequest
+ * @property {(what: Calibrate['what']) => void} onCalibrate
+ * @property {(requested: import('../video/video_paths.js').RequestedPath) => void} onPath
+ * @property {() => void} onSound
+ * @property {(() => void) | null} onFull Null where the page can't fill the screen.
+ */
+
 export {};

@@ -1,8 +1,7 @@
 /** The phone page's DOM: shows a state, reports what fingers do. Nothing else touches the document. */
 
-/** @import {State, ShownMode} from './session_types.js' */
+/** @import {Requests, State, ShownMode} from './session_types.js' */
 /** @import {Advice} from '../wire/problems.js' */
-/** @import {Calibrate} from '../wire/protocol_types.js' */
 /** @import {RequestedPath} from '../video/video_paths.js' */
 
 import { gapWords, healthWords, isAtRest, limitWords, modeWords, rampWords } from './mode_words.js';
@@ -16,20 +15,6 @@ import { goesOn, requestOf, shownMode, untilRamp } from './session.js';
 const REQUEST_WORDS = { arm: 'Arm', disarm: 'Disarm' };
 const MOST_REFUSALS = 4;
 const MOST_WARNINGS = 2;
-
-/**
- * @typedef {object} Requests
- * @property {() => void} onStart
- * @property {() => void} onReload
- * @property {() => void} onPress
- * @property {() => void} onRelease
- * @property {() => void} onStop
- * @property {() => void} onRequest
- * @property {(what: Calibrate['what']) => void} onCalibrate
- * @property {(requested: RequestedPath) => void} onPath
- * @property {() => void} onSound
- * @property {(() => void) | null} onFull Null where the page can't fill the screen.
- */
 
 export class View {
   /**

@@ -1,6 +1,6 @@
 /** Frames to bytes: H.264 where the browser can, else JPEG. */
 
-/** @import {Frame} from '../camera/frame_source.js' */
+/** @import {Frame} from '../camera/frame_types.js' */
 /** @import {JpegAnswer} from './jpeg_worker.js' */
 /** @import {Wanted} from '../camera/camera.js' */
 

@@ -1,6 +1,6 @@
 /** The camera's track in a WebRTC connection: each encoded picture with its record, what the encoder may spend. */
 
-/** @import {Frame} from '../camera/frame_source.js' */
+/** @import {Frame} from '../camera/frame_types.js' */
 /** @import {Level} from './rate_adaptation.js' */
 /** @import {Quaternion} from '../wire/protocol.js' */
 /** @import {FromWorker, ToWorker} from './rtc_worker.js' */

@@ -1,7 +1,7 @@
 /** Camera frames to FRAME records, never more under way than the server has credited. */
 
 /** @import {Encoded, Encoder, Outlet, Stream} from './encoder.js' */
-/** @import {Frame} from '../camera/frame_source.js' */
+/** @import {Frame} from '../camera/frame_types.js' */
 /** @import {Level} from './rate_adaptation.js' */
 
 import { EncoderLoad } from './encoder_load.js';

@@ -1,6 +1,6 @@
 /** The ways of a picture to the server, best first: WebRTC, H.264 by websocket, JPEG by websocket. */
 
-/** @import {Frame} from '../camera/frame_source.js' */
+/** @import {Frame} from '../camera/frame_types.js' */
 /** @import {Level} from './rate_adaptation.js' */
 /** @import {PathChoice, Welcome} from '../wire/protocol_types.js' */
 /** @import {RtcPath} from './rtc.js' */

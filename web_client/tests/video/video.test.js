@@ -7,7 +7,7 @@ import { MAX_RECORD_BYTES } from '../../src/wire/protocol.js';
 import { HELD_MS, VideoSender } from '../../src/video/video.js';
 import { FakeTime } from '../fakes.js';
 
-/** @import {Frame} from '../../src/camera/frame_source.js' */
+/** @import {Frame} from '../../src/camera/frame_types.js' */
 
 /** An encoder that keeps what it is given until the test lets it out. */
 class FakeEncoder {
