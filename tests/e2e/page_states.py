@@ -39,50 +39,54 @@ const BUSY = 'The server\\'s computer is too busy. chromium takes the most of it
 """
 """Short words for what the page's modules do."""
 PHONE = {
-    "start": "show('start', 'name-field'); text('host', 'robot.local'); text('step', 'Ready.');",
+    "start": """show('start', 'name-field'); text('host', 'robot.local');
+      text('step', 'Pairing with the server…');""",
     "problem": """show('problem', 'reload', 'last-stop', 'last-stop-words');
-      text('problem-title', 'The browser can’t use the motion sensors');
-      list('problem-steps', ['Reload the page.', 'Allow motion sensors in the settings.']);
-      text('last-stop-words', 'STOP was refused: a supervisor has ended this pairing.');""",
+      text('problem-title', 'The motion sensors are not allowed');
+      list('problem-steps', ['Click the icon left of the address and allow motion sensors.']);
+      text('last-stop-words', 'STOP is not confirmed by the robot. '
+        + 'Press it again, or cut the robot’s power.');""",
     "pairing": "show('pairing', 'start'); text('match', 'KWRT');",
     "refused": """operate(); mode('DISARMED', 'Thrusters are off', 'Not armed.');
       list('refusals', [BUSY, 'Let go of the button before arming.']); show('calibrate');
-      list('warnings', ['The server\\'s computer stood still 9 times in a minute.']);
+      list('warnings', ['The server\\'s computer stood still 9 times in a minute, '
+        + 'the longest 0.42 s.']);
       text('hold-hint', 'Arm first');""",
     "ready": """operate(); mode('DISARMED', 'Thrusters are off', 'Not armed.');
       show('handover-start', 'link-check-start');""",
     "moving": """operate(); mode('TRACK', 'The robot follows you', 'Following the phone.');
       document.getElementById('hold').dataset.look = 'moving'; show('toward');
-      text('toward', 'Closer, and to the left'); text('wish', 'Disarm');
+      text('toward', 'The robot is beyond the left of the picture.'); text('wish', 'Disarm');
       text('hold-title', 'Moving'); text('hold-hint', '0.5 × your way · Let go to keep still');""",
     "waiting": """operate(); mode('HOLD', 'The robot keeps still', BUSY);
       document.getElementById('hold').dataset.look = 'again'; show('left', 'notice', 'lens');
       show('lens-0', 'lens-1'); document.getElementById('lens').dataset.tone = 'hint';
-      text('lens-text', 'The camera focuses by itself: the lens is not as it was calibrated.');
+      text('lens-text', 'This phone can’t fix the focus: keep the robot between 1 and 4 m away.');
       text('left-s', '12 s'); text('hold-title', 'Let go and press again');
       text('hold-hint', 'Thrust fades in 12 s');
-      text('notice', 'This phone was too busy for 0.6 s: close other apps.');""",
+      text('notice', 'It came too late and was not done: press again.');""",
     "stopped": "operate(); mode('STOPPED', 'Thrust is off', 'STOP was pressed.');",
     "calibrating": """operate(); document.getElementById('operate').classList.add('calibrating');
       show('calibration', 'calibration-leave', 'calibration-go');
       document.getElementById('calibration').dataset.verdict = '';
-      text('calibration-title', 'Film the board: 12 of 20');
+      text('calibration-title', 'Film the board');
       text('board-url', 'robot.local/board');
-      text('calibration-hint', 'Tilt the phone to the left.');
-      document.getElementById('calibration-tasks').innerHTML = ['Corners', 'Tilts', 'Distances',
-        'Turns'].map((one) => `<div><dt>${one}</dt><dd><progress value=".4"></progress></dd></div>`)
-        .join('');
-      list('calibration-lines', ['Brighter light would help.'], 'advice');""",
+      text('calibration-hint', 'Look at the board from the left, at 20 to 45 degrees.');
+      document.getElementById('calibration-tasks').innerHTML = ['Whole picture', 'Tilted',
+        'Near and far', 'Turned'].map((one) => `<div><dt>${one}</dt>
+          <dd><progress value=".4"></progress></dd></div>`).join('');
+      list('calibration-lines', ['Film the board in the corners of the picture too.'],
+        'advice');""",
     "checking": """operate(); document.getElementById('operate').classList.add('checking');
       show('link-check', 'link-check-leave', 'link-check-go');
       document.getElementById('link-check').dataset.grade = 'fair';
       text('link-check-title', 'Usable: the robot will wait for the network now and then.');
-      text('link-check-hint', 'Listened for 20 s.');
+      text('link-check-hint', 'In the last 20 s:');
       list('link-check-lines', ['The robot would follow 97.3 % of the time.', 'Round trip 12 ms.']);
-      list('link-check-advice', ['Keep the phone awake and on its charger.']);""",
+      list('link-check-advice', ['The pictures are old: try another path for them.']);""",
     "handing": """operate(); document.getElementById('operate').classList.add('handing');
-      show('handover', 'handover-leave', 'handover-take'); text('handover-title', 'Hand over');
-      text('handover-hint', 'Who shall lead?');
+      show('handover', 'handover-leave', 'handover-take'); text('handover-title', 'Hand over to…');
+      text('handover-hint', 'The robot comes down first.');
       document.getElementById('handover-people').innerHTML = ['Anna', 'Bert'].map(
         (one) => `<button class="calibrate quiet-deed">${one}</button>`).join('');""",
     "asked": """show('start');
