@@ -1,6 +1,6 @@
 """What stands on the pages in each of their states; scripts do not run. As pictures to look at:
 
-python -m tests.e2e.page_states folder
+python -m tests.e2e.page_states folder [en | fr]
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pathlib import Path
 from playwright.sync_api import BrowserContext, Page
 
 from tests.e2e.conftest import find_chromium
-from tests.e2e.written_pages import opened, written_pages
+from tests.e2e.written_pages import FRENCH, opened, written_pages
 
 PHONES = ((360, 640), (412, 915), (915, 412), (667, 375))
 TABLET, DESKTOP, LAPTOP = (820, 1180), (1280, 720), (1440, 900)
@@ -194,6 +194,12 @@ STATES = {
     ("trust", "help"): "",
 }
 """By page and state."""
+FRENCH_PAGES = ("index",)
+SHOWN = [
+    *((name, state, "en") for name, state in STATES),
+    *((name, state, "fr") for name, state in STATES if name in FRENCH_PAGES),
+]
+"""Each page's states, in each of its languages."""
 
 
 def letters(px: int) -> tuple[str, ...]:
@@ -201,26 +207,34 @@ def letters(px: int) -> tuple[str, ...]:
     return (f"--blink-settings=defaultFontSize={px}",)
 
 
-def shown(context: BrowserContext, name: str, state: str, size: tuple[int, int]) -> Page:
-    """A page in one of its states."""
+def shown(
+    context: BrowserContext, name: str, state: str, size: tuple[int, int], language: str = "en"
+) -> Page:
+    """A page in one of its states, in one of its languages."""
     page = opened(context, name, size)
     page.evaluate(f"() => {{ {STATES[name, state]} }}")
+    if language == "fr":
+        page.evaluate(FRENCH)
     return page
 
 
 def main() -> None:
-    """A picture of each state, at each size of screen and of letters."""
+    """A picture of each state, at each size of screen and of letters, in one language or in all."""
     target, executable = Path(sys.argv[1]), find_chromium()
+    languages = sys.argv[2:] or ["en", "fr"]
     if executable is None:
         sys.exit("no Chromium found: apt-get install chromium")
     target.mkdir(parents=True, exist_ok=True)
     for px in LETTERS_PX:
         with written_pages(executable, letters(px)) as context:
-            for name, state in STATES:
+            for name, state, language in SHOWN:
+                if language not in languages:
+                    continue
                 sizes = PHONES if name == "index" else (PHONES[0], TABLET, DESKTOP, LAPTOP)
                 for width, height in sizes:
-                    page = shown(context, name, state, (width, height))
-                    file = f"{name}-{state}-{width}x{height}-{100 * px // LETTERS_PX[0]}.png"
+                    page = shown(context, name, state, (width, height), language)
+                    percent = 100 * px // LETTERS_PX[0]
+                    file = f"{name}-{state}-{language}-{width}x{height}-{percent}.png"
                     page.screenshot(path=target / file, full_page=name != "index")
                     page.close()
 

@@ -7,7 +7,16 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import BrowserContext
 
-from tests.e2e.page_states import DESKTOP, LETTERS_PX, PHONES, STATES, letters, shown
+from tests.e2e.page_states import (
+    DESKTOP,
+    FRENCH_PAGES,
+    LETTERS_PX,
+    PHONES,
+    SHOWN,
+    STATES,
+    letters,
+    shown,
+)
 from tests.e2e.written_pages import opened, written_pages
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
@@ -91,6 +100,25 @@ OFF = """
 """Buttons of a phone that leads which are not wholly on the screen; what is read may scroll."""
 
 
+NAMES = [
+    *("Lightleash", "STOP", "WebRTC", "WebSocket", "JPEG", "Anna", "Bert", "KWRT"),
+    *("robot.local", "robot.local/board"),
+]
+FIGURES = {"142 ms", "200 Hz"}
+"""What is the same in both languages."""
+LEFT = """
+async (names) => {
+  const words = (one) => [...one.childNodes].filter((node) => node.nodeType === Node.TEXT_NODE)
+    .map((node) => node.data.trim().replace(/\\s+/g, ' '));
+  const said = [...document.querySelectorAll('body, body *')]
+    .filter((one) => !['SCRIPT', 'NOSCRIPT'].includes(one.tagName))
+    .flatMap((one) => [...words(one), one.getAttribute('aria-label') ?? '']);
+  return [...new Set(said)].filter((text) => /[a-z]{2}/i.test(text) && !names.includes(text));
+}
+"""
+"""All words in a page's texts and labels, without `names`."""
+
+
 @pytest.fixture(scope="module", params=LETTERS_PX, ids=lambda px: f"{px} px")
 def pages(request: pytest.FixtureRequest, chromium: str) -> Iterator[BrowserContext]:
     """A browser whose owner has set his letters, the second time to twice the usual size."""
@@ -98,11 +126,11 @@ def pages(request: pytest.FixtureRequest, chromium: str) -> Iterator[BrowserCont
         yield context
 
 
-@pytest.mark.parametrize(("name", "state"), STATES)
+@pytest.mark.parametrize(("name", "state", "language"), SHOWN)
 def test_letters_are_large_enough_whole_and_on_nothing_else(
-    pages: BrowserContext, name: str, state: str
+    pages: BrowserContext, name: str, state: str, language: str
 ) -> None:
-    page = shown(pages, name, state, DESKTOP)
+    page = shown(pages, name, state, DESKTOP, language)
     for size in (DESKTOP, *PHONES):
         page.set_viewport_size({"width": size[0], "height": size[1]})
         is_dense = name == "supervisor" and size == DESKTOP
@@ -122,3 +150,14 @@ def test_letters_grow_as_their_reader_wants(pages: BrowserContext, name: str) ->
     page.evaluate("document.body.style.fontSize = 'medium'")
     assert own >= SLACK * page.evaluate(size)
     page.close()
+
+
+@pytest.mark.parametrize("state", [state for name, state in STATES if name in FRENCH_PAGES])
+def test_no_english_is_left_on_a_french_page(pages: BrowserContext, state: str) -> None:
+    english = shown(pages, "index", state, PHONES[0])
+    french = shown(pages, "index", state, PHONES[0], "fr")
+    said = english.evaluate(LEFT, NAMES)
+    assert len(said) > 50
+    assert set(said) & set(french.evaluate(LEFT, NAMES)) <= FIGURES
+    for page in (english, french):
+        page.close()

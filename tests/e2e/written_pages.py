@@ -1,4 +1,7 @@
-"""The pages' files in a real Chromium, without their scripts: what stands in them is the test's."""
+"""The pages' files in a real Chromium, without their scripts: what stands in them is the test's.
+
+Only the words of another language are there, for who asks for them.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,14 @@ from tests.e2e.chromium_phone import browser
 
 ORIGIN = "http://pages.test/"
 CLIENT = Path(__file__).parents[2] / "web_client"
+WORDS = CLIENT / "src" / "words"
+FRENCH = f"""
+async () => {{
+  const {{speakFrench}} = await import('{ORIGIN}src/words/french.js');
+  speakFrench(document);
+}}
+"""
+"""Says in French what stands in a page."""
 
 
 @contextmanager
@@ -22,6 +33,8 @@ def written_pages(chromium: str, flags: tuple[str, ...] = ()) -> Iterator[Browse
         path = CLIENT / route.request.url.removeprefix(ORIGIN)
         if path.suffix in {".html", ".css", ".svg"} and path.is_file():
             route.fulfill(path=path)
+        elif path.parent == WORDS and path.is_file():
+            route.fulfill(path=path, content_type="text/javascript")
         else:
             route.abort()
 

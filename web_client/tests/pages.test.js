@@ -16,6 +16,8 @@ const files = (folder) => readdirSync(join(ROOT, folder), { withFileTypes: true 
   .flatMap((entry) => (entry.isDirectory() ? files(join(folder, entry.name)) : [join(folder, entry.name)]));
 
 const MODULES = files('src');
+/** What only a French visitor loads, beside the page. */
+const FRENCH = 'src/words/french.js';
 
 /** Every file a page needs, through its modules. @param {string} page */
 function needed(page) {
@@ -57,8 +59,16 @@ test('every file a page names is there, and a page weighs less than 100 kB on th
   }
 });
 
+test('French is loaded by whoever speaks it, weighs less than 25 kB, and nobody else loads any of it', () => {
+  const words = needed(FRENCH);
+  assert.ok(MODULES.some((path) => read(path).includes(`import('./${FRENCH.split('/').pop()}')`)));
+  for (const page of PAGES) assert.deepEqual(needed(page).filter((path) => words.includes(path)), [], page);
+  const bytes = words.reduce((sum, path) => sum + gzipSync(read(path)).byteLength, 0);
+  assert.ok(bytes < 25_000, `${bytes} bytes`);
+});
+
 test('no module is left over', () => {
-  const used = new Set(PAGES.flatMap(needed));
+  const used = new Set([...PAGES, FRENCH].flatMap(needed));
   const onlyTypes = ['src/app/phone_types.js', 'src/camera/frame_types.js', 'src/ui/session_types.js', 'src/wire/pairing_types.js',
     'src/wire/protocol_types.js'];
   assert.deepEqual(MODULES.filter((path) => !used.has(path) && !onlyTypes.includes(path)), []);

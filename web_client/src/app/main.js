@@ -27,6 +27,7 @@ import { StopPost } from '../wire/stop.js';
 import { joinPaths } from './join_paths.js';
 import { VideoSender } from '../video/video.js';
 import { View } from '../ui/view.js';
+import { chooseOther, speak } from '../words/say.js';
 import { INITIAL, reduce, requestOf, touchOf } from '../ui/session.js';
 
 const TICK_MS = 33;
@@ -37,6 +38,7 @@ const HEALTH_MS = 500;
 const WHOLE = ['filming', 'solving'];
 const SILENT_MOTION_MS = 3000;
 
+await speak(document, navigator.languages, () => window.localStorage);
 const here = browserOf(window);
 const { scope, platform, fetchHere, links, screenAngle, startJpegWorker, startWorker, later } = here;
 const clock = new WakefulClock(performance, Date);
@@ -261,6 +263,7 @@ function notice(text) {
   dispatch({ type: 'notice', text, now: clock.now() });
 }
 
+document.getElementById('language')?.addEventListener('click', () => chooseOther(document, () => window.localStorage));
 document.addEventListener('visibilitychange', () => {
   dispatch({ type: 'visibility', visible: !document.hidden });
   if (!document.hidden && state.phase === 'operating') void comeBack();

@@ -2,6 +2,8 @@
 
 /** @import {Calibrate, Calibration} from '../wire/protocol_types.js' */
 
+import { say, write } from '../words/say.js';
+
 const SVG = 'http://www.w3.org/2000/svg';
 
 /** @type {Record<Calibration['phase'], string>} */
@@ -56,7 +58,7 @@ export class CalibrationView {
     this.map.toggleAttribute('hidden', phase !== 'filming');
     const good = phase === 'done' && calibration?.verdict === 'good';
     this.find('calibration-leave').hidden = !open || good;
-    this.find('calibration-leave').textContent = phase === 'done' ? 'Film again' : 'Cancel';
+    write(this.find('calibration-leave'), phase === 'done' ? 'Film again' : 'Cancel');
     this.find('calibration-go').hidden = !over;
     if (calibration !== null && open) this.open(calibration);
   }
@@ -67,11 +69,11 @@ export class CalibrationView {
     const filming = phase === 'filming';
     this.find('calibration').dataset.verdict = verdict;
     this.find('calibration').classList.toggle('busy', phase === 'solving');
-    this.find('calibration-title').textContent = TITLES[phase];
-    this.find('calibration-hint').textContent = phase === 'done' ? verdictWords(verdict) : hint;
+    write(this.find('calibration-title'), TITLES[phase]);
+    write(this.find('calibration-hint'), phase === 'done' ? verdictWords(verdict) : hint);
     this.find('calibration-hint').classList.toggle('warning', calibration.blurred);
     this.find('calibration-board').hidden = !filming || calibration.progress > 0;
-    this.find('calibration-go-title').textContent = phase === 'refused' ? 'Film again' : 'Go on';
+    write(this.find('calibration-go-title'), phase === 'refused' ? 'Film again' : 'Go on');
     this.tasks(filming ? calibration.tasks : {});
     this.lines(calibration);
     if (filming) this.draw(calibration);
@@ -84,9 +86,9 @@ export class CalibrationView {
       const term = this.document.createElement('dt');
       const value = this.document.createElement('dd');
       const bar = this.document.createElement('progress');
-      term.textContent = name;
+      write(term, name);
       bar.value = share;
-      bar.setAttribute('aria-label', name);
+      bar.setAttribute('aria-label', say(name));
       row.classList.toggle('full', share >= 1);
       value.append(bar);
       row.append(term, value);
@@ -100,7 +102,7 @@ export class CalibrationView {
     const items = Object.entries(kinds).flatMap(([kind, texts]) => texts.map((text) => {
       const item = this.document.createElement('li');
       item.className = kind;
-      item.textContent = text;
+      write(item, text);
       return item;
     }));
     this.find('calibration-lines').replaceChildren(...items);

@@ -2,6 +2,8 @@
 
 /** @import {Less} from '../wire/pairing_types.js' */
 
+import { write } from '../words/say.js';
+
 const MAY = { viewer: 'watches and may STOP', operator: 'may lead with a phone', supervisor: 'supervises' };
 
 export class ChoiceCard {
@@ -21,11 +23,11 @@ export class ChoiceCard {
    */
   ask({ held, offered, waits }) {
     const condition = waits ? ', once a supervisor has confirmed it' : '';
-    this.find('choice-title').textContent = `This browser is paired already: it ${MAY[held]}`;
-    this.find('choice-text').textContent = `With the link that you opened it only ${MAY[offered]}${condition}. `
-      + 'One browser has one pairing: if you take the link, the other one ends, and a robot that it leads comes down.';
-    this.find('choice-keep').textContent = `Keep mine: ${held}`;
-    this.find('choice-take').textContent = `Take the link: ${offered}`;
+    write(this.find('choice-title'), `This browser is paired already: it ${MAY[held]}`);
+    write(this.find('choice-text'), `With the link that you opened it only ${MAY[offered]}${condition}. `
+      + 'One browser has one pairing: if you take the link, the other one ends, and a robot that it leads comes down.');
+    write(this.find('choice-keep'), `Keep mine: ${held}`);
+    write(this.find('choice-take'), `Take the link: ${offered}`);
     this.dialog.returnValue = 'keep';
     this.dialog.showModal();
     return new Promise((resolve) => {

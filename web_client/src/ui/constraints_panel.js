@@ -8,6 +8,7 @@
 import { stepped } from '../camera/wanted_constraints.js';
 import { lackWords, lensWords } from '../camera/constraints_words.js';
 import { shownMode } from './session.js';
+import { write } from '../words/say.js';
 
 /** Between two changes that nobody tapped for: the server needs a second to judge the last one. */
 export const PAUSE_MS = 3000;
@@ -132,14 +133,12 @@ export class LensPanel {
     box.hidden = words === null;
     if (words === null) return;
     box.dataset.tone = words.tone;
-    const text = this.find('lens-text');
-    if (text.textContent !== words.text) text.textContent = words.text;
+    write(this.find('lens-text'), words.text);
     this.shown = words.deeds.map(({ deed }) => deed);
     for (const i of [0, 1]) {
       const button = this.find(`lens-${i}`);
       button.hidden = words.deeds[i] === undefined;
-      const label = words.deeds[i]?.label ?? '';
-      if (button.textContent !== label) button.textContent = label;
+      write(button, words.deeds[i]?.label ?? '');
     }
   }
 }

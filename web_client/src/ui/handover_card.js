@@ -7,6 +7,7 @@ import { isAtRest } from './mode_words.js';
 import { ask } from '../wire/pairing.js';
 import { shownMode } from './session.js';
 import { leadOf } from './standby.js';
+import { write } from '../words/say.js';
 
 /** @typedef {{ id: string, name: string }} Other */
 /** @typedef {{ phase: 'off' | 'choosing' | 'given' | 'offered', title: string, hint: string, names: Other[], go: string, mayGo: boolean, leave: string }} Card */
@@ -80,11 +81,11 @@ export class HandoverCard {
     const drawn = JSON.stringify(card);
     if (drawn === this.drawn) return; // a button must not change under a finger
     this.drawn = drawn;
-    this.find('handover-title').textContent = card.title;
-    this.find('handover-hint').textContent = card.hint;
-    this.find('handover-take-title').textContent = card.go;
+    write(this.find('handover-title'), card.title);
+    write(this.find('handover-hint'), card.hint);
+    write(this.find('handover-take-title'), card.go);
     /** @type {HTMLButtonElement} */ (this.find('handover-take')).disabled = !card.mayGo;
-    this.find('handover-leave').textContent = card.leave;
+    write(this.find('handover-leave'), card.leave);
     this.find('handover-people').replaceChildren(...card.names.map((person) => {
       const button = this.document.createElement('button');
       button.textContent = person.name;

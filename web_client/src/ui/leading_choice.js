@@ -2,6 +2,8 @@
 
 /** @import {Lead, LeadingStatus} from '../wire/protocol_types.js' */
 
+import { write } from '../words/say.js';
+
 /** So long a choice is shown that the server has not confirmed. */
 export const CHOICE_MS = 1500;
 /** What a robot that hangs from nothing can't be led by. */
@@ -46,7 +48,7 @@ export class LeadingChoice {
   sign(select) {
     const sign = this.document.getElementById(`${select.id}-sign`);
     const words = select === this.axes ? select.value : select.selectedOptions[0]?.text ?? '';
-    if (sign !== null && sign.textContent !== words) sign.textContent = words;
+    if (sign !== null) write(sign, words);
   }
 
   /**

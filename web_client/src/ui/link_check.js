@@ -7,6 +7,7 @@
 import { isAtRest } from './mode_words.js';
 import { refusalOf } from '../wire/pairing.js';
 import { shownMode } from './session.js';
+import { write } from '../words/say.js';
 
 export const LISTEN_MS = 60_000;
 /** Of less the server says nothing. */
@@ -120,13 +121,13 @@ export class LinkCheck {
     if (!open || text === this.drawn) return;
     this.drawn = text;
     this.find('link-check').dataset.grade = check.phase === 'told' ? check.report.grade : '';
-    this.find('link-check-title').textContent = words.title;
-    this.find('link-check-hint').textContent = words.hint;
+    write(this.find('link-check-title'), words.title);
+    write(this.find('link-check-hint'), words.hint);
     this.find('link-check-bar').hidden = check.phase !== 'listening';
     /** @type {HTMLProgressElement} */ (this.find('link-check-bar')).value = words.share;
     /** @type {HTMLButtonElement} */ (this.find('link-check-go')).disabled = !words.mayGo;
-    this.find('link-check-go-title').textContent = words.go;
-    this.find('link-check-leave').textContent = check.phase === 'told' || check.phase === 'failed' ? 'Close' : 'Cancel';
+    write(this.find('link-check-go-title'), words.go);
+    write(this.find('link-check-leave'), check.phase === 'told' || check.phase === 'failed' ? 'Close' : 'Cancel');
     this.list('link-check-lines', words.lines);
     this.list('link-check-advice', words.advice);
   }
@@ -135,7 +136,7 @@ export class LinkCheck {
   list(id, lines) {
     this.find(id).replaceChildren(...lines.map((text) => {
       const item = this.document.createElement('li');
-      item.textContent = text;
+      write(item, text);
       return item;
     }));
   }

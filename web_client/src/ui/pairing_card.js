@@ -1,6 +1,7 @@
 /** What a phone shows while it becomes known: a place for a name, then the four letters that a supervisor compares. */
 
 import { usualName } from '../wire/pairing.js';
+import { say } from '../words/say.js';
 
 const KEPT = 'lightleash-name';
 
@@ -18,7 +19,8 @@ export class PairingCard {
     this.input = /** @type {HTMLInputElement} */ (find('name'));
     this.card = find('pairing');
     this.letters = find('match');
-    this.input.placeholder = usualName(navigator.userAgent);
+    this.usual = usualName(navigator.userAgent);
+    this.input.placeholder = say(this.usual);
     this.input.value = this.kept();
   }
 
@@ -30,7 +32,7 @@ export class PairingCard {
     } catch {
       // It is asked for again.
     }
-    return typed || this.input.placeholder;
+    return typed || this.usual;
   }
 
   /** @param {boolean} wanted */

@@ -2,6 +2,8 @@
 
 /** @import {Sight} from '../wire/protocol_types.js' */
 
+import { write } from '../words/say.js';
+
 const SVG = 'http://www.w3.org/2000/svg';
 /** Older than this it is wiped off: the phone has moved on [ms]. */
 const LIFE_MS = 600;
@@ -42,7 +44,7 @@ export class SightOverlay {
 
   /** @param {string} words */
   say(words) {
-    if (this.words.textContent !== words) this.words.textContent = words; // said again, it would be read out again
+    write(this.words, words);
     this.words.hidden = words === '';
   }
 
@@ -53,7 +55,7 @@ export class SightOverlay {
   element({ name, text, ...attributes }) {
     const element = this.document.createElementNS(SVG, name);
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
-    if (text) element.textContent = text;
+    if (text) write(element, text);
     return element;
   }
 }

@@ -10,6 +10,7 @@ import { attachHold } from './hold_button.js';
 import { leadWords } from './leading_choice.js';
 import { standbyWords } from './standby.js';
 import { endWords, stopWords } from '../wire/stop.js';
+import { write } from '../words/say.js';
 import { goesOn, requestOf, shownMode, untilRamp } from './session.js';
 
 const REQUEST_WORDS = { arm: 'Arm', disarm: 'Disarm' };
@@ -215,8 +216,7 @@ export class View {
    * @param {string} text
    */
   text(id, text) {
-    const element = this.find(id);
-    if (element.textContent !== text) element.textContent = text;
+    write(this.find(id), text);
   }
 
   /**
@@ -252,7 +252,7 @@ export class View {
     element.dataset.items = words.join('\n');
     element.replaceChildren(...words.map((text, i) => {
       const item = this.document.createElement('li');
-      item.textContent = text;
+      write(item, text);
       item.classList.toggle('more', rest > 0 && i === shown.length);
       return item;
     }));

@@ -1,0 +1,149 @@
+"""French on the phone: whatever the server may say to it is in the page's dictionary."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from server.web.page_files import CLIENT
+from tests.sources import parsed, texts
+
+SPEAKERS = {
+    "hardware": "camera_file follower",
+    "pipeline/camera": "exposure verdict",
+    "pipeline/control": "failsafe latency_guard thruster_health twist_margins",
+    "pipeline/estimation": "rate_axes sensor_doubts sensor_monitor sensor_validation",
+    "pipeline/timing": "clock_synchronisation offset_watch time_offset",
+    "pipeline/vision": "camera_lies gating repeated_frames robot_identity vision visual_front_end",
+    "server/calibration": "guide job verdict",
+    "server/control": "controller gap_log process robot_clock robot_health tick_rate told_body",
+    "server/diagnostics": "blame camera_health link_words load",
+    "server/phone": "calibration_control calibration_session phone_session",
+    "server/process": "server_process",
+    "server/protocol": "command_age session",
+    "server/security": "least_role pairings quotas security",
+    "server/view": "glass_watch screen",
+    "server/web": "app handover people_api session_manager status websocket",
+}
+"""Modules by room whose sentences become reasons, refusals, doubts or advice on a phone."""
+TO_PHONES = ("WireError", "RefusedRequest", "PairingError", "CameraFileError")
+"""Errors whose words a phone may show."""
+TO_LOGS = ("log_event", "note", "debug", "info", "warning", "error", "exception", "add_argument")
+"""Functions whose words go to the supervisor, to logs or to the terminal."""
+SHORT = ("larger", "smaller", "Tilted", "Turned", "arming", "once", "silence", "silences")
+"""Of one word, so that they are not known from names of fields."""
+UNTOLD = {
+    # beginnings by which a sentence is known
+    "Control runs slowly",
+    "Pictures are",
+    "The server's computer stood still",
+    # to supervisors, in lists of events and to their own pages
+    "Gains {} have less margin than is usual {}: {}.",
+    "With gains {} a robot with a mass ± 30 % or thrusters' lag × 0.7-1.5 of what its file says"
+    " could become unstable",
+    "`lightleash tune` finds others.",
+    "Recorded: {}",
+    "a line of text",
+    "a paired page; end the program on its computer instead",
+    "from the next press: {} times as far, {}",
+    "of somebody who is {}",
+    ", waits to be confirmed",
+    "the four letters on that phone's screen",
+    "the newest one of the recording that runs",
+    "this server has a certificate of its owner's",
+    "true, to give up being paired as {}",
+    "viewer, operator; lightleash invite makes the other one",
+    "virtual camera:",
+    "websocket, {}",
+    # to the pages of screens
+    "a simulated robot: a real one has its own LEDs",
+    "one screen at a time: another one is open",
+    # to who writes a page or a program
+    "A key of the run file; pages bring the cookie of their pairing instead.",
+    "At least:",
+    "after hello",
+    "as {}: {}",
+    "hello first",
+    "local program ({})",
+    "no more than {} m/s and {} rad/s",
+    "not as {}",
+    "text/plain; version=0.0.4",
+    "the session of the phone that leads",
+    "token operator",
+    "token supervisor",
+    "{} at this address",
+    "{} records, {} MB a second",
+    # names of stages, and of a phone without one
+    "a phone",
+    "capture to arrival",
+    "to control",
+}
+"""What these modules say to others, or only look for."""
+PLACE = re.compile(r"\{[^{}]*\}")
+JOINS = re.compile(r"^; |^(?:\{\} )+(?=[A-Z])|^\{\}\. |(?<=\.) \{\}$")
+SEVERAL, ONE = re.compile(r"\S \S"), re.compile(r"[A-Z][a-z]+\.")
+"""A sentence of several words, and one of a single word."""
+
+
+def french() -> dict[str, str]:
+    """The dictionary of what the server says."""
+    text = (CLIENT / "src/words/french_server.js").read_text(encoding="utf-8")
+    words: dict[str, str] = json.loads(text[text.index("= {") + 2 : text.rindex("}") + 1])
+    return words
+
+
+def of_page() -> str:
+    """The dictionary of what the page says, as text."""
+    return (CLIENT / "src/words/french_page.js").read_text(encoding="utf-8")
+
+
+def literals(tree: ast.AST) -> Iterator[str]:
+    """Each text in it with {} for what is put in; no docstrings, logs, programmers' errors."""
+    for node in ast.iter_child_nodes(tree):
+        match node:
+            case ast.Expr(value=ast.Constant(value=str())):
+                continue
+            case ast.Call(func=ast.Attribute(attr=name) | ast.Name(id=name)) if name in TO_LOGS:
+                continue
+            case ast.Raise(exc=ast.Call(func=ast.Name(id=name))) if name not in TO_PHONES:
+                continue
+            case ast.JoinedStr(values=values):
+                parts = (part.value if isinstance(part, ast.Constant) else "{}" for part in values)
+                yield PLACE.sub("{}", "".join(str(part) for part in parts))
+                for part in values:
+                    if not isinstance(part, ast.Constant):
+                        yield from literals(part)
+                continue
+            case ast.Constant(value=str(text)):
+                yield PLACE.sub("{}", text)
+        yield from literals(node)
+
+
+def sentences(text: str) -> list[str]:
+    """A text's sentences, without what only joins one to others."""
+    parts = re.split(r"(?<=\S\S[.!?]) (?=[^a-z])", text.strip())
+    return [JOINS.sub("", part).strip() for part in parts]
+
+
+def said() -> set[str]:
+    """All that a phone may be told."""
+    paths = (Path(room, f"{name}.py") for room in SPEAKERS for name in SPEAKERS[room].split())
+    trees = (parsed(texts()[path]) for path in paths)
+    every = {one for tree in trees for text in literals(tree) for one in sentences(text)}
+    told = {one for one in every if SEVERAL.search(one) and re.search("[a-z]{2}", one)}
+    told |= {one for one in every if ONE.fullmatch(one)}
+    return {*told, *(every & set(SHORT))} - UNTOLD
+
+
+def test_whatever_the_server_says_to_a_phone_has_french_words() -> None:
+    assert len(said()) > 200
+    known = french()
+    missing = {one for one in said() if one not in known and f'  "{one}": ' not in of_page()}
+    assert missing == set()
+
+
+def test_no_french_is_kept_for_what_the_server_does_not_say() -> None:
+    assert set(french()) - said() == set()

@@ -1,0 +1,121 @@
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { readFileSync, readdirSync } from 'node:fs';
+import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+import { literals } from './literals.js';
+import { modeWords, SIDES } from '../../src/ui/mode_words.js';
+import { wayOf } from '../../src/ui/sight_overlay.js';
+import { PAGE } from '../../src/words/french_page.js';
+import { SERVER } from '../../src/words/french_server.js';
+import { french } from '../../src/words/french.js';
+
+/** @import {ShownMode} from '../../src/ui/session_types.js' */
+
+const ROOT = fileURLToPath(new URL('../..', import.meta.url));
+/** Rooms of the phone's page. */
+const ROOMS = ['app', 'camera', 'motion', 'ui', 'video', 'wire'];
+/** Of other pages. */
+const ELSEWHERE = ['app/board.js', 'app/board_size.js', 'wire/protocol_types.js'];
+/** What is a name in every language. */
+const NAMES = ['Lightleash', 'STOP', 'WebRTC', 'WebSocket', 'JPEG', 'Android', 'Edg', 'Edge', 'Mac', '{} · Lightleash'];
+/** For the supervisor's log, for who reads the code, or for the browser: not for who holds the phone. */
+const UNSEEN = [
+  'camera: {}', 'camera again: {}', 'page: {}', 'whoami: {}', 'the connection has ended', 'the connection has {}', 'the server has hung up', 'no connection within the time allowed',
+  'index.html has no #{}', 'outline blurred', 'translate({} {}) rotate({}) scale({})', 'Content-Type', 'Linux; Android', 'Enter',
+  'NotAllowedError', 'SecurityError', 'NotFoundError', 'OverconstrainedError', 'DeviceMotion', 'DeviceMotionEvent', 'DeviceOrientationEvent', 'Generic Sensor',
+  'no camera', '{}, through the {}', 'track processor', 'track processor in a worker', 'video element', '{} fps', 'focus {}{}', 'zoom {}', 'torch on', '{} ms', 'exposure {}{}{}',
+  'not a Lightleash record', 'record version {}, this page speaks {}', 'record of unknown kind {}', 'payload of {} bytes, expected {}', 'message without a type',
+  'its worker did not start', 'the offer has no place for pictures', 'no picture', 'pictures are {} ms old', 'holds pictures back', '{} encoder: {}',
+  'no WebRTC with records in this browser: pictures go by websocket', 'pictures go by WebRTC', 'no WebRTC: {}', 'WebRTC: {}; pictures go by websocket', '{} takes {} ms a picture: JPEG',
+];
+/** Words that are put together from what is no literal of their own: units, and marks before a link's grade. */
+const JOINED = ['fps', 'Mb/s', '✓ {}', '! {}', '✕ {}'];
+const MODES = /** @type {ShownMode[]} */ (['DISARMED', 'ARMED', 'TRACK', 'COAST', 'HOLD', 'RAMP', 'STOPPED', 'LOST', 'NO_LINK', 'NO_WORD']);
+
+/** @param {string} path */
+const read = (path) => readFileSync(join(ROOT, path), 'utf8');
+
+/** Whether it is for people. @param {string} text */
+const isSaid = (text) => /[a-z]{2}/.test(text) && (/\S \S/.test(text) || /^\W*[A-Z][a-z]/.test(text));
+
+/** Sentences without what only joins them to others. @param {string} text */
+const sentences = (text) => text.split(/(?<=[.!?…]) (?=[^a-z])/).map((one) => one.replace(/^(?:\{\} )+(?=[A-Z])|(?<=[.:]) ?(?:\{\})+$/g, '').trim())
+  .map((one, _, all) => (all.length === 1 && text.trim().endsWith(': {}') ? text.trim() : one)).filter((one) => isSaid(one));
+
+/** What the modules of the phone's page say. */
+function ofModules() {
+  const modules = ROOMS.flatMap((room) => readdirSync(join(ROOT, 'src', room)).map((name) => `${room}/${name}`)).filter((name) => !ELSEWHERE.includes(name));
+  return modules.flatMap((name) => literals(read(`src/${name}`))).filter((text) => !UNSEEN.includes(text.trim())).flatMap(sentences);
+}
+
+/** What stands in the page itself. */
+function ofPage() {
+  const page = read('index.html').replace(/<head>[^]*<\/head>|<noscript>[^]*<\/noscript>/g, '');
+  const names = [...page.matchAll(/(?:aria-label|title|placeholder)="([^"]*)"/g)].map(([, name]) => name ?? '');
+  return [...page.replace(/<[^>]*>/g, '\0').split('\0'), ...names].map((text) => text.replace(/\s+/g, ' ').trim()).filter((text) => /[A-Za-z]{2}/.test(text));
+}
+
+/** Short words that go into sentences, or stand for themselves. */
+function ofWords() {
+  const axes = [...read('index.html').matchAll(/<option value="([a-z]+)"/g)].map(([, value]) => value ?? '').filter((value) => value !== 'auto');
+  const ways = Array.from({ length: 8 }, (_, k) => wayOf((k * Math.PI) / 4));
+  return [...MODES.flatMap((mode) => modeWords(mode, null)), ...Object.values(SIDES), ...axes, ...ways, 'viewer', 'operator', 'supervisor', 'supervises'];
+}
+
+const SAID = new Set([...ofModules(), ...ofPage(), ...ofWords()].filter((text) => !NAMES.includes(text)));
+
+test('whatever the phone’s page says in English, it can say in French', () => {
+  assert.ok(SAID.size > 200, `${SAID.size} found`);
+  assert.deepEqual([...SAID].filter((text) => !(text in PAGE) && !(text in SERVER)), []);
+});
+
+test('words reach the page by `write` alone, but for names and numbers', () => {
+  const modules = ROOMS.flatMap((room) => readdirSync(join(ROOT, 'src', room)).map((name) => `${room}/${name}`)).filter((name) => !ELSEWHERE.includes(name));
+  const past = modules.flatMap((name) => read(`src/${name}`).match(/(?:textContent|innerText|nodeValue|placeholder|ariaLabel)\s=\s[^;]*|'(?:aria-label|title)', [^;]*/g) ?? []);
+  assert.deepEqual(past, ['textContent = `${origin}/board`', '\'aria-label\', say(name))', 'textContent = person.name', 'textContent = `× ${value}`',
+    'placeholder = say(this.usual)', 'textContent = code']);
+});
+
+test('no French is kept for what the page does not say', () => {
+  assert.deepEqual(Object.keys(PAGE).filter((text) => !SAID.has(text) && !JOINED.includes(text)), []);
+});
+
+test('a sentence has as many places for numbers and names in both languages', () => {
+  for (const [english, words] of Object.entries({ ...PAGE, ...SERVER })) {
+    assert.equal(words.split('{}').length, english.split('{}').length, english);
+    assert.notEqual(words.trim(), '', english);
+  }
+});
+
+test('numbers, names and sentences find their places', () => {
+  for (const [english, words] of [
+    ['Arm', 'Armer'],
+    ['Thrust fades in 12 s', 'Rampe dans 12 s'],
+    ['The robot\'s battery is low (14.2 V): bring it to rest soon.', 'La batterie du robot est faible (14,2 V) : immobilisez-le bientôt.'],
+    ['The robot\'s battery was empty when last told of (11.9 V): charge it before arming.', 'La batterie du robot était vide aux dernières nouvelles (11,9 V) : chargez-la avant d’armer.'],
+    ['Let go of the button before a reset.', 'Relâchez le bouton avant de réinitialiser.'],
+    ['Without a link the robot stops by itself. Last known: TRACK.', 'Sans liaison, le robot s’arrête de lui-même. Dernier état connu : SUIVI.'],
+    ['J. Roux leads. This phone asks for the lead when J. Roux has left.', 'J. Roux guide. Ce téléphone demandera la main au départ de J. Roux.'],
+    ['The camera has lost the robot. 2 of 5 LEDs seen: 3 are needed.', 'La caméra a perdu le robot. 2 LED sur 5 vues : il en faut 3.'],
+    ['Not taken: calibrate.what: while the robot is disarmed', 'Refusé : calibrate.what : tant que le robot est désarmé'],
+    ['0.5 × your way, height kept · Let go to keep still', '0,5 × votre trajet, hauteur gardée · Relâcher pour immobiliser'],
+    ['The server\'s computer is too busy. chromium takes the most of it: close what is not needed; a laptop wants its charger.',
+      'L’ordinateur du serveur est trop occupé. chromium en prend le plus : fermez ce qui est inutile ; un portable veut son chargeur.'],
+    ['12 computer', '12 ordinateur'],
+    ['3.1 Mb/s', '3,1 Mbit/s'],
+    ['ames', 'ames'],
+    ['', ''],
+  ]) assert.equal(french(english ?? '').replaceAll('\u00a0', ' '), words);
+});
+
+test('what comes from outside can be long and strange', () => {
+  const strange = `${'(.*) $& {} \\'.repeat(2000)}: {}`;
+  assert.equal(french(`${strange} leads.`).includes('$&'), true);
+  for (let k = 0; k < 1000; k += 1) assert.equal(french(`${k} s`), `${k}\u00a0s`);
+});
+
+test('a French sign of two parts never begins a line', () => {
+  for (const english of [...Object.keys(PAGE), ...Object.keys(SERVER)]) assert.doesNotMatch(french(english), / [:;?!»]|« /, english);
+});
