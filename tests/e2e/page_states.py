@@ -192,6 +192,7 @@ STATES = {
     **{("check", name): f"{OPERATING}{CHECKED}{script}" for name, script in CHECK.items()},
     ("board", "ruler"): "",
     ("trust", "help"): "",
+    ("trust_fr", "help"): "",
 }
 """By page and state."""
 FRENCH_PAGES = ("index",)

@@ -142,7 +142,9 @@ def test_letters_are_large_enough_whole_and_on_nothing_else(
     page.close()
 
 
-@pytest.mark.parametrize("name", ["index", "supervisor", "screen", "check", "board", "trust"])
+@pytest.mark.parametrize(
+    "name", ["index", "supervisor", "screen", "check", "board", "trust", "trust_fr"]
+)
 def test_letters_grow_as_their_reader_wants(pages: BrowserContext, name: str) -> None:
     page = opened(pages, name, DESKTOP)
     size = "parseFloat(getComputedStyle(document.body).fontSize)"

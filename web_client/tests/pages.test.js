@@ -6,7 +6,7 @@ import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
 
 const ROOT = fileURLToPath(new URL('..', import.meta.url));
-const PAGES = ['index.html', 'supervisor.html', 'board.html', 'screen.html', 'fleet.html', 'check.html', 'trust.html'];
+const PAGES = ['index.html', 'supervisor.html', 'board.html', 'screen.html', 'fleet.html', 'check.html', 'trust.html', 'trust_fr.html'];
 
 /** @param {string} path */
 const read = (path) => readFileSync(join(ROOT, path), 'utf8');

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,8 @@ from server.security.least_role import roles_of
 from server.security.request_guard import Guard
 from server.security.security import Doors
 from server.security.tls import certificate
-from server.web.trust_page import trust_app
+from server.web.page_files import CLIENT
+from server.web.trust_page import PAGES, trust_app
 
 BASE = "http://robot.lan:8443"
 STYLES = {"/style.css", "/trust.css"}
@@ -45,6 +47,39 @@ def test_it_shows_the_fingerprint_the_way_to_the_authority_and_the_secure_page(
     assert file.content == authority.read_bytes()
     assert file.headers["content-type"] == "application/x-x509-ca-cert"
     assert all(asks.get(path).status_code == 200 for path in STYLES)
+
+
+@pytest.mark.parametrize(
+    ("accepted", "language"),
+    [
+        ("", "en"),
+        ("fr", "fr"),
+        ("de,ja", "en"),
+        ("frr", "en"),
+        ("fr-CH, fr;q=0.9, en;q=0.8, *;q=0.5", "fr"),
+        ("en-US,en;q=0.9,fr;q=0.8", "en"),
+        ("de;q=0.9,en;q=0.3,FR;q=0.4", "fr"),
+        ("fr, en", "fr"),
+        ("fr;q=0", "en"),
+        ("fr;q=9999, ;;,=", "en"),
+    ],
+)
+def test_it_speaks_the_language_that_its_reader_likes_best(
+    authority: Path, accepted: str, language: str
+) -> None:
+    answer = client(authority).get("/", headers={"Accept-Language": accepted})
+    assert f'<html lang="{language}"' in answer.text
+    assert answer.headers["vary"] == "accept-language"
+    assert 'href="https://robot.lan:8443/"' in answer.text
+    assert "$" not in answer.text
+
+
+def test_both_languages_say_the_same_parts() -> None:
+    bodies = ((CLIENT / name).read_text(encoding="utf-8") for name in PAGES.values())
+    english, french = (
+        re.findall(r"<(?!/?b>)[^>]+>|\$\w+", one.partition("<body>")[2]) for one in bodies
+    )
+    assert english == french
 
 
 def test_nothing_else_is_there_and_nothing_can_be_asked_of_it(authority: Path) -> None:
