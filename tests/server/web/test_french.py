@@ -14,8 +14,11 @@ from tests.sources import parsed, texts
 SPEAKERS = {
     "hardware": "camera_file follower",
     "pipeline/camera": "exposure verdict",
-    "pipeline/control": "failsafe latency_guard thruster_health twist_margins",
+    "pipeline": "teleop",
+    "pipeline/control": "failsafe flight_envelope latency_guard thrust_acting thruster_health"
+    " twist_margins",
     "pipeline/estimation": "rate_axes sensor_doubts sensor_monitor sensor_validation",
+    "pipeline/glass": "lens_meter robot_of_light",
     "pipeline/timing": "clock_synchronisation offset_watch time_offset",
     "pipeline/vision": "camera_lies gating repeated_frames robot_identity vision visual_front_end",
     "server/calibration": "guide job verdict",
@@ -29,6 +32,10 @@ SPEAKERS = {
     "server/web": "app handover people_api session_manager status websocket",
 }
 """Modules by room whose sentences become reasons, refusals, doubts or advice on a phone."""
+LISTENED_TO = ("pipeline", "server/calibration", "server/control", "server/phone", "server/view")
+"""Rooms, and those in them, of which no module may begin to speak unheard ..."""
+WHOLE = re.compile(r"[A-Z].* .*[.?]")
+"""... in whole sentences."""
 TO_PHONES = ("WireError", "RefusedRequest", "PairingError", "CameraFileError")
 """Errors whose words a phone may show."""
 TO_LOGS = ("log_event", "note", "debug", "info", "warning", "error", "exception", "add_argument")
@@ -128,14 +135,20 @@ def sentences(text: str) -> list[str]:
     return [JOINS.sub("", part).strip() for part in parts]
 
 
+def spoken(path: Path) -> set[str]:
+    """All sentences of a module."""
+    return {one for text in literals(parsed(texts()[path])) for one in sentences(text)}
+
+
 def said() -> set[str]:
     """All that a phone may be told."""
-    paths = (Path(room, f"{name}.py") for room in SPEAKERS for name in SPEAKERS[room].split())
-    trees = (parsed(texts()[path]) for path in paths)
-    every = {one for tree in trees for text in literals(tree) for one in sentences(text)}
+    paths = [Path(room, f"{name}.py") for room in SPEAKERS for name in SPEAKERS[room].split()]
+    every = {one for path in paths for one in spoken(path)}
+    rooms = [path for path in texts() if path.as_posix().startswith(LISTENED_TO)]
+    whole = {one for path in rooms for one in spoken(path) if WHOLE.fullmatch(one)}
     told = {one for one in every if SEVERAL.search(one) and re.search("[a-z]{2}", one)}
     told |= {one for one in every if ONE.fullmatch(one)}
-    return {*told, *(every & set(SHORT))} - UNTOLD
+    return {*told, *whole, *(every & set(SHORT))} - UNTOLD
 
 
 def test_whatever_the_server_says_to_a_phone_has_french_words() -> None:

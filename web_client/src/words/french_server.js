@@ -337,5 +337,22 @@ export const SERVER = {
   "at a time": "à la fois",
   "open websockets": "websockets ouverts",
   "{} {}: end one of them": "{} {} : mettez fin à l’un d’eux",
-  "{} wrong links a minute": "{} mauvais liens par minute"
+  "{} wrong links a minute": "{} mauvais liens par minute",
+  "No estimate of the robot's pose yet.": "Pas encore d’estimation de la pose du robot.",
+  "The estimate was lost.": "L’estimation a été perdue.",
+  "The robot is tilted too far.": "Le robot est trop incliné.",
+  "The robot spins too fast.": "Le robot tourne trop vite.",
+  "The robot's place is too uncertain.": "La position du robot est trop incertaine.",
+  "Too far from where it should be.": "Trop loin de là où il devrait être.",
+  "Turned too far from where it should be.": "Tourné trop loin de son orientation voulue.",
+  "The robot can't hover.": "Le robot ne peut pas tenir en l’air.",
+  "Tilt the phone a little: its lens is being measured.": "Inclinez un peu le téléphone : mesure de son objectif.",
+  "Point the phone at the screen, all four corners in the picture.": "Visez l’écran, ses quatre coins dans l’image.",
+  "The phone is too far away: come nearer.": "Le téléphone est trop loin : approchez-vous.",
+  "The phone is too near: go back a little.": "Le téléphone est trop près : reculez un peu.",
+  "This robot does not fit the screen: choose a larger screen, or start with --robot screen.": "Ce robot ne tient pas dans l’écran : prenez un écran plus grand, ou démarrez avec --robot screen.",
+  "This screen shows everything {} ms late, which is too late to lead by: choose its game mode, or another one.": "Cet écran montre tout avec {} ms de retard, trop pour guider : choisissez son mode jeu, ou un autre écran.",
+  "It touches something: lead by all of the motion.": "Il touche quelque chose : guidez par tout le mouvement.",
+  "Mend it, then press STOP and Reset.": "Réparez, puis STOP et réinitialisation.",
+  "Too far from where it was led.": "Trop loin de là où il était guidé."
 };
