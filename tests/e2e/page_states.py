@@ -187,7 +187,8 @@ STATES = {
     ("fleet", "written"): "",
     ("screen", "setup"): "",
     ("screen", "shows"): """document.getElementById('setup').hidden = true;
-      document.getElementById('why').textContent = 'Hold the phone still.';""",
+      document.getElementById('why').textContent = 'Hold the phone still: '
+        + 'measuring how late this screen is.';""",
     ("check", "ready"): "",
     **{("check", name): f"{OPERATING}{CHECKED}{script}" for name, script in CHECK.items()},
     ("board", "ruler"): "",
@@ -195,7 +196,7 @@ STATES = {
     ("trust_fr", "help"): "",
 }
 """By page and state."""
-FRENCH_PAGES = ("index",)
+FRENCH_PAGES = ("index", "screen")
 SHOWN = [
     *((name, state, "en") for name, state in STATES),
     *((name, state, "fr") for name, state in STATES if name in FRENCH_PAGES),

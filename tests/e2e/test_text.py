@@ -154,12 +154,12 @@ def test_letters_grow_as_their_reader_wants(pages: BrowserContext, name: str) ->
     page.close()
 
 
-@pytest.mark.parametrize("state", [state for name, state in STATES if name in FRENCH_PAGES])
-def test_no_english_is_left_on_a_french_page(pages: BrowserContext, state: str) -> None:
-    english = shown(pages, "index", state, PHONES[0])
-    french = shown(pages, "index", state, PHONES[0], "fr")
+@pytest.mark.parametrize(("name", "state"), [one for one in STATES if one[0] in FRENCH_PAGES])
+def test_no_english_is_left_on_a_french_page(pages: BrowserContext, name: str, state: str) -> None:
+    english = shown(pages, name, state, PHONES[0])
+    french = shown(pages, name, state, PHONES[0], "fr")
     said = english.evaluate(LEFT, NAMES)
-    assert len(said) > 50
+    assert len(said) > (50 if name == "index" else 5)
     assert set(said) & set(french.evaluate(LEFT, NAMES)) <= FIGURES
     for page in (english, french):
         page.close()

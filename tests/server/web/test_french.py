@@ -49,8 +49,8 @@ UNTOLD = {
     "The server's computer stood still",
     # to supervisors, in lists of events and to their own pages
     "Gains {} have less margin than is usual {}: {}.",
-    "With gains {} a robot with a mass ± 30 % or thrusters' lag × 0.7-1.5 of what its file says"
-    " could become unstable",
+    "With gains {} a robot with a {} or thrusters' {} of what its file says{} could become"
+    " unstable",
     "`lightleash tune` finds others.",
     "Recorded: {}",
     "a line of text",
@@ -65,9 +65,6 @@ UNTOLD = {
     "viewer, operator; lightleash invite makes the other one",
     "virtual camera:",
     "websocket, {}",
-    # to the pages of screens
-    "a simulated robot: a real one has its own LEDs",
-    "one screen at a time: another one is open",
     # to who writes a page or a program
     "A key of the run file; pages bring the cookie of their pairing instead.",
     "At least:",

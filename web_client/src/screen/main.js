@@ -8,6 +8,7 @@ import { Link, socketUrl } from '../wire/link.js';
 import { becomeKnown, usualName } from '../wire/pairing.js';
 import { problemOf } from '../wire/problems.js';
 import { VERSION } from '../wire/protocol.js';
+import { speak, write } from '../words/say.js';
 import {
   CARD_HIGH_MM, CARD_MM, FramePeriod, LEAST_DOT_PX, OLD_MS, ServerClock, lightCells, lightsAt, mmPerPixel, sizeKey,
 } from './glass.js';
@@ -16,6 +17,7 @@ const ASK_MS = 200;
 /** Dim, or the fiducials would outshine the lights. */
 const GREY = '#4d4d4d';
 
+await speak(document, navigator.languages, () => window.localStorage);
 const { fetchHere, later, links } = browserOf(window);
 const canvas = /** @type {HTMLCanvasElement} */ (find('glass'));
 const card = find('card');
@@ -58,7 +60,7 @@ function remembered() {
 
 /** @param {string} words */
 function say(words) {
-  if (find('why').textContent !== words) find('why').textContent = words;
+  write(find('why'), words);
 }
 
 /** @param {ToPage} message */

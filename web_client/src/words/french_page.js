@@ -1,4 +1,4 @@
-/** The phone page's sentences; {} is a number, a name or a sentence of its own, in the same order in both. */
+/** Sentences of the phone's page and of the screen that it films; {} is a number, a name or a sentence of its own, in the same order in both. */
 
 /** @type {Record<string, string>} */
 export const PAGE = {
@@ -308,5 +308,17 @@ export const PAGE = {
   "STOP: no link, trying…": "STOP : pas de liaison, nouvel essai…",
   "STOP taken by the server: waiting for the robot to confirm": "STOP pris par le serveur : en attente de confirmation du robot",
   "STOP refused ({}): still trying…": "STOP refusé ({}) : nouvel essai…",
-  "Français": "English"
+  "Français": "English",
+  "A robot of light": "Un robot de lumière",
+  "This screen becomes a window. Behind it hangs a simulated robot, which your phone sees and leads.": "Cet écran devient une fenêtre. Derrière est suspendu un robot simulé, que votre téléphone voit et guide.",
+  "bank card": "carte bancaire",
+  "Make the outline as large as a bank card": "Donnez au cadre la taille d’une carte bancaire",
+  "Brightness of the screen all the way up, no lamp or window reflected in it.": "Luminosité de l’écran au maximum, sans reflet de lampe ni de fenêtre.",
+  "The screen stands still; you stand before it, an arm or two away.": "L’écran ne bouge pas ; vous êtes devant, à un bras ou deux.",
+  "Start, full screen": "Plein écran",
+  "The server is away: waiting for it.": "Le serveur est absent : en attente.",
+  "Hold the phone still: measuring how late this screen is.": "Ne bougez plus le téléphone : mesure du retard d’écran.",
+  "This screen is not taken: {}.": "Cet écran est refusé : {}.",
+  "Waiting to be let in: {}.": "En attente d’admission : {}.",
+  "This browser is not let in yet: open a link of “lightleash invite --role viewer” in it first.": "Ce navigateur n’est pas encore admis : ouvrez-y d’abord un lien de « lightleash invite --role viewer »."
 };

@@ -354,5 +354,7 @@ export const SERVER = {
   "This screen shows everything {} ms late, which is too late to lead by: choose its game mode, or another one.": "Cet écran montre tout avec {} ms de retard, trop pour guider : choisissez son mode jeu, ou un autre écran.",
   "It touches something: lead by all of the motion.": "Il touche quelque chose : guidez par tout le mouvement.",
   "Mend it, then press STOP and Reset.": "Réparez, puis STOP et réinitialisation.",
+  "a simulated robot: a real one has its own LEDs": "un robot simulé : un vrai a ses propres LED",
+  "one screen at a time: another one is open": "un écran à la fois : un autre est ouvert",
   "Too far from where it was led.": "Trop loin de là où il était guidé."
 };

@@ -14,8 +14,9 @@ import { french } from '../../src/words/french.js';
 /** @import {ShownMode} from '../../src/ui/session_types.js' */
 
 const ROOT = fileURLToPath(new URL('../..', import.meta.url));
-/** Rooms of the phone's page. */
-const ROOMS = ['app', 'camera', 'motion', 'ui', 'video', 'wire'];
+/** Rooms of the phone's page, and the one of the screen that it films. */
+const ROOMS = ['app', 'camera', 'motion', 'screen', 'ui', 'video', 'wire'];
+const FILES = ['index.html', 'screen.html'];
 /** Of other pages. */
 const ELSEWHERE = ['app/board.js', 'app/board_size.js', 'wire/protocol_types.js'];
 /** What is a name in every language. */
@@ -23,7 +24,7 @@ const NAMES = ['Lightleash', 'STOP', 'WebRTC', 'WebSocket', 'JPEG', 'Android', '
 /** For the supervisor's log, for who reads the code, or for the browser: not for who holds the phone. */
 const UNSEEN = [
   'camera: {}', 'camera again: {}', 'page: {}', 'whoami: {}', 'the connection has ended', 'the connection has {}', 'the server has hung up', 'no connection within the time allowed',
-  'index.html has no #{}', 'outline blurred', 'translate({} {}) rotate({}) scale({})', 'Content-Type', 'Linux; Android', 'Enter',
+  'index.html has no #{}', 'screen.html has no #{}', 'lightleash-mm {}x{}@{}', 'outline blurred', 'translate({} {}) rotate({}) scale({})', 'Content-Type', 'Linux; Android', 'Enter',
   'NotAllowedError', 'SecurityError', 'NotFoundError', 'OverconstrainedError', 'DeviceMotion', 'DeviceMotionEvent', 'DeviceOrientationEvent', 'Generic Sensor',
   'no camera', '{}, through the {}', 'track processor', 'track processor in a worker', 'video element', '{} fps', 'focus {}{}', 'zoom {}', 'torch on', '{} ms', 'exposure {}{}{}',
   'not a Lightleash record', 'record version {}, this page speaks {}', 'record of unknown kind {}', 'payload of {} bytes, expected {}', 'message without a type',
@@ -50,9 +51,9 @@ function ofModules() {
   return modules.flatMap((name) => literals(read(`src/${name}`))).filter((text) => !UNSEEN.includes(text.trim())).flatMap(sentences);
 }
 
-/** What stands in the page itself. */
+/** What stands in the pages themselves. */
 function ofPage() {
-  const page = read('index.html').replace(/<head>[^]*<\/head>|<noscript>[^]*<\/noscript>/g, '');
+  const page = FILES.map(read).join('').replace(/<head>[^]*?<\/head>|<noscript>[^]*?<\/noscript>/g, '');
   const names = [...page.matchAll(/(?:aria-label|title|placeholder)="([^"]*)"/g)].map(([, name]) => name ?? '');
   return [...page.replace(/<[^>]*>/g, '\0').split('\0'), ...names].map((text) => text.replace(/\s+/g, ' ').trim()).filter((text) => /[A-Za-z]{2}/.test(text));
 }
