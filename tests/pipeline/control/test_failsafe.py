@@ -418,3 +418,19 @@ def test_thrust_is_whole_in_flight_falls_in_the_ramp_and_is_zero_otherwise(mode:
         share = max(0.0, 1 - mode_ms / 2_000) if mode == Mode.RAMP else float(flying)
         state = Failsafe(mode=mode, mode_ms=mode_ms)
         assert failsafe.ceiling(state, LIMITS) == pytest.approx(share)
+
+
+def test_a_gap_is_over_to_the_millisecond_when_all_has_been_good_for_long_enough() -> None:
+    """By the measured clock, whose ticks are no round numbers."""
+    state = failsafe.step(tracking(), replace(HELD, operator_ms=151), 5, LIMITS)
+    for ms, mode in ((LIMITS.fresh - 1, Mode.COAST), (1, Mode.TRACK)):
+        state = failsafe.step(state, HELD, ms, LIMITS)
+        assert state.mode == mode
+
+
+def test_a_silence_is_borne_to_the_millisecond() -> None:
+    silent = replace(HELD, operator_ms=151)
+    state = failsafe.step(tracking(), silent, 5, LIMITS)
+    for ms, mode in ((LIMITS.coast - 1, Mode.COAST), (1, Mode.HOLD)):
+        state = failsafe.step(state, silent, ms, LIMITS)
+        assert state.mode == mode
