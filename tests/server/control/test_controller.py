@@ -537,6 +537,19 @@ def test_a_status_tells_everything_once_and_survives_the_link():
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
 
 
+def test_a_status_has_each_tick_s_command_once_with_the_digits_that_a_recording_keeps():
+    rig = Rig()
+    rig.track()
+    rig.status(rig.run(0.1)[-1][1])
+    ticks = rig.run(0.02)
+    status = rig.status(ticks[-1][1])
+    assert [row[0] for row in status.commands] == [round(output.t, 6) for _, output in ticks]
+    for (_, *thrusts), (command, _) in zip(status.commands, ticks, strict=True):
+        np.testing.assert_array_equal(thrusts, np.round(command.thrusts, 4))
+        assert max(thrusts) > 0.0
+    assert rig.status(ticks[-1][1]).commands == []
+
+
 def test_a_status_of_a_robot_that_takes_a_twist_has_what_it_is_told_and_what_it_measures():
     controller = Controller(load_robot("twister", takes=COMMANDS).robot, TeleopConfig())
     measured = (0.1, 0.0, 0.0, 0.0, 0.0, -0.2)
