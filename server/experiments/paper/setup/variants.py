@@ -10,6 +10,7 @@ from pipeline.config import (
     AllocationConfig,
     EstimatorName,
     FeedForwardConfig,
+    LeashConfig,
     SaturationPolicy,
     TeleopConfig,
     VirtualCameraConfig,
@@ -99,6 +100,8 @@ def config_of(robot_file: RobotFile, variant: Variant, leader: Leader) -> Teleop
         ),
         feedforward=feedforward,
         allocation=AllocationConfig(policy=variant.allocation),
+        # the paper has none, and its push takes up what a leash keeps for control
+        leash=LeashConfig(enabled=False),
     )
 
 
