@@ -76,7 +76,7 @@ def test_margins_are_those_of_the_intervals_in_the_file_that_a_bring_up_writes(t
     assert "}  # robot bring-up, ames-1.mcap" in text
     mine, bare = tmp_path / "mine.toml", tmp_path / "bare.toml"
     mine.write_text(text)
-    bare.write_text(text.partition("[identified.")[0])
+    bare.write_text(text.partition("\n[identified.")[0] + "\n")
     told = load_robot(mine).plant.intervals
     assert told.outdated == ()
     assert None not in (told.mass, *told.inertia, told.length, told.stiffness, told.lag, told.delay)
