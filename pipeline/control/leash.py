@@ -110,7 +110,7 @@ class Leash:
     def start(self) -> None:
         """A press: nothing has been taken off the reference."""
         self._offset_in_f = self._bend_in_f = self._beside_in_f = ZERO
-        self._was_known, self._border = True, 1.0
+        self._was_steady, self._border = True, 1.0
 
     def hold(
         self, error: PoseError, R_fv: Array, R_fr: Array, body: LeashedBody, h: float
@@ -130,27 +130,27 @@ class Leash:
         if not self._is_held:
             return Leashed(error, taken)
         if not body.is_steady:
-            self._was_known = False
+            self._was_steady = False
             return Leashed(_moved(error, R_fv, self._offset_in_f), taken)
         v_r_in_f = body.v_in_f + R_fv @ error.e_p_rate_in_v
         bend_in_f, J = self._bend(x_r_in_f + self._nears_s * v_r_in_f, R_fr, h)
         if J is None and self._offset_in_f is ZERO:  # as nearly always
-            self._was_known = True
+            self._was_steady = True
             return Leashed(error, taken)
-        if not self._was_known:
+        if not self._was_steady:
             self._beside_in_f, self._bend_in_f = self._offset_in_f - bend_in_f, bend_in_f
-            self._was_known = True
+            self._was_steady = True
         rate_in_f = (bend_in_f - self._bend_in_f) / self._nears_s
         self._bend_in_f = self._bend_in_f + h * rate_in_f
-        if not bend_in_f.any():
+        if J is None:
             self._bend_in_f = _until_nothing(self._bend_in_f)
         gone = way_gone(self._resumption, self._beside_in_f, h)
         self._beside_in_f = _until_nothing((1.0 - gone) * self._beside_in_f)
-        self._offset_in_f = self._bend_in_f + self._beside_in_f
-        if J is None and self._bend_in_f is ZERO:
-            self._offset_in_f = self._beside_in_f
-            return Leashed(_moved(error, R_fv, self._offset_in_f), taken)
+        is_bent = self._bend_in_f is not ZERO
+        self._offset_in_f = self._beside_in_f + self._bend_in_f if is_bent else self._beside_in_f
         held = _moved(error, R_fv, self._offset_in_f)
+        if not is_bent:
+            return Leashed(held, taken)
         J = np.eye(3) if J is None else J
         e_p_rate_in_v = error.e_p_rate_in_v + R_fv.T @ rate_in_f
         brakes_in_f = ((J - np.eye(3)) @ v_r_in_f - rate_in_f) / self._nears_s
