@@ -81,6 +81,7 @@ def recorded(path: Path) -> list[list[object]]:
 def test_a_battery_drains_in_flight_is_told_everywhere_and_keeps_the_robot_from_the_next_one(
     server: Serving,
 ) -> None:
+    until(lambda: volts(server) > 0.0, 5.0, "its battery: it may be DISARMED before it tells of it")
     before = volts(server)
     kill(server, "robot")
     until(lambda: volts(server) > before, 20.0, "the full battery of the next one")
