@@ -13,9 +13,8 @@ offset b of the acceleration for none of the robot's motion: with d = K⁻¹ D a
     ẋ = v + l₁ e,   v̇ = a − b + l₂ e,   ḃ = −ω³ e,   l₂ = 3ω² − d ω³,   l₁ = 3ω − d l₂.
 
 A force P of somebody else's on the body goes into y, which is (R_fb F + P − m (R_fb f_b + g)) / K.
-Slow, it can't be told from a place: both pull for ever. But no motion is as quick as a touch: what
-y misses by then is P's, and x is carried on by the accelerometer alone. A push that stays is kept
-apart so until it is let go, which is as quick, or for as long as `PUSH_STAYS_S`.
+`PushObserver` tells a quick one from a place: while it learns it, x is carried on by the
+accelerometer alone, and what it has learnt is taken off y.
 
 What is left: 1° of tilt in R_fb is 2 cm for a cable of 1.3 m; a push that began slowly is taken for
 P / K; thrust that is 10 % less than told makes x 10 % too large.
@@ -27,6 +26,7 @@ import numpy as np
 
 from pipeline.control import low_pass
 from pipeline.control.feedforward import G_IN_F
+from pipeline.control.push import PushObserver
 from pipeline.frames import Array
 from pipeline.robot import Robot
 
@@ -38,24 +38,8 @@ that is 40 mg off. A phone that was turned with its gyroscope silent had it at 0
 POLES: float = 3.0
 """ω [1/s]: the pendulum's own is 2.7. Faster, thrusters' lag and damping count for motion; slower,
 an error of the vertical, which the accelerometer takes for a / ω²."""
-PUSHED_N, PUSHED_S = 5.0, 0.02
-"""A force [N] that neither thrusters nor suspension explain, and quicker than ω, is a wall's or a
-push; smoothed over [s]."""
-TOUCHED_N, SETTLED_S = 1.0, 2.5
-"""A smaller one is taken for a motion as well, until it has been forgotten [s]: seven and a half
-time constants. In free flight, with hands of any kind, there is 0.4 N at most ..."""
-IN_TRANSIT = 0.5
-"""... and this share of what thrusters are on their way to give: they lag in their own way."""
-PUSH_BEGINS_S, PUSH_LEARNT_S = 0.3, 0.03
-"""So long after a touch [s] what y misses is a push, learnt in the second: thrusters that answer it
-have then come to where they go; the accelerometer, 50 mg off, to 2 cm."""
-PUSH_BEGUN_S = 1.2
-"""What goes on for longer [s] does not come and stay: a wall that it rubs along. x is carried on by
-y then, and is wrong by P / K."""
-FOUND_S = 1.5
-"""After so long untouched [s] x and v are right to 17 % of what they were off."""
-PUSH_STAYS_S = 60.0
-"""How slowly a push is given up for a place [s]: who hangs a weight on the robot does not tell."""
+SETTLED_S = 2.5
+"""Until what a touch put wrong has been forgotten [s]: seven and a half time constants."""
 
 
 class SuspendedPlace:
@@ -71,11 +55,8 @@ class SuspendedPlace:
         self._l_1 = 3.0 * POLES - self._lead_s * self._l_2
         self._thrust_in_f, self._bias_in_f = np.zeros(3), np.zeros(3)
         self._p_in_f, self._p_start_in_f = np.zeros(3), np.zeros(3)
-        self._stiffness_in_f, self._missed_in_f = robot.stiffness_in_f, np.zeros(3)
-        self._push_in_f, self._push_before_in_f = np.zeros(3), np.zeros(3)
+        self._stiffness_in_f, self._push, self._hangs = robot.stiffness_in_f, PushObserver(), hangs
         self._rest_in_f, self._rested_s = np.zeros(3), 0.0
-        self._hangs, self._untouched_s, self._ahead_n = hangs, 0.0, 0.0
-        self._quick_s, self._tells_pushes = 0.0, False
         self.v_in_f: Array = np.zeros(3)
         """Velocity of the body (3,) [m/s]."""
 
@@ -88,13 +69,12 @@ class SuspendedPlace:
     @property
     def is_pushed(self) -> bool:
         """Whether something else than thrusters and suspension has just begun or ended to push."""
-        new_in_f = self._missed_in_f + self._push_in_f - self._push_before_in_f
-        return float(new_in_f @ new_in_f) > PUSHED_N**2
+        return self._push.is_new
 
     @property
     def is_known(self) -> bool:
         """Whether it hangs, and nothing else has touched it for long enough: x and v are right."""
-        return self._hangs and self._untouched_s > SETTLED_S
+        return self._hangs and self._push.untouched_s > SETTLED_S
 
     @property
     def is_steady(self) -> bool:
@@ -102,7 +82,7 @@ class SuspendedPlace:
 
         Enough for who is led; not for who is to stay by it, blind, with an attitude in doubt.
         """
-        return self._hangs and self._tells_pushes and self._untouched_s > PUSH_BEGINS_S
+        return self._hangs and self._push.is_told_apart
 
     @property
     def from_rest_in_f(self) -> Array:
@@ -119,7 +99,7 @@ class SuspendedPlace:
         In the units in which they are commanded: an error of K or of all thrusts goes out.
         """
         pulled_in_f = self._stiffness_in_f * (self.from_rest_in_f + offset_in_f)
-        force_in_f: Array = pulled_in_f - self._push_before_in_f
+        force_in_f: Array = pulled_in_f - self._push.known_in_f
         return force_in_f
 
     def start(self) -> None:
@@ -148,28 +128,12 @@ class SuspendedPlace:
             self._rested_s += h
             share = max(low_pass.share(h / REST_S), h / self._rested_s)
             self._rest_in_f = self._rest_in_f + share * (pulled_in_f - self._rest_in_f)
-        pushed_in_f = self._softness_in_f * self._push_in_f
-        e_in_f = pulled_in_f + pushed_in_f - self._p_in_f - self._lead_s * self.v_in_f
+        pulled_in_f = pulled_in_f + self._softness_in_f * self._push.force_in_f
+        e_in_f = pulled_in_f - self._p_in_f - self._lead_s * self.v_in_f
         missed_in_f = -self._stiffness_in_f * e_in_f
-        self._missed_in_f = self._missed_in_f + low_pass.share(h / PUSHED_S) * (
-            missed_in_f - self._missed_in_f
-        )
-        ahead_n = float(np.linalg.norm(R_fb @ force_in_b - self._thrust_in_f))
-        self._ahead_n += low_pass.share(h / PUSHED_S) * (ahead_n - self._ahead_n)
-        missed_n = float(np.linalg.norm(self._missed_in_f))
-        is_touched = missed_n > TOUCHED_N + IN_TRANSIT * self._ahead_n
-        self._untouched_s = 0.0 if is_touched else self._untouched_s + h
-        is_quick = self._untouched_s < PUSH_BEGINS_S
-        self._quick_s = self._quick_s + h if is_quick else 0.0
-        self._tells_pushes = self._tells_pushes or self._untouched_s > FOUND_S
-        if not force_in_b.any() or self._quick_s > PUSH_BEGUN_S:
-            self._tells_pushes = False
-            self._push_in_f = self._push_before_in_f = np.zeros(3)
-        elif self._tells_pushes and is_quick:
-            self._push_in_f = self._push_in_f + low_pass.share(h / PUSH_LEARNT_S) * missed_in_f
+        to_come_n = float(np.linalg.norm(R_fb @ force_in_b - self._thrust_in_f))
+        if self._push.observe(missed_in_f, to_come_n, h, is_off=not force_in_b.any()):
             e_in_f = np.zeros(3)
-        else:
-            self._push_in_f = self._push_before_in_f = (1.0 - h / PUSH_STAYS_S) * self._push_in_f
         self._p_in_f = self._p_in_f + h * (self.v_in_f + self._l_1 * e_in_f)
         self.v_in_f = self.v_in_f + h * (a_in_f - self._bias_in_f + self._l_2 * e_in_f)
         self._bias_in_f = self._bias_in_f - h * POLES**3 * e_in_f

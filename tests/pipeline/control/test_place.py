@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hardware.robot_file import load_robot
-from pipeline.control.place import PUSH_STAYS_S, SuspendedPlace
+from pipeline.control.place import SuspendedPlace
+from pipeline.control.push import PUSH_STAYS_S
 from pipeline.frames import GRAVITY, Array, exp
 
 ROBOT = load_robot("ames").robot

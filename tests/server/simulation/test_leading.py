@@ -15,7 +15,7 @@ from hardware.sim.plant.obstacle import Obstacle
 from hardware.sim.plant.plant import PlantOptions
 from pipeline.config import TeleopConfig
 from pipeline.control.leading import PLAIN, Leading
-from pipeline.control.place import PUSHED_N
+from pipeline.control.push import PUSHED_N
 from pipeline.frames import Array, log
 from pipeline.signals import Mode
 from pipeline.teleop import Output
