@@ -95,11 +95,8 @@ export class CaptureMatcher {
     this.isSure ||= old.length >= ENOUGH;
     if (!this.isSure) return null;
     const frames = old.length >= ENOUGH ? old : this.frames;
-    const last = frames.at(-1);
-    if (last === undefined) return null;
-    const tried = this.captures
-      .filter(({ captureUs }) => captureUs <= last.outUs + this.lateUs && captureUs > last.outUs - OLD_US)
-      .map(({ stampUs }) => last.stampUs - stampUs);
+    // at first by every frame: the last one's own capture may have been skipped
+    const tried = frames.slice(this.aheadUs === null ? 0 : -1).flatMap((frame) => this.possible(frame));
     if (this.aheadUs !== null) tried.push(this.aheadUs);
     let best = this.aheadUs;
     let least = Infinity;
@@ -108,6 +105,13 @@ export class CaptureMatcher {
       if (misfit < least) [best, least, this.foundLateUs] = [aheadUs, misfit, Math.max(0, -delayUs)];
     }
     return best;
+  }
+
+  /** How far RTP's clock would be ahead by each capture that a frame may be. @param {Encoded} frame */
+  possible({ stampUs, outUs }) {
+    return this.captures
+      .filter(({ captureUs }) => captureUs <= outUs + this.lateUs && captureUs > outUs - OLD_US)
+      .map((capture) => stampUs - capture.stampUs);
   }
 
   /**
