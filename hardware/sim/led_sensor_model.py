@@ -50,35 +50,38 @@ class LedSensorModel:
         """What a picture taken at `t` [s], and dated `stamp` [s], says; None without any LED."""
         camera, lies = self._phone.camera, self._phone.lies
         t, seen_by = lies.moment(t), lies.at(t)
-        pixels = self._pixels(t, body, seen_by)
+        middle = self._pixels_at(t, self._leds_in_b, body, seen_by)
+        pixels = self._rolled(middle, t, body, seen_by)
         shown = camera.sees(pixels)
         shown[list(self._hidden(t))] = False
         led = np.flatnonzero(shown)
         if len(led) == 0:
             return None
-        spots = self._spots(pixels[led])
+        noise = self._noise_px * self._rng.standard_normal((len(led), 2))
         match = Match(led, np.arange(len(led)))
         pose = None
         if len(led) >= MIN_LEDS:
             R_cb, p_bc_in_c = self._phone.relative_pose(t, body)
+            spots = self._spots(middle[led] + noise)  # as vision does, by how they move meanwhile
             fit = pnp.solve(camera, self._leds_in_b, spots, match, (p_bc_in_c, R_cb))
             pose = pnp.pose_of(fit, stamp) if fit is not None else None
         if pose is not None:
             self._stamps.add_pose(pose)
-        rays = rays_of(camera, spots, match, stamp)
+        rays = rays_of(camera, self._spots(pixels[led] + noise), match, stamp)
         return VisionMeasurement(stamp, rays, pose, camera.half_field, self._stamps.offset)
 
-    def _pixels(self, t: float, body: BodyHistory, seen_by: Camera) -> Array:
-        """(n, 2) where the LEDs are in a picture, each when its row is read; behind: nowhere."""
-        pixels = self._pixels_at(t, self._leds_in_b, body, seen_by)
-        if seen_by.readout_s != 0.0:
-            delays = seen_by.delays(pixels)
-            for k in np.flatnonzero(np.isfinite(delays)):
-                later = t + float(delays[k])
-                pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body, seen_by)[0]
+    def _rolled(self, middle: Array, t: float, body: BodyHistory, seen_by: Camera) -> Array:
+        """(n, 2) where the LEDs are when each one's row is read; `middle`: when that one is."""
+        if seen_by.readout_s == 0.0:
+            return middle
+        pixels, delays = middle.copy(), seen_by.delays(middle)
+        for k in np.flatnonzero(np.isfinite(delays)):
+            later = t + float(delays[k])
+            pixels[k] = self._pixels_at(later, self._leds_in_b[k : k + 1], body, seen_by)[0]
         return pixels
 
     def _pixels_at(self, t: float, leds_in_b: Array, body: BodyHistory, seen_by: Camera) -> Array:
+        """(n, 2) where they are at `t` [s]; behind: nowhere."""
         R_cb, p_bc_in_c = self._phone.relative_pose(t, body)
         q_in_c = p_bc_in_c + leds_in_b @ R_cb.T
         pixels = np.full((len(leds_in_b), 2), np.nan)
@@ -88,6 +91,5 @@ class LedSensorModel:
 
     def _spots(self, pixels: Array) -> Spots:
         n, claimed = len(pixels), max(self._noise_px, LEAST_NOISE_PX) ** 2
-        noise = self._noise_px * self._rng.standard_normal((n, 2))
         covariances = np.tile(claimed * np.eye(2), (n, 1, 1))
-        return Spots(pixels + noise, covariances, np.ones(n), np.ones(n))
+        return Spots(pixels, covariances, np.ones(n), np.ones(n))

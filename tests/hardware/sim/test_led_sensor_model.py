@@ -78,3 +78,16 @@ def test_each_led_is_where_it_is_when_its_line_is_read(readout_s: float, axis: i
         alone = eye(0.0).seen(float(t), 4.0, at_rest)
         assert alone is not None
         np.testing.assert_allclose(rolling.rays.tangents[k], alone.rays.tangents[k], atol=2e-5)
+
+
+@pytest.mark.parametrize("readout_s", [0.03, -0.03])
+def test_its_pose_is_that_of_the_middle_row_though_others_are_read_at_other_times(
+    readout_s: float,
+) -> None:
+    one, away = eye(0.0, readout_s=readout_s), []
+    for t in 2.0 + 0.5 * np.arange(8):
+        seen = one.seen(t, t, at_rest)
+        assert seen is not None
+        assert seen.pose is not None
+        away.append(seen.pose.p_bc_in_c - one._phone.relative_pose(t, at_rest)[1])
+    np.testing.assert_allclose(away, np.zeros((8, 3)), atol=1e-6)
