@@ -8,6 +8,8 @@ disturbance observer does (Ohnishi 1987), by what is missed, but in the moments 
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from pipeline.control import low_pass
@@ -20,12 +22,17 @@ TOUCHED_N = 1.0
 """A smaller one may be a touch as well: in free flight, with hands of any kind, there is 0.4 N at
 most ..."""
 IN_TRANSIT = 0.5
-"""... and this share of what thrusters are on their way to give: they lag in their own way."""
+"""... and this share of what thrusters are on their way to give: they lag in their own way ..."""
+USUAL, USUAL_S = 4.0, 3.0
+"""... and so many times what is missed usually: the RMS of as long [s]. A robot that weighs more or
+less than told, or hangs from another spring, misses some all the time; one whose cable is slack now
+and then, as much as a touch: then nothing can be told."""
 PUSH_BEGINS_S, PUSH_LEARNT_S = 0.3, 0.03
 """So long after a touch [s] what is missed is a push, learnt in the second: thrusters that answer
 it have then come to where they go; the accelerometer, 50 mg off, to 2 cm."""
-PUSH_BEGUN_S = 1.2
-"""What goes on for longer [s] does not come and stay: a wall that it rubs along. It is taken for a
+PUSH_BEGUN_S, PUSH_RESTS = 1.2, 0.2
+"""What goes on for longer [s], or comes again and again with less than five times as long between,
+does not come and stay: a wall that it rubs along, a body that was told wrongly. It is taken for a
 place then, which is wrong by P / K."""
 FOUND_S = 1.5
 """After so long untouched [s] place and velocity are right to 17 % of what they were off."""
@@ -38,7 +45,7 @@ class PushObserver:
 
     def __init__(self) -> None:
         """Nothing has pushed yet, nor has it been untouched for long."""
-        self._missed_in_f, self._to_come_n = np.zeros(3), 0.0
+        self._missed_in_f, self._to_come_n, self._usual_n2 = np.zeros(3), 0.0, 0.0
         self._quick_s, self._tells = 0.0, False
         self.untouched_s = 0.0
         """How long nothing has begun or ended to push [s]."""
@@ -71,13 +78,15 @@ class PushObserver:
         share = low_pass.share(h / PUSHED_S)
         self._missed_in_f = self._missed_in_f + share * (missed_in_f - self._missed_in_f)
         self._to_come_n += share * (to_come_n - self._to_come_n)
-        missed_n = float(np.linalg.norm(self._missed_in_f))
-        is_touched = missed_n > TOUCHED_N + IN_TRANSIT * self._to_come_n
+        missed_n, usual_n = float(np.linalg.norm(self._missed_in_f)), sqrt(self._usual_n2)
+        least_n = max(TOUCHED_N, USUAL * usual_n)
+        self._usual_n2 += low_pass.share(h / USUAL_S) * (min(missed_n, least_n) ** 2 - usual_n**2)
+        is_touched = missed_n > least_n + IN_TRANSIT * self._to_come_n
         self.untouched_s = 0.0 if is_touched else self.untouched_s + h
         is_quick = self.untouched_s < PUSH_BEGINS_S
-        self._quick_s = self._quick_s + h if is_quick else 0.0
+        self._quick_s = max(0.0, self._quick_s + (h if is_quick else -h * PUSH_RESTS))
         self._tells = self._tells or self.untouched_s > FOUND_S
-        if is_off or self._quick_s > PUSH_BEGUN_S:
+        if is_off or self._quick_s > PUSH_BEGUN_S or usual_n > TOUCHED_N:
             self._tells = False
             self.force_in_f = self.known_in_f = np.zeros(3)
         elif self._tells and is_quick:

@@ -93,3 +93,29 @@ def test_without_thrust_nothing_is_kept_apart() -> None:
     observe(push, 1.0, PUSH_IN_F)
     assert not any(observe(push, 0.1, PUSH_IN_F, is_off=True))
     assert not push.force_in_f.any()
+
+
+def swings(push: PushObserver, seconds: float, most_n: float) -> list[bool]:
+    """Nobody pushes, but so much is missed as a robot of another weight does that swings."""
+    return [
+        push.observe(np.array([most_n * np.sin(8.0 * k * H), 0.0, 0.0]), 0.0, H, is_off=False)
+        for k in range(round(seconds / H))
+    ]
+
+
+def test_what_is_missed_all_the_time_is_no_touch_and_what_is_more_than_that_is() -> None:
+    push = PushObserver()
+    for most_n in (0.4, 0.8, 1.2):
+        swings(push, 6.0, most_n)
+    assert not any(swings(push, 6.0, 1.3))
+    assert push.is_told_apart
+    assert observe(push, 0.5, 5.0 * PUSH_IN_F / np.linalg.norm(PUSH_IN_F)).count(True) > 50
+
+
+def test_who_misses_as_much_as_a_touch_all_the_time_can_tell_nothing() -> None:
+    push = PushObserver()
+    for most_n in (0.5, 1.0, 1.5, 2.0):
+        swings(push, 6.0, most_n)
+    assert not push.is_told_apart
+    assert not any(observe(push, 0.5, 8.0 * PUSH_IN_F))
+    assert not push.force_in_f.any()
