@@ -1,5 +1,6 @@
 #: make setup   a Python environment in .venv with what `make run` needs
 #: make run     set up if needed, then start the server      (ARGS="--help")
+#: make arm     what else a robot with joints (`--robot so101`) needs in it
 #: make test    set up for development and run every check: what CI does
 #: make check   the same: lint, import rules, types, web client, all tests
 #: make fast    as many tests as fit into 15 s, the cheapest of them   (FAST_S=60)
@@ -15,7 +16,7 @@
 #: Needs Python 3.11 or later and make; uses uv where there is one. PYTHON=... picks the Python.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup dev run test check static lint contracts types web kernels pytest fast bench
+.PHONY: help setup arm dev run test check static lint contracts types web kernels pytest fast bench
 .PHONY: real robots pages quiet fast-server fast-others fuzz test-all counterparts mutants
 .PHONY: hooks lock image wheels clean
 
@@ -51,10 +52,15 @@ $(BIN)/python:
 	$(BIN)/lightleash warm
 	@touch $@
 
-.venv/dev.stamp: requirements/dev.txt pyproject.toml | $(BIN)/python
+.venv/dev.stamp: requirements/dev.txt requirements/arm.txt pyproject.toml | $(BIN)/python
 	$(LOCKED) requirements/dev.txt
+	$(LOCKED) requirements/arm.txt --no-deps
 	$(PROJECT)
 	@touch $@
+
+# What a robot with `[arm]` needs beside.
+arm: setup
+	$(LOCKED) requirements/arm.txt --no-deps
 
 # Node is needed for the checks of the web client only, never to run Lightleash.
 $(WEB): web_client/package.json web_client/package-lock.json
@@ -170,6 +176,7 @@ lock: dev
 	$(BIN)/uv pip compile $(COMPILE) --group build pyproject.toml -o requirements/core.txt
 	$(BIN)/uv pip compile $(COMPILE) --group dev -c requirements/core.txt pyproject.toml \
 		-o requirements/dev.txt
+	$(BIN)/uv pip compile $(COMPILE) --group arm --no-deps -o requirements/arm.txt
 	cd web_client && npm install --package-lock-only --ignore-scripts
 
 COMPILE := --quiet --universal --python-version 3.11 --only-binary :all: --generate-hashes \

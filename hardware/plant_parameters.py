@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from pipeline.frames import GRAVITY, Array
 
@@ -40,6 +41,24 @@ class OdometryParameters:
     """Of one measured twist [m/s] ..."""
     noise_omega: float
     """... and its angular rate [rad/s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmParameters:
+    """Joints that move a robot's body, the tip of an arm, and how far they may."""
+
+    model: Path
+    """Its MuJoCo model."""
+    tip: str
+    """Name of the site in it that is b."""
+    home: Array
+    """(n,) angles of the joints from base to tip, where it begins [rad]."""
+    rate: float
+    """Largest of each joint [rad/s]."""
+    keeps_apart: tuple[tuple[str, str], ...]
+    """Names of geoms in it of which no two come nearer to each other than ..."""
+    apart: float
+    """... this [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,5 +160,7 @@ class PlantParameters:
     """In place of motion sensors, of a robot that has none and measures its twist."""
     slip: float = 0.0
     """Share of its twist by which its body moves otherwise than its wheels, for a while."""
+    arm: ArmParameters | None = None
+    """Of a robot whose body is the tip of one."""
     intervals: PlantIntervals = PlantIntervals()
     """Of what was identified."""

@@ -47,6 +47,7 @@ from hardware.twist_schema import (
     MotionSection,
     Ros2Section,
     TwistRobotSchema,
+    arm_of,
     drive_of,
     motion_of,
     twist_clashes,
@@ -215,7 +216,7 @@ def _twist_robot_of(table: Mapping[str, Any], file: str) -> RobotFile:
         raise _explained(file, error, TwistRobotSchema) from error
     for key, reason in twist_clashes(schema):
         raise RobotFileError(file, key, reason)
-    robot_file = _converted_twist(schema)
+    robot_file = _converted_twist(schema, Path(file).parent)
     for key, reason in led_faults(robot_file.robot.leds_in_b):
         raise RobotFileError(file, key, reason)
     return robot_file
@@ -285,7 +286,7 @@ def _keys_at(schema: type[BaseModel], where: tuple[int | str, ...]) -> list[str]
     return list(section.model_fields)
 
 
-def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
+def _converted_twist(schema: TwistRobotSchema, folder: Path) -> RobotFile:
     link, start, drive = schema.link, schema.start, drive_of(schema.twist)
     motion = motion_of(schema.motion) if schema.motion is not None else None
     nowhere = np.zeros((0, 3))
@@ -305,6 +306,7 @@ def _converted_twist(schema: TwistRobotSchema) -> RobotFile:
         imu=NO_SENSORS if schema.body_imu is None else _imu(schema.body_imu),
         odometry=_odometry(schema.motion, motion),
         slip=motion.slip if motion is not None else 0.0,
+        arm=arm_of(schema.arm, folder) if schema.arm is not None else None,
     )
     robot = Robot(
         name=schema.name,

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import radians
+from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
+from hardware.plant_parameters import ArmParameters
 from hardware.robot_schema import (
     AXES,
     USUAL_PORTS,
@@ -66,6 +69,27 @@ class MotionSection(Section):
     `SLIP`."""
     unlike_s: Annotated[float, Field(ge=0.0, le=0.3)] | None = None
     """By how much its delay and lag may be others than [twist] says; usually `UNLIKE_S`."""
+
+
+class ArmSection(Section):
+    """[arm]: joints that carry the body, by a MuJoCo model."""
+
+    model: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}\.xml$")]
+    """Beside this file."""
+    tip: Annotated[str, Field(min_length=1, max_length=100)]
+    """Site in it that is the body: its place and its axes."""
+    home_deg: Annotated[
+        list[Annotated[float, Field(ge=-360.0, le=360.0)]], Field(min_length=1, max_length=12)
+    ]
+    """Where it begins: of the joints from the base to the tip."""
+    joint_speed_deg_s: Annotated[float, Field(gt=0.0, le=720.0)]
+    """Largest of each of them."""
+    keeps_apart: Annotated[
+        list[Annotated[list[str], Field(min_length=2, max_length=2)]],
+        Field(max_length=64, default_factory=list),
+    ]
+    """Pairs of geoms in it that come no nearer to each other than ..."""
+    apart_m: Annotated[float, Field(ge=0.0, le=0.2)] = 0.01
 
 
 SLIP = {"measured": 0.03, "commanded": 0.1}
@@ -131,6 +155,7 @@ class TwistRobotSchema(Section):
     twist: TwistSection
     body_imu: BodyImuSection | None = None
     motion: MotionSection | None = None
+    arm: ArmSection | None = None
     leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
     link: TwistLinkSection
     battery: BatterySection | None = None
@@ -162,6 +187,18 @@ def motion_of(section: MotionSection) -> ToldMotion:
         noise_omega=radians(section.noise_deg_s),
         slip=SLIP[section.twist] if slip is None else slip,
         unlike_s=UNLIKE_S[section.twist] if unlike_s is None else unlike_s,
+    )
+
+
+def arm_of(section: ArmSection, folder: Path) -> ArmParameters:
+    """The section in SI, of a robot file in `folder`."""
+    return ArmParameters(
+        model=folder / section.model,
+        tip=section.tip,
+        home=np.radians(section.home_deg),
+        rate=radians(section.joint_speed_deg_s),
+        keeps_apart=tuple((one, other) for one, other in section.keeps_apart),
+        apart=section.apart_m,
     )
 
 

@@ -91,7 +91,7 @@ class Output:
     error: PoseError | None
     saturated: bool
     at_limit: bool
-    """It is led to where its thrusters can't hold it; on a leash it stays at that border."""
+    """It is led to where it can't go, or its thrusters can't hold it: it stays at that border."""
     ages: Ages
     thrusters: tuple[str, ...] = ()
     """Those that don't give what they are told, in words."""

@@ -18,6 +18,8 @@ from hardware.contract import FollowerContract
 
 ROOT = Path(__file__).resolve().parents[1]
 LOCKS = sorted(ROOT.glob("requirements/*.txt"))
+WHOLE = [path for path in LOCKS if path.name != "arm.txt"]
+"""With all that what they name depends on; of `arm` the other two have it."""
 
 # The first releases without a known hole that this project could meet.
 SECURITY_FLOORS = {
@@ -58,7 +60,7 @@ def test_what_only_some_need_is_an_extra_that_development_brings(extra, name):
     assert [one for one in brought if one.startswith(name)] == brought
     tested = [one for one in project["dependency-groups"]["test"] if isinstance(one, str)]
     assert set(brought) <= {one.partition(";")[0] for one in tested}
-    core, dev = (path.read_text() for path in LOCKS)
+    core, dev = (path.read_text() for path in WHOLE)
     assert name not in core
     assert re.search(rf"^{name}==", dev, flags=re.MULTILINE)
 
@@ -70,7 +72,16 @@ def test_every_locked_release_has_a_hash(path):
     assert [release.split()[0] for release in releases if "--hash=sha256:" not in release] == []
 
 
-@pytest.mark.parametrize("path", LOCKS, ids=lambda path: path.name)
+def test_inverse_kinematics_are_an_extra_that_development_brings_beside_the_core_of_mujoco():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    extra = project["project"]["optional-dependencies"]["arm"]
+    assert [one.partition(">")[0] for one in extra] == ["mink", "mujoco"]
+    locked = (ROOT / "requirements/arm.txt").read_text()
+    assert re.findall(r"^[\w-]+(?===)", locked, flags=re.MULTILINE) == ["daqp", "mink", "qpsolvers"]
+    assert not any(re.search(r"^mujoco==", path.read_text(), re.MULTILINE) for path in LOCKS)
+
+
+@pytest.mark.parametrize("path", WHOLE, ids=lambda path: path.name)
 @pytest.mark.parametrize("name", SECURITY_FLOORS)
 def test_locked_release_has_no_known_hole(path, name):
     locked = re.findall(rf"^{name}==([\d.]+)", path.read_text(), flags=re.MULTILINE)

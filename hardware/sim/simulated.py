@@ -82,14 +82,14 @@ class SimulatedRobot:
         options: PlantOptions | None = None,
         battery: DrainingBattery | None = None,
     ) -> None:
-        """Hanging or standing at rest, refusing thrust; without a battery it tells of none."""
+        """Hanging or standing at rest, refusing thrust; without a battery it tells of none.
+
+        Raises:
+            ArmError: of an arm whose model can't be used, or for which mink is missing.
+        """
         robot = robot_file.robot
         rng = np.random.default_rng(seed)
-        self.body: SimulatedBody = (
-            TwistPlant(robot.twist, robot_file.plant.imu, rng, options, robot_file.plant.slip)
-            if robot.twist is not None
-            else Plant(robot_file.plant, rng, options)
-        )
+        self.body = _body_of(robot_file, rng, options)
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self._blink = BlinkEnd(key) if robot.blinks else None
         self.battery, self._health = battery, HealthEnd(boot_id, key)
@@ -100,7 +100,10 @@ class SimulatedRobot:
         self.dark: deque[int] = deque(maxlen=HISTORY)
         """The LED that was dark then, −1: none."""
         self._tells_motion, odometry = robot.motion is not None, robot_file.plant.odometry
-        self._odometry = Odometry(odometry, robot.axes, rng) if odometry is not None else None
+        self._odometry = None
+        if odometry is not None:  # encoders have a noise of their own
+            noisy = robot.axes & (robot_file.plant.arm is None)
+            self._odometry = Odometry(odometry, noisy, rng)
         self._nonces, self._boot_id = nonces, boot_id
         self._setpoint = self.end.setpoint(0)
 
@@ -149,3 +152,16 @@ class SimulatedRobot:
         if self._odometry is not None:
             given, age_s = self._odometry.read(now_us, self.body.given)
         return self.end.sample(now_us, nonce, NO_FORCE, NO_FORCE, given, age_s)
+
+
+def _body_of(
+    robot_file: RobotFile, rng: np.random.Generator, options: PlantOptions | None
+) -> SimulatedBody:
+    robot, plant = robot_file.robot, robot_file.plant
+    if robot.twist is None:
+        return Plant(plant, rng, options)
+    if plant.arm is None:
+        return TwistPlant(robot.twist, plant.imu, rng, options, plant.slip)
+    from hardware.sim.plant.arm_plant import ArmPlant  # needs an extra
+
+    return ArmPlant(plant.arm, robot.twist, robot.axes, plant.imu, rng, options)

@@ -28,6 +28,7 @@ import numpy as np
 
 from pipeline.control import low_pass
 from pipeline.control.acting import Acted, Moment
+from pipeline.control.held_back import HeldBack
 from pipeline.control.leading import Leading
 from pipeline.control.leash import Leashed
 from pipeline.control.pid import PoseError
@@ -61,6 +62,7 @@ class TwistActing:
         self._axes, self._drive, self._silent_s = robot.axes, drive, silent_s
         self._commanded_in_b = np.zeros(6)
         self._once_in_f = self._twice_in_f = np.zeros(3)
+        self._held_back = HeldBack(drive, robot.axes)
 
     def push(self, wrench_in_b: Array) -> None:
         """Nothing: it has no thrusters that could push it."""
@@ -79,8 +81,8 @@ class TwistActing:
         return error
 
     def leashed(self, error: PoseError, _view: VirtualView, _now: Moment) -> Leashed:
-        """The error as it is: its reach is not known."""
-        return Leashed(error)
+        """The error as it is: where its reach ends it stops by itself, which is noticed."""
+        return Leashed(error, self._held_back.taken)
 
     def start_place(self) -> None:
         """Nothing: its place is not asked for."""
@@ -88,6 +90,7 @@ class TwistActing:
     def start(self, _known: Situation, _from_rest: bool, /) -> None:
         """Begin with a reference that does not move yet."""
         self._once_in_f = self._twice_in_f = np.zeros(3)
+        self._held_back.start()
 
     def change_mode(
         self, before: Mode, mode: Mode, known: Situation | None, leashed: Leashed | None
@@ -98,6 +101,7 @@ class TwistActing:
         self, known: Situation | None, leashed: Leashed | None, now: Moment, _share: float
     ) -> Acted:
         """The twist of the mode, within its bounds."""
+        self._held_back.watch(self._commanded_in_b, now.body.twist_m_bf_in_b, now.h)
         if now.mode in (Mode.DISARMED, Mode.ARMED, Mode.STOPPED):
             self._commanded_in_b = np.zeros(6)
             return Acted(NO_FORCES, saturated=False, twist_in_b=self._commanded_in_b)

@@ -107,7 +107,7 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     commands: list[tuple[float, ...]] = []
     """Thrusts commanded since the last status, for recordings: each time t, then `thrusts`."""
     at_limit: bool = False
-    """The robot is led to where its thrusters can't hold it."""
+    """The robot is led to where it can't go, or can't be held by its thrusters."""
     gains_weak: str = ""
     """What gains of the user's own lack if the robot is not as told, in words; refuses nothing."""
     health: HealthFields | None = None

@@ -246,7 +246,7 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     thrusters_weak: list[str] = []
     """Each thruster that does not give what it is told, in words; arming is refused."""
     at_limit: bool = False
-    """The robot is led to where its thrusters can't hold it: it comes no farther."""
+    """It is led to where it can't go, or its thrusters can't hold it: it comes no farther."""
     server: dict[str, float] = {}
     """Of the server process: the longest stall of its event loop in the last minute, stall_ms, and
     while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a

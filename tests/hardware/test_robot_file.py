@@ -440,6 +440,32 @@ def test_a_mistake_in_what_a_robot_tells_of_its_motion_is_named(tmp_path, mistak
     is_named(tmp_path, "rover", *MOTION_MISTAKES[mistake])
 
 
+ARM_MISTAKES = {
+    "a mesh for a model": ('"so101.xml"', '"so101.stl"', "arm.model: "),
+    "a model elsewhere": ('"so101.xml"', '"../so101.xml"', "arm.model: "),
+    "misspelt": ("joint_speed_deg_s", "joint_sped_deg_s", "did you mean 'joint_speed_deg_s'"),
+    "no home": ("home_deg = [0.0, -34.0, 57.0, -23.0, 2.79]", "home_deg = []", "arm.home_deg: "),
+    "a part apart": ('["palm_ball", "base"]', '["palm_ball"]', "arm.keeps_apart.5: .*2 items"),
+    "no speed": ("joint_speed_deg_s = 120.0", "joint_speed_deg_s = 0.0", "arm.joint_speed_deg_s"),
+}
+
+
+@pytest.mark.parametrize("mistake", ARM_MISTAKES)
+def test_a_mistake_in_what_an_arm_is_is_named(tmp_path, mistake):
+    is_named(tmp_path, "so101", *ARM_MISTAKES[mistake])
+
+
+def test_the_model_of_an_arm_lies_beside_its_file(tmp_path):
+    text = robot_path("so101").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    for file, folder in (("so101", ROBOTS), (tmp_path / "mine.toml", tmp_path)):
+        arm = load_robot(file, takes=COMMANDS).plant.arm
+        assert arm.model == folder / "so101.xml"
+        assert arm.home == pytest.approx(np.radians([0.0, -34.0, 57.0, -23.0, 2.79]))
+        assert arm.rate == pytest.approx(np.radians(120.0))
+    assert load_robot("twister", takes=COMMANDS).plant.arm is None
+
+
 def test_a_robot_that_takes_a_twist_has_motion_sensors_or_says_what_it_tells(tmp_path):
     table = robot_table(robot_path("rover"))
     del table["motion"]

@@ -16,6 +16,7 @@ from math import sqrt
 import numpy as np
 
 from hardware.plant_parameters import BodyImuParameters
+from hardware.sim.plant.coasting import coasting
 from hardware.sim.plant.model import STEP_MS
 from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
 from pipeline.frames import GRAVITY, Array, cross, exp, wxyz_from_R
@@ -93,14 +94,7 @@ class TwistPlant:
 
         Rows (in how long [s], wxyz_fb (4,), p_bf_in_f (3,) [m]), `every` so often.
         """
-        v_in_b, omega_in_b = self.twist_in_b[:3], self.twist_in_b[3:]
-        rows = []
-        for k in range(1, round(seconds / every) + 1):
-            t = k * every
-            half = self.R_fb @ exp(0.5 * t * omega_in_b)
-            p_bf_in_f = self.p_bf_in_f + t * (half @ v_in_b)
-            rows.append((t, np.array(wxyz_from_R(self.R_fb @ exp(t * omega_in_b))), p_bf_in_f))
-        return rows
+        return coasting(self.R_fb, self.p_bf_in_f, self.twist_in_b, seconds, every)
 
     @property
     def wxyz_fb(self) -> Array:

@@ -260,7 +260,7 @@
  * @property {string[]} warnings What who arms should know, each in words; refuses nothing.
  * @property {string[]} sensors_doubted What of motion sensors and LEDs is believed less than usual, each in words.
  * @property {string[]} thrusters_weak Each thruster that does not give what it is told, in words; arming is refused.
- * @property {boolean} at_limit The robot is led to where its thrusters can't hold it: it comes no farther.
+ * @property {boolean} at_limit It is led to where it can't go, or its thrusters can't hold it: it comes no farther.
  * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a processor for armed_stall_waited_ms; recent_stall_ms, since the status before, so that none is hidden by a longer one, recent_stall_cpu_ms of it at work, recent_stall_waited_ms without a processor, until recent_stall_until_ms of the clock of time_ms; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
  * @property {Person[]} people Who is paired, in the order they came.
  * @property {LeadingStatus | null} leading null before the control process has told of it.

@@ -1,0 +1,1 @@
+"""Arms: joints that a twist of their tip moves, before a simulated arm or a real one."""

@@ -1,0 +1,178 @@
+"""A simulated arm: the twist of its tip by inverse kinematics to servos, which carry it in MuJoCo.
+
+Between a command and the tip's motion stand the robot's own limits and delay, a step of the inverse
+kinematics 200 times a second, angles in an encoder's steps, servos that lag, give way to weight and
+have a largest torque, and contact with the table. What it reports of itself comes by encoders, too.
+
+World axes f: those of the arm's base k, from where the tip is at home.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from math import pi
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from hardware.arm.arm_model import ArmError, ArmModel
+from hardware.arm.inverse_kinematics import InverseKinematics
+from hardware.arm.joint_setpoints import JointSetpoints
+from hardware.arm.tip_odometry import TipOdometry
+from hardware.plant_parameters import ArmParameters, BodyImuParameters
+from hardware.sim.plant.coasting import coasting
+from hardware.sim.plant.model import STEP_MS
+from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
+from pipeline.frames import Array, wxyz_from_R
+from pipeline.robot import TwistDrive
+
+ENCODER_STEP_RAD = 2.0 * pi / 4096
+"""Of angles, both told and measured."""
+
+
+OfObject = Callable[[mujoco.MjModel, mujoco.MjData, int, int, Array, int], None]
+"""MuJoCo's functions of one object: its kind and number, what is written, whether in its axes."""
+
+
+class ArmPlant:
+    """A robot. Deterministic for a seed of `rng`; nothing in it knows the time of day."""
+
+    def __init__(
+        self,
+        arm: ArmParameters,
+        drive: TwistDrive,
+        axes: npt.NDArray[np.bool_],
+        imu: BodyImuParameters,
+        rng: np.random.Generator,
+        options: PlantOptions | None = None,
+    ) -> None:
+        """At rest at home, to be led along and about `axes` (6,) of b.
+
+        Raises:
+            ArmError: its model can't be used, or mink is missing.
+        """
+        self.arm = ArmModel(arm)
+        self._drive, self._imu = drive, BodyImuErrors(imu, rng, options or PlantOptions())
+        self._model = self.arm.model
+        self._model.opt.timestep = 1e-3 * STEP_MS
+        self._data = mujoco.MjData(self._model)
+        self._tip = self._model.site(arm.tip).id
+        self._servos = _servos(self.arm)
+        self._home_in_k = self.arm.tip(arm.home)[1]
+        self._stand_at_home()
+        self._setpoints = JointSetpoints(InverseKinematics(self.arm, axes), arm.home)
+        self._odometry = TipOdometry(self.arm, drive.lag_s, arm.home)
+        self._delay_ms, self._now_ms = round(1e3 * drive.delay_s), 0
+        self._on_their_way: deque[tuple[int, Array]] = deque()
+        self._commanded = self._allowed = np.zeros(6)
+
+    def _stand_at_home(self) -> None:
+        data = self._data
+        data.qpos[:] = self.arm.configuration(self.arm.parameters.home)
+        data.ctrl[:] = data.qpos[self._model.jnt_qposadr[self._model.actuator_trnid[:, 0]]]
+        if self._model.na:
+            data.act[:] = data.ctrl
+        mujoco.mj_forward(self._model, data)
+
+    def step(self, twist_in_b: Array, dt: float = 0.005) -> None:
+        """Go on by `dt` [s], whole milliseconds, with a new command (6,) [m/s, rad/s]."""
+        self._on_their_way.append((self._now_ms + self._delay_ms, np.array(twist_in_b)))
+        while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
+            self._commanded = self._drive.within(self._on_their_way.popleft()[1])
+        self._allowed = self._drive.toward(self._allowed, self._commanded, dt)
+        before = self._setpoints.told
+        told = self._setpoints.follow(self._allowed, self.encoders, dt)
+        self._data.ctrl[self._servos] = _in_steps(told)
+        steps = round(1e3 * dt / STEP_MS)
+        mujoco.mj_step(self._model, self._data, steps)
+        mujoco.mj_forward(self._model, self._data)
+        self._now_ms += steps * STEP_MS
+        self._odometry.step((told - before) / dt, self.encoders, dt)
+
+    @property
+    def told(self) -> Array:
+        """Angles that the servos are told (n,) [rad], steps aside."""
+        return self._setpoints.told
+
+    @property
+    def angles(self) -> Array:
+        """Of its joints (n,) [rad]."""
+        return self.arm.angles(self._data.qpos)
+
+    @property
+    def encoders(self) -> Array:
+        """The same as its servos tell it."""
+        return _in_steps(self.angles)
+
+    def ahead(self, seconds: float, every: float = 0.005) -> list[tuple[float, Array, Array]]:
+        """Where it goes within `seconds` at its present twist; the robot itself doesn't move.
+
+        Rows (in how long [s], wxyz_fb (4,), p_bf_in_f (3,) [m]), `every` so often.
+        """
+        return coasting(self.R_fb, self.p_bf_in_f, self.twist_in_b, seconds, every)
+
+    @property
+    def p_bf_in_f(self) -> Array:
+        """Its tip (3,) [m]."""
+        place: Array = self._data.site_xpos[self._tip] - self._home_in_k
+        return place
+
+    @property
+    def R_fb(self) -> Array:
+        """Its attitude (3, 3)."""
+        R_kb: Array = self._data.site_xmat[self._tip].reshape(3, 3).copy()
+        return R_kb
+
+    @property
+    def wxyz_fb(self) -> Array:
+        """The same as a unit quaternion (4,)."""
+        return np.array(wxyz_from_R(self.R_fb))
+
+    @property
+    def twist_in_b(self) -> Array:
+        """Its velocity and angular rate in f, in b (6,) [m/s, rad/s]."""
+        turn_first = self._of_tip(mujoco.mj_objectVelocity)
+        return np.concatenate((turn_first[3:], turn_first[:3]))
+
+    @property
+    def given(self) -> Array:
+        """What it reports of itself: its twist (6,), by its joints."""
+        return self._odometry.twist_in_b
+
+    @property
+    def thrusts(self) -> Array:
+        """(0,): it has no thrusters."""
+        return np.zeros(0)
+
+    def imu(self) -> tuple[Array, Array]:
+        """What sensors on it read: (ω (3,) [rad/s], specific force (3,) [m/s²]) in b."""
+        mujoco.mj_rnePostConstraint(self._model, self._data)
+        felt_in_b = self._of_tip(mujoco.mj_objectAcceleration)[3:]
+        return self._imu.read(self.twist_in_b[3:], felt_in_b)
+
+    def _of_tip(self, what: OfObject) -> Array:
+        """MuJoCo's answer (6,) in b, what turns first."""
+        answer, site = np.zeros(6), mujoco.mjtObj.mjOBJ_SITE
+        what(self._model, self._data, site, self._tip, answer, 1)
+        return answer
+
+
+def _in_steps(angles: Array) -> Array:
+    steps: Array = ENCODER_STEP_RAD * np.round(angles / ENCODER_STEP_RAD)
+    return steps
+
+
+def _servos(arm: ArmModel) -> list[int]:
+    """Of each joint the servo that is told an angle.
+
+    Raises:
+        ArmError: a joint has none.
+    """
+    model = arm.model
+    moves = {int(joint): servo for servo, joint in enumerate(model.actuator_trnid[:, 0])}
+    lacking = [name for name in arm.names if model.joint(name).id not in moves]
+    if lacking:
+        raise ArmError("model", f"a position servo for each joint, and for {', '.join(lacking)}")
+    return [moves[model.joint(name).id] for name in arm.names]
