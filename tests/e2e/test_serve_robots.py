@@ -54,13 +54,14 @@ def twists(folder: Path) -> np.ndarray:
     return np.array([state["twist_in_b"] for state in states], dtype=np.float64)
 
 
+@pytest.mark.parametrize("robot", ["twister", "so101"])
 def test_a_robot_that_takes_a_twist_follows_and_is_told_to_stand_still_by_stop(
-    tmp_path: Path,
+    robot: str, tmp_path: Path
 ) -> None:
     words = ["phone", "--hand", "demo", "--rest", "1", "--seed", "1"]
     command = [sys.executable, "-m", "server", *words]
     with (
-        serving(tmp_path, "--robot", "twister") as server,
+        serving(tmp_path, "--robot", robot) as server,
         closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth,
     ):
         assert status(server)["takes"] == "twist"

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from hardware.arm.arm_model import ArmError, ArmModel, jacobian_rates
 from pipeline.frames import Array, log
-from tests.hardware.arm.arms import ARM, HOME, PARAMETERS, postures
+from tests.hardware.arm.arms import ARM, HOME, PARAMETERS, SO101, postures
 
 STEP = 1e-6
 
@@ -73,3 +74,22 @@ def test_joints_of_other_kinds_are_refused(words: str, tmp_path: Path) -> None:
     file.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     with pytest.raises(ArmError, match=words):
         ArmModel(replace(PARAMETERS, model=file, keeps_apart=(), home=np.zeros(1)))
+
+
+@pytest.mark.parametrize(
+    ("aside_m", "above_m", "hidden"),
+    [(0.0, 0.0, 0), (0.0, 0.3, 0), (0.15, 0.0, 0), (-0.3, 0.0, 0), (0.3, 0.0, 1)],
+)
+def test_the_arm_hides_at_most_one_of_its_leds_from_a_phone_behind_it(
+    aside_m: float, above_m: float, hidden: int
+) -> None:
+    """From where one begins, and from beside and above that: rays to LEDs meet nothing."""
+    data = mujoco.MjData(ARM.model)
+    data.qpos[:] = ARM.configuration(HOME)
+    mujoco.mj_kinematics(ARM.model, data)
+    R_kb, p_bk_in_k = ARM.tip(HOME)
+    phone = p_bk_in_k + np.array([-SO101.start.distance, aside_m, SO101.start.above + above_m])
+    solid, met = np.array([1, 1, 1, 0, 1, 1], dtype=np.uint8), np.full(1, -1, dtype=np.int32)
+    ways = [p_bk_in_k + R_kb @ led - phone for led in SO101.robot.leds_in_b]
+    shares = [mujoco.mj_ray(ARM.model, data, phone, way, solid, 1, -1, met) for way in ways]
+    assert sum(0.0 <= share < 1.0 for share in shares) == hidden
