@@ -69,7 +69,7 @@ class ArmModel:
         if home.shape != (len(joints),):
             raise ArmError("home_deg", f"{len(joints)} angles: of {', '.join(self.names)}")
         if bool((home < self.low).any() or (home > self.high).any()):
-            raise ArmError("home_deg", f"within {self._ranges()}")
+            raise ArmError("home_deg", f"within {self.ranges}")
 
     def configuration(self, q: Array) -> Array:
         """Of all of the model's joints, of which these have the angles `q` (n,) [rad]."""
@@ -96,6 +96,12 @@ class ArmModel:
         R_kb = self._data.site_xmat[self._tip].reshape(3, 3)
         in_b: Array = np.vstack((R_kb.T @ rows[0], R_kb.T @ rows[1]))[:, self.dofs]
         return in_b
+
+    @property
+    def ranges(self) -> str:
+        """Of its joints, in words [°]."""
+        rows = zip(self.names, np.degrees(self.low), np.degrees(self.high), strict=True)
+        return ", ".join(f"{name} {low:.0f} to {high:.0f}" for name, low, high in rows)
 
     def _place(self, q: Array) -> None:
         self._data.qpos[:] = self.configuration(q)
@@ -126,7 +132,3 @@ class ArmModel:
             what = "site" if kind == mujoco.mjtObj.mjOBJ_SITE else "geom"
             raise ArmError(key, f"{what}s of {file}, which has none that is called {name!r}")
         return found
-
-    def _ranges(self) -> str:
-        rows = zip(self.names, np.degrees(self.low), np.degrees(self.high), strict=True)
-        return ", ".join(f"{name} {low:.0f} to {high:.0f}" for name, low, high in rows)

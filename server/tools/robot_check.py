@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hardware.arm.arm_model import ArmError, ArmModel
 from hardware.authority import authority
 from hardware.dynamics import dynamics_of
 from hardware.follower import FollowerError
@@ -19,6 +20,7 @@ from hardware.led_layout.margins import margins
 from hardware.led_layout.viewpoints import looks_about
 from hardware.link.registry import link_kind
 from hardware.link.silence import SilenceTimes
+from hardware.plant_parameters import ArmParameters
 from hardware.robot_file import COMMANDS, RobotFile, load_robot
 from hardware.robot_schema import AXES
 from hardware.twist_schema import TOLD_ZERO_S
@@ -85,6 +87,8 @@ def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
     if robot_file.robot.twist is not None:
         yield from _twist(robot_file.robot.twist)
         yield _motion(robot_file.robot.motion)
+        if robot_file.plant.arm is not None:
+            yield _arm(robot_file.plant.arm)
     else:
         yield from _thrust(robot_file)
         yield from _gains(robot_file)
@@ -114,6 +118,17 @@ def _motion(motion: ToldMotion | None) -> RobotFinding:
     wrong = f"± {100.0 * motion.slip:.0f} %, {1e3 * motion.unlike_s:.0f} ms"
     up = "it stands level" if motion.is_level else UNTOLD_VERTICAL
     return RobotFinding("motion", True, f"no motion sensors: {said} ({wrong}); {up}")
+
+
+def _arm(parameters: ArmParameters) -> RobotFinding:
+    """Joints that carry its body, and whether anything here can move them."""
+    try:
+        arm = ArmModel(parameters)
+        import hardware.arm.mink_extra  # noqa: F401
+    except ArmError as error:
+        return RobotFinding("arm", False, str(error))
+    said = f"{len(arm.names)} joints, {degrees(parameters.rate):.0f}°/s at most; {arm.ranges}°"
+    return RobotFinding("arm", True, said)
 
 
 def _twist(drive: TwistDrive) -> Iterator[RobotFinding]:

@@ -56,6 +56,17 @@ def test_what_was_identified_is_said_and_what_was_changed_since(capsys, tmp_path
     assert found["identified"]["said"].startswith("body.mass_kg: not what was identified")
 
 
+def test_joints_that_carry_a_robot_are_looked_at(capsys, tmp_path):
+    code, found = findings(capsys, "so101", tmp_path)
+    assert code == 0
+    assert found["arm"]["said"].startswith("5 joints, 120°/s at most; shoulder_pan -110 to 110, ")
+    robot = tmp_path / "mine.toml"
+    robot.write_text(robot_path("so101").read_text())
+    code, found = findings(capsys, robot, tmp_path)
+    assert code == 1
+    assert found["arm"]["said"].startswith("arm.model: ")
+
+
 def changed(tmp_path, *changes):
     text = robot_path("ames").read_text()
     for old, new in changes:
