@@ -108,6 +108,7 @@ class Teleop:
         self.attitude, self._bridge = Attitude(), GyroBridge()
         self._config, self._robot = config, robot
         self._h, self._t_step, self._stood_still = period, np.nan, False
+        self._envelope = flight_envelope.limits_of(robot, config.envelope)
         self._limits = failsafe.FailsafeTimers.of(
             config.failsafe,
             robot.ramp_s,
@@ -326,7 +327,7 @@ class Teleop:
         error: PoseError | None,
         ages: Ages,
     ) -> failsafe.FailsafeInputs:
-        limits, is_tracking = self._config.envelope, self._failsafe.mode == Mode.TRACK
+        limits, is_tracking = self._envelope, self._failsafe.mode == Mode.TRACK
         return failsafe.FailsafeInputs(
             held=self._operator.held,
             press=self._operator.press,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import cos
+from dataclasses import dataclass, replace
+from math import cos, pi
 
 from pipeline.config import EnvelopeConfig
 from pipeline.control import failsafe
 from pipeline.control.pid import PoseError
 from pipeline.control.tracking import Situation
+from pipeline.robot import Robot
 from pipeline.signals import VirtualView
 
 
@@ -29,6 +30,12 @@ class Ages:
             "phone_imu_ms": saturated_ms(self.phone_imu),
             "robot_ms": saturated_ms(self.body_imu),
         }
+
+
+def limits_of(robot: Robot, limits: EnvelopeConfig) -> EnvelopeConfig:
+    """Those of a robot: one that takes a twist, and is led about roll or pitch, may tilt."""
+    is_tilted = robot.twist is not None and bool(robot.axes[3:5].any())
+    return replace(limits, max_tilt_rad=pi) if is_tilted else limits
 
 
 def fault(

@@ -13,7 +13,7 @@ from hardware.robot_file import COMMANDS, load_robot
 from hardware.sim.hand import Hand, make_hand
 from hardware.sim.plant.arm_plant import ArmPlant
 from pipeline.config import PERIOD_S, TeleopConfig
-from pipeline.frames import Array
+from pipeline.frames import Array, exp
 from pipeline.signals import Mode
 from server.experiments.forked import forked
 from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulation
@@ -118,26 +118,33 @@ def test_it_stands_a_fifth_of_a_second_after_the_phone_has_vanished(seed: int) -
 class FarHand:
     """The usual one, which goes a way off at 2.5 s within two seconds, stays, and comes back."""
 
-    def __init__(self, way_in_f: tuple[float, float, float], seed: int) -> None:
-        self._hand = make_hand("steady", seed=seed, start=SO101.start)
-        t = np.array([0.0, 1.0, 2.0, 2.5, 4.5, 5.0, 6.0, 6.5, 8.5, 9.0, 10.0, 20.0])
-        share = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    def __init__(self, way_in_f: tuple[float, float, float], roll: float = 0.0) -> None:
+        """`roll` [rad]: meanwhile it turns the phone about its line of sight."""
+        self._hand = make_hand("steady", seed=SEEDS[0], start=SO101.start)
+        t = np.array([0.0, 2.5, 4.5, 6.5, 8.5, 20.0])
+        share = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
         smooth = np.linspace(0.0, 20.0, 801)
         window = np.hanning(41) / np.hanning(41).sum()
-        way = np.convolve(np.pad(np.interp(smooth, t, share), 20, mode="edge"), window, "valid")
-        self._way = make_interp_spline(smooth, np.outer(way, way_in_f), k=5)
-        self._speed_up = self._way.derivative(2)
+        gone = np.convolve(np.pad(np.interp(smooth, t, share), 20, mode="edge"), window, "valid")
+        self._gone = make_interp_spline(smooth, gone, k=5)
+        self._way_in_f, self._roll = np.array(way_in_f), np.array([roll, 0.0, 0.0])
+
+    def _turned(self, t: float) -> Array:
+        turned: Array = exp(self._gone(t) * self._roll)
+        return turned
 
     def pose(self, t: float) -> tuple[Array, Array]:
         R_fc, p_cf_in_f = self._hand.pose(t)
-        return R_fc, p_cf_in_f + self._way(t)
+        return R_fc @ self._turned(t), p_cf_in_f + self._gone(t) * self._way_in_f
 
     def omega_in_c(self, t: float) -> Array:
-        return self._hand.omega_in_c(t)
+        omega: Array = self._turned(t).T @ self._hand.omega_in_c(t)
+        return omega + self._gone(t, 1) * self._roll
 
     def specific_force_in_c(self, t: float) -> Array:
-        force: Array = self._hand.specific_force_in_c(t)
-        return force + self.pose(t)[0].T @ self._speed_up(t)
+        beside_in_f = self._gone(t, 2) * self._way_in_f
+        force: Array = self._turned(t).T @ self._hand.specific_force_in_c(t)
+        return force + self.pose(t)[0].T @ beside_in_f
 
 
 @pytest.mark.parametrize(
@@ -146,7 +153,7 @@ class FarHand:
 def test_led_beyond_its_reach_it_stops_there_says_so_and_comes_back(
     way_m: tuple[float, float, float],
 ) -> None:
-    flight = Led(0.09, SEEDS[0], FarHand(way_m, SEEDS[0])).fly(6.4)
+    flight = Led(0.09, SEEDS[0], FarHand(way_m)).fly(6.4)
     assert flight.loop.trace.left == ""
     beyond = np.linalg.norm(flight.loop.trace.error_in_f[-1])
     assert beyond > 0.05
@@ -158,4 +165,27 @@ def test_led_beyond_its_reach_it_stops_there_says_so_and_comes_back(
     assert rms(flight.loop.trace.error_in_f[-100:]) < 0.010
     assert not any(flight.at_limit[-100:])
     assert Mode.RAMP not in flight.modes
+    flight.stays_within()
+
+
+def test_rolled_as_far_as_a_hand_turns_it_flies_on_and_keeps_its_place() -> None:
+    flight = Led(0.09, SEEDS[0], FarHand((0.0, 0.0, 0.0), 0.8)).fly(11.0)
+    trace = flight.loop.trace
+    assert trace.left == ""
+    assert np.degrees(np.ptp(np.array(flight.angles)[:, 4])) > 38.0
+    assert rms(trace.error_in_f) < 0.010
+    assert np.degrees(rms(trace.turn)) < 2.0
+    assert not any(flight.at_limit)
+    flight.stays_within()
+
+
+def test_rolled_beyond_what_its_joints_can_do_it_keeps_its_place_says_so_and_comes_back() -> None:
+    flight = Led(0.09, SEEDS[0], FarHand((0.0, 0.0, 0.0), 1.5)).fly(11.0)
+    trace = flight.loop.trace
+    assert trace.left == ""
+    assert np.degrees(np.linalg.norm(trace.turn, axis=1)).max() > 10.0
+    assert np.linalg.norm(trace.error_in_f, axis=1).max() < 0.030
+    assert any(flight.at_limit)
+    assert not any(flight.at_limit[-100:])
+    assert np.degrees(rms(trace.turn[-100:])) < 2.0
     flight.stays_within()

@@ -98,6 +98,17 @@ def test_a_wall_before_it_is_seen_in_the_pictures_and_ends_no_flight(name: str, 
     assert after_m < 0.015
 
 
+def stall(flight: Led) -> list[bool]:
+    flight.plant.is_blocked = True
+    return [flight.loop.advance().at_limit for _ in range(200)]
+
+
+def test_a_wall_before_it_is_told_to_who_leads_it() -> None:
+    told = forked(partial(stall, led("rover-measured")))
+    assert not told[0]
+    assert told[-1]
+
+
 def vanish(flight: Led) -> tuple[list[Array], list[Mode]]:
     flight.loop.lost = {"motion", "picture", "touch"}
     told, modes = [], []
