@@ -69,11 +69,11 @@ class ArmPlant:
         self._commanded = self._allowed = np.zeros(6)
 
     def _stand_at_home(self) -> None:
-        data = self._data
-        data.qpos[:] = self.arm.configuration(self.arm.parameters.home)
-        data.ctrl[:] = data.qpos[self._model.jnt_qposadr[self._model.actuator_trnid[:, 0]]]
-        if self._model.na:
-            data.act[:] = data.ctrl
+        data, home = self._data, self.arm.parameters.home
+        data.qpos[:] = self.arm.configuration(home)
+        data.ctrl[self._servos] = home
+        lagging = self._model.actuator_actadr >= 0
+        data.act[self._model.actuator_actadr[lagging]] = data.ctrl[lagging]
         mujoco.mj_forward(self._model, data)
 
     def step(self, twist_in_b: Array, dt: float = 0.005) -> None:
@@ -170,8 +170,9 @@ def _servos(arm: ArmModel) -> list[int]:
     Raises:
         ArmError: a joint has none.
     """
-    model = arm.model
-    moves = {int(joint): servo for servo, joint in enumerate(model.actuator_trnid[:, 0])}
+    model, of_joints = arm.model, arm.model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+    joints = model.actuator_trnid[:, 0]
+    moves = {int(joints[servo]): int(servo) for servo in np.flatnonzero(of_joints)}
     lacking = [name for name in arm.names if model.joint(name).id not in moves]
     if lacking:
         raise ArmError("model", f"a position servo for each joint, and for {', '.join(lacking)}")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from hardware.arm.arm_model import ArmError
 from hardware.plant_parameters import NO_SENSORS
 from hardware.sim.plant.arm_plant import ArmPlant
 from pipeline.frames import GRAVITY
@@ -105,3 +108,13 @@ def test_where_it_goes_is_where_it_then_is():
         assert arm.p_bf_in_f == pytest.approx(p, abs=0.0005)
         assert arm.wxyz_fb == pytest.approx(wxyz, abs=0.002)
     assert ahead[-1][0] == pytest.approx(0.05)
+
+
+def test_a_joint_without_a_servo_is_named(tmp_path):
+    text = PARAMETERS.model.read_text()
+    lacking = '<position name="elbow_flex" joint="elbow_flex"/>'
+    assert lacking in text
+    (tmp_path / "so101.xml").write_text(text.replace(lacking, ""))
+    arm = replace(PARAMETERS, model=tmp_path / "so101.xml")
+    with pytest.raises(ArmError, match=r"arm\.model: a position servo for .* elbow"):
+        ArmPlant(arm, DRIVE, AXES, NO_SENSORS, np.random.default_rng(0))
