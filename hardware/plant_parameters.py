@@ -55,6 +55,8 @@ class ArmParameters:
     """(n,) angles of the joints from base to tip, where it begins [rad]."""
     rate: float
     """Largest of each joint [rad/s]."""
+    servo_lag_s: float
+    """By which its servos follow what they are told."""
     keeps_apart: tuple[tuple[str, str], ...]
     """Names of geoms in it of which no two come nearer to each other than ..."""
     apart: float

@@ -84,6 +84,8 @@ class ArmSection(Section):
     """Where it begins: of the joints from the base to the tip."""
     joint_speed_deg_s: Annotated[float, Field(gt=0.0, le=720.0)]
     """Largest of each of them."""
+    servo_lag_s: Annotated[float, Field(ge=0.0, le=0.2)] = 0.0
+    """By which servos follow the angles that they are told: they are told so much ahead."""
     keeps_apart: Annotated[
         list[Annotated[list[str], Field(min_length=2, max_length=2)]],
         Field(max_length=64, default_factory=list),
@@ -197,6 +199,7 @@ def arm_of(section: ArmSection, folder: Path) -> ArmParameters:
         tip=section.tip,
         home=np.radians(section.home_deg),
         rate=radians(section.joint_speed_deg_s),
+        servo_lag_s=section.servo_lag_s,
         keeps_apart=tuple((one, other) for one, other in section.keeps_apart),
         apart=section.apart_m,
     )

@@ -20,11 +20,11 @@ from hardware.arm.mink_extra import mink
 from pipeline.frames import Array
 
 NEARS_PER_S: Final = 6.0
-"""Speed of an approach per way left: at 120 °/s a joint slows down from 20° before its end on."""
+"""Speed of an approach per way left: at 96 °/s a joint slows down from 16° before its end on."""
 MARGIN_RAD: Final = 0.02
 """Joints stay so far from the ends of their ranges: servos swing a little beyond what is told."""
-RATE_SHARE: Final = 0.95
-"""Of the largest rate is asked of a joint: in encoders' steps servos turn a little faster."""
+RATE_SHARE: Final = 0.8
+"""Of the largest rate is asked of a joint: hurried, its servo swings beyond that by up to 20 %."""
 SEES_M: Final = 0.15
 """Parts that are farther from each other are not looked at: at 0.9 m/s they may come nearer."""
 

@@ -82,19 +82,13 @@ class ArmPlant:
         while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
             self._commanded = self._drive.within(self._on_their_way.popleft()[1])
         self._allowed = self._drive.toward(self._allowed, self._commanded, dt)
-        before = self._setpoints.told
         told = self._setpoints.follow(self._allowed, self.encoders, dt)
         self._data.ctrl[self._servos] = _in_steps(told)
         steps = round(1e3 * dt / STEP_MS)
         mujoco.mj_step(self._model, self._data, steps)
         mujoco.mj_forward(self._model, self._data)
         self._now_ms += steps * STEP_MS
-        self._odometry.step((told - before) / dt, self.encoders, dt)
-
-    @property
-    def told(self) -> Array:
-        """Angles that the servos are told (n,) [rad], steps aside."""
-        return self._setpoints.told
+        self._odometry.step(self._setpoints.rates, self.encoders, dt)
 
     @property
     def angles(self) -> Array:

@@ -9,7 +9,7 @@ from hardware.arm.inverse_kinematics import InverseKinematics
 from hardware.arm.joint_setpoints import AHEAD_RAD, JointSetpoints
 from hardware.arm.tip_odometry import TipOdometry
 from hardware.sim.plant.arm_plant import ENCODER_STEP_RAD
-from tests.hardware.arm.arms import ARM, AXES, H_S, HOME
+from tests.hardware.arm.arms import ARM, AXES, H_S, HOME, PARAMETERS
 
 FORWARD = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
 LAG_S = 0.03
@@ -21,21 +21,34 @@ def setpoints(q=HOME):
 
 def test_a_twist_goes_on_from_what_was_told_whatever_servos_lag_or_bend():
     one = setpoints()
-    lagging = HOME + 0.01
+    bent = HOME + 0.01
     for _ in range(100):
-        told = one.follow(FORWARD, lagging, H_S)
-        lagging = lagging + 0.2 * (told + 0.01 - lagging)
-    moved = ARM.tip(told)[1] - ARM.tip(HOME)[1]
+        told = one.follow(FORWARD, bent, H_S)
+        bent = bent + 0.2 * (told + 0.01 - bent)
+    moved = ARM.tip(one.wanted)[1] - ARM.tip(HOME)[1]
     assert moved == pytest.approx([0.05, 0.0, 0.0], abs=0.001)
+
+
+def test_servos_are_told_where_they_shall_be_after_their_lag():
+    one, lagging = setpoints(), HOME.copy()
+    follows = 1.0 - np.exp(-H_S / PARAMETERS.servo_lag_s)
+    for _ in range(100):
+        lagging = lagging + follows * (one.follow(FORWARD, lagging, H_S) - lagging)
+    assert lagging == pytest.approx(one.wanted, abs=0.004)
+    assert one.rates == pytest.approx(np.linalg.pinv(ARM.jacobian(lagging)) @ FORWARD, abs=0.03)
+    one.follow(np.zeros(6), lagging, H_S)
+    assert not one.rates.any()
 
 
 def test_an_arm_that_is_held_is_told_to_be_little_ahead_and_comes_back_at_once():
     held = setpoints()
     for _ in range(400):
-        told = held.follow(FORWARD, HOME, H_S)
-        assert np.abs(told - HOME).max() <= AHEAD_RAD + 1e-9
-    back = held.follow(-FORWARD, HOME, H_S)
-    assert np.abs(back - HOME).max() < np.abs(told - HOME).max()
+        held.follow(FORWARD, HOME, H_S)
+        ahead = np.abs(held.wanted - HOME)
+        assert ahead.max() <= AHEAD_RAD + 1e-9
+    assert held.rates == pytest.approx(np.zeros(5), abs=1e-3)
+    held.follow(-FORWARD, HOME, H_S)
+    assert np.abs(held.wanted - HOME).max() < ahead.max()
 
 
 def test_an_arm_that_begins_beyond_its_range_is_told_to_be_in_it():

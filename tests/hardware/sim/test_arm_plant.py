@@ -54,7 +54,7 @@ def test_it_follows_each_axis_that_it_is_led_along_by_the_lag_of_its_file(axis, 
     response, honest = (moves @ wave) / (told @ wave), (says @ wave) / (moves @ wave)
     lag_s = -np.angle(response) / (2.0 * np.pi * 1.5)
     assert abs(response) == pytest.approx(1.0, abs=0.1)
-    assert lag_s == pytest.approx(DRIVE.lag_s + DRIVE.delay_s, abs=0.006)
+    assert lag_s == pytest.approx(DRIVE.lag_s + DRIVE.delay_s, abs=0.008)
     assert abs(honest) == pytest.approx(1.0, abs=0.05)
     assert abs(np.angle(honest)) / (2.0 * np.pi * 1.5) < 0.004
 
@@ -84,17 +84,17 @@ def test_it_is_the_same_for_a_seed():
     assert (one == again).all()
 
 
-def test_told_zero_it_stands_within_a_fifth_of_a_second_from_full_speed():
+def test_told_zero_it_stands_little_later_than_its_brakes_need():
     arm = plant()
     for _ in range(60):
         arm.step(along(1, DRIVE.speed))
-    assert np.linalg.norm(arm.twist_in_b[:3]) > 0.25
+    assert np.linalg.norm(arm.twist_in_b[:3]) > 0.2
     speeds = []
     for _ in range(100):
         arm.step(STILL)
         speeds.append(np.linalg.norm(arm.twist_in_b[:3]))
     stands = next(k for k, v in enumerate(speeds) if v < 0.005)
-    assert TICK_S * stands < DRIVE.stop_s + DRIVE.delay_s + 4.0 * DRIVE.lag_s
+    assert TICK_S * stands < DRIVE.stop_s + DRIVE.delay_s + 0.05
     assert max(speeds[60:]) < 0.002
 
 

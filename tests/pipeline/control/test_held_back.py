@@ -1,5 +1,7 @@
 """Whether a robot that is told a twist is held back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from hardware.robot_file import COMMANDS, load_robot
 from pipeline.control.held_back import HeldBack
 
 ROBOT = load_robot("so101", takes=COMMANDS).robot
-DRIVE, PERIOD_S = ROBOT.twist, 0.005
+DRIVE, PERIOD_S = replace(ROBOT.twist, lag_s=0.03), 0.005
 
 
 def watched(told, moves, seconds=3.0):
