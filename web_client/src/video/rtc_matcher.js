@@ -29,6 +29,8 @@ const OLD_US = 200_000;
 const FAR_US = 5000;
 /** Where cameras are too regular to tell, the quicker encoder is believed: a period costs half a ms. */
 const DELAY_COST = 0.015;
+/** None leaves before it was taken, but a busy page's first captures are told of some ms later than it knows. */
+const EARLY_COST = 0.2;
 
 export class CaptureMatcher {
   constructor() {
@@ -110,7 +112,7 @@ export class CaptureMatcher {
   /** How far RTP's clock would be ahead by each capture that a frame may be. @param {Encoded} frame */
   possible({ stampUs, outUs }) {
     return this.captures
-      .filter(({ captureUs }) => captureUs <= outUs + this.lateUs && captureUs > outUs - OLD_US)
+      .filter(({ captureUs }) => captureUs <= outUs + this.lateUs + FAR_US && captureUs > outUs - OLD_US)
       .map((capture) => stampUs - capture.stampUs);
   }
 
@@ -128,7 +130,8 @@ export class CaptureMatcher {
       misfit += Math.min(Math.abs(offset(this.captures, wayUs)), FAR_US) / frames.length;
       delayUs = Math.min(delayUs, outUs - this.taken(wayUs).captureUs);
     }
-    return { aheadUs, delayUs, misfit: delayUs < -this.lateUs ? Infinity : misfit + DELAY_COST * delayUs };
+    const earlyUs = Math.max(0, -this.lateUs - delayUs);
+    return { aheadUs, delayUs, misfit: misfit + DELAY_COST * delayUs + EARLY_COST * earlyUs };
   }
 
   /** @param {number} rtpTimestamp */
