@@ -58,9 +58,9 @@ class Bounds(mink.Limit):
             if seen is not None:
                 rows.append(seen[0])
                 left.append(np.array([NEARS_PER_S * seen[1]]))
-        shrinks, stretch = self._stretch(jacobian)
+        shrinks, left_m = self._singularity(jacobian)
         rows.append(shrinks)
-        left.append(np.array([NEARS_PER_S * stretch]))
+        left.append(np.array([NEARS_PER_S * left_m]))
         self._G, self._left = np.vstack(rows), np.maximum(0.0, h * np.concatenate(left))
 
     def take(self, way: Array) -> None:
@@ -75,7 +75,7 @@ class Bounds(mink.Limit):
         """What is left. See `mink.Limit`."""
         return mink.Constraint(self._G, self._left)
 
-    def _stretch(self, jacobian: Array) -> tuple[Array, float]:
+    def _singularity(self, jacobian: Array) -> tuple[Array, float]:
         """How the least motion that joints make shrinks, per angle (1, nv), and by how much it may.
 
         [m/rad], along the axes alone that the robot is led along. Least: of the singular values

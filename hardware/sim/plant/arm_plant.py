@@ -9,7 +9,6 @@ World axes f: those of the arm's base k, from where the tip is at home.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from math import pi
 
@@ -23,6 +22,7 @@ from hardware.arm.joint_setpoints import JointSetpoints
 from hardware.arm.tip_odometry import TipOdometry
 from hardware.plant_parameters import ArmParameters, BodyImuParameters
 from hardware.sim.plant.coasting import coasting
+from hardware.sim.plant.delayed_twist import DelayedTwist
 from hardware.sim.plant.model import STEP_MS
 from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
 from pipeline.frames import Array, wxyz_from_R
@@ -54,7 +54,8 @@ class ArmPlant:
             ArmError: its model can't be used, or mink is missing.
         """
         self.arm = ArmModel(arm)
-        self._drive, self._imu = drive, BodyImuErrors(imu, rng, options or PlantOptions())
+        self._told = DelayedTwist(drive)
+        self._imu = BodyImuErrors(imu, rng, options or PlantOptions())
         self._model = self.arm.model
         self._model.opt.timestep = 1e-3 * STEP_MS
         self._data = mujoco.MjData(self._model)
@@ -64,9 +65,6 @@ class ArmPlant:
         self._stand_at_home()
         self._setpoints = JointSetpoints(InverseKinematics(self.arm, axes), arm.home)
         self._odometry = TipOdometry(self.arm, drive.lag_s, arm.home)
-        self._delay_ms, self._now_ms = round(1e3 * drive.delay_s), 0
-        self._on_their_way: deque[tuple[int, Array]] = deque()
-        self._commanded = self._allowed = np.zeros(6)
 
     def _stand_at_home(self) -> None:
         data, home = self._data, self.arm.parameters.home
@@ -78,16 +76,13 @@ class ArmPlant:
 
     def step(self, twist_in_b: Array, dt: float = 0.005) -> None:
         """Go on by `dt` [s], whole milliseconds, with a new command (6,) [m/s, rad/s]."""
-        self._on_their_way.append((self._now_ms + self._delay_ms, np.array(twist_in_b)))
-        while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
-            self._commanded = self._drive.within(self._on_their_way.popleft()[1])
-        self._allowed = self._drive.toward(self._allowed, self._commanded, dt)
-        told = self._setpoints.follow(self._allowed, self.encoders, dt)
-        self._data.ctrl[self._servos] = _in_steps(told)
         steps = round(1e3 * dt / STEP_MS)
+        self._told.tell(twist_in_b)
+        allowed_in_b = self._told.step(steps * STEP_MS)
+        told = self._setpoints.follow(allowed_in_b, self.encoders, dt)
+        self._data.ctrl[self._servos] = _in_steps(told)
         mujoco.mj_step(self._model, self._data, steps)
         mujoco.mj_forward(self._model, self._data)
-        self._now_ms += steps * STEP_MS
         self._odometry.step(self._setpoints.rates, self.encoders, dt)
 
     @property

@@ -9,7 +9,6 @@ something blocks it.
 
 from __future__ import annotations
 
-from collections import deque
 from math import exp as exponential
 from math import sqrt
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from hardware.plant_parameters import BodyImuParameters
 from hardware.sim.plant.coasting import coasting
+from hardware.sim.plant.delayed_twist import DelayedTwist
 from hardware.sim.plant.model import STEP_MS
 from hardware.sim.plant.plant import BodyImuErrors, PlantOptions
 from pipeline.frames import GRAVITY, Array, cross, exp, wxyz_from_R
@@ -39,13 +39,11 @@ class TwistPlant:
         slip: float = 0.0,
     ) -> None:
         """At rest; `slip` is the share's standard deviation."""
-        self._drive = drive
+        self._told = DelayedTwist(drive)
         self._imu = BodyImuErrors(imu, rng, options or PlantOptions())
         h = 1e-3 * STEP_MS
         self._h, self._share = h, 1.0 - exponential(-h / (0.5 * drive.lag_s))
-        self._delay_ms, self._now_ms = round(1e3 * drive.delay_s), 0
-        self._on_their_way: deque[tuple[int, Array]] = deque()
-        self._commanded = self._allowed = self._halfway = np.zeros(6)
+        self._halfway = np.zeros(6)
         self.twist_in_b: Array = np.zeros(6)
         """Velocity and angular rate in f, in b (6,) [m/s, rad/s]."""
         self.wheels_in_b: Array = np.zeros(6)
@@ -63,17 +61,13 @@ class TwistPlant:
 
     def step(self, twist_in_b: Array, dt: float = 0.005) -> None:
         """Go on by `dt` [s], whole milliseconds, with a new command (6,) [m/s, rad/s]."""
-        self._on_their_way.append((self._now_ms + self._delay_ms, np.array(twist_in_b)))
+        self._told.tell(twist_in_b)
         for _ in range(round(1e3 * dt / STEP_MS)):
-            while self._on_their_way and self._on_their_way[0][0] <= self._now_ms:
-                self._commanded = self._drive.within(self._on_their_way.popleft()[1])
-            self._move()
-            self._now_ms += STEP_MS
+            self._move(self._told.step(STEP_MS))
 
-    def _move(self) -> None:
+    def _move(self, allowed_in_b: Array) -> None:
         h, share = self._h, self._share
-        self._allowed = self._drive.toward(self._allowed, self._commanded, h)
-        self._halfway = self._halfway + share * (self._allowed - self._halfway)
+        self._halfway = self._halfway + share * (allowed_in_b - self._halfway)
         before = self.twist_in_b
         if self.is_blocked and not self.wheels_spin:
             self._halfway = self.wheels_in_b = np.zeros(6)
