@@ -38,7 +38,8 @@ class HeldBack:
     def watch(self, told_in_b: Array, moves_in_b: Array | None, h: float) -> None:
         """For `h` [s] it was told a twist (6,), and it moves so; None: it does not say."""
         if moves_in_b is None:
-            return self.start()
+            self.start()
+            return
         follows, averages = low_pass.share(h / self._late_s), low_pass.share(h / AVERAGED_S)
         self._expected = self._expected + follows * (told_in_b - self._expected)
         missing = np.where(self._axes, self._expected - moves_in_b, 0.0)
@@ -46,7 +47,6 @@ class HeldBack:
             self._expected - self._mean_expected
         )
         self._mean_missing = self._mean_missing + averages * (missing - self._mean_missing)
-        return None
 
     @property
     def taken(self) -> float:

@@ -4,6 +4,7 @@ Slow, a push can't be told from a place: both pull for ever. But no motion is as
 what thrusters and suspension do not explain then is the push's. One that stays is kept apart so
 until it is let go, which is as quick, or for as long as `PUSH_STAYS_S`. It is learnt as a
 disturbance observer does (Ohnishi 1987), by what is missed, but in the moments of a touch alone.
+A touch stands out from what is missed usually, by a robot that is not quite as its file says.
 """
 
 from __future__ import annotations
