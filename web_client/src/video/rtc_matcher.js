@@ -29,7 +29,9 @@ const OLD_US = 200_000;
 const FAR_US = 5000;
 /** Where cameras are too regular to tell, the quicker encoder is believed: a period costs half a ms. */
 const DELAY_COST = 0.015;
-/** None leaves before it was taken, but a busy page's first captures are told of some ms later than it knows. */
+/** None leaves before it was taken, but a busy page's first captures are told of so much later than it knows [µs], */
+const EARLY_US = 5000;
+/** at a cost. */
 const EARLY_COST = 0.2;
 
 export class CaptureMatcher {
@@ -112,7 +114,7 @@ export class CaptureMatcher {
   /** How far RTP's clock would be ahead by each capture that a frame may be. @param {Encoded} frame */
   possible({ stampUs, outUs }) {
     return this.captures
-      .filter(({ captureUs }) => captureUs <= outUs + this.lateUs + FAR_US && captureUs > outUs - OLD_US)
+      .filter(({ captureUs }) => captureUs <= outUs + this.lateUs + EARLY_US && captureUs > outUs - OLD_US)
       .map((capture) => stampUs - capture.stampUs);
   }
 
