@@ -391,15 +391,6 @@ def test_a_robot_that_takes_a_twist_is_refused_where_only_thrusts_are_known():
     assert (drive.speed, drive.rate) == (0.5, pytest.approx(np.pi / 2))
 
 
-def is_named(tmp_path, robot, old, new, allowed):
-    """The shipped `robot` with a mistake `new` in place of `old` is refused by what is allowed."""
-    text = robot_path(robot).read_text(encoding="utf-8")
-    assert old in text
-    (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(RobotFileError, match=allowed):
-        load_robot(tmp_path / "changed.toml", takes=COMMANDS)
-
-
 TWIST_MISTAKES = {
     "brakes too late": ("acceleration_m_s2 = 5.0", "acceleration_m_s2 = 4.0", "4.55 or more"),
     "turns too long": ("deg_s2 = 1000.0", "deg_s2 = 800.0", "818 or more"),
@@ -410,11 +401,6 @@ TWIST_MISTAKES = {
     "no numbers": ("speed_m_s = 0.5", "speed_m_s = nan", "finite"),
     "LEDs in one place": ("[-0.089, 0.053, 0.140]", "[-0.012, -0.084, -0.117]", "from the others"),
 }
-
-
-@pytest.mark.parametrize("mistake", TWIST_MISTAKES)
-def test_a_mistake_of_a_robot_that_takes_a_twist_is_named(tmp_path, mistake):
-    is_named(tmp_path, "twister", *TWIST_MISTAKES[mistake])
 
 
 MOTION_MISTAKES = {
@@ -435,11 +421,6 @@ MOTION_MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("mistake", MOTION_MISTAKES)
-def test_a_mistake_in_what_a_robot_tells_of_its_motion_is_named(tmp_path, mistake):
-    is_named(tmp_path, "rover", *MOTION_MISTAKES[mistake])
-
-
 ARM_MISTAKES = {
     "a mesh for a model": ('"so101.xml"', '"so101.stl"', "arm.model: "),
     "a model elsewhere": ('"so101.xml"', '"../so101.xml"', "arm.model: "),
@@ -450,9 +431,19 @@ ARM_MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("mistake", ARM_MISTAKES)
-def test_a_mistake_in_what_an_arm_is_is_named(tmp_path, mistake):
-    is_named(tmp_path, "so101", *ARM_MISTAKES[mistake])
+MISTAKEN = {"twister": TWIST_MISTAKES, "rover": MOTION_MISTAKES, "so101": ARM_MISTAKES}
+
+
+@pytest.mark.parametrize(
+    ("robot", "mistake"), [(robot, one) for robot, table in MISTAKEN.items() for one in table]
+)
+def test_a_mistake_of_a_robot_that_takes_a_twist_is_named(tmp_path, robot, mistake):
+    old, new, allowed = MISTAKEN[robot][mistake]
+    text = robot_path(robot).read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "changed.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(RobotFileError, match=allowed):
+        load_robot(tmp_path / "changed.toml", takes=COMMANDS)
 
 
 def test_the_model_of_an_arm_lies_beside_its_file(tmp_path):
