@@ -29,7 +29,7 @@ STANDS_M_S = 0.005
 FOLLOWS_S = 8.0
 
 
-class Led:
+class ArmFlight:
     """A flight, and what its arm was told, how it moved and what people were told."""
 
     def __init__(
@@ -52,7 +52,7 @@ class Led:
         self.at_limit: list[bool] = []
         self.modes: list[Mode] = []
 
-    def fly(self, seconds: float) -> Led:
+    def fly(self, seconds: float) -> ArmFlight:
         until = self.loop.t + seconds - 1e-9
         while self.loop.t < until:
             output = self.loop.advance()
@@ -73,8 +73,8 @@ class Led:
 
 
 @cache
-def led(latency_s: float, seed: int) -> Led:
-    return Led(latency_s, seed).fly(FOLLOWS_S)
+def flown(latency_s: float, seed: int) -> ArmFlight:
+    return ArmFlight(latency_s, seed).fly(FOLLOWS_S)
 
 
 def rms(rows: list[Array]) -> float:
@@ -86,7 +86,7 @@ def rms(rows: list[Array]) -> float:
 def test_it_follows_a_hand_within_its_limits_and_nobody_is_told_of_its_reach(
     latency_s: float, seed: int
 ) -> None:
-    flight = led(latency_s, seed)
+    flight = flown(latency_s, seed)
     trace = flight.loop.trace
     assert trace.left == ""
     assert len(trace.t) > 1000
@@ -97,7 +97,7 @@ def test_it_follows_a_hand_within_its_limits_and_nobody_is_told_of_its_reach(
     flight.stays_within()
 
 
-def vanish(flight: Led) -> tuple[float, float]:
+def vanish(flight: ArmFlight) -> tuple[float, float]:
     """The phone is gone; after how long it is told zero and stands, for good [s]."""
     flight.loop.lost = {"motion", "picture", "touch"}
     flight.told, flight.speeds = [], []
@@ -109,7 +109,7 @@ def vanish(flight: Led) -> tuple[float, float]:
 
 @pytest.mark.parametrize("kind", ["filming", "walking"])
 def test_it_stands_a_fifth_of_a_second_after_the_phone_has_vanished(kind: str) -> None:
-    flight = Led(0.12, SEEDS[0], kind=kind).fly(6.0)
+    flight = ArmFlight(0.12, SEEDS[0], kind=kind).fly(6.0)
     for _ in range(6):
         flight.fly(0.115)
         told_s, stands_s = forked(partial(vanish, flight))
@@ -155,7 +155,7 @@ class FarHand:
 def test_led_beyond_its_reach_it_stops_there_says_so_and_comes_back(
     way_m: tuple[float, float, float],
 ) -> None:
-    flight = Led(0.09, SEEDS[0], FarHand(way_m)).fly(6.4)
+    flight = ArmFlight(0.09, SEEDS[0], FarHand(way_m)).fly(6.4)
     assert flight.loop.trace.left == ""
     beyond = np.linalg.norm(flight.loop.trace.error_in_f[-1])
     assert beyond > 0.05
@@ -171,7 +171,7 @@ def test_led_beyond_its_reach_it_stops_there_says_so_and_comes_back(
 
 
 def test_rolled_as_far_as_a_hand_turns_it_flies_on_and_keeps_its_place() -> None:
-    flight = Led(0.09, SEEDS[0], FarHand((0.0, 0.0, 0.0), 0.8)).fly(11.0)
+    flight = ArmFlight(0.09, SEEDS[0], FarHand((0.0, 0.0, 0.0), 0.8)).fly(11.0)
     trace = flight.loop.trace
     assert trace.left == ""
     assert np.degrees(np.ptp(np.array(flight.angles)[:, 4])) > 38.0
@@ -182,7 +182,7 @@ def test_rolled_as_far_as_a_hand_turns_it_flies_on_and_keeps_its_place() -> None
 
 
 def test_rolled_beyond_what_its_joints_can_do_it_keeps_its_place_says_so_and_comes_back() -> None:
-    flight = Led(0.09, SEEDS[0], FarHand((0.0, 0.0, 0.0), 1.5)).fly(11.0)
+    flight = ArmFlight(0.09, SEEDS[0], FarHand((0.0, 0.0, 0.0), 1.5)).fly(11.0)
     trace = flight.loop.trace
     assert trace.left == ""
     assert np.degrees(np.linalg.norm(trace.turn, axis=1)).max() > 10.0
