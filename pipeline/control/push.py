@@ -23,11 +23,11 @@ TOUCHED_N = 1.0
 """A smaller one may be a touch as well: in free flight, with hands of any kind, there is 0.4 N at
 most ..."""
 IN_TRANSIT = 0.5
-"""... and this share of what thrusters are on their way to give: they lag in their own way ..."""
+"""... and this share of what thrusters are on their way to give: they lag in their own way."""
 USUAL, USUAL_S = 4.0, 3.0
-"""... and so many times what is missed usually: the RMS of as long [s]. A robot that weighs more or
-less than told, or hangs from another spring, misses some all the time; one whose cable is slack now
-and then, as much as a touch: then nothing can be told."""
+"""It begins with so many times what is missed usually: the RMS of as long [s]. A robot that weighs
+more or less than told, or hangs from another spring, misses some all the time; one whose cable is
+slack now and then, as much as a touch: then nothing can be told."""
 PUSH_BEGINS_S, PUSH_LEARNT_S = 0.3, 0.03
 """So long after a touch [s] what is missed is a push, learnt in the second: thrusters that answer
 it have then come to where they go; the accelerometer, 50 mg off, to 2 cm."""
@@ -47,9 +47,9 @@ class PushObserver:
     def __init__(self) -> None:
         """Nothing has pushed yet, nor has it been untouched for long."""
         self._missed_in_f, self._to_come_n, self._usual_n2 = np.zeros(3), 0.0, 0.0
-        self._quick_s, self._tells = 0.0, False
+        self._quick_s, self._tells, self._is_quick = 0.0, False, False
         self.untouched_s = 0.0
-        """How long nothing has begun or ended to push [s]."""
+        """How long all but `TOUCHED_N` of what moves it has been explained [s]."""
         self.force_in_f: Array = np.zeros(3)
         """What pushes (3,) [N], the touch that is being learnt included ..."""
         self.known_in_f: Array = np.zeros(3)
@@ -63,8 +63,8 @@ class PushObserver:
 
     @property
     def is_told_apart(self) -> bool:
-        """Whether what pushes is known: no touch is being learnt, or was too soon after another."""
-        return self._tells and self.untouched_s > PUSH_BEGINS_S
+        """Whether what pushes is known: it can be told, and no touch is being learnt."""
+        return self._tells and not self._is_quick
 
     def observe(self, missed_in_f: Array, to_come_n: float, h: float, *, is_off: bool) -> bool:
         """Whether what is missed is a push's, which is learnt, and not the place's.
@@ -82,15 +82,16 @@ class PushObserver:
         missed_n, usual_n = float(np.linalg.norm(self._missed_in_f)), sqrt(self._usual_n2)
         least_n = max(TOUCHED_N, USUAL * usual_n)
         self._usual_n2 += low_pass.share(h / USUAL_S) * (min(missed_n, least_n) ** 2 - usual_n**2)
-        is_touched = missed_n > least_n + IN_TRANSIT * self._to_come_n
-        self.untouched_s = 0.0 if is_touched else self.untouched_s + h
-        is_quick = self.untouched_s < PUSH_BEGINS_S
-        self._quick_s = max(0.0, self._quick_s + (h if is_quick else -h * PUSH_RESTS))
+        unexplained_n = missed_n - IN_TRANSIT * self._to_come_n
+        self.untouched_s = 0.0 if unexplained_n > TOUCHED_N else self.untouched_s + h
+        goes_on = self._is_quick and self.untouched_s < PUSH_BEGINS_S
+        self._is_quick = goes_on or unexplained_n > least_n
+        self._quick_s = max(0.0, self._quick_s + (h if self._is_quick else -h * PUSH_RESTS))
         self._tells = self._tells or self.untouched_s > FOUND_S
         if is_off or self._quick_s > PUSH_BEGUN_S or usual_n > TOUCHED_N:
             self._tells = False
             self.force_in_f = self.known_in_f = np.zeros(3)
-        elif self._tells and is_quick:
+        elif self._tells and self._is_quick:
             self.force_in_f = self.force_in_f + low_pass.share(h / PUSH_LEARNT_S) * missed_in_f
             return True
         else:

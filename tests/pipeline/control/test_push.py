@@ -119,3 +119,15 @@ def test_who_misses_as_much_as_a_touch_all_the_time_can_tell_nothing() -> None:
     assert not push.is_told_apart
     assert not any(observe(push, 0.5, 8.0 * PUSH_IN_F))
     assert not push.force_in_f.any()
+
+
+def test_what_begins_to_sway_as_much_as_a_touch_ends_in_no_push_and_is_not_untouched() -> None:
+    """A vibration beside the sample rate, say: what it misses becomes usual while it is a touch."""
+    push = untouched()
+    for k in range(round(1.4 / H)):
+        missed_in_f = np.array([2.5 * np.sin(19.0 * k * H), 0.0, 0.0]) - push.force_in_f
+        push.observe(missed_in_f, 0.0, H, is_off=False)
+        if k * H > PUSH_BEGINS_S:
+            assert not push.is_told_apart
+            assert push.untouched_s < PUSH_BEGINS_S
+    assert not push.force_in_f.any()
