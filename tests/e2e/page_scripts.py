@@ -4,6 +4,7 @@ LENS = "canvas camera"
 BE_CAMERA = f"""navigator.mediaDevices.getUserMedia = async () => {{
     const stream = canvas.captureStream(30);
     Object.defineProperty(stream.getVideoTracks()[0], 'label', {{value: '{LENS}'}});
+    window.filming = stream;
     return stream;
   }};"""
 """What is painted on `canvas` is what the page's camera sees."""
@@ -44,3 +45,20 @@ window.pageHoles = [];
 })();
 """
 """Notes when the page's main thread was away, and for how long [ms]."""
+COUNT_GIVEN = """
+(() => {
+  const came = {phone_imu: [], video: []};
+  const note = (name) => came[name].push(performance.now());
+  const gyroscope = new Gyroscope({frequency: 60});
+  gyroscope.onreading = () => note('phone_imu');
+  gyroscope.start();
+  const {readable} = new MediaStreamTrackProcessor({track: filming.getVideoTracks()[0].clone()});
+  readable.pipeTo(new WritableStream({write(frame) { note('video'); frame.close(); }}));
+  window.givenHz = (windowS) => {
+    const since = performance.now() - 1000 * windowS;
+    const rate = (times) => times.filter((t) => t >= since).length / windowS;
+    return Object.fromEntries(Object.entries(came).map(([name, times]) => [name, rate(times)]));
+  };
+})();
+"""
+"""Counts what a page that films was given to send on: a slow machine's browser gives less."""

@@ -9,6 +9,7 @@ import signal
 import ssl
 import subprocess
 import sys
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -28,6 +29,7 @@ from server.protocol.messages import Status, decode_from_server
 from server.protocol.wire import VERSION
 from server.recording.reader import read
 from server.recording.writer import SERVER_MESSAGES
+from tests.e2e.flight_log import FlightLog
 from tests.e2e.serving import Serving, serving
 
 pytestmark = pytest.mark.e2e
@@ -35,6 +37,8 @@ MODULES = {"robot": "hardware.sim.robot", "control": "server.control.process", "
 ZERO_N = 1e-3
 RAMP_S = 6.0
 """A ramp of one period of the suspension, with the failsafe's waits before it."""
+LEAST_RAMP_S = 1.0
+"""Of it between nine tenths and one tenth of the thrust."""
 LOST_S = 0.3
 """Of a recording, at most, by a server that is killed."""
 ANSWER_S = 0.5
@@ -215,6 +219,37 @@ def test_what_it_leaves_on_the_disk_is_for_its_user_alone(server: Serving) -> No
     assert open_to_others(server.state) == []
 
 
+class ThrustLog:
+    """Thrust by the robot's own time, looked at from a thread that waits for no server."""
+
+    def __init__(self, server: Serving) -> None:
+        self._truth = TruthClient(server.truth_port, timeout=ANSWER_S)
+        self._is_over = threading.Event()
+        self.seen: list[tuple[float, float]] = []
+        """(t [s], sum of the thrusts [N])."""
+        self._thread = threading.Thread(target=self._look)
+        self._thread.start()
+
+    def _look(self) -> None:
+        while not self._is_over.wait(0.01):
+            with contextlib.suppress(FollowerError):  # next time
+                truth = self._truth.latest()
+                self.seen.append((float(truth.t[-1]), float(np.abs(truth.thrusts).sum())))
+
+    def close(self) -> None:
+        self._is_over.set()
+        self._thread.join()
+        self._truth.close()
+
+    @property
+    def are_over(self) -> bool:
+        return any(total < ZERO_N for _, total in self.seen)
+
+    def ramp(self, before: float) -> list[tuple[float, float]]:
+        """What was seen on the way down from a thrust [N]: a cut has no way."""
+        return [(t, total) for t, total in self.seen if 0.1 * before < total < 0.9 * before]
+
+
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "ended"])
 def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarmed(
     server: Serving, number: signal.Signals
@@ -222,18 +257,19 @@ def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarm
     with (
         closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth,
         flight(server) as phone,
+        closing(FlightLog(server)) as log,
+        closing(ThrustLog(server)) as thrusts,
     ):
         before = thrust(truth)
         assert before > 1.0
         pid = kill(server, "control", number)
         phone.send_signal(signal.SIGSTOP)  # it would arm again
         try:
-            # First what is over first: a fresh control is back long before the ramp's end.
-            until(lambda: mode(server) == "LOST", 3.0, "LOST")
-            until(lambda: thrust(truth) < 0.7 * before, RAMP_S, "less thrust")
-            assert thrust(truth) > 0.4 * before  # on a ramp of seconds, not cut
-            until(lambda: thrust(truth) < ZERO_N, RAMP_S, "no thrust")
+            until(lambda: thrusts.are_over, 2 * RAMP_S, "no thrust")
+            (begin, _), *_, (end, _) = ramp = thrusts.ramp(before)
+            assert end - begin > LEAST_RAMP_S, ramp
             until(lambda: mode(server) == "DISARMED", 10.0, "DISARMED")
+            assert "LOST" in [said.mode for said in log.said]
             assert processes(server.process.pid)["control"] != pid
             assert thrust(truth) < ZERO_N
         finally:
