@@ -115,7 +115,10 @@ def test_a_leader_hands_over_and_nobody_arms_before_the_other_has_taken_it(
         expect(other.locator("#mode")).to_have_text("DISARMED")
         for answer in ("handover-leave", "handover-take"):
             mine.click("#handover-start")
-            mine.locator("#handover-people button", has_text=heir).click()
+            button = mine.locator("#handover-people button", has_text=heir)
+            said = [server.request("GET", "/api/status")["people"], mine.inner_text("body")]
+            expect(button, f"{said}").to_be_visible(timeout=WAIT_MS)
+            button.click()
             expect(mine.locator("#handover-title")).to_have_text(
                 f"Offered to {heir}", timeout=WAIT_MS
             )

@@ -71,7 +71,7 @@ export class HandoverCard {
   render(state) {
     this.state = state;
     const may = mayGive(state);
-    if (!may) this.choosing = false;
+    if (!mayChoose(state)) this.choosing = false;
     const card = cardOf(state, this.choosing, this.given);
     const open = card.phase !== 'off';
     this.find('operate').classList.toggle('handing', open);
@@ -108,6 +108,12 @@ export function mayGive(state) {
   const mode = shownMode(state);
   const free = state.calibration === null || state.calibration.phase === 'needed';
   return state.linked && isAtRest(mode) && free && others(state).length > 0;
+}
+
+/** Whether a choice that was begun goes on: a moment without word of robot or others ends none. @param {State} state */
+export function mayChoose(state) {
+  const mode = shownMode(state);
+  return state.linked && (isAtRest(mode) || mode === 'NO_WORD' || mode === 'LOST');
 }
 
 /**

@@ -6,7 +6,7 @@ import { gapWords } from '../../src/ui/mode_words.js';
 import { Problem } from '../../src/wire/problems.js';
 import { endWords } from '../../src/wire/stop.js';
 import { FREE_MS, standbyWords } from '../../src/ui/standby.js';
-import { cardOf, mayGive } from '../../src/ui/handover_card.js';
+import { cardOf, mayChoose, mayGive } from '../../src/ui/handover_card.js';
 import { healthWords, modeWords, rampWords, robotWords } from '../../src/ui/mode_words.js';
 import { holdWords } from '../../src/ui/view.js';
 import { statusOf } from '../fakes.js';
@@ -365,6 +365,13 @@ test('the lead is handed to another operator who is there, while the robot is di
   assert.equal(mayGive(led), true);
   assert.equal(mayGive(after(...mine, status({ mode: 'TRACK', people })).state), false);
   assert.equal(mayGive(after(...mine, status({ people: people.slice(0, 1) })).state), false);
+  /** @type {[Event, boolean][]} */
+  const next = [[{ type: 'tick', now: 10_000 }, true], [status({ mode: 'LOST', people }), true], [status({ people: [] }), true],
+    [status({ mode: 'ARMED', people }), false], [{ type: 'disconnected' }, false]];
+  for (const [event, stays] of next) {
+    const { state } = after(...mine, status({ people }), event);
+    assert.deepEqual([mayGive(state), mayChoose(state)], [false, stays], 'a moment without word closes no choice');
+  }
   /** @param {string} heir @param {boolean} led */
   const aside = (heir, led) => after(...ASIDE, status({ people: [person('me', { offered: heir === 'me' }), person('Ben', { offered: heir === 'Ben' }),
     person('Anna', { leads: led })] })).state;
