@@ -18,6 +18,7 @@ import msgspec
 from hardware.follower import FollowerError
 from hardware.link.link_key import KEY_VARIABLE, LinkKeyError, new_key
 from hardware.link.registry import link_kind
+from hardware.plant_parameters import ArmParameters
 from hardware.robot_file import COMMANDS, RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
@@ -134,6 +135,8 @@ def children_of(
             raise RobotFileError(settings.robot, "gains", "none: it takes a twist, by [twist]")
     elif settings.gains not in robot_file.gains:
         raise RobotFileError(settings.robot, "gains", f"one of {', '.join(robot_file.gains)}")
+    if settings.simulate and (arm := robot_file.plant.arm) is not None:
+        _refuse_unless_movable(settings.robot, arm)
     link = robot_file.link
     host, port = settings.robot_host or link.host, settings.robot_port or link.port
     truth_port, children = 0, []
@@ -164,6 +167,23 @@ def children_of(
     server += arguments
     children.append(Child("server", server, secret, descriptors, SERVES, PROMPT_NICENESS))
     return children
+
+
+def _refuse_unless_movable(robot: str, arm: ArmParameters) -> None:
+    """A simulated arm that can't be would end as often as it is started.
+
+    Raises:
+        RobotFileError: it says why.
+    """
+    # With MuJoCo, for which no other robot waits.
+    from hardware.arm.arm_model import ArmError
+    from hardware.arm.movable import movable
+
+    try:
+        movable(arm)
+    except ArmError as error:
+        key = ".".join(filter(None, ("arm", error.key)))
+        raise RobotFileError(robot, key, error.allowed) from error
 
 
 def announce(run: Mapping[str, object]) -> None:

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.arm.arm_model import ArmError, ArmModel
+from hardware.arm.arm_model import ArmError
+from hardware.arm.movable import movable
 from hardware.authority import authority
 from hardware.dynamics import dynamics_of
 from hardware.follower import FollowerError
@@ -123,8 +124,7 @@ def _motion(motion: ToldMotion | None) -> RobotFinding:
 def _arm(parameters: ArmParameters) -> RobotFinding:
     """Joints that carry its body, and whether anything here can move them."""
     try:
-        arm = ArmModel(parameters)
-        import hardware.arm.mink_extra  # noqa: F401
+        arm = movable(parameters)
     except ArmError as error:
         return RobotFinding("arm", False, str(error))
     said = f"{len(arm.names)} joints, {degrees(parameters.rate):.0f}°/s at most; {arm.ranges}°"

@@ -1,4 +1,4 @@
-"""Without mink an arm's simulated robot ends with a line that names the extra; others don't ask."""
+"""Without mink an arm is refused, before it is started, by the name of the extra; others go."""
 
 from __future__ import annotations
 
@@ -25,6 +25,17 @@ def test_without_mink_an_arm_is_refused_by_the_name_of_its_extra() -> None:
     assert done.returncode == 2
     assert done.stderr.startswith("simulated robot: arm: mink is missing: `make arm`")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_without_mink_an_arm_is_not_even_started() -> None:
+    code = "from server.cli import main; sys.exit(main(['serve', '--robot', 'so101']))"
+    done = ran(code)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "lightleash serve: so101: arm: mink is missing: `make arm`, or pip install "
+        "'lightleash[arm]'; docs/arm.md\n"
+    )
 
 
 @pytest.mark.slow
