@@ -270,6 +270,14 @@ class Blinking(Protocol):
         """Send `order`; it may be lost."""
 
 
+@runtime_checkable
+class HasTool(Protocol):
+    """A `Follower` whose robot may have a tool that opens and closes."""
+
+    def use_tool(self, opening: float) -> None:
+        """Send how far it shall be open, 0 to 1; to be said again every 20 ms, or it stays."""
+
+
 @dataclass(frozen=True, slots=True)
 class RobotHealth:
     """What a robot tells of itself beside its samples."""

@@ -61,6 +61,10 @@ class ArmParameters:
     """Names of geoms in it of which no two come nearer to each other than ..."""
     apart: float
     """... this [m]."""
+    tool_joint: str
+    """Name of the joint that opens its tool, closed at the least of its range; empty: none."""
+    tool_stroke_s: float
+    """From closed to open."""
 
 
 @dataclass(frozen=True, slots=True)

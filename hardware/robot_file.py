@@ -320,6 +320,7 @@ def _converted_twist(schema: TwistRobotSchema, folder: Path) -> RobotFile:
         hangs=False,
         ramp_s=drive.stop_s,
         blinks=schema.blinks,
+        tool=schema.tool.name if schema.tool is not None else "",
         twist=drive,
         motion=motion,
     )
@@ -377,6 +378,7 @@ def _converted(schema: RobotSchema) -> RobotFile:
         hangs=schema.suspension is not None,
         ramp_s=_ramp_s(schema),
         blinks=schema.blinks,
+        tool=schema.tool.name if schema.tool is not None else "",
         stiffness_in_f=stiffness_in_f,
         damping_in_f=damping_in_f,
         thrust_lag_s=plant.lag,

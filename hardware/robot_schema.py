@@ -241,6 +241,13 @@ class IdentifiedSection(Section):
     thrusters: IdentifiedThrusters = IdentifiedThrusters()
 
 
+class ToolSection(Section):
+    """[tool]: what opens and closes by a slider on the phone, as long as the hand leads."""
+
+    name: Annotated[str, Field(min_length=1, max_length=20)]
+    """For people's screens."""
+
+
 class RobotSchema(Section):
     """The file."""
 
@@ -265,6 +272,7 @@ class RobotSchema(Section):
     link: LinkSection
     flight_controller: FlightControllerSection | None = None
     battery: BatterySection | None = None
+    tool: ToolSection | None = None
     identified: IdentifiedSection = IdentifiedSection()
 
 

@@ -21,6 +21,7 @@ from hardware.robot_schema import (
     LedSection,
     Section,
     Start,
+    ToolSection,
     axes_fault,
     battery_clashes,
 )
@@ -92,6 +93,10 @@ class ArmSection(Section):
     ]
     """Pairs of geoms in it that come no nearer to each other than ..."""
     apart_m: Annotated[float, Field(ge=0.0, le=0.2)] = 0.01
+    tool_joint: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    """Joint in it that opens and closes its tool: closed at the least of its range."""
+    tool_stroke_s: Annotated[float, Field(ge=0.1, le=60.0)] = 1.0
+    """From closed to open."""
 
 
 SLIP = {"measured": 0.03, "commanded": 0.1}
@@ -161,6 +166,7 @@ class TwistRobotSchema(Section):
     leds: Annotated[list[LedSection], Field(min_length=4, max_length=16)]
     link: TwistLinkSection
     battery: BatterySection | None = None
+    tool: ToolSection | None = None
 
 
 def drive_of(section: TwistSection) -> TwistDrive:
@@ -202,6 +208,8 @@ def arm_of(section: ArmSection, folder: Path) -> ArmParameters:
         servo_lag_s=section.servo_lag_s,
         keeps_apart=tuple((one, other) for one, other in section.keeps_apart),
         apart=section.apart_m,
+        tool_joint=section.tool_joint or "",
+        tool_stroke_s=section.tool_stroke_s,
     )
 
 
@@ -210,6 +218,8 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     if robot.link.port is None and robot.link.kind not in USUAL_PORTS:
         yield "link.port", f"missing: a link of kind {robot.link.kind!r} has no usual one"
     yield from battery_clashes(robot.battery)
+    if robot.arm is not None and (robot.arm.tool_joint is None) != (robot.tool is None):
+        yield "arm.tool_joint", "with [tool], and with it alone"
     yield from _motion_clashes(robot)
     yield from _ros2_clashes(robot.link, robot.motion)
     if len(set(robot.axes)) < len(robot.axes):

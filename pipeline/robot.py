@@ -139,6 +139,8 @@ class Robot:
     that mass and inertia count for nothing."""
     motion: ToldMotion | None = None
     """Of one that has no motion sensors on its body: its twist stands for them."""
+    tool: str = ""
+    """What people call its tool, which opens and closes; empty: it has none."""
 
     @property
     def blinking_leds(self) -> int:

@@ -1,15 +1,16 @@
 /* Throws anything at the watchdog, mostly with a right MAC, and holds its laws. For a fuzzer:
  *
- *   clang -g -O1 -fsanitize=fuzzer,address,undefined -DLIBFUZZER fuzz.c watchdog.c blink.c health.c attitude.c hmac.c -lm
+ *   clang -g -O1 -fsanitize=fuzzer,address,undefined -DLIBFUZZER fuzz.c watchdog.c blink.c health.c tool.c attitude.c hmac.c -lm
  *
  * or alone, with numbers of its own, for so many executions from a seed:
  *
- *   gcc -g -O1 -fsanitize=address,undefined -o fuzz fuzz.c watchdog.c blink.c health.c attitude.c hmac.c -lm
+ *   gcc -g -O1 -fsanitize=address,undefined -o fuzz fuzz.c watchdog.c blink.c health.c tool.c attitude.c hmac.c -lm
  *   ./fuzz 1000000 1
  */
 #include "blink.h"
 #include "bytes.h"
 #include "health.h"
+#include "tool.h"
 #include "watchdog.h"
 
 #include <math.h>
@@ -81,6 +82,29 @@ static void blink(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint6
            "after ten seconds all LEDs shine");
 }
 
+/* The same 8 bytes as an order for its tool. */
+static void tool(const ll_watchdog *w, const uint8_t *in, int64_t now_us, uint64_t nonce)
+{
+    static ll_tool t = {0, LL_TOOL_STAYS};
+    uint8_t data[LL_MAX_BYTES] = {0};
+    memcpy(data, "LLtl\1", 5);
+    put(data + 6, in[1] & 7 ? 40u * in[2] : 256u * in[2], 2);
+    put(data + 8, in[2] & 3 ? w->newest_epoch : in[5], 8);
+    put(data + 16, in[3] & 7 ? nonce : nonce - in[3], 8);
+    size_t length = seal(w, in, data, 24, 24);
+    ll_watchdog before = *w;
+    bool taken = ll_tool_receive(&t, w, data, length, now_us);
+    demand(memcmp(&before, w, sizeof before) == 0, "an order for its tool moves nothing else");
+    demand(!taken || in[7] != 252, "an order for its tool with a wrong MAC is refused");
+    demand(!taken || read_u64(data + 8) == w->newest_epoch, "only who is heard may move its tool");
+    int wanted = ll_tool_wanted(&t, w, now_us);
+    demand(wanted >= LL_TOOL_STAYS && wanted <= LL_TOOL_OPEN, "a tool is open by 0 to all");
+    demand(wanted == LL_TOOL_STAYS || w->state == LL_IDLE || w->state == LL_RUNNING,
+           "the tool of a robot that does not follow stays");
+    demand(ll_tool_wanted(&t, w, now_us + LL_TOOL_LASTS_US) == LL_TOOL_STAYS || t.told_us > now_us,
+           "a tool that hears no more stays");
+}
+
 /* The same 8 bytes as what it measures of itself: nothing moves by telling it. */
 static void health(const ll_watchdog *w, ll_health *h, const uint8_t *in, int64_t now_us)
 {
@@ -122,6 +146,7 @@ static void step(ll_watchdog *w, ll_health *h, const uint8_t *in, int64_t *now_u
     size_t size = ll_sample(w, *now_us, ++*nonce, gyro, acc, thrusts, out);
     demand(size == 92 + 4 * N, "a sample has its size");
     blink(w, in, *now_us, *nonce);
+    tool(w, in, *now_us, *nonce);
     health(w, h, in, *now_us);
     memcpy(data, "LLcm\2", 5);
     data[5] = (in[1] & 31) == 31 ? in[2] : N;

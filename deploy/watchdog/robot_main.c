@@ -1,7 +1,7 @@
 /* A whole robot around the watchdog, on Linux: 200 Hz, UDP, but no thrusters and no sensors.
  * Put yours where it says YOURS.
  *
- *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c blink.c health.c attitude.c hmac.c -lm
+ *   gcc -O2 -Wall -Wextra -Werror -o robot robot_main.c watchdog.c blink.c health.c tool.c attitude.c hmac.c -lm
  *   ./robot KEY_FILE PORT THRUSTERS F_MAX_N MAX_RISE_PER_COMMAND_N RAMP_MS [E_STOP_FILE]
  *
  * KEY_FILE is what `lightleash robot key` has made; on a microcontroller the key is in flash.
@@ -11,6 +11,7 @@
 #define _GNU_SOURCE
 #include "blink.h"
 #include "health.h"
+#include "tool.h"
 #include "watchdog.h"
 
 #include <arpa/inet.h>
@@ -93,6 +94,11 @@ static void shine(int dark)
     (void)dark; /* YOURS: all LEDs on but this one */
 }
 
+static void open_tool(int opening)
+{
+    (void)opening; /* YOURS: move it there; LL_TOOL_STAYS: stop it where it is */
+}
+
 static void sense(float gyro[3], float accelerometer[3])
 {
     memset(gyro, 0, 3 * sizeof *gyro); /* YOURS: read the sensors, body axes, SI */
@@ -130,7 +136,7 @@ static bool same(const struct sockaddr_in *a, const struct sockaddr_in *b)
 }
 
 /* Take some of what has arrived. */
-static void receive(int fd, ll_watchdog *w, ll_blink *b, recipients *to)
+static void receive(int fd, ll_watchdog *w, ll_blink *b, ll_tool *t, recipients *to)
 {
     uint8_t data[LL_MAX_BYTES + 1];
     for (int i = 0; i < MAX_DATAGRAMS; i++) {
@@ -142,7 +148,8 @@ static void receive(int fd, ll_watchdog *w, ll_blink *b, recipients *to)
             return;
         bool answer;
         int64_t now_us = clock_us();
-        if (ll_blink_receive(b, w, data, (size_t)size, now_us))
+        if (ll_blink_receive(b, w, data, (size_t)size, now_us) ||
+            ll_tool_receive(t, w, data, (size_t)size, now_us))
             continue;
         if (ll_receive(w, data, (size_t)size, now_us, &answer) == LL_NONE)
             to->control = (peer){from, now_us};
@@ -165,7 +172,8 @@ static void send_all(int fd, const uint8_t *data, size_t size, const recipients 
         send_to(fd, data, size, &to->asking.address);
 }
 
-static void tick(int fd, ll_watchdog *w, const ll_blink *b, ll_health *h, recipients *to, const char *e_stop)
+static void tick(int fd, ll_watchdog *w, const ll_blink *b, const ll_tool *t, ll_health *h, recipients *to,
+                 const char *e_stop)
 {
     float thrusts[LL_MAX_THRUSTERS], gyro[3], accelerometer[3];
     uint8_t out[LL_MAX_BYTES], told[LL_HEALTH_BYTES];
@@ -175,6 +183,7 @@ static void tick(int fd, ll_watchdog *w, const ll_blink *b, ll_health *h, recipi
     ll_setpoint(w, now_us, thrusts);
     give(thrusts);
     shine(ll_blink_dark(b, now_us));
+    open_tool(ll_tool_wanted(t, w, now_us));
     sense(gyro, accelerometer);
     size_t size = ll_sample(w, now_us, random_u64(), gyro, accelerometer, thrusts, out);
     send_all(fd, out, size, to, now_us);
@@ -203,8 +212,10 @@ int main(int argc, char **argv)
     const char *e_stop = argc == 8 ? argv[7] : NULL;
     ll_watchdog w;
     ll_blink b;
+    ll_tool t;
     ll_health h;
     ll_blink_init(&b);
+    ll_tool_init(&t);
     ll_health_init(&h);
     if (!ll_init(&w, &limits, (uint32_t)random_u64(), key)) {
         fprintf(stderr, "F_MAX_N, MAX_RISE_N and RAMP_MS must be finite and above 0\n");
@@ -224,14 +235,14 @@ int main(int argc, char **argv)
     for (int64_t next_us = clock_us(); !stopping;) {
         int64_t wait_us = next_us - clock_us();
         if (wait_us > 0 && poll(&readable, 1, (int)((wait_us + 999) / 1000)) > 0)
-            receive(fd, &w, &b, &to);
+            receive(fd, &w, &b, &t, &to);
         if (clock_us() >= next_us) { /* due by the clock, whatever arrives */
-            tick(fd, &w, &b, &h, &to, e_stop);
+            tick(fd, &w, &b, &t, &h, &to, e_stop);
             next_us += TICK_US;
         }
     }
     ll_halt(&w);
-    tick(fd, &w, &b, &h, &to, e_stop);
+    tick(fd, &w, &b, &t, &h, &to, e_stop);
     close(fd);
     return 0;
 }

@@ -5,12 +5,21 @@ Base axes k: the model's own, z up. Body axes b: those of the tip's site.
 
 from __future__ import annotations
 
+from typing import Final
+
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
 from hardware.plant_parameters import ArmParameters
 from pipeline.frames import Array, cross
+
+KINDS: Final = {
+    mujoco.mjtObj.mjOBJ_SITE: "site",
+    mujoco.mjtObj.mjOBJ_GEOM: "geom",
+    mujoco.mjtObj.mjOBJ_JOINT: "joint",
+}
+"""What robot files name of a model."""
 
 
 class ArmError(ValueError):
@@ -65,6 +74,11 @@ class ArmModel:
             (self._geom(one), self._geom(other)) for one, other in parameters.keeps_apart
         )
         """Geoms that are kept apart."""
+        joint = parameters.tool_joint
+        self.tool = self._id(mujoco.mjtObj.mjOBJ_JOINT, "tool_joint", joint) if joint else None
+        """Number of the joint that opens its tool."""
+        if self.tool is not None and (self.tool in joints or not self.model.jnt_limited[self.tool]):
+            raise ArmError("tool_joint", "a joint behind the tip's, with a range")
         home = parameters.home
         if home.shape != (len(joints),):
             raise ArmError("home_deg", f"{len(joints)} angles: of {', '.join(self.names)}")
@@ -129,6 +143,5 @@ class ArmModel:
         found = int(mujoco.mj_name2id(self.model, kind, name))
         if found < 0:
             file = self.parameters.model.name
-            what = "site" if kind == mujoco.mjtObj.mjOBJ_SITE else "geom"
-            raise ArmError(key, f"{what}s of {file}, which has none that is called {name!r}")
+            raise ArmError(key, f"{KINDS[kind]}s of {file}, which has none that is called {name!r}")
         return found

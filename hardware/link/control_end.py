@@ -41,6 +41,7 @@ from hardware.link.datagram import (
 )
 from hardware.link.health_datagram import MAGIC as HEALTH_MAGIC
 from hardware.link.health_datagram import HealthDatagram, decode_health
+from hardware.link.tool_datagram import ToolDatagram, encode_tool
 from hardware.robot_file import RobotFile
 from pipeline.config import PERIOD_S
 from pipeline.frames import Array
@@ -163,6 +164,11 @@ class ControlEnd:
         """The datagram for `order`; it is no command, and counts as none."""
         nonce = self._newest.nonce if self._newest else 0
         return encode_blink(BlinkDatagram(self.epoch, nonce, order), self._key)
+
+    def tool(self, opening: float) -> bytes:
+        """The datagram for a tool that shall be open so far, 0 to 1; it is no command, either."""
+        nonce = self._newest.nonce if self._newest else 0
+        return encode_tool(ToolDatagram(self.epoch, nonce, opening), self._key)
 
     def receive(self, data: bytes, now: float) -> BodySample | None:
         """The sample in `data`; None and counted if it is none, or not to be believed.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 
-from hardware.follower import Follower, FollowerError
+from hardware.follower import Follower, FollowerError, HasTool
 from hardware.link import robot_end, udp
 from hardware.link.rpit import rpit_follower
 from hardware.link.silence import SilenceTimes
@@ -68,14 +68,19 @@ def connect(robot_file: RobotFile, key: bytes, epoch: int) -> Follower:
     """Link to the robot of a robot file, by the kind that it names.
 
     Raises:
-        FollowerError: no such kind, one that can't carry what the robot takes, or no such robot.
+        FollowerError: no such kind, one that can't carry what the robot takes or has, or no such
+            robot.
     """
     link = robot_file.link
     kind = link_kind(link.kind)
     if link.takes not in kind.takes:
         what = f"link.takes = {link.takes!r} by a link of kind {link.kind!r}"
         raise FollowerError(what, f"{' or '.join(kind.takes)} by this one")
-    return kind.connect(robot_file, key, epoch)
+    follower = kind.connect(robot_file, key, epoch)
+    if robot_file.robot.tool and not isinstance(follower, HasTool):
+        follower.close()
+        raise FollowerError(f"[tool] by a link of kind {link.kind!r}", "none by this one")
+    return follower
 
 
 def _loaded(point: EntryPoint) -> LinkKind:

@@ -5,10 +5,12 @@
 | `datagram.py`       | both datagrams, byte by byte                                     |
 | `blink_datagram.py` | a third one, that tells LEDs to blink                            |
 | `health_datagram.py`| a fourth one, by which the robot tells how it is                 |
+| `tool_datagram.py`  | a fifth one, that opens and closes its tool                      |
 | `control_end.py`    | the control process's end without a socket                       |
 | `robot_end.py`      | the robot's end without a socket: gate, watchdog, ramp           |
 | `blink_end.py`      | the robot's end of blinking                                      |
 | `health_end.py`     | the robot's end of telling how it is                             |
+| `tool_end.py`       | the robot's end of its tool                                      |
 | `deploy/watchdog/`  | the robot's end in C, for firmware                               |
 | `link_follower.py`  | what this follower has in common with those of other links       |
 | this file           | the socket of the control process                                |
@@ -79,6 +81,11 @@ class UdpFollower(LinkFollower[ControlEnd]):
         """See `Blinking`."""
         self._check_open()
         self._post(self._end.blink(order))
+
+    def use_tool(self, opening: float) -> None:
+        """See `HasTool`."""
+        self._check_open()
+        self._post(self._end.tool(opening))
 
     def _send(self, command: RobotCommand) -> None:
         self._post(self._end.command(command, self._clock()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from hardware.link.datagram import U64
 from hardware.link.health_end import HealthEnd
 from hardware.link.robot_end import LinkLimits, Peer, RobotEnd
 from hardware.link.robot_server import TICK_US
+from hardware.link.tool_end import ToolEnd
 from hardware.robot_file import RobotFile
 from hardware.sim.battery import DrainingBattery
 from hardware.sim.plant.odometry import Odometry
@@ -60,6 +61,18 @@ class SimulatedBody(Protocol):
         """What its motion sensors read."""
 
 
+@runtime_checkable
+class Gripping(Protocol):
+    """A `SimulatedBody` with a tool that opens and closes."""
+
+    def use_tool(self, wanted: float | None, dt: float = 0.005, /) -> None:
+        """Open it towards `wanted`, 0 to 1, for `dt` [s]; None: it stays as it is."""
+
+    @property
+    def opening(self) -> float:
+        """How far it is open."""
+
+
 Nonces = Callable[[], int]
 
 
@@ -90,8 +103,11 @@ class SimulatedRobot:
         robot = robot_file.robot
         rng = np.random.default_rng(seed)
         self.body = _body_of(robot_file, rng, options)
+        self.gripper = self.body if isinstance(self.body, Gripping) else None
+        """The truth of its tool; None: it has none, or one that is not simulated."""
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
         self._blink = BlinkEnd(key) if robot.blinks else None
+        self._tool = ToolEnd(key) if robot.tool else None
         self.battery, self._health = battery, HealthEnd(boot_id, key)
         self.e_stop = EStop.NOT_WIRED
         """Of its wire; whoever sets this presses or releases it."""
@@ -115,7 +131,8 @@ class SimulatedRobot:
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
         """A datagram has come from `peer`."""
-        if self._blink is None or not self._blink.receive(data, self.end, now_us):
+        others = (one for one in (self._blink, self._tool) if one is not None)
+        if not any(other.receive(data, self.end, now_us) for other in others):
             self.end.receive(data, peer, now_us)
 
     def tick(self, now_us: int) -> tuple[bytes, ...]:
@@ -124,6 +141,8 @@ class SimulatedRobot:
         if self.e_stop != EStop.NOT_WIRED:
             self.end.wire(is_open=self.e_stop == EStop.OPEN)
         self._setpoint = self.end.setpoint(now_us)
+        if self._tool is not None and self.gripper is not None:
+            self.gripper.use_tool(self._tool.wanted(self.end, now_us))
         self.history.append((now_us, self.body.wxyz_fb, self.body.p_bf_in_f))
         self.dark.append(NO_LED if self._blink is None else self._blink.dark(now_us))
         sample = self._sample(now_us, self.body.given)
@@ -135,6 +154,7 @@ class SimulatedRobot:
         self._boot_id += 1
         self.end = RobotEnd(LinkLimits.of(robot_file), self._boot_id, key)
         self._blink = BlinkEnd(key) if robot_file.robot.blinks else None
+        self._tool = ToolEnd(key) if robot_file.robot.tool else None
         self._health = HealthEnd(self._boot_id, key)
 
     def shut_down(self, now_us: int) -> bytes:

@@ -119,6 +119,11 @@ class VirtualTimeFollower(LinkFollower[ControlEnd]):
         self._check_open()
         self._post(self._end.blink(order))
 
+    def use_tool(self, opening: float) -> None:
+        """See `HasTool`."""
+        self._check_open()
+        self._post(self._end.tool(opening))
+
     def close(self) -> None:
         """Close. See `Follower`."""
         self._closed = True

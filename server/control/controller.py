@@ -28,9 +28,10 @@ from server.common.runtime_parameters import RuntimeParameters, Tune, turned
 from server.control.gap_log import GapLog
 from server.control.ipc import BodyRow, ControlStatus
 from server.control.ipc_estimate import EstimateFields, finite
-from server.control.ipc_inputs import Input, ReadyInput, RequestInput
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput, ToolInput
 from server.control.robot_health import RobotCondition
 from server.control.tick_rate import TickRate
+from server.control.tool_channel import ToolChannel
 from server.protocol.lead_messages import Lead
 
 SERVER_SILENT_S = 0.5
@@ -90,6 +91,7 @@ class Controller:
         self._unfit, self._too_late = unfit, too_late
         self._picture_age, self._body_age = Mean(), Mean()
         self.teleop = Teleop(robot, config)
+        self.tool = ToolChannel()
         self._virtual_camera = config.virtual_camera
         self._estimator_name = config.estimator
         self._refusals: tuple[str, ...] = ("The server has not spoken yet.",)
@@ -156,6 +158,7 @@ class Controller:
             )
         )
         self._t_tick, self._mode = now, output.failsafe.mode
+        self.tool.step(self._mode)
         self._note_gaps(output, stall_s, robot_gap)
         for one in seen:
             self._fuse_ms = 1e3 * (now - one.t)
@@ -193,6 +196,8 @@ class Controller:
                     self.teleop.tune(self._virtual_camera)
                 case Lead():
                     self.teleop.lead(message.leading)
+                case ToolInput():
+                    self.tool.ask(message.opening)
         known = Requests.__slots__
         return phone, seen, operator, Requests(**{one: True for one in requested if one in known})
 
@@ -296,6 +301,7 @@ class Controller:
             body_twists=twists,
             commands=commands,
             gains_weak=self._gains_weak,
+            tool_opening=self.tool.told,
             health=self._condition.fields(flies=self._mode not in (*AT_REST, Mode.ARMED)),
         )
 

@@ -112,6 +112,8 @@ class ControlStatus(msgspec.Struct, tag="status", array_like=True, frozen=True):
     """What gains of the user's own lack if the robot is not as told, in words; refuses nothing."""
     health: HealthFields | None = None
     """What the robot tells of itself."""
+    tool_opening: float | None = None
+    """Told to the robot's tool, 0 closed to 1 open; None: it stays as it is."""
 
 
 def _has_attitudes(status: ControlStatus) -> bool:

@@ -47,8 +47,22 @@ class BlinkInput(msgspec.Struct, tag="blink", array_like=True, frozen=True):
     t_begin: float
 
 
+class ToolInput(msgspec.Struct, tag="tool", array_like=True, frozen=True):
+    """How far the robot's tool shall be open, 0 to 1, while the hand leads."""
+
+    opening: float
+
+
 Input = (
-    PhoneImu | VisionMeasurement | TouchState | RequestInput | ReadyInput | BlinkInput | Tune | Lead
+    PhoneImu
+    | VisionMeasurement
+    | TouchState
+    | RequestInput
+    | ReadyInput
+    | BlinkInput
+    | Tune
+    | Lead
+    | ToolInput
 )
 
 
@@ -98,7 +112,7 @@ _TAGGED = {
 }
 _encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
 _decoder = msgspec.msgpack.Decoder(
-    _Motion | _Seen | _Touch | RequestInput | ReadyInput | BlinkInput | _Tune | _Lead,
+    _Motion | _Seen | _Touch | RequestInput | ReadyInput | BlinkInput | _Tune | _Lead | ToolInput,
     dec_hook=_array,
 )
 
@@ -146,6 +160,8 @@ def is_believable(message: Input) -> bool:
             return abs(message.t) <= LARGEST
         case BlinkInput():
             return 0 <= message.number < CODES and abs(message.t_begin) <= LARGEST
+        case ToolInput():
+            return 0.0 <= message.opening <= 1.0
         case _:
             return True
 

@@ -41,6 +41,8 @@ from server.control.told_body import ToldBody
 
 STATUS_EVERY = 4
 """Ticks: 50 Hz."""
+TOOL_EVERY = 4
+"""Ticks, as `HasTool` wants it."""
 LATENESS_EVERY = 400
 """Ticks: every 2 s."""
 
@@ -232,6 +234,8 @@ def _loop(
         )
         link.send(command)
         link.pass_on(inputs, now)
+        if schedule.ticks % TOOL_EVERY == 0 and controller.tool.told is not None:
+            link.use_tool(controller.tool.told)
         cpu_ms[schedule.ticks % LATENESS_EVERY] = 1e3 * (clock.thread_cpu() - cpu)
         if schedule.ticks % LATENESS_EVERY == 0:
             lateness = schedule.lateness_ms()

@@ -15,6 +15,7 @@ from hardware.follower import (
     BodySample,
     Follower,
     FollowerState,
+    HasTool,
     Refusal,
     RobotCommand,
     TellsHealth,
@@ -143,6 +144,11 @@ class RobotLink:
         if begin_us is not None and begin_us >= 0 and 0 < lasts_ms <= LASTS_MS:
             dark = tuple(self._book[code.number].tolist())
             self._follower.blink(BlinkOrder(begin_us, lasts_ms, round(1e3 * SLOT_S), dark))
+
+    def use_tool(self, opening: float) -> None:
+        """Tell the robot how far its tool shall be open, 0 to 1, if it has one."""
+        if isinstance(self._follower, HasTool):
+            self._follower.use_tool(opening)
 
     def _left(self, now: float) -> float:
         """A robot that we don't hear coasts, too: commands must echo its newest samples."""

@@ -20,7 +20,7 @@ from typing import Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from hardware.link import blink_datagram, datagram, health_datagram
+from hardware.link import blink_datagram, datagram, health_datagram, tool_datagram
 from server.common import runtime_parameters
 from server.common.options import Parser
 from server.docs.protocol_text import RECORDS, page
@@ -47,6 +47,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.Command,
     runtime_parameters.Tune,
     lead_messages.Lead,
+    lead_messages.UseTool,
     PathChoice,
     calibration_messages.Calibrate,
     messages.Log,
@@ -60,6 +61,7 @@ STRUCTS: tuple[type[msgspec.Struct], ...] = (
     messages.VirtualCameraStatus,
     messages.Estimate,
     lead_messages.LeadingStatus,
+    lead_messages.ToolStatus,
     camera_messages.CameraHealth,
     people_messages.Person,
     messages.EpisodeStatus,
@@ -243,7 +245,7 @@ def message_tables() -> str:
 
 def links() -> str:
     """Datagrams of the robot's own link, as their modules tell them."""
-    modules = datagram, blink_datagram, health_datagram
+    modules = datagram, blink_datagram, health_datagram, tool_datagram
     told = (inspect.cleandoc(module.__doc__ or "") for module in modules)
     return "\n\n".join(told)
 

@@ -1,4 +1,4 @@
-"""What pages, server and control say to each other of how a hand leads the robot."""
+"""What pages, server and control say to each other of how a hand leads the robot and its tool."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from msgspec import Meta
 from pipeline.control.leading import LEAST_SCALE, MOST_SCALE, PLAIN, Leading, LeadingAxes
 
 LeadScale = Annotated[float, Meta(ge=LEAST_SCALE, le=MOST_SCALE)]
+Opening = Annotated[float, Meta(ge=0.0, le=1.0)]
+Press = Annotated[int, Meta(ge=0, le=(1 << 32) - 1)]
 
 
 class Lead(msgspec.Struct, tag="lead", forbid_unknown_fields=True, frozen=True):
@@ -51,3 +53,25 @@ class LeadingStatus(msgspec.Struct, frozen=True):
     any: bool
     """All can be chosen; else nothing but `shift` and `all`, at scale 1: the robot hangs from
     nothing, so nobody knows where it is."""
+
+
+class UseTool(msgspec.Struct, tag="tool", forbid_unknown_fields=True, frozen=True):
+    """Page of the phone that leads → server: how far the tool shall be open.
+
+    It moves there while the button is held, and stays as it is once it is not. Refused of a robot
+    without a tool; of an earlier press it counts for nothing.
+    """
+
+    opening: Opening
+    """0 closed to 1 open."""
+    press: Press
+    """During which it was asked, as TOUCH counts them."""
+
+
+class ToolStatus(msgspec.Struct, frozen=True):
+    """The robot's tool."""
+
+    name: str
+    """For people."""
+    opening: float | None = None
+    """What the robot is told, 0 closed to 1 open; None: to stay as it is."""

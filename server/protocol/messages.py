@@ -14,7 +14,7 @@ from pipeline.config import EstimatorName
 from server.common.runtime_parameters import RuntimeParameters, Tune
 from server.protocol.calibration_messages import Calibrate, Calibration
 from server.protocol.camera_messages import CameraHealth
-from server.protocol.lead_messages import Lead, LeadingStatus
+from server.protocol.lead_messages import Lead, LeadingStatus, ToolStatus, UseTool
 from server.protocol.people_messages import Deed, Person
 from server.protocol.screen_messages import ClockAnswer, ClockAsk, ScreenLights, ScreenSize
 from server.protocol.sight_messages import Sight
@@ -258,6 +258,8 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Who is paired, in the order they came."""
     leading: LeadingStatus | None = None
     """None before the control process has told of it."""
+    tool: ToolStatus | None = None
+    """None of a robot without."""
     takes: Literal["thrusts", "twist"] = "thrusts"
     """What the robot is told: by its thrusters, or a velocity that it follows by itself."""
     thrusts_n: list[float] = []
@@ -282,7 +284,9 @@ class Status(msgspec.Struct, tag="status", frozen=True):
     """Of the newest press since the recording began; None without."""
 
 
-FromPage = Hello | Command | Tune | Lead | PathChoice | Calibrate | Log | ScreenSize | ClockAsk
+FromPage = (
+    Hello | Command | Tune | Lead | UseTool | PathChoice | Calibrate | Log | ScreenSize | ClockAsk
+)
 ToPage = (
     Welcome
     | Refused

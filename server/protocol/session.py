@@ -5,7 +5,7 @@ from __future__ import annotations
 from server.common.runtime_parameters import Tune
 from server.protocol.calibration_messages import Calibrate
 from server.protocol.command_age import refuse_old
-from server.protocol.lead_messages import Lead
+from server.protocol.lead_messages import Lead, UseTool
 from server.protocol.messages import Command, FromPage, Hello, Log, decode_message
 from server.protocol.screen_messages import ClockAsk, ScreenSize
 from server.protocol.video_path_messages import PathChoice
@@ -25,7 +25,7 @@ ALLOWED: dict[str, tuple[type, ...]] = {
 }
 """Kinds of record by role."""
 MESSAGES: dict[str, tuple[type, ...]] = {
-    "operator": (Command, Lead, PathChoice, Calibrate, Log),
+    "operator": (Command, Lead, UseTool, PathChoice, Calibrate, Log),
     "rtc": (),
     "video": (Log,),
     "supervisor": (Command, Tune, Lead, PathChoice, Log),

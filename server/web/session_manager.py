@@ -19,7 +19,7 @@ from pipeline.signals import Mode
 from server.common.clock import now, unix_zero_ns
 from server.common.runtime_parameters import Tune
 from server.control.ipc import ControlStatus, server_end
-from server.control.ipc_inputs import Input, ReadyInput, RequestInput
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput, ToolInput
 from server.control.robot_health import HealthFields
 from server.diagnostics.blame import Blame
 from server.diagnostics.events import Events
@@ -35,12 +35,13 @@ from server.phone.screen_door import ScreenDoor
 from server.phone.transports import FastTransport, Transports
 from server.phone.vision_thread import Picture, jpeg
 from server.protocol.calibration_messages import Calibrate
-from server.protocol.lead_messages import AS_EVER, Lead
+from server.protocol.lead_messages import AS_EVER, Lead, UseTool
 from server.protocol.messages import Command, Hello, LoggedEvent, Status, ToPage, encode_message
 from server.protocol.people_messages import Deed
 from server.protocol.wire import WireError, encode
 from server.protocol.wire_records import Record, Thumbnail
 from server.recording.control import Recordings
+from server.recording.episodes import LARGEST_PRESS
 from server.security.pairings import Member, of_this_machine
 from server.security.security import Doors
 from server.web.handover import Handover
@@ -174,6 +175,18 @@ class SessionManager:
             self.log_event(f"{who.name}: {text}", of="leading")
         else:
             self.log_event(f"{text} did not reach the control process: try again.")
+
+    def use_tool(self, request: UseTool) -> None:
+        """Open or close the robot's tool, for the hand that leads.
+
+        Raises:
+            WireError: it has none.
+        """
+        if not self.robot.tool:
+            raise WireError("value", "tool", "none: this robot has no tool")
+        pressed = self.phone.pressed if self.phone is not None else None
+        if pressed is not None and pressed.press & LARGEST_PRESS == request.press:
+            self._control.send(ToolInput(request.opening))
 
     def calibrate(self, request: Calibrate) -> None:
         """Let the operator's phone begin its camera's calibration, or leave it."""

@@ -19,7 +19,7 @@ from server.diagnostics.load import Load
 from server.diagnostics.meter import Meter
 from server.diagnostics.pauses import Pauses
 from server.phone.phone_session import PhoneSession
-from server.protocol.lead_messages import LeadingStatus
+from server.protocol.lead_messages import LeadingStatus, ToolStatus
 from server.protocol.messages import (
     VIRTUAL_DEVICE,
     Estimate,
@@ -125,6 +125,7 @@ def build(manager: StatusSource) -> Status:
         server=manager.pauses.figures(),
         people=manager.people.present(),
         leading=_leading(manager.robot, control),
+        tool=_tool(manager.robot, control),
         takes="thrusts" if manager.robot.twist is None else "twist",
         thrusts_n=[round(f, 2) for f in control.thrusts] if control and not silence else [],
         thrust_limit_n=manager.robot.f_max,
@@ -213,6 +214,12 @@ def _leading(robot: Robot, control: ControlStatus | None) -> LeadingStatus | Non
     return LeadingStatus(
         chosen.scale, chosen.axes, held.scale, held.axes, any=knows_its_place(robot)
     )
+
+
+def _tool(robot: Robot, control: ControlStatus | None) -> ToolStatus | None:
+    if not robot.tool:
+        return None
+    return ToolStatus(robot.tool, None if control is None else control.tool_opening)
 
 
 def _estimate(control: ControlStatus | None) -> Estimate | None:

@@ -16,7 +16,7 @@ from server.common.runtime_parameters import Tune
 from server.common.settings import VideoSettings
 from server.phone.phone_session import PhoneSession
 from server.protocol.calibration_messages import Calibrate
-from server.protocol.lead_messages import Lead
+from server.protocol.lead_messages import Lead, UseTool
 from server.protocol.messages import (
     Command,
     FromPage,
@@ -252,6 +252,8 @@ class PageServer:
                 self._manager.tune(said)
             elif isinstance(said, Lead):
                 self._manager.lead(said, member)
+            elif isinstance(said, UseTool):
+                self._manager.use_tool(said)
             elif isinstance(said, PathChoice):
                 self._choose(said, phone)
             elif isinstance(said, ScreenSize) and (screen := self._manager.screen) is not None:

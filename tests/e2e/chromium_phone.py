@@ -117,6 +117,17 @@ class ChromiumPhone(PlayedPhone):
         self._touches = False
         self._touch("touchEnd")
 
+    def slide(self, selector: str, share: float) -> None:
+        """Draw a slider so far with another finger, while one is on the big button."""
+        thumb = {**self._middle("#hold"), "id": 0}
+        box = f"document.querySelector({selector!r}).getBoundingClientRect()"
+        x, y, width = self.evaluate(
+            f"(({{x, y, width, height}}) => [x, y + height / 2, width])({box})"
+        )
+        for kind, at in (("touchStart", 0.5), ("touchMove", share)):
+            self._touch(kind, thumb, {"x": x + at * width, "y": y, "id": 1})
+        self._touch("touchMove", thumb)  # a finger that is missing has left
+
     def _middle(self, selector: str) -> dict[str, float]:
         """Of an element [px], asked without waiting for anything, which would still the hand."""
         box = f"document.querySelector({selector!r}).getBoundingClientRect()"

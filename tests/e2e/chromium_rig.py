@@ -10,7 +10,7 @@ from pathlib import Path
 
 from playwright.sync_api import BrowserContext
 
-from hardware.robot_file import load_robot
+from hardware.robot_file import COMMANDS, load_robot
 from hardware.sim.hand import make_hand
 from server.diagnostics.garbage import held
 from server.experiments.vision.write import camera_text
@@ -121,16 +121,17 @@ def flown(
 
 @contextlib.contextmanager
 def led_server(
-    executable: str, folder: Path, hand: str, *, seed: int = 0, rest_s: float
+    executable: str, folder: Path, hand: str, *, seed: int = 0, rest_s: float, robot: str = "ames"
 ) -> Iterator[tuple[Serving, BrowserContext, ChromiumPhone]]:
     """Server, browser and a page that films the robot; the hand moves after `rest_s`."""
     with (
-        serving(folder, "--cameras", str(calibrate(folder))) as server,
+        serving(folder, "--cameras", str(calibrate(folder)), "--robot", robot) as server,
         browser(executable, **LANDSCAPE) as context,
     ):
+        robot_file = load_robot(robot, takes=COMMANDS)
         moves_at = time.monotonic() + rest_s
-        motion = make_hand(hand, seed=seed, t_start=moves_at)
-        leds_in_b = load_robot("ames").robot.leds_in_b
+        motion = make_hand(hand, seed=seed, start=robot_file.start, t_start=moves_at)
+        leds_in_b = robot_file.robot.leds_in_b
         phone = ChromiumPhone(context, motion, leds_in_b, server.truth_port)
         phone.moves_at = moves_at
         with contextlib.closing(phone), held():

@@ -77,7 +77,7 @@ def compiled_watchdog(directory: Path) -> Path:
     if shutil.which("gcc") is None:
         pytest.skip("NO COMPILER, not tested: gcc is not installed")
     program = directory / "robot"
-    names = ("robot_main.c", "watchdog.c", "blink.c", "health.c", "attitude.c", "hmac.c")
+    names = ("robot_main.c", "watchdog.c", "blink.c", "health.c", "tool.c", "attitude.c", "hmac.c")
     words = ("gcc", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(program))
     subprocess.run((*words, *(str(WATCHDOG / name) for name in names), "-lm"), check=True)
     return program

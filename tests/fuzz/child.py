@@ -21,6 +21,7 @@ INSTRUMENTED = [
     "hardware.led_file",
     "hardware.led_layout.file",
     "hardware.link.blink_datagram",
+    "hardware.link.tool_datagram",
     "hardware.link.robot_end",
     "hardware.robot_file",
     "hardware.robot_schema",

@@ -36,6 +36,7 @@ from hardware.link.health_datagram import MOST_V, HealthDatagram, decode_health,
 from hardware.link.link_key import MAC_BYTES, mac
 from hardware.link.robot_end import LinkLimits, RobotEnd
 from hardware.link.rpit.structs import decode_con
+from hardware.link.tool_datagram import ToolDatagram, decode_tool, encode_tool
 from tests.fuzz.sequence import pieces, together
 from tests.fuzz.target import target
 
@@ -138,6 +139,20 @@ def blink_order(data: bytes) -> None:
     decoded = decode_blink(sealed(data), KEY)
     assert encode_blink(decoded, KEY)[: len(data)] == data
     assert decoded.order.lasts_ms <= LASTS_MS
+    assert RobotEnd(LIMITS, 9, KEY).receive(sealed(data), PEER, 10**6) == Refusal.MALFORMED
+
+
+def tool_seeds():
+    for opening in (0.0, 0.5, 1.0):
+        yield encode_tool(ToolDatagram(5, 7, opening), KEY)[:-MAC_BYTES]
+
+
+@target("tool_order", tool_seeds, (LinkError,), max_bytes=60, mutants=4000)
+def tool_order(data: bytes) -> None:
+    """The same for orders to a tool, which opens by no more than all."""
+    decoded = decode_tool(sealed(data), KEY)
+    assert encode_tool(decoded, KEY)[: len(data)] == data
+    assert 0.0 <= decoded.opening <= 1.0
     assert RobotEnd(LIMITS, 9, KEY).receive(sealed(data), PEER, 10**6) == Refusal.MALFORMED
 
 

@@ -428,6 +428,8 @@ ARM_MISTAKES = {
     "no home": ("home_deg = [0.0, -34.0, 57.0, -23.0, 2.79]", "home_deg = []", "arm.home_deg: "),
     "a part apart": ('["palm_ball", "base"]', '["palm_ball"]', "arm.keeps_apart.5: .*2 items"),
     "no speed": ("joint_speed_deg_s = 120.0", "joint_speed_deg_s = 0.0", "arm.joint_speed_deg_s"),
+    "a tool of no joint": ('tool_joint = "gripper"', "", r"arm.tool_joint: with \[tool\]"),
+    "a nameless tool": ('name = "Gripper"', 'name = ""', "tool.name: "),
 }
 
 

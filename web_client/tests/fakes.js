@@ -106,7 +106,7 @@ export function statusOf(parts = {}) {
     error_deg: null, sigma_mm: null, saturated: false, virtual_camera: null, estimate: null, camera: null,
     path_choice: null, time_ms: 0, until_ramp_ms: null, resumes: false, gaps: {}, warnings: [], sensors_doubted: [], thrusters_weak: [], at_limit: false,
     recording: '', phones: 0, supervisors: 0, realtime: '',
-    control: {}, server: {}, events: [], people: [], leading: null, takes: 'thrusts', thrusts_n: [], thrust_limit_n: 3, told_mm_s: null, told_deg_s: null,
+    control: {}, server: {}, events: [], people: [], leading: null, tool: null, takes: 'thrusts', thrusts_n: [], thrust_limit_n: 3, told_mm_s: null, told_deg_s: null,
     battery: 'untold', battery_v: null, e_stop: 'untold', health: [], task: '', episode: null, ...parts,
   };
 }

@@ -19,6 +19,9 @@ const MODULES = files('src');
 /** What only a French visitor loads, beside the page. */
 const FRENCH = 'src/words/french.js';
 
+/** What only who leads a robot with a tool loads. */
+const TOOL = 'src/ui/tool_slider.js';
+
 /** Every file a page needs, through its modules. @param {string} page */
 function needed(page) {
   const found = new Set([page]);
@@ -43,7 +46,7 @@ test('pages have no inline script, style or handler: the policy forbids them', (
 
 test('nothing comes from another host', () => {
   for (const path of [...PAGES, ...MODULES, 'style.css', 'phone.css', 'supervisor.css', 'calibration.css', 'board.css', 'check.css', 'dark.css', 'fleet.css', 'lens.css', 'link.css',
-    'pairing.css', 'people.css', 'screen.css', 'sight.css', 'trust.css']) {
+    'pairing.css', 'people.css', 'screen.css', 'sight.css', 'tool.css', 'trust.css']) {
     const addresses = read(path).match(/https?:\/\/[\w.-]+/g) ?? [];
     const foreign = addresses.filter((address) => !/localhost|www\.w3\.org|^https:\/\/host$/.test(address));
     assert.deepEqual(foreign, [], path);
@@ -68,7 +71,7 @@ test('French is loaded by whoever speaks it, weighs less than 25 kB, and nobody 
 });
 
 test('no module is left over', () => {
-  const used = new Set([...PAGES, FRENCH].flatMap(needed));
+  const used = new Set([...PAGES, FRENCH, TOOL].flatMap(needed));
   const onlyTypes = ['src/app/phone_types.js', 'src/camera/frame_types.js', 'src/ui/session_types.js', 'src/wire/pairing_types.js',
     'src/wire/protocol_types.js'];
   assert.deepEqual(MODULES.filter((path) => !used.has(path) && !onlyTypes.includes(path)), []);

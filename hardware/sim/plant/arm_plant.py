@@ -61,6 +61,7 @@ class ArmPlant:
         self._data = mujoco.MjData(self._model)
         self._tip = self._model.site(arm.tip).id
         self._servos = _servos(self.arm)
+        self._tool = _Tool.of(self.arm, self._data) if self.arm.tool is not None else None
         self._home_in_k = self.arm.tip(arm.home)[1]
         self._stand_at_home()
         self._setpoints = JointSetpoints(InverseKinematics(self.arm, axes), arm.home)
@@ -84,6 +85,16 @@ class ArmPlant:
         mujoco.mj_step(self._model, self._data, steps)
         mujoco.mj_forward(self._model, self._data)
         self._odometry.step(self._setpoints.rates, self.encoders, dt)
+
+    def use_tool(self, wanted: float | None, dt: float = 0.005) -> None:
+        """Open its tool towards `wanted`, 0 to 1, for `dt` [s]; None: it stays as it is."""
+        if self._tool is not None:
+            self._tool.use(wanted, dt)
+
+    @property
+    def opening(self) -> float:
+        """How far its tool is open, 0 to 1; what it holds may keep it from closing."""
+        return 0.0 if self._tool is None else self._tool.opening
 
     @property
     def angles(self) -> Array:
@@ -153,16 +164,58 @@ def _in_steps(angles: Array) -> Array:
     return steps
 
 
+class _Tool:
+    """What opens and closes, by a joint of its own."""
+
+    def __init__(self, joint: int, servo: int, stroke_s: float, data: mujoco.MjData) -> None:
+        """As it is."""
+        model = data.model
+        self._servo, self._rate, self._data = servo, 1.0 / stroke_s, data
+        self._place = int(model.jnt_qposadr[joint])
+        low, high = model.jnt_range[joint]
+        self._closed, self._open = float(low), float(high)
+        self._told = self.opening
+
+    @classmethod
+    def of(cls, arm: ArmModel, data: mujoco.MjData) -> _Tool:
+        """That of an arm which has one.
+
+        Raises:
+            ArmError: nothing moves it.
+        """
+        assert arm.tool is not None
+        (servo,) = _servos_of(arm.model, [arm.tool])
+        return cls(arm.tool, servo, arm.parameters.tool_stroke_s, data)
+
+    @property
+    def opening(self) -> float:
+        """0 closed to 1 open."""
+        angle = float(self._data.qpos[self._place])
+        return min(max((angle - self._closed) / (self._open - self._closed), 0.0), 1.0)
+
+    def use(self, wanted: float | None, dt: float) -> None:
+        """Go towards it for `dt` [s]."""
+        if wanted is not None:
+            way = self._rate * dt
+            self._told += min(max(wanted - self._told, -way), way)
+        self._data.ctrl[self._servo] = self._closed + self._told * (self._open - self._closed)
+
+
 def _servos(arm: ArmModel) -> list[int]:
-    """Of each joint the servo that is told an angle.
+    """Of each joint of an arm the servo that is told an angle.
 
     Raises:
         ArmError: a joint has none.
     """
-    model, of_joints = arm.model, arm.model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
-    joints = model.actuator_trnid[:, 0]
-    moves = {int(joints[servo]): int(servo) for servo in np.flatnonzero(of_joints)}
-    lacking = [name for name in arm.names if model.joint(name).id not in moves]
+    return _servos_of(arm.model, [int(arm.model.joint(name).id) for name in arm.names])
+
+
+def _servos_of(model: mujoco.MjModel, joints: list[int]) -> list[int]:
+    """The same of some joints of a model."""
+    of_joints = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+    moved = model.actuator_trnid[:, 0]
+    moves = {int(moved[servo]): int(servo) for servo in np.flatnonzero(of_joints)}
+    lacking = [model.joint(joint).name for joint in joints if joint not in moves]
     if lacking:
         raise ArmError("model", f"a position servo for each joint, and for {', '.join(lacking)}")
-    return [moves[model.joint(name).id] for name in arm.names]
+    return [moves[joint] for joint in joints]

@@ -294,6 +294,18 @@ HAZARDS: Final = (
         ),
     ),
     Hazard(
+        "35a",
+        "The robot's tool opens or closes though nobody asks for it",
+        "control, by the press; the robot, by orders that stay away",
+        "orders count while the button is held, and for 100 ms; in every gap, ramp and stop it "
+        "stays as it is, for what it grips must not fall",
+        (
+            "server/web/test_tool.py::test_what_was_asked_before_a_press_counts_for_nothing",
+            "hardware/link/test_tool.py::test_it_stays_in_a_silence_though_orders_go_on",
+            "hardware/link/test_tool.py::test_it_stays_when_the_robot_stops",
+        ),
+    ),
+    Hazard(
         "36",
         "The disk is full or slow",
         "the recorder",

@@ -49,6 +49,8 @@ def test_how_its_jacobian_changes_is_its_difference(q: Array) -> None:
             {"keeps_apart": (("palm_ball", "wall"),)},
             "arm.keeps_apart: geoms of so101.xml, which has",
         ),
+        ({"tool_joint": "thumb"}, "arm.tool_joint: joints of so101.xml, which has none"),
+        ({"tool_joint": "wrist_roll"}, "arm.tool_joint: a joint behind the tip's, with a range"),
         ({"home": HOME[:4]}, "arm.home_deg: 5 angles: of shoulder_pan, shoulder_lift, elbow_flex"),
         ({"home": HOME + 2.0}, "arm.home_deg: within shoulder_pan -110 to 110, "),
     ],

@@ -25,7 +25,7 @@ KEY = bytes(range(16))
 VECTORS = json.loads((Path(__file__).parents[2] / "data" / "link_vectors.json").read_text())
 IDLE, RUNNING, RAMP, _, COAST, WIRE = FollowerState
 LIMITS = LinkLimits(thrusters=3, f_max=3.0, max_rise=1.0, ramp_us=700_000)
-NAMES = ("watchdog.c", "blink.c", "health.c", "attitude.c", "hmac.c")
+NAMES = ("watchdog.c", "blink.c", "health.c", "tool.c", "attitude.c", "hmac.c")
 GCC = ("gcc", "-std=c99", "-pedantic", "-O2", "-Wall", "-Wextra", "-Werror", "-Wconversion")
 
 

@@ -13,7 +13,7 @@ import pytest
 
 pytestmark = pytest.mark.slow
 SOURCE = Path(__file__).parents[3] / "deploy" / "watchdog"
-NAMES = ("fuzz.c", "watchdog.c", "blink.c", "health.c", "attitude.c", "hmac.c")
+NAMES = ("fuzz.c", "watchdog.c", "blink.c", "health.c", "tool.c", "attitude.c", "hmac.c")
 GCC = ("gcc", "-std=c99", "-g", "-O1", "-Wall", "-Wextra", "-Werror")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 EXECUTIONS = 50_000

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from hardware.arm.arm_model import ArmError
+from hardware.follower import TwistCommand
 from hardware.plant_parameters import NO_SENSORS
 from hardware.sim.plant.arm_plant import ArmPlant
+from hardware.sim.simulated import Gripping
+from hardware.sim.virtual_time_follower import VirtualTimeFollower
 from pipeline.frames import GRAVITY
 from tests.hardware.arm.arms import AXES, PARAMETERS, SO101
 
@@ -118,3 +121,44 @@ def test_a_joint_without_a_servo_is_named(tmp_path):
     arm = replace(PARAMETERS, model=tmp_path / "so101.xml")
     with pytest.raises(ArmError, match=r"arm\.model: a position servo for .* elbow"):
         ArmPlant(arm, DRIVE, AXES, NO_SENSORS, np.random.default_rng(0))
+
+
+def used(arm, wanted, seconds):
+    """How far its tool is open after so long."""
+    for _ in range(round(seconds / TICK_S)):
+        arm.use_tool(wanted)
+        arm.step(STILL)
+    return arm.opening
+
+
+def test_its_tool_opens_and_closes_within_its_stroke_and_stays_where_it_is_left():
+    arm = plant()
+    assert used(arm, 1.0, 0.5) == pytest.approx(0.55, abs=0.06)
+    left = used(arm, None, 0.1)
+    assert used(arm, None, 0.5) == pytest.approx(left, abs=0.02)
+    assert used(arm, 1.0, 1.0) == pytest.approx(1.0, abs=0.02)
+    assert used(arm, 0.0, 1.5) == pytest.approx(0.0, abs=0.02)
+    assert np.linalg.norm(arm.p_bf_in_f) < 2e-3  # the tip stays
+
+
+def test_a_robot_is_told_of_its_tool_by_the_link_and_stays_without_word():
+    follower = VirtualTimeFollower(SO101)
+    arm = follower.body
+    assert isinstance(arm, Gripping)
+
+    def fly(seconds, command, wanted):
+        for _ in range(round(seconds / TICK_S)):
+            follower.advance()
+            follower.receive()
+            follower.send(command)
+            if wanted is not None:
+                follower.use_tool(wanted)
+        return arm.opening
+
+    begins = fly(0.8, TwistCommand.zero(), 1.0)  # its handshake: it does not follow yet
+    assert begins < 0.6
+    follows = TwistCommand(np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0]), armed=True)
+    assert fly(1.2, follows, 1.0) == pytest.approx(1.0, abs=0.02)
+    assert fly(0.3, follows, 0.0) == pytest.approx(0.7, abs=0.06)
+    left = fly(0.3, follows, None)
+    assert fly(1.0, follows, None) == pytest.approx(left, abs=0.02)

@@ -71,6 +71,7 @@ UNTOLD = {
     "after hello",
     "as {}: {}",
     "hello first",
+    "none: this robot has no tool",
     "local program ({})",
     "no more than {} m/s and {} rad/s",
     "not as {}",

@@ -1,7 +1,8 @@
 /** The phone page: joins browser, sensors, links and screen. The only module that acts by itself. */
 
 /** @import {Effect, Event} from '../ui/session_types.js' */
-/** @import {PathChoice, Welcome} from '../wire/protocol_types.js' */
+/** @import {PathChoice, ToolStatus, Welcome} from '../wire/protocol_types.js' */
+/** @import {ToolSlider} from '../ui/tool_slider.js' */
 
 import { browserOf } from './browser.js';
 import { CameraFeed } from '../camera/camera_feed.js';
@@ -150,6 +151,9 @@ const handover = new HandoverCard(document, fetchHere, { onTake: () => dispatch(
 
 const leading = new LeadingChoice(document, (lead) => void phone.link.sendMessage(lead), () => performance.now());
 
+/** Of a robot that has a tool. @type {Promise<ToolSlider> | null} */
+let toolSlider = null;
+
 const linkCheck = new LinkCheck(document, performance, fetchHere);
 
 /** @param {Event} event */
@@ -171,7 +175,18 @@ function show() {
   lensPanel.render(state.standby ? { ...state, status: null } : state); // it is another phone’s camera
   linkCheck.render(state);
   handover.render(state);
+  useTool(!state.standby && state.heard ? state.status?.tool ?? null : null);
   leading.take(!state.standby && state.heard ? state.status?.leading ?? null : null, state.held);
+}
+
+/** @param {ToolStatus | null} tool */
+function useTool(tool) {
+  if (tool !== null) {
+    toolSlider ??= import('../ui/tool_slider.js').then(({ ToolSlider }) => new ToolSlider(
+      document, (use) => void phone.link.sendMessage(use), () => performance.now(),
+    ));
+  }
+  void toolSlider?.then((slider) => slider.take(tool, state.held ? state.press : null));
 }
 
 /** @param {Effect} effect */

@@ -44,6 +44,14 @@
  */
 
 /**
+ * Page of the phone that leads → server: how far the tool shall be open. It moves there while the button is held, and stays as it is once it is not. Refused of a robot without a tool; of an earlier press it counts for nothing.
+ * @typedef {object} UseTool
+ * @property {'tool'} type
+ * @property {number} opening 0 closed to 1 open.
+ * @property {number} press During which it was asked, as TOUCH counts them.
+ */
+
+/**
  * Which way the pictures of the phone that leads shall come by, and who chose it. A supervisor's page → server → operator's page: choose so. Operator's page → server: so it stands, when welcomed and at each choice; `status` shows that to all.
  * @typedef {object} PathChoice
  * @property {'path'} type
@@ -184,6 +192,13 @@
  */
 
 /**
+ * The robot's tool.
+ * @typedef {object} ToolStatus
+ * @property {string} name For people.
+ * @property {number | null} opening What the robot is told, 0 closed to 1 open; null: to stay as it is.
+ */
+
+/**
  * Is it the camera that was calibrated, and is it set well for LEDs?
  * @typedef {object} CameraHealth
  * @property {string} complaint Why nobody should fly with it, or "".
@@ -264,6 +279,7 @@
  * @property {Record<string, number>} server Of the server process: the longest stall of its event loop in the last minute, stall_ms, and while the robot was armed, armed_stall_ms: armed_stall_cpu_ms of it at work, and without a processor for armed_stall_waited_ms; recent_stall_ms, since the status before, so that none is hidden by a longer one, recent_stall_cpu_ms of it at work, recent_stall_waited_ms without a processor, until recent_stall_until_ms of the clock of time_ms; garbage collections while it was armed: processor time of the longest, gc_ms, and number of full ones, gc_full.
  * @property {Person[]} people Who is paired, in the order they came.
  * @property {LeadingStatus | null} leading null before the control process has told of it.
+ * @property {ToolStatus | null} tool null of a robot without.
  * @property {'thrusts' | 'twist'} takes What the robot is told: by its thrusters, or a velocity that it follows by itself.
  * @property {number[]} thrusts_n What each thruster is told ...
  * @property {number} thrust_limit_n ... and the most that one may be.
@@ -363,7 +379,7 @@
  * @property {number | null} distance_m From the camera to the robot.
  */
 
-/** @typedef {Hello | Command | Tune | Lead | PathChoice | Calibrate | Log | ScreenSize | ClockAsk} FromPage */
+/** @typedef {Hello | Command | Tune | Lead | UseTool | PathChoice | Calibrate | Log | ScreenSize | ClockAsk} FromPage */
 /** @typedef {Welcome | Refused | Status | Command | PathChoice | Calibration | Deed | ClockAnswer | ScreenLights | Sight} ToPage */
 
 export {};

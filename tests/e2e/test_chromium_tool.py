@@ -1,0 +1,64 @@
+"""A real Chromium leads a robot, and opens and closes its tool with another finger."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from hardware.robot_file import robot_path
+from tests.e2e.chromium_rig import flown, led_server, start
+
+pytestmark = [pytest.mark.e2e, pytest.mark.flight]
+SLIDER = ".tool-slider input"
+TOOL = '\n[tool]\nname = "Gripper"\n'
+BOX = f"""
+(() => {{
+  const slider = document.querySelector('{SLIDER}');
+  const {{left, right, top, bottom, width, height}} = slider.getBoundingClientRect();
+  const at = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+  return {{width, height, isFree: at === slider, isOff: slider.disabled}};
+}})()
+"""
+
+
+def test_a_robot_s_tool_follows_the_slider_while_the_button_is_held(
+    chromium: str, tmp_path: Path
+) -> None:
+    robot = tmp_path / "gripping.toml"
+    robot.write_text(robot_path("ames").read_text() + TOOL)
+    with led_server(chromium, tmp_path, "moving", seed=2, rest_s=15.0, robot=str(robot)) as (
+        server,
+        _,
+        phone,
+    ):
+        start(phone, server)
+        told: list[object] = []
+
+        def tool() -> dict[str, object]:
+            said = server.request("GET", "/api/status")["tool"]
+            assert isinstance(said, dict)
+            return said
+
+        def look() -> None:
+            told.append(tool()["opening"])
+
+        assert tool() == {"name": "Gripper", "opening": None}
+        box = phone.evaluate(BOX)
+        assert box["isFree"], "nothing lies on it"
+        assert box["isOff"], "it waits for a press"
+        assert box["height"] >= 44.0
+        assert box["width"] >= 100.0
+        slide = partial(phone.slide, SLIDER)
+        deeds = [(1.0, partial(slide, 0.8)), (2.0, look), (4.0, partial(slide, 0.2)), (5.0, look)]
+        flown(phone, server, 6.0, deeds)
+        opened, closed = told[-2:]
+        assert isinstance(opened, float)
+        assert isinstance(closed, float)
+        assert 0.7 < opened < 0.9
+        assert 0.1 < closed < 0.3
+        phone.let_go()
+        phone.play_until("document.body.innerText.includes('HOLD')", 3.0)
+        phone.play(0.3)
+        assert tool()["opening"] is None
