@@ -7,6 +7,7 @@ import re
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from math import ceil
 from pathlib import Path
 from typing import Final
@@ -30,6 +31,7 @@ TICK_S: Final = 0.005
 THRUST_S: Final = 0.02
 """Between two looks at the thrusts."""
 ZERO_N: Final = 1e-3
+PATIENCE_S: Final = 60.0
 AT_ZERO_S: Final = 1.0
 """So long thrusts are looked at after STOP."""
 F_MAX_N: Final = load_robot("ames").robot.f_max
@@ -54,15 +56,25 @@ def ask_as_phone(port: int, cookie: str) -> float:
     return time.monotonic() - began
 
 
-def watch(server: Serving, target: Target, cookie: str, name: str, seconds: float) -> Part:
-    """Ask as phone and as supervisor, look at the robot's thrusts."""
+def watch(
+    server: Serving,
+    target: Target,
+    cookie: str,
+    name: str,
+    seconds: float,
+    is_enough: Callable[[], bool] = lambda: True,
+) -> Part:
+    """Ask as phone and as supervisor, look at the robot's thrusts: so long at least, till enough.
+
+    A slow machine's attackers need longer for the same.
+    """
     part, pid = Part(name), processes(server.process.pid)["server"]
     with (
         contextlib.closing(Witness(TICK_S)) as witness,
         contextlib.closing(TruthClient(server.truth_port)) as truth,
     ):
         before, end = missed(server), time.monotonic() + seconds
-        while time.monotonic() < end:
+        while (now := time.monotonic()) < end or (now < end + PATIENCE_S and not is_enough()):
             due = time.monotonic() + PERIOD_S
             ask(server, target, cookie, part)
             part.rss_mb = max(part.rss_mb, rss_mb(pid))

@@ -3,8 +3,9 @@
     python -m tests.bench.hostile_phone --path websocket|webrtc    # and all of `lightleash phone`
 
 Among its own pictures, bombs on the ways that those come; and answers that are none: to fresh
-offers where it leads by websockets, else to the offer that it flies by. Its last line is what it
-came to as JSON, with what it `did` and what the server said to that.
+offers where it leads by websockets, else to the offer that it flies by. A line says when it has
+tried each kind of both once; its last one is what it came to as JSON, with what it `did` and what
+the server said to that.
 """
 
 from __future__ import annotations
@@ -57,6 +58,7 @@ class Hostile(PhoneClient):
     async def open(self, device: str) -> Welcome:
         self.did, self._begun, self._due = Counter(), asyncio.Event(), 0.0
         self._thrown = 0
+        self._kinds = {"bombs", "answers"}
         self._size = (0, 0)
         asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, self._begun.set)
         self._welcome = await super().open(device)
@@ -79,12 +81,15 @@ class Hostile(PhoneClient):
             made = list(bombs(*self._size).values())
             tracked = [(bomb, True) for bomb in made if self.by_track and bomb[0] is Codec.H264]
             self._next = cycle([*((bomb, False) for bomb in made), *tracked])
+            self._bombs = len(made) + len(tracked)
         (codec, data), as_track = next(self._next)
         number, t_us = NUMBERED_FROM + self._thrown, record.t_us + AFTER_US
         bomb = Record(number, t_us, replace(picture, codec=codec, key=True, data=data))
         self._thrown += 1
         self.did[f"bombs by {'track' if as_track else 'socket'}"] += 1
         await (super().send(bomb) if as_track else PhoneClient._say(self, bomb))
+        if self._thrown == self._bombs:
+            self._has_tried("bombs")
 
     async def _answer_offers(self) -> None:
         await self._begun.wait()
@@ -93,7 +98,14 @@ class Hostile(PhoneClient):
             answers = list(hostile(good).values())
             status, field = await self._request(Answer(offer, answers[n % len(answers)]))
             self.did[f"answers: {status} {field}".strip()] += 1
+            if n + 1 == len(answers):
+                self._has_tried("answers")
             await asyncio.sleep(ANSWER_S)
+
+    def _has_tried(self, what: str) -> None:
+        self._kinds.discard(what)
+        if not self._kinds:
+            print("each kind once", flush=True)
 
     async def _offered(self) -> tuple[str, str]:
         """(id of an offer, a good answer to it), of one that nobody has answered."""
