@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hardware.follower import FollowerError
-from hardware.link.registry import GROUP, OWN, link_kind
+from hardware.link.registry import GROUP, OWN, connect, link_kind
 from hardware.link.silence import SilenceTimes
 from hardware.robot_file import RobotFileError, load_robot, robot_of, robot_path, robot_table
 
@@ -19,6 +19,13 @@ from hardware.link.silence import SilenceTimes
 def connect(robot_file, key, epoch):
     raise AssertionError("nobody flies here")
 
+class Rig:
+    def close(self):
+        self.closed = True
+
+RIG = Rig()
+SILENCE = SilenceTimes(0.5, 0.5, 0.5)
+BARE = LinkKind(lambda *_: RIG, stops_in_silence=False, keyed=False, silence=SILENCE)
 LAB = LinkKind(connect, stops_in_silence=False, keyed=False, silence=SilenceTimes(0.5, 0.5, 0.5))
 NO_KIND = connect
 """
@@ -26,12 +33,13 @@ NO_KIND = connect
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch):
-    """An installed package of somebody else's, with three kinds; one alone is good."""
+    """An installed package of somebody else's, with four kinds, two of which load."""
     (tmp_path / "lab_links.py").write_text(OTHERS)
     info = tmp_path / "lab_links-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-links\nVersion: 1.0\n")
-    points = "lab = lab_links:LAB\nbroken = lab_links:MISSING\nno-kind = lab_links:NO_KIND\n"
+    kinds = {"bare": "BARE", "lab": "LAB", "broken": "MISSING", "no-kind": "NO_KIND"}
+    points = "".join(f"{kind} = lab_links:{name}\n" for kind, name in kinds.items())
     (info / "entry_points.txt").write_text(f"[{GROUP}]\n{points}")
     monkeypatch.syspath_prepend(str(tmp_path))
     yield
@@ -58,12 +66,23 @@ def test_an_installed_package_brings_its_own():
     [
         ("broken", "does not load"),
         ("no-kind", "is no LinkKind"),
-        ("uqp", r"broken, lab, no-kind, ros2, rpit, udp \(did you mean 'udp'\?\)"),
+        ("uqp", r"bare, broken, lab, no-kind, ros2, rpit, udp \(did you mean 'udp'\?\)"),
     ],
 )
 def test_what_can_not_be_used_is_named_with_what_can(name, words):
     with pytest.raises(FollowerError, match=words):
         link_kind(name)
+
+
+@pytest.mark.usefixtures("package")
+def test_a_robot_with_a_tool_is_not_led_by_a_link_that_has_no_word_for_it():
+    table = robot_table(robot_path("ames"))
+    table["link"] |= {"kind": "bare", "stopped_by": "a relay on the battery"}
+    rig = link_kind("bare").connect(None, b"", 0)
+    assert connect(robot_of(table, "lab.toml"), bytes(16), 1) is rig
+    with pytest.raises(FollowerError, match=r"\[tool\] by a link of kind 'bare': none by this one"):
+        connect(robot_of(table | {"tool": {"name": "Gripper"}}, "lab.toml"), bytes(16), 1)
+    assert rig.closed
 
 
 def test_a_robot_file_may_name_a_kind_that_is_not_installed_here():

@@ -201,7 +201,7 @@ export class BoardView extends Elements {
   }
 
   /** @param {Status} status */
-  told({ takes, saturated, thrusts_n: thrusts, thrust_limit_n: limit, told_mm_s: speed, told_deg_s: rate }) {
+  told({ takes, saturated, thrusts_n: thrusts, thrust_limit_n: limit, told_mm_s: speed, told_deg_s: rate, tool }) {
     this.show('saturated', saturated);
     this.text('told', takes === 'twist' ? 'Twist' : 'Thrusts');
     thrusts.forEach((thrust, i) => {
@@ -212,6 +212,10 @@ export class BoardView extends Elements {
       row.classList.toggle('full', thrust >= FULL * limit);
       write(row.lastElementChild, `${number(thrust, 2)} N`);
     });
+    if (tool !== null) {
+      const opening = tool.opening === null ? null : 100 * tool.opening;
+      this.figure('twist', tool.name, opening === null ? 'stays' : number(opening, 0), opening === null ? '' : '% open');
+    }
     if (takes !== 'twist') return;
     this.figure('twist', 'Told to move', number(speed, 0), 'mm/s');
     this.figure('twist', 'Told to turn', number(rate, 1), '°/s');
