@@ -19,6 +19,8 @@ from hardware.robot_file import load_robot
 
 TWIST = ("x.vel", "y.vel", "z.vel", "wx.vel", "wy.vel", "wz.vel")
 """[m/s] and [rad/s] of the tip, in axes of its own."""
+GRIPPER = ("gripper.pos", "gripper.enabled")
+"""How far it was told last to be open (100: all), and whether it shall move there or stay (0)."""
 
 
 @TeleoperatorConfig.register_subclass("lightleash")
@@ -45,11 +47,12 @@ class Lightleash(Teleoperator):
         super().__init__(config)
         self.config = config
         self._link: PolledServer | None = None
+        self._opening = 0.0
 
     @property
     def action_features(self) -> dict[str, type]:
-        """Twist, whether somebody leads (1 or 0), and how old that is [s]."""
-        return dict.fromkeys((*TWIST, "enabled", "age_s"), float)
+        """Twist, whether somebody leads (1 or 0), how old that is [s], and the gripper's."""
+        return dict.fromkeys((*TWIST, "enabled", "age_s", *GRIPPER), float)
 
     @property
     def feedback_features(self) -> dict[str, type]:
@@ -86,7 +89,11 @@ class Lightleash(Teleoperator):
             raise DeviceNotConnectedError(f"{self} is not connected.")
         told = self._link.ask()
         twist = dict(zip(TWIST, told.twist_in_b.tolist(), strict=True))
-        return {**twist, "enabled": float(told.enabled), "age_s": told.age_s}
+        if told.opening is not None:
+            self._opening = told.opening
+        told_to_move = float(told.opening is not None)
+        gripper = dict(zip(GRIPPER, (100.0 * self._opening, told_to_move), strict=True))
+        return {**twist, "enabled": float(told.enabled), "age_s": told.age_s, **gripper}
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:
         """Refuse: see `feedback_features`."""

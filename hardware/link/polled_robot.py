@@ -22,6 +22,7 @@ import numpy as np
 
 from hardware.follower import NOT_MEASURED, FollowerState, Refusal
 from hardware.link.robot_end import SILENCE_US, LinkLimits, Peer, RobotEnd
+from hardware.link.tool_end import ToolEnd
 from hardware.robot_file import RobotFile, RobotFileError
 from hardware.twist_schema import TOLD_ZERO_S
 from pipeline.frames import Array, Triple
@@ -47,6 +48,8 @@ class PolledTwist:
     """Somebody leads, and what he said is fresh; False while it brakes, too."""
     age_s: float
     """Since the last command taken [s], at most `OLDEST_S`."""
+    opening: float | None = None
+    """How far its tool shall be open, 0 to 1; None: it stays as it is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +60,7 @@ class _Tick:
     taken_us: int | None
     running: bool
     twist_in_b: Array
+    opening: float | None = None
 
 
 class PolledRobot:
@@ -76,6 +80,7 @@ class PolledRobot:
         if robot.motion is None or robot_file.plant.odometry is not None:
             raise RobotFileError(robot.name, "motion.twist", COMMANDED)
         self.end = RobotEnd(LinkLimits.of(robot_file), boot_id, key)
+        self._tool = ToolEnd(key) if robot.tool else None
         self._nonces = nonces
         self._taken_us: int | None = None
         self._tick = _Tick(0, None, running=False, twist_in_b=np.zeros(6))
@@ -84,6 +89,8 @@ class PolledRobot:
 
     def receive(self, data: bytes, peer: Peer, now_us: int) -> None:
         """A datagram has come from `peer`."""
+        if self._tool is not None and self._tool.receive(data, self.end, now_us):
+            return
         if self.end.receive(data, peer, now_us) == Refusal.NONE:
             self._taken_us = now_us
 
@@ -94,7 +101,8 @@ class PolledRobot:
             self.end.halt()
         twist_in_b = self.end.setpoint(now_us)
         running = self.end.state == FollowerState.RUNNING
-        self._tick = _Tick(now_us, self._taken_us, running, twist_in_b)
+        opening = None if self._tool is None else self._tool.wanted(self.end, now_us)
+        self._tick = _Tick(now_us, self._taken_us, running, twist_in_b, opening)
         return (self._sample(now_us, told_in_b),)
 
     def ask(self, now_us: int) -> PolledTwist:
@@ -104,8 +112,9 @@ class PolledRobot:
         twist_in_b = tick.twist_in_b if late_us <= TOLD_ZERO_US else np.zeros(6)
         self._asked = now_us, twist_in_b
         age_s = OLDEST_S if tick.taken_us is None else 1e-6 * (now_us - tick.taken_us)
-        enabled = tick.running and late_us <= SILENCE_US
-        return PolledTwist(twist_in_b, enabled, min(max(age_s, 0.0), OLDEST_S))
+        is_fresh = late_us <= SILENCE_US
+        enabled, opening = tick.running and is_fresh, tick.opening if is_fresh else None
+        return PolledTwist(twist_in_b, enabled, min(max(age_s, 0.0), OLDEST_S), opening)
 
     def shut_down(self, now_us: int) -> bytes:
         """Refuse for good; gives the last sample, which says so."""

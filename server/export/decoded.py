@@ -119,6 +119,7 @@ class RecordedState(msgspec.Struct, frozen=True):
     commands: list[tuple[float, ...]] = []
     estimate: EstimateFields | None = None
     health: HealthFields | None = None
+    tool_opening: float | None = None
 
     @property
     def battery_v(self) -> float | None:

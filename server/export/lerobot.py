@@ -5,6 +5,7 @@
 | observation.images.phone | the picture |
 | observation.state | body in the phone's axes, its velocity, the phone's attitude, of that moment |
 | action | what control told the robot at its first tick from then on: thrusts, or a twist |
+| … of one with a tool | behind it, how far that was last told to be open, 0 to 1 |
 | capture_time_s, capture_sigma_s | when it was taken, since 1970, and how well that is known |
 | acting_time_s | when that tick was |
 
@@ -102,6 +103,9 @@ class _Ticks:
             q[1:] *= np.cumprod(np.where(signs < 0.0, -1.0, 1.0))[:, None]
         self._t_acted = np.array([state.t for state in states])
         self._commands = [np.array(state.command) for state in states]
+        if decoded.robot.robot.tool:
+            openings = _held([state.tool_opening for state in states])
+            self._commands = list(map(np.append, self._commands, openings))
 
     def state(self, t: float) -> Array | None:
         """(14,) at `t` [s], between two ticks; None: nobody knew."""
@@ -121,6 +125,12 @@ class _Ticks:
         if k == len(self._t_acted) or self._t_acted[k] - t > GAP_S:
             return None
         return float(self._t_acted[k]), self._commands[k]
+
+
+def _held(told: Sequence[float | None]) -> list[float]:
+    """What stays when nothing is told: the last one; before the first one that, or 0."""
+    last = next((one for one in told if one is not None), 0.0)
+    return [last := last if one is None else one for one in told]
 
 
 def _row(state: RecordedState) -> list[float] | None:
@@ -169,9 +179,10 @@ class _Dataset:
         self._episodes = [episodes[k] for k in sorted({shot.episode for shot in shots})]
         """Those that have rows."""
         self._tasks = list(dict.fromkeys(one.task or UNNAMED for one in self._episodes))
+        names = decoded.command_names + ("tool_opening",) * bool(decoded.robot.robot.tool)
         self._features = {
             "observation.state": Feature("float32", STATE),
-            "action": Feature("float32", decoded.command_names),
+            "action": Feature("float32", names),
             "capture_time_s": Feature("float64", ()),
             "capture_sigma_s": Feature("float64", ()),
             "acting_time_s": Feature("float64", ()),

@@ -1,6 +1,7 @@
 """A robot that is asked for its set-point: by whoever is silent, it comes to rest and says so."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,9 +30,11 @@ class Line:
     """Control at 200 Hz, the robot's end, and who asks at 30 Hz, in virtual time."""
 
     def __init__(self) -> None:
-        self.robot = PolledRobot(TIP, 7, seeded_nonces(0), KEY)
+        tip = replace(TIP, robot=replace(TIP.robot, tool="Gripper"))
+        self.robot = PolledRobot(tip, 7, seeded_nonces(0), KEY)
         self.control = ControlEnd.of(TIP, KEY, 1)
         self.now_us, self.speaks, self.asks, self.ticks = 0, True, True, True
+        self.opening: float | None = None
         self.wants, self.samples, self.answers, self.sent = np.zeros(6), [], [], []
 
     def advance(self, seconds: float) -> None:
@@ -43,6 +46,8 @@ class Line:
                 command = TwistCommand(self.wants, armed=bool(self.wants.any()))
                 data = self.control.command(command, 1e-6 * self.now_us)
                 self.robot.receive(data, PEER, self.now_us)
+                if self.opening is not None:
+                    self.robot.receive(self.control.tool(self.opening), PEER, self.now_us)
             if self.asks and self.now_us % PERIOD_US < TICK_US:
                 self.answers.append((self.now_us, self.robot.ask(self.now_us)))
 
@@ -119,6 +124,23 @@ def test_one_whom_nobody_asks_refuses_and_needs_to_be_begun_anew(led):
     led.wants = FORWARD
     led.advance(0.5)
     assert led.answer.enabled
+
+
+@pytest.mark.parametrize("silent", ["slider", "control", "its own thread"])
+def test_its_tool_is_asked_for_by_the_slider_and_stays_in_every_silence(led, silent):
+    assert led.answer.opening is None
+    led.opening = 0.25
+    led.advance(0.2)
+    assert led.answer.opening == 0.25
+    if silent == "slider":
+        led.opening = None
+    elif silent == "control":
+        led.speaks = False
+    else:
+        led.ticks = False
+    led.advance(0.2)
+    assert led.answer.opening is None
+    assert led.answer.enabled == (silent == "slider")
 
 
 @pytest.mark.parametrize(("robot", "key"), [("ames", "link.takes"), ("rover", "motion.twist")])

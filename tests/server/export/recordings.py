@@ -50,8 +50,11 @@ def on_a_known_day(folder, source=FLIGHT, change=lambda entry: entry.data, notes
     return path
 
 
-def told_a_twist(folder):
-    """The same flight, as if its robot took a twist: it is told this one, and measures it."""
+def told_a_twist(folder, openings=None):
+    """The same flight, as if its robot took a twist: it is told this one, and measures it.
+
+    With an iterator of `openings` it has a tool that is told one at each status.
+    """
 
     def change(entry):
         if entry.topic != STATUS:
@@ -59,9 +62,12 @@ def told_a_twist(folder):
         status = json.loads(entry.data)
         measured = [[t, *TWIST_IN_B] for t, *_ in status["body_samples"]]
         status |= {"thrusts": [], "twist_in_b": TWIST_IN_B, "body_twists": measured}
+        if openings is not None:
+            status["tool_opening"] = next(openings)
         return json.dumps(status).encode()
 
     twister = (ROBOTS / "twister.toml").read_text()
+    twister += "" if openings is None else '\n[tool]\nname = "Gripper"\n'
     return on_a_known_day(folder, change=change, **{ROBOT_KEY: twister})
 
 

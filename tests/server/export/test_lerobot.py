@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import chain, repeat
 
 import av
 import cv2
@@ -185,6 +186,20 @@ def test_of_a_robot_that_takes_a_twist_that_is_the_action(tmp_path):
     assert {tuple(row["action"]) for row in dataset.rows} == {
         tuple(np.float32(TWIST_IN_B).tolist())
     }
+
+
+@pytest.mark.slow
+def test_a_tool_is_as_it_was_told_last(tmp_path):
+    told = chain([None] * 150, [0.25], [None] * 20, [0.75], repeat(None))
+    words = ["--to", "lerobot", "--out", str(tmp_path)]
+    assert main([str(told_a_twist(tmp_path, told)), *words]) == 0
+    dataset = Dataset(tmp_path / "virtual_phone.lerobot")
+    assert dataset.info["features"]["action"]["names"][-1] == "tool_opening"
+    openings = [row["action"][-1] for row in dataset.rows]
+    assert openings[0] == 0.25
+    assert openings[-1] == 0.75
+    assert set(openings) == {0.25, 0.75}
+    assert openings == sorted(openings)
 
 
 def test_a_recording_without_an_episode_is_named(tmp_path, capsys):
