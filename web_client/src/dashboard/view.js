@@ -212,13 +212,13 @@ export class BoardView extends Elements {
       row.classList.toggle('full', thrust >= FULL * limit);
       write(row.lastElementChild, `${number(thrust, 2)} N`);
     });
-    if (tool !== null) {
-      const opening = tool.opening === null ? null : 100 * tool.opening;
-      this.figure('twist', tool.name, opening === null ? 'stays' : number(opening, 0), opening === null ? '' : '% open');
+    if (takes === 'twist') {
+      this.figure('twist', 'Told to move', number(speed, 0), 'mm/s');
+      this.figure('twist', 'Told to turn', number(rate, 1), '°/s');
     }
-    if (takes !== 'twist') return;
-    this.figure('twist', 'Told to move', number(speed, 0), 'mm/s');
-    this.figure('twist', 'Told to turn', number(rate, 1), '°/s');
+    if (tool === null) return;
+    const opening = tool.opening === null ? null : 100 * tool.opening;
+    this.figure('twist', tool.name, opening === null ? 'stays' : number(opening, 0), opening === null ? '' : '% open');
   }
 
   /** @param {Status} status */
