@@ -25,8 +25,8 @@ import struct
 from dataclasses import dataclass
 
 from hardware.follower import BlinkOrder
-from hardware.link.datagram import LinkError
-from hardware.link.link_key import MAC_BYTES, is_authentic, mac
+from hardware.link.datagram import LinkError, fixed_fields
+from hardware.link.link_key import MAC_BYTES, mac
 
 MAGIC, VERSION = b"LLbl", 1
 SLOTS = 8  # of a round
@@ -72,15 +72,10 @@ def decode_blink(data: bytes, key: bytes) -> BlinkDatagram:
     Raises:
         LinkError: not one of this version, not made with the key, or with a value that can't be.
     """
-    if len(data) != BYTES:
-        raise LinkError("blink.size", f"{BYTES} bytes")
-    magic, version, zero, slot_ms, epoch, nonce, begin_us, lasts_ms, *dark = LAYOUT.unpack(
-        data[:-MAC_BYTES]
-    )
-    if (magic, version, zero) != (MAGIC, VERSION, 0):
-        raise LinkError("blink.magic, version", f"{MAGIC!r}, {VERSION}, 0")
-    if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
-        raise LinkError("mac", "made with the robot's key")
+    fields = fixed_fields(data, key, LAYOUT, "blink", MAGIC, VERSION)
+    zero, slot_ms, epoch, nonce, begin_us, lasts_ms, *dark = fields
+    if zero != 0:
+        raise LinkError("blink.zero", "0")
     if not SHORTEST_MS <= slot_ms <= LONGEST_MS or lasts_ms > LASTS_MS or begin_us >= 1 << 60:
         raise LinkError("blink.slot, begin, lasts", "20 to 1000 ms, 0 to 2^60 µs, 0 to 10 000 ms")
     leds = tuple(-1 if led == NO_LED else led for led in dark)

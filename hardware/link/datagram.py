@@ -56,6 +56,7 @@ import struct
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite
+from typing import Any
 
 from hardware.follower import NOT_MEASURED, FollowerState, Refusal
 from hardware.link.link_key import MAC_BYTES, is_authentic, mac
@@ -292,3 +293,21 @@ def _checked(
 def is_later(a: int, b: int) -> bool:
     """Whether counter `a` comes after `b`, round the corner of 32 bits."""
     return 0 < (a - b) % U32 < U32 // 2
+
+
+def fixed_fields(
+    data: bytes, key: bytes, layout: struct.Struct, what: str, magic: bytes, version: int
+) -> tuple[Any, ...]:
+    """Fields behind magic and version of a datagram of one size, for `what` it is.
+
+    Raises:
+        LinkError: another size or version, or not made with the key.
+    """
+    if len(data) != layout.size + MAC_BYTES:
+        raise LinkError(f"{what}.size", f"{layout.size + MAC_BYTES} bytes")
+    fields = layout.unpack(data[:-MAC_BYTES])
+    if fields[:2] != (magic, version):
+        raise LinkError(f"{what}.magic, version", f"{magic!r}, {version}")
+    if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
+        raise LinkError("mac", "made with the robot's key")
+    return fields[2:]

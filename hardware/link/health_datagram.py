@@ -26,8 +26,8 @@ from dataclasses import dataclass
 from math import isnan, nan
 
 from hardware.follower import EStop, RobotHealth
-from hardware.link.datagram import LinkError
-from hardware.link.link_key import MAC_BYTES, is_authentic, mac
+from hardware.link.datagram import LinkError, fixed_fields
+from hardware.link.link_key import MAC_BYTES, mac
 
 MAGIC, VERSION = b"LLhe", 1
 LAYOUT = struct.Struct("<4sBBHQIIf")
@@ -68,13 +68,10 @@ def decode_health(data: bytes, key: bytes) -> HealthDatagram:
     Raises:
         LinkError: not one of this version, not made with the key, or with a value that can't be.
     """
-    if len(data) != BYTES:
-        raise LinkError("health.size", f"{BYTES} bytes")
-    magic, version, e_stop, zero, t_us, boot_id, counter, volts = LAYOUT.unpack(data[:-MAC_BYTES])
-    if (magic, version, zero) != (MAGIC, VERSION, 0):
-        raise LinkError("health.magic, version", f"{MAGIC!r}, {VERSION}, 0")
-    if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
-        raise LinkError("mac", "made with the robot's key")
+    fields = fixed_fields(data, key, LAYOUT, "health", MAGIC, VERSION)
+    e_stop, zero, t_us, boot_id, counter, volts = fields
+    if zero != 0:
+        raise LinkError("health.zero", "0")
     if t_us >= 1 << 60:
         raise LinkError("health.time", "0 to 2^60 µs")
     if not (isnan(volts) or 0.0 <= volts <= MOST_V):

@@ -21,8 +21,8 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 
-from hardware.link.datagram import LinkError
-from hardware.link.link_key import MAC_BYTES, is_authentic, mac
+from hardware.link.datagram import LinkError, fixed_fields
+from hardware.link.link_key import MAC_BYTES, mac
 
 MAGIC, VERSION = b"LLtl", 1
 LAYOUT = struct.Struct("<4sBBHQQ")
@@ -53,13 +53,10 @@ def decode_tool(data: bytes, key: bytes) -> ToolDatagram:
     Raises:
         LinkError: not one of this version, not made with the key, or with a value that can't be.
     """
-    if len(data) != BYTES:
-        raise LinkError("tool.size", f"{BYTES} bytes")
-    magic, version, zero, opening, epoch, nonce = LAYOUT.unpack(data[:-MAC_BYTES])
-    if (magic, version, zero) != (MAGIC, VERSION, 0):
-        raise LinkError("tool.magic, version", f"{MAGIC!r}, {VERSION}, 0")
-    if not is_authentic(key, data[:-MAC_BYTES], data[-MAC_BYTES:]):
-        raise LinkError("mac", "made with the robot's key")
+    fields = fixed_fields(data, key, LAYOUT, "tool", MAGIC, VERSION)
+    zero, opening, epoch, nonce = fields
+    if zero != 0:
+        raise LinkError("tool.zero", "0")
     if opening > OPEN:
         raise LinkError("tool.opening", f"0 to {OPEN}")
     return ToolDatagram(epoch, nonce, opening / OPEN)
