@@ -105,15 +105,14 @@ function others({ status, you }) {
 
 /** Whether this phone leads, and may hand over. @param {State} state */
 export function mayGive(state) {
-  const mode = shownMode(state);
-  const free = state.calibration === null || state.calibration.phase === 'needed';
-  return state.linked && isAtRest(mode) && free && others(state).length > 0;
+  return mayChoose(state) && isAtRest(shownMode(state)) && others(state).length > 0;
 }
 
 /** Whether a choice that was begun goes on: a moment without word of robot or others ends none. @param {State} state */
 export function mayChoose(state) {
   const mode = shownMode(state);
-  return state.linked && (isAtRest(mode) || mode === 'NO_WORD' || mode === 'LOST');
+  const free = state.calibration === null || state.calibration.phase === 'needed';
+  return state.linked && free && (isAtRest(mode) || mode === 'NO_WORD' || mode === 'LOST');
 }
 
 /**
