@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hardware.follower import FollowerState, TwistCommand
+from hardware.follower import STOPPED, FollowerState, TwistCommand
 from hardware.link.registry import connect
 from hardware.robot_file import load_robot
 
@@ -21,9 +21,9 @@ READY_S, LEADS_S, STOPS_S, PERIOD_S = 20.0, 4.0, 1.0, 0.005
 def main() -> None:
     follower = connect(BASE, bytes(16), epoch=time.time_ns() // 1_000_000)
     x = y = yaw = 0.0
-    last_us, begun, gives_up = 0, math.inf, time.monotonic() + READY_S
-    state = FollowerState.REFUSING
-    while (led_s := time.monotonic() - begun) < LEADS_S + STOPS_S:
+    last_us, leads_until, state = 0, math.inf, FollowerState.REFUSING
+    gives_up = time.monotonic() + READY_S
+    while (now := time.monotonic()) < leads_until + STOPS_S or state != FollowerState.IDLE:
         for sample in follower.receive():
             dt = 1e-6 * (sample.t_us - last_us) if last_us else 0.0
             vx, vy, *_, turn = sample.twist_in_b
@@ -31,11 +31,15 @@ def main() -> None:
             x += dt * (vx * math.cos(yaw) - vy * math.sin(yaw))
             y += dt * (vx * math.sin(yaw) + vy * math.cos(yaw))
             last_us, state = sample.t_us, sample.state
-        if state == FollowerState.IDLE and begun == math.inf:  # it was told zero for half a second
-            begun, led_s = time.monotonic(), 0.0
-        if begun == math.inf and time.monotonic() > gives_up:
-            raise SystemExit(f"no base within {READY_S:g} s: does it publish its Imu and odometry?")
-        goes = 0.0 <= led_s < LEADS_S and begun < math.inf
+        if state == FollowerState.IDLE and leads_until == math.inf:  # told zero for half a second
+            print("leads")
+            leads_until, gives_up = now + LEADS_S, now + LEADS_S + READY_S
+        elif state in STOPPED and now < leads_until < math.inf:  # it does not go on by itself
+            print("stopped by itself: one of us was not heard for a while")
+            leads_until = now
+        if now > gives_up:
+            raise SystemExit(f"{state.name} for {READY_S:g} s: does it publish Imu and odometry?")
+        goes = now < leads_until < math.inf
         follower.send(TwistCommand(CIRCLE, armed=True) if goes else TwistCommand.zero())
         time.sleep(PERIOD_S)
     follower.close()
