@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -34,6 +35,9 @@ TIME_OFFSETS_S = (-0.5, 0.5)
 YAML_FAULTS = (yaml.YAMLError, ValueError, LookupError, AttributeError)
 """What the library raises of text that is no YAML, of a 13th month and of `!!bool x`."""
 MOST_NUMBERS = 64
+MOST_NESTED = 16
+"""Brackets that are open at once; the library's time grows as the square of theirs."""
+TOO_DEEP = "lists within too many others"
 SKEW = 1e-3
 """What rounding may take from a rotation."""
 
@@ -65,7 +69,10 @@ def load_camera(path: Path) -> tuple[str, Camera]:
 def _read(path: Path) -> tuple[str, Camera, int | None]:
     """Name, camera and, if the file tells it, the screen's angle [°]."""
     try:
-        table = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if _nested(text) > MOST_NESTED:
+            raise CameraFileError(str(path), "", TOO_DEEP)
+        table = yaml.safe_load(text)
     except OSError as error:
         raise CameraFileError(str(path), "", error.strerror or str(error)) from error
     except UnicodeDecodeError as error:
@@ -73,12 +80,17 @@ def _read(path: Path) -> tuple[str, Camera, int | None]:
     except YAML_FAULTS as error:
         raise CameraFileError(str(path), "", " ".join(str(error).split())) from error
     except RecursionError as error:
-        raise CameraFileError(str(path), "", "lists within too many others") from error
+        raise CameraFileError(str(path), "", TOO_DEEP) from error
     if not isinstance(table, dict):
         raise CameraFileError(str(path), "", "a YAML mapping: camera_info or a Kalibr camchain")
     reader = _CameraFileReader(str(path), table)
     name, camera = reader.kalibr("cam0") if "cam0" in table else reader.camera_info()
     return name, camera, reader.screen_angle_deg()
+
+
+def _nested(text: str) -> int:
+    """How many brackets of a text are open at once, at most."""
+    return max(accumulate((c in "[{") - (c in "]}") for c in text), default=0)
 
 
 def find_camera(

@@ -201,6 +201,21 @@ def test_what_is_no_yaml_mapping_is_refused(tmp_path, text):
         load_camera(written(tmp_path, text))
 
 
+def test_brackets_that_nobody_closes_are_refused_before_the_library_counts_them(
+    tmp_path, monkeypatch
+):
+    """Of 4096 of them it makes a second's work."""
+    closed = tmp_path / "closed.yaml"
+    closed.write_text("a: " + 16 * "[" + 16 * "]" + "\n")
+    with pytest.raises(CameraFileError, match="must be there"):
+        load_camera(closed)
+    monkeypatch.setattr(yaml, "safe_load", None)
+    open_ones = tmp_path / "open.yaml"
+    open_ones.write_text("a: " + 17 * "[")
+    with pytest.raises(CameraFileError, match="lists within too many others"):
+        load_camera(open_ones)
+
+
 def test_unreadable_files_are_refused(tmp_path):
     with pytest.raises(CameraFileError):
         load_camera(tmp_path / "missing.yaml")
