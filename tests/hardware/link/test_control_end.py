@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hardware.follower import FollowerState, Refusal, ThrustCommand
+from hardware.follower import BlinkOrder, FollowerState, Refusal, ThrustCommand, TwistCommand
+from hardware.link.blink_datagram import decode_blink
 from hardware.link.control_end import ControlEnd, random_u64
 from hardware.link.datagram import (
     U32,
@@ -22,6 +23,8 @@ from hardware.link.datagram import (
     decode_command,
     encode_sample,
 )
+from hardware.link.tool_datagram import decode_tool
+from hardware.robot_file import COMMANDS, load_robot
 
 KEY = bytes(range(16))
 THRUSTERS, F_MAX, MAX_RISE, EPOCH = 3, 4.0, 0.5, 10
@@ -220,3 +223,21 @@ def test_the_first_epoch_of_a_robot_that_never_flew_may_be_ours() -> None:
 def test_a_random_number_has_64_bits_and_is_not_zero(monkeypatch, drawn, number) -> None:
     monkeypatch.setattr(secrets, "randbelow", drawn)
     assert random_u64() == number
+
+
+def test_what_is_no_command_names_the_newest_sample_and_none_before_the_first() -> None:
+    bench, order = Bench(), BlinkOrder(1_000_000, 2_000, 62, 8 * (-1,))
+    for nonce in (0, 500):
+        blink = decode_blink(bench.end.blink(order), KEY)
+        tool = decode_tool(bench.end.tool(0.25), KEY)
+        assert (blink.epoch, blink.nonce) == (tool.epoch, tool.nonce) == (EPOCH, nonce)
+        bench.send()
+        assert bench.hears()
+
+
+def test_twists_that_are_slowed_down_are_counted_and_no_others() -> None:
+    drive = load_robot("twister", takes=COMMANDS).robot.twist
+    end = ControlEnd(0, 0.0, 0.0, EPOCH, KEY, twist=drive)
+    for speed, limited in ((0.004, 0), (0.4, 1), (0.4, 2)):
+        end.next_command(TwistCommand(np.array([speed, 0, 0, 0, 0, 0]), armed=True), 0.0)
+        assert end.limited == limited

@@ -29,9 +29,10 @@ from server.control.controller import (
 )
 from server.control.gap_log import MANY, SIDES
 from server.control.ipc import ControlStatus, control_end, expected_of, server_end
-from server.control.ipc_inputs import Input, ReadyInput, RequestInput
+from server.control.ipc_inputs import Input, ReadyInput, RequestInput, ToolInput
 from server.control.robot_health import PRESSED, HealthFields, RobotCondition
 from server.control.tick_rate import OVER_S
+from server.protocol.lead_messages import Lead
 from tests.pipeline.seeing import quiver, seen_at
 
 ROBOT = load_robot("ames").robot
@@ -540,6 +541,7 @@ def test_a_status_tells_everything_once_and_survives_the_link():
 def test_a_status_has_each_tick_s_command_once_with_the_digits_that_a_recording_keeps():
     rig = Rig()
     rig.track()
+    rig.controller.teleop.push(np.full(6, 0.123456789))
     rig.status(rig.run(0.1)[-1][1])
     ticks = rig.run(0.02)
     status = rig.status(ticks[-1][1])
@@ -548,6 +550,34 @@ def test_a_status_has_each_tick_s_command_once_with_the_digits_that_a_recording_
         np.testing.assert_array_equal(thrusts, np.round(command.thrusts, 4))
         assert max(thrusts) > 0.0
     assert rig.status(ticks[-1][1]).commands == []
+    command, output = rig.controller.tick(200.1234567, [], [], "")
+    assert [row[0] for row in rig.status(output).commands] == [200.123457]
+
+
+def test_how_it_is_led_is_told_and_holds_from_the_next_press_on():
+    rig = Rig()
+    rig.track()
+    status = rig.status(rig.run(0.1, [Lead(2.0, "shift")])[-1][1])
+    assert (status.lead, status.next_lead) == (Lead(1.0, "all"), Lead(2.0, "shift"))
+    rig.held = False
+    rig.run(0.1)
+    rig.held, rig.press = True, rig.press + 1
+    assert rig.status(rig.run(0.5)[-1][1]).lead == Lead(2.0, "shift")
+
+
+def test_what_a_hand_asks_of_the_tool_is_told_while_it_leads_and_never_before_or_after():
+    rig = Rig()
+    rig.run(0.1, [ToolInput(0.9)])
+    rig.track()
+    assert rig.status(rig.run(0.005)[-1][1]).tool_opening is None
+    assert rig.status(rig.run(0.005, [ToolInput(0.3)])[-1][1]).tool_opening == 0.3
+    assert rig.status(rig.run(0.1)[-1][1]).tool_opening == 0.3
+    rig.held = False
+    assert rig.status(rig.run(0.1)[-1][1]).tool_opening is None
+    rig.held, rig.press = True, rig.press + 1
+    output = rig.run(0.5)[-1][1]
+    assert output.failsafe.mode == Mode.TRACK
+    assert rig.status(output).tool_opening is None
 
 
 def test_a_status_of_a_robot_that_takes_a_twist_has_what_it_is_told_and_what_it_measures():
@@ -558,7 +588,9 @@ def test_a_status_of_a_robot_that_takes_a_twist_has_what_it_is_told_and_what_it_
     status = controller.status(output, 1, "", {}, 0.0, 0)
     assert (status.thrusts, status.twist_in_b) == ([], (0.0,) * 6)
     assert status.body_twists == [(0.005 * k, *measured) for k in range(4)]
-    assert controller.status(output, 1, "", {}, 0.0, 0).body_twists == []
+    told = replace(output, twist_in_b=np.arange(1.0, 7.0))
+    again = controller.status(told, 1, "", {}, 0.0, 0)
+    assert (again.twist_in_b, again.body_twists) == ((1.0, 2.0, 3.0, 4.0, 5.0, 6.0), [])
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(status), type=ControlStatus) == status
 
 
