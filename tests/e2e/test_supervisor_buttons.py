@@ -224,7 +224,11 @@ def lead_by_a_page(clicks: Clicks) -> None:
     """The link beside the code makes this browser a phone; the supervisor chooses its way."""
     server = clicks.server
     with clicks.follow("url") as phone:
-        until(lambda: bool(phone.evaluate(SHOWN.format("#start"))), SOON_S, "the phone page")
+        try:
+            until(lambda: bool(phone.evaluate(SHOWN.format("#start"))), SOON_S, "the phone page")
+        except AssertionError as error:
+            shown = phone.evaluate("`${document.readyState}: ${document.body.innerText}`")
+            raise AssertionError(f"the phone page shows {shown}") from error
         phone.evaluate("document.querySelector('#name').value = 'Paul'")
         phone.click("#start")
         until(lambda: "Paul" in people(server), SOON_S, "Paul asks")
