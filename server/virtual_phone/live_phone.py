@@ -38,6 +38,8 @@ EXPOSED_S = 0.03
 """After the middle row's exposure all rows are exposed, and their truth has arrived."""
 LEAVE_S = 0.4
 """Between letting go and closing, for the server to notice."""
+WORDS_S = 1.0
+"""For the server's reason to be read, once something of ours has failed."""
 
 
 async def until(t: float) -> None:
@@ -219,7 +221,13 @@ def _endless(stream: DelayedStream) -> Iterator[Event]:
 
 
 async def _first_failure(tasks: list[asyncio.Task[None]], seconds: float) -> None:
-    """Let the tasks run for `seconds`; raise what ends one of them before."""
+    """Let the tasks run for `seconds`; raise what ends one of them before.
+
+    The first of them hears what the server says: why a connection was closed it knows best.
+    """
     done, _ = await asyncio.wait(tasks, timeout=seconds, return_when=asyncio.FIRST_COMPLETED)
+    if any(task.exception() is not None for task in done):
+        heard, _ = await asyncio.wait(tasks[:1], timeout=WORDS_S)
+        done = heard or done
     for task in done:
         task.result()

@@ -15,12 +15,13 @@ from hardware.sim.render import RenderOptions
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import exp
 from pipeline.signals import PhoneImu, TouchState
+from server.common.access import PhoneClientError
 from server.phone.ingest import EncodedFrame, Ingest
 from server.protocol.messages import encode_message
 from server.protocol.wire import decode, encode
 from server.protocol.wire_records import Codec, Motion, Picture, Ping, Pong, Record, Touch
 from server.virtual_phone.command import main, summary
-from server.virtual_phone.live_phone import EXPOSED_S, LivePhone, is_superseded
+from server.virtual_phone.live_phone import EXPOSED_S, LivePhone, _first_failure, is_superseded
 from server.virtual_phone.phone_script import Manners, PhoneScript, TrackingMetrics, VirtualOperator
 from tests.server.page_server import WELCOME, PageServer, status
 
@@ -244,6 +245,22 @@ def test_a_phone_asked_to_leave_lets_go_first():
     assert not last.held
     last_word = json.loads(main[-1])
     assert (last_word["type"], last_word["what"]) == ("command", "disarm")
+
+
+@pytest.mark.parametrize(
+    ("heard_s", "why"), [(0.05, "one phone at a time"), (9.0, "received 1000")]
+)
+def test_who_is_hung_up_on_says_why_whoever_of_its_parts_notices_first(heard_s, why):
+    async def fails(words, after_s):
+        await asyncio.sleep(after_s)
+        raise PhoneClientError(words)
+
+    async def run():
+        parts = fails("one phone at a time", heard_s), fails("received 1000", 0.01)
+        await _first_failure([asyncio.create_task(part) for part in parts], 5.0)
+
+    with pytest.raises(PhoneClientError, match=why):
+        asyncio.run(run())
 
 
 def test_a_busy_phone_leaves_a_picture_out_once_the_next_is_there_and_it_would_come_late():
