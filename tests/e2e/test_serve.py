@@ -15,6 +15,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from cryptography.hazmat.primitives import hashes
 from websockets.sync.client import connect
 
 from hardware.follower import FollowerError
+from hardware.robot_file import load_robot
 from hardware.sim.truth import TruthClient
 from server.protocol.messages import Status, decode_from_server
 from server.protocol.wire import VERSION
@@ -37,8 +39,10 @@ MODULES = {"robot": "hardware.sim.robot", "control": "server.control.process", "
 ZERO_N = 1e-3
 RAMP_S = 6.0
 """A ramp of one period of the suspension, with the failsafe's waits before it."""
-LEAST_RAMP_S = 1.0
-"""Of it between nine tenths and one tenth of the thrust."""
+OWN_RAMP_S = load_robot("ames").robot.ramp_s
+"""Of the robot by itself, from the last command that it took, however much that asked for."""
+COASTS_S = 0.2
+"""By then it gives what it falls from."""
 LOST_S = 0.3
 """Of a recording, at most, by a server that is killed."""
 ANSWER_S = 0.5
@@ -51,11 +55,17 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
         yield running
 
 
-def until(condition: Callable[[], bool], seconds: float, what: str) -> float:
-    """Wait for it; gives how long that took [s]."""
+def until(
+    condition: Callable[[], bool],
+    seconds: float,
+    what: str,
+    instead: Callable[[], object] = lambda: "",
+) -> float:
+    """Wait for it; gives how long that took [s]. A failure shows what there is `instead`."""
     start = time.monotonic()
     while not condition():
-        assert time.monotonic() < start + seconds, f"after {seconds} s still not: {what}"
+        late = time.monotonic() > start + seconds
+        assert not late, f"after {seconds} s still not: {what}; {instead()}"
         time.sleep(0.02)
     return time.monotonic() - start
 
@@ -103,7 +113,7 @@ def flight(server: Serving, *options: str) -> Iterator[subprocess.Popen[bytes]]:
         [*command, *options], env=server.environment, stdout=subprocess.PIPE, bufsize=0
     )
     try:
-        until(lambda: mode(server) == "TRACK", 60.0, "TRACK")
+        until(lambda: mode(server) == "TRACK", 60.0, "TRACK", lambda: status(server))
         with closing(TruthClient(server.truth_port, timeout=ANSWER_S)) as truth:
             until(lambda: thrust(truth) > 1.0, 2.0, "thrust, which begins without a jump")
         yield phone
@@ -242,12 +252,13 @@ class ThrustLog:
         self._truth.close()
 
     @property
-    def are_over(self) -> bool:
-        return any(total < ZERO_N for _, total in self.seen)
+    def over(self) -> float:
+        """When there was none any more [s]; inf: there still is."""
+        return min((t for t, total in self.seen if total < ZERO_N), default=inf)
 
-    def ramp(self, before: float) -> list[tuple[float, float]]:
-        """What was seen on the way down from a thrust [N]: a cut has no way."""
-        return [(t, total) for t, total in self.seen if 0.1 * before < total < 0.9 * before]
+    def at(self, t: float) -> float:
+        """The last that was seen until then [N]."""
+        return [total for seen, total in self.seen if seen <= t][-1]
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=["killed", "ended"])
@@ -260,14 +271,14 @@ def test_control_killed_in_flight_lets_the_robot_ramp_down_and_comes_back_disarm
         closing(FlightLog(server)) as log,
         closing(ThrustLog(server)) as thrusts,
     ):
-        before = thrust(truth)
-        assert before > 1.0
-        pid = kill(server, "control", number)
+        assert thrust(truth) > 1.0
+        killed, pid = time.monotonic(), kill(server, "control", number)
         phone.send_signal(signal.SIGSTOP)  # it would arm again
         try:
-            until(lambda: thrusts.are_over, 2 * RAMP_S, "no thrust")
-            (begin, _), *_, (end, _) = ramp = thrusts.ramp(before)
-            assert end - begin > LEAST_RAMP_S, ramp
+            until(lambda: thrusts.over < inf, 2 * RAMP_S, "no thrust")
+            assert thrusts.over - killed > 0.95 * OWN_RAMP_S, thrusts.seen
+            full, half = thrusts.at(killed + COASTS_S), thrusts.at(killed + OWN_RAMP_S / 2)
+            assert half > 0.4 * full, thrusts.seen
             until(lambda: mode(server) == "DISARMED", 10.0, "DISARMED")
             assert "LOST" in [said.mode for said in log.said]
             assert processes(server.process.pid)["control"] != pid
