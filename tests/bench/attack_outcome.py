@@ -129,3 +129,5 @@ class Outcome:
         bad = sum(part.bad_thrusts for part in self.parts)
         yield bad == 0, f"looks that found a thrust beyond limits: {bad}"
         yield self.thrust_after == 0, f"looks that found thrust after STOP: {self.thrust_after}"
+        believed = [name for name in self.tally if name.isupper()]
+        yield not believed, f"others who were let in or believed: {believed or 'none'}"

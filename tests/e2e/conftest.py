@@ -1,17 +1,43 @@
-"""What a test with a real browser needs."""
+"""What a test with a real browser or server needs; what its servers said where it has failed."""
 
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import BrowserContext
 
+from tests.e2e.serving import printed_by_servers
 from tests.e2e.written_pages import written_pages
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FIREFOX_NAMES = ("firefox-esr", "firefox")
+PRINTED_BEFORE = pytest.StashKey[dict[Path, int]]()
+TOLD_CHARACTERS = 6_000
+"""Of what a server printed in a test that has failed: the newest."""
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Remember what servers had said before it."""
+    item.stash[PRINTED_BEFORE] = {path: len(text) for path, text in printed_by_servers().items()}
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A failed test shows what its servers said meanwhile."""
+    report = yield
+    if report.failed:
+        before = item.stash[PRINTED_BEFORE]
+        for path, text in printed_by_servers().items():
+            if said := text[before.get(path, 0) :][-TOLD_CHARACTERS:]:
+                report.sections.append((f"{path.name} in {call.when}", said))
+    return report
 
 
 def find_chromium() -> str | None:

@@ -20,6 +20,14 @@ START_S = 180.0
 """The kernels may have to be compiled first, on a busy machine."""
 DEVICE = "Linux 412x915@1 / canvas camera"
 """What the phone page calls itself in the Chromium of `chromium_phone`."""
+_RUNNING: set[Path] = set()
+_ENDED: dict[Path, str] = {}
+"""What servers print, by its file: theirs that run, and the whole of those that have ended."""
+
+
+def printed_by_servers() -> dict[Path, str]:
+    """All that servers of this run of the tests have printed so far."""
+    return _ENDED | {path: path.read_text(errors="replace") for path in _RUNNING}
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +85,7 @@ def serving(folder: Path, *arguments: str, name: str = "") -> Iterator[Serving]:
     own = own_directory(runtime / "lightleash", name)
     printed = folder / f"serve{name and f'-{name}'}.log"
     log = printed.open("wb")
+    _RUNNING.add(printed)
     process = subprocess.Popen(
         [*command, *arguments], env=environment, stdout=log, stderr=subprocess.STDOUT
     )
@@ -97,6 +106,8 @@ def serving(folder: Path, *arguments: str, name: str = "") -> Iterator[Serving]:
         except subprocess.TimeoutExpired:
             process.kill()
         log.close()
+        _RUNNING.discard(printed)
+        _ENDED[printed] = printed.read_text(errors="replace")
 
 
 def _run_file(process: subprocess.Popen[bytes], path: Path, printed: Path) -> dict[str, object]:
