@@ -101,14 +101,14 @@ kernels pytest real robots pages quiet fast-server fast-others: export PYTHONDON
 
 # First flights, whose phones and robots share the machine with nobody: what runs beside them, and be
 # it only when nobody else wants to, makes a virtual machine's processors wait. Then what else is real,
-# two at a time, one on a weak machine, and what no clock hurries takes the half that those leave, for
-# they wait.
+# one at a time: a browser and a flight beside each other starve both, and it would end no sooner, as
+# what no clock hurries takes what they leave, and is the last to end.
 pytest: dev
 	$(BIN)/pytest -m flight $(ARGS)$(MAYBE_NONE); flown=$$?; \
 	$(MAKE) --jobs=2 --keep-going --output-sync real quiet && exit $$flown
 
 real: dev
-	$(MAKE) --jobs=$$($(BIN)/python -m tests.machine) --keep-going robots pages
+	$(MAKE) --jobs=1 --keep-going robots pages
 
 robots: dev
 	$(BIN)/pytest -m "(e2e or bench) and not flight and not page and not counterpart" $(ARGS)$(MAYBE_NONE)

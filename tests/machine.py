@@ -3,8 +3,6 @@
 A flight in real time, its browser, pictures, server and robot share two processors, which suffice
 for less where the same work takes longer. CPU time is measured, of work that never changes: who
 waits for a processor does not count, nor what the project itself costs. No bound follows from it.
-
-    python -m tests.machine    # how many tests in real time this machine runs beside each other
 """
 
 from __future__ import annotations
@@ -19,8 +17,6 @@ REFERENCE_S = 0.0077
 """Inferred, not measured there: it took 15-25 ms where the plain numpy of `bench_relative` took
 2.7-3.3 ms of CPU, and that took 1.122 ms where docs/bench/estimation.md was made."""
 TRIES = 9
-WEAK = 2.0
-"""From here on two tests in real time starve each other: a page beside a robot did at 2.7."""
 
 
 def _work() -> None:
@@ -38,7 +34,3 @@ def slowness() -> float:
         _work()
         took.append(time.thread_time() - began)
     return max(1.0, median(took) / REFERENCE_S)
-
-
-if __name__ == "__main__":
-    print(1 if slowness() >= WEAK else 2)
