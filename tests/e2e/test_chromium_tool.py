@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Route
 
 from hardware.robot_file import robot_path
 from tests.e2e.chromium_rig import flown, led_server, start
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 SLIDER = ".tool-slider input"
+AGAIN_MS = 10_000.0
 TOOL = '\n[tool]\nname = "Gripper"\n'
 BOX = f"""
 (() => {{
@@ -30,10 +33,19 @@ def test_a_robot_s_tool_follows_the_slider_while_the_button_is_held(
     robot.write_text(robot_path("ames").read_text() + TOOL)
     with led_server(chromium, tmp_path, "moving", seed=2, rest_s=15.0, robot=str(robot)) as (
         server,
-        _,
+        context,
         phone,
     ):
+        failed: list[str] = []
+
+        def fail(route: Route) -> None:
+            failed.append(route.request.url)
+            route.abort()
+
+        context.route(re.compile(r"/tool_slider\.js\?0$"), fail)
         start(phone, server)
+        phone.page.wait_for_selector(SLIDER, timeout=AGAIN_MS)  # its waiting lets `fail` be called
+        assert len(failed) == 1, "a slider that could not be loaded is loaded anew"
         told: list[object] = []
 
         def tool() -> dict[str, object]:

@@ -151,8 +151,9 @@ const handover = new HandoverCard(document, fetchHere, { onTake: () => dispatch(
 
 const leading = new LeadingChoice(document, (lead) => void phone.link.sendMessage(lead), () => performance.now());
 
-/** Of a robot that has a tool. @type {Promise<ToolSlider> | null} */
+/** Of a robot that has a tool. @type {Promise<ToolSlider | null> | null} */
 let toolSlider = null;
+let toolLoads = 0;
 
 const linkCheck = new LinkCheck(document, performance, fetchHere);
 
@@ -181,12 +182,20 @@ function show() {
 
 /** @param {ToolStatus | null} tool */
 function useTool(tool) {
-  if (tool !== null) {
-    toolSlider ??= import('../ui/tool_slider.js').then(({ ToolSlider }) => new ToolSlider(
-      document, (use) => void phone.link.sendMessage(use), () => performance.now(),
-    ));
+  if (tool !== null) toolSlider ??= loadTool();
+  void toolSlider?.then((slider) => slider?.take(tool, state.held ? state.press : null));
+}
+
+/** Null: soon anew, by an address of which no browser knows that it failed. */
+async function loadTool() {
+  try {
+    /** @type {typeof import('../ui/tool_slider.js')} */
+    const { ToolSlider } = await import(`../ui/tool_slider.js?${toolLoads++}`);
+    return new ToolSlider(document, (use) => void phone.link.sendMessage(use), () => performance.now());
+  } catch {
+    setTimeout(() => { toolSlider = null; }, 2000);
+    return null;
   }
-  void toolSlider?.then((slider) => slider.take(tool, state.held ? state.press : null));
 }
 
 /** @param {Effect} effect */
