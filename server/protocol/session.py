@@ -50,6 +50,17 @@ class TokenBucket:
         self._level -= amount
         return True
 
+    def wait(self, now: float, most_s: float) -> float:
+        """Take one, be it in advance: how long to wait for it [s].
+
+        More than `most_s`: nothing is taken.
+        """
+        self.take(now, 0.0)
+        wait_s = max(0.0, (1.0 - self._level) / self._rate)
+        if wait_s <= most_s:
+            self._level -= 1.0
+        return wait_s
+
 
 class Session:
     """State of one connection: waiting for hello, then open as a role."""

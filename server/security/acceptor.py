@@ -4,7 +4,7 @@ Whose first byte begins no TLS, where TLS is spoken, meets another protocol: mos
 were given an address without `https://`.
 
 Until its first byte a connection costs a file handle and no memory for TLS, and it has three
-seconds for the whole handshake.
+seconds for the whole handshake. One that comes too soon after others of its address waits first.
 """
 
 from __future__ import annotations
@@ -131,6 +131,7 @@ class Acceptor:
 
     async def _welcome(self, guest: Guest, place: ConnectionSlot) -> None:
         """Bring a connection from its first byte to the protocol that takes over."""
+        await asyncio.sleep(place.wait_s)
         try:
             async with asyncio.timeout(HELLO_S):
                 first = await self._first_byte(guest)

@@ -20,6 +20,9 @@ from server.security.places import AdmissionLimits
 
 Kind = Literal["here", "known", "stranger"]
 LOOPBACK = ("127.0.0.1", "::1", "::ffff:127.0.0.1")
+PACED_S = 2.0
+"""So long waits at most a connection that comes too soon after others: a browser that trusts no
+certificate of ours opens thirty for a phone's page, which is dead without one of its files."""
 KNOWN_S = 12 * 3600.0
 """An address is known for so long after its last request with a role."""
 MAX_KNOWN, MAX_NETWORKS = 64, 1024
@@ -50,6 +53,8 @@ class ConnectionSlot:
     group: str
     """Address of the known, network of a stranger."""
     kind: Kind
+    wait_s: float = 0.0
+    """To be let pass before hands are shaken."""
     has_role: bool = False
     """A request with a role came by it."""
 
@@ -84,8 +89,8 @@ class Admission:
     def enter(self, peer: RemotePeer, end: Callable[[], None], now: float) -> ConnectionSlot | None:
         """A place for `peer`, or None; for that another one may be ended."""
         kind, group = self._kind_of(peer.host, now)
-        place = ConnectionSlot(peer, end, group, kind)
-        if not self._may_connect(kind, group, now) or not self._make_room(place):
+        place = ConnectionSlot(peer, end, group, kind, self._wait_of(kind, group, now))
+        if place.wait_s > PACED_S or not self._make_room(place):
             self.refused += 1
             return None
         self._places[peer] = place
@@ -204,9 +209,13 @@ class Admission:
         if not self._held[key]:
             del self._held[key]
 
-    def _may_connect(self, kind: Kind, group: str, now: float) -> bool:
+    def _wait_of(self, kind: Kind, group: str, now: float) -> float:
+        """How long a connection that comes now has to wait [s]; beyond `PACED_S` for nothing."""
         own, _ = self._buckets_of(kind, group)
-        return own.take(now) and (kind != "stranger" or self._connections.take(now))
+        wait_s = own.wait(now, PACED_S)
+        if kind == "stranger" and wait_s <= PACED_S:
+            wait_s = max(wait_s, self._connections.wait(now, PACED_S))
+        return wait_s
 
     def _shared_buckets(self) -> tuple[TokenBucket, TokenBucket]:
         limits = self._limits

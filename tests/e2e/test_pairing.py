@@ -8,6 +8,7 @@ import pty
 import re
 import select
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -27,6 +28,8 @@ from tests.e2e.test_serve import mode, processes, until
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
 SCREEN = {"viewport": {"width": 1280, "height": 720}}
 WAIT_MS = 30_000
+CAME_OFTEN = 28
+"""Of the 32 connections that a stranger may make at once."""
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +139,20 @@ def test_a_viewers_page_shows_all_and_offers_stop_alone(chromium: str, server: S
         expect(page.locator("#people li")).not_to_have_count(0, timeout=WAIT_MS)
         buttons = page.locator("button:visible")
         assert [one.strip() for one in buttons.all_inner_texts()] == ["STOP"]
+
+
+def test_a_phones_page_comes_whole_though_its_address_has_come_too_often(
+    chromium: str, server: Serving
+) -> None:
+    host, port = server.https_url.removeprefix("https://").rsplit(":", 1)
+    with browser(chromium) as context:
+        page, failed = context.new_page(), list[str]()
+        page.on("requestfailed", lambda request: failed.append(request.url))
+        for _ in range(CAME_OFTEN):
+            socket.create_connection((host, int(port)), 5.0).close()
+        page.goto(f"{server.https_url}/{server.link()}")
+        expect(page.locator("#start")).to_be_visible(timeout=WAIT_MS)
+        assert failed == []
 
 
 def test_a_server_killed_knows_who_was_in_and_who_was_shut_out(server: Serving) -> None:

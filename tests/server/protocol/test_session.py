@@ -223,6 +223,19 @@ def test_a_bucket_never_gives_more_than_its_burst_and_its_rate(
     assert taken <= rate + rate * t + 1e-6
 
 
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=60), st.floats(1.0, 50.0))
+def test_who_waits_for_a_bucket_waits_no_longer_than_is_borne_and_for_nothing_no_more_than_it_gives(
+    gaps: list[float], rate: float
+) -> None:
+    bucket, t, given_at = TokenBucket(rate, burst=rate), 0.0, list[float]()
+    for gap in gaps:
+        t += gap
+        wait_s = bucket.wait(t, 0.5)
+        given_at += [t + wait_s] if wait_s <= 0.5 else []
+    for n, end in enumerate(sorted(given_at)):
+        assert n + 1 <= rate + rate * end + 1e-6
+
+
 def test_a_clock_that_goes_back_gives_nothing() -> None:
     bucket = TokenBucket(1.0, burst=1.0)
     assert bucket.take(100.0)

@@ -186,6 +186,20 @@ def test_who_shakes_hands_is_served_and_its_place_given_back(secure, with_tls):
     asyncio.run(run())
 
 
+def test_who_comes_too_soon_after_others_of_its_address_waits_and_is_served(secure):
+    async def run():
+        limits = AdmissionLimits(per_stranger_connections_hz=10.0, burst_s=0.2)
+        async with door(secure.context, limits) as here:
+            began = asyncio.get_running_loop().time()
+            options = {"source": STRANGER, "ssl": secure.trust, "server_hostname": HOST}
+            many = await asyncio.gather(*(come(here.port, **options) for _ in range(8)))
+            assert asyncio.get_running_loop().time() - began >= (8 - 2) / 10.0
+            assert all([await echoed(*one) for one in many])
+            assert here.admission.refused == 0
+
+    asyncio.run(run())
+
+
 def test_a_flood_of_strangers_is_turned_away_at_once_and_others_are_served(secure):
     async def run():
         limits = AdmissionLimits(strangers=8, per_stranger=4)
