@@ -155,6 +155,22 @@ def test_a_phones_page_comes_whole_though_its_address_has_come_too_often(
         assert failed == []
 
 
+def test_a_phones_page_that_lacks_a_file_says_so_and_a_whole_one_does_not(
+    chromium: str, server: Serving
+) -> None:
+    with browser(chromium) as context:
+        whole, lacking = context.new_page(), context.new_page()
+        lacking.route("**/src/ui/view.js", lambda route: route.abort())
+        for page in (whole, lacking):
+            page.goto(f"{server.local_https}/")
+            page.wait_for_load_state("load")
+        expect(lacking.locator("#step span")).not_to_be_visible()
+        expect(lacking.locator("#step span")).to_be_visible(timeout=WAIT_MS)
+        expect(lacking.locator("#step")).to_contain_text("load it again")
+        expect(whole.locator("#problem")).to_be_visible()
+        expect(whole.locator("#step span")).to_have_count(0)
+
+
 def test_a_server_killed_knows_who_was_in_and_who_was_shut_out(server: Serving) -> None:
     stays, goes = (
         post(server, "/api/pair", {"token": server.link("viewer")[3:], "name": name})

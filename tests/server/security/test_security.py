@@ -30,7 +30,7 @@ OWN = {"Origin": BASE, "X-Lightleash": "1"}
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "PATCH", "OPTIONS")
 STYLES = (
     *("style", "phone", "supervisor", "calibration", "lens", "board"),
-    *("pairing", "people", "screen", "link", "sight", "trust", "fleet", "check", "dark", "tool"),
+    *("people", "screen", "link", "sight", "trust", "fleet", "check", "dark", "tool"),
 )
 PICTURES = ("icon", "lead", "board")
 FILES = {*(f"/{name}.css" for name in STYLES), *(f"/{name}.svg" for name in PICTURES)}

@@ -51,9 +51,9 @@ function ofModules() {
   return modules.flatMap((name) => literals(read(`src/${name}`))).filter((text) => !UNSEEN.includes(text.trim())).flatMap(sentences);
 }
 
-/** What stands in the pages themselves. */
+/** What stands in the pages themselves; what scripts take away stands there in both languages. */
 function ofPage() {
-  const page = FILES.map(read).join('').replace(/<head>[^]*?<\/head>|<noscript>[^]*?<\/noscript>/g, '');
+  const page = FILES.map(read).join('').replace(/<head>[^]*?<\/head>|<noscript>[^]*?<\/noscript>|<p id="step"[^]*?<\/p>/g, '');
   const names = [...page.matchAll(/(?:aria-label|title|placeholder)="([^"]*)"/g)].map(([, name]) => name ?? '');
   return [...page.replace(/<[^>]*>/g, '\0').split('\0'), ...names].map((text) => text.replace(/\s+/g, ' ').trim()).filter((text) => /[A-Za-z]{2}/.test(text));
 }
