@@ -33,6 +33,7 @@ const mode = (name, meaning, reason) => {
 const health = () => Object.entries({leds: '5', path: 'WebSocket', gaps: '12 computer',
   fps: '30 fps', imu: '200 Hz', rtt: '142 ms', kbps: '3.1 Mb/s'})
   .forEach(([id, words]) => text(`h-${id}`, words));
+document.getElementById('step')?.replaceChildren(); // as the first drawing does
 const operate = () => { hide('welcome'); show('operate', 'lead', 'full'); health(); };
 const BUSY = 'The server\\'s computer is too busy. chromium takes the most of it: close what is '
   + 'not needed; a laptop wants its charger.';
