@@ -49,6 +49,9 @@ CONTRARY: Final = -6.0
 """What has more against it is none of ours, even if all others have still more."""
 NEAR_M: Final = 0.35
 """A candidate is seen again so near to where it is predicted."""
+JUDGED: Final = 15
+"""Pictures by which one that comes later than the others has more against it, if it is none of
+ours."""
 LOST_S: Final = 1.0
 """A candidate not seen for longer must be held against the motion sensors anew."""
 
@@ -121,6 +124,8 @@ class RobotCandidate:
         self._models: list[MotionHypothesis] = []
         """Ours, then still and free; none before there are samples."""
         self._evidence = 0.0
+        self.pictures = 0
+        """So many were held against the motion sensors."""
         self.is_far = False
         """It was seen where ours can't be."""
 
@@ -146,6 +151,7 @@ class RobotCandidate:
         ours, *others = (model.judge(view, imus) for model in self._models)
         odds = min(max(ours - max(others), -MOST), MOST)
         self._evidence = MEMORY * self._evidence + odds
+        self.pictures += 1
 
     def read(self, view: CandidateView, code: BlinkCode | None) -> None:
         """What its LEDs say at `view`; `code` is what ours blinks, None: nothing."""

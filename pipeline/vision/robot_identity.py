@@ -12,6 +12,7 @@ from pipeline.vision.last_pose import PossiblePlaces
 from pipeline.vision.motion_hypotheses import (
     CONTRARY,
     DECISIVE,
+    JUDGED,
     CandidateView,
     RobotCandidate,
     both_cover,
@@ -30,7 +31,8 @@ class RobotIdentity:
     def __init__(self, leds_in_b: Array, imus: ImuStreams | None, blinks: bool = False) -> None:
         """LEDs (n, 3) [m]; without motion sensors only a place can tell.
 
-        One that `blinks` is not taken for ours just because no other is seen: ours may be dark.
+        One that `blinks` is not taken for ours just because no other is seen, nor because all
+        others are none of ours: ours may be dark.
         """
         self._blinks = blinks
         self._leds_in_b, self._imus = leds_in_b, imus
@@ -103,10 +105,12 @@ class RobotIdentity:
         *others, best = sorted(self._candidates, key=lambda one: one.odds(t))
         if best.t != t:
             return None
-        if best.is_far or not others:
+        if others and best.odds(t) - others[-1].odds(t) <= DECISIVE:
+            return None
+        if best.is_far or not others or self._blinks:
             return best if best.odds(t) > DECISIVE else None
-        clear = best.odds(t) - others[-1].odds(t) > DECISIVE
-        return best if clear and best.odds(t) > CONTRARY else None
+        is_judged = best.pictures >= min(JUDGED, others[-1].pictures)
+        return best if is_judged and best.odds(t) > CONTRARY else None
 
     def _said_so(self, t: float) -> RobotCandidate | None:
         """What blinks as ours was told to and as no other one does."""

@@ -1,10 +1,11 @@
-"""Two robots of one kind before a hand-held phone, as spots without pictures, and who is told."""
+"""Robots of one kind before a hand-held phone, as spots without pictures, and who is told."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from hardware.robot_file import load_robot
+from hardware.sim.hand import hovering
 from hardware.sim.scenes.motion import START_S, Sensors, movers
 from hardware.sim.scenes.scene import HD, SCENES
 from hardware.sim.scenes.video import IMU_AHEAD_S, RATE_HZ, camera_of
@@ -38,16 +39,23 @@ class Told:
 
 
 class Twins:
-    """Ours and another one; each may rest or be dark."""
+    """Ours and another one; each may rest or be dark. Strangers hover about them."""
 
-    def __init__(self, seed, resting=(False, False), imus=True, code=None):
-        """`resting`: ours, the other; `code` is what ours blinks."""
+    def __init__(self, seed, resting=(False, False), imus=True, code=None, strangers=()):
+        """`resting`: ours, the other; `code` is what ours blinks.
+
+        `strangers` are so far from ours [m], on the side where the other one is not.
+        """
         rng = np.random.default_rng((seed, 99))
         self.moving = movers(SCENES["twin"], rng)
-        self._robots = (self.moving.robot, self.moving.twin)
-        for robot, rests in zip(self._robots, resting, strict=True):
+        robots = [self.moving.robot, self.moving.twin]
+        for robot, rests in zip(robots, resting, strict=True):
             if rests:
                 robot._parts = ()
+        aside = np.array([0.0, -np.sign(self.moving.twin.pose(START_S)[1][1]), 0.0])
+        for k, far in enumerate(strangers):
+            robots.append(hovering(np.random.default_rng((seed, k)), far * aside, np.zeros(3)))
+        self._robots = robots
         self._felt = Sensors(
             self.moving, np.eye(3), np.random.default_rng((seed, 1)), np.random.default_rng(seed)
         )
@@ -56,7 +64,7 @@ class Twins:
         self.identity = RobotIdentity(LEDS_IN_B, streams if imus else None, code is not None)
         self.identity.code = code
         self._start = Initialisation(CAMERA, LEDS_IN_B, IdentifyConfig())
-        self._rng, self._off_px = rng, rng.normal(0.0, BIAS_PX, (2, 5, 2))
+        self._rng, self._off_px = rng, rng.normal(0.0, BIAS_PX, (len(self._robots), 5, 2))
         self._knows = imus
 
     def place(self, t):
@@ -65,7 +73,7 @@ class Twins:
         return R_fc.T @ (self.moving.robot.pose(t)[1] - p_cf_in_f)
 
     def look(self, k, shine=BOTH, reach=(), codes=(None, None)):
-        """At picture `k`, in which ours and the other `shine`, or blink codes."""
+        """At picture `k`, in which ours, the other and strangers `shine`, or blink codes."""
         t = START_S + k / RATE_HZ
         for s in self._felt.phone(t + IMU_AHEAD_S):
             self._phone.add(s.t, s.omega_m_cf_in_c, s.a_m_cf_in_c)
@@ -84,6 +92,7 @@ class Twins:
         return Told(len(looks), is_ours, self.identity.reason)
 
     def _spots(self, t, shine, codes):
+        codes = (*codes, *(None for _ in self._robots[2:]))
         R_fc, p_cf_in_f = self.moving.hand.pose(t)
         pixels = np.zeros((0, 2))
         each = zip(self._robots, self._off_px, shine, codes, strict=True)

@@ -111,3 +111,20 @@ def test_motion_tells_a_robot_whose_code_is_not_seen():
         twins = Twins(seed, code=CODE)
         _, is_ours = first_told(twins, 60)
         assert is_ours
+
+
+@pytest.mark.parametrize("resting", [(True, False), (True, True)])
+def test_of_robots_that_blink_who_is_none_of_the_others_is_not_ours_for_that(resting):
+    """Ours is dark, a second one is none of ours, and then comes a third one."""
+    for seed in SEEDS:
+        twins = Twins(seed, resting, code=CODE, strangers=[0.9])
+        for k in range(60):
+            assert twins.look(k, (False, True, k >= 20)).is_ours is None
+
+
+def test_who_comes_last_is_held_against_the_motion_sensors_as_the_others_were():
+    """Ours is dark and two others are none of ours, and then comes a third one."""
+    for seed in SEEDS:
+        twins = Twins(seed, strangers=[0.8, 1.6])
+        for k in range(60):
+            assert twins.look(k, (False, True, True, k >= 20)).is_ours is None
