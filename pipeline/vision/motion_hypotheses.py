@@ -37,6 +37,8 @@ FREE: Final = tuple(
 white."""
 SETTLED_S: Final = 0.1
 """Pictures and samples come in order: nothing older is made anew."""
+BEFORE_S: Final = 0.2
+"""So much of the samples before its first picture a model takes: stamps may be off by that."""
 MOST: Final = 3.0
 """One picture's logarithm of odds counts for no more, whatever it shows: stamps that are 40 ms off
 make the first few of a start lie."""
@@ -83,8 +85,8 @@ class MotionHypothesis:
     def judge(self, view: CandidateView, imus: ImuStreams) -> float:
         """Log-likelihood of a view, but for a constant; 0 for the first one of all."""
         track = self._track
-        self._add_new_samples(track.phone, imus.phone, None)
-        self._add_new_samples(track.body, imus.body, self._rest)
+        self._add_new_samples(track.phone, imus.phone, view.seen.t, None)
+        self._add_new_samples(track.body, imus.body, view.seen.t, self._rest)
         t = view.seen.t + float(track.newest.x[X_OFFSET])
         if not self._begun or t <= track.base.t:
             return self._begin(view)
@@ -103,12 +105,13 @@ class MotionHypothesis:
         self._begun = True
         return 0.0
 
-    def _add_new_samples(self, own: ImuStream, shared: ImuStream, rest: Array | None) -> None:
-        """Samples that are new."""
+    def _add_new_samples(
+        self, own: ImuStream, shared: ImuStream, t: float, rest: Array | None
+    ) -> None:
+        """Samples that are new; of those before the first picture, stamped `t` [s], the last."""
         times = shared.times
-        first = int(np.searchsorted(times, own.newest, side="right"))
-        if not len(own):  # no more than the first picture needs
-            first = max(0, int(np.searchsorted(times, shared.newest - LOST_S)))
+        since = own.newest if len(own) else t - BEFORE_S
+        first = int(np.searchsorted(times, since, side="right"))
         for t, row in zip(times[first:], shared.values[first:], strict=True):
             rate, force = (row[:3], row[3:]) if rest is None else (np.zeros(3), rest)
             self._track.insert(own, float(t), rate, force)
