@@ -29,7 +29,8 @@ class PhoneImu:
     a_m_cf_in_c: Array
     """Accelerometer (3,) [m/s²]: specific force, +9.8 up at rest."""
     phone: int = 0
-    """Which phone's: a new number is another phone, with other biases, held elsewhere."""
+    """Which phone's: a new number is another phone, with other biases, held elsewhere; or the same
+    one, whose screen has turned, and c with the picture."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

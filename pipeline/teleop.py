@@ -41,6 +41,9 @@ SHORTEST_STEP_S, LONGEST_STEP_S = 1e-4, 0.060
 VERTICAL_S: Final = 0.5
 """By news of phone and pictures that are younger the vertical is known: gyroscopes keep it so
 long to some tenths of a degree."""
+MET_S: Final = 1.0
+"""So long the pictures of a phone whose axes have turned may take to show the robot again."""
+TURNED: Final = "The phone's screen has turned: press again."
 MEND = "{} Mend it, then press STOP and Reset."
 """Why arming is refused, behind what is known of a thruster."""
 
@@ -269,7 +272,7 @@ class Teleop:
             self.estimator.reset()
             self.attitude.reset()
             self._monitor.forget_phone()
-            self._t_seen, self._t_met = -np.inf, sample.t
+            self._t_met = sample.t
         self._phone = sample.phone
 
     def _R_fc_now(self, relative: RelativeState | None) -> Array | None:
@@ -328,11 +331,14 @@ class Teleop:
         ages: Ages,
     ) -> failsafe.FailsafeInputs:
         limits, is_tracking = self._envelope, self._failsafe.mode == Mode.TRACK
+        # with its screen a phone's axes turn, and what was known in them is forgotten: no fault
+        is_new = known is None and inputs.t - self._t_met < MET_S
+        has_turned = is_new and self._flies
         return failsafe.FailsafeInputs(
             held=self._operator.held,
             press=self._operator.press,
             fault=inputs.fault
-            or flight_envelope.fault(limits, is_tracking, known, error)
+            or ("" if has_turned else flight_envelope.fault(limits, is_tracking, known, error))
             or (self._monitor.frozen if self._flies else "")
             or self._acting.fault,
             gap=inputs.gap,
@@ -340,7 +346,7 @@ class Teleop:
             or self._monitor.jumped
             or self._lie
             or self._astray(known),
-            block=self._blocked(),
+            block=TURNED if has_turned else self._blocked(),
             is_settled=self._is_settled(known, ages),
             refusals=(
                 *inputs.refusals,

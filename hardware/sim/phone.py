@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import ceil, floor, radians
 
@@ -194,14 +194,20 @@ class VirtualPhone:
         """The moment [s] that the last picture shows, and the picture."""
         self._bias_omega = schedule.normal(0.0, 1.0, 3) * options.bias_omega
         self._bias_a = schedule.normal(0.0, 1.0, 3) * options.bias_a
-        # the sensors are taken to be the device, and the camera to sit beside its place
-        self._R_cd = camera.extrinsics.R_ci @ R_cd(options.screen_angle_deg)
+        self.turn_screen(options.screen_angle_deg)
         self.motions = DelayedStream(
             EventKind.MOTION, options.motion_rate_hz, options.motion_delay_s, schedule
         )
         self.pictures = DelayedStream(
             EventKind.PICTURE, options.frame_rate_hz, options.picture_delay_s, schedule
         )
+
+    def turn_screen(self, angle_deg: int) -> None:
+        """From now on the picture is turned so; the hand's poses are its camera's all the same."""
+        self.options = replace(self.options, screen_angle_deg=angle_deg)
+        # the sensors are taken to be the device, and the camera to sit beside its place
+        self._R_cd = self.camera.extrinsics.R_ci @ R_cd(angle_deg)
+        self._read = None
 
     def events(self, t_from: float, t_to: float) -> list[Event]:
         """What arrives within [t_from, t_to), in order; windows that join lose nothing."""

@@ -8,7 +8,7 @@
 | ARMED | TRACK | a press, all good for the recovery time |
 | ARMED | DISARMED | disarm, fault, camera lost, silence or doubt longer than a gap, or idle |
 | TRACK | COAST | no news from phone or robot, control stood still, or the estimate is in doubt |
-| TRACK | HOLD | the finger has left, another press, the camera has lost the robot, a touch |
+| TRACK | HOLD | the finger has left, another press, the camera lost the robot or turned, a touch |
 | COAST | TRACK | all fresh for a moment, the place settled, and the same press still held |
 | COAST | HOLD | the finger has left, another press, camera lost, too long for a gap and a picture |
 | HOLD | TRACK | another press, all good for the recovery time |

@@ -58,6 +58,9 @@ class Ingest:
         self._asked: OrderedDict[int, float] = OrderedDict()
         self._answered: set[int] = set()
         self._last_motion_t = -np.inf
+        self._screen_angle_deg: int | None = None
+        self._turns = 0
+        """Of the screen: the picture turns with it, and what is known is known in other axes."""
         self._gyroscope = HeldGyroscope()
         self._last_touch = -1
         self._pings = 0
@@ -137,9 +140,13 @@ class Ingest:
         if t is None or t <= self._last_motion_t:
             return None
         self._last_motion_t = t
+        if self._screen_angle_deg not in (None, motion.screen_angle_deg):
+            self._turns += 1
+        self._screen_angle_deg = motion.screen_angle_deg
         if self._gyroscope.is_old(t, np.array(motion.rotation_rate)):
             return None
-        return self.extrinsics.in_camera_axes(phone_imu(motion, t, self._phone))
+        axes = (self._phone + self._turns) & 0x7FFFFFFF
+        return self.extrinsics.in_camera_axes(phone_imu(motion, t, axes))
 
     def _dated(self, record: Record, field: str, now: float) -> float | None:
         if not self.clock.ready:

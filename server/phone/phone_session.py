@@ -82,6 +82,8 @@ class PhoneSession:
         self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
         self.vision: VisionThread | None = None
         self._shape: ImageFormat | None = None
+        self._axes: int | None = None
+        """In which motion comes; see `PhoneImu.phone`."""
         self._profiles, self._make_decoder = profiles, make_decoder
         self._screen = screen
         self.wizard: CalibrationSession | None = None
@@ -125,6 +127,8 @@ class PhoneSession:
         """
         match self.ingest.record(record, now):
             case PhoneImu() as sample if isinstance(record.body, Motion):
+                if sample.phone != self._axes:  # eyes that know motion in others look anew
+                    self._axes, self._shape = sample.phone, None
                 self.meters["phone_imu"].tick(now, sample.t)
                 self.link.came("motion", sample.t, now)
                 self._watch.add_motion(sample)

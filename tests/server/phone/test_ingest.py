@@ -79,6 +79,21 @@ def test_up_is_up_however_the_screen_is_turned(
     np.testing.assert_allclose(sample.a_m_cf_in_c, [0.0, 0.0, GRAVITY], atol=1e-9)
 
 
+def test_with_the_screen_motion_gets_other_axes_and_the_press_stays() -> None:
+    ingest, samples, presses = synchronised(), [], []
+    nonce = nonce_of(ingest.ping(1.0))
+    for k, angle in enumerate((0, 0, 90, 90)):
+        t = at(1.0 + 0.1 * k)
+        sample = ingest.record(Record(k, t, replace(FLAT, screen_angle_deg=angle)), 2.0)
+        touch = ingest.record(Record(k, t, Touch(True, True, 3, nonce)), 2.0)
+        assert isinstance(sample, PhoneImu)
+        assert isinstance(touch, TouchState)
+        samples.append(sample.phone)
+        presses.append(touch.press)
+    assert samples[0] == samples[1] != samples[2] == samples[3]
+    assert len(set(presses)) == 1
+
+
 def test_looking_along_the_back_of_the_phone_is_forward() -> None:
     spin = replace(FLAT, rotation_rate=(0.0, 0.0, -1.0))  # about the rear camera's axis
     sample = synchronised().record(Record(1, at(1.0), spin), 1.0)

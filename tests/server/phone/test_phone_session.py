@@ -358,6 +358,20 @@ def test_only_before_a_screen_a_camera_without_a_calibration_may_be_guessed() ->
     rig.phone.close()
 
 
+def test_eyes_that_know_motion_in_other_axes_look_anew() -> None:
+    rig = Rig(DEVICE)
+    rig.synchronise()
+    eyes = []
+    for k, angle in enumerate((0, 0, 90, 90)):
+        rig.t += 0.02
+        rig.say(replace(FLAT, screen_angle_deg=angle), k)
+        rig.say(JPEG, k)
+        eyes.append(rig.phone.vision)
+    assert eyes[0] is eyes[1] is not eyes[2] is eyes[3]
+    assert None not in eyes
+    rig.phone.close()
+
+
 def test_the_page_is_told_what_its_picture_shows_as_often_as_it_is_drawn() -> None:
     rig = Rig(DEVICE)
     assert rig.phone.sight(control_status(), rig.t) is None  # no picture yet: no size

@@ -22,6 +22,7 @@ export const SERVER = {
   "Armed but not moved for a while.": "Armé, mais immobile depuis un moment.",
   "Following the phone.": "Suit le téléphone.",
   "Button released: press again to go on.": "Bouton relâché : appuyez de nouveau pour reprendre.",
+  "The phone's screen has turned: press again.": "L’écran du téléphone a tourné : appuyez de nouveau.",
   "Pressed again.": "Appuyé de nouveau.",
   "Held for as long as is allowed.": "Maintenu aussi longtemps que permis.",
   "The pictures are {} s old: too late for this robot's gains.": "Les images ont {} s : trop tard pour les gains de ce robot.",
