@@ -6,11 +6,13 @@ jobs need no memory.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
+from functools import partial
 from itertools import islice
 from multiprocessing import active_children, get_context
 from threading import current_thread, main_thread
@@ -41,12 +43,13 @@ def each(
     others = set(active_children())
     pool = ProcessPoolExecutor(workers, get_context("spawn"))
     waiting, given = iter(jobs), set[Future[Result]]()
+    job_done = partial(_done, work)
     try:
         with _single_threaded(), _deaf():
-            given |= {pool.submit(work, one) for one in islice(waiting, AHEAD * workers)}
+            given |= {pool.submit(job_done, one) for one in islice(waiting, AHEAD * workers)}
         while given:
             done, given = wait(given, return_when=FIRST_COMPLETED)
-            given |= {pool.submit(work, one) for one in islice(waiting, len(done))}
+            given |= {pool.submit(job_done, one) for one in islice(waiting, len(done))}
             yield from (one.result() for one in done)
     except BaseException:
         for child in set(active_children()) - others:
@@ -54,6 +57,17 @@ def each(
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _done(work: Callable[[Job], Result], job: Job) -> Result:
+    """Do a job, and give back what it held.
+
+    A flight refers to itself; its decoder's memory is not Python's, which sees no need to look.
+    """
+    try:
+        return work(job)
+    finally:
+        gc.collect()
 
 
 @contextmanager
