@@ -79,6 +79,7 @@ class Refusal(IntEnum):
     ZERO_FIRST = 12
     HANDSHAKE = 13
     WIRE = 14
+    FAULT = 15
 
 
 EXPLANATIONS: dict[Refusal, str] = {
@@ -97,6 +98,7 @@ EXPLANATIONS: dict[Refusal, str] = {
     Refusal.ZERO_FIRST: "A new control process must begin with zero.",
     Refusal.HANDSHAKE: "The robot is still making sure that it is told zero.",
     Refusal.WIRE: "The robot's emergency stop was pressed.",
+    Refusal.FAULT: "The robot's own controller has stopped it.",
 }
 """For the person who can mend it."""
 

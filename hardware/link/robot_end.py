@@ -216,10 +216,11 @@ class RobotEnd:
         self._advance(now_us)
         return self._given.at(now_us)
 
-    def halt(self) -> None:
-        """Zero at once, then refuse: the robot is being switched off."""
+    def halt(self, why: Refusal = Refusal.SILENT) -> None:
+        """Zero at once, then refuse: the robot is being switched off, or can't move."""
         if self.state != FollowerState.STOPPED_BY_WIRE:  # which says more
             self._refuse()
+            self.refusal = why
         self._candidate = 0
 
     def wire(self, *, is_open: bool) -> None:

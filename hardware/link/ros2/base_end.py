@@ -1,8 +1,9 @@
 """A base of ROS 2 without a socket: who it is, what is believed of it, and what it is told.
 
 Nobody can be told apart by DDS as ROS uses it: there is no key, and no message answers another. So
-the gate and the watchdog that our own link has on the robot (`robot_end.py`) stand here, before the
-topic. Whatever control says goes through them, and what they give is what the base is told:
+the gate and the watchdog that our own link has on the robot stand here, before the topic
+(`link/gate_here.py`). Whatever control says goes through them, and what they give is what the base
+is told:
 
 * The gate takes a command only if control has just had a sample of the base's motion sensors, or,
   of a base that has none, its odometry is as fresh as its file says it comes. A base that isn't
@@ -22,33 +23,23 @@ round trip is from a command that the gate took to the next sample of the base.
 
 from __future__ import annotations
 
-import secrets
-from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hardware.follower import NOT_MEASURED, BodySample, RobotCommand
-from hardware.link.control_end import ControlEnd, random_u64
-from hardware.link.link_key import new_key
-from hardware.link.robot_end import LinkLimits, RobotEnd
+from hardware.link.gate_here import GateHere
+from hardware.link.stamp_clock import StampClock
 from hardware.presumed_twist import PresumedTwist
 from hardware.robot_file import RobotFile, Ros2Parameters
 from pipeline.frames import Array, Triple, triple
 
 KEEPS_WRITER_S = 1.0
 """So long nobody else is heard in place of one who has fallen silent."""
-CLOCK_SET_S = 1.0
-"""A stamp that is farther from where the last one lets it be: that clock has been set anew."""
-QUICKEST_OF = 200
-"""Samples of which the quickest dates the newest; `BodyClock` of the server does the same."""
 ODOMETRY_LASTS_S = 0.1
 """With an older one nothing is known of how the base moves, and its samples are not believed."""
 MOST = 1e4
 """Nothing that a robot measures is more [rad/s, m/s², m/s]."""
-HERE = ("here", 0)
-NOTHING = (0.0, 0.0, 0.0)
-"""By motion sensors that a base has not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,31 +86,6 @@ class FirstWriter:
         return True
 
 
-class StampClock:
-    """Dates stamps on our clock: the quickest of the last ones took no time. Times are [s]."""
-
-    def __init__(self) -> None:
-        """No stamp yet."""
-        self._excess: deque[float] = deque(maxlen=QUICKEST_OF)
-        self._last = (-1.0, -1.0)
-        """Stamp and arrival."""
-
-    def is_set_anew(self, stamp: float, now: float) -> bool:
-        """Whether that is no time that the clock can have come to since the last stamp."""
-        if not self._excess:
-            return False
-        passed, went = now - self._last[1], stamp - self._last[0]
-        return went < -CLOCK_SET_S or went > passed + CLOCK_SET_S
-
-    def dated(self, stamp: float, now: float) -> float | None:
-        """When that was on our clock; None: not after the last one."""
-        if self._excess and stamp <= self._last[0]:
-            return None
-        self._last = stamp, now
-        self._excess.append(now - stamp)
-        return stamp + min(self._excess)
-
-
 class BaseEnd:
     """Turns commands into twists, and messages of a base into samples. Times are [s], monotonic."""
 
@@ -128,25 +94,22 @@ class BaseEnd:
         drive = robot_file.robot.twist
         assert drive is not None  # it takes a twist
         self._presumed = PresumedTwist(drive)
-        self._limits, self._key = LinkLimits.of(robot_file), new_key()
-        self._control = ControlEnd.of(robot_file, self._key, epoch)
+        self._gate, self._clock = GateHere(robot_file, epoch), StampClock()
         self._R_bi, self._has_odometry = topics.R_bi, bool(topics.odometry)
         self._imu_writer, self._odometry_writer = FirstWriter(), FirstWriter()
         self._twist_in_b, self._twist_at = np.zeros(6), -np.inf
         self._motion, self._t_measured = robot_file.robot.motion, -np.inf
-        self._boot_id = secrets.randbits(31)
         self._dropped = 0
-        self._begin()
 
     @property
     def epoch(self) -> int:
         """Under which commands are given; a new one after the gate has gone to zero by itself."""
-        return self._control.epoch
+        return self._gate.epoch
 
     @property
     def dropped(self) -> int:
         """Messages that were not the base's, not to be believed, repeated or overtaken."""
-        return self._dropped + self._control.dropped
+        return self._dropped + self._gate.dropped
 
     def drop(self) -> None:
         """Something came that could not be read."""
@@ -158,15 +121,13 @@ class BaseEnd:
         Raises:
             FollowerError: a command no robot may be told.
         """
-        now_us = _us(now)
-        self._gate.receive(self._control.command(command, now), HERE, now_us)
-        told = self._gate.setpoint(now_us)
+        told = self._gate.command(command, now)
         self._presumed.tell(told, now)
         return told
 
     def zero(self) -> RobotCommand:
         """Nothing, disarmed."""
-        return self._control.zero()
+        return self._gate.zero()
 
     def hear(self, heard: HeardImu | HeardOdometry, now: float) -> BodySample | None:
         """The sample that comes of a message; None if none does."""
@@ -186,13 +147,12 @@ class BaseEnd:
         """
         if self._motion is None:
             return None
-        told, age_s = self._gate.setpoint(_us(now)), NOT_MEASURED
+        told, age_s = self._gate.setpoint(now), NOT_MEASURED
         if self._motion.is_measured:
             told, age_s = self._twist_in_b, now - self._t_measured
             if age_s > self._motion.lasts_s:
                 return None
-        data = self._gate.sample(_us(now), random_u64(), NOTHING, NOTHING, told, age_s)
-        return self._control.receive(data, now)
+        return self._gate.sample(now, told, now, twist_age_s=age_s)
 
     def _hear_odometry(self, heard: HeardOdometry, is_other: bool, now: float) -> None:
         stamp, dated = 1e-6 * heard.stamp_us, now
@@ -226,8 +186,7 @@ class BaseEnd:
 
     def _begin(self) -> None:
         """With a base that has just started, for all we know."""
-        self._boot_id += 1
-        self._gate = RobotEnd(self._limits, self._boot_id, self._key)
+        self._gate.begin()
         self._clock = StampClock()
 
     def _knows_its_twist(self, now: float) -> bool:
@@ -237,15 +196,10 @@ class BaseEnd:
         omega_in_b = self._R_bi @ np.array(heard.omega_in_i)
         a_in_b = self._R_bi @ np.array(heard.a_in_i)
         moves = self._twist_in_b if self._has_odometry else self._presumed.at(now)
-        data = self._gate.sample(
-            _us(dated), random_u64(), triple(omega_in_b), triple(a_in_b), moves
+        sample = self._gate.sample(
+            dated, moves, now, omega_in_b=triple(omega_in_b), a_in_b=triple(a_in_b)
         )
-        sample = self._control.receive(data, now)
         return None if sample is None else replace(sample, t_us=heard.stamp_us)
-
-
-def _us(t: float) -> int:
-    return round(1e6 * t)
 
 
 def _can_be(*values: float) -> bool:
