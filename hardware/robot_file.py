@@ -44,6 +44,7 @@ from hardware.robot_schema import (
     clashes,
 )
 from hardware.twist_schema import (
+    FrankaSection,
     MotionSection,
     Ros2Section,
     TwistRobotSchema,
@@ -91,6 +92,18 @@ class Ros2Parameters:
     """"": it tells none."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FrankaParameters:
+    """Where the body b is on an arm of Franka's with an end effector e."""
+
+    R_be: Array
+    """(3, 3)."""
+    p_be_in_e: Array
+    """(3,) of b's origin with respect to e's [m]."""
+    real_time: bool
+    """The library refuses a kernel without."""
+
+
 @dataclass(frozen=True, slots=True)
 class LinkParameters:
     """How the robot is reached, where it listens and what it takes."""
@@ -108,6 +121,8 @@ class LinkParameters:
     """One of `COMMANDS`."""
     ros2: Ros2Parameters | None = None
     """Of a link of that kind."""
+    franka: FrankaParameters | None = None
+    """The same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -338,6 +353,7 @@ def _converted_twist(schema: TwistRobotSchema, folder: Path) -> RobotFile:
             0.0,
             link.takes,
             _ros2(link.ros2) if link.kind == "ros2" else None,
+            _franka(link.franka),
         ),
         keeps_attitude_in_ramp=False,
         battery=_battery(schema.battery),
@@ -480,6 +496,13 @@ def _ros2(section: Ros2Section | None) -> Ros2Parameters:
         R_bi=R_from_axes(section.imu_axes),
         odometry=whole(section.odometry) if section.odometry is not None else "",
     )
+
+
+def _franka(section: FrankaSection | None) -> FrankaParameters | None:
+    if section is None:
+        return None
+    R_be = R_from_axes(section.ee_axes)
+    return FrankaParameters(R_be, np.array(section.body_in_ee_m), section.real_time)
 
 
 def _ramp_s(schema: RobotSchema) -> float:

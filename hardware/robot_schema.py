@@ -134,8 +134,8 @@ class GainsSection(Section):
     """[N s/m, N m s/rad]."""
 
 
-USUAL_PORTS = {"ros2": 7400, "rpit": 31415}
-"""UDP ports of kinds of links that have one which everybody uses."""
+USUAL_PORTS = {"franka": 1337, "ros2": 7400, "rpit": 31415}
+"""Ports of kinds of links that have one which everybody uses: franka's of TCP, others of UDP."""
 
 
 class LinkSection(Section):

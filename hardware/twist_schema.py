@@ -22,6 +22,7 @@ from hardware.robot_schema import (
     Section,
     Start,
     ToolSection,
+    Vector,
     axes_fault,
     battery_clashes,
 )
@@ -138,6 +139,19 @@ class Ros2Section(Section):
     """nav_msgs/Odometry; without it the robot is taken to move as told, after its delay and lag."""
 
 
+class FrankaSection(Section):
+    """[link.franka]: where the body is on an arm of Franka's; see `link/franka/`."""
+
+    body_in_ee_m: Annotated[Vector, Field(default_factory=lambda: [0.0, 0.0, 0.0])]
+    """Origin of the body's axes in those of the end effector, as Franka's Desk has that."""
+    ee_axes: Annotated[
+        list[Direction], Field(min_length=3, max_length=3, default_factory=lambda: ["x", "y", "z"])
+    ]
+    """Along which axis of the end effector each of the body's lies."""
+    real_time: bool = True
+    """Refuse a computer whose kernel has no real time, as Franka demands one."""
+
+
 class TwistLinkSection(Section):
     """[link] of a robot that takes a twist."""
 
@@ -147,6 +161,7 @@ class TwistLinkSection(Section):
     host: Annotated[str, Field(min_length=1, max_length=253)]
     port: Annotated[int, Field(ge=1, le=65535)] | None = None
     ros2: Ros2Section | None = None
+    franka: FrankaSection | None = None
 
 
 class TwistRobotSchema(Section):
@@ -222,6 +237,7 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
         yield "arm.tool_joint", "with [tool], and with it alone"
     yield from _motion_clashes(robot)
     yield from _ros2_clashes(robot.link, robot.motion)
+    yield from _franka_clashes(robot)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     drive = drive_of(robot.twist)
@@ -274,3 +290,21 @@ def _ros2_clashes(
         is_measured = motion.twist == "measured"
         allowed = "missing: topic of the nav_msgs/Odometry that" if is_measured else "none where"
         yield "link.ros2.odometry", f"{allowed} motion.twist = {motion.twist!r}"
+
+
+def _franka_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
+    link, motion = robot.link, robot.motion
+    if link.kind != "franka":
+        if link.franka is not None:
+            yield "link.franka", f"only with kind = 'franka', not {link.kind!r}"
+        return
+    if link.port is not None:
+        yield "link.port", "none with kind = 'franka': its library has one"
+    if link.franka is None:
+        yield "link.franka", "missing: where the body is on the arm"
+    elif fault := axes_fault(link.franka.ee_axes):
+        yield "link.franka.ee_axes", fault
+    if motion is None or motion.twist != "measured":
+        yield "motion.twist", "'measured' with kind = 'franka': its joints tell how it moves"
+    if robot.tool is not None:
+        yield "tool", "none with kind = 'franka'"

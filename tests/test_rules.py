@@ -18,6 +18,8 @@ CLOCKS = {
     "hardware/sim/truth.py": "patience for an answer, in whatever process asks",
     "hardware/link/udp.py": "a default, in whatever process has the link",
     "hardware/link/rpit/rpit_follower.py": "the same",
+    "hardware/link/franka/franka_follower.py": "the same",
+    "hardware/link/franka/arm_line.py": "the same: that of who tells",
     "hardware/link/ros2/ros2_follower.py": "the same",
     "hardware/link/ros2/ports.py": "the same, for the time in ROS's headers",
 }
