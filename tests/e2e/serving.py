@@ -70,17 +70,19 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(folder: Path, *arguments: str, name: str = "") -> Iterator[Serving]:
+def serving(
+    folder: Path, *arguments: str, name: str = "", python: str = sys.executable
+) -> Iterator[Serving]:
     """Start it, wait until it answers, end it: by SIGTERM, which a job in the background hears too.
 
     A link is enough to lead, unless `arguments` say otherwise. Several run in one folder, each with
-    a `name` of its own.
+    a `name` of its own. It may be the `python` of another environment.
     """
     runtime, state = folder / "run", folder / "state"
     for path in (runtime, state):
         path.mkdir(mode=0o700, exist_ok=True)
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(runtime), "XDG_STATE_HOME": str(state)}
-    command = [sys.executable, "-m", "server", "serve", "--https-port", "0", "--http-port", "0"]
+    command = [python, "-m", "server", "serve", "--https-port", "0", "--http-port", "0"]
     command += ["--pairing.confirm", "self", "--name", name]
     own = own_directory(runtime / "lightleash", name)
     printed = folder / f"serve{name and f'-{name}'}.log"

@@ -28,7 +28,11 @@ HOLDS_MS = 60
 """As long as our own link's robot bears silence; then it brakes."""
 OLD_S = 0.04
 """As old as a command may be that our own link's robot takes."""
-LISTENS_EVERY_S = 0.002
+FULL_AFTER_S = 0.005
+"""Until an acceleration is reached. By Franka's own limits it takes 2 ms at most, but then the
+library fails to plan a motion to one in some thousand twists, and the one that it had ends there.
+"""
+LISTENS_EVERY_S = 0.005
 MEAN_S = 0.01
 """Rates of joints are means over this: they themselves jump from one millisecond to the next."""
 AGAIN_S = 1.0
@@ -80,7 +84,7 @@ class ArmLine:
             try:
                 self._serve(_Session(self._connected(), self._limits, self._clock, self._note))
             except franky.Exception as error:
-                self._note(str(error))
+                self._note(_said(error))
             self._is_connected = False
             self._closed.wait(AGAIN_S)
 
@@ -155,7 +159,9 @@ class _Session:
         except franky.NetworkException:
             raise
         except franky.Exception as error:
-            self._error = str(error)
+            self._error = _said(error)
+        except RuntimeError as error:  # there was no motion to this twist; the next one has its own
+            self._note(_said(error))
 
     def listen(self, connection: int) -> HeardArm | None:
         """What the arm says; None: nothing new.
@@ -213,10 +219,17 @@ def _limit(robot: franky.Robot, limits: ArmLimits) -> None:
     for own, value in (
         (robot.translation_velocity_limit, limits.speed),
         (robot.translation_acceleration_limit, limits.acceleration),
+        (robot.translation_jerk_limit, limits.acceleration / FULL_AFTER_S),
         (robot.rotation_velocity_limit, limits.rate),
         (robot.rotation_acceleration_limit, limits.angular_acceleration),
+        (robot.rotation_jerk_limit, limits.angular_acceleration / FULL_AFTER_S),
     ):
         own.set(min(value, own.max))
+
+
+def _said(error: Exception) -> str:
+    """Without the states of the last milliseconds, which come in the lines below."""
+    return str(error).partition("\n")[0]
 
 
 def _fault(state: franky.RobotState) -> str:
