@@ -11,8 +11,8 @@ pytest.importorskip("cyclonedds", reason="NO CYCLONE DDS: pip install 'lightleas
 
 from hardware.follower import FollowerState, TwistCommand
 from hardware.link.address import ANYBODY
+from hardware.link.base_end import HeardImu, HeardOdometry
 from hardware.link.registry import connect
-from hardware.link.ros2.base_end import HeardImu, HeardOdometry
 from hardware.link.ros2.ports import RosPorts
 from tests.counterparts.fastdds_base import FastDdsBase, NoFastDdsError, program
 from tests.hardware.link.ros2.ros2_rig import (

@@ -1,9 +1,10 @@
 """A base of ROS 2, by DDS and without ROS: a twist out, its motion sensors and odometry in.
 
-| file               | what                                                                       |
-|--------------------|----------------------------------------------------------------------------|
-| `base_end.py`      | who the base is, what is believed of it, what it is told: without a socket |
-| `messages.py`      | its messages, byte by byte as ROS has them                                 |
-| `ports.py`         | its topics, by Cyclone DDS                                                 |
-| `ros2_follower.py` | the link                                                                   |
+| file               | what                                       |
+|--------------------|--------------------------------------------|
+| `messages.py`      | its messages, byte by byte as ROS has them |
+| `ports.py`         | its topics, by Cyclone DDS                 |
+| `ros2_follower.py` | the link                                   |
+
+What is believed of it and what it is told is decided without a socket: `link/base_end.py`.
 """

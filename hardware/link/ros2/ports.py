@@ -28,7 +28,7 @@ from cyclonedds.topic import Topic
 
 from hardware.follower import FollowerError
 from hardware.link.address import ANYBODY, address_of
-from hardware.link.ros2.base_end import HeardImu, HeardOdometry
+from hardware.link.base_end import HeardImu, HeardOdometry
 from hardware.link.ros2.messages import (
     UNREADABLE,
     RosHeader,

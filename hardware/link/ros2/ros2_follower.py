@@ -12,10 +12,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from hardware.follower import BodySample, FollowerError, RobotCommand
+from hardware.link.base_end import BaseEnd
 from hardware.link.link_follower import LinkFollower
 from hardware.link.registry import LinkKind
-from hardware.link.ros2.base_end import BaseEnd
-from hardware.robot_file import RobotFile
+from hardware.robot_file import RobotFile, Ros2Parameters
 
 if TYPE_CHECKING:
     from hardware.link.ros2.ports import RosPorts
@@ -64,6 +64,11 @@ class Ros2Follower(LinkFollower[BaseEnd]):
         self.lost += not self._is_heard
 
 
+def end_of(robot_file: RobotFile, topics: Ros2Parameters, epoch: int) -> BaseEnd:
+    """The base of a robot file, without its topics."""
+    return BaseEnd(robot_file, epoch, topics.R_bi, has_odometry=bool(topics.odometry))
+
+
 def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> Ros2Follower:
     """Link to the robot of a robot file. A `Connect` of `registry.py`.
 
@@ -77,7 +82,7 @@ def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> Ros2Follower:
     topics = robot_file.link.ros2
     if topics is None:
         raise FollowerError("link.kind = 'ros2'", "[link.ros2] in the robot file")
-    return Ros2Follower(RosPorts(topics, robot_file.link.host), BaseEnd(robot_file, topics, epoch))
+    return Ros2Follower(RosPorts(topics, robot_file.link.host), end_of(robot_file, topics, epoch))
 
 
 KIND = LinkKind(connect, stops_in_silence=False, keyed=False, takes=("twist",))

@@ -8,9 +8,8 @@ import time
 
 from cyclonedds.qos import Policy, Qos
 
-from hardware.link.ros2.base_end import BaseEnd
 from hardware.link.ros2.ports import TELLS, RosPorts
-from hardware.link.ros2.ros2_follower import Ros2Follower
+from hardware.link.ros2.ros2_follower import Ros2Follower, end_of
 from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
 from tests.hardware.link.flight import FollowerFlight
 from tests.hardware.link.ros2.lab_base import LabBase, twister
@@ -67,7 +66,7 @@ class Ros2Rig:
     def leader(self, epoch: int) -> Ros2Follower:
         """A control process's end; its domain is new, and ends with it."""
         ports = RosPorts(self.topics, LOCALHOST, lambda: round(1e9 * self.stamp), self._tells)
-        end = BaseEnd(self.robot_file, self.topics, epoch)
+        end = end_of(self.robot_file, self.topics, epoch)
         return Ros2Follower(ports, end, lambda: self.now)
 
     @property

@@ -14,8 +14,8 @@ import pytest
 pytest.importorskip("cyclonedds", reason="NO CYCLONE DDS: pip install 'lightleash[ros2]'")
 
 from hardware.follower import FollowerState, TwistCommand
+from hardware.link.base_end import HeardOdometry
 from hardware.link.registry import connect
-from hardware.link.ros2.base_end import HeardOdometry
 from hardware.link.ros2.ports import RosPorts
 from tests.hardware.link.ros2.ros2_rig import (
     BELOW,

@@ -1,9 +1,9 @@
-"""A base of ROS 2 without a socket: who it is, what is believed of it, and what it is told.
+"""A base without key or gate, and without a socket: who it is, what is believed, what it is told.
 
-Nobody can be told apart by DDS as ROS uses it: there is no key, and no message answers another. So
-the gate and the watchdog that our own link has on the robot stand here, before the topic
-(`link/gate_here.py`). Whatever control says goes through them, and what they give is what the base
-is told:
+Bases of ROS 2 and autopilots of MAVLink are such: nobody can be told apart by what they speak, and
+no message answers another. So the gate and the watchdog that our own link has on the robot
+stand here (`gate_here.py`), in control's process, before the first byte. Whatever control says goes
+through them, and what they give is what the base is told:
 
 * The gate takes a command only if control has just had a sample of the base's motion sensors, or,
   of a base that has none, its odometry is as fresh as its file says it comes. A base that isn't
@@ -16,13 +16,14 @@ is told:
 A base that says nothing at all (`twist = "commanded"`) is taken to be there while somebody listens
 to what it is told; that its driver hangs nobody notices but the pictures.
 
-What it can't do is stop a base when this process or its network dies: the base itself has to, see
-`docs/ros2.md`, so that its robot file says who does (`stopped_by`). Nor does anybody answer: a
-round trip is from a command that the gate took to the next sample of the base.
+What it can't do is stop a base when this process or its network dies: the base itself has to, so
+that its robot file says who does (`stopped_by`). Nor does anybody answer: a round trip is from a
+command that the gate took to the next sample of the base.
 """
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +32,7 @@ from hardware.follower import NOT_MEASURED, BodySample, RobotCommand
 from hardware.link.gate_here import GateHere
 from hardware.link.stamp_clock import StampClock
 from hardware.presumed_twist import PresumedTwist
-from hardware.robot_file import RobotFile, Ros2Parameters
+from hardware.robot_file import RobotFile
 from pipeline.frames import Array, Triple, triple
 
 KEEPS_WRITER_S = 1.0
@@ -46,27 +47,27 @@ MOST = 1e4
 class HeardImu:
     """A message of the base's motion sensors."""
 
-    writer: int
+    writer: Hashable
     """Whose."""
     stamp_us: int
-    """Of its header [µs], 0: not dated."""
+    """On its own clock [µs], 0: not dated."""
     omega_in_i: Triple
     """[rad/s]."""
     a_in_i: Triple
     """Specific force [m/s²]."""
     measures_both: bool
-    """Neither is missing, by its covariances."""
+    """Neither is missing."""
 
 
 @dataclass(frozen=True, slots=True)
 class HeardOdometry:
     """The twist of a message of its odometry."""
 
-    writer: int
+    writer: Hashable
     twist_in_b: tuple[float, float, float, float, float, float]
     """[m/s, rad/s]."""
     stamp_us: int = 0
-    """Of its header [µs], 0: not dated."""
+    """On its own clock [µs], 0: not dated."""
 
 
 class FirstWriter:
@@ -74,10 +75,10 @@ class FirstWriter:
 
     def __init__(self) -> None:
         """Nobody yet."""
-        self.writer: int | None = None
+        self.writer: Hashable | None = None
         self._heard = 0.0
 
-    def admits(self, writer: int, now: float) -> bool:
+    def admits(self, writer: Hashable, now: float) -> bool:
         """Whether this one is, or now becomes, the one; of who said something that can be."""
         is_other = self.writer not in (None, writer)
         if is_other and now - self._heard <= KEEPS_WRITER_S:
@@ -89,13 +90,18 @@ class FirstWriter:
 class BaseEnd:
     """Turns commands into twists, and messages of a base into samples. Times are [s], monotonic."""
 
-    def __init__(self, robot_file: RobotFile, topics: Ros2Parameters, epoch: int) -> None:
-        """Nothing said, nothing heard."""
+    def __init__(
+        self, robot_file: RobotFile, epoch: int, R_bi: Array, *, has_odometry: bool
+    ) -> None:
+        """Nothing said, nothing heard.
+
+        `R_bi` (3, 3) is from the axes of its motion sensors to the body's.
+        """
         drive = robot_file.robot.twist
         assert drive is not None  # it takes a twist
         self._presumed = PresumedTwist(drive)
         self._gate, self._clock = GateHere(robot_file, epoch), StampClock()
-        self._R_bi, self._has_odometry = topics.R_bi, bool(topics.odometry)
+        self._R_bi, self._has_odometry = R_bi, has_odometry
         self._imu_writer, self._odometry_writer = FirstWriter(), FirstWriter()
         self._twist_in_b, self._twist_at = np.zeros(6), -np.inf
         self._motion, self._t_measured = robot_file.robot.motion, -np.inf

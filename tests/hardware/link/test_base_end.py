@@ -1,4 +1,4 @@
-"""What is believed of a base of ROS 2, and what it is told, without DDS."""
+"""What is believed of a base without key or gate, and what it is told, without a socket."""
 
 from __future__ import annotations
 
@@ -8,28 +8,21 @@ import numpy as np
 import pytest
 
 from hardware.follower import NOT_MEASURED, FollowerState, Refusal, TwistCommand
-from hardware.link.robot_end import LinkLimits
-from hardware.link.ros2.base_end import (
+from hardware.link.base_end import (
     KEEPS_WRITER_S,
     ODOMETRY_LASTS_S,
     BaseEnd,
     HeardImu,
     HeardOdometry,
 )
-from hardware.robot_file import (
-    COMMANDS,
-    Ros2Parameters,
-    load_robot,
-    robot_of,
-    robot_path,
-    robot_table,
-)
+from hardware.link.robot_end import LinkLimits
+from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
 from hardware.sim.plant.twist_plant import TwistPlant
 from hardware.twist_schema import TOLD_ZERO_S
 
 TWISTER = load_robot("twister", takes=COMMANDS)
 DRIVE = TWISTER.robot.twist
-TOPICS = Ros2Parameters(0, "/cmd_vel", "", "/imu", np.eye(3), "/odom")
+STRAIGHT = np.eye(3)
 BASE, STRANGER = 11, 12
 PERIOD_S = 0.005
 FRESH_S = LinkLimits.of(TWISTER).max_age_us / 1e6
@@ -41,13 +34,13 @@ GRAVITY = (0.0, 0.0, 9.8)
 class Led:
     """A base that is led: says something each tick, is told something each tick."""
 
-    def __init__(self, topics=TOPICS):
-        self.end, self.now = BaseEnd(TWISTER, topics, 1), 10.0
+    def __init__(self, R_bi=STRAIGHT, has_odometry=True):
+        self.end, self.now = BaseEnd(TWISTER, 1, R_bi, has_odometry=has_odometry), 10.0
         self.stamp_ahead, self.writer = 1_000.0, BASE
         self.late = 0.0
         """How long what it says is on its way [s]."""
         self.told, self.samples = [], []
-        self.speaks = self.has_odometry = True
+        self.speaks, self.has_odometry = True, has_odometry
 
     def imu(self, **changes):
         stamp_us = round(1e6 * (self.now - self.late + self.stamp_ahead))
@@ -128,8 +121,7 @@ def test_one_whose_odometry_falls_silent_soon_is_none_that_is_heard(led):
 
 
 def test_without_odometry_it_is_taken_to_move_as_the_simulated_one_does():
-    led = Led(replace(TOPICS, odometry=""))
-    led.has_odometry = False
+    led = Led(has_odometry=False)
     led.ticks(0.7)
     plant = TwistPlant(DRIVE, TWISTER.plant.imu, np.random.default_rng(0))
     for twist in (MOVING, 0.1 * MOVING, -MOVING):
@@ -157,7 +149,7 @@ def test_a_clock_that_goes_otherwise_than_ours_makes_no_sample_late(led):
 
 def test_samples_have_the_base_s_time_axes_and_motion(led):
     turned = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    led = Led(replace(TOPICS, R_bi=turned)).ticks(0.2)
+    led = Led(turned).ticks(0.2)
     led.now += PERIOD_S
     led.odometry((0.1, 0.2, 0.3, 0.4, 0.5, 0.6))
     sample = led.imu(a_in_i=(9.8, 0.0, 0.1))
@@ -271,8 +263,8 @@ class LedWithoutSensors:
 
     def __init__(self, robot_file):
         self.motion = robot_file.robot.motion
-        topics = replace(TOPICS, imu="", odometry="/odom" if self.motion.is_measured else "")
-        self.end, self.now = BaseEnd(robot_file, topics, 1), 10.0
+        measures = self.motion.is_measured
+        self.end, self.now = BaseEnd(robot_file, 1, STRAIGHT, has_odometry=measures), 10.0
         self.speaks = self.motion.is_measured
 
     def ticks(self, seconds, twist_in_b=(0.0,) * 6):
