@@ -48,12 +48,12 @@ class FollowerContract:
         """A new robot that has heard nothing, and its follower: to be given."""
         raise NotImplementedError
 
-    @staticmethod
-    def command(rig: Rig, level: float) -> RobotCommand:
+    @classmethod
+    def command(cls, rig: Rig, level: float) -> RobotCommand:
         return ThrustCommand(np.full(rig.follower.thrusters, level), armed=level > 0.0)
 
-    @staticmethod
-    def given(sample: BodySample) -> Array:
+    @classmethod
+    def given(cls, sample: BodySample) -> Array:
         return sample.thrusts
 
     @classmethod

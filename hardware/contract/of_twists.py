@@ -1,10 +1,13 @@
 """What every follower of a robot that takes a twist must do, beside what all must.
 
 A level of 1 is 0.1 m/s and 0.1 rad/s along and about x; its robot is that of
-`hardware/robots/twister.toml`, or as quick.
+`hardware/robots/twister.toml`, or as quick. One that can't be told to turn about x says by `leads`
+what it is told instead.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +23,10 @@ from hardware.follower import (
 )
 from pipeline.frames import Array
 
-LEVEL = 0.1 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+LEVEL = 0.1
+"""[m/s, rad/s]."""
+STILL = 1e-6
+"""Along and about what it isn't led: by float32 [m/s, rad/s]."""
 SILENT_S = 0.17
 """After the last command the robot is told to stand still."""
 SETTLE_S = 0.15
@@ -31,17 +37,22 @@ class TwistFollowerContract(FollowerContract):
     """Of a robot that takes a twist."""
 
     deaf = FollowerState.REFUSING
+    leads = (0, 3)
+    """Of its twist (6,): one of its velocity, one of its rates."""
 
-    @staticmethod
-    def command(rig: Rig, level: float) -> RobotCommand:  # noqa: ARG004 (as of thrusts)
-        return TwistCommand(level * LEVEL, armed=level > 0.0)
+    @classmethod
+    def command(cls, rig: Rig, level: float) -> RobotCommand:  # noqa: ARG003 (as of thrusts)
+        twist_in_b = np.zeros(6)
+        twist_in_b[list(cls.leads)] = LEVEL * level
+        return TwistCommand(twist_in_b, armed=level > 0.0)
 
-    @staticmethod
-    def given(sample: BodySample) -> Array:
+    @classmethod
+    def given(cls, sample: BodySample) -> Array:
         assert sample.twist_in_b is not None
         assert sample.thrusts.shape == (0,)
-        assert sample.twist_in_b[[1, 2, 4, 5]] == pytest.approx(0.0, abs=1e-9)
-        return sample.twist_in_b[[0, 3]] / 0.1
+        others = np.delete(sample.twist_in_b, cls.leads)
+        assert others == pytest.approx(0.0, abs=STILL)
+        return sample.twist_in_b[list(cls.leads)] / LEVEL
 
     def test_silence_ends_in_zero_that_only_a_new_handshake_ends(self, rig: Rig) -> None:
         self.ready(rig)
@@ -81,9 +92,9 @@ class TwistFollowerContract(FollowerContract):
         with pytest.raises(FollowerError, match="shape"):
             rig.follower.send(TwistCommand(np.zeros(3), armed=True))
         with pytest.raises(FollowerError, match="armed"):
-            rig.follower.send(TwistCommand(LEVEL, armed=False))
+            rig.follower.send(replace(self.command(rig, 1.0), armed=False))
         with pytest.raises(FollowerError, match="armed"):
-            rig.follower.send(TwistCommand(LEVEL, armed=True, stop=True))
+            rig.follower.send(replace(self.command(rig, 1.0), stop=True))
 
     def test_refuses_what_another_kind_of_robot_takes(self, rig: Rig) -> None:
         with pytest.raises(FollowerError, match="takes nothing else"):
