@@ -80,6 +80,8 @@ class Refusal(IntEnum):
     HANDSHAKE = 13
     WIRE = 14
     FAULT = 15
+    NOT_ARMED = 16
+    MODE = 17
 
 
 EXPLANATIONS: dict[Refusal, str] = {
@@ -99,6 +101,8 @@ EXPLANATIONS: dict[Refusal, str] = {
     Refusal.HANDSHAKE: "The robot is still making sure that it is told zero.",
     Refusal.WIRE: "The robot's emergency stop was pressed.",
     Refusal.FAULT: "The robot's own controller has stopped it.",
+    Refusal.NOT_ARMED: "The autopilot is not armed: only its pilot can do that.",
+    Refusal.MODE: "The autopilot follows nobody: its pilot has not set OFFBOARD or GUIDED.",
 }
 """For the person who can mend it."""
 

@@ -45,6 +45,7 @@ from hardware.robot_schema import (
 )
 from hardware.twist_schema import (
     FrankaSection,
+    MavlinkSection,
     MotionSection,
     Ros2Section,
     TwistRobotSchema,
@@ -105,6 +106,18 @@ class FrankaParameters:
 
 
 @dataclass(frozen=True, slots=True)
+class MavlinkParameters:
+    """Who an autopilot is among those who speak MAVLink, and by what it says how it moves."""
+
+    system: int
+    component: int
+    own_component: int
+    """Ours, in its system."""
+    twist_from: str
+    """ODOMETRY or LOCAL_POSITION_NED."""
+
+
+@dataclass(frozen=True, slots=True)
 class LinkParameters:
     """How the robot is reached, where it listens and what it takes."""
 
@@ -122,6 +135,8 @@ class LinkParameters:
     ros2: Ros2Parameters | None = None
     """Of a link of that kind."""
     franka: FrankaParameters | None = None
+    """The same."""
+    mavlink: MavlinkParameters | None = None
     """The same."""
 
 
@@ -354,6 +369,7 @@ def _converted_twist(schema: TwistRobotSchema, folder: Path) -> RobotFile:
             link.takes,
             _ros2(link.ros2) if link.kind == "ros2" else None,
             _franka(link.franka),
+            _mavlink(link.mavlink) if link.kind == "mavlink" else None,
         ),
         keeps_attitude_in_ramp=False,
         battery=_battery(schema.battery),
@@ -503,6 +519,13 @@ def _franka(section: FrankaSection | None) -> FrankaParameters | None:
         return None
     R_be = R_from_axes(section.ee_axes)
     return FrankaParameters(R_be, np.array(section.body_in_ee_m), section.real_time)
+
+
+def _mavlink(section: MavlinkSection | None) -> MavlinkParameters:
+    section = section or MavlinkSection.model_validate({})
+    return MavlinkParameters(
+        section.system, section.component, section.own_component, section.twist_from
+    )
 
 
 def _ramp_s(schema: RobotSchema) -> float:

@@ -134,7 +134,7 @@ class GainsSection(Section):
     """[N s/m, N m s/rad]."""
 
 
-USUAL_PORTS = {"franka": 1337, "ros2": 7400, "rpit": 31415}
+USUAL_PORTS = {"franka": 1337, "mavlink": 14540, "ros2": 7400, "rpit": 31415}
 """Ports of kinds of links that have one which everybody uses: franka's of TCP, others of UDP."""
 
 

@@ -152,6 +152,19 @@ class FrankaSection(Section):
     """Refuse a computer whose kernel has no real time, as Franka demands one."""
 
 
+class MavlinkSection(Section):
+    """[link.mavlink]: who an autopilot is, and how it says that it moves; see `link/mavlink/`."""
+
+    system: Annotated[int, Field(ge=1, le=255)] = 1
+    """MAV_SYSID, SYSID_THISMAV."""
+    component: Annotated[int, Field(ge=1, le=255)] = 1
+    """MAV_COMP_ID_AUTOPILOT1."""
+    own_component: Annotated[int, Field(ge=1, le=255)] = 191
+    """Ours in that system: MAV_COMP_ID_ONBOARD_COMPUTER."""
+    twist_from: Literal["LOCAL_POSITION_NED", "ODOMETRY"] = "LOCAL_POSITION_NED"
+    """The first with ATTITUDE or ATTITUDE_QUATERNION beside."""
+
+
 class TwistLinkSection(Section):
     """[link] of a robot that takes a twist."""
 
@@ -162,6 +175,7 @@ class TwistLinkSection(Section):
     port: Annotated[int, Field(ge=1, le=65535)] | None = None
     ros2: Ros2Section | None = None
     franka: FrankaSection | None = None
+    mavlink: MavlinkSection | None = None
 
 
 class TwistRobotSchema(Section):
@@ -238,6 +252,7 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     yield from _motion_clashes(robot)
     yield from _ros2_clashes(robot.link, robot.motion)
     yield from _franka_clashes(robot)
+    yield from _mavlink_clashes(robot)
     if len(set(robot.axes)) < len(robot.axes):
         yield "axes", "each word once"
     drive = drive_of(robot.twist)
@@ -268,6 +283,21 @@ def _motion_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
         yield "motion.rate_hz", "missing: how often it measures its twist"
     if motion.twist == "commanded" and motion.rate_hz is not None:
         yield "motion.rate_hz", "only with twist = 'measured'"
+
+
+def _mavlink_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
+    link, motion = robot.link, robot.motion
+    if link.kind != "mavlink":
+        if link.mavlink is not None:
+            yield "link.mavlink", f"only with kind = 'mavlink', not {link.kind!r}"
+        return
+    if tilting := [axis for axis in robot.axes if axis in ("roll", "pitch")]:
+        yield "axes", f"without {' and '.join(tilting)}: an autopilot tilts as it must"
+    if motion is not None and motion.twist != "measured":
+        yield "motion.twist", "'measured': an autopilot says how it moves"
+    section = link.mavlink
+    if section is not None and section.own_component == section.component:
+        yield "link.mavlink.own_component", "another one than the autopilot's"
 
 
 def _ros2_clashes(

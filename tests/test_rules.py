@@ -20,6 +20,7 @@ CLOCKS = {
     "hardware/link/rpit/rpit_follower.py": "the same",
     "hardware/link/franka/franka_follower.py": "the same",
     "hardware/link/franka/arm_line.py": "the same: that of who tells",
+    "hardware/link/mavlink/mavlink_follower.py": "the same",
     "hardware/link/ros2/ros2_follower.py": "the same",
     "hardware/link/ros2/ports.py": "the same, for the time in ROS's headers",
 }

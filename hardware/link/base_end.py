@@ -25,10 +25,11 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 
-from hardware.follower import NOT_MEASURED, BodySample, RobotCommand
+from hardware.follower import NOT_MEASURED, BodySample, Refusal, RobotCommand
 from hardware.link.gate_here import GateHere
 from hardware.link.stamp_clock import StampClock
 from hardware.presumed_twist import PresumedTwist
@@ -57,6 +58,8 @@ class HeardImu:
     """Specific force [m/s²]."""
     measures_both: bool
     """Neither is missing."""
+    at: float | None = None
+    """When that was on our clock [s]; None: nobody has related the two."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +71,22 @@ class HeardOdometry:
     """[m/s, rad/s]."""
     stamp_us: int = 0
     """On its own clock [µs], 0: not dated."""
+    at: float | None = None
+    """As of `HeardImu`."""
 
 
-class FirstWriter:
+Writer = TypeVar("Writer", bound=Hashable)
+
+
+class FirstWriter(Generic[Writer]):
     """Keeps to one of those who publish. Times are [s], monotonic."""
 
     def __init__(self) -> None:
         """Nobody yet."""
-        self.writer: Hashable | None = None
+        self.writer: Writer | None = None
         self._heard = 0.0
 
-    def admits(self, writer: Hashable, now: float) -> bool:
+    def admits(self, writer: Writer, now: float) -> bool:
         """Whether this one is, or now becomes, the one; of who said something that can be."""
         is_other = self.writer not in (None, writer)
         if is_other and now - self._heard <= KEEPS_WRITER_S:
@@ -102,10 +110,12 @@ class BaseEnd:
         self._presumed = PresumedTwist(drive)
         self._gate, self._clock = GateHere(robot_file, epoch), StampClock()
         self._R_bi, self._has_odometry = R_bi, has_odometry
-        self._imu_writer, self._odometry_writer = FirstWriter(), FirstWriter()
+        self._imu_writer = FirstWriter[Hashable]()
+        self._odometry_writer = FirstWriter[Hashable]()
         self._twist_in_b, self._twist_at = np.zeros(6), -np.inf
         self._motion, self._t_measured = robot_file.robot.motion, -np.inf
         self._dropped = 0
+        self._held_by = Refusal.NONE
 
     @property
     def epoch(self) -> int:
@@ -130,6 +140,12 @@ class BaseEnd:
         told = self._gate.command(command, now)
         self._presumed.tell(told, now)
         return told
+
+    def hold(self, why: Refusal) -> None:
+        """From now on it follows nobody; NONE: it does again, after half a second of zero."""
+        self._held_by = why
+        if why != Refusal.NONE:
+            self._gate.halt(why)
 
     def zero(self) -> RobotCommand:
         """Nothing, disarmed."""
@@ -158,7 +174,7 @@ class BaseEnd:
             told, age_s = self._twist_in_b, now - self._t_measured
             if age_s > self._motion.lasts_s:
                 return None
-        return self._gate.sample(now, told, now, twist_age_s=age_s)
+        return self._believed(self._gate.sample(now, told, now, twist_age_s=age_s))
 
     def _hear_odometry(self, heard: HeardOdometry, is_other: bool, now: float) -> None:
         stamp, dated = 1e-6 * heard.stamp_us, now
@@ -169,7 +185,7 @@ class BaseEnd:
             if on_ours is None:
                 self._dropped += 1
                 return
-            dated = min(on_ours, now)
+            dated = _earliest(on_ours, heard.at, now)
         self._twist_in_b, self._twist_at = np.array(heard.twist_in_b), now
         self._t_measured = dated
 
@@ -188,7 +204,7 @@ class BaseEnd:
         if dated is None or not self._knows_its_twist(now):
             self._dropped += 1
             return None
-        return self._sample(heard, min(dated, now), now)
+        return self._sample(heard, _earliest(dated, heard.at, now), now)
 
     def _begin(self) -> None:
         """With a base that has just started, for all we know."""
@@ -205,7 +221,18 @@ class BaseEnd:
         sample = self._gate.sample(
             dated, moves, now, omega_in_b=triple(omega_in_b), a_in_b=triple(a_in_b)
         )
+        sample = self._believed(sample)
         return None if sample is None else replace(sample, t_us=heard.stamp_us)
+
+    def _believed(self, sample: BodySample | None) -> BodySample | None:
+        if sample is None or self._held_by == Refusal.NONE:
+            return sample
+        return replace(sample, refusal=self._held_by)
+
+
+def _earliest(quickest: float, at: float | None, now: float) -> float:
+    """When a stamp was: no message took less than no time."""
+    return min(quickest, now, quickest if at is None else at)
 
 
 def _can_be(*values: float) -> bool:

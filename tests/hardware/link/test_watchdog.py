@@ -248,6 +248,7 @@ def test_c_and_python_agree_on_every_answer_thrust_and_sample(library, limits):
     assert seen >= {(taken, answered) for taken in (True, False) for answered in (True, False)}
     assert seen >= {(state, WIRE) for state in (RUNNING, RAMP, WIRE)}  # others: the search
     others = {Refusal.NONE, Refusal.STARTED, Refusal.HANDSHAKE, Refusal.FAULT}
+    others |= {Refusal.NOT_ARMED, Refusal.MODE}  # an autopilot's alone
     others |= {Refusal.RISE} if limits is FLIES else set()  # from 0 to full in two commands
     assert seen >= {("answer", why) for why in Refusal if why not in others}
 

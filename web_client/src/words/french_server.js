@@ -80,6 +80,8 @@ export const SERVER = {
   "The robot is still making sure that it is told zero.": "Le robot s’assure encore que la commande est nulle.",
   "The robot's emergency stop was pressed.": "L’arrêt d’urgence du robot a été enclenché.",
   "The robot's own controller has stopped it.": "Le contrôleur du robot l’a arrêté.",
+  "The autopilot is not armed: only its pilot can do that.": "L’autopilote n’est pas armé : seul son pilote peut le faire.",
+  "The autopilot follows nobody: its pilot has not set OFFBOARD or GUIDED.": "L’autopilote ne suit personne : son pilote n’a pas mis OFFBOARD ou GUIDED.",
   "The server's computer was too busy.": "L’ordinateur du serveur était trop occupé.",
   "The phone was too busy: it sent pictures, and no word.": "Le téléphone était trop occupé : il envoyait des images, et rien d’autre.",
   "Close other apps on it, end power saving, let it cool down.": "Fermez-y d’autres applis, quittez l’économie d’énergie, laissez-le refroidir.",

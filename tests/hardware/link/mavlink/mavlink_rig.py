@@ -1,0 +1,64 @@
+"""A simulated robot behind an autopilot of pymavlink on a real socket, in virtual time."""
+
+from __future__ import annotations
+
+from hardware.link.mavlink.autopilot_end import AutopilotEnd
+from hardware.link.mavlink.mavlink_follower import MavlinkFollower
+from hardware.robot_file import robot_of, robot_path, robot_table
+from tests.hardware.link.flight import FollowerFlight
+from tests.hardware.link.mavlink.lab_autopilot import LOCALHOST, LabAutopilot, twister
+
+STAMP_BEFORE_S = 20.0
+"""Of the autopilot's clock before ours."""
+LEVEL = ["x", "y", "z", "yaw"]
+MEASURED = {"twist": "measured", "rate_hz": 100.0, "stands_level": False}
+
+
+def mavlink_robot(motion=None, host=LOCALHOST, **section):
+    """The simulated robot that takes a twist, behind MAVLink; with `motion` without sensors."""
+    table = robot_table(robot_path("twister")) | {"axes": LEVEL}
+    if motion is not None:
+        del table["body_imu"]
+        table["motion"] = motion
+    link = {"kind": "mavlink", "takes": "twist", "host": host, "mavlink": section}
+    return robot_of(table | {"link": link}, "mavlink.toml")
+
+
+class MavlinkRig:
+    def __init__(self, robot_file=None, seed: int = 0, **autopilot) -> None:
+        self.robot_file = robot_file or mavlink_robot()
+        self.now = 50.0
+        """On our clock, which is another than the autopilot's [s]."""
+        self.booted = STAMP_BEFORE_S
+        self.follower = self.leader(1)
+        self.body, drive = twister(seed)
+        names = self.robot_file.link.mavlink
+        odometry = names.twist_from == "ODOMETRY"
+        told = {"system": names.system, "odometry": odometry} | autopilot
+        self.autopilot = LabAutopilot(self.follower.port, self.body, drive, **told)
+
+    def leader(self, epoch: int, port: int = 0) -> MavlinkFollower:
+        """A control process's end; port 0 takes any free one."""
+        link = self.robot_file.link
+        end = AutopilotEnd(self.robot_file, link.host, link.mavlink, epoch)
+        return MavlinkFollower((LOCALHOST, port), end, lambda: self.now)
+
+    @property
+    def stamp(self) -> float:
+        return self.now - self.booted
+
+    def advance(self, dt: float) -> None:
+        for _ in range(round(dt / 0.005)):
+            self.now += 0.005
+            self.autopilot.step(self.now, self.stamp)
+
+    def cut_link(self) -> None:
+        self.autopilot.connected = False
+
+    def close(self) -> None:
+        self.follower.close()
+        self.autopilot.close()
+
+
+class MavlinkFlight(FollowerFlight, MavlinkRig):
+    """The same as a follower, for a flight in virtual time."""
