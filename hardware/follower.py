@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from pipeline.estimation.standing_camera import StandingPose
 from pipeline.frames import Array
 from pipeline.robot import Robot, TwistDrive
 
@@ -282,6 +283,17 @@ class HasTool(Protocol):
 
     def use_tool(self, opening: float) -> None:
         """Send how far it shall be open, 0 to 1; to be said again every 20 ms, or it stays."""
+
+
+@runtime_checkable
+class TakesVision(Protocol):
+    """A `Follower` whose robot may want to be told where it was seen."""
+
+    wants_vision: bool
+    """By its file."""
+
+    def see(self, seen: StandingPose) -> None:
+        """Send where a picture showed the body, in a frame that stands; it may be lost."""
 
 
 @dataclass(frozen=True, slots=True)

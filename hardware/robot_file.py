@@ -115,6 +115,8 @@ class MavlinkParameters:
     """Ours, in its system."""
     twist_from: str
     """ODOMETRY or LOCAL_POSITION_NED."""
+    vision: bool = False
+    """It is told where a phone that stands sees it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -524,7 +526,11 @@ def _franka(section: FrankaSection | None) -> FrankaParameters | None:
 def _mavlink(section: MavlinkSection | None) -> MavlinkParameters:
     section = section or MavlinkSection.model_validate({})
     return MavlinkParameters(
-        section.system, section.component, section.own_component, section.twist_from
+        section.system,
+        section.component,
+        section.own_component,
+        section.twist_from,
+        section.vision,
     )
 
 

@@ -163,6 +163,8 @@ class MavlinkSection(Section):
     """Ours in that system: MAV_COMP_ID_ONBOARD_COMPUTER."""
     twist_from: Literal["LOCAL_POSITION_NED", "ODOMETRY"] = "LOCAL_POSITION_NED"
     """The first with ATTITUDE or ATTITUDE_QUATERNION beside."""
+    vision: bool = False
+    """It is told where a phone that stands sees it."""
 
 
 class TwistLinkSection(Section):

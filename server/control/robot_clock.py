@@ -18,13 +18,15 @@ from hardware.follower import (
     HasTool,
     Refusal,
     RobotCommand,
+    TakesVision,
     TellsHealth,
 )
 from hardware.link.blink_datagram import LASTS_MS
 from hardware.link.robot_end import SILENCE
 from hardware.link.silence import SilenceTimes
 from hardware.robot_file import BatteryParameters
-from pipeline.signals import BodyImu
+from pipeline.estimation.standing_camera import StandingCamera
+from pipeline.signals import BodyImu, PhoneImu, VisionMeasurement
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, Input
 from server.control.robot_health import PRESSED, HealthWatch, RobotCondition
@@ -81,6 +83,8 @@ class RobotLink:
         self._told = told
         self._follower, self._silence = follower, silence
         self._tells = follower if isinstance(follower, TellsHealth) else None
+        wants = isinstance(follower, TakesVision) and follower.wants_vision
+        self._standing = StandingCamera() if wants else None
         self._ramp_begun_s = silence.back_s - silence.ramps_s
         """A robot that has just begun to ramp takes commands back: so long it may say so."""
         self._book = book(blinking_leds) if blinking_leds else None
@@ -135,7 +139,9 @@ class RobotLink:
         self._follower.send(command)
 
     def pass_on(self, messages: Iterable[Input], now: float) -> None:
-        """Tell the robot to go on blinking, if it can and one of the server's messages says so."""
+        """Tell the robot what it wants of the server's messages: to go on blinking, to be seen."""
+        messages = tuple(messages)
+        self._tell_vision(messages)
         requests = [message for message in messages if isinstance(message, BlinkInput)]
         if not requests or self._book is None or not isinstance(self._follower, Blinking):
             return
@@ -144,6 +150,19 @@ class RobotLink:
         if begin_us is not None and begin_us >= 0 and 0 < lasts_ms <= LASTS_MS:
             dark = tuple(self._book[code.number].tolist())
             self._follower.blink(BlinkOrder(begin_us, lasts_ms, round(1e3 * SLOT_S), dark))
+
+    def _tell_vision(self, messages: Iterable[Input]) -> None:
+        """Motion samples first: a picture's are older than it comes."""
+        if self._standing is None or not isinstance(self._follower, TakesVision):
+            return
+        for message in messages:
+            if isinstance(message, PhoneImu):
+                self._standing.add(message)
+        for seen in messages:
+            if isinstance(seen, VisionMeasurement) and seen.pose is not None and not seen.lie:
+                late_s = seen.offset.value if seen.offset is not None else 0.0
+                if (pose := self._standing.pose(seen.pose, seen.pose.t + late_s)) is not None:
+                    self._follower.see(pose)
 
     def use_tool(self, opening: float) -> None:
         """Tell the robot how far its tool shall be open, 0 to 1, if it has one."""

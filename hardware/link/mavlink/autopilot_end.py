@@ -12,11 +12,14 @@ autopilot, until it has been silent for a second. What others say is dropped.
 * How it moves it says by LOCAL_POSITION_NED and ATTITUDE, or by ODOMETRY; a robot whose file has
   [body_imu] says HIGHRES_IMU beside. Nothing of it counts without an attitude, for a set-point is
   turned by it (`axes.py`).
+* If its file wants so, it is told where a phone that stands sees it (ODOMETRY), with the time of
+  the picture on our clock, which it relates to its own by TIMESYNC.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -25,12 +28,20 @@ from hardware.follower import BodySample, RobotCommand, RobotHealth
 from hardware.link.address import ANYBODY
 from hardware.link.base_end import BaseEnd, FirstWriter, HeardImu, HeardOdometry
 from hardware.link.mavlink import messages as mav
-from hardware.link.mavlink.axes import R_ab, R_na_from_rpy, R_na_from_wxyz, in_b, told_in_h
+from hardware.link.mavlink.axes import (
+    R_ab,
+    R_na_from_rpy,
+    R_na_from_wxyz,
+    in_b,
+    pose_in_n,
+    told_in_h,
+)
 from hardware.link.mavlink.packets import MavlinkPacket, encoded, packets
 from hardware.link.mavlink.pilot import Pilot
 from hardware.link.mavlink.time_sync import EVERY_S, TimeSync
 from hardware.link.robot_end import Peer
 from hardware.robot_file import MavlinkParameters, RobotFile
+from pipeline.estimation.standing_camera import StandingPose
 from pipeline.frames import Array, Triple
 
 ALIVE_EVERY_S = 1.0
@@ -38,7 +49,9 @@ ALIVE_EVERY_S = 1.0
 ATTITUDE_LASTS_US = 100_000
 """A velocity in n that is farther from an attitude is in no axes of the body."""
 US_PER_MS = 1000
-U32 = 1 << 32
+US_PER_S = 1_000_000
+U8, U32 = 1 << 8, 1 << 32
+"""How many numbers a field has."""
 BOTH_NEW = 0b11_1111
 """Of HIGHRES_IMU: three axes of the accelerometer, three of the gyroscope."""
 ALIVE = (
@@ -49,6 +62,8 @@ ALIVE = (
     mav.MAV_STATE_ACTIVE,
     mav.MAVLINK_VERSION,
 )
+UNKNOWN_TWIST = (nan,) * 6
+UNKNOWN_COVARIANCE = (nan,) * 21
 NOWHERE: Triple = (0.0, 0.0, 0.0)
 """What the mask of a set-point takes out."""
 
@@ -120,6 +135,27 @@ class AutopilotEnd:
             self._asked_at = now
             going.append(self._packet(mav.TIMESYNC, *self._sync.question(now)))
         return going
+
+    def vision(self, seen: StandingPose) -> bytes:
+        """The packet that tells where the body was seen, at the time of the picture on our clock.
+
+        Velocity and rates are not known: no picture says them.
+        """
+        place, wxyz, covariance = pose_in_n(seen)
+        return self._packet(
+            mav.ODOMETRY,
+            round(US_PER_S * seen.t),
+            *place,
+            *wxyz,
+            *UNKNOWN_TWIST,
+            *covariance,
+            *UNKNOWN_COVARIANCE,
+            mav.MAV_FRAME_LOCAL_FRD,
+            mav.MAV_FRAME_BODY_FRD,
+            seen.frame % U8,
+            mav.MAV_ESTIMATOR_TYPE_VISION,
+            0,
+        )
 
     def answers(self) -> list[bytes]:
         """Packets that answer what has come since the last call: to be sent at once."""

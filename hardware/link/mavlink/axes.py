@@ -2,6 +2,7 @@
 
 | here | MAVLink                                                              |
 |------|----------------------------------------------------------------------|
+| s    | where a phone stands, z up (`standing_camera.py`)                    |
 | b    | body, forward left up (REP-103)                                      |
 | a    | the same body, forward right down: MAV_FRAME_BODY_FRD                |
 | n    | what the autopilot takes to stand: MAV_FRAME_LOCAL_NED or _LOCAL_FRD |
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.estimation.standing_camera import StandingPose
 from pipeline.frames import (
     Array,
     R_from_rpy,
@@ -24,6 +26,7 @@ from pipeline.frames import (
     rotation_about_z,
     rpy_from_R,
     triple,
+    wxyz_from_R,
 )
 
 R_ab: Array = np.diag([1.0, -1.0, -1.0])
@@ -47,6 +50,17 @@ def R_na_from_wxyz(wxyz: tuple[float, ...]) -> Array | None:
 def in_b(v_in_a: Array) -> Triple:
     """What an autopilot's body says in its axes (3,), in ours."""
     return triple(R_ab.T @ v_in_a)
+
+
+def pose_in_n(seen: StandingPose) -> tuple[Triple, tuple[float, ...], tuple[float, ...]]:
+    """Place [m], attitude (wxyz) and covariance of ODOMETRY, whose 21 go row by row.
+
+    n is s with half a turn about its x: MAV_FRAME_LOCAL_FRD.
+    """
+    turn = np.kron(np.eye(2), R_ab)
+    covariance = turn @ seen.covariance @ turn.T
+    wxyz = wxyz_from_R(R_ab @ seen.R_sb @ R_ab.T)
+    return triple(R_ab @ seen.p_bs_in_s), wxyz, tuple(covariance[np.triu_indices(6)].tolist())
 
 
 def told_in_h(twist_in_b: Array, R_na: Array) -> tuple[Triple, float]:

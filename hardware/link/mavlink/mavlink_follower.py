@@ -18,6 +18,7 @@ from hardware.link.registry import LinkKind
 from hardware.link.robot_end import Peer
 from hardware.link.robot_server import bound
 from hardware.robot_file import RobotFile
+from pipeline.estimation.standing_camera import StandingPose
 
 MOST_DATAGRAMS = 256
 """Taken at once; the rest waits for the next call."""
@@ -31,7 +32,12 @@ class MavlinkFollower(LinkFollower[AutopilotEnd]):
     thrusters = 0
 
     def __init__(
-        self, address: Peer, end: AutopilotEnd, clock: Callable[[], float] = time.monotonic
+        self,
+        address: Peer,
+        end: AutopilotEnd,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        wants_vision: bool = False,
     ) -> None:
         """Listens at `address`; says nothing before it has heard something.
 
@@ -39,6 +45,8 @@ class MavlinkFollower(LinkFollower[AutopilotEnd]):
             FollowerError: somebody else listens there.
         """
         super().__init__(end, clock)
+        self.wants_vision = wants_vision
+        """See `TakesVision`."""
         try:
             self._socket = bound(address)
         except OSError as error:
@@ -70,6 +78,11 @@ class MavlinkFollower(LinkFollower[AutopilotEnd]):
         if (sample := self._end.beat(self._clock())) is not None:
             samples.append(sample)
         return samples
+
+    def see(self, seen: StandingPose) -> None:
+        """See `TakesVision`."""
+        self._check_open()
+        self._tell([self._end.vision(seen)])
 
     def close(self) -> None:
         """Close. See `Follower`.
@@ -108,7 +121,7 @@ def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> MavlinkFollower:
     host = address_of(link.host, "whoever speaks first")
     here = host if host.startswith("127.") else ANYBODY
     end = AutopilotEnd(robot_file, host, link.mavlink, epoch)
-    return MavlinkFollower((here, link.port), end)
+    return MavlinkFollower((here, link.port), end, wants_vision=link.mavlink.vision)
 
 
 KIND = LinkKind(connect, stops_in_silence=False, keyed=False, takes=("twist",))

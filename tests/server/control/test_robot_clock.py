@@ -21,6 +21,8 @@ from hardware.follower import (
 from hardware.link.robot_end import SILENCE
 from hardware.link.silence import SilenceTimes
 from hardware.robot_file import BatteryParameters
+from pipeline.estimation.standing_camera import STANDS_S, StandingPose
+from pipeline.signals import LedRays, PhoneImu, RelativePose, StampOffset, VisionMeasurement
 from pipeline.vision.blink_code import SLOT_S, book
 from server.control.ipc_inputs import BlinkInput, RequestInput
 from server.control.robot_clock import (
@@ -297,3 +299,53 @@ def test_nobody_blinks_that_cannot_or_for_longer_than_is_allowed() -> None:
     RobotLink(silent, 5).pass_on([BlinkInput(2, 100.1)], 100.2)  # its clock is not known
     RobotLink(Script(), 5).pass_on([BlinkInput(2, 100.1)], 100.2)
     assert silent.orders == []
+
+
+class SeeingScript(Script):
+    """Whose robot wants to be told where it is seen."""
+
+    def __init__(self, *, wants: bool = True) -> None:
+        super().__init__()
+        self.wants_vision = wants
+        self.seen: list[StandingPose] = []
+
+    def see(self, seen: StandingPose) -> None:
+        self.seen.append(seen)
+
+
+def filmed(follower: SeeingScript, turning: float = 0.0) -> list[float]:
+    """By a phone that stands, or turns; each picture comes 100 ms late. Gives their times."""
+    link, captured = RobotLink(follower), []
+    for k in range(300):
+        t = 100.0 + k / 60.0
+        up, late = np.array([0.0, 0.0, 9.81]), t - 0.1
+        pose = RelativePose(late, np.array([2.0, 0.0, 0.0]), np.eye(3), np.eye(6), 0.1, 5)
+        rays = LedRays(np.zeros(0, np.intp), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+        offset = StampOffset(-0.005, 0.002)
+        messages = [
+            VisionMeasurement(late, rays, pose, offset=offset),
+            VisionMeasurement(late, rays, None),
+            VisionMeasurement(late, rays, pose, lie="It shows another room."),
+            PhoneImu(t, np.array([0.0, 0.0, turning]), up),
+        ]
+        link.pass_on(messages, t)
+        captured.append(late - 0.005)
+    return captured
+
+
+def test_a_robot_that_wants_it_is_told_where_a_standing_phone_saw_it_and_when() -> None:
+    follower = SeeingScript()
+    captured = filmed(follower)
+    assert len(follower.seen) == pytest.approx(300 - 60 * (STANDS_S + 0.1), abs=3)
+    times = [seen.t for seen in follower.seen]
+    assert times == pytest.approx(captured[-len(times) :])
+    assert follower.seen[-1].p_bs_in_s == pytest.approx([2.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("wants", "turning"), [(True, 0.1), (False, 0.0)])
+def test_nothing_is_told_of_a_phone_that_moves_or_to_who_does_not_want_it(
+    wants: bool, turning: float
+) -> None:
+    follower = SeeingScript(wants=wants)
+    filmed(follower, turning)
+    assert follower.seen == []

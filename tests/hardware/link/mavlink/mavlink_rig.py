@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 from hardware.link.mavlink.autopilot_end import AutopilotEnd
 from hardware.link.mavlink.mavlink_follower import MavlinkFollower
 from hardware.robot_file import robot_of, robot_path, robot_table
@@ -22,6 +24,13 @@ def mavlink_robot(motion=None, host=LOCALHOST, **section):
         table["motion"] = motion
     link = {"kind": "mavlink", "takes": "twist", "host": host, "mavlink": section}
     return robot_of(table | {"link": link}, "mavlink.toml")
+
+
+def free_port():
+    """One that nobody has just now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        asked.bind((LOCALHOST, 0))
+        return asked.getsockname()[1]
 
 
 class MavlinkRig:

@@ -7,8 +7,15 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 
-from hardware.link.mavlink.axes import R_na_from_rpy, R_na_from_wxyz, in_b, told_in_h
-from pipeline.frames import R_from_rpy
+from hardware.link.mavlink.axes import (
+    R_na_from_rpy,
+    R_na_from_wxyz,
+    in_b,
+    pose_in_n,
+    told_in_h,
+)
+from pipeline.estimation.standing_camera import StandingPose
+from pipeline.frames import R_from_rpy, rotation_about_y, rotation_about_z
 
 LEVEL = np.eye(3)
 S, C = sin(radians(30.0)), cos(radians(30.0))
@@ -78,3 +85,29 @@ def test_what_its_body_says_is_ours_after_half_a_turn_about_forward():
     assert in_b(np.array([1.0, 2.0, 3.0])) == (1.0, -2.0, -3.0)
     at_rest_down = np.array([0.0, 0.0, -9.8])
     assert in_b(at_rest_down)[2] == 9.8
+
+
+def seen(R_sb=LEVEL, covariance=LEVEL):
+    return StandingPose(7.0, np.array([2.0, 0.5, -0.25]), R_sb, covariance, 1)
+
+
+def test_where_it_is_seen_is_told_forward_right_down():
+    place, wxyz, _ = pose_in_n(seen(covariance=np.eye(6)))
+    assert place == (2.0, -0.5, 0.25)
+    assert wxyz == pytest.approx((1.0, 0.0, 0.0, 0.0))
+
+
+def test_a_turn_to_its_left_is_one_against_the_clock_and_its_nose_up_is_up():
+    left = pose_in_n(seen(rotation_about_z(radians(90.0)), np.eye(6)))[1]
+    assert left == pytest.approx((sin(pi / 4), 0.0, 0.0, -sin(pi / 4)))
+    up = pose_in_n(seen(rotation_about_y(radians(-60.0)), np.eye(6)))[1]  # about left, by the hand
+    assert up == pytest.approx((C, 0.0, S, 0.0))
+    assert R_na_from_wxyz(up) == pytest.approx(R_na_from_rpy(0.0, radians(60.0), 0.0))
+
+
+def test_a_covariance_goes_row_by_row_and_keeps_its_variances():
+    covariance = np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    covariance[0, 1] = covariance[1, 0] = 0.5
+    rows = pose_in_n(seen(covariance=covariance))[2]
+    assert [rows[k] for k in (0, 6, 11, 15, 18, 20)] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert rows[1] == -0.5  # forward with right

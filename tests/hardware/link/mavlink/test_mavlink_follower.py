@@ -12,11 +12,14 @@ from hardware.follower import EXPLANATIONS, FollowerError, FollowerState, Refusa
 from hardware.link.base_end import KEEPS_WRITER_S
 from hardware.link.mavlink.mavlink_follower import connect
 from hardware.twist_schema import TOLD_ZERO_S
+from pipeline.estimation.standing_camera import StandingPose
 from tests.hardware.link.mavlink.lab_autopilot import OFFBOARD, POSCTL, LabAutopilot, twister
 from tests.hardware.link.mavlink.mavlink_rig import (
+    LOCALHOST,
     MEASURED,
     STAMP_BEFORE_S,
     MavlinkRig,
+    free_port,
     mavlink_robot,
 )
 
@@ -290,6 +293,43 @@ def test_a_twist_is_as_old_as_the_way_that_timesync_has_found():
     ages = [s.twist_age_s for s in lead(late, 1.0)]
     assert min(ages) > 0.005
     late.close()
+
+
+def test_where_a_standing_phone_saw_it_is_dated_by_the_picture_on_its_own_clock(rig):
+    """Late by 150 ms, as pictures are: by a pose that is taken for new is how users fail."""
+    running(rig)
+    lead(rig, 1.0)
+    rig.autopilot.heard.clear()
+    place, covariance = np.array([2.0, 0.5, -0.25]), np.diag([0.01, 0.02, 0.03, 1e-4, 1e-4, 1e-4])
+    rig.follower.see(StandingPose(rig.now - 0.15, place, np.eye(3), covariance, 258))
+    rig.advance(PERIOD_S)
+    (said,) = [one for one in rig.autopilot.heard if one.get_type() == "ODOMETRY"]
+    captured = 1e-6 * said.time_usec - np.median(rig.autopilot.offsets)
+    assert captured == pytest.approx(rig.stamp - PERIOD_S - 0.15, abs=PERIOD_S)
+    assert (said.frame_id, said.child_frame_id) == (20, 12)  # LOCAL_FRD, BODY_FRD
+    assert (said.x, said.y, said.z) == (2.0, -0.5, 0.25)
+    assert said.q == [1.0, 0.0, 0.0, 0.0]
+    assert said.pose_covariance[:12:6] == pytest.approx([0.01, 0.02])
+    assert np.isnan([said.vx, said.yawspeed, said.velocity_covariance[0]]).all()
+    assert (said.reset_counter, said.estimator_type) == (2, 2)
+
+
+def test_what_is_seen_goes_nowhere_before_anybody_has_spoken_and_not_once_it_is_closed():
+    rig = MavlinkRig(mavlink_robot(vision=True))
+    seen = StandingPose(1.0, np.zeros(3), np.eye(3), np.eye(6), 1)
+    rig.follower.see(seen)
+    rig.advance(PERIOD_S)
+    assert rig.autopilot.heard == []
+    rig.close()
+    with pytest.raises(FollowerError, match="closed"):
+        rig.follower.see(seen)
+
+
+@pytest.mark.parametrize("wants", [False, True])
+def test_vision_is_wanted_by_the_file_alone(wants):
+    follower = connect(mavlink_robot(vision=wants).reached(LOCALHOST, free_port()), KEY, 1)
+    assert follower.wants_vision == wants
+    follower.close()
 
 
 def test_its_battery_is_heard(rig):

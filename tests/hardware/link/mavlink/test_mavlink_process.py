@@ -14,18 +14,11 @@ pytest.importorskip("pymavlink", reason="NO PYMAVLINK: pip install pymavlink")
 
 from hardware.follower import FollowerState, TwistCommand
 from hardware.link.registry import connect
-from tests.hardware.link.mavlink.mavlink_rig import LOCALHOST, MavlinkRig, mavlink_robot
+from tests.hardware.link.mavlink.mavlink_rig import LOCALHOST, free_port, mavlink_robot
 
 pytestmark = pytest.mark.e2e
 FORWARD = TwistCommand(np.array([0.25, *5 * (0.0,)]), armed=True)
 PATIENCE_S = 20.0
-
-
-def free_port():
-    rig = MavlinkRig()
-    port = rig.follower.port
-    rig.close()
-    return port
 
 
 class Autopilot:
