@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import socket
 
+import numpy as np
+
 from hardware.link.mavlink.autopilot_end import AutopilotEnd
 from hardware.link.mavlink.mavlink_follower import MavlinkFollower
 from hardware.robot_file import robot_of, robot_path, robot_table
+from hardware.sim.plant.twist_plant import TwistPlant
 from tests.hardware.link.flight import FollowerFlight
-from tests.hardware.link.mavlink.lab_autopilot import LOCALHOST, LabAutopilot, twister
+from tests.hardware.link.mavlink.lab_autopilot import LOCALHOST, LabAutopilot
 
 STAMP_BEFORE_S = 20.0
 """Of the autopilot's clock before ours."""
@@ -40,7 +43,8 @@ class MavlinkRig:
         """On our clock, which is another than the autopilot's [s]."""
         self.booted = STAMP_BEFORE_S
         self.follower = self.leader(1)
-        self.body, drive = twister(seed)
+        drive = self.robot_file.robot.twist
+        self.body = TwistPlant(drive, self.robot_file.plant.imu, np.random.default_rng(seed))
         names = self.robot_file.link.mavlink
         odometry = names.twist_from == "ODOMETRY"
         told = {"system": names.system, "odometry": odometry} | autopilot

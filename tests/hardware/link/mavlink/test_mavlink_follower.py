@@ -99,6 +99,7 @@ def test_each_command_comes_once_and_as_it_was_given_whatever_the_heading(rig):
     assert rig.follower.lost == lost
 
 
+@pytest.mark.slow
 def test_pymavlink_reads_each_packet_in_its_order_and_nothing_is_lost(rig):
     running(rig)
     rig.autopilot.heard.clear()
@@ -174,6 +175,7 @@ def test_who_leads_is_told_why_it_does_not_begin(switches, why):
     rig.close()
 
 
+@pytest.mark.slow
 def test_one_that_says_nothing_of_its_mode_any_more_is_not_led(rig):
     running(rig)
     rig.autopilot.ticks = 1  # of 200
@@ -195,6 +197,7 @@ def test_silence_is_zero_in_time_and_within_its_accelerations(rig):
     assert changes.max() <= rig.autopilot.drive.acceleration * PERIOD_S * 1.001
 
 
+@pytest.mark.slow
 def test_a_line_that_loses_two_of_a_hundred_leads_as_well():
     rig = running(MavlinkRig(loss=0.02))
     samples = lead(rig, 10.0)
@@ -233,6 +236,7 @@ def test_who_else_poses_as_it_is_dropped_and_told_nothing(rig):
     other.close()
 
 
+@pytest.mark.slow
 def test_another_takes_its_place_once_it_has_been_silent_and_begins_anew(rig):
     running(rig)
     rig.cut_link()
