@@ -18,6 +18,8 @@ TABLET, DESKTOP, LAPTOP = (820, 1180), (1280, 720), (1440, 900)
 LETTERS_PX = (16, 32)
 """The usual size, and 200 % of it."""
 
+DRAWN = "document.querySelectorAll('.late').forEach((one) => one.remove());"
+"""As each page's first drawing does."""
 OPERATING = """
 const show = (...ids) => ids.forEach((id) => { document.getElementById(id).hidden = false; });
 const hide = (...ids) => ids.forEach((id) => { document.getElementById(id).hidden = true; });
@@ -33,7 +35,6 @@ const mode = (name, meaning, reason) => {
 const health = () => Object.entries({leds: '5', path: 'WebSocket', gaps: '12 computer',
   fps: '30 fps', imu: '200 Hz', rtt: '142 ms', kbps: '3.1 Mb/s'})
   .forEach(([id, words]) => text(`h-${id}`, words));
-document.getElementById('step')?.replaceChildren(); // as the first drawing does
 const operate = () => { hide('welcome'); show('operate', 'lead', 'full'); health(); };
 const BUSY = 'The server\\'s computer is too busy. chromium takes the most of it: close what is '
   + 'not needed; a laptop wants its charger.';
@@ -197,7 +198,7 @@ STATES = {
     ("trust_fr", "help"): "",
 }
 """By page and state."""
-FRENCH_PAGES = ("index", "screen")
+FRENCH_PAGES = ("index", "screen", "check")
 SHOWN = [
     *((name, state, "en") for name, state in STATES),
     *((name, state, "fr") for name, state in STATES if name in FRENCH_PAGES),
@@ -215,7 +216,7 @@ def shown(
 ) -> Page:
     """A page in one of its states, in one of its languages."""
     page = opened(context, name, size)
-    page.evaluate(f"() => {{ {STATES[name, state]} }}")
+    page.evaluate(f"() => {{ {DRAWN} {STATES[name, state]} }}")
     if language == "fr":
         page.evaluate(FRENCH)
     return page

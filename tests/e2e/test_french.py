@@ -39,7 +39,7 @@ def test_who_prefers_french_is_told_in_french_what_the_page_and_the_server_say(
         expect(phone.locator("html")).to_have_attribute("lang", "fr", timeout=WAIT_MS)
         expect(phone.locator("#start")).to_have_text("Démarrer")
         expect(phone.locator("#last-stop-button")).to_have_attribute(
-            "aria-label", "Arrêter le robot"
+            "aria-label", "STOP\u00a0: arrêter le robot"
         )
         phone.fill("#name", "Anna")
         phone.click("#start")

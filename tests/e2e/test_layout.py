@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import BrowserContext
 
 from tests.e2e.axe import violations
-from tests.e2e.page_states import DESKTOP, PHONES, STATES, shown
+from tests.e2e.page_states import DESKTOP, PHONES, SHOWN, shown
 from tests.e2e.written_pages import opened
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
@@ -90,11 +90,11 @@ def test_a_large_sigma_lies_on_no_other_number(
     page.close()
 
 
-@pytest.mark.parametrize(("name", "state"), STATES)
+@pytest.mark.parametrize(("name", "state", "language"), SHOWN)
 def test_everybody_can_use_a_page_in_each_state(
-    written: BrowserContext, name: str, state: str
+    written: BrowserContext, name: str, state: str, language: str
 ) -> None:
     for size in (PHONES[1], PHONES[2], DESKTOP):
-        page = shown(written, name, state, size)
+        page = shown(written, name, state, size, language)
         assert violations(page) == [], size
         page.close()

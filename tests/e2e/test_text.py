@@ -103,6 +103,7 @@ OFF = """
 NAMES = [
     *("Lightleash", "STOP", "WebRTC", "WebSocket", "JPEG", "Anna", "Bert", "KWRT"),
     *("robot.local", "robot.local/board"),
+    *(f"Android 412x915@2.6 / camera 0, {s} s" for s in (24, 60)),
 ]
 FIGURES = {"142 ms", "200 Hz"}
 """What is the same in both languages."""
@@ -113,7 +114,8 @@ async (names) => {
   const said = [...document.querySelectorAll('body, body *')]
     .filter((one) => !['SCRIPT', 'NOSCRIPT'].includes(one.tagName))
     .flatMap((one) => [...words(one), one.getAttribute('aria-label') ?? '']);
-  return [...new Set(said)].filter((text) => /[a-z]{2}/i.test(text) && !names.includes(text));
+  return [...new Set([...said, document.title])]
+    .filter((text) => /[a-z]{2}/i.test(text) && !names.includes(text));
 }
 """
 """All words in a page's texts and labels, without `names`."""

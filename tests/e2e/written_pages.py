@@ -19,7 +19,7 @@ WORDS = CLIENT / "src" / "words"
 FRENCH = f"""
 async () => {{
   const {{speakFrench}} = await import('{ORIGIN}src/words/french.js');
-  speakFrench(document);
+  await speakFrench(document);
 }}
 """
 """Says in French what stands in a page."""

@@ -18,6 +18,8 @@ const files = (folder) => readdirSync(join(ROOT, folder), { withFileTypes: true 
 const MODULES = files('src');
 /** What only a French visitor loads, beside the page. */
 const FRENCH = 'src/words/french.js';
+/** What of it only one page's visitors load. */
+const OWN = [...read(FRENCH).matchAll(/import\('\.\/(.*?)'\)/g)].map(([, name]) => `src/words/${name}`);
 
 /** What only who leads a robot with a tool loads. */
 const TOOL = 'src/ui/tool_slider.js';
@@ -65,13 +67,15 @@ test('every file a page names is there, and a page weighs less than 100 kB on th
 test('French is loaded by whoever speaks it, weighs less than 25 kB, and nobody else loads any of it', () => {
   const words = needed(FRENCH);
   assert.ok(MODULES.some((path) => read(path).includes(`import('./${FRENCH.split('/').pop()}')`)));
-  for (const page of PAGES) assert.deepEqual(needed(page).filter((path) => words.includes(path)), [], page);
-  const bytes = words.reduce((sum, path) => sum + gzipSync(read(path)).byteLength, 0);
-  assert.ok(bytes < 25_000, `${bytes} bytes`);
+  for (const page of PAGES) assert.deepEqual(needed(page).filter((path) => [...words, ...OWN].includes(path)), [], page);
+  /** @param {string[]} paths */
+  const weight = (paths) => paths.reduce((sum, path) => sum + gzipSync(read(path)).byteLength, 0);
+  assert.ok(weight(words) < 25_000, `${weight(words)} bytes`);
+  for (const own of OWN) assert.ok(weight(needed(own)) < 10_000, `${own}: ${weight(needed(own))} bytes`);
 });
 
 test('no module is left over', () => {
-  const used = new Set([...PAGES, FRENCH, TOOL].flatMap(needed));
+  const used = new Set([...PAGES, FRENCH, ...OWN, TOOL].flatMap(needed));
   const onlyTypes = ['src/app/phone_types.js', 'src/camera/frame_types.js', 'src/ui/session_types.js', 'src/wire/pairing_types.js',
     'src/wire/protocol_types.js'];
   assert.deepEqual(MODULES.filter((path) => !used.has(path) && !onlyTypes.includes(path)), []);

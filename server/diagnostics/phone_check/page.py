@@ -8,14 +8,8 @@ from markupsafe import Markup
 
 from server.common.markup import document, element
 from server.diagnostics.phone_check.figures import PhoneFigures
-from server.diagnostics.phone_check.verdicts import CheckLine, worst
+from server.diagnostics.phone_check.verdicts import TITLES, CheckLine, worst
 
-TITLES: Final = {
-    "good": "Good: nothing speaks against leading a robot with this phone.",
-    "fair": "Usable, with what is said below.",
-    "poor": "Not yet: mend what is poor first.",
-    "unknown": "Nothing speaks against it so far, but not all is known yet.",
-}
 STYLE: Final = """
 :root { color-scheme: light dark; }
 body { max-width: 60rem; margin: 0 auto; padding: 1rem; font: 1rem/1.5 system-ui, sans-serif; }

@@ -6,9 +6,9 @@ import msgspec
 
 from server.diagnostics.phone_check.figures import PhoneFigures
 from server.diagnostics.phone_check.measure import figures
-from server.diagnostics.phone_check.page import TITLES, page
+from server.diagnostics.phone_check.page import page
 from server.diagnostics.phone_check.phone_watch import PhoneSeries
-from server.diagnostics.phone_check.verdicts import CheckLine, verdicts, worst
+from server.diagnostics.phone_check.verdicts import TITLES, CheckLine, verdicts, worst
 from server.protocol.link_messages import Grade
 
 

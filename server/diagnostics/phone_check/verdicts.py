@@ -15,6 +15,13 @@ from server.protocol.link_messages import Grade
 
 ORDER: Final[tuple[Grade, ...]] = ("good", "unknown", "fair", "poor")
 """From best to worst; what nobody knows spoils nothing."""
+TITLES: Final = {
+    "good": "Good: nothing speaks against leading a robot with this phone.",
+    "fair": "Usable, with what is said below.",
+    "poor": "Not yet: mend what is poor first.",
+    "unknown": "Nothing speaks against it so far, but not all is known yet.",
+}
+"""Of the whole, by its grade."""
 SURE: Final = 2.0
 """Standard deviations."""
 AGES_MS: Final = (120.0, 200.0)
@@ -250,7 +257,7 @@ def _robot(found: PhoneFigures) -> Iterator[CheckLine]:
     codec = "" if isnan(found.codec_pct) else f"; {found.codec_pct:.0f} % of its square by {by}"
     yield _line(
         "LEDs in the picture",
-        f"exact to {found.noise_px:.2f} px (each: {each}){codec}",
+        f"exact to {found.noise_px:.2f} px (each: {each})" + codec,
         _low(found.noise_px, 0.15, 0.4),
         "Hold the phone more quietly, focus on the robot, allow more kbit/s.",
     )

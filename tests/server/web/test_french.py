@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from server.web.page_files import CLIENT
 from tests.sources import parsed, texts
 
@@ -32,6 +34,8 @@ SPEAKERS = {
     "server/web": "app handover people_api session_manager status websocket",
 }
 """Modules by room whose sentences become reasons, refusals, doubts or advice on a phone."""
+ELSEWHERE = {"check": {"server/diagnostics/phone_check": "verdicts"}}
+"""Those whose sentences other pages show, by the page."""
 LISTENED_TO = ("pipeline", "server/calibration", "server/control", "server/phone", "server/view")
 """Rooms, and those in them, of which no module may begin to speak unheard ..."""
 WHOLE = re.compile(r"[A-Z].* .*[.?]")
@@ -91,12 +95,15 @@ PLACE = re.compile(r"\{[^{}]*\}")
 JOINS = re.compile(r"^; |^(?:\{\} )+(?=[A-Z])|^\{\}\. |(?<=\.) \{\}$")
 SEVERAL, ONE = re.compile(r"\S \S"), re.compile(r"[A-Z][a-z]+\.")
 """A sentence of several words, and one of a single word."""
+NAME, FIGURE = re.compile(r"[A-Z][a-z]+"), re.compile(r"[{}±\s]*(?:ms|px)")
+"""Of a figure, and one without words."""
 
 
-def french() -> dict[str, str]:
-    """The dictionary of what the server says."""
-    text = (CLIENT / "src/words/french_server.js").read_text(encoding="utf-8")
-    words: dict[str, str] = json.loads(text[text.index("= {") + 2 : text.rindex("}") + 1])
+def french(name: str) -> dict[str, str]:
+    """The dictionary of what the server says, of a file's name."""
+    text = (CLIENT / f"src/words/french_{name}.js").read_text(encoding="utf-8")
+    text = text[text.index(" SERVER = {") + 10 :]
+    words: dict[str, str] = json.loads(text[: text.index("\n};") + 2])
     return words
 
 
@@ -138,23 +145,47 @@ def spoken(path: Path) -> set[str]:
     return {one for text in literals(parsed(texts()[path])) for one in sentences(text)}
 
 
+def modules(speakers: dict[str, str]) -> list[Path]:
+    """By room."""
+    return [Path(room, f"{name}.py") for room in speakers for name in speakers[room].split()]
+
+
+def told(every: set[str]) -> set[str]:
+    """Those for people among a module's texts."""
+    several = {one for one in every if SEVERAL.search(one) and re.search("[a-z]{2}", one)}
+    return {*several, *(one for one in every if ONE.fullmatch(one))}
+
+
 def said() -> set[str]:
     """All that a phone may be told."""
-    paths = [Path(room, f"{name}.py") for room in SPEAKERS for name in SPEAKERS[room].split()]
-    every = {one for path in paths for one in spoken(path)}
+    every = {one for path in modules(SPEAKERS) for one in spoken(path)}
     rooms = [path for path in texts() if path.as_posix().startswith(LISTENED_TO)]
     whole = {one for path in rooms for one in spoken(path) if WHOLE.fullmatch(one)}
-    told = {one for one in every if SEVERAL.search(one) and re.search("[a-z]{2}", one)}
-    told |= {one for one in every if ONE.fullmatch(one)}
-    return {*told, *whole, *(every & set(SHORT))} - UNTOLD
+    return {*told(every), *whole, *(every & set(SHORT))} - UNTOLD
+
+
+def said_on(page: str) -> set[str]:
+    """All that is said on another page beside it, single words with a capital among them."""
+    every = {one for path in modules(ELSEWHERE[page]) for one in spoken(path)}
+    names = {one for one in every if NAME.fullmatch(one)}
+    bare = {one for one in every if FIGURE.fullmatch(one)}
+    return {*told(every), *names} - bare - UNTOLD - said()
 
 
 def test_whatever_the_server_says_to_a_phone_has_french_words() -> None:
     assert len(said()) > 200
-    known = french()
+    known = french("server")
     missing = {one for one in said() if one not in known and f'  "{one}": ' not in of_page()}
     assert missing == set()
 
 
 def test_no_french_is_kept_for_what_the_server_does_not_say() -> None:
-    assert set(french()) - said() == set()
+    assert set(french("server")) - said() == set()
+
+
+@pytest.mark.parametrize("page", ELSEWHERE)
+def test_whatever_the_server_says_on_another_page_has_french_words_and_nothing_else_has(
+    page: str,
+) -> None:
+    assert len(said_on(page)) > 20
+    assert said_on(page) == set(french(page))

@@ -3,11 +3,13 @@
 /** @import {Answer, Line} from './check.js' */
 
 import { browserOf } from '../app/browser.js';
-import { Elements, write } from '../dashboard/elements.js';
+import { Elements } from '../dashboard/elements.js';
+import { speak, write } from '../words/say.js';
 import { LONG_MS, MINUTE_MS, PhoneCheck, fileName, gradeWords, wordsOf } from './check.js';
 
 const TURN_MS = 250;
 
+await speak(document, navigator.languages, () => window.localStorage);
 const { fetchHere, later } = browserOf(window);
 const elements = new Elements(document);
 const check = new PhoneCheck(fetchHere, () => performance.now());
@@ -53,7 +55,7 @@ function lineOf({ what, value, grade, advice }) {
 function part(tag, className, words) {
   const element = document.createElement(tag);
   element.className = className;
-  element.textContent = words;
+  write(element, words);
   return element;
 }
 

@@ -1,5 +1,7 @@
 /** Elements of a page by name, written only where something is new. */
 
+import { say, write } from '../words/say.js';
+
 export class Elements {
   /** @param {Document} document */
   constructor(document) {
@@ -56,7 +58,7 @@ export class Elements {
    */
   make(tag, text) {
     const element = this.document.createElement(tag);
-    element.textContent = text;
+    write(element, text);
     return element;
   }
 
@@ -83,15 +85,7 @@ export class Elements {
   list(id, items) {
     const element = this.find(id);
     const old = [...element.children].map((child) => child.textContent);
-    if (old.length === items.length && old.every((text, i) => text === items[i])) return;
+    if (old.length === items.length && old.every((text, i) => text === say(items[i] ?? ''))) return;
     element.replaceChildren(...items.map((text) => this.make('li', text)));
   }
-}
-
-/**
- * @param {Element | null | undefined} element
- * @param {string} text
- */
-export function write(element, text) {
-  if (element && element.textContent !== text) element.textContent = text;
 }

@@ -4,12 +4,13 @@
 /** @import {Advice} from '../wire/problems.js' */
 /** @import {Status} from '../wire/protocol_types.js' */
 
-import { Elements, write } from './elements.js';
+import { Elements } from './elements.js';
 import { healthWords, limitWords, modeWords, rampWords, robotWords } from '../ui/mode_words.js';
 import { age, alarm, gapLine, metres, number, scaleEnd, screenWords, streamName, timeOfDay } from './format.js';
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
 import { REMEMBERED, beforeArming, requests, shownMode } from './model.js';
+import { write } from '../words/say.js';
 
 /** @typedef {{ onRequest: (what: 'arm' | 'disarm' | 'reset') => void, onStop: () => void, onVirtual: () => void,
  *   onRecord: () => void, onCode: () => void, onReload: () => void }} Requests */

@@ -2,7 +2,7 @@
 
 /** @import {Card} from './fleet.js' */
 
-import { write } from '../dashboard/elements.js';
+import { write } from '../words/say.js';
 
 export class FleetView {
   /** @param {Document} document */

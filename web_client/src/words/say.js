@@ -5,10 +5,10 @@ const KEPT = 'lightleash-language';
 /** @type {(text: string) => string} */
 export let say = (text) => text;
 
-/** @param {Element} element @param {string} text */
+/** @param {Element | null | undefined} element @param {string} text */
 export function write(element, text) {
   const said = say(text);
-  if (element.textContent !== said) element.textContent = said;
+  if (element && element.textContent !== said) element.textContent = said;
 }
 
 /**
@@ -20,9 +20,8 @@ export function write(element, text) {
 export async function speak(document, languages, storage) {
   try {
     if (!(kept(storage) ?? languages.find((one) => /^(en|fr)\b/.test(one)))?.startsWith('fr')) return;
-    const { french, speakFrench } = await import('./french.js');
-    speakFrench(document);
-    say = french;
+    const { speakFrench } = await import('./french.js');
+    say = await speakFrench(document);
   } catch {
     // English will do
   }

@@ -5,6 +5,7 @@ const PLACE = '{}';
 const SENTENCES = [/(?<=\S\S[.!?…]) /, / · /];
 /** What parts what is in one, the largest first. */
 const CLAUSES = [/; /, /: /, /, /];
+const WORDS = /\p{L}/u;
 /** So many of something. */
 const COUNTED = /^([+-]?\d[\d.]*) (.*\D.*)$/;
 /** A pattern of fewer letters, as "{} by {}", is in many sentences: it counts where all its places are understood. */
@@ -62,7 +63,7 @@ export function translatorOf(dictionary, numbers) {
       if (at === null) continue;
       const parts = text.split(between);
       const said = parts.map(say);
-      if (said.some((part, i) => part !== parts[i])) return said.join(numbers(at[0] === ': ' ? ' : ' : at[0]));
+      if (said.some((part, i) => part !== parts[i])) return said.join(numbers(at[0].replace(/^[:;]/, ' $&')));
     }
     return null;
   }
@@ -74,6 +75,7 @@ export function translatorOf(dictionary, numbers) {
 
   /** @param {string} text */
   function found(text) {
+    if (!WORDS.test(text)) return numbers(text);
     const bare = text.endsWith('.') ? sentence(text.slice(0, -1)) : null;
     return sentence(text) ?? (bare === null ? null : `${bare}.`) ?? parted(text, SENTENCES) ?? fitted(text, false) ?? parted(text, CLAUSES)
       ?? numbers(text.replace(COUNTED, (_, count, what) => `${count} ${say(what)}`));
@@ -102,6 +104,7 @@ const ATTRIBUTES = ['aria-label', 'title', 'placeholder'];
  * @param {(text: string) => string} say
  */
 export function translatePage(document, say) {
+  document.title = say(document.title);
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   for (let node = texts.nextNode(); node !== null; node = texts.nextNode()) {
     node.nodeValue = say((node.nodeValue ?? '').replace(/\s+/g, ' '));

@@ -5,20 +5,48 @@ import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 import { literals } from './literals.js';
+import { gradeWords } from '../../src/check/check.js';
 import { modeWords, SIDES } from '../../src/ui/mode_words.js';
 import { wayOf } from '../../src/ui/sight_overlay.js';
 import { PAGE } from '../../src/words/french_page.js';
 import { SERVER } from '../../src/words/french_server.js';
-import { french } from '../../src/words/french.js';
+import * as check from '../../src/words/french_check.js';
+import { frenchOf } from '../../src/words/french.js';
 
 /** @import {ShownMode} from '../../src/ui/session_types.js' */
 
 const ROOT = fileURLToPath(new URL('../..', import.meta.url));
-/** Rooms of the phone's page, and the one of the screen that it films. */
-const ROOMS = ['app', 'camera', 'motion', 'screen', 'ui', 'video', 'wire'];
-const FILES = ['index.html', 'screen.html'];
+
+/**
+ * @typedef {object} Book
+ * @property {Record<string, string>} words What a page's own dictionary has.
+ * @property {string[]} files
+ * @property {string[]} modules
+ * @property {string[]} short Words that go into sentences, or stand for themselves.
+ */
+
+/** @param {string} path */
+const read = (path) => readFileSync(join(ROOT, path), 'utf8');
+
+/** @param {string[]} rooms */
+const modulesOf = (...rooms) => rooms.flatMap((room) => readdirSync(join(ROOT, 'src', room)).map((name) => `${room}/${name}`));
+
+const MODES = /** @type {ShownMode[]} */ (['DISARMED', 'ARMED', 'TRACK', 'COAST', 'HOLD', 'RAMP', 'STOPPED', 'LOST', 'NO_LINK', 'NO_WORD']);
+const GRADES = /** @type {const} */ (['good', 'fair', 'poor', 'unknown']);
+const AXES = [...read('index.html').matchAll(/<option value="([a-z]+)"/g)].map(([, value]) => value ?? '').filter((value) => value !== 'auto');
+const WAYS = Array.from({ length: 8 }, (_, k) => wayOf((k * Math.PI) / 4));
 /** Of other pages. */
 const ELSEWHERE = ['app/board.js', 'app/board_size.js', 'wire/protocol_types.js'];
+/** By whom: the phone's page with the screen that it films, and each other page. @type {Record<string, Book>} */
+const BOOKS = {
+  phone: {
+    words: PAGE,
+    files: ['index.html', 'screen.html'],
+    modules: modulesOf('app', 'camera', 'motion', 'screen', 'ui', 'video', 'wire').filter((name) => !ELSEWHERE.includes(name)),
+    short: [...MODES.flatMap((mode) => modeWords(mode, null)), ...Object.values(SIDES), ...AXES, ...WAYS, 'viewer', 'operator', 'supervisor', 'supervises'],
+  },
+  check: { words: check.PAGE, files: ['check.html'], modules: modulesOf('check'), short: GRADES.map((grade) => gradeWords(grade).slice(2)) },
+};
 /** What is a name in every language. */
 const NAMES = ['Lightleash', 'STOP', 'WebRTC', 'WebSocket', 'JPEG', 'Android', 'Edg', 'Edge', 'Mac', '{} · Lightleash'];
 /** For the supervisor's log, for who reads the code, or for the browser: not for who holds the phone. */
@@ -32,11 +60,7 @@ const UNSEEN = [
   'no WebRTC with records in this browser: pictures go by websocket', 'pictures go by WebRTC', 'no WebRTC: {}', 'WebRTC: {}; pictures go by websocket', '{} takes {} ms a picture: JPEG',
 ];
 /** Words that are put together from what is no literal of their own: units, and marks before a link's grade. */
-const JOINED = ['fps', 'Mb/s', '✓ {}', '! {}', '✕ {}'];
-const MODES = /** @type {ShownMode[]} */ (['DISARMED', 'ARMED', 'TRACK', 'COAST', 'HOLD', 'RAMP', 'STOPPED', 'LOST', 'NO_LINK', 'NO_WORD']);
-
-/** @param {string} path */
-const read = (path) => readFileSync(join(ROOT, path), 'utf8');
+const JOINED = ['fps', 'Mb/s', '✓ {}', '! {}', '✕ {}', '? {}'];
 
 /** Whether it is for people. @param {string} text */
 const isSaid = (text) => /[a-z]{2}/.test(text) && (/\S \S/.test(text) || /^\W*[A-Z][a-z]/.test(text));
@@ -45,46 +69,49 @@ const isSaid = (text) => /[a-z]{2}/.test(text) && (/\S \S/.test(text) || /^\W*[A
 const sentences = (text) => text.split(/(?<=[.!?…]) (?=[^a-z])/).map((one) => one.replace(/^(?:\{\} )+(?=[A-Z])|(?<=[.:]) ?(?:\{\})+$/g, '').trim())
   .map((one, _, all) => (all.length === 1 && text.trim().endsWith(': {}') ? text.trim() : one)).filter((one) => isSaid(one));
 
-/** What the modules of the phone's page say. */
-function ofModules() {
-  const modules = ROOMS.flatMap((room) => readdirSync(join(ROOT, 'src', room)).map((name) => `${room}/${name}`)).filter((name) => !ELSEWHERE.includes(name));
+/** What a page's modules say. @param {Book} book */
+function ofModules({ modules }) {
   return modules.flatMap((name) => literals(read(`src/${name}`))).filter((text) => !UNSEEN.includes(text.trim())).flatMap(sentences);
 }
 
-/** What stands in the pages themselves; what scripts take away stands there in both languages. */
-function ofPage() {
-  const page = FILES.map(read).join('').replace(/<head>[^]*?<\/head>|<noscript>[^]*?<\/noscript>|<p id="step"[^]*?<\/p>/g, '');
-  const names = [...page.matchAll(/(?:aria-label|title|placeholder)="([^"]*)"/g)].map(([, name]) => name ?? '');
-  return [...page.replace(/<[^>]*>/g, '\0').split('\0'), ...names].map((text) => text.replace(/\s+/g, ' ').trim()).filter((text) => /[A-Za-z]{2}/.test(text));
+/** What stands in the pages themselves; what scripts take away stands there in both languages. @param {Book} book */
+function ofPage({ files }) {
+  const page = files.map(read).join('').replace(/<noscript>[^]*?<\/noscript>|<span class="late">[^]*?<\/span>/g, '');
+  const names = [...page.matchAll(/(?:aria-label|alt|title|placeholder)="([^"]*)"/g)].map(([, name]) => name ?? '');
+  return [...page.replace(/<[^>]*>/g, '\0').split('\0'), ...names].map((text) => text.replace(/\s+/g, ' ').trim()).filter((text) => /[A-Za-z]{2}/.test(text))
+    .map((text) => text.replace(/ · Lightleash$/, ''));
 }
 
-/** Short words that go into sentences, or stand for themselves. */
-function ofWords() {
-  const axes = [...read('index.html').matchAll(/<option value="([a-z]+)"/g)].map(([, value]) => value ?? '').filter((value) => value !== 'auto');
-  const ways = Array.from({ length: 8 }, (_, k) => wayOf((k * Math.PI) / 4));
-  return [...MODES.flatMap((mode) => modeWords(mode, null)), ...Object.values(SIDES), ...axes, ...ways, 'viewer', 'operator', 'supervisor', 'supervises'];
+/** @param {Book} book */
+const said = (book) => [...new Set([...ofModules(book), ...ofPage(book), ...book.short])].filter((text) => !NAMES.includes(text));
+
+/** Whether a page has French for it, with or without its full stop. @param {Book} book @param {string} text */
+const isKnown = ({ words }, text) => [text, text.replace(/\.$/, '')].some((one) => one in words || one in PAGE || one in SERVER);
+
+const french = frenchOf(Object.assign({}, check.PAGE, check.SERVER));
+const ALL = [...Object.values(BOOKS).map(({ words }) => words), SERVER, check.SERVER];
+
+for (const [name, book] of Object.entries(BOOKS)) {
+  test(`whatever the page says in English, it can say in French: ${name}`, () => {
+    assert.ok(said(book).length > (name === 'phone' ? 200 : 5), `${said(book).length} found`);
+    assert.deepEqual(said(book).filter((text) => !isKnown(book, text)), []);
+  });
+
+  test(`no French is kept for what the page does not say: ${name}`, () => {
+    const known = said(book).flatMap((text) => [text, text.replace(/\.$/, '')]);
+    assert.deepEqual(Object.keys(book.words).filter((text) => !known.includes(text) && !JOINED.includes(text)), []);
+  });
 }
-
-const SAID = new Set([...ofModules(), ...ofPage(), ...ofWords()].filter((text) => !NAMES.includes(text)));
-
-test('whatever the phone’s page says in English, it can say in French', () => {
-  assert.ok(SAID.size > 200, `${SAID.size} found`);
-  assert.deepEqual([...SAID].filter((text) => !(text in PAGE) && !(text in SERVER)), []);
-});
 
 test('words reach the page by `write` alone, but for names and numbers', () => {
-  const modules = ROOMS.flatMap((room) => readdirSync(join(ROOT, 'src', room)).map((name) => `${room}/${name}`)).filter((name) => !ELSEWHERE.includes(name));
-  const past = modules.flatMap((name) => read(`src/${name}`).match(/(?:textContent|innerText|nodeValue|placeholder|ariaLabel)\s=\s[^;]*|'(?:aria-label|title)', [^;]*/g) ?? []);
+  const past = Object.values(BOOKS).flatMap(({ modules }) => modules)
+    .flatMap((name) => read(`src/${name}`).match(/(?:textContent|innerText|nodeValue|placeholder|ariaLabel)\s=\s[^;]*|'(?:aria-label|title)', [^;]*/g) ?? []);
   assert.deepEqual(past, ['textContent = `${origin}/board`', '\'aria-label\', say(name))', 'textContent = person.name', 'textContent = `× ${value}`',
     'placeholder = say(this.usual)', 'textContent = code']);
 });
 
-test('no French is kept for what the page does not say', () => {
-  assert.deepEqual(Object.keys(PAGE).filter((text) => !SAID.has(text) && !JOINED.includes(text)), []);
-});
-
 test('a sentence has as many places for numbers and names in both languages', () => {
-  for (const [english, words] of Object.entries({ ...PAGE, ...SERVER })) {
+  for (const [english, words] of ALL.flatMap(Object.entries)) {
     assert.equal(words.split('{}').length, english.split('{}').length, english);
     assert.notEqual(words.trim(), '', english);
   }
@@ -118,5 +145,5 @@ test('what comes from outside can be long and strange', () => {
 });
 
 test('a French sign of two parts never begins a line', () => {
-  for (const english of [...Object.keys(PAGE), ...Object.keys(SERVER)]) assert.doesNotMatch(french(english), / [:;?!»]|« /, english);
+  for (const english of ALL.flatMap(Object.keys)) assert.doesNotMatch(french(english), / [:;?!»]|« /, english);
 });

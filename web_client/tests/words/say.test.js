@@ -20,7 +20,7 @@ function counted() {
 function page() {
   const walker = { nextNode: () => null };
   return {
-    documentElement: { lang: 'en' }, body: {}, location: { reloads: 0, reload() { this.reloads += 1; } },
+    title: '', documentElement: { lang: 'en' }, body: {}, location: { reloads: 0, reload() { this.reloads += 1; } },
     createTreeWalker: () => walker, querySelectorAll: () => [], getElementById: () => null,
   };
 }
