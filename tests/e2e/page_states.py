@@ -181,24 +181,41 @@ CHECK = {
       text('hint', 'Android 412x915@2.6 / camera 0, 60 s');""",
 }
 """By state of the phone check's page."""
+RULER = """text('square', 'Optional: only distances need the board’s size, '
+  + 'the lens does not.');"""
+FLEET = """text('why', '');
+  document.getElementById('servers').innerHTML = [
+    ['hall', 'ames (simulated)', 'TRACK', 'TRACK', 'Following the phone.',
+      [['Leads', 'Anna'], ['Latency', '87 ms'], ['Battery', '14.8 V']]],
+    ['roof', 'twister', 'NO_WORD', 'GONE',
+      'Its server was killed: a robot in flight stops by its own watchdog.', []],
+    ['yard', 'screen', 'DISARMED', 'STARTING', 'Its server is starting: some seconds.', []],
+  ].map(([name, robot, mode, title, words, figures]) => `<li class="server">
+    <h2><span>${name}</span><small>${robot}</small></h2>
+    <p class="state" data-mode="${mode}"><strong>${title}</strong><span>${words}</span></p>
+    <dl>${figures.map(([dt, dd]) => `<dt>${dt}</dt><dd>${dd}</dd>`).join('')}</dl>
+    <a href="supervisor">Open the page of ${name}</a></li>`).join('');
+"""
 STATES = {
     **{("index", name): f"{OPERATING}{script}" for name, script in PHONE.items()},
     **{
         ("supervisor", name): f"{OPERATING}{FIGURES}{script}" for name, script in SUPERVISOR.items()
     },
-    ("fleet", "written"): "",
+    ("fleet", "written"): f"{OPERATING}{FLEET}",
     ("screen", "setup"): "",
     ("screen", "shows"): """document.getElementById('setup').hidden = true;
       document.getElementById('why').textContent = 'Hold the phone still: '
         + 'measuring how late this screen is.';""",
     ("check", "ready"): "",
     **{("check", name): f"{OPERATING}{CHECKED}{script}" for name, script in CHECK.items()},
-    ("board", "ruler"): "",
+    ("board", "ruler"): f"{OPERATING}{RULER}",
+    ("board", "measured"): f"{OPERATING}text('square', 'A square measures 25.4 mm '"
+    " + '(--square-mm 25.40).');",
     ("trust", "help"): "",
     ("trust_fr", "help"): "",
 }
 """By page and state."""
-FRENCH_PAGES = ("index", "screen", "check")
+FRENCH_PAGES = ("index", "screen", "check", "board", "fleet")
 SHOWN = [
     *((name, state, "en") for name, state in STATES),
     *((name, state, "fr") for name, state in STATES if name in FRENCH_PAGES),

@@ -34,7 +34,6 @@
  * @property {string} words Why.
  * @property {[string, string][]} figures Each with its name.
  * @property {string} href Its supervisor's page, or "" where there is none to open.
- * @property {string} link
  */
 
 /** An answer that is older tells nothing of a robot that may fly [ms]. */
@@ -67,7 +66,6 @@ export function cardOf(server, location, isOld) {
     words,
     figures: server.state === 'live' && !isOld ? figuresOf(server) : [],
     href: isOver ? '' : `${location.protocol}//${location.hostname}:${port}/supervisor`,
-    link: `Open the page of ${nameOf(server)}`,
   };
 }
 

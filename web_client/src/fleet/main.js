@@ -6,10 +6,12 @@ import { browserOf } from '../app/browser.js';
 import { refusalOf } from '../wire/pairing.js';
 import { OLD_MS, cardOf, withEnded } from './fleet.js';
 import { FleetView } from './view.js';
+import { speak } from '../words/say.js';
 
 const ASK_MS = 1000;
 const PATIENCE_MS = 2500;
 
+await speak(document, navigator.languages, () => window.localStorage);
 const { fetchHere, later } = browserOf(window);
 const view = new FleetView(document);
 /** @type {Server[]} */

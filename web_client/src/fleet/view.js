@@ -2,7 +2,7 @@
 
 /** @import {Card} from './fleet.js' */
 
-import { write } from '../words/say.js';
+import { say, write } from '../words/say.js';
 
 export class FleetView {
   /** @param {Document} document */
@@ -37,8 +37,8 @@ export class FleetView {
       this.cards.set(card.id, row);
     }
     const [name, robot, title, words] = row.querySelectorAll('h2 > *, .state > *');
-    write(name, card.name);
-    write(robot, card.robot === card.name ? '' : card.robot);
+    called(name, card.name);
+    called(robot, card.robot === card.name ? '' : card.robot);
     write(title, card.title);
     write(words, card.words);
     /** @type {HTMLElement} */ (row.querySelector('.state')).dataset.mode = card.mode;
@@ -46,7 +46,7 @@ export class FleetView {
     const link = /** @type {HTMLAnchorElement} */ (row.querySelector('a'));
     link.hidden = card.href === '';
     if (link.getAttribute('href') !== card.href) link.href = card.href;
-    write(link, card.link);
+    called(link, say('Open the page of {}').replace('{}', () => card.name));
     return row;
   }
 
@@ -71,4 +71,13 @@ export class FleetView {
     element.append(...children);
     return element;
   }
+}
+
+/**
+ * What is a name in every language, or holds one: words of a page may be somebody's name.
+ * @param {Element | undefined} element
+ * @param {string} name
+ */
+function called(element, name) {
+  if (element && element.textContent !== name) element.textContent = name;
 }

@@ -172,4 +172,5 @@ window.setInterval(() => {
   link.sendMessage({ type: 'clock_ask', page_ms: performance.now() });
 }, ASK_MS);
 showCard();
+say('');
 requestAnimationFrame(draw);

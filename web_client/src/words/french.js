@@ -9,7 +9,9 @@ import { translatePage, translatorOf } from './translator.js';
  * @type {Record<string, () => Promise<{ PAGE: Record<string, string>, SERVER?: Record<string, string> }>>}
  */
 const OWN = {
+  board: () => import('./french_board.js'),
   check: () => import('./french_check.js'),
+  fleet: () => import('./french_fleet.js'),
 };
 const UNITS = 's|ms|min|mm|cm|m|px|V|N|Hz|GHz|i/s|kbit/s|Mbit/s|MB|ppm';
 
