@@ -133,6 +133,8 @@ class Teleop:
         self._led_to: Reference | None = None
         self._leading = self.next_leading = PLAIN
         self._aim: Reference | None = None
+        self._known: Situation | None = None
+        """Of the last step."""
 
     def tune(self, virtual_camera: VirtualCameraConfig) -> None:
         """Set the virtual camera's runtime parameters in flight, without a jump."""
@@ -187,7 +189,7 @@ class Teleop:
         # last, what was given: feed-forward takes it off the next period's specific force
         share = failsafe.ceiling(self._failsafe, self._limits)
         acted = self._acting.act(known, leashed, self._moment(inputs.t), share)
-        self._aim = self._aim_now(known, error)
+        self._aim, self._known = self._aim_now(known, error), known
         left_ms = failsafe.until_ramp(self._failsafe, judged, self._limits)
         return Output(
             t=inputs.t,
@@ -401,7 +403,10 @@ class Teleop:
                 self._led_to = self._reference
             self._acting.start(known, before == Mode.ARMED)
             return known, self._error(known)
-        self._acting.change_mode(before, mode, known, None if in_doubt else leashed)
+        # where an estimate has just been lost, what holds begins by the last one: one that flies
+        # would fall by none
+        last = known or self._known
+        self._acting.change_mode(before, mode, last, None if in_doubt else leashed)
         if mode != Mode.COAST:
             self._reference = self._led_to = None
         return known, None

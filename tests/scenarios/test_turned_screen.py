@@ -14,8 +14,8 @@ from server.simulation.virtual_time import SimulationOptions, VirtualTimeSimulat
 pytestmark = pytest.mark.slow
 TURNS_S, ENDS_S = 5.0, 10.0
 LED_NOISE_PX = 0.05
-MOST_M = 0.15
-"""A robot that hangs and is held no more swings back towards its rest."""
+MOST_M = {"ames": 0.1, "quadrotor": 0.35}
+"""While it is held: what flies drifts."""
 
 
 class TurnedHand:
@@ -37,9 +37,10 @@ class TurnedHand:
         return turned
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_robot_holds_and_follows_again_by_another_press(seed: int) -> None:
-    robot_file = load_robot("ames")
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("name", ["ames", "quadrotor"])
+def test_the_robot_holds_and_follows_again_by_another_press(name: str, seed: int) -> None:
+    robot_file = load_robot(name)
     hand = TurnedHand(make_hand("filming", seed=seed, start=robot_file.start))
     scene = SimulationOptions(hand="filming", seed=seed, led_noise_px=LED_NOISE_PX)
     flight = VirtualTimeSimulation(robot_file, TeleopConfig(), scene, hand=hand)
@@ -51,13 +52,14 @@ def test_the_robot_holds_and_follows_again_by_another_press(seed: int) -> None:
     modes, far_m = [Mode.TRACK], 0.0
     while flight.t < ENDS_S:
         output = flight.advance()
-        far_m = max(far_m, float(np.linalg.norm(flight.follower.body.p_bf_in_f - before)))
+        if output.failsafe.mode == Mode.HOLD:
+            far_m = max(far_m, float(np.linalg.norm(flight.follower.body.p_bf_in_f - before)))
         if output.failsafe.mode != modes[-1]:
             modes.append(output.failsafe.mode)
             if len(modes) == 2:
                 assert output.failsafe.reason == TURNED
     assert modes == [Mode.TRACK, Mode.HOLD, Mode.TRACK]
-    assert far_m < MOST_M
+    assert far_m < MOST_M[name]
     assert output.relative is not None
     (R_fc, p_cf), (R_fb, p_bf) = flight.truth()
     assert np.linalg.norm(R_fc.T @ (p_bf - p_cf) - output.relative.p_bc_in_c) < 0.02
