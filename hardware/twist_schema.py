@@ -252,6 +252,9 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     if robot.arm is not None and (robot.arm.tool_joint is None) != (robot.tool is None):
         yield "arm.tool_joint", "with [tool], and with it alone"
     yield from _motion_clashes(robot)
+    for kind in ("ros2", "franka", "mavlink"):
+        if robot.link.kind != kind and getattr(robot.link, kind) is not None:
+            yield f"link.{kind}", f"only with kind = {kind!r}, not {robot.link.kind!r}"
     yield from _ros2_clashes(robot.link, robot.motion)
     yield from _franka_clashes(robot)
     yield from _mavlink_clashes(robot)
@@ -290,8 +293,6 @@ def _motion_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
 def _mavlink_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     link, motion = robot.link, robot.motion
     if link.kind != "mavlink":
-        if link.mavlink is not None:
-            yield "link.mavlink", f"only with kind = 'mavlink', not {link.kind!r}"
         return
     if tilting := [axis for axis in robot.axes if axis in ("roll", "pitch")]:
         yield "axes", f"without {' and '.join(tilting)}: an autopilot tilts as it must"
@@ -306,8 +307,6 @@ def _ros2_clashes(
     link: TwistLinkSection, motion: MotionSection | None
 ) -> Iterator[tuple[str, str]]:
     if link.kind != "ros2":
-        if link.ros2 is not None:
-            yield "link.ros2", f"only with kind = 'ros2', not {link.kind!r}"
         return
     if link.port is not None:
         yield "link.port", "none with kind = 'ros2': DDS takes its ports by link.ros2.domain"
@@ -327,8 +326,6 @@ def _ros2_clashes(
 def _franka_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     link, motion = robot.link, robot.motion
     if link.kind != "franka":
-        if link.franka is not None:
-            yield "link.franka", f"only with kind = 'franka', not {link.kind!r}"
         return
     if link.port is not None:
         yield "link.port", "none with kind = 'franka': its library has one"
