@@ -20,9 +20,14 @@ import pkgutil, sys
 sys.modules["matplotlib"] = None
 for package in ("pipeline", "hardware", "server"):
     for found in pkgutil.walk_packages([package], f"{package}."):
-        if not found.name.endswith("__main__"):
+        if found.name.endswith("__main__"):
+            continue
+        try:
             __import__(found.name)
-            print(found.name)
+        except ModuleNotFoundError as lack:
+            if lack.name != "franky":  # of an extra that has an environment of its own in tests
+                raise
+        print(found.name)
 """
 
 
