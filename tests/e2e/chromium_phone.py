@@ -13,7 +13,8 @@ from playwright.sync_api import BrowserContext, Page, sync_playwright
 from hardware.sim.hand import Hand
 from tests.e2e.chromium_channel import Channel, address, evaluation, value_of
 from tests.e2e.fed_sensors import FedSensors
-from tests.e2e.played_phone import CANVAS, PlayedPhone
+from tests.e2e.page_scripts import STAMP_SENSORS
+from tests.e2e.played_phone import PLAYED, PlayedPhone
 from tests.e2e.witness import Hole
 
 FLAGS = [
@@ -70,7 +71,7 @@ class ChromiumPhone(PlayedPhone):
         """`leds_in_b` (n, 3) [m]."""
         super().__init__(hand, leds_in_b, truth_port, 90.0)  # a phone emulated in landscape
         self.page: Page = context.new_page()
-        self.page.add_init_script(CANVAS)
+        self.page.add_init_script(PLAYED + STAMP_SENSORS)
         url = address(context, self.page)
         self._channel, self._touches = Channel(url), False
         self._sensors = FedSensors(url, self._felt)
@@ -96,8 +97,8 @@ class ChromiumPhone(PlayedPhone):
         (answer,) = self._channel.orders(evaluation(script))
         return value_of(answer)
 
-    def _show(self, spots: str) -> None:
-        (answer,) = self._channel.orders(evaluation(spots))
+    def _tell(self, future: str) -> None:
+        (answer,) = self._channel.orders(evaluation(future))
         value_of(answer)
 
     def tap(self, selector: str) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import time
 from typing import Any
 
 import numpy as np
@@ -11,29 +9,20 @@ import numpy as np
 from hardware.sim.hand import Hand
 from tests.e2e.firefox import Firefox
 from tests.e2e.page_scripts import LENS
-from tests.e2e.played_phone import AHEAD_S, CANVAS, PlayedPhone
+from tests.e2e.played_phone import PLAYED, PlayedPhone
 
 WIDTH, HEIGHT = 915, 412
 FEEL = """
-(() => {
-  // An event has the reading of its own moment, from what was told of the future: a page that is
-  // told late would else feel what was long ago.
-  let told = null;
-  window.tellFelt = (times, felt) => { told = {times, felt}; };
-  const feel = ({times, felt}) => {
-    const t = Math.min(performance.now(), times.at(-1));
-    const next = Math.max(1, times.findIndex((later) => later >= t));
-    const share = (t - times[next - 1]) / (times[next] - times[next - 1]);
-    const [a, l, w] = felt[next - 1].map((from, k) =>
-      from.map((value, i) => value + share * (felt[next][k][i] - value)));
-    const xyz = ([x, y, z]) => ({x, y, z});
-    window.dispatchEvent(new DeviceMotionEvent('devicemotion', {
-      accelerationIncludingGravity: xyz(a), acceleration: xyz(l),
-      rotationRate: {alpha: w[0], beta: w[1], gamma: w[2]}, interval: 16,
-    }));
-  };
-  setInterval(() => { if (told) feel(told); }, 16);
-})();
+setInterval(() => {
+  const felt = feltAt(performance.now());
+  if (!felt) return;
+  const xyz = (first) => ({x: felt[first], y: felt[first + 1], z: felt[first + 2]});
+  const [alpha, beta, gamma] = felt.slice(3, 6).map((rate) => rate * 180 / Math.PI);
+  window.dispatchEvent(new DeviceMotionEvent('devicemotion', {
+    accelerationIncludingGravity: xyz(0), acceleration: xyz(6),
+    rotationRate: {alpha, beta, gamma}, interval: 16,
+  }));
+}, 16);
 """
 NO_MOTION = "delete window.DeviceMotionEvent;"
 
@@ -48,7 +37,7 @@ class FirefoxPhone(PlayedPhone):
         super().__init__(hand, leds_in_b, truth_port, 0.0)
         self.tab, self._url = tab, ""
         tab.size(WIDTH, HEIGHT)
-        tab.before_each_page(CANVAS + FEEL + script)
+        tab.before_each_page(PLAYED + FEEL + script)
 
     def open(self, url: str) -> None:
         """Go to the page."""
@@ -64,21 +53,8 @@ class FirefoxPhone(PlayedPhone):
         """The value of a JavaScript expression."""
         return self.tab.evaluate(script)
 
-    def _show(self, spots: str) -> None:
-        now = time.monotonic()
-        times = (1e3 * (now - self._page_epoch() + AHEAD_S)).tolist()
-        felt = [self._reading(now + ahead) for ahead in AHEAD_S]
-        self.evaluate(f"({spots}, tellFelt({json.dumps(times)}, {json.dumps(felt)}), null)")
-
-    def _reading(self, t: float) -> list[list[float]]:
-        """Of an event: force with and without gravity [m/s²], turn rate [°/s]."""
-        felt = self._felt(t)
-        turn_rate = np.degrees(felt["gyroscope"])
-        return [
-            felt["accelerometer"].tolist(),
-            felt["linear-acceleration"].tolist(),
-            turn_rate.tolist(),
-        ]
+    def _tell(self, future: str) -> None:
+        self.evaluate(future)
 
     def tap(self, selector: str) -> None:
         """Touch an element shortly."""

@@ -8,6 +8,56 @@ BE_CAMERA = f"""navigator.mediaDevices.getUserMedia = async () => {{
     return stream;
   }};"""
 """What is painted on `canvas` is what the page's camera sees."""
+STAMP_PICTURES = f"""if (window.MediaStreamTrackGenerator) {{
+    const track = new MediaStreamTrackGenerator({{kind: 'video'}});
+    const writer = track.writable.getWriter();
+    Object.defineProperty(track, 'label', {{value: '{LENS}'}});
+    film = (ms) => {{
+      writer.write(new VideoFrame(canvas, {{timestamp: Math.round(1e3 * ms)}}));
+    }};
+    navigator.mediaDevices.getUserMedia = async () => {{
+      window.filming = new MediaStream([track]);
+      return filming;
+    }};
+  }}"""
+"""Where the browser permits it, who paints stamps the pictures, as a camera's hardware does: those
+of a canvas are stamped when the browser comes to read it, on a busy machine up to 36 ms late."""
+FELT = """
+(() => {
+  const told = [];
+  window.tellFelt = (rows) => {
+    told.push(...rows);
+    told.splice(0, told.length - MOST_ROWS);
+  };
+  window.feltAt = (ms) => {
+    const next = told.findIndex(([t]) => t >= ms);
+    if (next < 1) return undefined;
+    const [[t, ...before], [later, ...after]] = [told[next - 1], told[next]];
+    const share = (ms - t) / (later - t);
+    return before.map((value, k) => value + share * (after[k] - value));
+  };
+})();
+"""
+FELT = FELT.replace("MOST_ROWS", "100")
+"""What sensors feel at a time of the page's clock, from what was told of the future; undefined
+where nothing was. A row is a time [ms], then x, y, z of each of `SENSORS`."""
+STAMP_SENSORS = """
+(() => {
+  const stamped = (Sensor, first, unit) => class extends Sensor {
+    felt(axis, given) {
+      const felt = feltAt(this.timestamp);
+      return felt ? unit * Math.round(felt[first + axis] / unit) : given;
+    }
+    get x() { return this.felt(0, super.x); }
+    get y() { return this.felt(1, super.y); }
+    get z() { return this.felt(2, super.z); }
+  };
+  window.Accelerometer = stamped(Accelerometer, 0, 0.1);
+  window.Gyroscope = stamped(Gyroscope, 3, 0.1 * Math.PI / 180);
+})();
+"""
+"""Chromium's sensors read what is felt at their stamps, as hardware does, rounded as it rounds:
+what it is fed it stamps when it hears of it, on a busy machine 10 to 25 ms late."""
 NO_WEBRTC = "delete window.RTCPeerConnection;"
 NO_ENCODER = "delete window.VideoEncoder;"
 LACKING = {"WebRTC": (), "WebCodecs": (NO_WEBRTC,), "JPEG": (NO_WEBRTC, NO_ENCODER)}

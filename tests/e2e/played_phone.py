@@ -18,7 +18,8 @@ from hardware.sim.truth import Truth, TruthClient
 from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd, exp, log
-from tests.e2e.page_scripts import BE_CAMERA, TICKER
+from tests.e2e.chromium_channel import SENSORS
+from tests.e2e.page_scripts import BE_CAMERA, FELT, STAMP_PICTURES, TICKER
 from tests.e2e.witness import PERIOD_S, Hole, Witness
 
 STEP_S = 0.01
@@ -47,8 +48,8 @@ CANVAS = """
   // A frame shows the lights where they are when it is painted, from what was told of the future.
   let told = null;
   window.tellSpots = (times, spots) => { told = {times, spots}; };
-  const now_of = ({times, spots}) => {
-    const t = Math.min(performance.now(), times.at(-1));
+  const at = (now, {times, spots}) => {
+    const t = Math.min(now, times.at(-1));
     const next = Math.max(1, times.findIndex((later) => later >= t));
     const share = (t - times[next - 1]) / (times[next] - times[next - 1]);
     const mix = (from, to) => from.map((value, k) => value + share * (to[k] - value));
@@ -68,16 +69,24 @@ CANVAS = """
       paint.fill();
     }
   };
+  let [film, filmed] = [() => {}, -Infinity];
   const onFrame = () => {
-    draw(told ? now_of(told) : []);
     requestAnimationFrame(onFrame);
+    const now = performance.now();
+    if (now - filmed < SHORTEST_MS) return;
+    filmed = now;
+    draw(told ? at(now, told) : []);
+    film(now);
   };
   onFrame();
   BE_CAMERA
+  STAMP_PICTURES
 })();
 """
+CANVAS = CANVAS.replace("SHORTEST_MS", "25")  # 30 Hz, as its camera may be asked for
 CANVAS = CANVAS.replace("WIDTH", str(CAMERA.width)).replace("HEIGHT", str(CAMERA.height))
-CANVAS = CANVAS.replace("BE_CAMERA", BE_CAMERA) + TICKER
+CANVAS = CANVAS.replace("BE_CAMERA", BE_CAMERA).replace("STAMP_PICTURES", STAMP_PICTURES)
+PLAYED = CANVAS + FELT + TICKER
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,6 +125,8 @@ class PlayedPhone(ABC):
         self._felt = Felt(hand, R_cd(screen_angle_deg).T)
         self._stepped = time.monotonic()
         self._page_shown, self._epoch = "", 0.0
+        self._felt_in, self._felt_until = 0.0, 0.0
+        """The epoch of the page that was told what will be felt, and until when [s]."""
         self._witness = Witness(PERIOD_S)
         self._still: list[Hole] = []
         """When what is played stood still, as no phone's hardware does."""
@@ -131,8 +142,8 @@ class PlayedPhone(ABC):
         """The value of a JavaScript expression."""
 
     @abstractmethod
-    def _show(self, spots: str) -> None:
-        """Run a JavaScript expression that paints the lights from now on."""
+    def _tell(self, future: str) -> None:
+        """Run a JavaScript expression that tells what will be seen and felt."""
 
     @abstractmethod
     def tap(self, selector: str) -> None:
@@ -166,7 +177,7 @@ class PlayedPhone(ABC):
         truth = self._truth.latest()
         told_until = self._stepped + AHEAD_S[-1]
         self._stepped = time.monotonic()
-        self._show(self._shown(truth))
+        self._tell(f"({self._shown(truth)}, {self._felt_ahead()}, null)")
         if (late_s := time.monotonic() - told_until) > 0.0:
             self._still.append(Hole("lights", time.monotonic(), late_s))
         t = float(truth.t[-1])
@@ -180,6 +191,20 @@ class PlayedPhone(ABC):
         hands = [self._hand.pose(t + ahead) for ahead in AHEAD_S]
         spots = self._spots(hands, bodies).round(4).tolist()
         return f"tellSpots({json.dumps(times)}, {json.dumps(spots)})"
+
+    def _felt_ahead(self) -> str:
+        """The expression that tells what sensors will feel, where that was not told yet."""
+        epoch, now = self._page_epoch(), self._stepped
+        if epoch != self._felt_in:
+            self._felt_in, self._felt_until = epoch, now
+        times = np.arange(max(self._felt_until, now), now + AHEAD_S[-1], STEP_S)
+        self._felt_until = max(self._felt_until, now) + STEP_S * len(times)
+        rows = [[1e3 * (t - epoch), *self._felt_at(t)] for t in times.tolist()]
+        return f"tellFelt({json.dumps(rows)})"
+
+    def _felt_at(self, t: float) -> list[float]:
+        felt = self._felt(t)
+        return np.concatenate([felt[name] for name in SENSORS]).tolist()
 
     def _spots(self, hands: Sequence[Pose], bodies: Sequence[Pose]) -> np.ndarray:
         """(n, LEDs, 3) u, v, radius [px] of each LED, for each pair of poses."""
