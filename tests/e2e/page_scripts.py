@@ -8,20 +8,23 @@ BE_CAMERA = f"""navigator.mediaDevices.getUserMedia = async () => {{
     return stream;
   }};"""
 """What is painted on `canvas` is what the page's camera sees."""
-STAMP_PICTURES = f"""if (window.MediaStreamTrackGenerator) {{
-    const track = new MediaStreamTrackGenerator({{kind: 'video'}});
-    const writer = track.writable.getWriter();
-    Object.defineProperty(track, 'label', {{value: '{LENS}'}});
-    film = (ms) => {{
-      writer.write(new VideoFrame(canvas, {{timestamp: Math.round(1e3 * ms)}}));
-    }};
+STAMPING_CAMERA = f"""{BE_CAMERA}
+  if (window.MediaStreamTrackGenerator) {{
     navigator.mediaDevices.getUserMedia = async () => {{
+      const track = new MediaStreamTrackGenerator({{kind: 'video'}});
+      const writer = track.writable.getWriter();
+      Object.defineProperty(track, 'label', {{value: '{LENS}'}});
+      film = (ms) => {{
+        if (track.readyState === 'ended') return;
+        writer.write(new VideoFrame(canvas, {{timestamp: Math.round(1e3 * ms)}}));
+      }};
       window.filming = new MediaStream([track]);
       return filming;
     }};
   }}"""
-"""Where the browser permits it, who paints stamps the pictures, as a camera's hardware does: those
-of a canvas are stamped when the browser comes to read it, on a busy machine up to 36 ms late."""
+"""The same, but `film`, which the painter calls with the time [ms] of each picture, stamps it where
+the browser permits that, as a camera's hardware does: it stamps those of a canvas when it comes to
+read it, on a busy machine up to 36 ms late."""
 FELT = """
 (() => {
   const told = [];
