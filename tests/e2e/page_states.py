@@ -102,7 +102,7 @@ const rows = (id, tag, all) => { document.getElementById(id).innerHTML = all.map
   (cells) => `<${tag}>${cells}</${tag}>`).join(''); };
 const figures = (id, all) => rows(id, 'div', all.map(
   ([name, value]) => `<dt>${name}</dt><dd>${value}</dd>`));
-const STAGES = ['capture to arrival', 'waiting', 'decode', 'detect', 'associate', 'solve',
+const STAGES = ['capture to arrival', 'waiting', 'decode', 'detect', 'identify', 'pose',
   'to control', 'control'];
 const fill = () => {
   text('robot', 'ames (simulated)'); text('operator', 'Android 412x915@2.6 / camera 0');
@@ -115,7 +115,8 @@ const fill = () => {
     .map((name) => [name, name === 'Missed' ? '123' : '0.12<small>ms</small>']));
   figures('estimate', ['NIS / dof', 'Age', 'Rejected', 'Fused', 'Dropped', 'Late', 'Offset',
     'σ offset', 'σ pos.', 'σ att.'].map((name) => [name, '12.3<small>ms</small>']));
-  figures('biases', ['Robot', 'Robot', 'Phone', 'Phone'].map((name) => [name, '0.01 0.02 0.03']));
+  figures('biases', ['Robot gyro [°/s]', 'Robot accel [m/s²]', 'Phone gyro [°/s]',
+    'Phone accel [m/s²]'].map((name) => [name, '+0.01 +0.02 −0.03']));
   rows('streams', 'tr', ['Operator', 'Phone motion', 'Video', 'Pose', 'Robot motion', 'Control']
     .map((name) => `<td>${name}</td><td>142 ms</td><td></td><td>200 Hz</td><td>0</td>`));
   rows('events', 'li', [1, 2, 3].map(
@@ -123,7 +124,8 @@ const fill = () => {
   rows('people', 'li', ['Anna', 'Bert'].map((name) => `<b class="clip">${name}</b>
     <span class="quiet">may lead · 3 min</span><button class="button slim">Give lead</button>
     <button class="button slim">Revoke</button>`));
-  text('total', '87 ms light to command'); text('gaps', 'Gaps in a minute: phone 3, computer 9.');
+  text('total', '87 ms light to command');
+  text('gaps', 'Gaps in the last minute: phone 3 (0.42 s) · robot 2 · computer 0');
   text('url', 'https://192.168.178.42:8443/#k=AbCdEfGhIjKlMnOpQrSt'); text('ready', '2 to mend');
   document.querySelectorAll('output').forEach((one) => { one.textContent = '+2.5 Hz/(rad/s)'; });
   text('crowd', 'phones 1 · supervisors 2'); text('recording', '2026-07-01T12-34-56');
@@ -134,17 +136,19 @@ SUPERVISOR = {
     "refused": """fill(); mode('DISARMED', 'Thrusters are off', 'Not armed.');
       show('invite', 'lead');
       list('refusals', [BUSY, 'Let go of the button before arming.']);
-      list('warnings', ['The server\\'s computer stood still 9 times in a minute.']);""",
+      list('warnings', ['The server\\'s computer stood still 9 times in a minute, '
+        + 'the longest 0.42 s.']);""",
     "flying": """fill(); mode('HOLD', 'The robot keeps still', BUSY);
       show('screen', 'saturated', 'episode');
       text('left', 'Thrust fades in 3 s');""",
-    "asking": """fill(); show('asking', 'notice'); text('notice', 'Not done: id: of a paired page');
+    "asking": """fill(); show('asking', 'notice');
+      text('notice', 'Not done: press: the newest one of the recording that runs');
       rows('asking', 'li', [`<span><b>Anna</b> (10.0.0.7) asks to lead. Do these letters stand on
       that phone? </span><strong class="match">KWRT</strong><button class="button slim confirm">
       Confirm</button><button class="button slim">Deny</button>`]);""",
     "blocked": """show('blocked', 'last-stop', 'last-stop-words'); hide('board');
       text('problem-title', 'The server has been updated'); text('last-stop-words', 'STOPPED');
-      list('problem-steps', ['Reload this page.']);""",
+      list('problem-steps', ['Reload this page to get the version that fits.']);""",
 }
 """By state of the supervisor's."""
 CHECKED = """
@@ -215,7 +219,7 @@ STATES = {
     ("trust_fr", "help"): "",
 }
 """By page and state."""
-FRENCH_PAGES = ("index", "screen", "check", "board", "fleet")
+FRENCH_PAGES = ("index", "screen", "check", "board", "fleet", "supervisor")
 SHOWN = [
     *((name, state, "en") for name, state in STATES),
     *((name, state, "fr") for name, state in STATES if name in FRENCH_PAGES),

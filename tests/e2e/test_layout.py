@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import pytest
-from playwright.sync_api import BrowserContext
+from playwright.sync_api import BrowserContext, Page
 
 from tests.e2e.axe import violations
 from tests.e2e.page_states import DESKTOP, PHONES, SHOWN, shown
-from tests.e2e.written_pages import opened
+from tests.e2e.written_pages import FRENCH, opened
 
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
 DESKTOPS = [(820, 1180), (1280, 720), (1440, 900)]
+LANGUAGES = pytest.mark.parametrize("language", ["en", "fr"])
 
 FILL = """
 ([id, figures]) => document.getElementById(id).replaceChildren(...figures.map(([name, value]) => {
@@ -59,18 +60,30 @@ NAMES = [
 """In the order of `web_client/src/dashboard/estimate.js`."""
 
 
+def desk(context: BrowserContext, size: tuple[int, int], language: str) -> Page:
+    """The supervisor's page as it begins, in one of its languages."""
+    page = opened(context, "supervisor", size)
+    if language == "fr":
+        page.evaluate(FRENCH)
+    return page
+
+
+@LANGUAGES
 @pytest.mark.parametrize("size", DESKTOPS)
-def test_the_phone_cards_buttons_stay_in_it(written: BrowserContext, size: tuple[int, int]) -> None:
-    page = opened(written, "supervisor", size)
+def test_the_phone_cards_buttons_stay_in_it(
+    written: BrowserContext, size: tuple[int, int], language: str
+) -> None:
+    page = desk(written, size, language)
     assert page.evaluate(OUTSIDE, ".card.phone > footer") == []
     page.close()
 
 
+@LANGUAGES
 @pytest.mark.parametrize("size", [(1280, 720), (1366, 768), (1440, 900), (1920, 1080)])
 def test_all_that_tells_is_on_the_first_screen(
-    written: BrowserContext, size: tuple[int, int]
+    written: BrowserContext, size: tuple[int, int], language: str
 ) -> None:
-    page = opened(written, "supervisor", size)
+    page = desk(written, size, language)
     for name, rows in (("thrusts", 8), ("stages", 8)):
         page.evaluate(FILL, [name, [(str(n), "12.3") for n in range(rows)]])
     page.evaluate(STREAMS, [["Phone motion", "142 ms", "", "200 Hz", "0"]] * 6)

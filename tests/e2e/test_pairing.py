@@ -28,6 +28,7 @@ from tests.e2e.test_serve import mode, processes, until
 pytestmark = [pytest.mark.e2e, pytest.mark.page]
 SCREEN = {"viewport": {"width": 1280, "height": 720}}
 WAIT_MS = 30_000
+OTHER_PAGES = ("supervisor", "board", "screen", "fleet", "check")
 CAME_OFTEN = 28
 """Of the 32 connections that a stranger may make at once."""
 
@@ -171,6 +172,18 @@ def test_a_phones_page_that_lacks_a_file_says_so_and_a_whole_one_does_not(
         expect(lacking.locator("#step")).to_contain_text("load it again")
         expect(whole.locator("#problem")).to_be_visible()
         expect(whole.locator("#step span")).to_have_count(0)
+
+
+def test_each_other_page_that_lacks_its_scripts_says_so(chromium: str, server: Serving) -> None:
+    with browser(chromium) as context:
+        context.route("**/src/**", lambda route: route.abort())
+        pages = {name: context.new_page() for name in OTHER_PAGES}
+        for name, page in pages.items():
+            page.goto(f"{server.http_url}/{name}")
+            expect(page.locator(".late")).not_to_be_visible()
+        for page in pages.values():
+            expect(page.locator(".late")).to_be_visible(timeout=WAIT_MS)
+            expect(page.locator(".late")).to_contain_text("load it again")
 
 
 def test_a_server_killed_knows_who_was_in_and_who_was_shut_out(server: Serving) -> None:

@@ -34,8 +34,20 @@ SPEAKERS = {
     "server/web": "app handover people_api session_manager status websocket",
 }
 """Modules by room whose sentences become reasons, refusals, doubts or advice on a phone."""
-ELSEWHERE = {"check": {"server/diagnostics/phone_check": "verdicts"}}
+ELSEWHERE = {"check": {"server/diagnostics/phone_check": "verdicts"}, "supervisor": {}}
 """Those whose sentences other pages show, by the page."""
+TO_SUPERVISORS = {
+    "a line of text",
+    "a paired page; end the program on its computer instead",
+    "the four letters on that phone's screen",
+    "the newest one of the recording that runs",
+    "this server has a certificate of its owner's",
+    "Recorded: {}",
+    "from the next press: {} times as far, {}",
+    ", waits to be confirmed",
+    "virtual camera:",
+}
+"""What is refused to supervisors, and parts of events."""
 LISTENED_TO = ("pipeline", "server/calibration", "server/control", "server/phone", "server/view")
 """Rooms, and those in them, of which no module may begin to speak unheard ..."""
 WHOLE = re.compile(r"[A-Z].* .*[.?]")
@@ -51,23 +63,15 @@ UNTOLD = {
     "Control runs slowly",
     "Pictures are",
     "The server's computer stood still",
-    # to supervisors, in lists of events and to their own pages
+    # to supervisors: of gains, with words of the margins that only engineers read
     "Gains {} have less margin than is usual {}: {}.",
     "With gains {} a robot with a {} or thrusters' {} of what its file says{} could become"
     " unstable",
     "`lightleash tune` finds others.",
-    "Recorded: {}",
-    "a line of text",
-    "a paired page; end the program on its computer instead",
-    "from the next press: {} times as far, {}",
+    # to whoever writes a program for them, and in the terminal
     "of somebody who is {}",
-    ", waits to be confirmed",
-    "the four letters on that phone's screen",
-    "the newest one of the recording that runs",
-    "this server has a certificate of its owner's",
     "true, to give up being paired as {}",
     "viewer, operator; lightleash invite makes the other one",
-    "virtual camera:",
     "websocket, {}",
     # to who writes a page or a program
     "A key of the run file; pages bring the cookie of their pairing instead.",
@@ -161,12 +165,27 @@ def said() -> set[str]:
     every = {one for path in modules(SPEAKERS) for one in spoken(path)}
     rooms = [path for path in texts() if path.as_posix().startswith(LISTENED_TO)]
     whole = {one for path in rooms for one in spoken(path) if WHOLE.fullmatch(one)}
-    return {*told(every), *whole, *(every & set(SHORT))} - UNTOLD
+    return {*told(every), *whole, *(every & set(SHORT))} - UNTOLD - TO_SUPERVISORS
+
+
+def events() -> set[str]:
+    """What is said by calls of `log_event`, and is no sentence put into another."""
+    calls = (
+        node
+        for path in texts()
+        if path.as_posix().startswith("server/")
+        for node in ast.walk(parsed(texts()[path]))
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "log_event"
+    )
+    every = {text for call in calls for part in call.args for text in literals(ast.Expr(part))}
+    return {one for text in every for one in sentences(text)}
 
 
 def said_on(page: str) -> set[str]:
     """All that is said on another page beside it, single words with a capital among them."""
     every = {one for path in modules(ELSEWHERE[page]) for one in spoken(path)}
+    if page == "supervisor":
+        every |= events() | TO_SUPERVISORS
     names = {one for one in every if NAME.fullmatch(one)}
     bare = {one for one in every if FIGURE.fullmatch(one)}
     return {*told(every), *names} - bare - UNTOLD - said()

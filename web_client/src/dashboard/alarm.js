@@ -3,6 +3,7 @@
 /** @import {ShownMode, Signal} from '../ui/session_types.js' */
 
 import { Lasting } from '../ui/lasting.js';
+import { say } from '../words/say.js';
 
 /** @type {readonly ShownMode[]} */
 const ALARMS = ['RAMP', 'LOST'];
@@ -33,7 +34,7 @@ export class Alarm {
   take(mode, name, flies, now, empty = false) {
     const isAlarm = ALARMS.includes(mode) || (flies && DEAF.includes(mode));
     const warns = isAlarm || empty ? '⚠ ' : '';
-    this.document.title = `${warns}${name} · ${this.server || 'Lightleash'}`;
+    this.document.title = `${warns}${say(name)} · ${this.server || 'Lightleash'}`;
     if (isAlarm) this.lasting.take(mode, now);
     else if (empty) this.lasting.take('EMPTY', now);
     else this.lasting.over();

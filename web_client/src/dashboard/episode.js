@@ -29,7 +29,7 @@ export class EpisodePanel extends Elements {
     this.episode = status.episode;
     const { task, episode } = status;
     if (task !== this.known) this.task.value = this.known = task; // somebody's typing is not written over
-    this.text('press', episode === null ? 'no press yet' : `${episode.keep ? 'press' : 'discarded'} ${episode.press}`);
+    this.text('press', episode === null ? 'no press yet' : episode.keep ? `press ${episode.press}` : `discarded ${episode.press}`);
     this.text('verdict', episode === null || episode.keep ? 'Discard' : 'Keep');
     /** @type {HTMLButtonElement} */ (this.find('verdict')).disabled = episode === null;
   }

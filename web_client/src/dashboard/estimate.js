@@ -40,7 +40,7 @@ export function worries({ complaint, nis }, history, camera = null) {
   if (nis !== null && nis > HONEST.most) found.set('nis', 'Pictures surprise it: it knows less than it says.');
   if (nis !== null && nis < HONEST.least) found.set('nis', 'Pictures fit too well: it knows more than it says.');
   const rejected = rejectedLately(history);
-  if (rejected >= RISING) found.set('rejected', `${rejected} lights rejected in 2\u00a0s.`);
+  if (rejected >= RISING) found.set('rejected', `${rejected} lights rejected in 2 s.`);
   return found;
 }
 
@@ -64,9 +64,9 @@ export class EstimatePanel extends Elements {
     this.put('σ att.', number(estimate?.sigma_deg, 2), '°');
     this.camera(heard ? status?.camera ?? null : null);
     this.bias('Robot gyro [°/s]', estimate?.bias_body_deg_s);
-    this.bias('Robot accel. [m/s²]', estimate?.bias_body_m_s2);
+    this.bias('Robot accel [m/s²]', estimate?.bias_body_m_s2);
     this.bias('Phone gyro [°/s]', estimate?.bias_phone_deg_s);
-    this.bias('Phone accel. [m/s²]', estimate?.bias_phone_m_s2);
+    this.bias('Phone accel [m/s²]', estimate?.bias_phone_m_s2);
   }
 
   /** @param {CameraHealth | null} camera */

@@ -95,6 +95,5 @@ const USUAL_SCREEN_M = 0.34;
  * @param {number} heightM Of the smallest one.
  */
 export function screenWords(heightM) {
-  const size = heightM > USUAL_SCREEN_M ? ` ${Math.ceil(100 * heightM)} cm high` : '';
-  return `Robot on a screen${size}`;
+  return heightM > USUAL_SCREEN_M ? `Robot on a screen ${Math.ceil(100 * heightM)} cm high` : 'Robot on a screen';
 }

@@ -25,11 +25,13 @@ import { PhoneCard } from './phone_card.js';
 import { Kind, VERSION } from '../wire/protocol.js';
 import { Problem, adviceFor, problemOf } from '../wire/problems.js';
 import { StopPost } from '../wire/stop.js';
+import { speak } from '../words/say.js';
 import { OWN_HEADERS, ask, becomeKnown, exclusion, usualName } from '../wire/pairing.js';
 
 const TICK_MS = 100;
 const STOP_TICK_MS = 50;
 
+await speak(document, navigator.languages, () => window.localStorage);
 const { fetchHere, later, links, platform } = browserOf(window);
 const clock = new WakefulClock(performance, Date);
 const serverTime = new ServerTime(clock);
@@ -191,6 +193,7 @@ async function arrive() {
   }
 }
 
+dispatch({ type: 'tick', now: clock.now() });
 window.addEventListener('pointerdown', () => feedback.unlock());
 void arrive().then(() => {
   window.setInterval(() => {

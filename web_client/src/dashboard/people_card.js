@@ -2,6 +2,8 @@
 
 /** @import {Person} from '../wire/protocol_types.js' */
 
+import { say, write } from '../words/say.js';
+
 /** @typedef {'confirm' | 'deny' | 'revoke' | 'lead'} Deed */
 
 const ROLES = { viewer: 'watches', operator: 'may lead', supervisor: 'supervises' };
@@ -58,17 +60,16 @@ export class PeopleCard {
     this.asking.hidden = waiting.length === 0 || !may;
     this.asking.replaceChildren(...waiting.map((person) => this.request(person)));
     this.people.replaceChildren(...present.map((person) => this.row(person, doomed === person.id)));
-    this.count.textContent = `${present.filter(({ connected }) => connected).length} connected`;
+    write(this.count, `${present.filter(({ connected }) => connected).length} connected`);
   }
 
   /** @param {Person} person */
   request(person) {
     const row = this.make('li', '');
     const words = this.make('span', '');
-    words.append(
-      this.make('b', person.name), ` (${person.address}) asks to lead. Do these letters stand on that phone? `,
-    );
-    const letters = this.make('strong', person.code);
+    words.append(this.name(person), say(` (${person.address}) asks to lead. Do these letters stand on that phone? `));
+    const letters = this.make('strong', '');
+    letters.textContent = person.code;
     letters.className = 'match';
     row.append(words, letters, this.button('Confirm', 'confirm', person), this.button('Deny', 'deny', person));
     return row;
@@ -81,12 +82,12 @@ export class PeopleCard {
   row(person, doomed) {
     const row = this.make('li', '');
     row.classList.toggle('away', !person.connected);
-    const name = this.make('b', person.name);
+    const name = this.name(person);
     name.className = 'clip';
     const what = person.leads ? 'leads' : person.offered ? 'has the lead offered' : person.connected ? ROLES[person.role] : 'away';
     const words = this.make('span', `${what} · ${since(person.since_s)}`);
     words.className = person.leads ? 'badge good' : 'quiet';
-    row.title = `${person.name}, ${person.role}, ${person.address || 'on this computer'}`;
+    row.title = `${person.name}, ${say(person.role)}, ${person.address || say('on this computer')}`;
     row.append(name, words);
     if (this.may && person.role === 'operator' && !person.leads) row.append(this.button('Give lead', 'lead', person));
     if (this.may && !person.id.startsWith('local-')) {
@@ -104,7 +105,7 @@ export class PeopleCard {
     const button = this.make('button', text);
     button.className = `button slim ${deed}`;
     button.setAttribute('type', 'button');
-    button.setAttribute('aria-label', `${text}: ${person.name}`);
+    button.setAttribute('aria-label', `${say(text)}: ${person.name}`);
     button.addEventListener('click', () => this.press(deed, person));
     return button;
   }
@@ -126,7 +127,14 @@ export class PeopleCard {
    */
   make(tag, text) {
     const element = this.document.createElement(tag);
-    element.textContent = text;
+    write(element, text);
+    return element;
+  }
+
+  /** @param {Person} person Called alike in every language. */
+  name(person) {
+    const element = this.make('b', '');
+    element.textContent = person.name;
     return element;
   }
 }

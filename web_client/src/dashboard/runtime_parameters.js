@@ -4,6 +4,7 @@
 
 import { Elements } from './elements.js';
 import { number } from './format.js';
+import { say } from '../words/say.js';
 
 const SLOWEST_HZ = 0.03;
 const DECADES = 2;
@@ -54,7 +55,7 @@ export function words(knobs) {
   return {
     cutoff: `${number(cutoff_hz, cutoff_hz < 0.1 ? 3 : 2)} Hz`,
     adaptive: adaptive_beta === 0 ? 'off' : `+${number(adaptive_beta, 1)} Hz/(rad/s)`,
-    limit: max_speed_m_s === 0 ? 'none' : `${number(max_speed_m_s, 1)} m/s`,
+    limit: max_speed_m_s === 0 ? 'no limit' : `${number(max_speed_m_s, 1)} m/s`,
   };
 }
 
@@ -171,10 +172,11 @@ export class KnobPanel extends Elements {
   /**
    * @param {string} id
    * @param {string} value
-   * @param {string} said What is read out.
+   * @param {string} words What is read out.
    */
-  place(id, value, said = '') {
+  place(id, value, words = '') {
     const input = this.input(id);
+    const said = say(words);
     if (input.value !== value) input.value = value;
     if (said !== '' && input.getAttribute('aria-valuetext') !== said) input.setAttribute('aria-valuetext', said);
   }

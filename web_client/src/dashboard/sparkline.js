@@ -1,5 +1,7 @@
 /** Small graphs of the last seconds. */
 
+import { say } from '../words/say.js';
+
 /** @typedef {{ values: readonly (number | null)[], colour: string }} Line */
 
 /**
@@ -38,7 +40,7 @@ export function drawLines(canvas, lines, slots, pixelRatio) {
     trace(context, values, (i) => ((slots - values.length + i) / (slots - 1)) * width,
       (value) => height - 2 - (value / end) * (height - 4));
   }
-  label(context, known.length > 0 ? String(end) : 'nothing yet', pixelRatio);
+  label(context, say(known.length > 0 ? String(end) : 'nothing yet'), pixelRatio);
 }
 
 /**

@@ -10,7 +10,7 @@ import { age, alarm, gapLine, metres, number, scaleEnd, screenWords, streamName,
 import { stopWords } from '../wire/stop.js';
 import { drawLines } from './sparkline.js';
 import { REMEMBERED, beforeArming, requests, shownMode } from './model.js';
-import { write } from '../words/say.js';
+import { say, write } from '../words/say.js';
 
 /** @typedef {{ onRequest: (what: 'arm' | 'disarm' | 'reset') => void, onStop: () => void, onVirtual: () => void,
  *   onRecord: () => void, onCode: () => void, onReload: () => void }} Requests */
@@ -106,7 +106,7 @@ export class BoardView extends Elements {
     this.show('screen', heightM !== null);
     if (heightM === null) return;
     this.text('screen', screenWords(heightM));
-    this.find('screen').title = 'A phone that films the screen leads the simulated robot';
+    this.find('screen').title = say('A phone that films the screen leads the simulated robot');
   }
 
   /** @param {Status} status */
@@ -126,7 +126,7 @@ export class BoardView extends Elements {
   phone({ operator, phones, supervisors, recording, video_path: path, path_choice: choice }) {
     const words = path && `video by ${path}${choice?.by ? `, ${choice.by}’s choice` : ''}`;
     this.text('video-path', words);
-    this.find('video-path').title = words;
+    this.find('video-path').title = say(words);
     this.text('operator', operator || 'none');
     this.find('operator').title = operator;
     this.text('crowd', `phones ${phones} · supervisors ${supervisors}`);
@@ -193,7 +193,7 @@ export class BoardView extends Elements {
     Object.entries(stages).forEach(([name, ms], i) => {
       const part = this.row('stack', name, 'i', () => []);
       part.className = `tone-${i % 8}`;
-      part.title = name;
+      part.title = say(name);
       part.style.width = `${(ms / end) * 100}%`;
       const row = this.row('stages', name, 'div', () => [this.make('dt', name), this.make('dd', '')]);
       row.className = `tone-${i % 8}`;

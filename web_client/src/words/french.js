@@ -12,6 +12,7 @@ const OWN = {
   board: () => import('./french_board.js'),
   check: () => import('./french_check.js'),
   fleet: () => import('./french_fleet.js'),
+  supervisor: () => import('./french_supervisor.js'),
 };
 const UNITS = 's|ms|min|mm|cm|m|px|V|N|Hz|GHz|i/s|kbit/s|Mbit/s|MB|ppm';
 

@@ -12,7 +12,7 @@ export const PAGE = {
   "the phone: the robot follows.": "le téléphone : le robot suit.",
   ": it keeps still. Press again: it goes on from there.": " : il s’immobilise. Appuyer de nouveau : il reprend de là.",
   "Show these letters to the supervisor": "Montrez ces lettres au superviseur",
-  "The same four must stand on the supervisor’s screen, with “Confirm” beside them.": "Les quatre mêmes doivent s’afficher sur l’écran du superviseur, à côté de « Confirm ».",
+  "The same four must stand on the supervisor’s screen, with “Confirm” beside them.": "Les quatre mêmes doivent s’afficher sur l’écran du superviseur, à côté de « Confirmer » ou « Confirm ».",
   "Your name": "Votre nom",
   "Start": "Démarrer",
   "Reload": "Recharger",

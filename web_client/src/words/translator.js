@@ -96,7 +96,7 @@ export function translatorOf(dictionary, numbers) {
   return say;
 }
 
-const ATTRIBUTES = ['aria-label', 'title', 'placeholder'];
+const ATTRIBUTES = ['alt', 'aria-label', 'title', 'placeholder'];
 
 /**
  * Says what stands in a page already.

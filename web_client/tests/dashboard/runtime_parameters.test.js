@@ -27,7 +27,7 @@ test('the speed limit loosens to the right, and the last place is none', () => {
 test('knobs are said with their units', () => {
   assert.deepEqual(words(STANDING), { cutoff: '0.28 Hz', adaptive: 'off', limit: '1.0 m/s' });
   assert.deepEqual(words({ ...STANDING, cutoff_hz: 2, adaptive_beta: 0.6, max_speed_m_s: 0 }), {
-    cutoff: '2.00 Hz', adaptive: '+0.6 Hz/(rad/s)', limit: 'none',
+    cutoff: '2.00 Hz', adaptive: '+0.6 Hz/(rad/s)', limit: 'no limit',
   });
 });
 

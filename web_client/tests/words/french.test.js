@@ -13,6 +13,7 @@ import { SERVER } from '../../src/words/french_server.js';
 import * as board from '../../src/words/french_board.js';
 import * as check from '../../src/words/french_check.js';
 import * as fleet from '../../src/words/french_fleet.js';
+import * as supervisor from '../../src/words/french_supervisor.js';
 import { frenchOf } from '../../src/words/french.js';
 
 /** @import {ShownMode} from '../../src/ui/session_types.js' */
@@ -37,6 +38,8 @@ const MODES = /** @type {ShownMode[]} */ (['DISARMED', 'ARMED', 'TRACK', 'COAST'
 const GRADES = /** @type {const} */ (['good', 'fair', 'poor', 'unknown']);
 const AXES = [...read('index.html').matchAll(/<option value="([a-z]+)"/g)].map(([, value]) => value ?? '').filter((value) => value !== 'auto');
 const WAYS = Array.from({ length: 8 }, (_, k) => wayOf((k * Math.PI) / 4));
+/** Of a picture on its way, as the server calls them. */
+const STAGES = ['capture to arrival', 'waiting', 'decode', 'detect', 'identify', 'pose', 'to control', 'control'];
 /** Of other pages. */
 const ELSEWHERE = ['app/board.js', 'app/board_size.js', 'wire/protocol_types.js'];
 /** By whom: the phone's page with the screen that it films, and each other page. @type {Record<string, Book>} */
@@ -50,13 +53,20 @@ const BOOKS = {
   board: { words: board.PAGE, files: ['board.html'], modules: ['app/board.js'], short: [] },
   check: { words: check.PAGE, files: ['check.html'], modules: modulesOf('check'), short: GRADES.map((grade) => gradeWords(grade).slice(2)) },
   fleet: { words: fleet.PAGE, files: ['fleet.html'], modules: modulesOf('fleet'), short: ['STARTING', 'GONE', 'ENDED', 'nobody'] },
+  supervisor: {
+    words: supervisor.PAGE,
+    files: ['supervisor.html'],
+    modules: modulesOf('dashboard'),
+    short: [...MODES.map((mode) => mode.toLowerCase()).filter((mode) => !/disarmed|no_/.test(mode)), 'leads', 'away', 'watches', 'now', 'off', 'ready', 'none', 'stays', ...STAGES],
+  },
 };
 /** What is a name in every language. */
-const NAMES = ['Lightleash', 'STOP', 'WebRTC', 'WebSocket', 'JPEG', 'Android', 'Edg', 'Edge', 'Mac', '{} · Lightleash'];
+const NAMES = ['Lightleash', 'STOP', 'WebRTC', 'WebSocket', 'JPEG', 'Android', 'Edg', 'Edge', 'Mac', '{} · Lightleash', '{} min', '{} h {} min', 'σ [mm]'];
 /** For the supervisor's log, for who reads the code, or for the browser: not for who holds the phone. */
 const UNSEEN = [
   'camera: {}', 'camera again: {}', 'page: {}', 'whoami: {}', 'the connection has ended', 'the connection has {}', 'the server has hung up', 'no connection within the time allowed',
-  'index.html has no #{}', 'screen.html has no #{}', 'board.html has no #{}', '--square-mm {}', 'h2 > *, .state > *', 'lightleash-mm {}x{}@{}', 'outline blurred', 'translate({} {}) rotate({}) scale({})', 'Content-Type', 'Linux; Android', 'Enter',
+  'index.html has no #{}', 'screen.html has no #{}', 'board.html has no #{}', '--square-mm {}', 'h2 > *, .state > *',
+  'the page has no #{}', 'worry fine', 'badge good', 'badge {}', 'button slim {}', '{}px system-ui, sans-serif', 'lightleash-mm {}x{}@{}', 'outline blurred', 'translate({} {}) rotate({}) scale({})', 'Content-Type', 'Linux; Android', 'Enter',
   'NotAllowedError', 'SecurityError', 'NotFoundError', 'OverconstrainedError', 'DeviceMotion', 'DeviceMotionEvent', 'DeviceOrientationEvent', 'Generic Sensor',
   'no camera', '{}, through the {}', 'track processor', 'track processor in a worker', 'video element', '{} fps', 'focus {}{}', 'zoom {}', 'torch on', '{} ms', 'exposure {}{}{}',
   'not a Lightleash record', 'record version {}, this page speaks {}', 'record of unknown kind {}', 'payload of {} bytes, expected {}', 'message without a type',
@@ -64,7 +74,7 @@ const UNSEEN = [
   'no WebRTC with records in this browser: pictures go by websocket', 'pictures go by WebRTC', 'no WebRTC: {}', 'WebRTC: {}; pictures go by websocket', '{} takes {} ms a picture: JPEG',
 ];
 /** Words that are put together from what is no literal of their own: units, and marks before a link's grade. */
-const JOINED = ['fps', 'Mb/s', '✓ {}', '! {}', '✕ {}', '? {}'];
+const JOINED = ['fps', 'Mb/s', '✓ {}', '! {}', '✕ {}', '? {}', '{} {} ({} s)', 'phone {}', 'computer {}'];
 
 /** Whether it is for people. @param {string} text */
 const isSaid = (text) => /[a-z]{2}/.test(text) && (/\S \S/.test(text) || /^\W*[A-Z][a-z]/.test(text));
@@ -83,7 +93,7 @@ function ofPage({ files }) {
   const page = files.map(read).join('').replace(/<noscript>[^]*?<\/noscript>|<span class="late">[^]*?<\/span>/g, '');
   const names = [...page.matchAll(/(?:aria-label|alt|title|placeholder)="([^"]*)"/g)].map(([, name]) => name ?? '');
   return [...page.replace(/<[^>]*>/g, '\0').split('\0'), ...names].map((text) => text.replace(/\s+/g, ' ').trim()).filter((text) => /[A-Za-z]{2}/.test(text))
-    .map((text) => text.replace(/ · Lightleash$/, ''));
+    .map((text) => text.replace(/^Lightleash · | · Lightleash$/, ''));
 }
 
 /** @param {Book} book */
@@ -93,7 +103,7 @@ const said = (book) => [...new Set([...ofModules(book), ...ofPage(book), ...book
 const isKnown = ({ words }, text) => [text, text.replace(/\.$/, '')].some((one) => one in words || one in PAGE || one in SERVER);
 
 const french = frenchOf(Object.assign({}, check.PAGE, check.SERVER));
-const ALL = [...Object.values(BOOKS).map(({ words }) => words), SERVER, check.SERVER];
+const ALL = [...Object.values(BOOKS).map(({ words }) => words), SERVER, check.SERVER, supervisor.SERVER];
 
 for (const [name, book] of Object.entries(BOOKS)) {
   test(`whatever the page says in English, it can say in French: ${name}`, () => {
@@ -111,7 +121,8 @@ test('words reach the page by `write` alone, but for names and numbers', () => {
   const past = Object.values(BOOKS).flatMap(({ modules }) => modules)
     .flatMap((name) => read(`src/${name}`).match(/(?:textContent|innerText|nodeValue|placeholder|ariaLabel)\s=\s[^;]*|'(?:aria-label|title)', [^;]*/g) ?? []);
   assert.deepEqual([...new Set(past)], ['textContent = `${origin}/board`', '\'aria-label\', say(name))', 'textContent = person.name', 'textContent = `× ${value}`',
-    'placeholder = say(this.usual)', 'textContent = code', 'textContent = name']);
+    'placeholder = say(this.usual)', 'textContent = code', 'textContent = name', 'textContent = person.code',
+    '\'aria-label\', `${say(text)}: ${person.name}`)', 'textContent = invite.url']);
 });
 
 test('a sentence has as many places for numbers and names in both languages', () => {
