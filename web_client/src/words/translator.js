@@ -10,6 +10,8 @@ const WORDS = /\p{L}/u;
 const COUNTED = /^([+-]?\d[\d.]*) (.*\D.*)$/;
 /** A pattern of fewer letters, as "{} by {}", is in many sentences: it counts where all its places are understood. */
 const TELLING = 7;
+/** No sentence of ours has more of one kind; what does comes from outside, and can be long. */
+const MOST_PARTS = 8;
 /** So many texts are remembered: those with numbers in them change all the time. */
 const MOST_KNOWN = 400;
 
@@ -61,7 +63,9 @@ export function translatorOf(dictionary, numbers) {
     for (const between of borders) {
       const at = between.exec(text);
       if (at === null) continue;
-      const parts = text.split(between);
+      // at the first one alone: what follows may be known with a border inside
+      const every = text.split(between);
+      const parts = every.length > MOST_PARTS ? every : [every[0] ?? '', text.slice(at.index + at[0].length)];
       const said = parts.map(say);
       if (said.some((part, i) => part !== parts[i])) return said.join(numbers(at[0].replace(/^[:;]/, ' $&')));
     }

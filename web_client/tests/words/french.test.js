@@ -73,8 +73,8 @@ const UNSEEN = [
   'its worker did not start', 'the offer has no place for pictures', 'no picture', 'pictures are {} ms old', 'holds pictures back', '{} encoder: {}',
   'no WebRTC with records in this browser: pictures go by websocket', 'pictures go by WebRTC', 'no WebRTC: {}', 'WebRTC: {}; pictures go by websocket', '{} takes {} ms a picture: JPEG',
 ];
-/** Words that are put together from what is no literal of their own: units, and marks before a link's grade. */
-const JOINED = ['fps', 'Mb/s', '✓ {}', '! {}', '✕ {}', '? {}', '{} {} ({} s)', 'phone {}', 'computer {}'];
+/** Words that are put together from what is no literal of their own: units, marks before a link's grade, a member's name. */
+const JOINED = ['fps', 'Mb/s', '✓ {}', '! {}', '✕ {}', '? {}', '{} {} ({} s)', 'phone {}', 'computer {}', 'computer {} ({} s)', 'local program ({})'];
 
 /** Whether it is for people. @param {string} text */
 const isSaid = (text) => /[a-z]{2}/.test(text) && (/\S \S/.test(text) || /^\W*[A-Z][a-z]/.test(text));
@@ -103,6 +103,7 @@ const said = (book) => [...new Set([...ofModules(book), ...ofPage(book), ...book
 const isKnown = ({ words }, text) => [text, text.replace(/\.$/, '')].some((one) => one in words || one in PAGE || one in SERVER);
 
 const french = frenchOf(Object.assign({}, check.PAGE, check.SERVER));
+const frenchAtDesk = frenchOf(Object.assign({}, supervisor.PAGE, supervisor.SERVER));
 const ALL = [...Object.values(BOOKS).map(({ words }) => words), SERVER, check.SERVER, supervisor.SERVER];
 
 for (const [name, book] of Object.entries(BOOKS)) {
@@ -146,6 +147,8 @@ test('numbers, names and sentences find their places', () => {
     ['0.5 × your way, height kept · Let go to keep still', '0,5 × votre trajet, hauteur gardée · Relâcher pour immobiliser'],
     ['The server\'s computer is too busy. chromium takes the most of it: close what is not needed; a laptop wants its charger.',
       'L’ordinateur du serveur est trop occupé. chromium en prend le plus : fermez ce qui est inutile ; un portable veut son chargeur.'],
+    ['LOST: The control process is starting: some seconds; the robot stops by its own watchdog.',
+      'PERDU : Le processus de commande démarre : quelques secondes ; le robot s’arrête par son propre chien de garde.'],
     ['12 computer', '12 ordinateur'],
     ['3.1 Mb/s', '3,1 Mbit/s'],
     ['ames', 'ames'],
@@ -153,9 +156,17 @@ test('numbers, names and sentences find their places', () => {
   ]) assert.equal(french(english ?? '').replaceAll('\u00a0', ' '), words);
 });
 
+test('numbers and names find their places on the supervisor\'s page', () => {
+  for (const [english, words] of [
+    ['Gaps in the last minute: phone 3 (0.42 s) · computer 1 (0.14 s)', 'Coupures en une minute : téléphone 3 (0,42 s) · ordinateur 1 (0,14 s)'],
+    ['local program (operator) leads: Android.', 'programme local (opérateur) guide : Android.'],
+  ]) assert.equal(frenchAtDesk(english ?? '').replaceAll('\u00a0', ' '), words);
+});
+
 test('what comes from outside can be long and strange', () => {
   const strange = `${'(.*) $& {} \\'.repeat(2000)}: {}`;
   assert.equal(french(`${strange} leads.`).includes('$&'), true);
+  for (const border of [', ', ': ', '; ', ' · ', '. ']) assert.equal(french(`someone${border}`.repeat(20_000)).includes('someone'), true);
   for (let k = 0; k < 1000; k += 1) assert.equal(french(`${k} s`), `${k}\u00a0s`);
 });
 
