@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.signals import Image
-from tests.e2e.page_scripts import STAMPING_CAMERA
+from tests.e2e.page_scripts import PAINTED_CAMERA
 
 BITS = 24
 """Of milliseconds; a checksum of 8 bits follows. The second row is the first one inverted."""
@@ -28,17 +28,12 @@ _CANVAS = """
     pixels.data[i + 3] = 255;
   }
   grain.putImageData(pixels, 0, 0);
-  window.painted = 0;
-  let [film, filmed] = [() => {}, -Infinity];
-  const onFrame = () => {
-    requestAnimationFrame(onFrame);
-    const now = performance.now();
-    if (now - filmed < 25) return;  // 30 Hz, of a screen's 60
-    filmed = now;
-    painted += 1;
-    paint.fillStyle = `hsl(${painted % 360} 30% 25%)`;
+  let pictures = 0;
+  const paintAt = (now) => {
+    pictures += 1;
+    paint.fillStyle = `hsl(${pictures % 360} 30% 25%)`;
     paint.fillRect(0, 2 * size, width, height);
-    const [x, y] = [(painted * 37) % 192, (painted * 23) % 192];
+    const [x, y] = [(pictures * 37) % 192, (pictures * 23) % 192];
     // something to encode
     paint.drawImage(noise, x, y, 320, 320, 12 * size, 6 * size, 8 * size, 8 * size);
     const ms = Math.round(now) & 0xffffff;
@@ -48,17 +43,15 @@ _CANVAS = """
       block(0, i, on);
       block(1, i, !on);
     }
-    film(now);
   };
-  onFrame();
-  BE_CAMERA
+  PAINTED_CAMERA
 })();
 """
 
 
 def clock_canvas(width: int) -> str:
     """The script; 16:9, 32 blocks wide."""
-    return _CANVAS.replace("WIDTH", str(width)).replace("BE_CAMERA", STAMPING_CAMERA)
+    return _CANVAS.replace("WIDTH", str(width)).replace("PAINTED_CAMERA", PAINTED_CAMERA)
 
 
 def painted_ms(luma: Image) -> int | None:

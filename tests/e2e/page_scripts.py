@@ -8,29 +8,39 @@ BE_CAMERA = f"""navigator.mediaDevices.getUserMedia = async () => {{
     return stream;
   }};"""
 """What is painted on `canvas` is what the page's camera sees."""
-STAMPING_CAMERA = f"""{BE_CAMERA}
+PAINTED_CAMERA = f"""{BE_CAMERA}
+  let [stamp, painted] = [() => {{}}, -Infinity];
   if (window.MediaStreamTrackGenerator) {{
     navigator.mediaDevices.getUserMedia = async () => {{
       const track = new MediaStreamTrackGenerator({{kind: 'video'}});
       const writer = track.writable.getWriter();
       Object.defineProperty(track, 'label', {{value: '{LENS}'}});
-      film = (ms) => {{
+      stamp = (ms) => {{
         if (track.readyState === 'ended') return;
         writer.write(new VideoFrame(canvas, {{timestamp: Math.round(1e3 * ms)}}));
       }};
       window.filming = new MediaStream([track]);
       return filming;
     }};
-  }}"""
-"""The same, but `film`, which the painter calls with the time [ms] of each picture, stamps it where
-the browser permits that, as a camera's hardware does: it stamps those of a canvas when it comes to
-read it, on a busy machine up to 36 ms late."""
+  }}
+  const onFrame = () => {{
+    requestAnimationFrame(onFrame);
+    const ms = performance.now();
+    if (ms - painted < 25) return;  // 30 Hz, of a screen's 60
+    painted = ms;
+    paintAt(ms);
+    stamp(ms);
+  }};
+  onFrame();"""
+"""The same camera films what `paintAt` paints on `canvas` for a time [ms], and stamps it with that
+where the browser permits it, as a camera's hardware does: the browser stamps a canvas when it comes
+to read it, on a busy machine up to 36 ms late."""
 FELT = """
 (() => {
   const told = [];
   window.tellFelt = (rows) => {
     told.push(...rows);
-    told.splice(0, told.length - MOST_ROWS);
+    told.splice(0, told.length - 100);
   };
   window.feltAt = (ms) => {
     const next = told.findIndex(([t]) => t >= ms);
@@ -41,7 +51,6 @@ FELT = """
   };
 })();
 """
-FELT = FELT.replace("MOST_ROWS", "100")
 """What sensors feel at a time of the page's clock, from what was told of the future; undefined
 where nothing was. A row is a time [ms], then x, y, z of each of `SENSORS`."""
 STAMP_SENSORS = """

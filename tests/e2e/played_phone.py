@@ -19,7 +19,7 @@ from pipeline.camera.lens import Camera
 from pipeline.config import VirtualCameraConfig
 from pipeline.frames import GRAVITY, R_cd, exp, log
 from tests.e2e.chromium_channel import SENSORS
-from tests.e2e.page_scripts import FELT, STAMPING_CAMERA, TICKER
+from tests.e2e.page_scripts import FELT, PAINTED_CAMERA, TICKER
 from tests.e2e.witness import PERIOD_S, Hole, Witness
 
 STEP_S = 0.01
@@ -69,21 +69,12 @@ CANVAS = """
       paint.fill();
     }
   };
-  let [film, filmed] = [() => {}, -Infinity];
-  const onFrame = () => {
-    requestAnimationFrame(onFrame);
-    const now = performance.now();
-    if (now - filmed < 25) return;  // 30 Hz, of a screen's 60
-    filmed = now;
-    draw(told ? at(now, told) : []);
-    film(now);
-  };
-  onFrame();
-  BE_CAMERA
+  const paintAt = (now) => draw(told ? at(now, told) : []);
+  PAINTED_CAMERA
 })();
 """
 CANVAS = CANVAS.replace("WIDTH", str(CAMERA.width)).replace("HEIGHT", str(CAMERA.height))
-CANVAS = CANVAS.replace("BE_CAMERA", STAMPING_CAMERA)
+CANVAS = CANVAS.replace("PAINTED_CAMERA", PAINTED_CAMERA)
 PLAYED = CANVAS + FELT + TICKER
 
 
@@ -196,7 +187,8 @@ class PlayedPhone(ABC):
         if epoch != self._felt_in:
             self._felt_in, self._felt_until = epoch, now
         times = np.arange(max(self._felt_until, now), now + AHEAD_S[-1], STEP_S)
-        self._felt_until = max(self._felt_until, now) + STEP_S * len(times)
+        if len(times):
+            self._felt_until = times[-1] + STEP_S
         rows = [[1e3 * (t - epoch), *self._felt_at(t)] for t in times.tolist()]
         return f"tellFelt({json.dumps(rows)})"
 

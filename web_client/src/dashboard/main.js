@@ -193,7 +193,7 @@ async function arrive() {
   }
 }
 
-dispatch({ type: 'tick', now: clock.now() });
+dispatch({ type: 'tick', now: clock.now() }); // the page is whole: what it says at once is true, server or none
 window.addEventListener('pointerdown', () => feedback.unlock());
 void arrive().then(() => {
   window.setInterval(() => {
