@@ -16,6 +16,7 @@ from hardware.robot_file import load_robot
 BASE = load_robot(Path(__file__).with_name("base.toml"), takes=("twist",))
 CIRCLE = np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.5])  # velocity [m/s], then angular rate [rad/s]
 READY_S, LEADS_S, STOPS_S, PERIOD_S = 20.0, 4.0, 1.0, 0.005
+KNOWN_S = 0.06  # so long after a sample it is taken to move on: then the base stands by itself
 
 
 def main() -> None:
@@ -25,7 +26,7 @@ def main() -> None:
     gives_up = time.monotonic() + READY_S
     while (now := time.monotonic()) < leads_until + STOPS_S or state != FollowerState.IDLE:
         for sample in follower.receive():
-            dt = 1e-6 * (sample.t_us - last_us) if last_us else 0.0
+            dt = min(1e-6 * (sample.t_us - last_us), KNOWN_S)
             vx, vy, *_, turn = sample.twist_in_b
             yaw += dt * turn
             x += dt * (vx * math.cos(yaw) - vy * math.sin(yaw))

@@ -29,8 +29,8 @@ def main() -> None:
     odometry = DataWriter(node, Topic(node, f"rt{TOPICS.odometry}", ros.RosOdometry), qos=RELIABLE)
     told, moves, heard_at, next_s = [0.0] * 3, [0.0] * 3, 0.0, time.monotonic()
     while True:
-        next_s += PERIOD_S
         time.sleep(max(0.0, next_s - time.monotonic()))
+        next_s = max(next_s + PERIOD_S, time.monotonic())  # what it has missed it has not moved
         for twist in commands.take(10):
             if twist.sample_info.valid_data:
                 told = [twist.linear.x, twist.linear.y, twist.angular.z]
