@@ -16,9 +16,12 @@ BACKOFF_S = (0.2, 0.5, 1.0, 2.0, 5.0)
 STEADY_S = 10.0
 """A process that has lived so long starts with the first back-off again."""
 GRACE_S = 3.0
+PROMPT_PRIORITY = 1
+"""By SCHED_RR, of what hears the phone: before a build or a browser, behind control and all that is
+of real time. Niceness alone is not enough: a group that slept on a processor bears little weight
+there at first, and waited for 27 to 82 ms beside a browser, however nice (sched_switch)."""
 PROMPT_NICENESS = -10
-"""Of what hears the phone: before a build or a browser, which would keep it from a processor for
-tens of milliseconds; behind control, which has SCHED_FIFO."""
+"""Where that is not permitted, and of what helps it."""
 
 
 @dataclass(slots=True)
@@ -33,8 +36,8 @@ class Child:
     """Open files that it inherits."""
     oom_score: int = 0
     """See `set_oom_score`."""
-    niceness: int = 0
-    """See `set_niceness`."""
+    is_prompt: bool = False
+    """See `go_before_others`."""
     process: subprocess.Popen[bytes] | None = None
     deaths: int = 0
     """In a row."""
@@ -82,7 +85,8 @@ class Child:
     def _prepare(self, parent: int) -> None:
         die_with(parent)
         set_oom_score(self.oom_score)
-        set_niceness(self.niceness)
+        if self.is_prompt:
+            go_before_others()
 
     def stop(self) -> None:
         """Ask it to end, and make it end if it doesn't."""
@@ -129,13 +133,25 @@ def set_oom_score(score: int) -> None:
         Path("/proc/self/oom_score_adj").write_text(str(score))
 
 
+def go_before_others() -> None:
+    """Let this process and its threads run before all that have no real time.
+
+    Takes CAP_SYS_NICE or LimitRTPRIO; without it niceness is asked for. Who uses this ends its
+    children's share in it by `set_niceness` or `raise_niceness`: they inherit it.
+    """
+    set_niceness(PROMPT_NICENESS)
+    with contextlib.suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(PROMPT_PRIORITY))
+
+
 def set_niceness(niceness: int) -> None:
-    """Let this process run before ordinary ones (down to -20) or behind them (up to 19).
+    """Let this process run before other ordinary ones (down to -20) or behind them (up to 19).
 
     For the leader of a session. Where Linux groups processes by session (autogroups), groups take
     equal turns whatever the niceness of those within, so the group is told, too. Behind is always
     permitted, before takes CAP_SYS_NICE: without it things stay as they are.
     """
+    _be_ordinary()
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, niceness)
         Path("/proc/self/autogroup").write_text(str(niceness))
@@ -143,7 +159,14 @@ def set_niceness(niceness: int) -> None:
 
 def raise_niceness(least: int) -> None:
     """Let this process run no sooner than so, whatever it inherited: a server's own goes before."""
+    _be_ordinary()
     os.nice(max(0, least - os.getpriority(os.PRIO_PROCESS, 0)))
+
+
+def _be_ordinary() -> None:
+    """Without real time that was inherited."""
+    with contextlib.suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def ending(code: int) -> str:

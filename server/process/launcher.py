@@ -22,7 +22,7 @@ from hardware.plant_parameters import ArmParameters
 from hardware.robot_file import COMMANDS, RobotFileError, load_robot
 from server.common import clock
 from server.common.access import PhoneClientError
-from server.common.child import PROMPT_NICENESS, Child, die_with, ending, watched
+from server.common.child import Child, die_with, ending, watched
 from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
 from server.common.settings import GAINS, Settings
 from server.process.invite import invite, print_code
@@ -165,7 +165,7 @@ def children_of(
     server = ["server", "_server", str(runtime), str(truth_port), *map(str, descriptors)]
     secret = {SECRET_VARIABLE: secrets.token_hex(32)}
     server += arguments
-    children.append(Child("server", server, secret, descriptors, SERVES, PROMPT_NICENESS))
+    children.append(Child("server", server, secret, descriptors, SERVES, is_prompt=True))
     return children
 
 

@@ -180,27 +180,45 @@ def test_when_memory_runs_out_the_server_goes_before_what_flies(program):
             child.stop()
 
 
-def may_go_before():
-    """Whether this process may lower its niceness, asked of a process that is then gone."""
-    command = [sys.executable, "-c", "import os; os.setpriority(os.PRIO_PROCESS, 0, -10)"]
-    return subprocess.run(command, stderr=subprocess.DEVNULL, check=False).returncode == 0
+def asked(*lines):
+    """What a process of its own prints, which may ask for what this one must not keep."""
+    command = [sys.executable, "-c", "\n".join(("import os", *lines))]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False).stdout
 
 
-@pytest.mark.parametrize("niceness", [-10, 5])
-def test_what_hears_the_phone_runs_before_others_where_that_is_permitted(program, niceness):
-    child = Child("listens", program(SLEEPER), niceness=niceness)
-    own = os.getpriority(os.PRIO_PROCESS, 0)
-    got = niceness if niceness >= own or may_go_before() else own
+RR_1 = "os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))"
+CLASS_AND_NICENESS = "print(os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0))"
+
+
+def test_what_hears_the_phone_runs_before_others_where_that_is_permitted(program):
+    child = Child("listens", program(SLEEPER), is_prompt=True)
+    policy = int(asked(RR_1, "print(os.sched_getscheduler(0))") or os.SCHED_OTHER)
+    niceness = int(
+        asked(
+            "os.setpriority(os.PRIO_PROCESS, 0, -10)", "print(os.getpriority(os.PRIO_PROCESS, 0))"
+        )
+        or os.getpriority(os.PRIO_PROCESS, 0)
+    )
     group = Path(f"/proc/{os.getpid()}/autogroup")
     try:
         child.revive(0.0)
         pid = child.process.pid
-        wait_for(lambda: os.getpriority(os.PRIO_PROCESS, pid) == got)
+        wait_for(lambda: os.getpriority(os.PRIO_PROCESS, pid) == niceness)
+        wait_for(lambda: os.sched_getscheduler(pid) == policy)
+        assert os.sched_getparam(pid).sched_priority == (1 if policy == os.SCHED_RR else 0)
         if group.exists() and "nice" in group.read_text():
             words = Path(f"/proc/{pid}/autogroup")
-            wait_for(lambda: int(words.read_text().split()[-1]) == got)
+            wait_for(lambda: int(words.read_text().split()[-1]) == niceness)
     finally:
         child.stop()
+
+
+@pytest.mark.parametrize("by", ["raise_niceness(0)", "set_niceness(-10)"])
+def test_no_child_keeps_real_time_that_it_inherited(by):
+    """Whatever its niceness: a bomb that a decoder works on is not to go before others."""
+    ask = f"from server.common.child import {by.partition('(')[0]}"
+    inherited = ["import contextlib", "with contextlib.suppress(OSError):", f"    {RR_1}"]
+    assert asked(*inherited, ask, by, CLASS_AND_NICENESS).split()[0] == str(os.SCHED_OTHER)
 
 
 @pytest.mark.parametrize("inherited", [-10, 0, 15])
