@@ -79,18 +79,27 @@ class RobotFileError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ros2Parameters:
-    """Where a base of ROS 2 listens and speaks: whole names of its topics, with a stroke before."""
+    """Where a robot of ROS 2 listens and speaks: whole names of its topics, a stroke before."""
 
     domain: int
     command: str
+    message: str
+    """Twist, TwistStamped or PoseStamped."""
     frame: str
-    """Of the header of a TwistStamped; "": it takes a Twist."""
+    """Of the header of a TwistStamped; of an arm's base, by whose joints it says where it is."""
     imu: str
     """"": it has none."""
     R_bi: Array
     """(3, 3) from the axes of its motion sensors to the body's."""
     odometry: str
     """"": it tells none."""
+    joint_states: str
+    """The same."""
+
+    @property
+    def takes_pose(self) -> bool:
+        """It is told where to be, not how to move."""
+        return self.message == "PoseStamped"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -509,10 +518,12 @@ def _ros2(section: Ros2Section | None) -> Ros2Parameters:
     return Ros2Parameters(
         domain=section.domain,
         command=whole(section.command),
-        frame=section.frame if section.stamped else "",
+        message=section.message,
+        frame=section.frame,
         imu=whole(section.imu) if section.imu is not None else "",
         R_bi=R_from_axes(section.imu_axes),
         odometry=whole(section.odometry) if section.odometry is not None else "",
+        joint_states=whole(section.joint_states) if section.joint_states is not None else "",
     )
 
 

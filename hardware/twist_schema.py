@@ -119,16 +119,17 @@ LEVEL = "false: it is led about {axis}, so it does not stand level"
 
 
 class Ros2Section(Section):
-    """[link.ros2]: where a base of ROS 2 listens and speaks; see `link/ros2/`."""
+    """[link.ros2]: where a robot of ROS 2 listens and speaks; see `link/ros2/`."""
 
     domain: Annotated[int, Field(ge=0, le=232)] = 0
-    """ROS_DOMAIN_ID of the base."""
+    """ROS_DOMAIN_ID of the robot."""
     namespace: Annotated[str, Field(pattern=f"^(/|{ROS_NAME})$", max_length=200)] = "/"
     command: RosName = "cmd_vel"
-    """geometry_msgs/Twist, or TwistStamped if ..."""
-    stamped: bool = False
+    """What it takes ..."""
+    message: Literal["Twist", "TwistStamped", "PoseStamped"] = "Twist"
+    """... of geometry_msgs; a pose where it says that it is in its odometry's frame."""
     frame: Annotated[str, Field(pattern=r"^[!-~]{1,100}$")] = "base_link"
-    """... in the header of a TwistStamped."""
+    """In the header of a TwistStamped; of a PoseStamped by joint_states."""
     imu: RosName | None = None
     """sensor_msgs/Imu, of the body; only of a base with [motion] there is none."""
     imu_axes: Annotated[
@@ -137,6 +138,8 @@ class Ros2Section(Section):
     """Along which axis of its motion sensors each of the body's lies."""
     odometry: RosName | None = None
     """nav_msgs/Odometry; without it the robot is taken to move as told, after its delay and lag."""
+    joint_states: RosName | None = None
+    """sensor_msgs/JointState of an arm, in place of odometry: [arm] says what its joints move."""
 
 
 class FrankaSection(Section):
@@ -255,7 +258,7 @@ def twist_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
     for kind in ("ros2", "franka", "mavlink"):
         if robot.link.kind != kind and getattr(robot.link, kind) is not None:
             yield f"link.{kind}", f"only with kind = {kind!r}, not {robot.link.kind!r}"
-    yield from _ros2_clashes(robot.link, robot.motion)
+    yield from _ros2_clashes(robot.link, robot.motion, robot.arm)
     yield from _franka_clashes(robot)
     yield from _mavlink_clashes(robot)
     if len(set(robot.axes)) < len(robot.axes):
@@ -304,7 +307,7 @@ def _mavlink_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
 
 
 def _ros2_clashes(
-    link: TwistLinkSection, motion: MotionSection | None
+    link: TwistLinkSection, motion: MotionSection | None, arm: ArmSection | None
 ) -> Iterator[tuple[str, str]]:
     if link.kind != "ros2":
         return
@@ -317,10 +320,21 @@ def _ros2_clashes(
         yield "link.ros2.imu", "none of a base with [motion], which has no motion sensors"
     elif fault := axes_fault(topics.imu_axes):
         yield "link.ros2.imu_axes", fault
-    if motion is not None and (motion.twist == "measured") != (topics.odometry is not None):
+    says = [key for key in ("odometry", "joint_states") if getattr(topics, key) is not None]
+    if len(says) > 1:
+        yield "link.ros2.joint_states", "none beside odometry: one of them says how it moves"
+    if topics.joint_states is not None and arm is None:
+        yield "arm", "missing: the model of the arm, by which link.ros2.joint_states move its tip"
+    if motion is not None and (motion.twist == "measured") != bool(says):
         is_measured = motion.twist == "measured"
         allowed = "missing: topic of the nav_msgs/Odometry that" if is_measured else "none where"
-        yield "link.ros2.odometry", f"{allowed} motion.twist = {motion.twist!r}"
+        key = says[0] if says else "odometry"
+        yield f"link.ros2.{key}", f"{allowed} motion.twist = {motion.twist!r}"
+    if topics.message == "PoseStamped" and not says:
+        yield (
+            "link.ros2.message",
+            "'PoseStamped' with odometry or joint_states, which say where",
+        )
 
 
 def _franka_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:

@@ -32,6 +32,7 @@ import numpy as np
 from hardware.follower import NOT_MEASURED, BodySample, Refusal, RobotCommand
 from hardware.link.gate_here import GateHere
 from hardware.link.stamp_clock import StampClock
+from hardware.pose_setpoint import BasePose
 from hardware.presumed_twist import PresumedTwist
 from hardware.robot_file import RobotFile
 from pipeline.frames import Array, Triple, triple
@@ -64,7 +65,7 @@ class HeardImu:
 
 @dataclass(frozen=True, slots=True)
 class HeardOdometry:
-    """The twist of a message of its odometry."""
+    """How a base moves, by its wheels, joints or whatever it has."""
 
     writer: Hashable
     twist_in_b: tuple[float, float, float, float, float, float]
@@ -73,6 +74,23 @@ class HeardOdometry:
     """On its own clock [µs], 0: not dated."""
     at: float | None = None
     """As of `HeardImu`."""
+    pose: BasePose | None = None
+    """Where it is; None: it does not say, or nobody wants to know."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeardJoints:
+    """A message of an arm's joints, of which `ros2/joint_odometry.py` makes the other."""
+
+    writer: Hashable
+    """Whose."""
+    stamp_us: int
+    """On its own clock [µs], 0: not dated."""
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+    """[rad]; it may have none."""
+    velocities: tuple[float, ...]
+    """[rad/s]; many have none."""
 
 
 Writer = TypeVar("Writer", bound=Hashable)
@@ -99,17 +117,26 @@ class BaseEnd:
     """Turns commands into twists, and messages of a base into samples. Times are [s], monotonic."""
 
     def __init__(
-        self, robot_file: RobotFile, epoch: int, R_bi: Array, *, has_odometry: bool
+        self,
+        robot_file: RobotFile,
+        epoch: int,
+        R_bi: Array,
+        *,
+        has_odometry: bool,
+        says_where: bool = False,
     ) -> None:
         """Nothing said, nothing heard.
 
-        `R_bi` (3, 3) is from the axes of its motion sensors to the body's.
+        `R_bi` (3, 3) is from the axes of its motion sensors to the body's; `says_where`: odometry
+        without a pose is none.
         """
         drive = robot_file.robot.twist
         assert drive is not None  # it takes a twist
         self._presumed = PresumedTwist(drive)
         self._gate, self._clock = GateHere(robot_file, epoch), StampClock()
-        self._R_bi, self._has_odometry = R_bi, has_odometry
+        self._R_bi, self._has_odometry, self._says_where = R_bi, has_odometry, says_where
+        self.pose: BasePose | None = None
+        """Where it said last that it is."""
         self._imu_writer = FirstWriter[Hashable]()
         self._odometry_writer = FirstWriter[Hashable]()
         self._twist_in_b, self._twist_at = np.zeros(6), -np.inf
@@ -156,7 +183,8 @@ class BaseEnd:
         if isinstance(heard, HeardImu):
             return self._hear_imu(heard, now)
         before = self._odometry_writer.writer
-        if _can_be(*heard.twist_in_b) and self._odometry_writer.admits(heard.writer, now):
+        can_be = _can_be(*heard.twist_in_b) and self._says_enough(heard.pose)
+        if can_be and self._odometry_writer.admits(heard.writer, now):
             self._hear_odometry(heard, before not in (None, heard.writer), now)
         else:
             self._dropped += 1
@@ -186,7 +214,7 @@ class BaseEnd:
                 self._dropped += 1
                 return
             dated = _earliest(on_ours, heard.at, now)
-        self._twist_in_b, self._twist_at = np.array(heard.twist_in_b), now
+        self._twist_in_b, self._twist_at, self.pose = np.array(heard.twist_in_b), now, heard.pose
         self._t_measured = dated
 
     def _hear_imu(self, heard: HeardImu, now: float) -> BodySample | None:
@@ -205,6 +233,11 @@ class BaseEnd:
             self._dropped += 1
             return None
         return self._sample(heard, _earliest(dated, heard.at, now), now)
+
+    def _says_enough(self, pose: BasePose | None) -> bool:
+        if pose is None:
+            return not self._says_where
+        return _can_be(*pose.p_bk_in_k.tolist(), *pose.R_kb.ravel().tolist())
 
     def _begin(self) -> None:
         """With a base that has just started, for all we know."""

@@ -1,4 +1,4 @@
-"""A base of ROS 2 by Fast DDS (Apache-2.0), from Debian's packages, built when asked for."""
+"""Robots of ROS 2 by Fast DDS (Apache-2.0), from Debian's packages, built when asked for."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class NoFastDdsError(RuntimeError):
     """It can't be had here; says why."""
 
 
-def program() -> Path:
-    """The base, built once: some seconds.
+def program(name: str = "base") -> Path:
+    """`base` or `arm`, built once: some seconds.
 
     Raises:
         NoFastDdsError: no packages, or they are of another release.
     """
-    sources = [SOURCE / "base.idl", SOURCE / "base.cpp"]
+    sources = [SOURCE / "base.idl", SOURCE / f"{name}.cpp"]
     made_of = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:12]
-    built = FOLDER / f"fastdds-{made_of}" / "base"
+    built = FOLDER / f"fastdds-{made_of}" / name
     if built.exists():
         return built
     why = "" if _is_there() else next(filter(None, map(install, PACKAGES)), "")
@@ -39,9 +39,9 @@ def program() -> Path:
         _run(["fastddsgen", "-replace", "-d", folder, str(sources[0])])
         made = [str(path) for path in Path(folder).glob("*.cxx")]
         words = ["g++", "-std=c++17", "-O1", "-w", "-I", folder, str(sources[1]), *made]
-        _run([*words, "-o", f"{folder}/base", "-lfastrtps", "-lfastcdr", "-pthread"])
+        _run([*words, "-o", f"{folder}/{name}", "-lfastrtps", "-lfastcdr", "-pthread"])
         built.parent.mkdir(parents=True, exist_ok=True)
-        shutil.move(f"{folder}/base", built)
+        shutil.move(f"{folder}/{name}", built)
     return built
 
 
@@ -60,10 +60,10 @@ def _run(command: list[str]) -> None:
 class FastDdsBase:
     """A running one."""
 
-    def __init__(self, domain: int, below: str, *words: str) -> None:
-        """`words`: of "stamped" and "garbage"."""
+    def __init__(self, domain: int, below: str, *words: str, name: str = "base") -> None:
+        """`words`: of "stamped" and "garbage"; an `arm` has none."""
         self._process = subprocess.Popen(
-            [str(program()), str(domain), below, *words],
+            [str(program(name)), str(domain), below, *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=dict(os.environ),

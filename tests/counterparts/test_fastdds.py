@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip("cyclonedds", reason="NO CYCLONE DDS: pip install 'lightleash[ros2]'")
 
@@ -14,11 +15,14 @@ from hardware.link.address import ANYBODY
 from hardware.link.base_end import HeardImu, HeardOdometry
 from hardware.link.registry import connect
 from hardware.link.ros2.ports import RosPorts
+from hardware.pose_setpoint import BasePose
+from pipeline.frames import wxyz_from_R
 from tests.counterparts.fastdds_base import FastDdsBase, NoFastDdsError, program
 from tests.hardware.link.ros2.ros2_rig import (
     BELOW,
     LOCALHOST,
     PATIENCE_S,
+    arm_robot,
     patiently,
     ros2_robot,
 )
@@ -50,7 +54,7 @@ def told(base):
 @pytest.mark.parametrize("host", [LOCALHOST, ANYBODY])
 @pytest.mark.parametrize("words", [(), ("stamped",)])
 def test_it_hears_each_twist_once_bit_by_bit_and_what_it_says_is_heard(host, words):
-    topics = ros2_robot(stamped=bool(words)).link.ros2
+    topics = ros2_robot(message="TwistStamped" if words else "Twist").link.ros2
     ports = RosPorts(topics, host)
     base, heard = FastDdsBase(topics.domain, BELOW, *words), []
     for _ in patiently():
@@ -73,6 +77,33 @@ def test_it_hears_each_twist_once_bit_by_bit_and_what_it_says_is_heard(host, wor
     assert {(*one.omega_in_i, *one.a_in_i) for one in imus} == {SAYS}
     assert (np.diff([one.stamp_us for one in imus]) > 0).all()
     assert moves <= {(0.0,) * 6, FIRST}
+
+
+def test_an_arm_hears_each_pose_once_bit_by_bit_and_its_joints_are_heard():
+    topics = arm_robot(command="target").link.ros2
+    ports, arm = RosPorts(topics, LOCALHOST), FastDdsBase(topics.domain, BELOW, name="arm")
+    heard = []
+    for _ in patiently():
+        heard += ports.heard()
+        if heard and ports.tell_pose(None):
+            break
+    rng, wanted = np.random.default_rng(2), []
+    for _ in range(100):
+        pose = BasePose(Rotation.random(rng=rng).as_matrix(), rng.normal(size=3), "odom")
+        assert ports.tell_pose(pose)
+        w, x, y, z = wxyz_from_R(pose.R_kb)
+        wanted.append([*pose.p_bk_in_k, x, y, z, w])
+        time.sleep(0.005)
+    time.sleep(0.5)
+    ports.close()
+    lines = [line.split() for line in arm.end()]
+    assert {(line[0], line[3]) for line in lines} == {("pose", "odom")}
+    assert np.array_equal([[float.fromhex(one) for one in line[4:]] for line in lines], wanted)
+    assert int(lines[-1][1]) == pytest.approx(time.time(), abs=PATIENCE_S)
+    assert {(one.names, one.positions, one.velocities) for one in heard} == {
+        (("gripper", "lift", "turn"), (0.125, -0.5, 1.75), (0.0, 0.25, -1.5))
+    }
+    assert (np.diff([one.stamp_us for one in heard]) > 0).all()
 
 
 class Led:

@@ -11,14 +11,18 @@ from typing import TYPE_CHECKING
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import array, float64, int32, uint32
+from cyclonedds.idl.types import array, float64, int32, sequence, uint32
 
 if TYPE_CHECKING:
     Nine = list[float]
     Square = list[float]
+    Names = list[str]
+    Numbers = list[float]
 else:
     Nine = array[float64, 9]
     Square = array[float64, 36]
+    Names = sequence[str]
+    Numbers = sequence[float64]
 
 UNREADABLE = (struct.error, ValueError, IndexError, OverflowError, MemoryError)
 """What Cyclone DDS raises for bytes that are no such message; it reads them in Python."""
@@ -112,6 +116,27 @@ class RosPose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
 
     position: RosPoint
     orientation: RosQuaternion
+
+
+@dataclass
+@final
+class RosPoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
+    """geometry_msgs/PoseStamped."""
+
+    header: RosHeader
+    pose: RosPose
+
+
+@dataclass
+@final
+class RosJointState(IdlStruct, typename="sensor_msgs::msg::dds_::JointState_"):
+    """sensor_msgs/JointState [rad, rad/s, N m]; each of the last three may be empty."""
+
+    header: RosHeader
+    name: Names
+    position: Numbers
+    velocity: Numbers
+    effort: Numbers
 
 
 @dataclass

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -28,23 +29,33 @@ from cyclonedds.topic import Topic
 
 from hardware.follower import FollowerError
 from hardware.link.address import ANYBODY, address_of
-from hardware.link.base_end import HeardImu, HeardOdometry
+from hardware.link.base_end import HeardImu, HeardJoints, HeardOdometry
 from hardware.link.ros2.messages import (
     UNREADABLE,
     RosHeader,
     RosImu,
+    RosJointState,
     RosOdometry,
+    RosPoint,
+    RosPose,
+    RosPoseStamped,
+    RosQuaternion,
     RosTime,
     RosTwist,
     RosTwistStamped,
     RosVector3,
 )
+from hardware.pose_setpoint import BasePose
 from hardware.robot_file import Ros2Parameters
-from pipeline.frames import Array, Triple
+from pipeline.frames import Array, R_from_wxyz, Triple, wxyz_from_R
 
 MOST_MESSAGES = 128
 """Of a topic, taken at once; what came before is overwritten."""
 NS_PER_S, NS_PER_US = 1_000_000_000, 1_000
+TOLD = {"Twist": RosTwist, "TwistStamped": RosTwistStamped, "PoseStamped": RosPoseStamped}
+"""By `link.ros2.message`."""
+ROUGHLY_ONE = 1e-3
+"""By so much the norm of a quaternion may be off."""
 MISSING = -1.0  # what begins the covariance of something that is not measured
 AS_ROS = Policy.DataRepresentation(use_cdrv0_representation=True)
 LASTS_NS = 40_000_000
@@ -79,12 +90,13 @@ class Opened:
     writer: DataWriter[Any]
     imu: DataReader[Any] | None
     odometry: DataReader[Any] | None
+    joints: DataReader[Any] | None
     participant: DomainParticipant
     domain: Domain
 
 
 class RosPorts:
-    """A participant of a domain: one topic out, two, one or none in."""
+    """A participant of a domain: one topic out, up to two in."""
 
     def __init__(
         self,
@@ -98,7 +110,7 @@ class RosPorts:
         Raises:
             FollowerError: no such address, or DDS can't be had on this machine's network.
         """
-        self._frame, self._wall_ns = topics.frame, wall_ns
+        self._message, self._frame, self._wall_ns = topics.message, topics.frame, wall_ns
         settings = _settings(address_of(host, "found by multicast"))
         try:
             self._opened: Opened | None = _open(topics, settings, tells)
@@ -107,34 +119,53 @@ class RosPorts:
             allowed = "a network that is up, CYCLONEDDS_URI unset or right, one link to a domain"
             raise FollowerError(what, allowed) from error
 
-    def heard(self) -> Iterator[HeardImu | HeardOdometry | None]:
-        """What has arrived, odometry first; None for each that can't be read."""
+    def heard(self) -> Iterator[HeardImu | HeardOdometry | HeardJoints | None]:
+        """What has arrived, odometry or joints first; None for each that can't be read."""
         assert self._opened is not None
         if self._opened.odometry is not None:
+            wants_pose = self._message == "PoseStamped"
             for taken in _taken(self._opened.odometry):
-                yield None if taken is None else _odometry(*taken)
+                yield None if taken is None else _odometry(*taken, wants_pose=wants_pose)
+        if self._opened.joints is not None:
+            for taken in _taken(self._opened.joints):
+                yield None if taken is None else _joints(*taken)
         if self._opened.imu is not None:
             for taken in _taken(self._opened.imu):
                 yield None if taken is None else _imu(*taken)
 
     def tell(self, twist_in_b: Array) -> bool:
         """Publish a twist (6,) [m/s, rad/s]; False: nobody listens, or the way is down."""
-        assert self._opened is not None
-        writer, values = self._opened.writer, twist_in_b.tolist()
+        values = twist_in_b.tolist()
         twist = RosTwist(RosVector3(*values[:3]), RosVector3(*values[3:]))
-        try:
-            writer.write(self._headed(twist) if self._frame else twist)
-        except DDSException:  # the way is down or full
-            return False
-        return bool(writer.get_publication_matched_status().current_count)
+        if self._message == "Twist":
+            return self._write(twist)
+        return self._write(RosTwistStamped(self._header(self._frame), twist))
+
+    def tell_pose(self, pose: BasePose | None) -> bool:
+        """Publish a pose, or nothing; gives the same."""
+        if pose is None:
+            return self._write(None)
+        w, x, y, z = wxyz_from_R(pose.R_kb)
+        place, attitude = RosPoint(*pose.p_bk_in_k.tolist()), RosQuaternion(x, y, z, w)
+        return self._write(RosPoseStamped(self._header(pose.frame), RosPose(place, attitude)))
 
     def close(self) -> None:
         """Leave the domain; may be called twice."""
         self._opened = None
 
-    def _headed(self, twist: RosTwist) -> RosTwistStamped:
+    def _write(self, message: RosTwist | RosTwistStamped | RosPoseStamped | None) -> bool:
+        assert self._opened is not None
+        writer = self._opened.writer
+        try:
+            if message is not None:
+                writer.write(message)
+        except DDSException:  # the way is down or full
+            return False
+        return bool(writer.get_publication_matched_status().current_count)
+
+    def _header(self, frame: str) -> RosHeader:
         sec, nanosec = divmod(self._wall_ns(), NS_PER_S)
-        return RosTwistStamped(RosHeader(RosTime(sec, nanosec), self._frame), twist)
+        return RosHeader(RosTime(sec, nanosec), frame)
 
 
 def _settings(address: str) -> str:
@@ -154,13 +185,16 @@ def _open(topics: Ros2Parameters, settings: str, tells: Qos) -> Opened:
     def topic(name: str, message: type[Any]) -> Topic[Any]:
         return Topic(participant, f"rt{name}", message)
 
-    told = topic(topics.command, RosTwistStamped if topics.frame else RosTwist)
-    imu = odometry = None
+    told = topic(topics.command, TOLD[topics.message])
+    imu = odometry = joints = None
     if topics.imu:
         imu = DataReader(participant, topic(topics.imu, RosImu), qos=HEARS)
     if topics.odometry:
         odometry = DataReader(participant, topic(topics.odometry, RosOdometry), qos=HEARS)
-    return Opened(DataWriter(participant, told, qos=tells), imu, odometry, participant, domain)
+    if topics.joint_states:
+        joints = DataReader(participant, topic(topics.joint_states, RosJointState), qos=HEARS)
+    writer = DataWriter(participant, told, qos=tells)
+    return Opened(writer, imu, odometry, joints, participant, domain)
 
 
 def _taken(reader: DataReader[Any]) -> Iterator[tuple[int, Any] | None]:
@@ -191,10 +225,30 @@ def _imu(writer: int, message: RosImu) -> HeardImu:
     )
 
 
-def _odometry(writer: int, message: RosOdometry) -> HeardOdometry:
+def _odometry(writer: int, message: RosOdometry, *, wants_pose: bool) -> HeardOdometry:
     twist = message.twist.twist
     values = (*_vector(twist.linear), *_vector(twist.angular))
-    return HeardOdometry(writer, values, _stamp_us(message.header))
+    pose = _pose(message.pose.pose, message.header.frame_id) if wants_pose else None
+    return HeardOdometry(writer, values, _stamp_us(message.header), pose=pose)
+
+
+def _pose(pose: RosPose, frame: str) -> BasePose | None:
+    """None: its quaternion is none, as in messages whose pose nobody filled in."""
+    place, turned = pose.position, pose.orientation
+    wxyz = np.array([turned.w, turned.x, turned.y, turned.z])
+    if not abs(float(np.linalg.norm(wxyz)) - 1.0) < ROUGHLY_ONE:
+        return None
+    return BasePose(R_from_wxyz(wxyz), np.array([place.x, place.y, place.z]), frame)
+
+
+def _joints(writer: int, message: RosJointState) -> HeardJoints:
+    return HeardJoints(
+        writer,
+        _stamp_us(message.header),
+        tuple(message.name),
+        tuple(message.position),
+        tuple(message.velocity),
+    )
 
 
 def _stamp_us(header: RosHeader) -> int:

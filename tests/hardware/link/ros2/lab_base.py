@@ -18,17 +18,20 @@ import numpy as np
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import array, float64, int32, uint32
+from cyclonedds.idl.types import array, float64, int32, sequence, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from scipy.spatial.transform import Rotation
 
 from hardware.robot_file import COMMANDS, load_robot
 from hardware.sim.plant.twist_plant import TwistPlant
 
 PERIOD_S = 0.005
 TIMEOUT_S = 0.06
+FOLLOWS_S = 0.05
+"""Time constant by which it goes to a pose."""
 RELIABLE = Policy.Reliability.Reliable(100_000_000)
 DEFAULT = Qos(RELIABLE, Policy.Durability.Volatile, Policy.History.KeepLast(10))
 PATIENT = Qos(RELIABLE, Policy.Durability.Volatile, Policy.History.KeepLast(1000))
@@ -36,13 +39,13 @@ PATIENT = Qos(RELIABLE, Policy.Durability.Volatile, Policy.History.KeepLast(1000
 SENSORS = Qos(Policy.Reliability.BestEffort, Policy.Durability.Volatile, Policy.History.KeepLast(5))
 
 
-def named(name):
+def named(name, /):
     """package/Name as rmw calls it."""
     package, _, message = name.partition("/")
     return f"{package}::msg::dds_::{message}_"
 
 
-def message(name, **fields):
+def message(name, /, **fields):
     """A message of these fields, each a type, as `rosidl` would make it."""
     made = type(
         name.replace("/", "_"), (IdlStruct,), {"__annotations__": fields}, typename=named(name)
@@ -58,6 +61,15 @@ Quaternion = message("geometry_msgs/Quaternion", x=float64, y=float64, z=float64
 Twist = message("geometry_msgs/Twist", linear=Vector3, angular=Vector3)
 TwistStamped = message("geometry_msgs/TwistStamped", header=Header, twist=Twist)
 Pose = message("geometry_msgs/Pose", position=Point, orientation=Quaternion)
+PoseStamped = message("geometry_msgs/PoseStamped", header=Header, pose=Pose)
+JointState = message(
+    "sensor_msgs/JointState",
+    header=Header,
+    name=sequence[str],
+    position=sequence[float64],
+    velocity=sequence[float64],
+    effort=sequence[float64],
+)
 PoseWithCovariance = message(
     "geometry_msgs/PoseWithCovariance", pose=Pose, covariance=array[float64, 36]
 )
@@ -107,36 +119,70 @@ def imu_message(stamp, omega, a, gyro_missing=False):
     return Imu(header(stamp, "imu"), NOTHING, none, Vector3(*omega), gyro, Vector3(*a), 9 * [0.0])
 
 
-def odometry_message(stamp, twist):
-    pose = PoseWithCovariance(Pose(Point(0.0, 0.0, 0.0), NOTHING), 36 * [0.0])
+def pose_of(R, p):
+    return Pose(Point(*p.tolist()), Quaternion(*Rotation.from_matrix(R).as_quat().tolist()))
+
+
+NOWHERE = Pose(Point(0.0, 0.0, 0.0), NOTHING)
+
+
+def odometry_message(stamp, twist, where=NOWHERE):
+    pose = PoseWithCovariance(where, 36 * [0.0])
     moves = TwistWithCovariance(Twist(Vector3(*twist[:3]), Vector3(*twist[3:])), 36 * [0.0])
     return Odometry(header(stamp, "odom"), "base_link", pose, moves)
+
+
+class PoseBody:
+    """Goes where it is told by a first-order lag, as arms do; it feels nothing."""
+
+    def __init__(self, R_fb=None, p_in_f=(0.3, -0.2, 0.5)):
+        self.R_fb = np.eye(3) if R_fb is None else R_fb
+        self.p_in_f, self.twist_in_b = np.array(p_in_f), np.zeros(6)
+
+    def step(self, goal, dt):
+        self.twist_in_b = np.zeros(6)
+        if goal is None:
+            return
+        place, turned = goal.position, goal.orientation
+        R_goal = Rotation.from_quat([turned.x, turned.y, turned.z, turned.w]).as_matrix()
+        to_go = np.array([place.x, place.y, place.z]) - self.p_in_f
+        to_turn = Rotation.from_matrix(self.R_fb.T @ R_goal).as_rotvec()
+        share = 1.0 - np.exp(-dt / FOLLOWS_S)
+        self.twist_in_b = np.concatenate((self.R_fb.T @ to_go, to_turn)) * share / dt
+        self.p_in_f = self.p_in_f + share * to_go
+        self.R_fb = self.R_fb @ Rotation.from_rotvec(share * to_turn).as_matrix()
 
 
 class LabBase:
     """Moves, feels and speaks when it is told that time has passed."""
 
-    def __init__(self, domain, body, drive, below="", stamped=False, odometry=True):
+    def __init__(self, domain, body, drive, below="", kind=Twist, odometry=True):
         self.participant = DomainParticipant(domain)
-        kind = TwistStamped if stamped else Twist
         told = Topic(self.participant, f"rt{below}/cmd_vel", kind)
         self.commands = DataReader(self.participant, told, qos=PATIENT)
         imu = Topic(self.participant, f"rt{below}/imu", Imu)
         self.imu = DataWriter(self.participant, imu, qos=SENSORS)
         odom = Topic(self.participant, f"rt{below}/odom", Odometry)
         self.odometry = DataWriter(self.participant, odom, qos=DEFAULT) if odometry else None
-        self.body, self.drive, self.stamped = body, drive, stamped
-        self.told, self.heard_at = np.zeros(6), -1.0
+        self.body, self.drive, self.kind = body, drive, kind
+        self.told, self.goal, self.heard_at = np.zeros(6), None, -1.0
         self.connected = True
         self.taken = []
-        """Each command: when it was taken, its stamp, its twist (6,)."""
+        """Each command: when it was taken, its stamp, its twist (6,) or pose."""
 
     def listen(self, now):
         for one in self.commands.take(100):
             if not one.sample_info.valid_data or not self.connected:
                 continue
-            stamp = one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec if self.stamped else None
-            twist = one.twist if self.stamped else one
+            stamp = None
+            if self.kind is not Twist:
+                stamp = one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec
+            if self.kind is PoseStamped:
+                assert one.header.frame_id == "odom"
+                self.goal = one.pose
+                self.taken.append((now, stamp, one.pose))
+                continue
+            twist = one.twist if stamp is not None else one
             v, omega = twist.linear, twist.angular
             self.told, self.heard_at = np.array([v.x, v.y, v.z, omega.x, omega.y, omega.z]), now
             self.taken.append((now, stamp, self.told))
@@ -146,13 +192,18 @@ class LabBase:
         self.listen(now)
         if now - self.heard_at > TIMEOUT_S:
             self.told = self.drive.toward(self.told, np.zeros(6), PERIOD_S)
-        self.body.step(self.told, PERIOD_S)
+        self.body.step(self.goal if self.kind is PoseStamped else self.told, PERIOD_S)
         if self.connected:
             self.speak(stamp)
 
     def speak(self, stamp):
         if self.odometry is not None:
-            self.odometry.write(odometry_message(stamp, self.body.twist_in_b.tolist()))
+            twist = self.body.twist_in_b.tolist()
+            if self.kind is PoseStamped:  # of which odometry alone says how it moves
+                where = pose_of(self.body.R_fb, self.body.p_in_f)
+                self.odometry.write(odometry_message(stamp, twist, where))
+                return
+            self.odometry.write(odometry_message(stamp, twist))
         omega, a = self.body.imu()
         self.imu.write(imu_message(stamp, omega.tolist(), a.tolist()))
 

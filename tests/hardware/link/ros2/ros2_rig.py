@@ -9,10 +9,10 @@ import time
 from cyclonedds.qos import Policy, Qos
 
 from hardware.link.ros2.ports import TELLS, RosPorts
-from hardware.link.ros2.ros2_follower import Ros2Follower, end_of
+from hardware.link.ros2.ros2_follower import Ros2Follower, follower_of
 from hardware.robot_file import COMMANDS, load_robot, robot_of, robot_path, robot_table
 from tests.hardware.link.flight import FollowerFlight
-from tests.hardware.link.ros2.lab_base import LabBase, twister
+from tests.hardware.link.ros2.lab_base import LabBase, PoseBody, PoseStamped, twister
 
 LOCALHOST = "127.0.0.1"
 STAMP_AHEAD_S = 1_700_000_000.0
@@ -52,6 +52,28 @@ def ros2_robot(**changes):
     return robot_of(table | {"link": link}, "ros2.toml")
 
 
+def pose_robot(**changes):
+    """The same without motion sensors, which takes poses and says where it is."""
+    robot_file = ros2_robot(**changes)
+    table = robot_table(robot_path("twister"))
+    del table["body_imu"]
+    motion = {"twist": "measured", "rate_hz": 200.0, "stands_level": False}
+    section = {"domain": robot_file.link.ros2.domain, "namespace": BELOW, "odometry": "odom"}
+    section |= {"message": "PoseStamped"} | changes
+    link = {"kind": "ros2", "takes": "twist", "host": LOCALHOST, "ros2": section}
+    return robot_of(table | {"link": link, "motion": motion}, "ros2.toml")
+
+
+def arm_robot(**changes):
+    """The arm that ships, without its gripper: its joints say where it is, it is told poses."""
+    table = robot_table(robot_path("so101"))
+    del table["tool"], table["arm"]["tool_joint"], table["arm"]["tool_stroke_s"]
+    section = {"domain": new_domain(), "namespace": BELOW, "joint_states": "joint_states"}
+    section |= {"message": "PoseStamped"} | changes
+    link = {"kind": "ros2", "takes": "twist", "host": LOCALHOST, "ros2": section}
+    return robot_of(table | {"link": link}, str(robot_path("so101")))
+
+
 class Ros2Rig:
     def __init__(self, robot_file=None, seed: int = 0, tells: Qos = TIMELESS, **base) -> None:
         self.robot_file = robot_file or ros2_robot()
@@ -61,13 +83,14 @@ class Ros2Rig:
         self._tells = tells
         self.follower = self.leader(1)
         self.body, drive = twister(seed)
+        if base.get("kind") is PoseStamped:
+            self.body = PoseBody()
         self.base = LabBase(self.topics.domain, self.body, drive, **{"below": BELOW} | base)
 
     def leader(self, epoch: int) -> Ros2Follower:
         """A control process's end; its domain is new, and ends with it."""
         ports = RosPorts(self.topics, LOCALHOST, lambda: round(1e9 * self.stamp), self._tells)
-        end = end_of(self.robot_file, self.topics, epoch)
-        return Ros2Follower(ports, end, lambda: self.now)
+        return follower_of(self.robot_file, self.topics, ports, epoch, lambda: self.now)
 
     @property
     def stamp(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import replace
 
@@ -16,14 +17,32 @@ from cyclonedds.qos import Policy
 from cyclonedds.topic import Topic
 
 from hardware.contract import TwistFollowerContract, exchange
+from hardware.contract.of_twists import SETTLE_S, SILENT_S
 from hardware.follower import FollowerError, FollowerState, TwistCommand
 from hardware.link.address import ANYBODY
 from hardware.link.registry import connect
 from hardware.link.robot_end import LinkLimits
 from hardware.link.ros2.messages import RosImu
 from hardware.link.ros2.ports import TELLS
-from tests.hardware.link.ros2.lab_base import DEFAULT, Imu, imu_message, odometry_message
-from tests.hardware.link.ros2.ros2_rig import BELOW, TIMELESS, TWISTER, Ros2Rig, ros2_robot
+from tests.hardware.link.ros2.lab_base import (
+    DEFAULT,
+    Imu,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    TwistStamped,
+    imu_message,
+    odometry_message,
+)
+from tests.hardware.link.ros2.ros2_rig import (
+    BELOW,
+    TIMELESS,
+    TWISTER,
+    Ros2Rig,
+    pose_robot,
+    ros2_robot,
+)
 
 FORWARD = TwistCommand(np.array([0.25, 0.0, 0.0, 0.0, 0.0, 0.5]), armed=True)
 KEY = bytes(16)
@@ -45,9 +64,41 @@ class TestContract(TwistFollowerContract):
 class TestContractOfTwistStamped(TwistFollowerContract):
     @pytest.fixture
     def rig(self):
-        rig = Ros2Rig(ros2_robot(stamped=True), stamped=True)
+        rig = Ros2Rig(ros2_robot(message="TwistStamped"), kind=TwistStamped)
         yield rig
         rig.close()
+
+
+class TestContractOfPoseStamped(TwistFollowerContract):
+    @pytest.fixture
+    def rig(self):
+        rig = pose_rig()
+        yield rig
+        rig.close()
+
+    def test_silence_ends_in_zero_that_only_a_new_handshake_ends(self, rig):
+        """Told nothing more, it goes to its pose and stands: sooner than one that takes a twist."""
+        self.ready(rig)
+        self.fly(rig, 4.0, 0.5)
+        rig.follower.receive()
+        silent = self.listen(rig, SILENT_S + SETTLE_S)
+        assert self.given(silent[2]).min() > 2.0
+        assert self.given(silent[-1]).max() < 0.05
+        rig.advance(0.2)
+        assert rig.follower.receive()[-1].state == FollowerState.REFUSING
+        assert self.given(self.fly(rig, 2.0, 0.5)[-1]).max() < 1e-4
+        self.ready(rig)
+
+    def test_a_lost_link_is_no_error_but_silence(self, rig):
+        """Without motion sensors it is known for 0.1 s and some intervals how it moves."""
+        self.ready(rig)
+        rig.cut_link()
+        self.fly(rig, 1.0, 0.15)
+        assert self.fly(rig, 1.0, 0.2) == []
+
+
+def pose_rig():
+    return Ros2Rig(pose_robot(), kind=PoseStamped)
 
 
 def lead(rig, seconds, command=FORWARD):
@@ -75,11 +126,46 @@ def test_each_command_comes_once_and_as_it_was_given(rig):
 
 
 def test_a_header_has_the_time_at_which_it_was_said():
-    rig = Ros2Rig(ros2_robot(stamped=True), stamped=True)
+    rig = Ros2Rig(ros2_robot(message="TwistStamped"), kind=TwistStamped)
     running(rig)
     lead(rig, 0.1)
     for now, stamp, _ in rig.base.taken:
         assert stamp == pytest.approx(now - 0.005 + rig.stamp - rig.now, abs=1e-6)
+    rig.close()
+
+
+def test_one_that_takes_poses_goes_as_far_as_its_twist_says_and_is_then_left_alone():
+    rig = pose_rig()
+    lead(rig, 0.7, TwistCommand.zero())
+    assert rig.base.taken == []  # whoever else moves it is not pulled back
+    began = rig.body.p_in_f
+    samples = lead(rig, 1.0)
+    lead(rig, 1.0, TwistCommand.zero())
+    told = np.array([sample.twist_in_b for sample in samples])
+    assert told[-1] == pytest.approx(FORWARD.twist_in_b, abs=1e-3)
+    turned = 2.0 * math.asin(rig.base.goal.orientation.z)
+    assert turned == pytest.approx(0.5, abs=0.06)  # it begins and ends within its accelerations
+    radius = 0.25 / 0.5
+    gone = radius * np.array([math.sin(turned), 1.0 - math.cos(turned), 0.0])
+    assert rig.body.p_in_f - began == pytest.approx(gone, abs=5e-3)
+    taken = len(rig.base.taken)
+    lead(rig, 0.5, TwistCommand.zero())
+    assert len(rig.base.taken) == taken
+    rig.close()
+
+
+def test_one_that_takes_poses_is_not_led_without_saying_where_it_is():
+    """A quaternion of zeros is how a driver says that it has no pose."""
+    rig = pose_rig()
+    lead(rig, 0.7, TwistCommand.zero())
+    rig.base.connected = False
+    dropped = rig.follower.dropped
+    for _ in range(100):
+        nowhere = Pose(Point(0.0, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 0.0))
+        rig.base.odometry.write(odometry_message(rig.stamp, 6 * [0.0], nowhere))
+        lead(rig, 0.005)
+    assert rig.follower.dropped == dropped + 100
+    assert rig.base.taken == []
     rig.close()
 
 

@@ -31,17 +31,18 @@ def link_of(section, **link):
 
 def test_most_need_to_be_told_the_topic_of_the_imu_alone():
     topics = link_of({"imu": "imu/data"}).link.ros2
-    assert (topics.domain, topics.command, topics.frame) == (0, "/cmd_vel", "")
-    assert (topics.imu, topics.odometry) == ("/imu/data", "")
+    assert (topics.domain, topics.command, topics.message) == (0, "/cmd_vel", "Twist")
+    assert (topics.imu, topics.odometry, topics.joint_states) == ("/imu/data", "", "")
     assert (topics.R_bi == np.eye(3)).all()
 
 
 @pytest.mark.parametrize("namespace", ["/left/arm", "left/arm"])
 def test_names_are_below_the_namespace_unless_they_begin_with_a_stroke(namespace):
-    section = {"imu": "imu", "odometry": "/odom", "namespace": namespace, "stamped": True}
+    section = {"imu": "imu", "odometry": "/odom", "namespace": namespace, "message": "TwistStamped"}
     topics = link_of(section | {"frame": "tip", "imu_axes": ["y", "-x", "z"]}).link.ros2
     assert topics.command == "/left/arm/cmd_vel"
     assert (topics.imu, topics.odometry, topics.frame) == ("/left/arm/imu", "/odom", "tip")
+    assert topics.message == "TwistStamped"
     assert topics.R_bi.tolist() == [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
 
 
@@ -69,11 +70,43 @@ def test_a_base_without_motion_sensors_has_its_odometry_or_nothing_at_all():
         ({"imu": "imu", "odometry": "odom"}, MEASURED, r"link\.ros2\.imu: none of a base with"),
         ({}, MEASURED, r"link\.ros2\.odometry: missing: .*'measured'"),
         ({"odometry": "odom"}, COMMANDED, r"link\.ros2\.odometry: none where .*'commanded'"),
+        ({"joint_states": "joints"}, MEASURED, r"arm: missing: the model of the arm"),
+        (
+            {"message": "PoseStamped"},
+            COMMANDED,
+            r"link\.ros2\.message: 'PoseStamped' with odometry",
+        ),
     ],
 )
 def test_topics_that_do_not_fit_what_it_tells_are_named(section, motion, words):
     with pytest.raises(RobotFileError, match=words):
         without_sensors(section, motion)
+
+
+def arm_of(section, motion=MEASURED):
+    table = robot_table(robot_path("so101")) | {"motion": motion}
+    del table["tool"], table["arm"]["tool_joint"], table["arm"]["tool_stroke_s"]
+    link = {"kind": "ros2", "takes": "twist", "host": "127.0.0.1", "ros2": section}
+    return robot_of(table | {"link": link}, str(robot_path("so101")))
+
+
+def test_an_arm_says_by_its_joints_where_it_is_and_may_be_told_where_to_be():
+    topics = arm_of({"joint_states": "joint_states", "message": "PoseStamped"}).link.ros2
+    assert (topics.odometry, topics.joint_states) == ("", "/joint_states")
+    assert (topics.takes_pose, topics.frame) == (True, "base_link")
+
+
+@pytest.mark.parametrize(
+    ("section", "motion", "words"),
+    [
+        ({"joint_states": "js", "odometry": "odom"}, MEASURED, r"joint_states: none beside odom"),
+        ({"joint_states": "js"}, COMMANDED, r"link\.ros2\.joint_states: none where"),
+        ({"joint_states": "js", "message": "Pose"}, MEASURED, r"link\.ros2\.message: .*'PoseSt"),
+    ],
+)
+def test_what_an_arm_can_not_say_is_named(section, motion, words):
+    with pytest.raises(RobotFileError, match=words):
+        arm_of(section, motion)
 
 
 MISTAKES: dict[str, tuple] = {
