@@ -10,7 +10,7 @@ braking in silence, delay and lag of `[twist]`) holds of it. What differs:
   wall, it pushes by so much and no more, and comes away at once.
 * At rest nothing is said: whoever else moves the robot is not pulled back. A motion begins where
   the last one ended, so that a robot that sags below what it is told does not sag again each time;
-  if it is elsewhere, where it is.
+  where it is, if it is elsewhere or has started anew: so may its odometry have.
 """
 
 from __future__ import annotations
@@ -53,16 +53,21 @@ class PoseSetpoint:
         self._farthest = drive.speed * behind_s + SAG
         self._farthest_rad = drive.rate * behind_s + SAG_RAD
         self._pose: BasePose | None = None
+        self._start = 0
         self._moved, self._last = -np.inf, -np.inf
 
-    def next(self, twist_in_b: Array, measured: BasePose | None, now: float) -> BasePose | None:
+    def next(
+        self, twist_in_b: Array, measured: BasePose | None, now: float, start: int = 0
+    ) -> BasePose | None:
         """The pose to be told now, for a twist (6,) [m/s, rad/s]; None: say nothing.
 
-        `measured` is where the robot is; None: it has not said so.
+        `measured` is where the robot is; None: it has not said so. `start` counts its starts.
         """
         dt, self._last = min(now - self._last, LONGEST_S), now
         if measured is None:
             return None
+        if start != self._start:
+            self._pose, self._start = None, start
         rests = now - self._moved > REST_S
         if twist_in_b.any():
             if self._pose is None or (rests and self._held(self._pose, measured) is not self._pose):

@@ -150,6 +150,11 @@ class BaseEnd:
         return self._gate.epoch
 
     @property
+    def boot_id(self) -> int:
+        """Another one with each start of the base, for all we know."""
+        return self._gate.boot_id
+
+    @property
     def dropped(self) -> int:
         """Messages that were not the base's, not to be believed, repeated or overtaken."""
         return self._dropped + self._gate.dropped

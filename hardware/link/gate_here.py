@@ -42,6 +42,11 @@ class GateHere:
         """Samples that control's end did not believe."""
         return self._control.dropped
 
+    @property
+    def boot_id(self) -> int:
+        """Another one with each start of the robot."""
+        return self._boot_id
+
     def begin(self) -> None:
         """With a robot that has just started, for all we know."""
         self._boot_id += 1

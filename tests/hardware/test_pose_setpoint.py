@@ -111,6 +111,18 @@ def test_moved_by_somebody_else_it_begins_where_it_is():
     assert led.said[0].R_kb == pytest.approx(np.eye(3))
 
 
+def test_with_another_start_of_the_robot_it_begins_where_that_says_that_it_is():
+    """Its odometry may have begun anew, a little beside: nearer than a sag."""
+    led = Led()
+    led.told(FORWARD, 0.5)
+    led.told(STILL, 1.0)
+    p_in_k = led.where.p_bk_in_k + 0.5 * SAG
+    led.where = BasePose(led.where.R_kb, p_in_k, "base_link")
+    pose = led.setpoint.next(FORWARD, led.where, led.now + PERIOD_S, start=1)
+    ahead_in_k = pose.p_bk_in_k - p_in_k
+    assert ahead_in_k == pytest.approx(0.2 * PERIOD_S * led.where.R_kb[:, 0])
+
+
 def test_what_was_missed_is_not_caught_up():
     led = Led()
     before = led.told(FORWARD, 0.5)

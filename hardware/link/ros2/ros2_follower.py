@@ -80,7 +80,7 @@ class Ros2Follower(LinkFollower[BaseEnd]):
         if self._setpoint is None:
             self._is_heard = self._ports.tell(twist_in_b)
         else:
-            pose = self._setpoint.next(twist_in_b, self._end.pose, now)
+            pose = self._setpoint.next(twist_in_b, self._end.pose, now, self._end.boot_id)
             self._is_heard = self._ports.tell_pose(pose)
         self.lost += not self._is_heard
 

@@ -77,8 +77,8 @@ def arm_robot(**changes):
 class Ros2Rig:
     def __init__(self, robot_file=None, seed: int = 0, tells: Qos = TIMELESS, **base) -> None:
         self.robot_file = robot_file or ros2_robot()
-        self.now = 50.0
-        """On our clock, which is another than the base's [s]."""
+        self.now, self.started_s = 50.0, 0.0
+        """On our clock, which is another than the base's [s]; how far that was set back."""
         self.topics = self.robot_file.link.ros2
         self._tells = tells
         self.follower = self.leader(1)
@@ -94,7 +94,7 @@ class Ros2Rig:
 
     @property
     def stamp(self) -> float:
-        return self.now + STAMP_AHEAD_S
+        return self.now + STAMP_AHEAD_S - self.started_s
 
     def advance(self, dt: float) -> None:
         for _ in range(round(dt / 0.005)):

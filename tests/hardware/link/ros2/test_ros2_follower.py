@@ -169,6 +169,24 @@ def test_one_that_takes_poses_is_not_led_without_saying_where_it_is():
     rig.close()
 
 
+def test_one_that_takes_poses_begins_anew_where_it_is_when_its_driver_has_started_anew():
+    rig = pose_rig()
+    lead(rig, 0.7, TwistCommand.zero())
+    lead(rig, 0.5)
+    lead(rig, 1.0, TwistCommand.zero())
+    rig.now += 2.0
+    rig.body.p_in_f = rig.body.p_in_f - np.array([0.02, 0.0, 0.0])  # where its odometry begins
+    p, rig.base.goal = rig.body.p_in_f, None
+    rig.base.taken.clear()
+    rig.started_s = 60.0
+    lead(rig, 0.7, TwistCommand.zero())
+    samples = lead(rig, 0.1)
+    assert samples[-1].state == FollowerState.RUNNING
+    first = rig.base.taken[0][2].position
+    assert [first.x, first.y, first.z] == pytest.approx(p, abs=2e-3)
+    rig.close()
+
+
 def test_stopped_the_last_words_are_zeros(rig):
     running(rig)
     lead(rig, 0.2)
