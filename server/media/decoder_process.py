@@ -5,7 +5,9 @@ time and memory, and when a picture kills it the next child is there in some mil
 when the server has closed its end of the socket, so when it has died.
 
 Requests and answers are small and of fixed length; a picture lies at the beginning of the shared
-memory, coded when it is asked for and decoded when it is answered.
+memory, coded when it is asked for and decoded when it is answered. So no request may be given up
+that is still to be read: the next child would write its picture over a newer one. A child notes
+which it works on, and only that one dies with it.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ from server.common.child import PROMPT_NICENESS, die_with, set_niceness, set_oom
 REQUEST = struct.Struct("<IIBHHI")
 """Number, stream, codec, width, height [px], bytes of the coded picture."""
 ANSWER = struct.Struct("<IB")
-"""Number of the request (0: the process that had it doesn't tell any more), what became of it."""
+"""Number of the request (0: none was being worked on), what became of it."""
+WORKS_ON = struct.Struct("<I")
+"""The same number, in memory that parent and child share."""
 DECODED, REFUSED, DIED = range(3)
 MEMORY_BYTES = 256 << 20
 """Beyond what the process has before its first picture."""
@@ -53,21 +57,23 @@ def main() -> None:
     channel = socket.socket(fileno=descriptor)
     memory = mmap.mmap(memory_descriptor, size)
     cv2.setNumThreads(1)  # a forked process has none but the thread that forked it
+    works_on = mmap.mmap(-1, WORKS_ON.size)
     gc.collect()
     gc.freeze()
     while True:
+        WORKS_ON.pack_into(works_on, 0, 0)
         parent, child = os.getpid(), os.fork()
         if child == 0:
-            _decode_for_ever(parent, channel, memory, cpu_s)
+            _decode_for_ever(parent, channel, memory, works_on, cpu_s)
         _, status = os.waitpid(child, 0)
         if status == 0:
             return
         with contextlib.suppress(OSError):
-            channel.sendall(ANSWER.pack(0, DIED))
+            channel.sendall(ANSWER.pack(*WORKS_ON.unpack_from(works_on), DIED))
 
 
 def _decode_for_ever(
-    parent: int, channel: socket.socket, memory: mmap.mmap, cpu_s: float
+    parent: int, channel: socket.socket, memory: mmap.mmap, works_on: mmap.mmap, cpu_s: float
 ) -> NoReturn:
     """Decode in the child: ends with 0 when the server has gone, or as a picture would have it."""
     code = 1
@@ -77,10 +83,12 @@ def _decode_for_ever(
         decoders: OrderedDict[int, Decoder] = OrderedDict()
         while len(request := channel.recv(REQUEST.size, socket.MSG_WAITALL)) == REQUEST.size:
             number, *asked = REQUEST.unpack(request)
+            WORKS_ON.pack_into(works_on, 0, number)
             signal.setitimer(signal.ITIMER_PROF, cpu_s)  # its SIGPROF ends the process
             became = _answer(decoders, memory, *asked)
             signal.setitimer(signal.ITIMER_PROF, 0.0)
             channel.sendall(ANSWER.pack(number, became))
+            WORKS_ON.pack_into(works_on, 0, 0)
         code = 0
     except ConnectionError:  # the server has gone meanwhile
         code = 0

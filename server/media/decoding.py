@@ -91,7 +91,7 @@ class _Running:
         self.channel.sendall(request)
         while True:
             of, became = self._answer()
-            if of == number or became == DIED:
+            if of == number:
                 return became
 
     def _answer(self) -> tuple[int, int]:
