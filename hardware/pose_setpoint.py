@@ -53,24 +53,25 @@ class PoseSetpoint:
         self._farthest = drive.speed * behind_s + SAG
         self._farthest_rad = drive.rate * behind_s + SAG_RAD
         self._pose: BasePose | None = None
-        self._start = 0
+        self._boot_id = 0
         self._moved, self._last = -np.inf, -np.inf
 
     def next(
-        self, twist_in_b: Array, measured: BasePose | None, now: float, start: int = 0
+        self, twist_in_b: Array, measured: BasePose | None, now: float, boot_id: int = 0
     ) -> BasePose | None:
         """The pose to be told now, for a twist (6,) [m/s, rad/s]; None: say nothing.
 
-        `measured` is where the robot is; None: it has not said so. `start` counts its starts.
+        `measured` is where the robot is; None: it has not said so. With another `boot_id` it has
+        started anew.
         """
         dt, self._last = min(now - self._last, LONGEST_S), now
         if measured is None:
             return None
-        if start != self._start:
-            self._pose, self._start = None, start
+        if boot_id != self._boot_id:
+            self._pose, self._boot_id = None, boot_id
         rests = now - self._moved > REST_S
         if twist_in_b.any():
-            if self._pose is None or (rests and self._held(self._pose, measured) is not self._pose):
+            if self._pose is None or (rests and self._is_far(self._pose, measured)):
                 self._pose = measured
             self._moved = now
         elif rests or self._pose is None:
@@ -81,16 +82,26 @@ class PoseSetpoint:
         self._pose = self._held(ahead, measured)
         return self._pose
 
+    def _is_far(self, pose: BasePose, measured: BasePose) -> bool:
+        """Whether it is farther ahead than it may be."""
+        ahead_in_k, turned = _ahead(pose, measured)
+        return _length(ahead_in_k) > self._farthest or _length(turned) > self._farthest_rad
+
     def _held(self, pose: BasePose, measured: BasePose) -> BasePose:
         """The same, or as far in its direction as it may be ahead."""
-        ahead_in_k = pose.p_bk_in_k - measured.p_bk_in_k
-        turned = log(measured.R_kb.T @ pose.R_kb)
-        share = min(1.0, self._farthest / max(float(np.linalg.norm(ahead_in_k)), 1e-12))
-        share_rad = min(1.0, self._farthest_rad / max(float(np.linalg.norm(turned)), 1e-12))
-        if share == share_rad == 1.0:
+        if not self._is_far(pose, measured):
             return pose
-        return BasePose(
-            measured.R_kb @ exp(share_rad * turned),
-            measured.p_bk_in_k + share * ahead_in_k,
-            measured.frame,
-        )
+        ahead_in_k, turned = _ahead(pose, measured)
+        ahead_in_k *= min(1.0, self._farthest / max(_length(ahead_in_k), 1e-12))
+        turned *= min(1.0, self._farthest_rad / max(_length(turned), 1e-12))
+        p_in_k = measured.p_bk_in_k + ahead_in_k
+        return BasePose(measured.R_kb @ exp(turned), p_in_k, measured.frame)
+
+
+def _ahead(pose: BasePose, measured: BasePose) -> tuple[Array, Array]:
+    """How far it is (3,) in k [m], and how far turned (3,) in the measured b [rad]."""
+    return pose.p_bk_in_k - measured.p_bk_in_k, log(measured.R_kb.T @ pose.R_kb)
+
+
+def _length(v: Array) -> float:
+    return float(np.linalg.norm(v))

@@ -118,7 +118,7 @@ def test_with_another_start_of_the_robot_it_begins_where_that_says_that_it_is():
     led.told(STILL, 1.0)
     p_in_k = led.where.p_bk_in_k + 0.5 * SAG
     led.where = BasePose(led.where.R_kb, p_in_k, "base_link")
-    pose = led.setpoint.next(FORWARD, led.where, led.now + PERIOD_S, start=1)
+    pose = led.setpoint.next(FORWARD, led.where, led.now + PERIOD_S, boot_id=1)
     ahead_in_k = pose.p_bk_in_k - p_in_k
     assert ahead_in_k == pytest.approx(0.2 * PERIOD_S * led.where.R_kb[:, 0])
 

@@ -85,17 +85,6 @@ class Ros2Follower(LinkFollower[BaseEnd]):
         self.lost += not self._is_heard
 
 
-def end_of(robot_file: RobotFile, topics: Ros2Parameters, epoch: int) -> BaseEnd:
-    """The base of a robot file, without its topics."""
-    return BaseEnd(
-        robot_file,
-        epoch,
-        topics.R_bi,
-        has_odometry=bool(topics.odometry or topics.joint_states),
-        says_where=topics.takes_pose,
-    )
-
-
 def follower_of(
     robot_file: RobotFile,
     topics: Ros2Parameters,
@@ -110,8 +99,15 @@ def follower_of(
     """
     drive = robot_file.robot.twist
     assert drive is not None  # no other robot's file has such a link
+    end = BaseEnd(
+        robot_file,
+        epoch,
+        topics.R_bi,
+        has_odometry=bool(topics.odometry or topics.joint_states),
+        says_where=topics.takes_pose,
+    )
     setpoint = PoseSetpoint(drive) if topics.takes_pose else None
-    end, joints = end_of(robot_file, topics, epoch), _joints_of(robot_file, topics)
+    joints = _joints_of(robot_file, topics)
     return Ros2Follower(ports, end, clock, setpoint=setpoint, joints=joints)
 
 
@@ -133,7 +129,8 @@ def connect(robot_file: RobotFile, _key: bytes, epoch: int) -> Ros2Follower:
     """Link to the robot of a robot file. A `Connect` of `registry.py`.
 
     Raises:
-        FollowerError: no Cyclone DDS, no such host, no network, or another link in its domain.
+        FollowerError: no Cyclone DDS, no such host, no network, another link in its domain, or an
+            arm whose model can't be used.
     """
     try:
         from hardware.link.ros2.ports import RosPorts

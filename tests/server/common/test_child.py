@@ -187,16 +187,15 @@ def asked(*lines):
 
 
 RR_1 = "os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))"
-CLASS_AND_NICENESS = "print(os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0))"
+CLASS = "print(os.sched_getscheduler(0))"
+NICENESS = "print(os.getpriority(os.PRIO_PROCESS, 0))"
 
 
 def test_what_hears_the_phone_runs_before_others_where_that_is_permitted(program):
     child = Child("listens", program(SLEEPER), is_prompt=True)
-    policy = int(asked(RR_1, "print(os.sched_getscheduler(0))") or os.SCHED_OTHER)
+    policy = int(asked(RR_1, CLASS) or os.SCHED_OTHER)
     niceness = int(
-        asked(
-            "os.setpriority(os.PRIO_PROCESS, 0, -10)", "print(os.getpriority(os.PRIO_PROCESS, 0))"
-        )
+        asked("os.setpriority(os.PRIO_PROCESS, 0, -10)", NICENESS)
         or os.getpriority(os.PRIO_PROCESS, 0)
     )
     group = Path(f"/proc/{os.getpid()}/autogroup")
@@ -218,22 +217,20 @@ def test_no_child_keeps_real_time_that_it_inherited(by):
     """Whatever its niceness: a bomb that a decoder works on is not to go before others."""
     ask = f"from server.common.child import {by.partition('(')[0]}"
     inherited = ["import contextlib", "with contextlib.suppress(OSError):", f"    {RR_1}"]
-    assert asked(*inherited, ask, by, CLASS_AND_NICENESS).split()[0] == str(os.SCHED_OTHER)
+    assert int(asked(*inherited, ask, by, CLASS)) == os.SCHED_OTHER
 
 
 @pytest.mark.parametrize("inherited", [-10, 0, 15])
 def test_what_only_computes_runs_behind_others_whatever_it_inherited(inherited):
     lines = [
-        "import contextlib, os",
+        "import contextlib",
         "from server.common.child import raise_niceness",
         "with contextlib.suppress(PermissionError):",
         f"    os.setpriority(os.PRIO_PROCESS, 0, {inherited})",
-        "print(os.getpriority(os.PRIO_PROCESS, 0))",
+        NICENESS,
         "raise_niceness(10)",
-        "print(os.getpriority(os.PRIO_PROCESS, 0))",
+        NICENESS,
     ]
-    command = [sys.executable, "-c", "\n".join(lines)]
-    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    before, after = map(int, said.split())
+    before, after = map(int, asked(*lines).split())
     assert after == max(10, before)
     assert before == inherited or os.geteuid() != 0

@@ -45,33 +45,30 @@ def patiently():
 def ros2_robot(**changes):
     """The simulated robot that takes a twist, behind ROS 2, in a domain of its own."""
     table = robot_table(robot_path("twister"))
-    section = {"domain": new_domain(), "namespace": BELOW, "imu": "imu", "odometry": "odom"}
-    section |= changes
-    section = {key: value for key, value in section.items() if value is not None}
-    link = {"kind": "ros2", "takes": "twist", "host": LOCALHOST, "ros2": section}
-    return robot_of(table | {"link": link}, "ros2.toml")
+    return behind_ros2(table, {"imu": "imu", "odometry": "odom"} | changes)
 
 
 def pose_robot(**changes):
     """The same without motion sensors, which takes poses and says where it is."""
-    robot_file = ros2_robot(**changes)
     table = robot_table(robot_path("twister"))
     del table["body_imu"]
-    motion = {"twist": "measured", "rate_hz": 200.0, "stands_level": False}
-    section = {"domain": robot_file.link.ros2.domain, "namespace": BELOW, "odometry": "odom"}
-    section |= {"message": "PoseStamped"} | changes
-    link = {"kind": "ros2", "takes": "twist", "host": LOCALHOST, "ros2": section}
-    return robot_of(table | {"link": link, "motion": motion}, "ros2.toml")
+    table["motion"] = {"twist": "measured", "rate_hz": 200.0, "stands_level": False}
+    return behind_ros2(table, {"odometry": "odom", "message": "PoseStamped"} | changes)
 
 
 def arm_robot(**changes):
     """The arm that ships, without its gripper: its joints say where it is, it is told poses."""
     table = robot_table(robot_path("so101"))
     del table["tool"], table["arm"]["tool_joint"], table["arm"]["tool_stroke_s"]
-    section = {"domain": new_domain(), "namespace": BELOW, "joint_states": "joint_states"}
-    section |= {"message": "PoseStamped"} | changes
+    return behind_ros2(table, {"joint_states": "joint_states", "message": "PoseStamped"} | changes)
+
+
+def behind_ros2(table, section):
+    """The robot of a table by that section, but for keys without a value."""
+    section = {"domain": new_domain(), "namespace": BELOW} | section
+    section = {key: value for key, value in section.items() if value is not None}
     link = {"kind": "ros2", "takes": "twist", "host": LOCALHOST, "ros2": section}
-    return robot_of(table | {"link": link}, str(robot_path("so101")))
+    return robot_of(table | {"link": link}, str(robot_path(table["name"])))
 
 
 class Ros2Rig:
