@@ -145,6 +145,8 @@ class StampOffset:
     """[s]."""
     sigma: float
     """[s]."""
+    since: float = 0.0
+    """Stamp of the first picture that it rests on [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

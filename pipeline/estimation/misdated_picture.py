@@ -1,4 +1,4 @@
-"""A picture that is dated badly: beside its place along its own motion, once.
+"""Pictures that are dated badly: beside their place along their own motion.
 
 A busy browser now and then gives a picture the time of another one, 10 to 35 ms off. At that time
 the robot was elsewhere in the picture: the pose is off by what it moves meanwhile, in place and
@@ -6,11 +6,15 @@ attitude together. Fused as it is, such a picture leaves a speed behind that not
 prediction is doubted for it instead, its speed is doubted most, and the next picture, right again,
 tears it away. So what the date explains is believed less, along its motion alone. Only once: what
 is beside twice running is no stumble.
+
+If the same date explains both, pictures are dated otherwise from now on: a camera that exposes for
+longer, or gives fewer pictures a second, is dated up to half a period beside what was learnt.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf, isfinite, isinf
 from typing import Final
 
 import numpy as np
@@ -22,6 +26,9 @@ from pipeline.signals import VisionMeasurement
 
 STUMBLE_S: Final = 0.02
 """Standard deviation of a date that is wrong."""
+ALIKE_S: Final = 0.006
+"""Two pictures running whose dates are wrong by the same, as far as pictures tell. One that stands
+or is steadied gets later by a period with each."""
 
 
 class MisdatedPictures:
@@ -30,6 +37,10 @@ class MisdatedPictures:
     def __init__(self) -> None:
         """None so far."""
         self._was_far = False
+        self._late_s = inf
+        """By its date, if that explains the picture before; inf: it was not far, or else."""
+        self.are_redated = False
+        """The same date explains the last two pictures."""
 
     def explained(
         self, seen: VisionMeasurement, leds_in_b: Array, e: Array, S: Array, passing: Array
@@ -44,12 +55,26 @@ class MisdatedPictures:
             passing: (6,) how the predicted pose passes: ṗ in c [m/s], attitude in b [rad/s].
         """
         was_far, self._was_far = self._was_far, misfit(e, S) > FAR
-        if not self._was_far or was_far or seen.pose is None:
+        before_s, self._late_s = self._late_s, late_by(e, S, passing) if self._was_far else inf
+        self.are_redated = are_alike(before_s, self._late_s)
+        if was_far or seen.pose is None or isinf(self._late_s):
             return None
-        stumbled = S + STUMBLE_S**2 * np.outer(passing, passing)
-        if misfit(e, stumbled) > FAR:
-            return None
-        late_s = STUMBLE_S**2 * float(passing @ np.linalg.solve(stumbled, e))
-        moved = late_s * passing
+        moved = self._late_s * passing
         pose, rays = widened(seen.pose, seen.rays, leds_in_b, moved[:3], moved[3:])
         return replace(seen, pose=pose, rays=rays)
+
+
+def late_by(e: Array, S: Array, passing: Array) -> float:
+    """How much later than dated a picture was taken, as it is off by e (n,) [s]; inf: not by that.
+
+    Covariance S (n, n) of e, were its date right; `passing` (n,) as in `MisdatedPictures`.
+    """
+    misdated = S + STUMBLE_S**2 * np.outer(passing, passing)
+    if misfit(e, misdated) > FAR:
+        return inf
+    return STUMBLE_S**2 * float(passing @ np.linalg.solve(misdated, e))
+
+
+def are_alike(before_s: float, late_s: float) -> bool:
+    """Whether the same date explains two pictures running."""
+    return isfinite(before_s) and abs(late_s - before_s) < ALIKE_S

@@ -18,7 +18,7 @@ from pipeline.estimation.adaptive_noise import AdaptiveNoise
 from pipeline.estimation.aliased_tone import AliasedTone
 from pipeline.estimation.bias_steps import BiasSteps
 from pipeline.estimation.estimator import Fusion, Health
-from pipeline.estimation.misdated_picture import MisdatedPictures
+from pipeline.estimation.misdated_picture import STUMBLE_S, MisdatedPictures
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, OFFSET, X_BIASES, X_OFFSET, N, X
 from pipeline.estimation.relative_noise import initial_biases
@@ -178,6 +178,10 @@ class RelativeFilter:
             misdated = self._misdated.explained(seen, self._leds_in_b, e, P + C, passing)
             if misdated is not None:
                 return misdated, 1.0
+            if self._misdated.are_redated:
+                track.redate(STUMBLE_S)
+                predicted.copy(track.predicted(predicted.t))
+                return seen, 1.0
         moved = self._bias_steps.learn(predicted.t, e, P + C, predicted.P)
         track.walk(self._bias_steps.walks)
         if moved.any():

@@ -148,6 +148,12 @@ class RelativeTrack(OutOfSequence[VisionMeasurement]):
         variances[BIASES:OFFSET] = np.repeat(by * by, 3)
         self.open(variances)
 
+    def redate(self, sigma: float) -> None:
+        """Pictures since the base may be dated otherwise, by `sigma` [s]."""
+        variances = np.zeros(len(self.base.P))
+        variances[OFFSET] = sigma * sigma
+        self.open(variances)
+
     def walk(self, densities: Array) -> None:
         """Biases walk by `densities` (4,) [unit²/s] more than configured, by sensor."""
         self._walks[:INPUTS] = self._calm[:INPUTS] + np.repeat(densities, 3)

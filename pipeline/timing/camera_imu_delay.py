@@ -31,4 +31,4 @@ class CameraImuDelay:
         if self._pictures % EVERY == 0:
             found = self._search.estimate()
             if found is not None:
-                self.offset = StampOffset(found.value_s, found.sigma_s)
+                self.offset = StampOffset(found.value_s, found.sigma_s, found.since)

@@ -3,10 +3,14 @@
 A tremor looks alike a ninth of a second later, and a filter sees only the valley it is in. So a
 coarse offset, found apart from it (`time_offset`), must agree; before there is one, stamps are
 taken to be nearly right.
+
+The filter follows dates that change within pictures, the coarse one within its window. Once both
+have agreed it is refuted by pictures from after they parted alone.
 """
 
 from __future__ import annotations
 
+from math import inf
 from typing import Final
 
 from pipeline.signals import StampOffset
@@ -34,7 +38,8 @@ class OffsetMonitor:
         self.coarse: StampOffset | None = None
         self.complaint = ""
         """Why the filter's offset can't be believed; empty if it can."""
-        self._t_set_right = -float("inf")
+        self._t_set_right = self._t_agreed = -inf
+        """When the filter was last set right, and when the coarse one last bore it out [s]."""
 
     def must_begin_again(self, value: float, sigma: float, t: float) -> bool:
         """Whether what is learnt, `value` ± `sigma` [s] at time `t`, is wrong: start by the coarse.
@@ -46,6 +51,11 @@ class OffsetMonitor:
         if coarse is not None:
             middle, reach = coarse.value, max(BESIDE_S, SURE * coarse.sigma)
         if abs(value - middle) <= reach:
+            self.complaint = ""
+            if coarse is not None and sigma < BESIDE_S:
+                self._t_agreed = t
+            return False
+        if coarse is not None and coarse.since <= self._t_agreed:
             self.complaint = ""
             return False
         if coarse is None:

@@ -39,8 +39,9 @@ class Offset:
     """Standard deviation, the misfit of the pictures included."""
     quality: float
     """How much worse the best rival fits, over what is demanded: at least 1."""
+    since: float
     t: float
-    """Stamp of the newest picture it rests on [s]."""
+    """Stamps of the first and the newest picture it rests on [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +141,7 @@ class TimeOffset:
             return STILL
         if abs(value) > config.max_s:
             return FAR.format(ms=1e1 * round(1e2 * value))
-        return Offset(value, sigma, quality, self._seen[-1].t)
+        return Offset(value, sigma, quality, self._seen[0].t, self._seen[-1].t)
 
     def _misfits(self) -> Array:
         """χ² by shift, (shifts,): what constant attitude and bias leave unexplained."""

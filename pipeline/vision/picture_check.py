@@ -23,13 +23,14 @@ Nothing is judged without fresh samples of both sides, or before the pictures' t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import log, sqrt
+from math import inf, log, sqrt
 from typing import Final
 
 import numpy as np
 
 from pipeline.camera.verdict import FOCAL, SURE
 from pipeline.estimation.believed_less import widened
+from pipeline.estimation.misdated_picture import STUMBLE_S, are_alike, late_by
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, X_BIASES, X_OFFSET
 from pipeline.estimation.relative_start import Learnt, can_start, first_checkpoint
@@ -124,6 +125,8 @@ class PictureCheck:
         """Of what is predicted, for a robot that shakes more than the model says."""
         self._was_beside = False
         """The picture before was beside its place."""
+        self._late_s = inf
+        """By its date, if that explains the picture before; inf: it was not beside, or else."""
         self._t_begun = -np.inf
         self._right_s = 0.0
         """So long pictures were right since that could have been wrong."""
@@ -174,8 +177,10 @@ class PictureCheck:
         track.settle(t - LAG_S)
         track.doubt_phone(max(self._noise.phone, _bent(track.phone, t, BEND_PHONE)))
         self._stretch = _bent(track.body, t, BEND_BODY)
-        far, near = track.predicted(t, t - LAG_S), track.predicted(t)
-        misses = self._missed(pose, far), self._missed(pose, near)
+        misses = self._misses(pose, t)
+        if self._are_redated(misses[1]) and not self.complaint:
+            track.redate(STUMBLE_S)
+            misses = self._misses(pose, t)
         self._match_noise(pose, misses[1])
         known_s = KNOWN_S if self._learnt is None else LAG_S
         is_known = seen.t - self._t_begun > known_s
@@ -186,6 +191,7 @@ class PictureCheck:
             return self._name(seen, CameraLie(SHIFTED))
         self._shown = [seen]
         self._acquit(misses[0])
+        near = misses[1].predicted
         if not np.isfinite(track.fuse(near, self._inflated(seen, pose, misses[1]), len(seen.rays))):
             self._begin(seen)
         self._noise.add_innovation(max(miss.chi2 for miss in misses))
@@ -212,6 +218,22 @@ class PictureCheck:
             return seen
         pose, rays = widened(pose, seen.rays, self._leds_in_b, near.off)
         return replace(seen, pose=pose, rays=rays)
+
+    def _misses(self, pose: RelativePose, t: float) -> tuple[Missed, Missed]:
+        """Beside what was predicted without the last pictures, and with them."""
+        track = self._track
+        far, near = track.predicted(t, t - LAG_S), track.predicted(t)
+        return self._missed(pose, far), self._missed(pose, near)
+
+    def _are_redated(self, near: Missed) -> bool:
+        """Whether this picture and the one before are beside their places by the same date."""
+        passing = self._track.passing(near.predicted)[:3]
+        is_beside = near.chi2 > LONE_CHI2
+        before_s, self._late_s = (
+            self._late_s,
+            late_by(near.off, near.S, passing) if is_beside else inf,
+        )
+        return are_alike(before_s, self._late_s)
 
     def _missed(self, pose: RelativePose, predicted: Checkpoint[VisionMeasurement]) -> Missed:
         """Where it is seen from where it was predicted."""

@@ -25,6 +25,8 @@ from tests.pipeline.lying_camera import measured
 USUAL = Faults(led_m=0.001, focal=1.004, middle_px=(8.0, -8.0), gyro=1.004)
 """Errors of a good calibration and a robot file that somebody measured."""
 SECONDS, FIRST = 25.0, 2000
+COARSE_S = 4.0
+"""After so long the coarse offset tells what dates have become: most of its window."""
 BOTH = (True, True)
 
 
@@ -46,6 +48,9 @@ class Adversity:
     """Pictures are dated wrongly by up to so much, either way [s]."""
     stumbles: float = 0.0
     """Share of the pictures that are dated wrongly by 10 to 35 ms."""
+    redated: tuple[float, float] = (0.0, 0.0)
+    """In the middle of the film pictures become dated so much later for good [s], within so long:
+    another exposure, another rate, another way through the browser."""
     occluded: bool = False
     """Some LEDs or all are hidden for up to 2 s, every `every`."""
     refused: float = 0.01
@@ -93,6 +98,9 @@ ADVERSITIES = {
         stumbles=0.04,
         refused=LATELY_WORSE,
     ),
+    "a longer exposure": replace(of_hand("filming"), redated=(-0.008, 0.5)),
+    "a shorter exposure": replace(of_hand("walking"), redated=(0.008, 0.3)),
+    "dates half a frame earlier": Adversity({"tremor_relaxation": 0.15}, redated=(-0.016, 0.0)),
     "propellers shake": replace(of_hand("filming"), body_noise=1.0),
     "a slow line": of_hand("filming", time_offset=0.06, picture_delay=(0.1, 0.25)),
     "holes": replace(of_hand("walking"), hole=(0.1, 0.6)),
@@ -166,7 +174,7 @@ def _samples(world, it, rng):
 
 
 def _pictures(world, it, rng):
-    offset = StampOffset(world.setup.time_offset + 0.002, 0.002)
+    truth, middle = world.setup.time_offset, 0.5 * world.setup.duration
     hidden = _windows(world, it.every, (0.1, 2.0), rng) if it.occluded else []
     shown = [int(rng.integers(len(LEDS_IN_B))) for _ in hidden]
     told = zip(world.pictures.arrival.tolist(), looks(world, USUAL, world.setup.seed), strict=True)
@@ -174,6 +182,9 @@ def _pictures(world, it, rng):
         t = look.t + rng.uniform(-it.dated, it.dated)
         if it.stumbles and rng.uniform() < it.stumbles:
             t += rng.choice((-1.0, 1.0)) * rng.uniform(0.010, 0.035)
+        t += it.redated[0] * min(max((look.t - middle) / max(it.redated[1], 1e-9), 0.0), 1.0)
+        later = it.redated[0] if arrival > middle + COARSE_S else 0.0
+        offset = StampOffset(truth + 0.002 - later, 0.002, max(look.t - 5.0, 0.0))
         seen = measured(replace(look, t=t), offset if arrival > 0.5 else None)
         for (begin, end), n in zip(hidden, shown, strict=True):
             if begin < look.t < end:

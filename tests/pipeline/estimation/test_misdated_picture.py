@@ -69,6 +69,37 @@ def test_twice_running_is_no_stumble(seen):
     assert misdated.explained(seen, LEDS_IN_B, e, S, PASSING) is not None
 
 
+def test_the_same_date_twice_running_is_that_of_all_pictures_from_now_on(seen):
+    misdated, e = MisdatedPictures(), 0.016 * PASSING
+    for is_second in (False, True):
+        misdated.explained(seen, LEDS_IN_B, e, S, PASSING)
+        assert misdated.are_redated is is_second
+
+
+@pytest.mark.parametrize("periods", [(1, 2), (2, 1), (-1, 1), (1, 0)])
+def test_what_stands_or_stumbles_is_dated_by_nothing(seen, periods):
+    misdated = MisdatedPictures()
+    for n in periods:
+        misdated.explained(seen, LEDS_IN_B, 0.02 * n * PASSING, S, PASSING)
+        assert not misdated.are_redated
+
+
+@pytest.mark.parametrize(
+    ("adversity", "seed", "most_m"),
+    [
+        ("a longer exposure", 2002, 0.025),
+        ("a longer exposure", 2003, 0.025),
+        ("dates half a frame earlier", 2002, 0.03),
+        ("dates half a frame earlier", 2003, 0.02),
+    ],
+)
+def test_dates_that_change_for_good_are_learnt_and_lose_nothing(adversity, seed, most_m):
+    """32, 38, 36 and 72 mm before, the first and the third sure of their place to 0.07 m alone."""
+    farthest, sigma = followed(adversity, seed, 20.0)
+    assert farthest < most_m
+    assert sigma < 0.06  # or it is COAST: `EnvelopeConfig.max_sigma_p_m`
+
+
 @pytest.mark.parametrize(
     ("adversity", "seed"),
     [("dates that stumble", 3000), ("dates that stumble", 3003), ("a starved browser", 3004)],

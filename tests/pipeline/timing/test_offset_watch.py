@@ -30,6 +30,7 @@ def test_one_that_the_coarse_one_refutes_begins_again_and_soon_after_complains()
     watch = OffsetMonitor()
     watch.coarse = StampOffset(0.08, 0.002)
     assert not watch.must_begin_again(0.073, 1e-3, 1.0)
+    watch.coarse = StampOffset(0.08, 0.002, since=1.1)
     assert watch.must_begin_again(0.0, 1.0, 2.0)  # however unsure of itself it is
     assert watch.complaint == ""
     assert watch.must_begin_again(0.0, 1e-3, 3.0)
@@ -44,3 +45,14 @@ def test_what_a_phone_at_rest_was_wrongly_sure_of_is_not_kept(value: float, begi
     watch = OffsetMonitor()
     watch.coarse = StampOffset(0.0012, 0.0023)
     assert watch.must_begin_again(value, 3e-4, 4.0) is begins
+
+
+def test_a_coarse_one_by_older_pictures_says_nothing_of_dates_that_have_changed() -> None:
+    watch = OffsetMonitor()
+    for since in (0.0, 4.9):
+        watch.coarse = StampOffset(0.03, 0.002, since)
+        assert not watch.must_begin_again(0.03, 1e-4, 4.9)
+        assert not watch.must_begin_again(0.015, 1e-4, 5.0)
+        assert watch.complaint == ""
+    watch.coarse = StampOffset(0.03, 0.002, since=5.0)
+    assert watch.must_begin_again(0.015, 1e-4, 10.0)
