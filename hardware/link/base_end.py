@@ -210,15 +210,16 @@ class BaseEnd:
         return self._believed(self._gate.sample(now, told, now, twist_age_s=age_s))
 
     def _hear_odometry(self, heard: HeardOdometry, is_other: bool, now: float) -> None:
-        stamp, dated = 1e-6 * heard.stamp_us, now
+        stamp, at, dated = 1e-6 * heard.stamp_us, heard.at, now
         if self._motion is not None and heard.stamp_us > 0:
             if is_other or self._clock.is_set_anew(stamp, now):
                 self._begin()
+                at = None  # by the clock that it had
             on_ours = self._clock.dated(stamp, now)
             if on_ours is None:
                 self._dropped += 1
                 return
-            dated = _earliest(on_ours, heard.at, now)
+            dated = _earliest(on_ours, at, now)
         self._twist_in_b, self._twist_at, self.pose = np.array(heard.twist_in_b), now, heard.pose
         self._t_measured = dated
 
@@ -229,15 +230,16 @@ class BaseEnd:
         if not can_be or not self._imu_writer.admits(heard.writer, now):
             self._dropped += 1
             return None
-        stamp = 1e-6 * heard.stamp_us
+        stamp, at = 1e-6 * heard.stamp_us, heard.at
         is_other = before not in (None, heard.writer)
         if is_other or self._clock.is_set_anew(stamp, now):
             self._begin()
+            at = None  # by the clock that it had
         dated = self._clock.dated(stamp, now)
         if dated is None or not self._knows_its_twist(now):
             self._dropped += 1
             return None
-        return self._sample(heard, _earliest(dated, heard.at, now), now)
+        return self._sample(heard, _earliest(dated, at, now), now)
 
     def _says_enough(self, pose: BasePose | None) -> bool:
         if pose is None:

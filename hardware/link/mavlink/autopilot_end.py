@@ -79,6 +79,8 @@ class AutopilotEnd:
         self._names, self._host = names, host
         self._autopilot = FirstWriter[Peer]()
         self._pilot, self._sync = Pilot(), TimeSync()
+        self._boot_id = self._base.boot_id
+        """Of the start whose clock `_sync` relates to ours."""
         self._R_na, self._omega_in_a = np.eye(3), np.zeros(3)
         self._attitude_us = -ATTITUDE_LASTS_US
         self._sequence = self._dropped = 0
@@ -235,15 +237,21 @@ class AutopilotEnd:
             self._take_velocity(np.array(values[mav.ODOMETRY_V]), at_us, now)
 
     def _take_velocity(self, v_in_a: Array, at_us: int, now: float) -> None:
-        moves, at = (*in_b(v_in_a), *in_b(self._omega_in_a)), self._sync.ours(1e-6 * at_us)
+        moves, at = (*in_b(v_in_a), *in_b(self._omega_in_a)), self._ours(at_us)
         self._base.hear(HeardOdometry(self.peer, moves, at_us, at), now)
 
     def _hear_imu(self, values: tuple[float, ...], now: float) -> BodySample | None:
         at_us, ax, ay, az, wx, wy, wz = values[:7]
         measures_both = int(values[mav.IMU_NEW]) & BOTH_NEW == BOTH_NEW
-        at = self._sync.ours(1e-6 * at_us)
+        at = self._ours(int(at_us))
         heard = HeardImu(self.peer, int(at_us), (wx, wy, wz), (ax, ay, az), measures_both, at)
         return self._base.hear(heard, now)
+
+    def _ours(self, at_us: int) -> float | None:
+        """When that was on our clock; None: no answer has come since it started."""
+        if self._base.boot_id != self._boot_id:
+            self._boot_id, self._sync = self._base.boot_id, TimeSync()
+        return self._sync.ours(1e-6 * at_us)
 
     def _set_point(self, told_in_b: Array, now: float) -> bytes:
         v_in_h, yaw_rate = told_in_h(told_in_b, self._R_na)

@@ -207,9 +207,12 @@ def test_a_line_that_loses_two_of_a_hundred_leads_as_well():
     rig.close()
 
 
-def test_an_autopilot_that_starts_anew_begins_anew(rig):
+@pytest.mark.parametrize("booted", [STAMP_BEFORE_S, -4000.0])
+def test_an_autopilot_that_starts_anew_begins_anew(rig, booted):
+    """What TIMESYNC found of the clock before, it may be hours ahead, dates nothing any more."""
+    rig.booted = booted
     running(rig)
-    before = lead(rig, 0.1)[-1].boot_id
+    before = lead(rig, 0.15)[-1].boot_id  # and 0.05 s until TIMESYNC is asked again
     rig.booted = rig.now  # its clock begins at zero
     samples = lead(rig, 0.5)
     assert samples[-1].boot_id != before
