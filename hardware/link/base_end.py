@@ -271,8 +271,8 @@ class BaseEnd:
 
 
 def _earliest(quickest: float, at: float | None, now: float) -> float:
-    """When a stamp was: no message took less than no time."""
-    return min(quickest, now, quickest if at is None else at)
+    """When a stamp was: no message took less than no time, none came before our clock began."""
+    return max(0.0, min(quickest, now, quickest if at is None else at))
 
 
 def _can_be(*values: float) -> bool:

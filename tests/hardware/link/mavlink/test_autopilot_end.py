@@ -160,6 +160,18 @@ def test_what_asks_the_time_is_answered_at_once_by_our_own():
     assert led_one.end.answers() == []
 
 
+def test_one_whose_timesync_is_of_another_clock_than_its_stamps_is_not_led_and_ends_nothing():
+    flies = led()
+    flies.now += 0.2
+    going = flies.end.command(TwistCommand.zero(), flies.now)
+    read = [packet for data in going for packet in packets(data)]
+    (asked,) = (packet.values[1] for packet in read if packet.message == mav.TIMESYNC)
+    flies.say((mav.TIMESYNC, (1_764_000_000_000_000_000, asked)))  # since 1970
+    flies.ticks(0.7).ticks(0.3, FORWARD)
+    assert (flies.state, flies.samples[-1].refusal) == (FollowerState.REFUSING, Refusal.STALE)
+    assert not np.any(flies.told)
+
+
 def test_whoever_speaks_first_may_be_it_where_the_file_says_so():
     anybody = Led(host=ANYBODY).ticks(0.7).ticks(0.3, FORWARD)
     assert anybody.state == FollowerState.RUNNING
