@@ -231,10 +231,14 @@ class AutopilotEnd:
 
     def _hear_odometry(self, values: tuple[float, ...], now: float) -> None:
         at_us, R_na = int(values[0]), R_na_from_wxyz(values[mav.ODOMETRY_Q])
-        if values[mav.ODOMETRY_TWIST_FRAME] != mav.MAV_FRAME_BODY_FRD:
+        frame, twist_frame = values[mav.ODOMETRY_FRAMES]
+        is_in_a = twist_frame == mav.MAV_FRAME_BODY_FRD
+        is_in_n = twist_frame == frame and frame in mav.FRAMES_OF_N
+        if not (is_in_a or is_in_n):
             self._dropped += 1
         elif self._take_attitude(R_na, values[mav.ODOMETRY_OMEGA], at_us):
-            self._take_velocity(np.array(values[mav.ODOMETRY_V]), at_us, now)
+            v = np.array(values[mav.ODOMETRY_V])
+            self._take_velocity(v if is_in_a else self._R_na.T @ v, at_us, now)
 
     def _take_velocity(self, v_in_a: Array, at_us: int, now: float) -> None:
         moves, at = (*in_b(v_in_a), *in_b(self._omega_in_a)), self._ours(at_us)

@@ -40,18 +40,21 @@ MAV_AUTOPILOT_INVALID = 8
 MAV_STATE_ACTIVE = 4
 MAVLINK_VERSION = 3
 MAV_MODE_FLAG_SAFETY_ARMED = 128
+MAV_FRAME_LOCAL_NED = 1
 MAV_FRAME_BODY_NED = 8
 MAV_FRAME_BODY_FRD = 12
 MAV_FRAME_LOCAL_FRD = 20
 MAV_ESTIMATOR_TYPE_VISION = 2
 """By the names of the definition."""
+FRAMES_OF_N = MAV_FRAME_LOCAL_NED, MAV_FRAME_LOCAL_FRD
+"""What stands, z down."""
 VELOCITY_AND_YAW_RATE = 0b0101_1100_0111
 """POSITION_TARGET_TYPEMASK: place, acceleration and yaw are to be ignored."""
 UNKNOWN_MV = 0xFFFF
 """A battery's voltage that nobody measures."""
 
 ODOMETRY_Q, ODOMETRY_V, ODOMETRY_OMEGA = slice(4, 8), slice(8, 11), slice(11, 14)
-SYS_VOLTAGE, IMU_NEW, ODOMETRY_TWIST_FRAME = 4, 14, 57
+SYS_VOLTAGE, IMU_NEW, ODOMETRY_FRAMES = 4, 14, slice(56, 58)
 """Where fields stand in their messages."""
 
 

@@ -112,25 +112,43 @@ def test_samples_are_in_our_axes_and_of_its_clock():
     assert sample.t_us == 1000 * flies.ms
 
 
-def test_odometry_says_attitude_and_twist_at_once_in_the_body_s_axes_alone():
-    flies = Led(twist_from="ODOMETRY")
-    q = cos(0.5), 0.0, 0.0, sin(0.5)
+def says_odometry(flies, twist_frame, frame=mav.MAV_FRAME_LOCAL_NED):
+    """From now on, at a heading of 1 rad."""
 
-    def speak(frame=mav.MAV_FRAME_BODY_FRD):
-        twist = 0.1, 0.2, 0.3, 0.01, 0.02, 0.03
-        odometry = 1000 * flies.ms, 0.0, 0.0, 0.0, *q, *twist, *42 * (nan,), 1, frame, 0, 0, 0
+    def speak():
+        q, twist = (cos(0.5), 0.0, 0.0, sin(0.5)), (0.1, 0.2, 0.3, 0.01, 0.02, 0.03)
+        frames = frame, twist_frame
+        odometry = 1000 * flies.ms, 0.0, 0.0, 0.0, *q, *twist, *42 * (nan,), *frames, 0, 0, 0
         imu = 1000 * flies.ms, *GRAVITY, *3 * (0.0,), *7 * (0.0,), 63
         flies.say((mav.HEARTBEAT, (OFFBOARD, 2, 12, ARMED, 4, 3)))
         flies.say((mav.ODOMETRY, odometry), (mav.HIGHRES_IMU, imu))
 
     flies.speak = speak
+    return flies
+
+
+def test_odometry_says_attitude_and_twist_at_once():
+    flies = says_odometry(Led(twist_from="ODOMETRY"), mav.MAV_FRAME_BODY_FRD)
     sample = flies.ticks(0.1).samples[-1]
     assert sample.twist_in_b == pytest.approx([0.1, -0.2, -0.3, 0.01, -0.02, -0.03], abs=1e-6)
     dropped = flies.end.dropped
-    flies.speak = lambda: speak(mav.MAV_FRAME_BODY_NED)
-    flies.ticks(0.3)
+    says_odometry(flies, mav.MAV_FRAME_BODY_NED).ticks(0.3)
     assert flies.samples[-1].t_us < 1000 * (flies.ms - 150), "only until the last twist is old"
     assert flies.end.dropped >= dropped + 60
+
+
+@pytest.mark.parametrize("frame", [mav.MAV_FRAME_LOCAL_NED, mav.MAV_FRAME_LOCAL_FRD])
+def test_a_velocity_in_the_axes_of_the_pose_is_turned_into_the_body_s(frame):
+    """So PX4 says its own; its rates are the body's all the same."""
+    sample = says_odometry(Led(twist_from="ODOMETRY"), frame, frame).ticks(0.1).samples[-1]
+    ahead, right = 0.1 * cos(1.0) + 0.2 * sin(1.0), 0.2 * cos(1.0) - 0.1 * sin(1.0)
+    assert sample.twist_in_b == pytest.approx([ahead, -right, -0.3, 0.01, -0.02, -0.03], abs=1e-6)
+
+
+@pytest.mark.parametrize(("frame", "twist_frame"), [(20, 1), (1, 20), (4, 4), (8, 8), (21, 21)])
+def test_a_velocity_in_axes_that_no_attitude_is_told_of_is_dropped(frame, twist_frame):
+    flies = says_odometry(Led(twist_from="ODOMETRY"), twist_frame, frame).ticks(0.1)
+    assert flies.samples == []
 
 
 @pytest.mark.parametrize(
