@@ -4,5 +4,6 @@
 |----------------------|--------------------------------------------------------------------------|
 | `arm_end.py`         | what is believed of the arm, what it is told: without the library        |
 | `arm_line.py`        | the library, in a thread of its own                                      |
+| `joint_rates.py`     | how fast its joints turn, by where they were                             |
 | `franka_follower.py` | the link                                                                 |
 """

@@ -21,6 +21,7 @@ import franky
 import numpy as np
 
 from hardware.link.franka.arm_end import ArmLimits, HeardArm, ToldArm
+from hardware.link.franka.joint_rates import JointRates
 from pipeline.frames import Array
 
 _LOG = logging.getLogger(__name__)
@@ -33,8 +34,6 @@ FULL_AFTER_S = 0.005
 library fails to plan a motion to one in some thousand twists, and the one that it had ends there.
 """
 LISTENS_EVERY_S = 0.005
-MEAN_S = 0.01
-"""Rates of joints are means over this: they themselves jump from one millisecond to the next."""
 AGAIN_S = 1.0
 """Between two attempts to connect, or to recover from errors."""
 ENDS_S = 1.0
@@ -108,23 +107,6 @@ class ArmLine:
         if what != self._was_said:
             _LOG.warning("Franka arm at %s: %s", self._host, what)
         self._was_said = what
-
-
-class JointRates:
-    """Rates of joints by where they were, without what they do from one millisecond to the next."""
-
-    def __init__(self) -> None:
-        """At rest."""
-        self._past: deque[tuple[float, Array]] = deque()
-
-    def at(self, stamp: float, q: Array) -> tuple[Array, float]:
-        """Mean rates (n,) [rad/s] over `MEAN_S`, and how long before `stamp` [s] they were so."""
-        self._past.append((stamp, q))
-        while stamp - self._past[0][0] > MEAN_S:
-            self._past.popleft()
-        then, q_then = self._past[0]
-        passed = stamp - then
-        return ((q - q_then) / passed, 0.5 * passed) if passed > 0.0 else (np.zeros(len(q)), 0.0)
 
 
 class _Session:
