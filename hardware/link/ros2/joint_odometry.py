@@ -37,10 +37,8 @@ class JointOdometry:
         if -1 in order or len(joints.positions) != len(joints.names):
             return None
         q = np.array([joints.positions[k] for k in order])
-        stamp_us = joints.stamp_us
-        if len(joints.velocities) == len(joints.names):
-            rates = np.array([joints.velocities[k] for k in order])
-        else:
+        stamp_us, rates = joints.stamp_us, _told_rates(joints, order)
+        if rates is None:
             before, self._before = self._before, (joints.writer, stamp_us, q)
             if before is None or before[0] != joints.writer:
                 return None
@@ -55,6 +53,14 @@ class JointOdometry:
         pose = BasePose(*self._arm.tip(q), self._frame)
         twist_in_b = (v_x, v_y, v_z, w_x, w_y, w_z)
         return HeardOdometry(joints.writer, twist_in_b, stamp_us, pose=pose)
+
+
+def _told_rates(joints: HeardJoints, order: list[int]) -> Array | None:
+    """(n,) [rad/s]; None: it tells none, or NaN, as ros2_control does of who measures none."""
+    if len(joints.velocities) != len(joints.names):
+        return None
+    rates = np.array([joints.velocities[k] for k in order])
+    return None if np.isnan(rates).any() else rates
 
 
 def _index(names: tuple[str, ...], name: str) -> int:

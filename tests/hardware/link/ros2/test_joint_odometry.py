@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -92,18 +94,38 @@ def test_joints_of_others_on_the_same_topic_say_nothing():
         assert odometry.heard(HeardJoints(1, STAMP_US, names, angles_of, angles_of)) is None
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e300])
-def test_what_is_no_angle_is_dropped_and_moves_nothing(value):
+@pytest.mark.parametrize("which", [NAMES, NAMES[2:3]])
+def test_rates_that_are_no_numbers_are_none(which):
+    """So the broadcaster of ros2_control fills them in for joints that measure angles alone."""
+    odometry, heard = JointOdometry(ARM, "base_link"), None
+    for t in (0.3, 0.3 + STEP_S):
+        told = joints(t)
+        rows = zip(NAMES, told.velocities, strict=True)
+        rates = tuple(np.nan if name in which else rate for name, rate in rows)
+        heard = odometry.heard(replace(told, velocities=rates))
+    assert heard.twist_in_b == pytest.approx(moves(0.3 + 0.5 * STEP_S), abs=5e-3)
+
+
+def test_a_gripper_without_rates_takes_them_from_no_joint():
+    told = joints(0.3)
+    heard = JointOdometry(ARM, "base_link").heard(
+        replace(told, velocities=(np.nan, *told.velocities[1:]))
+    )
+    assert heard.twist_in_b == pytest.approx(moves(0.3), abs=1e-6)
+
+
+BROKEN = [(which, value) for which in ("positions", "velocities") for value in (np.inf, 1e300)]
+
+
+@pytest.mark.parametrize(("which", "value"), [("positions", np.nan), *BROKEN])
+def test_what_is_no_angle_and_no_rate_is_dropped_and_moves_nothing(which, value):
     end = BaseEnd(SO101, 1, np.eye(3), has_odometry=True, says_where=True)
     odometry, sound = JointOdometry(ARM, "base_link"), joints(0.3)
     assert end.hear(odometry.heard(sound), 10.0) is None
     before = end.pose
     assert end.dropped == 0
-    for positions, velocities in (
-        ((*sound.positions[:-1], value), sound.velocities),
-        (sound.positions, (*sound.velocities[:-1], value)),
-    ):
-        broken = HeardJoints(1, STAMP_US + 310_000, NAMES, positions, velocities)
-        end.hear(odometry.heard(broken), 10.01)
-    assert end.dropped == 2
+    row = (*getattr(sound, which)[:-1], value)
+    broken = replace(sound, stamp_us=STAMP_US + 310_000, **{which: row})
+    end.hear(odometry.heard(broken), 10.01)
+    assert end.dropped == 1
     assert end.pose is before
