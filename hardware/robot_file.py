@@ -236,8 +236,12 @@ def robot_of(table: Mapping[str, Any], file: str) -> RobotFile:
         RobotFileError: names `file`, key and what is allowed.
     """
     link = table.get("link")
-    if isinstance(link, Mapping) and link.get("takes") == "twist":
+    takes = link.get("takes") if isinstance(link, Mapping) else None
+    if takes == "twist":
         return _twist_robot_of(table, file)
+    if "twist" in table and takes not in COMMANDS:
+        said = "missing" if takes is None else repr(takes)
+        raise RobotFileError(file, "link.takes", f"{said}; allowed with [twist]: 'twist'")
     try:
         schema = RobotSchema.model_validate(table)
     except ValidationError as error:

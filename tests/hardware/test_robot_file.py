@@ -399,6 +399,8 @@ TWIST_MISTAKES = {
     "thrusters": ("[twist] ", "[thrusters]\n[twist] ", "unknown key; allowed here: .*twist"),
     "a battery": ("[twist] ", "[battery]\nlow_v = 1\nempty_v = 2\n[twist] ", "less than low_v"),
     "no numbers": ("speed_m_s = 0.5", "speed_m_s = nan", "finite"),
+    "says not that": ('takes = "twist"', "", r"link\.takes: missing; .*'twist'"),
+    "takes what": ('takes = "twist"', 'takes = "twits"', r"link\.takes: 'twits'; .*'twist'"),
     "LEDs in one place": ("[-0.089, 0.053, 0.140]", "[-0.012, -0.084, -0.117]", "from the others"),
 }
 
