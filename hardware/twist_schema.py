@@ -349,5 +349,7 @@ def _franka_clashes(robot: TwistRobotSchema) -> Iterator[tuple[str, str]]:
         yield "link.franka.ee_axes", fault
     if motion is None or motion.twist != "measured":
         yield "motion.twist", "'measured' with kind = 'franka': its joints tell how it moves"
+    if robot.arm is not None:
+        yield "arm", "none with kind = 'franka': joints are its controller's"
     if robot.tool is not None:
         yield "tool", "none with kind = 'franka'"

@@ -18,13 +18,14 @@ MOUNT = {"body_in_ee_m": [0.05, -0.02, 0.1], "ee_axes": ["x", "-y", "-z"]}
 MEASURED = {"twist": "measured", "rate_hz": 200.0, "stands_level": False}
 
 
-def franka_robot(section=MOUNT, motion=MEASURED, **link):
+def franka_robot(section=MOUNT, motion=MEASURED, arm=None, **link):
     """The simulated robot that takes a twist, carried by an arm of Franka's."""
     table = robot_table(robot_path("twister"))
     del table["body_imu"]
     link = {"kind": "franka", "takes": "twist", "host": "127.0.0.1", "franka": section} | link
     link = {key: value for key, value in link.items() if value is not None}
-    return robot_of(table | {"link": link, "motion": motion}, "franka.toml")
+    table |= {"link": link, "motion": motion} | ({} if arm is None else {"arm": arm})
+    return robot_of(table, "franka.toml")
 
 
 class LabArm:

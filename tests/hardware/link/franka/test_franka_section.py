@@ -30,12 +30,14 @@ def test_the_example_is_one():
 
 
 COMMANDED = {"twist": "commanded", "stands_level": False}
+ARM = {"model": "fr3.xml", "tip": "hand", "home_deg": [0.0], "joint_speed_deg_s": 90.0}
 MISTAKES: dict[str, tuple] = {
     "no section": ({"section": None}, r"link\.franka: missing"),
     "a mirror": ({"section": MOUNT | {"ee_axes": ["x", "y", "-z"]}}, r"ee_axes: .*right-handed"),
     "misspelt": ({"section": {"ee_axis": ["x"]}}, r"link\.franka\.ee_axis: .*'ee_axes'"),
     "a port": ({"port": 1337}, r"link\.port: none with kind = 'franka'"),
     "another kind": ({"kind": "udp", "port": 1}, r"link\.franka: only with kind = 'franka'"),
+    "joints": ({"arm": ARM}, r"arm: none with kind = 'franka'"),
     "not measured": ({"motion": COMMANDED}, r"motion\.twist: 'measured' with kind = 'franka'"),
 }
 
