@@ -53,10 +53,13 @@ class UdpFollower(LinkFollower[ControlEnd]):
         super().__init__(end, clock)
         self.thrusters = end.thrusters
         try:
-            family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
         except OSError as error:
             what = f"robot at {host}:{port}: {error}"
             raise FollowerError(what, "a host this machine knows") from error
+        # a name may stand for both: robots listen by IPv4, as `robot_server.py` does
+        by_ipv4_first = sorted(found, key=lambda one: one[0] != socket.AF_INET)
+        family, kind, _, _, address = by_ipv4_first[0]
         self._socket = socket.socket(family, kind)
         self._socket.setblocking(False)
         self._socket.connect(address)  # from here on the kernel drops whatever others send

@@ -52,6 +52,19 @@ def test_an_unknown_host_is_an_error_that_names_it():
         udp.connect(AMES.reached("no-such-robot.invalid", 47001), KEY, 1)
 
 
+def test_a_name_that_has_addresses_of_both_kinds_is_the_robot_s_of_ipv4(loopback, monkeypatch):
+    """As localhost and *.local have them on most machines, that of IPv6 first."""
+    port = loopback.socket.getsockname()[1]
+    both = [
+        (socket.AF_INET6, socket.SOCK_DGRAM, 17, "", ("::1", port, 0, 0)),
+        (socket.AF_INET, socket.SOCK_DGRAM, 17, "", ("127.0.0.1", port)),
+    ]
+    monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: both)
+    loopback.follower.close()
+    loopback.follower = another(loopback, 7)
+    assert run(loopback, ZERO, 5)
+
+
 def test_damaged_repeated_and_overtaken_samples_are_dropped_and_counted(loopback):
     samples = run(loopback, ZERO, 20)
     (good,) = loopback.robot.tick(loopback.now_us + 5000)
