@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 
-from hardware.follower import Follower, FollowerError, HasTool
+from hardware.follower import Blinking, Follower, FollowerError, HasTool
 from hardware.link import robot_end, udp
 from hardware.link.rpit import rpit_follower
 from hardware.link.silence import SilenceTimes
 from hardware.robot_file import COMMANDS, RobotFile
+from pipeline.robot import Robot
 
 GROUP = "lightleash.followers"
 SIMULATED = "udp"
@@ -77,10 +78,17 @@ def connect(robot_file: RobotFile, key: bytes, epoch: int) -> Follower:
         what = f"link.takes = {link.takes!r} by a link of kind {link.kind!r}"
         raise FollowerError(what, f"{' or '.join(kind.takes)} by this one")
     follower = kind.connect(robot_file, key, epoch)
-    if robot_file.robot.tool and not isinstance(follower, HasTool):
+    if lacking := _lacking(robot_file.robot, follower):
         follower.close()
-        raise FollowerError(f"[tool] by a link of kind {link.kind!r}", "none by this one")
+        raise FollowerError(f"{lacking} by a link of kind {link.kind!r}", "none by this one")
     return follower
+
+
+def _lacking(robot: Robot, follower: Follower) -> str:
+    """What a robot has by its file and the link has no word for, or ""."""
+    if robot.tool and not isinstance(follower, HasTool):
+        return "[tool]"
+    return "blinks = true" if robot.blinks and not isinstance(follower, Blinking) else ""
 
 
 def _loaded(point: EntryPoint) -> LinkKind:

@@ -76,12 +76,16 @@ def test_what_can_not_be_used_is_named_with_what_can(name, words):
 
 
 @pytest.mark.usefixtures("package")
-def test_a_robot_with_a_tool_is_not_led_by_a_link_that_has_no_word_for_it():
+@pytest.mark.parametrize(
+    ("words", "key", "value"),
+    [(r"\[tool\]", "tool", {"name": "Gripper"}), ("blinks = true", "blinks", True)],
+)
+def test_a_robot_is_not_led_by_a_link_that_has_no_word_for_what_its_file_has(words, key, value):
     table = robot_table(robot_path("ames"))
     table["link"] |= {"kind": "bare", "stopped_by": "a relay on the battery"}
     rig = connect(robot_of(table, "lab.toml"), bytes(16), 1)
-    with pytest.raises(FollowerError, match=r"\[tool\] by a link of kind 'bare': none by this one"):
-        connect(robot_of(table | {"tool": {"name": "Gripper"}}, "lab.toml"), bytes(16), 1)
+    with pytest.raises(FollowerError, match=f"{words} by a link of kind 'bare': none by this one"):
+        connect(robot_of(table | {key: value}, "lab.toml"), bytes(16), 1)
     assert vars(rig) == {"closed": True}
 
 
