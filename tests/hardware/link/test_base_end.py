@@ -233,6 +233,27 @@ def test_a_clock_that_is_set_begins_anew(led, by):
     restarts(led)
 
 
+@pytest.mark.parametrize("by", [-0.13, -0.3, -0.9])
+def test_a_clock_that_is_set_back_a_little_begins_anew_once_it_says_something_new(led, by):
+    """As by ntpd, from 0.128 s on: dated by the time before, all would be late."""
+    boot_id = led.samples[-1].boot_id
+    led.stamp_ahead += by
+    led.ticks(0.05 - by, MOVING)
+    assert led.samples[-1].boot_id != boot_id
+    led.ticks(0.7).ticks(0.2, MOVING)
+    assert led.state == FollowerState.RUNNING
+
+
+def test_what_comes_again_by_a_slower_way_sets_no_clock(led):
+    boot_id = led.samples[-1].boot_id
+    for _ in range(100):
+        led.ticks(PERIOD_S, MOVING)
+        led.late = 0.2
+        assert led.imu() is None
+        led.late = 0.0
+    assert (led.state, led.samples[-1].boot_id) == (FollowerState.RUNNING, boot_id)
+
+
 def test_a_pause_of_the_network_sets_no_clock(led):
     boot_id = led.samples[-1].boot_id
     led.now += 3.0  # all is lost
@@ -265,14 +286,14 @@ class LedWithoutSensors:
         self.motion = robot_file.robot.motion
         measures = self.motion.is_measured
         self.end, self.now = BaseEnd(robot_file, 1, STRAIGHT, has_odometry=measures), 10.0
-        self.speaks = self.motion.is_measured
+        self.speaks, self.stamp_ahead = self.motion.is_measured, 1000.0
 
     def ticks(self, seconds, twist_in_b=(0.0,) * 6):
         told, samples, twist = [], [], np.array(twist_in_b)
         for _ in range(round(seconds / PERIOD_S)):
             self.now += PERIOD_S
             if self.speaks and round(self.now / PERIOD_S) % 20 == 0:
-                stamp_us = round(1e6 * (self.now - 0.02 + 1000.0))
+                stamp_us = round(1e6 * (self.now - 0.02 + self.stamp_ahead))
                 said = HeardOdometry(BASE, tuple(0.5 * MOVING), stamp_us)
                 assert self.end.hear(said, self.now) is None
             if (sample := self.end.beat(self.now)) is not None:
@@ -295,6 +316,15 @@ def test_a_base_without_motion_sensors_is_led_by_its_odometry_and_told_to_stand_
     silent, _ = led.ticks(1.0, MOVING)
     bound = led.motion.lasts_s + FRESH_S + TOLD_ZERO_S
     assert not np.any(silent[round(bound / PERIOD_S) :])
+
+
+def test_no_twist_is_older_than_it_is_because_a_clock_was_set_back():
+    led = LedWithoutSensors(told(twist="measured", rate_hz=10.0))
+    led.ticks(0.8)
+    led.stamp_ahead -= 0.25
+    led.ticks(0.5)
+    _, samples = led.ticks(1.0)
+    assert max(s.twist_age_s for s in samples) < 0.125
 
 
 def test_a_base_that_says_nothing_is_led_by_what_it_was_told():
