@@ -268,12 +268,13 @@ class Teleop:
         """Forget what was known by the phone before.
 
         Its biases, taken for this one's, would be made up for by the robot's: pictures tell but the
-        difference of both.
+        difference of both. Nor does this one's camera lie as that one's did.
         """
         if self._phone is not None:
             self.estimator.reset()
             self.attitude.reset()
             self._monitor.forget_phone()
+            self._half_field, self._lie = None, ""
             self._t_met = sample.t
         self._phone = sample.phone
 

@@ -175,6 +175,13 @@ def test_a_camera_that_is_found_out_is_followed_no_further() -> None:
     assert run(teleop, 2.3, 0.5, held=True)[-1].failsafe.mode == Mode.TRACK
 
 
+def test_the_next_phone_is_not_told_to_mend_the_camera_of_the_one_before() -> None:
+    teleop = Teleop(ROBOT, TeleopConfig())
+    run(teleop, 0.0, 1.5)
+    assert "It zooms." in run(teleop, 1.5, 0.3, lie="It zooms.")[-1].refusals
+    assert "It zooms." not in run(teleop, 1.8, 0.02, phone=1)[-1].refusals
+
+
 @pytest.mark.parametrize("estimator", ["relative", "paper", "none"])
 def test_what_was_known_by_another_phone_is_forgotten(estimator: EstimatorName) -> None:
     """Its pictures too, which are later than motion; a flight under way coasts and comes down."""
