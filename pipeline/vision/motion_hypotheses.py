@@ -10,6 +10,7 @@ While all rest, nobody can know.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf, sqrt
 from typing import Final
 
 import numpy as np
@@ -170,14 +171,15 @@ class RobotCandidate:
         """Logarithm of the odds by which its LEDs say that it is ours."""
         return self._reader.odds if self._reader is not None else 0.0
 
-    def is_near(self, view: CandidateView) -> bool:
-        """Whether it could be what is seen now."""
+    def off_m(self, view: CandidateView) -> float:
+        """How far from its predicted place this is seen [m]; inf: too far, or too late."""
         t, last = view.seen.t, self._last.pose
         if not 0.0 < t - self.t < LOST_S:
-            return False
+            return inf
         predicted = last.p_bc_in_c if not self._models else self._models[0].place_at(t)
         off = view.pose.p_bc_in_c - predicted
-        return bool(off @ off < NEAR_M**2)
+        off_m = sqrt(float(off @ off))
+        return off_m if off_m < NEAR_M else inf
 
     def is_at(self, view: CandidateView) -> bool:
         """Whether that was how it looked last."""

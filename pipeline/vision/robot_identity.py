@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import Final
 
 from pipeline.frames import Array
@@ -66,7 +67,7 @@ class RobotIdentity:
             return None
         recent = (one for one in self._candidates if 0.0 < t - one.t < REMEMBERED_S)
         self._candidates = list(recent)
-        known = [self._again(view) for view in views]
+        known = self._again(views)
         near = [
             k
             for k, (view, one) in enumerate(zip(views, known, strict=True))
@@ -91,9 +92,16 @@ class RobotIdentity:
     def _is_observable(self, t: float, up_in_c: Array | None) -> bool:
         return up_in_c is not None and self._imus is not None and both_cover(self._imus, t)
 
-    def _again(self, view: CandidateView) -> RobotCandidate | None:
-        """What was seen before, if this is it."""
-        return next((one for one in self._candidates if one.is_near(view)), None)
+    def _again(self, views: Sequence[CandidateView]) -> list[RobotCandidate | None]:
+        """What of those seen before each is: the nearest pairs first, for nobody is two."""
+        known: list[RobotCandidate | None] = [None] * len(views)
+        offs_m = [[one.off_m(view) for one in self._candidates] for view in views]
+        pairs = ((off_m, k, i) for k, row in enumerate(offs_m) for i, off_m in enumerate(row))
+        for off_m, k, i in sorted(pairs):
+            one = self._candidates[i]
+            if off_m < inf and known[k] is None and not any(one is other for other in known):
+                known[k] = one
+        return known
 
     def _is_alone(self, candidate: RobotCandidate | None) -> bool:
         return all(one is candidate for one in self._candidates)

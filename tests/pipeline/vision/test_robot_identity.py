@@ -5,10 +5,19 @@ import pytest
 
 from hardware.sim.scenes.motion import START_S
 from hardware.sim.scenes.video import RATE_HZ
+from pipeline.signals import RelativePose, VisionMeasurement
 from pipeline.vision.blink_code import BlinkCode
 from pipeline.vision.last_pose import PossiblePlace
-from pipeline.vision.robot_identity import ELSEWHERE, READING, REMEMBERED_S, TWO
-from tests.pipeline.twins import BOTH, Twins
+from pipeline.vision.motion_hypotheses import CandidateView
+from pipeline.vision.robot_identity import (
+    ELSEWHERE,
+    READING,
+    REMEMBERED_S,
+    TWO,
+    RobotIdentity,
+)
+from tests.pipeline.seeing import rays_at
+from tests.pipeline.twins import BOTH, LEDS_IN_B, Twins
 
 OURS, OTHER = (True, False), (False, True)
 SEEDS = range(2)
@@ -128,3 +137,23 @@ def test_who_comes_last_is_held_against_the_motion_sensors_as_the_others_were():
         twins = Twins(seed, strangers=[0.8, 1.6])
         for k in range(60):
             assert twins.look(k, (False, True, True, k >= 20)).is_ours is None
+
+
+def test_two_that_stand_closer_together_than_one_may_go_between_pictures_are_held_apart():
+    """Each was taken for whichever of them had been seen first."""
+    identity = RobotIdentity(LEDS_IN_B, None, blinks=True)
+    identity.code, n = CODE, len(LEDS_IN_B)
+    ours, beside = np.array([2.5, 0.0, 0.0]), np.array([0.0, 0.25, 0.0])
+    told = []
+    for k in range(30):
+        t = k / RATE_HZ
+        lit = [led for led in range(n) if led != CODE.dark(t, n)]
+        views = [view_of(t, ours + beside, range(n)), view_of(t, ours, lit)]
+        told.append(identity.which(t, views, (), None))
+    assert set(told) == {None, 1}
+
+
+def view_of(t, p, leds):
+    rays, R = rays_at(t, p, np.eye(3), list(leds)), np.eye(3)
+    pose = RelativePose(t, p, R, 1e-6 * np.eye(6), 0.1, len(rays))
+    return CandidateView(VisionMeasurement(t, rays, pose), pose)
