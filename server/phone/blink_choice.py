@@ -34,7 +34,8 @@ class BlinkChoice:
         prior = detection.prior
         if detection.pose is not None or len(detection.rays) > 0:
             self._t_found = now
-        hears = prior.up_in_c is not None and prior.up_in_b is not None
+        # not by which way is up: one that does not stand level cannot say that
+        hears = prior.omega_cf_in_c is not None and prior.omega_bf_in_b is not None
         if now - self._t_found < UNSEEN_S or not hears:
             self.code = None
             return None

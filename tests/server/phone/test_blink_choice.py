@@ -11,8 +11,8 @@ from pipeline.vision.rays import NO_RAYS
 from server.phone.blink_choice import KEPT_S, LEAD_S, SAID_S, UNSEEN_S, BlinkChoice
 
 NONE = Spots(np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0), np.zeros(0))
-UP = np.array([0.0, 0.0, 1.0])
-MISSED = Detection(0.0, None, NO_RAYS, NONE, None, "", prior=FramePrior(UP, UP))
+UP, STILL = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+MISSED = Detection(0.0, None, NO_RAYS, NONE, None, "", prior=FramePrior(UP, UP, STILL, STILL))
 POSE = RelativePose(0.0, np.array([2.5, 0.0, 0.0]), np.eye(3), 1e-6 * np.eye(6), 0.1, 5)
 FOUND = replace(MISSED, pose=POSE)
 FEW = replace(
@@ -55,7 +55,8 @@ def test_a_longer_miss_begins_a_new_code():
 
 
 def test_while_nothing_is_heard_of_the_robot_or_phone_nothing_is_awaited():
-    for prior in (FramePrior(UP, None), FramePrior(None, UP), FramePrior()):
+    deaf = FramePrior(UP, None, STILL, None), FramePrior(None, UP, None, STILL), FramePrior()
+    for prior in deaf:
         choice = BlinkChoice()
         assert choice.look(replace(MISSED, prior=prior), 0.0) is None
         assert choice.code is None
@@ -69,3 +70,9 @@ def test_who_stays_unfound_is_given_other_codes_by_and_by():
         begins.add(choice.code.t_begin)
     assert len(begins) >= 38
     assert len(numbers) > CODES / 2
+
+
+def test_one_that_cannot_say_which_way_is_up_is_told_as_well():
+    """An arm's tip without motion sensors: who it is shows nowhere but in its code."""
+    prior = FramePrior(UP, None, STILL, STILL)
+    assert BlinkChoice().look(replace(MISSED, prior=prior), 0.0) is not None
