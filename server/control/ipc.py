@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import socket
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -16,6 +17,7 @@ import numpy as np
 
 from pipeline.frames import R_from_wxyz, Triple
 from pipeline.prediction import Prediction
+from pipeline.signals import BodyImu
 from server.common.runtime_parameters import RuntimeParameters
 from server.control.gap_log import GapStatistics
 from server.control.ipc_estimate import EstimateFields
@@ -138,6 +140,13 @@ def expected_of(status: ControlStatus) -> Prediction | None:
         sigma_theta=status.sigma_theta,
         time_offset=status.time_offset or 0.0,
     )
+
+
+def body_imus(samples: Sequence[BodyRow], twists: Sequence[BodyRow]) -> list[BodyImu]:
+    """The body's samples as control heard them, by rows of `body_samples` and `body_twists`."""
+    rows, told = (np.array(some, dtype=np.float64).reshape(-1, 7) for some in (samples, twists))
+    twist_at = {row[0]: row[1:] for row in told}
+    return [BodyImu(float(row[0]), row[1:4], row[4:7], twist_at.get(row[0])) for row in rows]
 
 
 _status_encoder = msgspec.msgpack.Encoder()

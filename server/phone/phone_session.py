@@ -18,10 +18,10 @@ from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.estimation.sensor_doubts import PHONES
 from pipeline.robot import Robot
-from pipeline.signals import BodyImu, PhoneImu, TouchState
+from pipeline.signals import PhoneImu, TouchState
 from pipeline.vision.detection import Detection
 from pipeline.vision_config import GatesConfig
-from server.control.ipc import ControlStatus, expected_of
+from server.control.ipc import ControlStatus, body_imus, expected_of
 from server.control.ipc_inputs import Input
 from server.diagnostics import camera_health
 from server.diagnostics.link_log import LinkLog
@@ -161,9 +161,9 @@ class PhoneSession:
         self._check.add_status(status)
         self._doubts = status.estimate.doubts if status.estimate is not None else ()
         if self.vision is not None:
-            front_end, rows = self.vision.front_end, np.array(status.body_samples).reshape(-1, 7)
+            front_end = self.vision.front_end
             front_end.add_prediction(expected_of(status))
-            front_end.add_imu(*(BodyImu(float(r[0]), r[1:4], r[4:7]) for r in rows))
+            front_end.add_imu(*body_imus(status.body_samples, status.body_twists))
 
     def sight(self, status: ControlStatus, now: float) -> Sight | None:
         """Where things are in its picture; None if it does not look, or knows since a moment."""

@@ -7,13 +7,11 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
-
 from hardware.camera_file import CAMERAS, CameraFileError
 from hardware.robot_file import COMMANDS, RobotFile, RobotFileError, load_robot
 from pipeline.camera.lens import Camera
-from pipeline.frames import Array
 from pipeline.signals import BodyImu
+from server.control.ipc import body_imus
 from server.media.image_format import ImageFormat
 from server.protocol.wire import WireError, decode
 from server.protocol.wire_records import Picture
@@ -79,18 +77,11 @@ def body_samples(recording: Recording) -> list[BodyImu]:
     for entry in recording.entries(STATUS):
         try:
             status = json.loads(entry.data)
-            rows = _body_rows(status["body_samples"])
-            twists = {row[0]: row[1:] for row in _body_rows(status.get("body_twists", []))}
+            samples += body_imus(status["body_samples"], status.get("body_twists", []))
         except (ValueError, LookupError, TypeError) as error:
             what = f"holds a status that can't be read: {error}"
             raise RecordingError(recording.path, what, "record anew") from error
-        samples += [BodyImu(float(r[0]), r[1:4], r[4:7], twists.get(r[0])) for r in rows]
     return sorted(samples, key=lambda sample: sample.t)
-
-
-def _body_rows(listed: object) -> Array:
-    """(n, 7): a time [s] and two vectors in b."""
-    return np.array(listed, dtype=np.float64).reshape(-1, 7)
 
 
 def _unusable(recording: Recording, error: ValueError) -> RecordingError:

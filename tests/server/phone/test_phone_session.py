@@ -382,3 +382,18 @@ def test_the_page_is_told_what_its_picture_shows_as_often_as_it_is_drawn() -> No
     told = [one for one in said if one is not None]
     assert (told[0].width, told[0].height) == (JPEG.width, JPEG.height)
     assert 24 <= len(told) <= 31
+
+
+def test_eyes_hear_the_twist_of_a_robot_that_has_no_motion_sensors() -> None:
+    """Without it no picture can be held against how such a robot moves."""
+    rig, heard, twist = Rig(DEVICE), [], (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    rig.synchronise()
+    rig.say(JPEG)
+    assert rig.phone.vision is not None
+    rig.phone.vision.front_end.add_imu = lambda *samples: heard.extend(samples)
+    rows = [(t, *6 * [0.0]) for t in (1.0, 1.005)]
+    rig.phone.add_status(control_status(body_samples=rows, body_twists=[(1.005, *twist)]))
+    rig.phone.close()
+    before, last = heard
+    assert (before.twist_m_bf_in_b, last.t) == (None, 1.005)
+    assert tuple(last.twist_m_bf_in_b) == twist
