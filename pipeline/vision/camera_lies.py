@@ -29,6 +29,7 @@ SCALED = (
     "The picture became {percent:.0f} % {larger} though nothing came nearer or went away: set the "
     "zoom back to 1×, take the lens as before, fix the focus if the phone can."
 )
+BACK: Final = "The picture has its old size again: move the phone a little, to show it."
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,7 @@ from pipeline.frames import Array
 from pipeline.imu_stream import ImuStream
 from pipeline.robot import ToldMotion
 from pipeline.signals import BodyImu, PhoneImu, RelativePose, VisionMeasurement
-from pipeline.vision.camera_lies import SHIFTED, CameraLie, is_far, named, scaled
+from pipeline.vision.camera_lies import BACK, SHIFTED, CameraLie, is_far, named, scaled
 from pipeline.vision.check_noise import CheckNoise
 from pipeline.vision.rays import NO_RAYS
 from pipeline.vision.steadied_picture import SteadiedPicture
@@ -308,10 +308,13 @@ class PictureCheck:
 
     def _name(self, seen: VisionMeasurement, lie: CameraLie) -> Judged:
         """Put the camera on trial."""
+        was_scaled = abs(self._scale) >= RETURNED
         self._scale += lie.scale
         self._begin(seen)
-        is_scaled = lie.scale != 0.0 or abs(self._scale) >= RETURNED
-        self.complaint = scaled(self._scale) if is_scaled else lie.words
+        is_scaled = abs(self._scale) >= RETURNED
+        self.complaint = scaled(self._scale) if is_scaled or lie.scale != 0.0 else lie.words
+        if was_scaled and not is_scaled:
+            self.complaint = BACK
         self.t_named = seen.t
         return REFUSED
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hardware.sim.world.world import LEDS_IN_B, World, WorldOptions
-from pipeline.vision.camera_lies import SHIFTED
+from pipeline.vision.camera_lies import BACK, SHIFTED
 from pipeline.vision.picture_check import TRIAL_S, PictureCheck
 from pipeline.vision.repeated_frames import STANDS
 from tests.pipeline.faulty_camera import Faults, looks
@@ -118,6 +118,8 @@ def test_a_zoom_that_is_taken_back_is_forgiven_after_its_trial_and_no_other() ->
     assert check.complaint == ""
     assert not any(believed for t, believed, *_ in rows if 2.5 <= t < 3.5 + TRIAL_S)
     assert all(believed for t, believed, *_ in rows if t > 3.5 + TRIAL_S + UNTELLING_S)
+    said = {complaint for t, *_, complaint in rows if t > 3.5 + NAMED_S}
+    assert said == {BACK, ""}, "nobody is told to take back what was taken back"
     check, rows = checked(long, lying(long, "zoom", 2.5))
     assert "8 % larger" in check.complaint
     check.measured(0.0, 0.001)

@@ -195,6 +195,7 @@ export const SERVER = {
   "The LEDs are dim in the picture: come nearer, expose longer, or brighten them.": "Les LED sont faibles dans l’image : approchez-vous, allongez la pose, ou augmentez-les.",
   "The picture does not move as the phone turns: switch off video stabilisation, or use another lens or browser; if pictures come late, reload the page.": "L’image ne bouge pas comme le téléphone tourne : désactivez la stabilisation vidéo, ou changez d’objectif ou de navigateur ; si les images tardent, rechargez la page.",
   "The picture became {} % {} though nothing came nearer or went away: set the zoom back to 1×, take the lens as before, fix the focus if the phone can.": "L’image est devenue de {} % {} sans que rien ne bouge : remettez le zoom à 1×, reprenez le même objectif, fixez la mise au point si le téléphone le peut.",
+  "The picture has its old size again: move the phone a little, to show it.": "L’image a retrouvé sa taille : bougez un peu le téléphone, pour le montrer.",
   "the pose is not a number": "la pose n’est pas un nombre",
   "the pose is behind the camera": "la pose est derrière la caméra",
   "{} m away: outside {} to {} m": "à {} m : hors de {} à {} m",
