@@ -72,6 +72,10 @@ class CalibrationMonitor:
         self.complaint = ""
         """Why nobody should fly with this camera; empty if all is well, or not known yet."""
 
+    def go_on_from(self, before: CalibrationMonitor) -> None:
+        """The same lens makes pictures of another size or angle: until these are judged, it was."""
+        self.complaint, self._doubts = before.complaint, before._doubts
+
     def add_observation(self, look: LedObservation, coarse: StampOffset | None) -> bool:
         """Take the named LEDs of a believed pose and, if known, how wrong the stamps are.
 

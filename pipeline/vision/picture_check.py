@@ -140,6 +140,11 @@ class PictureCheck:
         self.complaint = ""
         """Why nothing is believed; empty if all is well."""
 
+    def go_on_from(self, before: PictureCheck) -> None:
+        """The same lens makes pictures of another size or angle: its trial begins anew."""
+        self.complaint, self.t_named = before.complaint, before.t_named
+        self._scale = before._scale
+
     def add_imu(self, sample: PhoneImu | BodyImu) -> None:
         """Take a motion sample of either side, in any order."""
         track = self._track

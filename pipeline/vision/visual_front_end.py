@@ -100,6 +100,11 @@ class VisualFrontEnd:
         """The robot blinks so from now on; None: its LEDs shine."""
         self._vision.blinks(code)
 
+    def go_on_from(self, before: VisualFrontEnd) -> None:
+        """`before` saw through the same lens: what is wrong with that is not forgotten."""
+        self.check.go_on_from(before.check)
+        self.monitor.go_on_from(before.monitor)
+
     def process(self, frame: Frame) -> Detection:
         """Find the robot in a frame, with what both motion sensors said of its time."""
         prior = self.prior(frame.t)

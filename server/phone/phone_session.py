@@ -20,6 +20,7 @@ from pipeline.estimation.sensor_doubts import PHONES
 from pipeline.robot import Robot
 from pipeline.signals import PhoneImu, TouchState
 from pipeline.vision.detection import Detection
+from pipeline.vision.visual_front_end import VisualFrontEnd
 from pipeline.vision_config import GatesConfig
 from server.control.ipc import ControlStatus, body_imus, expected_of
 from server.control.ipc_inputs import Input
@@ -81,6 +82,8 @@ class PhoneSession:
         self._greeted = clock()
         self._on_taken, self._on_key_wanted = on_taken, on_key_wanted
         self.vision: VisionThread | None = None
+        self._eyes_before: tuple[str, VisualFrontEnd] | None = None
+        """The last that were closed, with the camera file that they saw by."""
         self._shape: ImageFormat | None = None
         self._axes: int | None = None
         """In which motion comes; see `PhoneImu.phone`."""
@@ -221,6 +224,8 @@ class PhoneSession:
         frame_pipeline = FramePipeline(
             camera, self._robot, GatesConfig(), self._clock, self._make_decoder
         )
+        if self._eyes_before is not None and self._eyes_before[0] == self.camera_text != "":
+            frame_pipeline.front_end.go_on_from(self._eyes_before[1])
         screen, is_guessed = self._screen, self._guessed is not None
         self.vision = VisionThread(
             frame_pipeline,
@@ -373,5 +378,6 @@ class PhoneSession:
             self.wizard.stop()
             self.wizard = None
         if self.vision is not None:
+            self._eyes_before = self.camera_text, self.vision.front_end
             self.vision.stop()
             self.vision = None

@@ -150,11 +150,13 @@ class Offline:
         shape = ImageFormat.of(picture)
         if shape == self._shape:
             return
-        self._shape = shape
+        self._shape, before = shape, self._frame_pipeline.front_end
         try:
             self._new_sight()
         except RecordingError:
             self._is_blind = True
+        else:
+            self._frame_pipeline.front_end.go_on_from(before)
 
     def _see(self, frame: EncodedFrame) -> None:
         self._fit(frame.picture)

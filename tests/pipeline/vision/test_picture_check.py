@@ -126,6 +126,17 @@ def test_a_zoom_that_is_taken_back_is_forgiven_after_its_trial_and_no_other() ->
     assert not any(believed for t, believed, *_ in rows if t > 2.5)
 
 
+def test_the_next_eyes_of_the_same_lens_know_of_its_zoom() -> None:
+    zoomed, _ = checked(world(), lying(world(), "zoom", ONSET_S))
+    long, eyes = world(duration=6.5), PictureCheck(LEDS_IN_B)
+    eyes.go_on_from(zoomed)
+    back = [1.08 if one.t < 2.5 else 1.0 for one in looks(long, Faults())]
+    _, rows = checked(long, seen_as(looks(long, Faults()), back), check=eyes)
+    assert {complaint for t, *_, complaint in rows if t < 2.5} == {zoomed.complaint}
+    assert not any(believed for t, believed, *_ in rows if t < 2.5 + TRIAL_S)
+    assert all(believed for t, believed, *_ in rows if t > 2.5 + 2.0 * TRIAL_S)
+
+
 STILL = WorldOptions(duration=7.0, hand_sigma=(0.0, 0.0), tremor=0.0, robot_sigma=(0.0, 0.0))
 
 

@@ -294,6 +294,56 @@ def test_pictures_that_the_page_made_smaller_are_those_of_the_same_camera():
         rig.phone.close()
 
 
+def said_of_the_next_eyes(rig, *records):
+    """What is said of the camera after `records`; that the lens zooms was said before."""
+    rig.settle()
+    rig.say(JPEG, 1)
+    eyes = rig.phone.vision.front_end
+    eyes.monitor.complaint = eyes.check.complaint = "It zooms."
+    for k, record in enumerate(records, 2):
+        rig.t += 0.02
+        rig.say(record, k)
+    front_end = rig.phone.vision.front_end
+    assert front_end is not eyes
+    return front_end.monitor.complaint, front_end.check.complaint
+
+
+ASIDE = (replace(FLAT, screen_angle_deg=90), replace(JPEG, screen_angle_deg=90))
+
+
+@pytest.mark.parametrize("records", [ASIDE, (SMALL,), (replace(JPEG, screen_angle_deg=180),)])
+def test_what_is_wrong_with_a_lens_is_not_forgotten_as_its_picture_turns_or_shrinks(records):
+    rig = Rig(DEVICE)
+    try:
+        assert said_of_the_next_eyes(rig, *records) == ("It zooms.", "It zooms.")
+    finally:
+        rig.phone.close()
+
+
+def test_a_calibration_that_was_left_mends_no_camera(tmp_path):
+    rig = Rig(DEVICE)
+    rig.phone._profiles = tmp_path
+    try:
+        rig.settle()
+        rig.say(JPEG, 1)
+        rig.phone.vision.front_end.monitor.complaint = "It zooms."
+        for what in ("start", "stop"):
+            rig.phone.calibrate(Calibrate(what))
+        rig.say(JPEG, 2)
+        assert rig.phone.vision.front_end.complaint == "It zooms."
+    finally:
+        rig.phone.close()
+
+
+def test_another_calibration_is_judged_by_itself():
+    rig = Rig(DEVICE)
+    try:
+        other = replace(JPEG, width=640, height=480)
+        assert said_of_the_next_eyes(rig, other) == ("", "")
+    finally:
+        rig.phone.close()
+
+
 @pytest.mark.parametrize("size", [{"shrunk": 0}, {"shrunk": 2}, {"height": 528}])
 def test_pictures_of_a_size_nobody_calibrated_are_refused_until_the_size_is_right_again(size):
     rig = Rig(DEVICE)
