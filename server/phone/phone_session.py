@@ -28,6 +28,7 @@ from server.diagnostics import camera_health
 from server.diagnostics.link_log import LinkLog
 from server.diagnostics.meter import Meter
 from server.diagnostics.phone_check.phone_watch import (
+    ClockFacts,
     PhoneFacts,
     PhoneSeries,
     PhoneWatch,
@@ -269,7 +270,7 @@ class PhoneSession:
         facts = PhoneFacts(
             device=self.device,
             since=self._greeted,
-            clock=self.ingest.clock,
+            clock=ClockFacts.of(self.ingest.clock),
             axes=self._check.axes,
             camera=vision.front_end.camera if vision is not None else None,
             is_calibrated=self.camera_text != "",

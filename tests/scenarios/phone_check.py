@@ -15,7 +15,7 @@ from pipeline.vision.detection import Detection
 from server.control.process import teleop_config
 from server.diagnostics import camera_health
 from server.diagnostics.link_log import LinkLog
-from server.diagnostics.phone_check.phone_watch import PhoneFacts, PhoneWatch, look_of
+from server.diagnostics.phone_check.phone_watch import ClockFacts, PhoneFacts, PhoneWatch, look_of
 from server.diagnostics.phone_check.report import CheckAnswer, answer_of
 from server.phone.frame_pipeline import FramePipeline
 from server.phone.sensor_check import SensorCheck
@@ -56,7 +56,7 @@ class CheckedScreen(ScreenSimulation):
         facts = PhoneFacts(
             device="A virtual phone",
             since=0.0,
-            clock=self._ingest.clock,
+            clock=ClockFacts.of(self._ingest.clock),
             axes=self._sensors.axes,
             camera=pipeline.camera,
             is_calibrated=self.scene.knows_camera,

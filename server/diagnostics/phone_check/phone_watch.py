@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
 
 import numpy as np
 
@@ -64,6 +64,23 @@ def look_of(detection: Detection, camera: Camera, leds_in_b: Array) -> PixelLook
     )
 
 
+@dataclass(frozen=True, slots=True)
+class ClockFacts:
+    """What was known of the phone's clock at one time; NaN: nothing yet."""
+
+    drift: float = nan
+    """How much faster it runs than ours [s/s]."""
+    error: float = nan
+    """Bound of the error of its offset [s]."""
+    round_trip: float = nan
+    """The shortest of the last minute [s]."""
+
+    @classmethod
+    def of(cls, clock: ClockSynchronisation) -> ClockFacts:
+        """What `clock`, which goes on learning, knows now."""
+        return cls(clock.drift, clock.error, clock.round_trip) if clock.ready else cls()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PhoneFacts:
     """What others have learnt of the phone so far."""
@@ -71,7 +88,7 @@ class PhoneFacts:
     device: str
     since: float
     """When it came [s]."""
-    clock: ClockSynchronisation
+    clock: ClockFacts
     axes: Axes
     camera: Camera | None
     """What looks; None: nothing yet."""

@@ -13,7 +13,7 @@ from server.diagnostics import camera_health
 from server.diagnostics.link_log import LinkLog
 from server.diagnostics.phone_check.figures import PhoneFigures
 from server.diagnostics.phone_check.measure import figures
-from server.diagnostics.phone_check.phone_watch import PhoneFacts, PhoneWatch, look_of
+from server.diagnostics.phone_check.phone_watch import ClockFacts, PhoneFacts, PhoneWatch, look_of
 from server.phone.ingest import EncodedFrame
 from server.phone.sensor_check import SensorCheck
 from server.protocol.wire import decode
@@ -52,7 +52,7 @@ class RecordedPhone(Offline):
         facts = PhoneFacts(
             device=device_of(recording) or "unknown",
             since=recording.t_first,
-            clock=self._ingest.clock,
+            clock=ClockFacts.of(self._ingest.clock),
             axes=self._sensors.axes,
             camera=pipeline.camera,
             is_calibrated=True,

@@ -18,6 +18,7 @@ from pipeline.signals import LedRays, PhoneImu, RelativePose, Spots, TouchState,
 from pipeline.vision import camera_lies, repeated_frames
 from pipeline.vision.detection import Detection
 from pipeline.vision.rays import NO_RAYS
+from server.diagnostics.phone_check.measure import figures
 from server.phone.ingest import UNHEARD_S, EncodedFrame
 from server.phone.phone_session import STALE_S, PhoneSession
 from server.protocol.calibration_messages import Calibrate
@@ -176,6 +177,18 @@ def test_hello_is_the_first_sign_of_life_and_a_page_that_hears_nothing_gives_non
     rig.t += 2.0
     rig.say(Touch(False, True, 0, rig.nonce))
     assert rig.phone.silent_for(rig.t) == pytest.approx(2.05 - UNHEARD_S)
+
+
+def test_what_its_check_is_made_of_is_as_it_was_whatever_comes_while_that_is_judged(rig):
+    rig.synchronise()
+    rig.settle()
+    series = rig.phone.series(rig.t, 60.0)
+    before = figures(series)
+    ping = rig.phone.ingest.ping(rig.t)
+    late = Record(1, int(1e6 * rig.t) + 10_000_000, Pong(ping.body.nonce, ping.t_us))
+    rig.phone.take(late, rig.t)  # its clock has jumped, it seems
+    assert not rig.phone.ingest.clock.ready
+    assert figures(series).clock_error_ms == before.clock_error_ms
 
 
 def test_pictures_that_cannot_be_dated_are_given_back(rig):

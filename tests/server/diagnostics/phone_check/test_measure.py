@@ -15,16 +15,21 @@ from pipeline.glass.display_lag import DisplayLag
 from pipeline.glass.lens_meter import GlassViews
 from pipeline.glass.robot_of_light import GlassSeen
 from pipeline.glass.window import Glass
-from pipeline.timing.clock_synchronisation import ClockSynchronisation
 from server.diagnostics.link_log import LinkLog
 from server.diagnostics.phone_check.figures import PhoneFigures
 from server.diagnostics.phone_check.measure import figures
-from server.diagnostics.phone_check.phone_watch import LONG_S, PhoneFacts, PhoneWatch, PixelLook
+from server.diagnostics.phone_check.phone_watch import (
+    LONG_S,
+    ClockFacts,
+    PhoneFacts,
+    PhoneWatch,
+    PixelLook,
+)
 from server.protocol.wire_records import Codec, Picture
 
 AGE_S = 0.08
 CAMERA = SimpleLens().camera(1280, 720)
-FACTS = PhoneFacts("A phone", 0.0, ClockSynchronisation(), "all", CAMERA, True, None, (), None)
+FACTS = PhoneFacts("A phone", 0.0, ClockFacts(), "all", CAMERA, True, None, (), None)
 PICTURE = Picture(Codec.H264, True, 1280, 720, 90, bytes(1000))
 
 
