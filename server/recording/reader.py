@@ -187,8 +187,12 @@ def recover(part: Path) -> Path:
             raise RecordingError(part, "is not an MCAP file", "name a *.mcap.part of a recording")
         source.seek(0)
         temporary.unlink(missing_ok=True)
-        with new_private_file(temporary) as target:
-            _copy_complete(source, target)
+        try:
+            with new_private_file(temporary) as target:
+                _copy_complete(source, target)
+        except BaseException:  # half of it is of no use, and may be all that was left of the disk
+            temporary.unlink(missing_ok=True)
+            raise
     temporary.rename(path)
     if part != path:
         part.unlink()

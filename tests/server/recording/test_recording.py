@@ -1,5 +1,6 @@
 """Recordings: what was put in comes out; crashes cost the last moments only; damage is named."""
 
+import errno
 import json
 import signal
 import subprocess
@@ -291,6 +292,22 @@ def finished_bytes(tmp_path):
     recorder = make(tmp_path, touches=30)
     recorder.close()
     return recorder.path.read_bytes()
+
+
+def test_what_finds_no_room_to_be_recovered_stays_as_it_is_and_leaves_the_room_there_was(
+    tmp_path, monkeypatch
+):
+    def full(*_args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (folder := tmp_path / "recordings").mkdir()
+    part = folder / "killed.mcap.part"
+    part.write_bytes(finished_bytes(tmp_path)[:-50])
+    monkeypatch.setattr("server.recording.reader.finish_file", full)
+    with pytest.raises(RecordingError, match="No space left"):
+        recover(part)
+    assert recover_all(folder) == []
+    assert list(folder.iterdir()) == [part]
 
 
 @pytest.mark.parametrize(
