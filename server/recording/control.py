@@ -107,7 +107,7 @@ class Recordings:
 
     def end_if_failed(self) -> bool:
         """Whether a recording had ended by itself, see `failure`; it is put away."""
-        if self._recorder is None or not self._recorder.error:
+        if self._recorder is None or not self._recorder.has_failed:
             return False
         self.failure = self._recorder.error
         self.stop()

@@ -156,6 +156,11 @@ class Recorder:
         self._put(metadata)
 
     @property
+    def has_failed(self) -> bool:
+        """Whether it has ended by itself, see `error`, and nothing is left to wait for."""
+        return self.error != "" and not self._thread.is_alive()
+
+    @property
     def stuck(self) -> str:
         """Why what comes is not written though it has not ended, or ""."""
         waits_s = clock.now() - self._t_alive

@@ -30,6 +30,7 @@ from server.recording.writer import (
     UNIX_ZERO_KEY,
     Recorder,
     RecordingError,
+    finish_file,
     part_of,
 )
 
@@ -247,6 +248,27 @@ def test_a_full_disk_ends_the_recording_and_says_so(tmp_path):
     recorder.close()
     assert "larger than" in recorder.error
     assert read(recorder.path).metadata["device"] == "a phone"
+
+
+def test_a_recording_that_ends_by_itself_makes_nobody_wait_for_the_disk(tmp_path, monkeypatch):
+    disk = threading.Event()
+
+    def slow(writer, file):
+        disk.wait(1.0)
+        finish_file(writer, file)
+
+    monkeypatch.setattr("server.recording.writer.finish_file", slow)
+    recordings = Recordings(tmp_path, METADATA)
+    recordings.start()
+    recorder = recordings._recorder
+    recorder._max_bytes = 0
+    while not recorder.error:
+        recordings.record("phone", TOUCH, 1.0)
+    assert not recordings.end_if_failed()
+    disk.set()
+    recorder._thread.join(5.0)
+    assert recordings.end_if_failed()
+    assert "larger than" in recordings.failure
 
 
 def test_a_killed_recording_is_refused_then_recovered(tmp_path):
