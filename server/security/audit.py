@@ -49,7 +49,8 @@ class Audit:
         self._newest: dict[tuple[str, str], float] = {}
         self._refusals: dict[str, list[float]] = {AUDIT_FILE: [], STRANGERS_FILE: []}
         self._left_out = dict.fromkeys(self._refusals, 0)
-        self._queue: queue.Queue[tuple[str, Deed] | None] = queue.Queue(CAPACITY)
+        self._counting = threading.Lock()
+        self._queue: queue.Queue[tuple[str, Deed, int] | None] = queue.Queue(CAPACITY)
         self._thread: threading.Thread | None = None
 
     def note(
@@ -65,22 +66,25 @@ class Audit:
         if len(self._newest) > CAPACITY:
             self._newest.clear()
         self._newest[key] = t
-        if left_out := self._left_out[file]:
-            why, self._left_out[file] = f"{why} ({left_out} more left out)", 0
+        with self._counting:
+            left_out, self._left_out[file] = self._left_out[file], 0
+        if left_out:
+            why = f"{why} ({left_out} more left out)"
         deed = Deed(round(t, 6), wall(), what, who, role, address, why)
-        self._keep(file, deed)
+        self._keep(file, deed, left_out)
         return deed
 
     def _may_refuse(self, file: str, t: float) -> bool:
         recent = [one for one in self._refusals[file] if one > t - REFUSALS_S]
         self._refusals[file] = recent
         if len(recent) >= REFUSALS:
-            self._left_out[file] += 1
+            self._leave_out(file, 1)
             return False
         recent.append(t)
         return True
 
-    def _keep(self, file: str, deed: Deed) -> None:
+    def _keep(self, file: str, deed: Deed, left_out: int) -> None:
+        """Hand it to the thread; `left_out` before it go with it if it can't be kept."""
         if self._directory is None:
             return
         if self._thread is None:
@@ -88,9 +92,13 @@ class Audit:
             self._thread = threading.Thread(target=writing, name="audit", daemon=True)
             self._thread.start()
         try:
-            self._queue.put_nowait((file, deed))
+            self._queue.put_nowait((file, deed, left_out))
         except queue.Full:
-            self._left_out[file] += 1
+            self._leave_out(file, 1 + left_out)
+
+    def _leave_out(self, file: str, count: int) -> None:
+        with self._counting:
+            self._left_out[file] += count
 
     def close(self) -> None:
         """Write what waits."""
@@ -101,10 +109,11 @@ class Audit:
 
     def _run(self, directory: Path) -> None:
         while (kept := self._queue.get()) is not None:
-            file, deed = kept
+            file, deed, left_out = kept
             try:
                 append(directory / file, line_of(deed))
             except OSError as error:
+                self._leave_out(file, 1 + left_out)
                 log.warning("the audit log can't be written: %s", error)
 
 

@@ -136,3 +136,18 @@ def test_a_disk_that_takes_nothing_stops_nobody(tmp_path, caplog):
     assert log.note("arm", "Anna") is not None
     log.close()
     assert "can't be written" in caplog.text
+
+
+def test_what_the_disk_did_not_take_is_counted_in_the_next_line_that_it_takes(tmp_path):
+    (state := tmp_path / "state").write_text("a file where a folder should be")
+    log = Audit(state)
+    for who in ("Anna", "Bert"):
+        log.note("arm", who)
+    log.close()
+    log.note("arm", "Carl")  # tells of two, and is lost itself
+    log.close()
+    state.unlink()
+    log.note("arm", "Dora")
+    log.close()
+    (line,) = lines(state)
+    assert (line["who"], line["why"].strip()) == ("Dora", "(3 more left out)")
