@@ -39,6 +39,12 @@ def unreadable(error: CameraFileError) -> Verdict:
     return Verdict("refused", [reason], ["Film again, with larger and quicker turns."])
 
 
+def unkept(error: OSError) -> Verdict:
+    """The verdict on a calibration that the disk did not take."""
+    reason = f"What was found can't be kept: {error.strerror}."
+    return Verdict("refused", [reason], ["Make room on the server's disk, then film again."])
+
+
 class CalibrationSession(FrameThread):
     """One calibration of one phone at one picture size and orientation."""
 
@@ -168,6 +174,8 @@ class CalibrationSession(FrameThread):
                 self.stored = path
             except CameraFileError as error:
                 verdict, done = unreadable(error), False
+            except OSError as error:
+                verdict, done = unkept(error), False
         return Calibration(
             phase="done" if done else "refused",
             hint="Calibrated." if done else "Not good enough yet.",

@@ -131,6 +131,19 @@ def test_a_profile_that_could_not_be_read_again_is_a_refusal_in_words(tmp_path):
         wizard.stop()
 
 
+def test_a_profile_that_the_disk_does_not_take_is_a_refusal_in_words(tmp_path):
+    (folder := tmp_path / "cameras").write_text("a file where a folder should be")
+    wizard = CalibrationSession("a phone", (1280, 720, 90), folder, lambda _n: None, lambda: None)
+    text = (CAMERAS / "virtual_phone.yaml").read_text()
+    try:
+        told = wizard._finished(CalibrationOutcome(Verdict(), text, []))
+        assert (told.phase, told.verdict) == ("refused", "refused")
+        assert told.reasons == ["What was found can't be kept: File exists."]
+        assert wizard.stored is None
+    finally:
+        wizard.stop()
+
+
 class Front:
     """A phone that leads, a desk, and what its page was told."""
 

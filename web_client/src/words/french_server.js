@@ -123,6 +123,8 @@ export const SERVER = {
   "The calibration failed: look at the server's log.": "L’étalonnage a échoué : consultez le journal du serveur.",
   "What was found is no camera: {}: {}.": "Ce qui a été trouvé n’est pas une caméra : {} : {}.",
   "Film again, with larger and quicker turns.": "Filmez de nouveau, avec des rotations plus amples et plus vives.",
+  "What was found can't be kept: {}.": "Ce qui a été trouvé ne peut pas être conservé : {}.",
+  "Make room on the server's disk, then film again.": "Libérez de la place sur le disque du serveur, puis filmez de nouveau.",
   "Enough filmed.": "Assez filmé.",
   "Put the phone down: computing takes half a minute.": "Posez le téléphone : le calcul prend une demi-minute.",
   "Whole picture": "Toute l’image",
