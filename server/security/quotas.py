@@ -16,7 +16,10 @@ from server.protocol.session import TokenBucket
 
 Kind = Literal["member", "program", "loopback", "address"]
 MAX_POOLS = 256  # one for each who asks; the oldest is forgotten
-COSTS = {"/api/link": 25.0, "/metrics": 25.0, "/api/invite": 10.0, "/view": 10.0, "/view/": 10.0}
+COSTS = {
+    **dict.fromkeys(("/api/check", "/api/link", "/metrics"), 25.0),
+    **dict.fromkeys(("/api/invite", "/view", "/view/"), 10.0),
+}
 """What computes for long, or is large, counts for so many requests."""
 
 

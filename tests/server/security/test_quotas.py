@@ -50,6 +50,16 @@ def test_a_flood_of_one_takes_nothing_from_any_other(flooder):
         assert not any(quotas.may_ask(asker, "/", 0.0) for _ in range(at_once))
 
 
+@pytest.mark.parametrize("path", ["/api/link", "/api/check", "/metrics"])
+def test_what_computes_for_tens_of_milliseconds_may_not_be_asked_for_without_a_pause(path):
+    quotas = Quotas()
+    asked = 0
+    while not quotas.may_ask(ANNA, path, 0.0):
+        asked += 1
+    assert asked <= 20
+    assert quotas.may_ask(ANNA, path, 0.4)
+
+
 def test_who_waits_may_ask_again():
     quotas = Quotas()
     while not quotas.may_ask(ANNA, "/", 0.0):
