@@ -52,7 +52,8 @@ class RecordingFolder:
 
     def full(self) -> str:
         """Why there would be no room even without all that may be removed, or ""."""
-        finished = list(self._finished())
+        may_any_go = self._limits.budget_bytes > 0  # if not, none needs be looked at
+        finished = list(self._finished()) if may_any_go else []
         free_bytes = sum(one.size for one in finished if self._may_go(one))
         kept = sum(one.size for one in finished) - free_bytes
         return self._excess(kept, free_bytes)

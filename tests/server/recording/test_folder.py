@@ -154,3 +154,10 @@ def test_where_those_that_are_kept_take_all_no_recording_begins_and_it_is_said(
     assert recordings.why_not() == "recordings take 0.003 GiB, of 0.002 that they may"
     with pytest.raises(RecordingError, match=r"take 0\.003 GiB"):
         recordings.start()
+
+
+def test_where_none_may_go_nobody_looks_through_them_to_say_that_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(RecordingFolder, "_finished", lambda _self: pytest.fail("looked"))
+    assert RecordingFolder(tmp_path).full() == ""
