@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import secrets
@@ -12,6 +13,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TextIO
 
 import msgspec
 
@@ -52,6 +54,12 @@ def free_udp_port() -> int:
         return port
 
 
+def say(text: str, to: TextIO | None = None) -> None:
+    """Print; that nobody reads it any more, for his terminal has gone, ends nothing."""
+    with contextlib.suppress(OSError):
+        print(text, file=to, flush=True)
+
+
 class Launcher:
     """Keeps the processes alive until told to stop."""
 
@@ -69,7 +77,7 @@ class Launcher:
         """Start, announce, watch, stop; gives the exit code."""
         announced, said = False, clock.now()
         names = ", ".join(child.name for child in self.children)
-        print(f"Starting {names}: some seconds.", flush=True)
+        say(f"Starting {names}: some seconds.")
         try:
             while not self._stopping:
                 self.revive(clock.now())
@@ -80,10 +88,10 @@ class Launcher:
                     return 1
                 if not announced and clock.now() - said > REMIND_S:
                     said = clock.now()
-                    print("Still starting: this computer is slow, or busy elsewhere.", flush=True)
+                    say("Still starting: this computer is slow, or busy elsewhere.")
                 time.sleep(POLL_S)
         finally:
-            print("\nStopping: robot first.", flush=True)
+            say("\nStopping: robot first.")
             for child in self.children:
                 child.stop()
             self._run_file.unlink(missing_ok=True)
@@ -93,20 +101,20 @@ class Launcher:
         try:
             announce(json.loads(self._run_file.read_text()))
         except (OSError, PhoneClientError) as error:  # the server has just died: it comes back
-            print(f"{error}; `lightleash invite` prints links.", file=sys.stderr, flush=True)
+            say(f"{error}; `lightleash invite` prints links.", sys.stderr)
 
     def revive(self, now: float) -> None:
         """Start whoever should run and doesn't."""
         for child in self.children:
             said = child.revive(now)
             if said:
-                print(said, file=sys.stderr, flush=True)
+                say(said, sys.stderr)
 
     def _is_hopeless(self) -> bool:
         worst = max(self.children, key=lambda child: child.deaths)
         if worst.deaths < MAX_DEATHS:
             return False
-        print(f"The {worst.name} process does not start: see above.", file=sys.stderr)
+        say(f"The {worst.name} process does not start: see above.", sys.stderr)
         return True
 
 

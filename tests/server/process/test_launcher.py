@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import json
 import socket
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -141,6 +144,31 @@ def test_all_are_stopped_in_order_and_the_run_file_goes(tmp_path, capsys):
     assert one.run() == 0
     assert log == ["robot", "control", "server"]
     assert not (tmp_path / RUN_FILE).exists()
+
+
+class Gone(io.StringIO):
+    """A terminal that was closed."""
+
+    def write(self, text: str) -> int:
+        raise OSError(errno.EIO, "Input/output error")
+
+
+def test_whose_terminal_has_gone_stops_all_in_order_all_the_same(tmp_path, monkeypatch):
+    log = []
+    one = Launcher([fake(n, log) for n in ("robot", "control", "server")], tmp_path / RUN_FILE)
+    (tmp_path / RUN_FILE).write_text(json.dumps(RUN))
+    one.revive = lambda now: one.stop()  # SIGHUP
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(sys, stream, Gone())
+    assert one.run() == 0
+    assert log == ["robot", "control", "server"]
+    assert not (tmp_path / RUN_FILE).exists()
+
+
+def test_a_death_that_nobody_reads_of_ends_nothing(tmp_path, monkeypatch):
+    child = SimpleNamespace(name="server", revive=lambda now: "The server process ended.")
+    monkeypatch.setattr(sys, "stderr", Gone())
+    Launcher([child], tmp_path / RUN_FILE).revive(0.0)
 
 
 def test_what_never_starts_ends_the_whole_with_its_name(tmp_path, capsys, monkeypatch):
