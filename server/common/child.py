@@ -53,24 +53,35 @@ class Child:
     def revive(self, now: float) -> str:
         """Start it if it is due, notice its death; gives what people should read, or ""."""
         if self._due is not None:
-            if now >= self._due:
-                self._start(now)
-            return ""
+            return self._start(now) if now >= self._due else ""
         if self.alive or self.process is None:
             return ""
         if now - self._started > STEADY_S:
             self.deaths = 0
-        wait = BACKOFF_S[min(self.deaths, len(BACKOFF_S) - 1)]
-        self.deaths += 1
-        self._due = now + wait
+        wait = self._wait(now)
         return (
             f"The {self.name} process ended ({ending(self.process.returncode)}); "
             f"starting it again in {wait:g} s."
         )
 
-    def _start(self, now: float) -> None:
+    def _wait(self, now: float) -> float:
+        """Try again in so long [s]."""
+        wait = BACKOFF_S[min(self.deaths, len(BACKOFF_S) - 1)]
+        self.deaths += 1
+        self._due = now + wait
+        return wait
+
+    def _start(self, now: float) -> str:
+        """Start it, or say why not: memory or numbers of processes may be short for a while."""
+        try:
+            self._begin(now)
+        except OSError as error:
+            wait = self._wait(now)
+            return f"Can't start the {self.name} process ({error}); trying again in {wait:g} s."
+        return ""
+
+    def _begin(self, now: float) -> None:
         """Start it; it ends with us, however we end, and Ctrl-C in the terminal is for us alone."""
-        self._started, self._due = now, None
         parent = os.getpid()
         self.process = subprocess.Popen(
             [sys.executable, "-m", *watched(self.arguments, parent)],
@@ -81,6 +92,7 @@ class Child:
             stdin=subprocess.DEVNULL,
             stdout=sys.stderr,
         )
+        self._started, self._due = now, None
 
     def _prepare(self, parent: int) -> None:
         die_with(parent)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -18,6 +19,7 @@ NAME = "lightleash_test_program"
 SLEEPER = "import time; time.sleep(60)"
 STUBBORN = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); time.sleep(60)"
 WRITER = """
+import errno
 import os
 for descriptor in ({given}, {kept}):
     try:
@@ -72,6 +74,23 @@ def test_what_dies_at_once_is_started_with_growing_patience(program):
         assert child.process is dead
         now += wait
     assert child.deaths == len(BACKOFF_S) + 1
+
+
+def test_what_can_not_be_started_is_tried_again_with_the_same_patience(program, monkeypatch):
+    def no_room(*_args, **_options):
+        raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    child = Child("c", program(SLEEPER))
+    with monkeypatch.context() as short:
+        short.setattr(subprocess, "Popen", no_room)
+        said = child.revive(100.0)
+        assert "Resource temporarily unavailable" in said
+        assert said.endswith(f"trying again in {BACKOFF_S[0]:g} s.")
+        assert child.revive(100.0 + 0.99 * BACKOFF_S[0]) == ""
+    assert child.deaths == 1
+    assert child.revive(100.0 + BACKOFF_S[0]) == ""
+    assert child.alive
+    child.stop()
 
 
 def test_what_has_lived_long_is_started_soon(program):
