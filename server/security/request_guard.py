@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from ipaddress import ip_address
 
 from msgspec.structs import replace
 from starlette.responses import JSONResponse
@@ -53,7 +54,7 @@ class Guard:
         self._quotas = Quotas() if quotas is None else quotas
         self._roles = RoleTable({}) if roles is None else roles
         doors.on_gone = self._admission.forget
-        self._hosts = {f"[{host}]" if ":" in host else host.lower() for host in hosts}
+        self._hosts = set(map(as_browsers_write, hosts))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let in or turn away."""
@@ -127,6 +128,15 @@ class Guard:
         if headers.get("origin") != f"{scheme}://{host}":
             return False
         return scope["type"] == "websocket" or "x-lightleash" in headers
+
+
+def as_browsers_write(host: str) -> str:
+    """A name or an address as it comes in a Host header, however it was written in the settings."""
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return host.lower()
+    return f"[{address}]" if address.version == 6 else str(address)
 
 
 def _changes(scope: Scope) -> bool:

@@ -431,6 +431,12 @@ def test_every_name_of_our_own_is_answered(rig, host):
     assert rig.client.get("/", headers={"Host": host}).status_code == 200
 
 
+@pytest.mark.parametrize("written", ["fd00::7", "FD00::7", "fd00:0:0:0:0:0:0:7"])
+def test_an_ipv6_address_is_our_own_however_the_settings_write_it(written):
+    client = TestClient(Guard(pytest.fail, Doors(), [written]), base_url="http://[fd00::7]:8080")
+    assert client.get("/").status_code == 401  # and not 421
+
+
 def test_pairing_gives_a_cookie_that_scripts_and_other_sites_do_not_get(rig):
     response = pair(rig, "viewer")
     cookie = response.headers["set-cookie"].lower()
