@@ -98,7 +98,8 @@ GAINS = "phone"
 """The gain set that is taken unless another is named."""
 TURN_LIVES_S = 12 * 3600.0
 """A relay asks for the credential again while it relays: longer than anybody flies."""
-TURN_URL = r"^(turns?:[^\s?]{1,200}(\?transport=(udp|tcp))?)?$"
+TURN_URL = r"^(turns?:[^\s?:]{1,200}(:\d{1,5})?(\?transport=(udp|tcp))?)?$"
+"""With a name or an IPv4 address: aiortc reads no IPv6 address here, nor a port of letters."""
 
 
 class RtcSettings(BaseModel):

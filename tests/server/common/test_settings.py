@@ -93,6 +93,8 @@ def test_lists_grow_with_each_mention():
         ("https_port = ", ["settings.toml"]),
         ('cert = "/c.pem"', ["cert", "key"]),
         ('robot_host = "1.2.3.4"', ["robot_host", "--no-simulate"]),
+        ('[rtc]\nturn_url = "turn:[2001:db8::1]:3478"', ["rtc.turn_url"]),
+        ('[rtc]\nturn_url = "turn:relay:port"', ["rtc.turn_url"]),
         ('name = "left arm"', ["name: allowed: up to 24 letters", "not 'left arm'"]),
         ("simulate = false\nsimulated.battery_v = 12", ["simulated", "--no-simulate"]),
     ],
