@@ -13,7 +13,7 @@ from typing import cast, get_args
 
 import segno
 
-from server.common.access import PhoneClientError, run_of
+from server.common.access import PhoneClientError, direct, run_of
 from server.common.options import Parser, add_name_argument
 from server.common.roles import Role
 from server.common.runtime import runtime_directory
@@ -44,9 +44,8 @@ def invite(run: Mapping[str, object], role: Role) -> Invitation:
         headers={"Authorization": f"Bearer {run['supervisor_token']}"},
         method="POST",
     )
-    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
-        with direct.open(request, timeout=TIMEOUT_S) as response:
+        with direct().open(request, timeout=TIMEOUT_S) as response:
             answer = json.loads(response.read())
         return Invitation(str(answer["url"]), str(answer["here"]), float(answer["lives_s"]))
     except (OSError, ValueError, LookupError) as error:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from server.common.access import Access, PhoneClientError
+from server.common.access import Access, PhoneClientError, direct
 from server.diagnostics.link_log import KEPT_S
 from server.protocol.link_messages import LinkReport
 
@@ -44,7 +44,7 @@ def ask(access: Access, seconds: float) -> LinkReport:
     secure = access.url.startswith("https")
     tls = ssl.create_default_context(cafile=access.ca) if secure else None
     try:
-        with urllib.request.urlopen(request, timeout=TIMEOUT_S, context=tls) as answer:
+        with direct(tls).open(request, timeout=TIMEOUT_S) as answer:
             return msgspec.json.decode(answer.read(), type=LinkReport)
     except urllib.error.HTTPError as error:
         raise PhoneClientError(f"{access.url}: {_why(error.read()) or error}") from error

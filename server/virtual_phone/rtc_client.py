@@ -21,7 +21,7 @@ from aiortc import (
     RTCSessionDescription,
 )
 
-from server.common.access import Access, PhoneClientError
+from server.common.access import Access, PhoneClientError, direct
 from server.protocol.messages import Command, Status, Welcome
 from server.protocol.signalling import Answer, Ask, Offer
 from server.protocol.wire import WireError, decode, encode
@@ -230,7 +230,7 @@ class RtcPhoneClient(PhoneClient):
 
     def _fetch(self, request: urllib.request.Request) -> bytes:
         try:
-            with urllib.request.urlopen(request, timeout=TIMEOUT_S, context=self._tls()) as answer:
+            with direct(self._tls()).open(request, timeout=TIMEOUT_S) as answer:
                 said: bytes = answer.read()
                 return said
         except URLError as error:

@@ -50,6 +50,20 @@ def test_the_link_of_the_phone_that_leads_is_told_and_without_one_that_is_said(s
 
 
 @pytest.mark.slow
+def test_no_proxy_of_the_environment_comes_between_nor_learns_the_key(server, monkeypatch):
+    for name in ("no_proxy", "NO_PROXY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("http_proxy", f"http://{HOST}:9")
+
+    async def scene():
+        async with server.open():
+            with pytest.raises(PhoneClientError, match="while a phone leads"):
+                await asyncio.to_thread(ask, access(server), 1.0)
+
+    asyncio.run(scene())
+
+
+@pytest.mark.slow
 def test_a_verdict_is_printed_with_what_to_do_and_poor_or_unknown_fails(server):
     told = []
 
