@@ -206,7 +206,8 @@ class PhoneSession:
         """Begin to look, or begin again at another size or angle: that is another camera."""
         is_calibrating = self.wizard is not None and self.wizard.stored is None
         self.close()
-        self._shape, self.camera_problem, self._guessed = shape, "", None
+        self._shape, self._guessed = shape, None
+        self.camera_problem = self.camera_text = ""
         if is_calibrating and not shape.shrunk:
             self._calibrate(shape)
             return
@@ -218,7 +219,7 @@ class PhoneSession:
                 self.camera_problem = str(error)
                 return
             # enough for a robot that is only light, and its screen measures what is guessed
-            lens, self.camera_text = self._lens or SimpleLens(), ""
+            lens = self._lens or SimpleLens()
             camera = shape.guessed(lens)
             self._guessed = camera if self._lens is None else None
         self.ingest.extrinsics = camera.extrinsics

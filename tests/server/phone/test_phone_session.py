@@ -376,6 +376,16 @@ def test_pictures_of_a_size_nobody_calibrated_are_refused_until_the_size_is_righ
         rig.phone.close()
 
 
+def test_a_recording_is_not_told_of_a_calibration_that_its_pictures_have_not(rig):
+    rig.phone.device = DEVICE
+    rig.synchronise()
+    rig.say(JPEG)
+    assert rig.phone.camera_text != ""
+    with pytest.raises(WireError, match="no calibration"):
+        rig.say(replace(JPEG, width=640, height=200), 2)
+    assert rig.phone.camera_text == ""
+
+
 class OpenableScreen:
     """A place of a screen that only says whether one is there."""
 
