@@ -79,6 +79,16 @@ def base_url(host: str, port: int) -> str:
     return f"https://[{address}]:{port}" if ":" in address else f"https://{address}:{port}"
 
 
+def names_of(settings: Settings) -> list[str]:
+    """Names and addresses that this server answers to."""
+    return [*own_names(), *settings.names, *_bound_to(settings)]
+
+
+def _bound_to(settings: Settings) -> list[str]:
+    """The address that its links name then; others may mostly reach this machine elsewhere."""
+    return [] if settings.host in ANY_ADDRESS else [settings.host]
+
+
 async def serve(settings: Settings, given: LaunchContext) -> None:
     """Serve until SIGTERM or SIGINT."""
     tls = _certificate(settings)
@@ -98,7 +108,7 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
     routes = [*people.routes(), *view_routes(view), *signalling.routes(), *Fleet().routes()]
     app = make_app(api, PageServer(manager, settings.video, settings.name), routes)
     admission = Admission(limits_for(raise_handles()))
-    hosts = [*own_names(), *settings.names]
+    hosts = names_of(settings)
     guarded, trust = (
         Guard(one, doors, hosts, admission, roles=roles_of(one.routes))
         for one in (app, trust_app(tls.authority))
@@ -222,7 +232,7 @@ def raise_handles() -> int:
 def _certificate(settings: Settings) -> Certificate:
     if settings.cert is not None and settings.key is not None:
         return Certificate(settings.cert, settings.key, None)
-    return certificate(settings.state, settings.names, settings.own_state)
+    return certificate(settings.state, settings.names, settings.own_state, _bound_to(settings))
 
 
 def _metadata(settings: Settings) -> dict[str, str]:

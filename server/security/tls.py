@@ -88,24 +88,27 @@ def own_names() -> list[str]:
     return [*own_addresses(), *own_hosts()]
 
 
-def certificate(state: Path, names: Iterable[str] = (), own: Path | None = None) -> Certificate:
+def certificate(
+    state: Path, names: Iterable[str] = (), own: Path | None = None, also: Iterable[str] = ()
+) -> Certificate:
     """The certificate in `own` for this machine and `names`, made or renewed if it must be.
 
     So is the authority in `state` that signs it, with a word in the log if phones trusted another
     one. It signs for names and addresses of this machine and for private addresses, nothing else.
     Servers that share `state` share the authority: a phone trusts one, and so all. They must have
     the same `names`, for which alone it may sign: another list makes another authority.
+    What it is `also` reached by is in the certificate as far as the authority may sign for it.
     """
     own = private_directory(own or state)
     private_directory(state)
     paths = {name: state / f"{name}.pem" for name in ("ca", "ca-key")}
     paths |= {name: own / f"{name}.pem" for name in ("server", "server-key")}
     with one_at_a_time(state / AUTHORITY_LOCK):  # two that start at once make one authority
-        return _renewed(paths, names)
+        return _renewed(paths, names, also)
 
 
-def _renewed(paths: dict[str, Path], names: Iterable[str]) -> Certificate:
-    addresses, hosts = own_addresses(), [*own_hosts(), *names]
+def _renewed(paths: dict[str, Path], names: Iterable[str], also: Iterable[str]) -> Certificate:
+    addresses, hosts = [*own_addresses(), *also], [*own_hosts(), *names]
     if not _is_good_authority(paths, [addresses[0], *hosts]):
         if paths["ca"].exists():
             log.warning(
