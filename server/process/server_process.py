@@ -31,7 +31,7 @@ from server.phone.frame_worker import join_all
 from server.recording.control import Recordings
 from server.recording.folder import GIB, DiskLimits
 from server.recording.reader import recover_all
-from server.recording.writer import ROBOT_KEY, SETTINGS_KEY
+from server.recording.writer import ROBOT_KEY, SETTINGS_KEY, RecordingError
 from server.rtc.signalling_endpoint import SignallingEndpoint
 from server.security.admission import Admission
 from server.security.audit import Audit
@@ -114,7 +114,7 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
         for one in (app, trust_app(tls.authority))
     )
     if settings.record:
-        manager.start_recording()
+        record_from_the_start(manager)
     run = json.dumps(_run(settings, given, base, doors))
     reporting = asyncio.create_task(_report_ready(manager, warming, given.runtime / RUN_FILE, run))
     try:
@@ -132,6 +132,14 @@ async def serve(settings: Settings, given: LaunchContext) -> None:
         audit.close()
         await asyncio.to_thread(join_all)
         decoding.close()
+
+
+def record_from_the_start(manager: SessionManager) -> None:
+    """Record, if the disk has room: without it a server that died could not come back."""
+    try:
+        manager.start_recording()
+    except RecordingError as error:
+        manager.log_event(f"Nothing is recorded: {error}.")
 
 
 def http_url(given: LaunchContext) -> str:

@@ -171,6 +171,7 @@ export const SERVER = {
   "A screen shows the robot.": "Un écran montre le robot.",
   "No recording was running.": "Aucun enregistrement n’était en cours.",
   "Recording {}.": "Enregistrement : {}.",
+  "Nothing is recorded: {}.": "Rien n’est enregistré : {}.",
   "The recording has ended: {}.": "L’enregistrement a pris fin : {}.",
   "{} gives the lead to {}.": "{} passe la main à {}.",
   "{} ends the hand-over to {}.": "{} annule le passage de main à {}.",
