@@ -5,6 +5,7 @@ Written by a thread: a disk that hangs stops nobody. What can't be kept is count
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
 import os
@@ -123,7 +124,11 @@ def line_of(deed: Deed) -> str:
 
 
 def append(path: Path, line: str) -> None:
-    """Add to a file of our own that nobody else reads; a full one is put aside first."""
+    """Add to a file of our own that nobody else reads; a full one is put aside first.
+
+    Raises:
+        OSError: the disk does not take it; nothing of it is in the file then.
+    """
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     if path.exists() and path.stat().st_size + len(line) > MAX_BYTES:
         for n in range(FILES - 1, 0, -1):
@@ -132,6 +137,9 @@ def append(path: Path, line: str) -> None:
             if former.exists():
                 former.replace(older)
     flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
-    with os.fdopen(os.open(path, flags, 0o600), "w", encoding="ascii") as file:
+    with os.fdopen(os.open(path, flags, 0o600), "wb", buffering=0) as file:
         os.fchmod(file.fileno(), 0o600)
-        file.write(line)
+        before, data = os.fstat(file.fileno()).st_size, line.encode("ascii")
+        if file.write(data) < len(data):  # what begins would spoil the next line, too
+            os.ftruncate(file.fileno(), before)
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 
 import pytest
 from hypothesis import given
@@ -151,3 +152,16 @@ def test_what_the_disk_did_not_take_is_counted_in_the_next_line_that_it_takes(tm
     log.close()
     (line,) = lines(state)
     assert (line["who"], line["why"].strip()) == ("Dora", "(3 more left out)")
+
+
+def test_half_a_line_that_a_full_disk_takes_does_not_spoil_the_next(tmp_path):
+    append(tmp_path / AUDIT_FILE, "{}\n")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8, hard))
+    try:
+        with pytest.raises(OSError, match=r"No space|too large"):
+            append(tmp_path / AUDIT_FILE, '{"what": "arm"}\n')
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    append(tmp_path / AUDIT_FILE, "{}\n")
+    assert lines(tmp_path) == [{}, {}]
