@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, NoReturn
@@ -38,6 +39,9 @@ MOST_NUMBERS = 64
 MOST_NESTED = 16
 """Brackets that are open at once; the library's time grows as the square of theirs."""
 TOO_DEEP = "lists within too many others"
+MOST_KEPT = 256
+"""Of what was read: a text takes 3 ms, and all are looked through for each camera, also in flight,
+when a page makes its pictures smaller."""
 SKEW = 1e-3
 """What rounding may take from a rotation."""
 
@@ -70,20 +74,26 @@ def _read(path: Path) -> tuple[str, Camera, int | None]:
     """Name, camera and, if the file tells it, the screen's angle [°]."""
     try:
         text = path.read_text(encoding="utf-8")
-        if _nested(text) > MOST_NESTED:
-            raise CameraFileError(str(path), "", TOO_DEEP)
-        table = yaml.safe_load(text)
     except OSError as error:
         raise CameraFileError(str(path), "", error.strerror or str(error)) from error
     except UnicodeDecodeError as error:
         raise CameraFileError(str(path), "", "not a text file in UTF-8") from error
+    return _parsed(str(path), text)
+
+
+@lru_cache(MOST_KEPT)
+def _parsed(file: str, text: str) -> tuple[str, Camera, int | None]:
+    if _nested(text) > MOST_NESTED:
+        raise CameraFileError(file, "", TOO_DEEP)
+    try:
+        table = yaml.safe_load(text)
     except YAML_FAULTS as error:
-        raise CameraFileError(str(path), "", " ".join(str(error).split())) from error
+        raise CameraFileError(file, "", " ".join(str(error).split())) from error
     except RecursionError as error:
-        raise CameraFileError(str(path), "", TOO_DEEP) from error
+        raise CameraFileError(file, "", TOO_DEEP) from error
     if not isinstance(table, dict):
-        raise CameraFileError(str(path), "", "a YAML mapping: camera_info or a Kalibr camchain")
-    reader = _CameraFileReader(str(path), table)
+        raise CameraFileError(file, "", "a YAML mapping: camera_info or a Kalibr camchain")
+    reader = _CameraFileReader(file, table)
     name, camera = reader.kalibr("cam0") if "cam0" in table else reader.camera_info()
     return name, camera, reader.screen_angle_deg()
 

@@ -303,3 +303,14 @@ def test_a_calibrated_camera_is_known_at_any_angle_of_the_screen(tmp_path, angle
     table |= {"screen_angle_deg": angle, "image_width": size[0], "image_height": size[1]}
     own = written(tmp_path, table, "own.yaml")
     assert find_camera_file("pixel-7", size[0], size[1], [tmp_path], angle)[0] == own
+
+
+def test_a_text_that_was_read_is_not_read_through_again_and_another_one_is(tmp_path, monkeypatch):
+    file = tmp_path / "phone.yaml"
+    file.write_text(yaml.safe_dump(INFO | {"camera_name": "first"}))
+    assert load_camera(file)[0] == "first"
+    with monkeypatch.context() as once:
+        once.setattr(yaml, "safe_load", None)
+        assert load_camera(file)[0] == "first"
+    file.write_text(yaml.safe_dump(INFO | {"camera_name": "other"}))
+    assert load_camera(file)[0] == "other"
