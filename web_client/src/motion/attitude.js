@@ -49,7 +49,6 @@ export class GravitySign {
     /** @type {1 | -1} */
     this.sign = negated ? -1 : 1;
     this.against = 0;
-    this.turned = false;
   }
 
   /**
@@ -67,7 +66,6 @@ export class GravitySign {
     if (this.against >= NEEDED) {
       this.sign = this.sign === 1 ? -1 : 1;
       this.against = 0;
-      this.turned = true;
     }
     return this.sign;
   }

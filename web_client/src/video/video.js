@@ -33,7 +33,6 @@ export class VideoSender {
     this.bytes = new Rate();
     /** @type {Encoder | null} */
     this.encoder = null;
-    this.dropped = 0;
     this.load = new EncoderLoad();
     this.throttle = new Throttle();
     this.shrunk = 0;
@@ -119,7 +118,6 @@ export class VideoSender {
     }
     this.load.meant(encoder.waiting);
     if (!this.credits.mayTake(now)) {
-      this.dropped += 1;
       frame.close();
       return;
     }
@@ -177,14 +175,5 @@ export class VideoSender {
   failed(error) {
     this.surroundings.log(`${this.encoder?.name} encoder: ${error}`);
     this.replace(this.encoder instanceof JpegEncoder ? null : this.jpegEncoder());
-  }
-
-  /** @param {number} now [ms] */
-  health(now) {
-    return {
-      fps: this.frames.perSecond(now),
-      rttMs: this.credits.roundTripMs,
-      kbps: this.bytes.perSecond(now) * 0.008,
-    };
   }
 }

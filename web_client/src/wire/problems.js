@@ -5,7 +5,7 @@
 /**
  * @typedef {'insecure' | 'link_expired' | 'not_paired' | 'too_many_tries' | 'server_unreachable'
  *   | 'server_error' | 'not_supervisor' | 'shut_out' | 'waiting' | 'wrong_role' | 'camera_missing' | 'camera_denied' | 'camera_busy'
- *   | 'camera_absent' | 'motion_denied' | 'motion_silent' | 'encoder_missing' | 'old_page' | 'refused'} ProblemCode
+ *   | 'camera_absent' | 'motion_denied' | 'encoder_missing' | 'old_page' | 'refused'} ProblemCode
  */
 
 /** Something the person has to mend. */
@@ -177,13 +177,6 @@ const ADVICE = {
       'firefox-android': ['In about:config, “device.sensors.enabled” must be true.'],
       desktop: ['Click the icon left of the address and allow motion sensors.'],
     }[platform],
-    retry: true,
-  }),
-  motion_silent: (platform) => ({
-    title: 'The motion sensors say nothing',
-    steps: platform === 'desktop'
-      ? ['This device has no motion sensors, so it can’t lead the robot: use a phone.']
-      : ['Reload the page. In Chrome: Settings → Site settings → Motion sensors → “Allowed”.'],
     retry: true,
   }),
   encoder_missing: () => ({

@@ -16,7 +16,7 @@ test('every problem has a title and, on every platform, a way to mend it', () =>
   const codes = /** @type {const} */ ([
     'insecure', 'link_expired', 'not_paired', 'too_many_tries', 'server_unreachable', 'server_error',
     'not_supervisor', 'wrong_role', 'camera_missing', 'camera_denied', 'camera_busy', 'camera_absent',
-    'motion_denied', 'motion_silent', 'encoder_missing', 'old_page',
+    'motion_denied', 'encoder_missing', 'old_page',
   ]);
   for (const code of codes) {
     for (const platform of /** @type {const} */ (['ios', 'android', 'firefox-android', 'desktop'])) {
