@@ -145,8 +145,12 @@ export class H264Encoder {
   /** @param {EncodedVideoChunk} chunk */
   output(chunk) {
     const about = this.inside.get(chunk.timestamp);
-    this.inside.delete(chunk.timestamp);
     if (about === undefined) return;
+    for (const timestamp of this.inside.keys()) {
+      this.inside.delete(timestamp);
+      if (timestamp === chunk.timestamp) break;
+      this.outlet.onLost(); // it may drop pictures, and says nothing of them
+    }
     const data = new Uint8Array(chunk.byteLength);
     if (data.byteLength + HEADERS_BYTES > MAX_RECORD_BYTES) {
       this.wantsKey = true;

@@ -45,11 +45,11 @@ export class EncoderLoad {
   }
 
   /**
-   * How long a new encoder has held its first picture back [ms]; 0 once it has given one.
+   * How long it has held its oldest picture back [ms].
    * @param {number} nowMs
    */
   heldMs(nowMs) {
-    return this.hasGiven ? 0 : nowMs - (this.inside[0] ?? nowMs);
+    return nowMs - (this.inside[0] ?? nowMs);
   }
 
   /**

@@ -111,10 +111,13 @@ export class VideoSender {
       return;
     }
     if (this.load.heldMs(now) > HELD_MS) {
-      frame.close();
-      this.needsJpeg = true;
-      this.failed(new Error('holds pictures back'));
-      return;
+      if (!this.load.hasGiven) {
+        frame.close();
+        this.needsJpeg = true;
+        this.failed(new Error('holds pictures back'));
+        return;
+      }
+      this.lost();
     }
     this.load.meant(encoder.waiting);
     if (!this.credits.mayTake(now)) {
@@ -124,6 +127,12 @@ export class VideoSender {
     this.credits.taken();
     this.load.entered(now);
     encoder.encode(frame);
+  }
+
+  /** A picture that was taken will not come out. */
+  lost() {
+    this.load.lost();
+    this.credits.lost();
   }
 
   /**
@@ -140,10 +149,7 @@ export class VideoSender {
         this.load.left(this.surroundings.performance.now());
         this.send(encoded);
       },
-      onLost: () => {
-        this.load.lost();
-        this.credits.lost();
-      },
+      onLost: () => this.lost(),
       onFailure: (error) => this.failed(error),
     };
   }

@@ -147,6 +147,26 @@ test('a frame that is never credited blocks for two seconds only', () => {
   assert.equal(credits.mayTake(2001), true);
 });
 
+test('pictures that an encoder drops without a word free their places', async () => {
+  const { sender, sent, time, offer } = await senderOf();
+  for (let i = 0; i < 2 * MAX_UNDER_WAY; i++) {
+    offer();
+    offer();
+    FakeEncoder.newest.inside.shift();
+    FakeEncoder.newest.out();
+    assert.equal(sent.length, i + 1, 'at the next one that comes out');
+    sender.credit(headOf(sent.at(-1)).sequence);
+  }
+  for (let i = 0; i < MAX_UNDER_WAY; i++) offer();
+  FakeEncoder.newest.inside = [];
+  offer();
+  assert.equal(FakeEncoder.newest.inside.length, 0);
+  time.ms += HELD_MS + 1;
+  offer();
+  assert.equal(FakeEncoder.newest.inside.length, 1, 'or where none does for a while');
+  assert.equal(sender.encoder?.name, 'H.264');
+});
+
 test('the first frame is a key, then one each ten seconds and one when asked', async () => {
   const { sender, sent, offer } = await senderOf();
   /** @type {number[]} */
