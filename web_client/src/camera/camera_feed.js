@@ -64,12 +64,13 @@ export class CameraFeed {
   async settle(wanted) {
     this.wanted = wanted;
     const { track, settings } = this;
-    if (track === null || settings === null) return 'no camera';
-    this.source?.stop();
+    if (track === null || settings === null || !this.isLive) return 'no camera';
     await settleCamera(track, wanted);
     await settings.steady(wanted.distance_m);
-    this.source = await startFrames({ ...this.surroundings, track });
-    return `${settingsWords(track.getSettings())}, through the ${this.source.name}`;
+    const source = await startFrames({ ...this.surroundings, track });
+    this.source?.stop(); // one that began meanwhile, too
+    this.source = source;
+    return `${settingsWords(track.getSettings())}, through the ${source.name}`;
   }
 
   /** Opens it again if it was lost; resolves with its words, or "" if nothing was to be done. */
