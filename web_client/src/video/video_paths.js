@@ -50,6 +50,10 @@ export class VideoPaths {
     return video.encoder.name === 'JPEG' ? 'JPEG' : 'WebSocket';
   }
 
+  get wantsSocket() {
+    return this.requested === 'WebSocket' || this.requested === 'JPEG';
+  }
+
   /**
    * The server has welcomed us, and the camera is settled: begin with the websocket, look for better.
    * @param {Welcome} welcome
@@ -86,7 +90,7 @@ export class VideoPaths {
     this.tell();
     this.fastTries.reset();
     this.encoderTries.reset();
-    if (requested === 'WebSocket' || requested === 'JPEG') rtc.close();
+    if (this.wantsSocket) rtc.close();
     if ((requested === 'JPEG') !== (video.encoder?.name === 'JPEG')) void video.prepare(welcome, requested === 'JPEG');
     else video.requestKey();
     this.seek();
@@ -95,7 +99,7 @@ export class VideoPaths {
   /** Connects, if the fast path is wanted and not there. */
   seek() {
     const { rtc, say } = this.surroundings;
-    if (this.requested === 'WebSocket' || this.requested === 'JPEG' || rtc.isOpen) return;
+    if (this.wantsSocket || rtc.isOpen) return;
     if (rtc.isAble && (this.requested === 'WebRTC' || rtc.pictures.haveRecords)) void this.connect();
     else say('no WebRTC with records in this browser: pictures go by websocket');
   }
@@ -168,10 +172,11 @@ export class VideoPaths {
     const { rtc, place, say } = this.surroundings;
     const { session, track } = place();
     const { welcome } = this;
-    if (welcome === null || this.isConnecting || track === null) return;
+    if (welcome === null || this.wantsSocket || this.isConnecting || track === null) return;
     this.isConnecting = true;
     try {
       await rtc.open(session, track, welcome);
+      if (this.wantsSocket) return rtc.close(); // chosen meanwhile
       this.complaints.old.reset();
       this.fastTries.succeeded();
       say('pictures go by WebRTC');
@@ -189,7 +194,7 @@ export class VideoPaths {
   /** @param {string} why The fast path has ended: the websocket takes over, with a key; later, another try. */
   lost(why) {
     const { video, say } = this.surroundings;
-    if (this.welcome === null || this.requested === 'WebSocket' || this.requested === 'JPEG') return;
+    if (this.welcome === null || this.wantsSocket) return;
     video.requestKey();
     say(`WebRTC: ${why}; pictures go by websocket`);
     this.fastTries.failed(() => void this.connect());

@@ -215,6 +215,21 @@ test('a person’s choice is kept until he chooses again', async () => {
   assert.equal(paths.name, 'WebRTC');
 });
 
+test('the websocket that is chosen while the fast path is being connected stays chosen', async () => {
+  for (const wish of /** @type {const} */ (['WebSocket', 'JPEG'])) {
+    paths.choose('auto', 'operator');
+    paths.begin(WELCOME);
+    paths.choose(wish, 'supervisor');
+    await settled();
+    assert.equal(paths.name, wish);
+    paths.choose('auto', 'operator');
+    paths.choose(wish, 'supervisor');
+    paths.begin(/** @type {any} */ ({ session: 's2' }));
+    await settled();
+    assert.equal(paths.name, wish, 'welcomed anew meanwhile, too');
+  }
+});
+
 test('who chose last is obeyed, and the server is told of it, and again when it welcomes the page anew', async () => {
   paths.begin(WELCOME);
   await settled();
