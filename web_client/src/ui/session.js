@@ -282,7 +282,7 @@ function ticked(state, now) {
   const away = now - state.tickedMs;
   const free = state.standby && isFree({ ...state, heard });
   const freeMs = free ? Math.min(state.freeMs, now) : Infinity;
-  const next = { ...state, heard, notice, tickedMs: now, freeMs, led: state.led && !isLed({ ...state, heard }) };
+  const next = { ...state, heard, notice, tickedMs: state.visible ? now : Infinity, freeMs, led: state.led && !isLed({ ...state, heard }) };
   if (now - freeMs > (next.led ? AGAIN_MS : FREE_MS)) return to({ ...next, freeMs: now }, { type: 'ask_lead' });
   if (away > BUSY_MS && state.linked && FLYING.includes(shownMode(state)) && notice === null) {
     const text = `This phone was too busy for ${(away / 1000).toFixed(1)} s: close other apps, end power saving, let it cool down.`;

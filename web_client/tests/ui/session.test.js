@@ -308,6 +308,8 @@ test('a page that was too busy says so, for it was no link; one that was hidden 
   assert.equal(notice({ type: 'tick', now: 500 }), 'This phone was too busy for 0.4 s: close other apps, end power saving, let it cool down.');
   assert.equal(notice({ type: 'visibility', visible: false }, { type: 'visibility', visible: true }, { type: 'tick', now: 9000 }),
     undefined);
+  const seldom = [1000, 2000, 3000].flatMap((now) => [status({ mode: 'HOLD' }, now), /** @type {const} */ ({ type: 'tick', now })]);
+  assert.equal(notice({ type: 'visibility', visible: false }, ...seldom), undefined, 'browsers tick seldom in hidden pages');
   const { state, effects } = after(...UP, status({ mode: 'TRACK' }), { type: 'tick', now: 100 }, { type: 'tick', now: 500 });
   assert.deepEqual(effects.find(({ type }) => type === 'tell'), { type: 'tell', text: state.notice?.text }, 'to the supervisor, too');
 });
