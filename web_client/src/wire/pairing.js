@@ -139,8 +139,8 @@ export async function ask(fetch, method, path, body) {
       method, headers: OWN_HEADERS, keepalive: true, signal: AbortSignal.timeout(PATIENCE_MS), ...told,
     });
     return response.ok ? '' : await refusalOf(response);
-  } catch (error) {
-    return error instanceof Error ? error.message : String(error);
+  } catch {
+    return 'The server does not answer.';
   }
 }
 

@@ -136,6 +136,7 @@ test('a wish resolves with the server’s reason when it is refused', async () =
   assert.equal(await ask(fetch, 'POST', 'api/recording'), 'recording: one at a time');
   assert.equal(await ask(server({ 'api/stop': [202, {}] }).fetch, 'POST', 'api/stop'), '');
   assert.equal(await ask(server({}).fetch, 'POST', 'api/x'), '404');
+  assert.equal(await ask(() => Promise.reject(new TypeError('Failed to fetch')), 'POST', 'api/x'), 'The server does not answer.');
 });
 
 test('a STOP by POST says how old it is, and a request without a body has none', async () => {
