@@ -49,7 +49,9 @@ export class Feedback {
   signal(mode) {
     const { vibration, tones } = SIGNALS[mode];
     this.navigator.vibrate?.(vibration);
-    if (this.sound) tones.forEach((hz, i) => this.tone(hz, i * TONE_S));
+    if (!this.sound) return;
+    void this.context?.resume().catch(() => {}); // iPhones silence it for a call or another app, for good
+    tones.forEach((hz, i) => this.tone(hz, i * TONE_S));
   }
 
   /**
