@@ -159,6 +159,7 @@ export class RtcPictures {
     this.isFlowing = false;
     this.tell({ type: 'origin', timeOrigin: this.surroundings.performance.timeOrigin });
     await this.sender?.replaceTrack(track);
+    this.holdSize(this.sender);
   }
 
   /** @param {ToWorker} message */

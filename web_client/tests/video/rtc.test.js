@@ -160,6 +160,9 @@ test('a browser that does not know what to give up last is told by the track', a
   FakeConnection.newest.sender.getParameters = () => ({ encodings: [{}] });
   await rtc.pictures.limit(WELCOME);
   assert.equal(track.contentHint, 'detail');
+  const anew = /** @type {any} */ ({ kind: 'video', contentHint: '' });
+  await rtc.pictures.replaceTrack(anew);
+  assert.equal(anew.contentHint, 'detail', 'each of its tracks');
 });
 
 test('the worker is told when pictures were taken, how the phone is turned, and the page’s clock', async () => {
