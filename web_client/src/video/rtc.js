@@ -81,6 +81,7 @@ export class RtcPath {
     const connection = new PeerConnection({ iceServers: offer.ice_servers, ...this.pictures.configuration });
     this.connection = connection;
     const opened = this.expectChannel(connection);
+    opened.catch(() => {}); // awaited below
     await connection.setRemoteDescription({ type: 'offer', sdp: offer.sdp });
     await this.pictures.attach(connection, track);
     await connection.setLocalDescription(await connection.createAnswer());

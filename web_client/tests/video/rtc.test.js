@@ -236,6 +236,16 @@ test('no connection in time is an error', async () => {
   await failed;
 });
 
+test('a try that has failed does not fail once more when its time is up', async () => {
+  const { prototype } = FakeConnection;
+  const { setRemoteDescription } = prototype;
+  prototype.setRemoteDescription = async () => { throw new Error('closed'); };
+  await assert.rejects(rtc.open('s1', TRACK, WELCOME), /closed/);
+  prototype.setRemoteDescription = setRemoteDescription;
+  time.advance(10_000);
+  await new Promise((resolve) => setImmediate(resolve));
+});
+
 test('a server without WebRTC says so, one that refuses says why', async () => {
   status = 404;
   await assert.rejects(rtc.open('s1', TRACK, WELCOME), RtcRefused);
