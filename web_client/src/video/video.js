@@ -111,7 +111,7 @@ export class VideoSender {
       return;
     }
     if (this.load.heldMs(now) > HELD_MS) {
-      if (!this.load.hasGiven) {
+      if (encoder.name !== 'JPEG' && !this.load.hasGiven) {
         frame.close();
         this.needsJpeg = true;
         this.failed(new Error('holds pictures back'));

@@ -311,6 +311,15 @@ test('an encoder that holds its first pictures back is given up for good, one th
   assert.equal(await sender.prepare(STREAM), 'JPEG');
 });
 
+test('a JPEG worker that is slow to load is waited for: there is no other encoder', async () => {
+  const { sender, sent, time, offer } = await senderOf(false);
+  offer();
+  time.ms = HELD_MS + 1;
+  offer();
+  await new Promise((resolve) => { setImmediate(() => setImmediate(resolve)); });
+  assert.deepEqual([sender.encoder?.name, sent.length, sender.needsJpeg], ['JPEG', 2, false]);
+});
+
 test('JPEGs that fail, are too large or were overtaken count as lost, and a worker that fails is given up', async () => {
   /** @type {string[]} */
   const log = [];
