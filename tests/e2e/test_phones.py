@@ -18,6 +18,22 @@ PERMISSIONS = ["camera", "accelerometer", "gyroscope", "magnetometer"]
 PHONE = {"viewport": {"width": 412, "height": 915}}
 WAIT_MS = 30_000
 PRESSED = ("wish", "stop", "hold")
+LOSES_CAMERA = """
+window.tracks = [];
+window.refusals = 0;
+const ask = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices);
+navigator.mediaDevices.getUserMedia = async (wanted) => {
+  if (refusals-- > 0) throw new DOMException('another app has it', 'NotReadableError');
+  const stream = await ask(wanted);
+  tracks.push(stream.getVideoTracks()[0]);
+  return stream;
+};
+window.lose = () => {
+  refusals = 1;
+  tracks.at(-1).stop();
+  tracks.at(-1).dispatchEvent(new Event('ended'));
+};
+"""
 
 
 @pytest.fixture(scope="module")
@@ -95,6 +111,17 @@ def test_with_text_twice_as_large_what_is_pressed_lies_on_the_screen(
             "['wish', 'stop', 'hold'].every((id) => { const e = document.getElementById(id);"
             " return e.scrollWidth <= e.clientWidth && e.scrollHeight <= e.clientHeight; })"
         )
+
+
+def test_a_camera_that_is_taken_away_from_a_page_in_sight_is_opened_again(
+    chromium: str, server: Serving
+) -> None:
+    with browser(chromium, **PHONE) as context:
+        context.add_init_script(LOSES_CAMERA)
+        page = joined(context, server, "Anna")
+        page.evaluate("lose()")
+        expect(page.locator("#notice")).to_contain_text("does not come back", timeout=WAIT_MS)
+        until(lambda: bool(page.evaluate("tracks.length === 2")), 30.0, "another track")
 
 
 def test_a_leader_hands_over_and_nobody_arms_before_the_other_has_taken_it(

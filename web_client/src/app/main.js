@@ -38,6 +38,8 @@ const HEALTH_MS = 500;
 /** Phases of a calibration that need pictures of the camera's own size. */
 const WHOLE = ['filming', 'solving'];
 const SILENT_MOTION_MS = 3000;
+/** Before a camera that was taken away is asked for again. */
+const CAMERA_AGAIN_MS = 2000;
 
 await speak(document, navigator.languages, () => window.localStorage);
 const here = browserOf(window);
@@ -112,6 +114,7 @@ const camera = new CameraFeed({
   onLost: (text) => {
     notice(text);
     phone.log(text);
+    later(comeBack, CAMERA_AGAIN_MS);
   },
 });
 
@@ -260,6 +263,7 @@ function choosePath(requested, by) {
 }
 
 async function comeBack() {
+  if (document.hidden) return;
   void stayAwake(navigator);
   try {
     const words = await camera.revive();
@@ -267,7 +271,9 @@ async function comeBack() {
     phone.log(`camera again: ${words}`);
     if (camera.track !== null) await paths.filmAnew(camera.track);
   } catch (error) {
-    notice(`The camera does not come back: ${problemOf(error).message}`);
+    const { code, message } = problemOf(error);
+    notice(`The camera does not come back: ${message}`);
+    if (code === 'camera_busy') later(comeBack, CAMERA_AGAIN_MS);
   }
 }
 
@@ -290,7 +296,7 @@ function notice(text) {
 document.getElementById('language')?.addEventListener('click', () => chooseOther(document, () => window.localStorage));
 document.addEventListener('visibilitychange', () => {
   dispatch({ type: 'visibility', visible: !document.hidden });
-  if (!document.hidden && state.phase === 'operating') void comeBack();
+  if (state.phase === 'operating') void comeBack();
 });
 window.addEventListener('pagehide', () => dispatch({ type: 'visibility', visible: false }));
 window.addEventListener('pageshow', () => dispatch({ type: 'visibility', visible: !document.hidden }));
