@@ -56,6 +56,9 @@ def test_who_prefers_french_is_told_in_french_what_the_page_and_the_server_say(
         screen = context.new_page()
         screen.goto(f"{server.http_url}/screen")
         expect(screen.locator("#start")).to_have_text("Plein écran", timeout=WAIT_MS)
+        screen.route("**/api/whoami", lambda route: route.abort())
+        screen.dispatch_event("#start", "click")
+        expect(screen.locator("#why")).to_have_text("Le serveur ne répond pas", timeout=WAIT_MS)
         assert asked_for(phone) == [
             *("french.js", "french_page.js", "french_server.js", "say.js", "translator.js"),
         ]

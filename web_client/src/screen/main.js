@@ -6,7 +6,7 @@ import { browserOf } from '../app/browser.js';
 import { stayAwake } from '../ui/display.js';
 import { Link, socketUrl } from '../wire/link.js';
 import { becomeKnown, usualName } from '../wire/pairing.js';
-import { problemOf } from '../wire/problems.js';
+import { adviceFor, problemOf } from '../wire/problems.js';
 import { VERSION } from '../wire/protocol.js';
 import { speak, write } from '../words/say.js';
 import {
@@ -18,7 +18,7 @@ const ASK_MS = 200;
 const GREY = '#4d4d4d';
 
 await speak(document, navigator.languages, () => window.localStorage);
-const { fetchHere, later, links } = browserOf(window);
+const { fetchHere, later, links, platform } = browserOf(window);
 const canvas = /** @type {HTMLCanvasElement} */ (find('glass'));
 const card = find('card');
 const slider = /** @type {HTMLInputElement} */ (find('size'));
@@ -142,7 +142,8 @@ async function start() {
     }
     link.open();
   } catch (error) {
-    say(problemOf(error).message);
+    const problem = problemOf(error);
+    say(problem.detail || adviceFor(problem, platform, window.location.port).title);
   }
 }
 
