@@ -150,7 +150,8 @@ def children_of(
     truth_port, children = 0, []
     key, epochs = new_key(), runtime / f"{name}.epoch"
     if not settings.simulate:
-        key = key_of(settings.state, name) if link_kind(link.kind).keyed else new_key()
+        is_keyed = link_kind(link.kind).keyed
+        key = key_of(settings.state, name, settings.robot) if is_keyed else new_key()
         epochs = epoch_file(settings.state, name)
     shared = {KEY_VARIABLE: key.hex()}
     if settings.simulate:

@@ -27,8 +27,8 @@ def epoch_file(state: Path, robot: str) -> Path:
     return state / ROBOTS / f"{robot}.epoch"
 
 
-def key_of(state: Path, robot: str) -> bytes:
-    """The key of a real robot.
+def key_of(state: Path, robot: str, named: str) -> bytes:
+    """The key of a real robot, which people have `named` by itself or by its file.
 
     Raises:
         LinkKeyError: none yet, or it can't be used; names the command that makes one.
@@ -36,7 +36,8 @@ def key_of(state: Path, robot: str) -> bytes:
     file = key_file(state, robot)
     if not file.exists():
         raise LinkKeyError(
-            f"robot {robot}", f"a real robot needs a key: make it by `lightleash robot key {robot}`"
+            f"robot {robot}",
+            f"a real robot needs a key: make it by `lightleash robot key {named}`",
         )
     return read_key(file)
 

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         RobotFileError: the file can't be used; names the key and what is allowed.
     """
     robot_file = load_robot(arguments.robot, takes=COMMANDS)
-    found = list(findings(robot_file, arguments.state))
+    found = list(findings(robot_file, arguments.robot, arguments.state))
     if arguments.json:
         print(json.dumps([asdict(one) for one in found], indent=1, ensure_ascii=False))
     else:
@@ -83,8 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
     return int(any(not one.ok for one in found))
 
 
-def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
-    """All of them, the robot's body first, then its LEDs, its link at the end."""
+def findings(robot_file: RobotFile, named: str, state: Path) -> Iterator[RobotFinding]:
+    """All of a robot, `named` by itself or its file: body first, then LEDs, link at the end."""
     if robot_file.robot.twist is not None:
         yield from _twist(robot_file.robot.twist)
         yield _motion(robot_file.robot.motion)
@@ -97,7 +97,7 @@ def findings(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
             said = f"{', '.join(outdated)}: not what was identified, so assumed as of any robot"
             yield RobotFinding("identified", True, said)
     yield _leds(robot_file)
-    yield from _link(robot_file, state)
+    yield from _link(robot_file, named, state)
 
 
 def _stops(drive: TwistDrive, silence: SilenceTimes) -> RobotFinding:
@@ -202,7 +202,7 @@ def _leds(robot_file: RobotFile) -> RobotFinding:
     return RobotFinding("LEDs", found.grade != "bad" and depth < inf, f"{said} (robot leds: more)")
 
 
-def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
+def _link(robot_file: RobotFile, named: str, state: Path) -> Iterator[RobotFinding]:
     link, name = robot_file.link, robot_file.robot.name
     try:
         kind = link_kind(link.kind)
@@ -221,7 +221,7 @@ def _link(robot_file: RobotFile, state: Path) -> Iterator[RobotFinding]:
         yield _stops(robot_file.robot.twist, kind.silence)
     if kind.keyed:
         has = key_file(state, name).exists()
-        lacks = f"no key: `lightleash robot key {name}` (a simulated robot needs none)"
+        lacks = f"no key: `lightleash robot key {named}` (a simulated robot needs none)"
         yield RobotFinding("key", has or link.host == "127.0.0.1", "kept" if has else lacks)
     else:
         yield RobotFinding("key", True, NOBODY_ASKED)

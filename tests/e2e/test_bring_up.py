@@ -168,7 +168,7 @@ def test_nobody_at_the_stop_no_key_or_another_server_refuses_it(
     mine, state = str(folder / "mine.toml"), ("--state", str(folder))
     assert "allowed: --confirm ames" in refused(mine, *state)
     elsewhere = ("--state", str(folder / "nobody"), "--confirm", "ames")
-    assert "lightleash robot key ames" in refused(mine, *elsewhere)
+    assert f"lightleash robot key {mine}`" in refused(mine, *elsewhere)
     assert "stands, by its file" in refused("quadrotor", *state)
     assert "'twist'" in refused("twister", *state)
     assert not (folder / "bring-up").exists()

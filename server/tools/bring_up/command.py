@@ -166,7 +166,7 @@ def _recorded(robot_file: RobotFile, text: str, arguments: argparse.Namespace) -
     _confirm(robot_file, stand, arguments.confirm)
     with claimed_robot(arguments.state, name, "`lightleash robot bring-up`"):
         kind = link_kind(robot_file.link.kind)
-        key = key_of(arguments.state, name) if kind.keyed else new_key()
+        key = key_of(arguments.state, name, arguments.robot) if kind.keyed else new_key()
         epoch = next_epoch(epoch_file(arguments.state, name), clock.unix_ms())
         metadata = {DEVICE_KEY: "bring-up", ROBOT_KEY: text}
         folder = RecordingFolder(arguments.state / RECORDINGS)

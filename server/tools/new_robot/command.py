@@ -83,9 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"written: {out}, after {kind.template}.toml")
     for line in to_measure(answers):
         print(f"  still to be measured: {line}")
-    against = [
-        one for one in findings(load_robot(out, takes=COMMANDS), arguments.state) if not one.ok
-    ]
+    found = findings(load_robot(out, takes=COMMANDS), str(out), arguments.state)
+    against = [one for one in found if not one.ok]
     for one in against:
         print(f"  !!  {one.what}: {one.said}")
     print(f"then: lightleash robot check {out}")

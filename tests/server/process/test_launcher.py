@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from hardware.link.link_key import KEY_VARIABLE, LinkKeyError, new_key, read_key, write_key
-from hardware.robot_file import RobotFileError
+from hardware.robot_file import RobotFileError, robot_path
 from server import cli
 from server.common.access import PhoneClientError
 from server.common.runtime import RUN_FILE, BusyError, prepare, runtime_directory
@@ -112,6 +112,14 @@ def test_a_real_robot_has_its_own_key_and_without_one_the_command_is_named(tmp_p
     assert control.environment[KEY_VARIABLE] == key.hex()
     assert option(control, "--epochs") == str(tmp_path / "robots" / "ames.epoch")
     assert "--real" in control.arguments
+
+
+def test_the_key_of_a_robot_of_ones_own_is_made_by_its_file(tmp_path, sockets):
+    mine = tmp_path / "robot.toml"
+    mine.write_text(robot_path("ames").read_text().replace('name = "ames"', 'name = "mine"'))
+    settings = load(["--no-simulate", "--robot", str(mine), "--state", str(tmp_path)])
+    with pytest.raises(LinkKeyError, match=f"robot mine: .*`lightleash robot key {mine}`"):
+        children_of(settings, [], tmp_path, sockets)
 
 
 def test_no_such_robot_or_gains_are_refused_by_name(tmp_path, sockets):

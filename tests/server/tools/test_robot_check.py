@@ -205,3 +205,16 @@ def test_what_tells_of_a_body_without_motion_sensors_is_said(capsys, tmp_path):
     assert "only the phone knows" in found["motion"]["said"]
     _, found = findings(capsys, "twister", tmp_path)
     assert found["motion"]["said"] == "by a gyroscope and an accelerometer on its body"
+
+
+def test_the_command_that_is_named_for_want_of_a_key_makes_it(capsys, tmp_path):
+    text = robot_path("twister").read_text().replace('name = "twister"', 'name = "mine"')
+    robot = tmp_path / "robot.toml"
+    robot.write_text(text.replace('host = "127.0.0.1"', 'host = "10.0.0.9"'))
+    code, found = findings(capsys, robot, tmp_path)
+    assert (code, found["key"]["ok"]) == (1, False)
+    named = found["key"]["said"].split("`")[1].removeprefix("lightleash robot ")
+    assert main([*named.split(), "--state", str(tmp_path)]) == 0
+    capsys.readouterr()
+    code, found = findings(capsys, robot, tmp_path)
+    assert (code, found["key"]["said"]) == (0, "kept")
