@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Final
 
 from pipeline.frames import GRAVITY
@@ -64,9 +65,9 @@ def _inertia(file: Table, template: Table) -> Value:
 
 
 def _stiffness(file: Table, _: Table) -> Value:
-    """Of a rope that gives by half of its length."""
-    cable = file["suspension"]
-    return round(float(file["body"]["mass_kg"] * GRAVITY / (0.6 * cable["length_m"])), 1)
+    """Of a rope that gives by 0.6 of its length; what has none is refused when all is said."""
+    weight, gives = file["body"]["mass_kg"] * GRAVITY, 0.6 * file["suspension"]["length_m"]
+    return round(float(weight / (gives or inf)), 1)
 
 
 def _f_max(file: Table, _: Table) -> Value:

@@ -76,6 +76,7 @@ def test_at_a_terminal_each_question_is_asked_and_a_word_is_asked_again(
         ((), "--kind: missing; allowed: hangs, flies, stands, twist"),
         (("--kind", "hangs", "--name", "Ä"), "up to 32 of a-z"),
         (("--kind", "hangs", "--body.mass_kg", "0.001"), "body.mass_kg"),
+        (("--kind", "hangs", "--suspension.length_m", "0"), "suspension.length_m"),
         (("--kind", "flies", "--thrusters.f_max_n", "1.0"), "thrusters.f_max_n"),
     ],
 )
