@@ -38,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `lightleash robot`."""
     words = "Examine a robot's file or flights, make a key, run the robot's own computer."
     parser = Parser(prog="lightleash robot", description=words)
-    kinds = parser.add_subparsers(required=True, metavar="WHAT", dest="name")
+    kinds = parser.add_subparsers(required=True, metavar="WHAT", dest="what")
     for name, kind in KINDS.items():
         one = kinds.add_parser(name, help=kind.HELP, description=kind.HELP)
         kind.add_arguments(one)
@@ -59,6 +59,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         BusyError,
         OSError,
     ) as error:
-        print(f"lightleash robot {arguments.name}: {error}", file=sys.stderr)
+        print(f"lightleash robot {arguments.what}: {error}", file=sys.stderr)
         return 2
     return code

@@ -83,7 +83,9 @@ def test_at_a_terminal_each_question_is_asked_and_a_word_is_asked_again(
 def test_what_can_t_be_is_refused_by_name_and_nothing_is_written(options, words, tmp_path, capsys):
     code, file = new(tmp_path, *options)
     assert code == 2
-    assert words in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert told.startswith("lightleash robot new: ")
+    assert words in told
     assert not file.exists()
 
 
