@@ -46,6 +46,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     try:
         code: int = arguments.run(arguments)
+    except EOFError:  # Ctrl-D at a question
+        said = "the input ended before all was answered: nothing is done"
+        print(f"\nlightleash robot {arguments.what}: {said}", file=sys.stderr)
+        return 2
     except (
         RobotFileError,
         LedLayoutError,

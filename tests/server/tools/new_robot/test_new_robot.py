@@ -14,6 +14,11 @@ from server.tools.new_robot.questions import KINDS
 from server.tools.robot import main
 
 
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
 def new(folder: Path, *options: str) -> tuple[int, Path]:
     file = folder / "mine.toml"
     return main(["new", str(file), "--state", str(folder), *options]), file
@@ -55,10 +60,6 @@ def test_what_is_said_stands_in_the_file_and_the_rest_follows_from_it(tmp_path, 
 def test_at_a_terminal_each_question_is_asked_and_a_word_is_asked_again(
     tmp_path, monkeypatch, capsys
 ):
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
-
     count = len(KINDS["hangs"].questions)
     lines = ["swims", "hangs", "heavy", "4.2", *[""] * (count - 1)]
     monkeypatch.setattr("sys.stdin", Terminal("\n".join(lines) + "\n"))
@@ -94,3 +95,16 @@ def test_no_file_is_overwritten(tmp_path, capsys):
     code, file = new(tmp_path, "--kind", "hangs")
     assert code == 2
     assert file.read_text() == "name = 'old'"
+
+
+@pytest.mark.parametrize("said", ["", "hangs\n4.2\n"])
+def test_an_input_that_ends_amid_the_questions_is_told_in_a_line(
+    said, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr("sys.stdin", Terminal(said))
+    code, file = new(tmp_path)
+    assert code == 2
+    told = capsys.readouterr().err.strip()
+    assert told.startswith("lightleash robot new: the input ended")
+    assert "\n" not in told
+    assert not file.exists()
