@@ -8,7 +8,6 @@ import multiprocessing
 import os
 import platform
 import queue
-import socket
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -22,6 +21,7 @@ from server.common.options import Parser
 from server.common.settings import state_directory
 from server.diagnostics.link_check import LEAST_S
 from server.diagnostics.link_log import KEPT_S
+from server.process.ports import listen
 from server.tools.doctor_phone import examine
 
 GOOD, POOR, BAD = "ok", "!!", "XX"
@@ -94,16 +94,15 @@ def certificates() -> Iterator[Finding]:
         yield Finding(GOOD, "fingerprint of ca.crt", f"SHA-256 {fingerprint(made.authority)}")
 
 
-def ports(numbers: Sequence[int]) -> Iterator[Finding]:
-    """Whether the default ports are free."""
-    for number in numbers:
-        with socket.socket() as probe:
-            try:
-                probe.bind(("0.0.0.0", number))
-                yield Finding(GOOD, f"port {number}", "free")
-            except OSError as error:
-                advice = "stop what uses it, or choose another with --https-port, --http-port"
-                yield Finding(POOR, f"port {number}", str(error), advice)
+def ports(places: Sequence[tuple[str, int]]) -> Iterator[Finding]:
+    """Whether `serve` could listen at these addresses and ports."""
+    for host, number in places:
+        try:
+            listen(host, number).close()
+            yield Finding(GOOD, f"port {number}", "free")
+        except OSError as error:
+            advice = "stop what uses it, or choose another with --https-port, --http-port"
+            yield Finding(POOR, f"port {number}", str(error.__cause__ or error), advice)
 
 
 def codecs() -> Iterator[Finding]:
@@ -201,7 +200,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         machine,
         lambda: realtime(seconds),
         certificates,
-        lambda: ports((8443, 8080)),
+        lambda: ports((("0.0.0.0", 8443), ("127.0.0.1", 8080))),
         codecs,
         cameras,
         gains,

@@ -21,9 +21,20 @@ def test_every_codec_of_the_lock_file_works():
 
 def test_a_port_in_use_is_told_with_a_way_out():
     with socket.create_server(("127.0.0.1", 0)) as used:
-        (finding,) = doctor.ports([used.getsockname()[1]])
+        (finding,) = doctor.ports([used.getsockname()])
     assert finding.grade == POOR
     assert "--https-port" in finding.advice
+
+
+def test_a_port_whose_server_has_just_ended_is_free_as_it_is_for_the_next_one():
+    """For a minute the system keeps what is left of its connections."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        place = server.getsockname()
+        with socket.create_connection(place) as page:
+            server.accept()[0].close()
+            assert page.recv(1) == b""
+    (finding,) = doctor.ports([place])
+    assert (finding.grade, finding.found) == (GOOD, "free")
 
 
 def test_calibrations_are_listed_and_a_broken_one_is_named(tmp_path, monkeypatch):
