@@ -75,6 +75,8 @@ def test_each_command_gets_its_own_words(name, module, monkeypatch):
         ["robot"],
         ["survey"],
         ["doctor", "--seconds", "few"],
+        ["doctor", "--seconds", "0"],
+        ["doctor", "--seconds", "nan"],
     ],
     ids=" ".join,
 )
