@@ -60,11 +60,17 @@ class RecordedFilm:
     """Pictures of a recording, by their numbers; their times are those of capture."""
 
     def __init__(self, decoded: DecodedRecording) -> None:
-        """See how many there are, and when."""
+        """See how many there are, and when.
+
+        Raises:
+            InputError: the recording is damaged, or has none.
+        """
         self._decoded = decoded
         times = [item.t for item in _guarded(decoded) if isinstance(item, DatedPicture)]
+        if not times:
+            raise InputError(decoded.recording.path, "", "holds no picture; name another recording")
         self.count: int | None = len(times)
-        self.span = (min(times), max(times)) if times else None
+        self.span = min(times), max(times)
         self.notes: list[str] = []
 
     def __iter__(self) -> Iterator[MediaFrame]:

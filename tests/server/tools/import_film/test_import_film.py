@@ -15,7 +15,7 @@ from server.media.frame_source import open_frames
 from server.protocol.wire_records import Codec
 from server.recording.reader import read
 from server.replay.offline import Offline
-from tests.server.export.recordings import CHROMIUM, FLIGHT, SIZE, spot, spot_at
+from tests.server.export.recordings import CHROMIUM, FLIGHT, SIZE, film, spot, spot_at
 from tests.server.tools.locate.locating import table
 
 CAMERA = str(CAMERAS / "virtual_phone.yaml")
@@ -225,3 +225,14 @@ def test_a_damaged_recording_is_named(tmp_path, capsys):
     words = ["--camera", CAMERA, "--robot", "ames", "--out", "x.csv"]
     assert main(["locate", str(path), *words]) == 2
     assert "never closed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("tool", ["locate", "calibrate"])
+def test_a_recording_without_a_picture_is_named_and_nothing_is_written(tool, tmp_path, capsys):
+    """Of a phone whose camera was refused, its motion and its button alone are there."""
+    flight = film(tmp_path, "jpeg", pictures=0, touches=[(100.0, False, 0), (100.1, True, 1)])
+    more = ["--camera", CAMERA, "--robot", "ames", "--no-plot"] if tool == "locate" else []
+    assert main([tool, str(flight), *more, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1] == f"lightleash {tool}: {flight}: holds no picture; name another recording"
+    assert not (tmp_path / "out").exists()
