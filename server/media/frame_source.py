@@ -18,6 +18,8 @@ SUFFIXES = (".png", ".jpg", ".jpeg")
 TIMES = "times.csv"
 FPS = 30.0
 """Without any times."""
+RATES_HZ = 0.01, 10_000.0
+"""Pictures a second that somebody may say there are."""
 DEEP = 4096
 """Grey levels of a 12 bit sensor."""
 

@@ -20,8 +20,10 @@ from server.calibration.verdict import Verdict, judge, judge_views
 from server.common.clock import today
 from server.common.errors import InputError
 from server.common.options import Parser
+from server.common.ranges import number
 from server.common.settings import state_directory
 from server.export.recorded_film import imu_samples
+from server.media.frame_source import RATES_HZ
 from server.media.plots import drawn
 from server.media.tables import IMU_HEADER, load_imu
 from server.tools.calibrate.draw_board import write_board
@@ -51,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("film", nargs="?", type=Path, metavar="FRAMES_OR_VIDEO")
-    parser.add_argument("--fps", type=float, help="of a folder without times.csv")
+    parser.add_argument("--fps", type=number(*RATES_HZ), help="of a folder without times.csv")
     parser.add_argument("--imu", type=Path, metavar="CSV")
     board = parser.add_argument_group("board")
     board.add_argument("--board", default="9x6", metavar="CxR", help="squares; default 9x6")

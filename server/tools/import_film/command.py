@@ -18,6 +18,8 @@ from hardware.robot_file import RobotFileError, load_robot, robot_path
 from pipeline.frames import Array
 from server.common.errors import InputError
 from server.common.options import Parser
+from server.common.ranges import number
+from server.media.frame_source import RATES_HZ
 from server.media.tables import IMU_HEADER, load_imu
 from server.recording.writer import (
     CAMERA_KEY,
@@ -40,6 +42,8 @@ MARGIN_S = 5.0
 """Motion samples of so long before and after the film are kept."""
 CALENDAR_S = 1e9
 """Later times are seconds since 1970: 2001 was."""
+MOST_OFFSET_S = 1e10
+"""Far beyond any calendar's; a recording counts nanoseconds to 1.8e10 s."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -51,8 +55,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("film", type=Path, metavar="FILM_OR_FOLDER")
     parser.add_argument("--imu", type=Path, metavar="CSV")
     parser.add_argument("--out", type=Path, required=True, metavar="RECORDING.mcap")
-    parser.add_argument("--offset", type=float, default=0.0, metavar="S", help="default 0")
-    parser.add_argument("--fps", type=float, help="in place of the film's own times")
+    moved = number(-MOST_OFFSET_S, MOST_OFFSET_S)
+    parser.add_argument("--offset", type=moved, default=0.0, metavar="S", help="default 0")
+    rate = number(*RATES_HZ)
+    parser.add_argument("--fps", type=rate, help="in place of the film's own times")
     parser.add_argument("--camera", type=Path, metavar="YAML", help="its camera file, if known")
     parser.add_argument("--device", help="its name; default: as the camera file says")
     parser.add_argument("--robot", default="ames", help="whose LEDs it films; default ames")

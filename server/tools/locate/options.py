@@ -6,11 +6,11 @@ import argparse
 from pathlib import Path
 
 from server.common.options import Parser
+from server.media.frame_source import RATES_HZ
 
 PURPOSE = (
     "Where was the robot in each frame, and how sure is that? Runs the live pipeline on files."
 )
-FPS = (0.01, 10_000.0)  # least, most pictures a second
 PLOTS = (".png", ".pdf", ".svg")
 FORMATS = """\
 files:
@@ -69,8 +69,9 @@ def _fps(text: str) -> float:
         fps = float(text)
     except ValueError:
         fps = 0.0
-    if not FPS[0] <= fps <= FPS[1]:
-        raise argparse.ArgumentTypeError(f"{text!r}: allowed: {FPS[0]:g} to {FPS[1]:g}")
+    least, most = RATES_HZ
+    if not least <= fps <= most:
+        raise argparse.ArgumentTypeError(f"{text!r}: allowed: {least:g} to {most:g}")
     return fps
 
 
