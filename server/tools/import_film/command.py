@@ -14,7 +14,7 @@ import av.error
 import numpy as np
 
 from hardware.camera_file import CameraFileError, load_camera
-from hardware.robot_file import RobotFileError, load_robot, robot_path
+from hardware.robot_file import COMMANDS, RobotFileError, load_robot, robot_path
 from pipeline.frames import Array
 from server.common.errors import InputError
 from server.common.options import Parser
@@ -101,7 +101,7 @@ def _run(given: argparse.Namespace) -> str:
 
 
 def _metadata(given: argparse.Namespace) -> dict[str, str]:
-    load_robot(given.robot)  # refused here, not by who reads the recording
+    load_robot(given.robot, takes=COMMANDS)  # refused here, not by who reads the recording
     device, camera = given.device or given.film.stem, ""
     if given.camera is not None:
         name, _ = load_camera(given.camera)

@@ -236,3 +236,11 @@ def test_a_recording_without_a_picture_is_named_and_nothing_is_written(tool, tmp
     said = capsys.readouterr().err.splitlines()
     assert said[-1] == f"lightleash {tool}: {flight}: holds no picture; name another recording"
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("robot", ["rover", "quadrotor"])
+def test_a_film_of_any_robot_is_taken(robot, tmp_path):
+    film = write_film(tmp_path / "film.mp4", "mpeg4", {}, pictures=3)
+    words = ["import", str(film), "--out", str(tmp_path / "a.mcap"), "--robot", robot]
+    assert main(words) == 0
+    assert DecodedRecording(read(tmp_path / "a.mcap")).robot.robot.name == robot
