@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from server.common.options import Parser
@@ -83,6 +85,19 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+@contextmanager
+def _whole(place: Path) -> Iterator[None]:
+    """What is there of a file or folder that did not get to its end is removed again."""
+    try:
+        yield
+    except BaseException:
+        if place.is_dir():
+            shutil.rmtree(place, ignore_errors=True)
+        else:
+            place.unlink(missing_ok=True)
+        raise
+
+
 def _run(arguments: argparse.Namespace) -> str:
     """Do what is asked; gives lines about it."""
     write, suffix = FORMATS[arguments.to]()
@@ -92,7 +107,8 @@ def _run(arguments: argparse.Namespace) -> str:
     if place.exists():
         raise FileExistsError(f"{place} is there already: name another --out")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    said = f"{place}: {write(decoded, found, place)}"
+    with _whole(place):
+        said = f"{place}: {write(decoded, found, place)}"
     if decoded.zero_ns is None:
         said += "\nThe recording doesn't know the day: its clock's 0 is shown as 1970."
     return said

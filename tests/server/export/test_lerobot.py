@@ -206,3 +206,11 @@ def test_a_recording_without_an_episode_is_named(tmp_path, capsys):
     source = film(tmp_path, "jpeg")
     assert main([str(source), "--to", "lerobot", "--out", str(tmp_path / "out")]) == 1
     assert "no episode" in capsys.readouterr().err
+
+
+def test_a_flight_without_an_episode_leaves_nothing_in_the_way_of_the_next(tmp_path, capsys):
+    source = film(tmp_path, "jpeg")
+    for _ in range(2):
+        assert main([str(source), "--to", "lerobot", "--out", str(tmp_path / "out")]) == 1
+        assert "holds no episode" in capsys.readouterr().err
+    assert list((tmp_path / "out").iterdir()) == []
