@@ -174,7 +174,8 @@ def recover(part: Path) -> Path:
     """Make a readable recording of one that was never closed; the unfinished file is removed.
 
     Raises:
-        RecordingError: it is being written right now, or not an MCAP file.
+        RecordingError: it is being written right now, not an MCAP file, or nothing of it is ours to
+            be read: it stays as it is.
     """
     path = part.with_name(part.name.removesuffix(".part"))
     temporary = path.with_name(path.name + ".recovering")
@@ -189,7 +190,10 @@ def recover(part: Path) -> Path:
         temporary.unlink(missing_ok=True)
         try:
             with new_private_file(temporary) as target:
-                _copy_complete(source, target)
+                copied = _copy_complete(source, target)
+            if not copied:
+                what = "holds nothing of Lightleash that can be rescued"
+                raise RecordingError(part, what, "name a *.mcap.part of a recording")
         except BaseException:  # half of it is of no use, and may be all that was left of the disk
             temporary.unlink(missing_ok=True)
             raise
@@ -199,10 +203,11 @@ def recover(part: Path) -> Path:
     return path
 
 
-def _copy_complete(source: IO[bytes], target: IO[bytes]) -> None:
-    """Copy every complete chunk; the first damage is the end."""
+def _copy_complete(source: IO[bytes], target: IO[bytes]) -> int:
+    """Copy every complete chunk; the first damage is the end. Gives how many items there were."""
     reader = StreamReader(source, validate_crcs=True, record_size_limit=MAX_MCAP_RECORD_BYTES)
     writer: Writer | None = None
+    copied = 0
     topics: dict[int, str] = {}
     ours: dict[str, int] = {}
     with suppress(*_DAMAGE):
@@ -217,9 +222,11 @@ def _copy_complete(source: IO[bytes], target: IO[bytes]) -> None:
                     topics[id] = topic
                 case Message(channel_id=id, log_time=t, publish_time=sent, data=data) if writer:
                     writer.add_message(ours[topics[id]], t, data, sent)
+                    copied += 1
     if writer is None:
         writer, _ = start_file(target, {})
     finish_file(writer, target)
+    return copied
 
 
 def recover_all(directory: Path) -> list[Path]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from mcap.writer import Writer
 
 from server.common import clock
 from server.control.ipc import ControlStatus
@@ -380,8 +381,6 @@ def test_every_cut_is_recovered_up_to_the_cut(tmp_path):
 
 
 def test_another_version_is_named(tmp_path):
-    from mcap.writer import Writer
-
     path = tmp_path / "old.mcap"
     for metadata, what in (({"protocol_version": "0"}, "version 0"), (None, "no recording of")):
         with path.open("wb") as stream:
@@ -408,3 +407,22 @@ def test_statuses_survive_whatever_number_they_hold(tmp_path):
     recorder.status(odd, 3.0)
     recorder.close()
     assert recorder.written == 2
+
+
+@pytest.mark.parametrize("metadata", [None, "lightleash", "other"])
+def test_a_file_of_another_program_is_not_rescued_but_stays_as_it_is(tmp_path, metadata):
+    """Exports for Foxglove have metadata of that name and channels of their own."""
+    path = tmp_path / "theirs.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        if metadata:
+            writer.add_metadata(metadata, {"device": "a phone"})
+        channel = writer.register_channel("/tf", "protobuf", schema_id=0)
+        writer.add_message(channel, 1, b"not ours", 1)
+        writer.finish()
+    before = path.read_bytes()
+    with pytest.raises(RecordingError, match="nothing of Lightleash that can be rescued"):
+        recover(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
