@@ -57,6 +57,19 @@ class ExperimentReport:
         return [file, *(drawn(lambda: draw(folder)) if draw is not None else ())]
 
 
+def make_folder(folder: Path | None) -> None:
+    """Before long work, so that its results have a place, if they are to have one.
+
+    Raises:
+        RefusedError: it can't be made.
+    """
+    try:
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RefusedError(f"--out: {error}") from error
+
+
 def experiment(
     name: str, *refusals: type[Exception]
 ) -> Callable[[Callable[[Namespace], ExperimentReport | int]], Callable[[Namespace], int]]:
@@ -73,6 +86,7 @@ def experiment(
         def run(arguments: Namespace) -> int:
             """Measure, print, write, draw; 1 if a goal is missed, 2 if it can't be measured."""
             try:
+                make_folder(arguments.out)
                 found = measure(arguments)
             except refused as error:
                 print(f"lightleash experiments {name}: {error}", file=sys.stderr)
@@ -83,8 +97,12 @@ def experiment(
                 print(found.text)
             if found.holds:
                 print("\n".join(("", *statements(found.holds))))
-            if arguments.out is not None:
-                print(f"\nwritten: {', '.join(map(str, found.write(arguments.out, name)))}")
+            try:
+                if arguments.out is not None:
+                    print(f"\nwritten: {', '.join(map(str, found.write(arguments.out, name)))}")
+            except OSError as error:
+                print(f"lightleash experiments {name}: --out: {error}", file=sys.stderr)
+                return REFUSED
             return found.code
 
         return run

@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         folder = arguments.out or arguments.file.with_suffix("")
         with SweepResults(folder, sweep, arguments.mix) as results:
             return _flown(sweep, results, folder, arguments)
-    except (SweepError, InputError) as error:
+    except (SweepError, InputError, OSError) as error:
         print(f"lightleash experiments sweep: {error}", file=sys.stderr)
         return 2
 

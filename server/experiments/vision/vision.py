@@ -34,6 +34,7 @@ from hardware.sim.scenes.scene import (
 )
 from hardware.sim.scenes.video import RenderedVideo
 from pipeline.vision.visual_front_end import warm_up
+from server.experiments.runner import make_folder
 from server.experiments.vision import lies
 from server.experiments.vision.channel import DEFAULT_CODECS, WITHOUT_IMU, Channel, channel
 from server.experiments.vision.learning import LearningFigures, learn
@@ -103,10 +104,27 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.lies:
         return _lies(arguments)
     try:
+        make_folder(arguments.out)
         tasks = list(_tasks(arguments))
     except ValueError as error:
-        print(f"lightleash bench: {error}", file=sys.stderr)
-        return 2
+        return _refused(error)
+    try:
+        return _measured(tasks, arguments)
+    except OSError as error:
+        return _refused(error)
+
+
+def _refused(error: Exception) -> int:
+    print(f"lightleash bench: {error}", file=sys.stderr)
+    return 2
+
+
+def _measured(tasks: list[Task], arguments: argparse.Namespace) -> int:
+    """Look at all films, or write them.
+
+    Raises:
+        OSError: what comes of it can't be written.
+    """
     if arguments.write is not None:
         return _write(tasks, arguments.write)
     records: dict[tuple[str, Size, str], SceneRecord] = {}
@@ -145,7 +163,6 @@ def _report(
     judged = verdicts(rows, pools) + verdicts_on_learning(learnt)
     print("\n".join(map(str, judged)))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         goals = [{"goal": v.goal, "met": v.met, "found": v.found} for v in judged]
         films = [asdict(one) for one in learnt]
         values = {

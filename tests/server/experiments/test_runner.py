@@ -84,3 +84,27 @@ def test_rows_statements_and_pictures_are_written_where_they_are_asked_for(
         "holds": {"near": False},
     }
     assert capsys.readouterr().out.endswith(f"written: {file}, {drawn[0]}\n")
+
+
+def test_a_folder_that_can_t_be_made_is_refused_before_the_work_and_a_full_disk_after_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measured: list[bool] = []
+
+    def measure(arguments: Namespace) -> ExperimentReport:
+        measured.append(True)
+        return ExperimentReport([], "a table")
+
+    run = experiment("some")(measure)
+    (tmp_path / "file").write_text("")
+    assert run(Namespace(out=tmp_path / "file")) == 2
+    assert not measured
+    said = capsys.readouterr()
+    assert said.err.startswith("lightleash experiments some: --out: ")
+    assert said.err.count("\n") == 1
+    (tmp_path / "out" / "some.json").mkdir(parents=True)
+    assert run(Namespace(out=tmp_path / "out")) == 2
+    said = capsys.readouterr()
+    assert said.out == "a table\n"
+    assert said.err.startswith("lightleash experiments some: --out: ")
+    assert said.err.count("\n") == 1

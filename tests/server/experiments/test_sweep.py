@@ -273,6 +273,15 @@ def test_so_is_one_beside_the_grid(tmp_path, text, says):
     assert says in str(caught.value)
 
 
+def test_a_disk_that_refuses_is_told_in_one_line(tmp_path, capsys):
+    (tmp_path / "short.toml").write_text(SHORT)
+    (tmp_path / "short" / "results.csv").mkdir(parents=True)
+    assert main(["sweep", str(tmp_path / "short.toml")]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("lightleash experiments sweep: ")
+    assert told.count("\n") == 1
+
+
 def test_a_missing_file_is_told_in_one_line(tmp_path, capsys):
     assert main(["sweep", str(tmp_path / "nowhere.toml")]) == 2
     assert "nowhere.toml" in capsys.readouterr().err

@@ -274,6 +274,16 @@ def test_wrong_words_are_refused_with_what_is_allowed(capsys):
     assert main(["vision", "--seed", "5000"]) == 2
 
 
+def test_what_can_t_be_written_is_told_in_a_line(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    for option in ("--out", "--write"):
+        words = ["--scenes", "far_vga", "--frames", "2", "--tuning", option, str(tmp_path / "file")]
+        assert main(["vision", *words]) == 2
+        told = capsys.readouterr().err
+        assert told.startswith("lightleash bench: ")
+        assert told.count("\n") == 1
+
+
 def test_the_command_writes_films_instead_of_looking(tmp_path, capsys):
     words = ["--write", str(tmp_path), "--scenes", "far_vga", "--frames", "2", "--tuning"]
     assert main(["vision", *words]) == 0
