@@ -29,6 +29,10 @@ CORNER_S = 0.02
 RECORDED_COLUMNS = "t_s, x_m, y_m, z_m, roll_deg, pitch_deg, yaw_deg"
 
 
+class HandError(ValueError):
+    """A hand that there is not, or a recorded one that can't be used; says what is allowed."""
+
+
 class Hand(Protocol):
     """Where the phone's camera is, and what its sensors feel."""
 
@@ -153,15 +157,15 @@ def recorded(path: Path) -> MotionComponent:
     """A hand from a CSV file: a heading line, then 6 rows or more of `RECORDED_COLUMNS`.
 
     Raises:
-        ValueError: not such a file; says what is allowed.
+        HandError: not such a file; says what is allowed.
     """
     try:
         rows = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except ValueError as error:
-        raise ValueError(f"{path}: {error}; allowed: columns {RECORDED_COLUMNS}") from error
+        raise HandError(f"{path}: {error}; allowed: columns {RECORDED_COLUMNS}") from error
     good = rows.shape[1:] == (7,) and len(rows) >= 6 and bool(np.isfinite(rows).all())
     if not good or not bool((np.diff(rows[:, 0]) > 0.0).all()):
-        raise ValueError(f"{path}: allowed: 6 or more finite rows in order of {RECORDED_COLUMNS}")
+        raise HandError(f"{path}: allowed: 6 or more finite rows in order of {RECORDED_COLUMNS}")
     x = rows[:, 1:] - rows[0, 1:]
     x[:, 3:] = np.deg2rad(x[:, 3:])
     still = [(1, np.zeros(6)), (2, np.zeros(6))]
@@ -188,7 +192,7 @@ def make_hand(
     It begins as `start` says from a robot at `p_robot_in_f` [m] (default: 0), and looks at it.
 
     Raises:
-        ValueError: an unknown kind or a file that can't be used.
+        HandError: an unknown kind or a file that can't be used.
     """
     parts: tuple[MotionComponent, ...]
     if kind in HANDS:
@@ -196,7 +200,7 @@ def make_hand(
     elif Path(kind).is_file():
         parts = (recorded(Path(kind)),)
     else:
-        raise ValueError(f"hand: {kind!r} is neither a file nor one of {', '.join(HANDS)}")
+        raise HandError(f"hand: {kind!r} is neither a file nor one of {', '.join(HANDS)}")
     if start.lift > 0.0:
         parts = (*parts, lift(start.lift))
     behind = rotation_about_z(yaw_start) @ np.array([-start.distance, 0.0, start.above])

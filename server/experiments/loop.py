@@ -12,6 +12,7 @@ from typing import get_args
 import numpy as np
 
 from hardware.robot_file import load_robot
+from hardware.sim.hand import make_hand
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
 from server.common import clock, text
@@ -78,6 +79,8 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     robot_file = load_robot(arguments.robot)
     virtual_camera, estimator = TeleopConfig().virtual_camera, arguments.estimator
     config = teleop_config(robot_file, arguments.gains, virtual_camera, estimator)
+    for hand in arguments.hands:
+        make_hand(hand)  # refused before another one is flown
     if arguments.live:
         return live(arguments)
     low, high = arguments.latency_ms

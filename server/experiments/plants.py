@@ -19,6 +19,7 @@ import numpy as np
 
 from hardware.plant_parameters import PlantParameters
 from hardware.robot_file import RobotFile, load_robot
+from hardware.sim.hand import make_hand
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
 from server.common.ranges import number, whole
@@ -233,6 +234,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
     """Fly plants that nobody told, and thrusters that fail."""
     robot_file = load_robot(arguments.robot)
     config = teleop_config(robot_file, arguments.gains, TeleopConfig().virtual_camera, "relative")
+    make_hand(arguments.hand)  # refused before anything is flown
     setting = Setting(robot_file, config, arguments.hand)
     first, workers = arguments.seed, arguments.workers
     seeds = range(first, first + arguments.plants)

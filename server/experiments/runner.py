@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from hardware.robot_file import RobotFileError
+from hardware.sim.hand import HandError
 from server.common.text import plain, statements
 from server.media.plots import drawn
 
@@ -75,10 +76,10 @@ def experiment(
 ) -> Callable[[Callable[[Namespace], ExperimentReport | int]], Callable[[Namespace], int]]:
     """Make a command of a function that measures; one that gives a number has told all itself.
 
-    `refusals` are errors that say why it can't be measured, beside those of robot files and of
-    what was asked for.
+    `refusals` are errors that say why it can't be measured, beside those of robot files, of hands
+    and of what was asked for.
     """
-    refused: tuple[type[Exception], ...] = (RobotFileError, RefusedError, *refusals)
+    refused: tuple[type[Exception], ...] = (RobotFileError, HandError, RefusedError, *refusals)
 
     def command(
         measure: Callable[[Namespace], ExperimentReport | int],

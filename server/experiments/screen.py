@@ -19,6 +19,7 @@ import numpy as np
 
 from hardware.camera_file import find_camera
 from hardware.robot_file import RobotFile, load_robot
+from hardware.sim.hand import make_hand
 from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import PERIOD_S, TeleopConfig
@@ -281,6 +282,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
     """Fly the robot itself, and as light on each display."""
     robot_file = load_robot("screen")
     config = teleop_config(robot_file, "phone", TeleopConfig().virtual_camera, "relative")
+    make_hand(arguments.hand)  # refused before anything is flown
     setting = ScreenSetting(robot_file, config, arguments.hand)
     first, workers = arguments.seed, arguments.workers
     jobs = [(case, seed) for case in cases() for seed in range(first, first + arguments.seeds)]

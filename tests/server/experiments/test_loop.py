@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 
+import pytest
+
 from hardware.sim.measured_hands import MEASURED
-from server.experiments import loop
+from server.experiments import loop, main
 from tests.bench.blocks import PAGES
 
 
@@ -23,3 +25,23 @@ def test_the_figures_of_hands_that_are_none_name_them() -> None:
     commands = [line for line in lines if line.startswith(".venv/bin/lightleash experiments loop")]
     assert commands
     assert all("--hands steady moving" in command for command in commands)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["loop", "--hands", "steady", "shaky"],
+        ["loop", "--hands", "shaky", "--live"],
+        ["plants", "--hand", "shaky"],
+        ["screen", "--hand", "shaky"],
+    ],
+    ids=" ".join,
+)
+def test_a_hand_that_there_is_not_is_refused_in_a_line(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith(f"lightleash experiments {words[0]}: hand: 'shaky' is neither")
+    assert said.err.count("\n") == 1
+    assert said.out == ""
