@@ -6,6 +6,9 @@ import argparse
 from collections.abc import Callable
 from math import inf
 
+MOST_SEED = 2**31 - 1
+"""Of what is drawn by chance; NumPy takes none below 0."""
+
 
 def number(low: float, high: float) -> Callable[[str], float]:
     """Reads a number within a range."""
@@ -29,3 +32,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
         return value
 
     return whole_number
+
+
+seed_number = whole(0, MOST_SEED)
+"""Reads a seed."""

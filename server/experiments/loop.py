@@ -16,6 +16,7 @@ from hardware.sim.hand import make_hand
 from pipeline.config import EstimatorName, TeleopConfig
 from pipeline.control.cutoff import cutoff_hz
 from server.common import clock, text
+from server.common.ranges import number, seed_number
 from server.control.process import teleop_config
 from server.experiments.drawing import panels, save
 from server.experiments.runner import ExperimentReport, experiment
@@ -162,10 +163,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="HAND",
         help=f"default: {', '.join(RECORDED)}, as recorded ones move",
     )
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--latency-ms", nargs=2, type=float, default=(60.0, 120.0))
-    parser.add_argument("--fps", type=float, default=30.0)
+    parser.add_argument("--seconds", type=number(1.0, 3600.0), default=60.0)
+    parser.add_argument("--seed", type=seed_number, default=1)
+    parser.add_argument("--latency-ms", nargs=2, type=number(0.0, 400.0), default=(60.0, 120.0))
+    parser.add_argument("--fps", type=number(1.0, 1000.0), default=30.0)
     parser.add_argument("--codec", choices=("h264", "jpeg"), default="h264")
     parser.add_argument(
         "--hide",

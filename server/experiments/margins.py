@@ -25,6 +25,7 @@ from pipeline.control.robust_margins import (
     worst_margins,
 )
 from server.common import text
+from server.common.ranges import number
 from server.experiments.drawing import panels, save
 from server.experiments.runner import ExperimentReport, experiment
 
@@ -216,8 +217,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("robot", nargs="?", default="ames", help="name or path of a robot file")
     parser.add_argument("--gains", nargs="+", default=[], metavar="SET", help="default: all")
     parser.add_argument("--estimator", nargs="+", choices=ESTIMATORS, default=["relative", "none"])
-    parser.add_argument("--latency-ms", type=float, default=90.0, help="of a picture, until fused")
-    parser.add_argument("--body-age-ms", type=float, default=5.0, help="of the body's IMU sample")
+    late = number(0.0, 400.0)
+    parser.add_argument("--latency-ms", type=late, default=90.0, help="of a picture, until fused")
+    parser.add_argument("--body-age-ms", type=late, default=5.0, help="of the body's IMU sample")
     parser.add_argument(
         "--feedforward",
         action=argparse.BooleanOptionalAction,

@@ -22,7 +22,7 @@ from hardware.robot_file import RobotFile, load_robot
 from hardware.sim.hand import make_hand
 from pipeline.config import TeleopConfig
 from pipeline.frames import Array
-from server.common.ranges import number, whole
+from server.common.ranges import number, seed_number, whole
 from server.common.text import Column, flights
 from server.control.process import teleop_config
 from server.experiments import processes
@@ -274,7 +274,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--thruster-seeds", type=whole(1, 1000), default=1, help="flights of each that fails"
     )
-    parser.add_argument("--seed", type=int, default=1000, help="of the first plant")
+    parser.add_argument("--seed", type=seed_number, default=1000, help="of the first plant")
     parser.add_argument(
         "--workers", type=whole(1, 256), default=1, help="processes that fly at a time"
     )

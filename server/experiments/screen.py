@@ -23,7 +23,7 @@ from hardware.sim.hand import make_hand
 from pipeline.camera.lens import Camera
 from pipeline.camera.simple_lens import SimpleLens
 from pipeline.config import PERIOD_S, TeleopConfig
-from server.common.ranges import number, whole
+from server.common.ranges import number, seed_number, whole
 from server.common.text import Column, dashed, flights
 from server.control.process import teleop_config
 from server.experiments import processes
@@ -303,7 +303,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("--hand", default="moving", help="of the virtual phone")
     parser.add_argument("--seeds", type=whole(1, 1000), default=3, help="flights of each kind")
-    parser.add_argument("--seed", type=int, default=1000, help="of the first flight")
+    parser.add_argument("--seed", type=seed_number, default=1000, help="of the first flight")
     parser.add_argument(
         "--seconds", type=number(5.0, 600.0), default=12.0, help="each is led for so long"
     )

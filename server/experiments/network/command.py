@@ -12,6 +12,7 @@ import numpy as np
 
 from hardware.sim.network.emulated_link import EmulatedLink
 from hardware.sim.network.netns import NamespaceError
+from server.common.ranges import seed_number
 from server.common.text import table
 from server.experiments.network.figures import drops, percentile, recovery
 from server.experiments.network.phone import CLIENTS, FRAME_RATE_HZ
@@ -172,5 +173,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--paths", nargs="+", choices=CLIENTS, default=list(CLIENTS))
     parser.add_argument("--seconds", type=_seconds, default=30.0, help="of each scenario and path")
-    parser.add_argument("--seed", type=int, default=0, help="of the line's chances and of the hand")
+    parser.add_argument(
+        "--seed", type=seed_number, default=0, help="of the line's chances and of the hand"
+    )
     parser.add_argument("--out", type=Path, default=None, help="folder for picture and JSON")

@@ -17,7 +17,7 @@ from pipeline.config import PERIOD_S, VirtualCameraConfig
 from pipeline.control.cutoff import time_constants
 from pipeline.control.virtual_camera import VirtualCamera
 from pipeline.frames import Array, log, rotation_about_z
-from server.common.ranges import number
+from server.common.ranges import number, seed_number
 from server.common.runtime_parameters import FASTEST_HZ, SLOWEST_HZ
 from server.common.text import Column, table
 from server.experiments.runner import ExperimentReport, experiment
@@ -195,7 +195,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument("--hand", default="steady", help="of the virtual phone")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=seed_number, default=1)
     parser.add_argument("--seconds", type=number(SHORTEST_S, 3600.0), default=64.0)
     parser.add_argument("--recording", type=Path, default=None, help="MCAP: its phone's motion")
     parser.add_argument("--cutoff-hz", type=number(SLOWEST_HZ, FASTEST_HZ), default=0.28)
