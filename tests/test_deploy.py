@@ -98,6 +98,14 @@ def test_control_may_be_on_time_without_a_capability():
     assert not unit("RestrictRealtime")
 
 
+def test_ports_that_the_page_proposes_for_the_unit_need_no_capability():
+    """Below 1024 they need CAP_NET_BIND_SERVICE."""
+    page = (ROOT / "deploy" / "README.md").read_text()
+    ports = [int(port) for port in re.findall(r"LIGHTLEASH_HTTPS?_PORT=(\d+)", page)]
+    assert ports
+    assert min(ports) >= 1024
+
+
 def test_the_image_is_given_all_that_its_recipe_copies_and_no_more():
     recipe = (ROOT / "deploy" / "Dockerfile").read_text()
     copied = {
