@@ -166,6 +166,8 @@ def _run(arguments: argparse.Namespace) -> str:
     recording = read(path)
     if arguments.offline:
         out = arguments.out or path.with_suffix(".csv")
+        if out.exists() and out.samefile(path):
+            raise InputError("--out", "", f"{out} is the recording itself: name another file")
         return f"{out}: {run_offline(recording, out)}"
     played = asyncio.run(play(recording, access_of(arguments), arguments.speed))
     modes = ", ".join(sorted(played.modes)) or "none"

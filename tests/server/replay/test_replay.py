@@ -207,6 +207,14 @@ def test_command_writes_the_csv_beside_the_recording(tmp_path, capsys):
     assert "pictures" in capsys.readouterr().out
 
 
+def test_the_csv_does_not_take_the_place_of_the_recording(tmp_path, capsys):
+    path = tmp_path / "flight.mcap"
+    path.write_bytes(FLIGHT.read_bytes())
+    assert command.main([str(path), "--offline", "--out", str(path)]) == 1
+    assert "is the recording itself" in capsys.readouterr().err
+    assert path.read_bytes() == FLIGHT.read_bytes()
+
+
 class ReplayServer(PageServer):
     """Pings a replayed page until its clock is known, then says it is LOST."""
 
