@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
 NO_PLOTS = "nothing is drawn, for matplotlib is missing: pip install 'lightleash[plots]'"
+SUFFIXES = (".png", ".pdf", ".svg")
 
 
 class NoPlotsError(Exception):
@@ -45,3 +47,10 @@ def drawn(draw: Callable[[], Sequence[Path]]) -> Sequence[Path]:
         print(why, file=sys.stderr, flush=True)
         return ()
     return draw()
+
+
+def picture_file(text: str) -> Path:
+    """Reads where a picture goes to, from the command line."""
+    if Path(text).suffix.lower() not in SUFFIXES:
+        raise argparse.ArgumentTypeError(f"{text!r}: allowed: {', '.join(SUFFIXES)}")
+    return Path(text)

@@ -81,6 +81,7 @@ def test_each_command_gets_its_own_words(name, module, monkeypatch):
         ["calibrate", "film.mp4", "--store"],
         ["calibrate", "--model", "pinhole"],
         ["calibrate", "film.mp4", "--fps", "-1"],
+        ["calibrate", "film.mp4", "--report", "report.txt"],
         ["robot"],
         ["survey"],
         ["doctor", "--seconds", "few"],

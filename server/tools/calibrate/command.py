@@ -24,7 +24,7 @@ from server.common.ranges import number
 from server.common.settings import state_directory
 from server.export.recorded_film import imu_samples
 from server.media.frame_source import RATES_HZ
-from server.media.plots import drawn
+from server.media.plots import drawn, picture_file
 from server.media.tables import IMU_HEADER, load_imu
 from server.tools.calibrate.draw_board import write_board
 from server.tools.calibrate.report import draw
@@ -71,7 +71,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--store", action="store_true", help="keep it where `lightleash serve` looks; needs --name"
     )
-    parser.add_argument("--report", type=Path, metavar="PNG", help="a picture of what was found")
+    parser.add_argument(
+        "--report", type=picture_file, metavar="PNG", help="a picture of what was found"
+    )
     return parser
 
 

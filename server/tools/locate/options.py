@@ -7,11 +7,11 @@ from pathlib import Path
 
 from server.common.options import Parser
 from server.media.frame_source import RATES_HZ
+from server.media.plots import picture_file
 
 PURPOSE = (
     "Where was the robot in each frame, and how sure is that? Runs the live pipeline on files."
 )
-PLOTS = (".png", ".pdf", ".svg")
 FORMATS = """\
 files:
   FRAMES         a folder of .png and .jpg, taken in the order of their names, all of one size;
@@ -58,7 +58,7 @@ def parser() -> argparse.ArgumentParser:
     words.add_argument("--covariance", type=Path, metavar="FILE.npz", help="full 6x6, for numpy")
     words.add_argument("--overlay", type=Path, metavar="DIR", help="frames with what was seen")
     words.add_argument(
-        "--plot", type=_plot, metavar="FILE", help="default: beside poses.csv, as .png"
+        "--plot", type=picture_file, metavar="FILE", help="default: beside poses.csv, as .png"
     )
     words.add_argument("--no-plot", action="store_true")
     return words
@@ -73,12 +73,6 @@ def _fps(text: str) -> float:
     if not least <= fps <= most:
         raise argparse.ArgumentTypeError(f"{text!r}: allowed: {least:g} to {most:g}")
     return fps
-
-
-def _plot(text: str) -> Path:
-    if Path(text).suffix.lower() not in PLOTS:
-        raise argparse.ArgumentTypeError(f"{text!r}: allowed: {', '.join(PLOTS)}")
-    return Path(text)
 
 
 def outputs_of(given: argparse.Namespace) -> dict[str, Path]:
