@@ -229,13 +229,17 @@ def write_whole(
     """A recording of what is known already: topic, time [s] and bytes of each item.
 
     Raises:
-        OSError: there is a file of this name, or it can't be written.
+        OSError: there is a file of this name, or it can't be written: nothing of it stays.
     """
     with new_private_file(path) as file:
-        writer, channels = start_file(file, metadata | OWN)
-        for topic, t, data in items:
-            _add(writer, channels[topic], _Item(topic, t, data))
-        finish_file(writer, file)
+        try:
+            writer, channels = start_file(file, metadata | OWN)
+            for topic, t, data in items:
+                _add(writer, channels[topic], _Item(topic, t, data))
+            finish_file(writer, file)
+        except BaseException:
+            path.unlink()
+            raise
 
 
 def part_of(path: Path) -> Path:

@@ -33,6 +33,7 @@ from server.recording.writer import (
     RecordingError,
     finish_file,
     part_of,
+    write_whole,
 )
 
 TOUCH = encode(Record(7, 5_000_000, Touch(True, True, 1, 99)))
@@ -426,3 +427,13 @@ def test_a_file_of_another_program_is_not_rescued_but_stays_as_it_is(tmp_path, m
         recover(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_is_known_already_is_written_whole_or_not_at_all(tmp_path):
+    def items():
+        yield PHONE_RECORDS, 1.0, TOUCH
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space left"):
+        write_whole(tmp_path / "film.mcap", METADATA, items())
+    assert list(tmp_path.iterdir()) == []
