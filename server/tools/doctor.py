@@ -18,7 +18,7 @@ from server import __version__
 from server.common.access import PhoneClientError, access_of, add_access_arguments
 from server.common.clock import wall
 from server.common.options import Parser
-from server.common.settings import state_directory
+from server.common.settings import SettingsError, load
 from server.diagnostics.link_check import LEAST_S
 from server.diagnostics.link_log import KEPT_S
 from server.process.ports import listen
@@ -86,7 +86,11 @@ def certificates() -> Iterator[Finding]:
     from server.security.tls import certificate, fingerprint, own_addresses
 
     try:
-        made = certificate(state_directory())
+        chosen = load(())
+        made = certificate(chosen.state, chosen.names)
+    except SettingsError as error:
+        yield Finding(BAD, "certificate", str(error), "mend the setting")
+        return
     except OSError as error:
         yield Finding(BAD, "certificate", str(error), "make the state directory writable")
         return
@@ -152,7 +156,6 @@ def gains() -> Iterator[Finding]:
     """What gains of the chosen robot lack if it is not quite as its file says."""
     from hardware.gain_check import bodies_words, report, worst_words
     from hardware.robot_file import COMMANDS, RobotFileError, load_robot
-    from server.common.settings import SettingsError, load
 
     try:
         chosen = load(())

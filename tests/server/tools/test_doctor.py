@@ -70,13 +70,24 @@ def test_a_robot_or_gains_that_there_are_not_are_named(name, value, says, monkey
 
 
 def test_a_state_directory_that_cannot_be_written_is_told(monkeypatch):
-    def denied(_state):
+    def denied(*_):
         raise PermissionError("no")
 
     monkeypatch.setattr(tls, "certificate", denied)
     (finding,) = doctor.certificates()
     assert finding.grade == BAD
     assert "writable" in finding.advice
+
+
+def test_the_certificate_is_the_one_of_the_server_that_is_set_up(tmp_path, monkeypatch):
+    """Its fingerprint is compared with what a phone shows."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "else"))
+    monkeypatch.setenv("LIGHTLEASH_STATE", str(tmp_path / "state"))
+    served = tls.fingerprint(tls.certificate(tmp_path / "state").authority)
+    made, shown = doctor.certificates()
+    assert str(tmp_path / "state") in made.found
+    assert shown.found == f"SHA-256 {served}"
+    assert not (tmp_path / "else").exists()
 
 
 @pytest.mark.parametrize(("grade", "code"), [(GOOD, 0), (POOR, 0), (BAD, 1)])
