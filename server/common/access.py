@@ -115,4 +115,6 @@ def access_of(arguments: argparse.Namespace) -> Access:
         return running_server(runtime_directory(arguments.name))
     if not arguments.url.startswith(("http://", "https://")):
         raise PhoneClientError(f"--url {arguments.url}: allowed: http://… or https://…")
+    if arguments.ca is not None and not arguments.ca.is_file():
+        raise PhoneClientError(f"--ca {arguments.ca}: no such file")
     return Access(arguments.url, arguments.token, ca=arguments.ca)

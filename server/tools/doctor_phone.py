@@ -8,6 +8,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable
+from http.client import HTTPException
 
 import msgspec
 
@@ -40,16 +41,17 @@ def ask(access: Access, seconds: float) -> LinkReport:
         PhoneClientError: no server there, or nobody leads.
     """
     url = f"{access.url.rstrip('/')}/api/link?seconds={seconds:g}"
-    request = urllib.request.Request(url, headers={"Authorization": f"Bearer {access.token}"})
+    headers = {"Authorization": f"Bearer {access.token}"}
     secure = access.url.startswith("https")
-    tls = ssl.create_default_context(cafile=access.ca) if secure else None
     try:
+        request = urllib.request.Request(url, headers=headers)
+        tls = ssl.create_default_context(cafile=access.ca) if secure else None
         with direct(tls).open(request, timeout=TIMEOUT_S) as answer:
             return msgspec.json.decode(answer.read(), type=LinkReport)
     except urllib.error.HTTPError as error:
         raise PhoneClientError(f"{access.url}: {_why(error.read()) or error}") from error
-    except (OSError, msgspec.MsgspecError) as error:
-        raise PhoneClientError(f"{access.url}: {error}") from error
+    except (OSError, HTTPException, msgspec.MsgspecError) as error:
+        raise PhoneClientError(f"{access.url}: {' '.join(str(error).split())}") from error
 
 
 def _why(body: bytes) -> str:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+import threading
 
 import pytest
 
@@ -89,3 +91,26 @@ def test_without_a_server_doctor_says_so(monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     assert doctor.main(["--phone"]) == 1
     assert "no server is running here" in capsys.readouterr().err
+
+
+def test_a_certificate_that_is_not_there_is_told_in_a_line(capsys):
+    words = ["--token", "t", "--url", "https://127.0.0.1:1", "--ca", "nowhere.pem"]
+    assert doctor.main(["--phone", *words]) == 1
+    assert capsys.readouterr().err == "lightleash doctor: --ca nowhere.pem: no such file\n"
+
+
+def test_a_server_of_another_kind_is_told_in_a_line(capsys):
+    with socket.create_server((HOST, 0)) as other:
+
+        def answer():
+            here, _ = other.accept()
+            with here:
+                here.recv(1)
+                here.sendall(b"SSH-2.0-something\r\n")
+
+        threading.Thread(target=answer, daemon=True).start()
+        url = f"http://{HOST}:{other.getsockname()[1]}"
+        assert doctor.main(["--phone", "--token", "t", "--url", url]) == 1
+    told = capsys.readouterr().err
+    assert told.startswith(f"lightleash doctor: {url}: ")
+    assert told.count("\n") == 1
