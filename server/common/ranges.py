@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 from math import inf
 
+MOST_PORT = 65_535
 MOST_SEED = 2**31 - 1
 """Of what is drawn by chance; NumPy takes none below 0."""
 

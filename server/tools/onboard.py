@@ -8,6 +8,7 @@ from pathlib import Path
 from hardware.flight_controller import process
 from hardware.link.link_key import read_key
 from hardware.robot_file import load_robot
+from server.common.ranges import MOST_PORT, whole
 
 HELP = "Run the robot's end of the link on its own computer, before its flight controller."
 
@@ -25,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="input of the emergency stop's wire, like /sys/class/gpio/gpio17/value: 1 is closed",
     )
-    add("--port", type=int, help="of the link; default: the robot file's")
+    add("--port", type=whole(0, MOST_PORT), help="of the link; default: the robot file's")
 
 
 def run(arguments: argparse.Namespace) -> int:

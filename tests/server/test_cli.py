@@ -83,6 +83,8 @@ def test_each_command_gets_its_own_words(name, module, monkeypatch):
         ["calibrate", "film.mp4", "--fps", "-1"],
         ["calibrate", "film.mp4", "--report", "report.txt"],
         ["robot"],
+        ["robot", "bring-up", "ames", "--port", "0"],
+        ["robot", "onboard", "quadrotor", "--at", "x", "--key", "x", "--port", "70000"],
         ["survey"],
         ["doctor", "--seconds", "few"],
         ["doctor", "--seconds", "0"],

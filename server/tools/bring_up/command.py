@@ -30,7 +30,7 @@ from hardware.robot_text import (
 )
 from pipeline.config import PERIOD_S
 from server.common import clock
-from server.common.ranges import number
+from server.common.ranges import MOST_PORT, number, whole
 from server.common.settings import state_directory
 from server.common.text import Column, dashed, table
 from server.control import realtime
@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a thruster's largest thrust; default: %(default)g, and never more",
     )
     add("--host", help="of the robot; default: the robot file's")
-    add("--port", type=int, help="likewise")
+    add("--port", type=whole(1, MOST_PORT), help="likewise")
     add("--state", type=Path, default=state_directory(), help="keys and recordings")
     add("--from", dest="recording", type=Path, metavar="RECORDING", help="judge it again, no robot")
 
