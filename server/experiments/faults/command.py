@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from hardware.robot_file import RobotFile, load_robot
 from pipeline.config import TeleopConfig, VirtualCameraConfig
@@ -19,7 +19,7 @@ from server.experiments import processes
 from server.experiments.faults import live, picture
 from server.experiments.faults.catalogue import FAULTS
 from server.experiments.faults.fault import Fault, FaultOutcome, suffer
-from server.experiments.faults.live import LiveOutcome
+from server.experiments.faults.live import LiveFault, LiveOutcome
 from server.experiments.faults.measure import (
     FaultRow,
     live_goals,
@@ -32,12 +32,13 @@ from server.experiments.forked import forked
 from server.experiments.gaps import vanish
 from server.experiments.gaps.flight import GapFlight
 from server.experiments.gaps.vanish import Vanished
-from server.experiments.runner import ExperimentReport, experiment
+from server.experiments.runner import ExperimentReport, RefusedError, experiment
 
 APART_TICKS: Final = 7
 """Between two faults in a flight: each meets another moment of it."""
 SHARED: Final = 16
 """Faults that are tried in one flight."""
+Named = TypeVar("Named", Fault, LiveFault)
 COLUMNS: Final[tuple[Column, ...]] = (
     ("fault", "fault", "{}"),
     ("COAST", "COAST s", "{:.3f}"),
@@ -88,6 +89,19 @@ def flown(job: FaultJob) -> list[FaultOutcome]:
     return outcomes
 
 
+def named(faults: Sequence[Named], words: str) -> list[Named]:
+    """Those with these words in their names.
+
+    Raises:
+        RefusedError: there are none.
+    """
+    found = [fault for fault in faults if words in fault.name]
+    if not found:
+        names = "; ".join(fault.name for fault in faults)
+        raise RefusedError(f"--only: {words!r} is in no fault's name; there are: {names}")
+    return found
+
+
 @experiment("faults")
 def run(arguments: argparse.Namespace) -> ExperimentReport | int:
     """Let every fault happen to flights of many seeds."""
@@ -95,7 +109,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
         return run_live(arguments)
     robot_file = load_robot(arguments.robot)
     config = teleop_config(robot_file, arguments.gains, VirtualCameraConfig(), "relative")
-    faults = [fault for fault in FAULTS if arguments.only in fault.name]
+    faults = named(FAULTS, arguments.only)
     outcomes = _outcomes(robot_file, config, faults, arguments)
     rows = [row_of(fault, [o for o in outcomes if o.fault == fault.name]) for fault in faults]
     times = times_of(faults, outcomes)
@@ -115,7 +129,7 @@ def run(arguments: argparse.Namespace) -> ExperimentReport | int:
 def run_live(arguments: argparse.Namespace) -> ExperimentReport:
     """The ones that need real processes."""
     outcomes: list[LiveOutcome] = []
-    faults = [fault for fault in live.LIVE if arguments.only in fault.name]
+    faults = named(live.LIVE, arguments.only)
     for one in live.fly(arguments.robot, arguments.gains, arguments.live, faults):
         outcomes.append(one)
         print(text_of(one), flush=True)

@@ -272,3 +272,13 @@ def test_a_live_fault_is_judged_by_when_thrust_ends_and_that_it_stays_so() -> No
     assert (by_control.coasts_s, by_control.ramps_s) == (0.14, 0.2)
     followed = outcome_of(fault, before, watched([2.0, 2.0]))
     assert (followed.coasts_s, followed.ramps_s) == (float("inf"), float("inf"))
+
+
+@pytest.mark.parametrize("more", [[], ["--live", "1"]], ids=["virtual", "live"])
+def test_words_that_are_in_no_fault_s_name_are_no_success(
+    more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["faults", "--only", "stop whlie", "--vanish", "0", *more]) == 2
+    told = capsys.readouterr()
+    assert "--only: 'stop whlie' is in no fault's name; there are: " in told.err
+    assert "holds" not in told.out
