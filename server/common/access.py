@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import ssl
 import urllib.request
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import msgspec
 
@@ -101,6 +103,14 @@ def add_access_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ca", type=Path, help="certificate of the server's own authority (PEM)")
 
 
+def _is_address(url: str) -> bool:
+    """Whether a server can have it."""
+    with suppress(ValueError):  # a port that is none, half an address in brackets
+        parts = urlsplit(url)
+        return parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+    return False
+
+
 def access_of(arguments: argparse.Namespace) -> Access:
     """The server these options mean.
 
@@ -113,8 +123,8 @@ def access_of(arguments: argparse.Namespace) -> Access:
         raise PhoneClientError("--name is of a server here: not with --url")
     if arguments.url is None:
         return running_server(runtime_directory(arguments.name))
-    if not arguments.url.startswith(("http://", "https://")):
-        raise PhoneClientError(f"--url {arguments.url}: allowed: http://… or https://…")
+    if not _is_address(arguments.url):
+        raise PhoneClientError(f"--url {arguments.url}: allowed: http://HOST:PORT or https://…")
     if arguments.ca is not None and not arguments.ca.is_file():
         raise PhoneClientError(f"--ca {arguments.ca}: no such file")
     return Access(arguments.url, arguments.token, ca=arguments.ca)

@@ -90,3 +90,12 @@ def test_no_run_file_says_how_to_start_a_server(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(PhoneClientError, match="lightleash serve"):
         running_server(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "url", ["gopher://x", "http://", "http://x:port", "http://x:99999", "http://x:0", "http://[x"]
+)
+def test_an_address_that_no_server_can_have_is_refused_before_it_is_asked(url):
+    with pytest.raises(PhoneClientError, match=r"--url .*: allowed: http://HOST:PORT"):
+        asked("--url", url, "--token", "t")
+    assert asked("--url", "https://[::1]:8443", "--token", "t").url == "https://[::1]:8443"
