@@ -66,18 +66,19 @@ def _server(argv: Sequence[str]) -> int:
 
 
 def _config_of(argv: Sequence[str]) -> tuple[list[str], Path | None]:
-    """Takes `--config FILE` out of the arguments."""
-    arguments = list(argv)
-    if "--config" not in arguments:
-        return arguments, None
-    at = arguments.index("--config")
+    """Takes `--config FILE`, or `--config=FILE`, out of the arguments."""
     from server.common.settings import SettingsError
 
-    if at + 1 >= len(arguments):
+    arguments = list(argv)
+    at = next((k for k, word in enumerate(arguments) if word.split("=")[0] == "--config"), None)
+    if at is None:
+        return arguments, None
+    _, is_whole, text = arguments[at].partition("=")
+    text = text if is_whole else "".join(arguments[at + 1 : at + 2])
+    if not text:
         raise SettingsError("--config: a TOML file must follow")
-    file = Path(arguments[at + 1])
-    del arguments[at : at + 2]
-    return arguments, file
+    del arguments[at : at + (1 if is_whole else 2)]
+    return arguments, Path(text)
 
 
 def _invite(argv: Sequence[str]) -> int:

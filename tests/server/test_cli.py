@@ -115,6 +115,8 @@ def test_a_command_ended_by_hand_says_so_with_its_code(monkeypatch):
     [
         (["--config"], "a TOML file must follow"),
         (["--config", "/nowhere.toml"], "/nowhere.toml"),
+        (["--config=/nowhere.toml"], "/nowhere.toml"),
+        (["--config="], "a TOML file must follow"),
         (["--https-port", "70000"], "65535"),
         (["--robot", "nobody"], "no such robot"),
         (["--gains", "none"], "paper_with_ekf"),
