@@ -13,9 +13,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import argparse
 import json
 import sys
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -34,6 +34,7 @@ from hardware.sim.scenes.scene import (
 )
 from hardware.sim.scenes.video import RenderedVideo
 from pipeline.vision.visual_front_end import warm_up
+from server.experiments import processes
 from server.experiments.runner import make_folder
 from server.experiments.vision import lies
 from server.experiments.vision.channel import DEFAULT_CODECS, WITHOUT_IMU, Channel, channel
@@ -129,7 +130,7 @@ def _measured(tasks: list[Task], arguments: argparse.Namespace) -> int:
         return _write(tasks, arguments.write)
     records: dict[tuple[str, Size, str], SceneRecord] = {}
     pools: dict[tuple[str, str], SceneRecord] = {}
-    for done, part in enumerate(_watched(tasks, arguments.jobs), 1):
+    for done, part in enumerate(watched(tasks, arguments.jobs), 1):
         _progress(done, len(tasks))
         for record in part:
             key = (record.scene, record.size, record.channel)
@@ -203,22 +204,23 @@ def _tasks(arguments: argparse.Namespace) -> Iterator[Task]:
                 yield Task(scene, size, first + k, frames, tuple(channels), not arguments.no_plain)
 
 
-def _watched(tasks: list[Task], jobs: int) -> Iterator[list[SceneRecord]]:
+def watched(tasks: Iterable[Task], jobs: int) -> Generator[list[SceneRecord], None, None]:
+    """What was seen in each film, by so many processes; closing it ends them at once."""
     if jobs == 1:
-        _warm()
         yield from map(_watch, tasks)
         return
-    with ProcessPoolExecutor(jobs, initializer=_warm) as pool:
-        for done in as_completed([pool.submit(_watch, task) for task in tasks]):
-            yield done.result()
+    yield from processes.each(_watch, tasks, jobs)
 
 
+@cache
 def _warm() -> None:
+    """Once in each process."""
     cv2.setNumThreads(1)
     warm_up()
 
 
 def _watch(task: Task) -> list[SceneRecord]:
+    _warm()
     return watch(task.scene, task.size, task.seed, task.frames, list(task.channels), task.plain)
 
 

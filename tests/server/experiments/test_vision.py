@@ -1,6 +1,8 @@
 import csv
 import json
+from contextlib import closing
 from dataclasses import replace
+from multiprocessing import active_children
 
 import cv2
 import numpy as np
@@ -17,6 +19,7 @@ from server.experiments.vision.learning import LearningFigures
 from server.experiments.vision.plain import PlainTracker
 from server.experiments.vision.rows import VisionRow, plain_values, row, text
 from server.experiments.vision.verdicts import PLAIN, verdicts, verdicts_on_learning
+from server.experiments.vision.vision import Task, watched
 from server.experiments.vision.watch import ChannelRun, SceneRecord, watch
 from server.experiments.vision.write import write_film
 
@@ -299,3 +302,18 @@ def test_the_command_prints_a_table_and_verdicts_and_keeps_them(tmp_path, capsys
     values = json.loads((tmp_path / "vision.json").read_text())
     assert values["rows"][0]["scene"] == "far_vga"
     assert (tmp_path / "vision.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_an_interruption_ends_the_processes_and_waits_for_no_film_that_is_not_begun():
+    given, before = [], set(active_children())
+
+    def tasks():
+        for seed in range(30):
+            given.append(seed)
+            yield Task(SCENES["far_vga"], VGA, seed, 1, (channel("raw"),), plain=False)
+
+    with closing(watched(tasks(), 2)) as films:
+        assert {record.scene for record in next(films)} == {"far_vga"}
+    assert len(given) < 10
+    assert set(active_children()) == before
