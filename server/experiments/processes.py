@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import gc
 import os
-import signal
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from multiprocessing import active_children, get_context
-from threading import current_thread, main_thread
 from typing import Final, TypeVar
 
+from server.common.child import deaf
 from server.common.cluster.workers import AHEAD
 
 ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -45,7 +44,7 @@ def each(
     waiting, given = iter(jobs), set[Future[Result]]()
     job_done = partial(_done, work)
     try:
-        with _single_threaded(), _deaf():
+        with _single_threaded(), deaf():
             given |= {pool.submit(job_done, one) for one in islice(waiting, AHEAD * workers)}
         while given:
             done, given = wait(given, return_when=FIRST_COMPLETED)
@@ -68,19 +67,6 @@ def _done(work: Callable[[Job], Result], job: Job) -> Result:
         return work(job)
     finally:
         gc.collect()
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Processes started in here don't hear the keyboard's interrupt, which reaches all; we do."""
-    if current_thread() is not main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager

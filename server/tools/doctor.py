@@ -16,6 +16,7 @@ from pathlib import Path
 
 from server import __version__
 from server.common.access import PhoneClientError, access_of, add_access_arguments
+from server.common.child import deaf
 from server.common.clock import wall
 from server.common.options import Parser
 from server.common.settings import SettingsError, load
@@ -57,13 +58,15 @@ def realtime(seconds: float) -> Iterator[Finding]:
     context = multiprocessing.get_context("spawn")
     results: multiprocessing.Queue[tuple[str, dict[str, float]]] = context.Queue()
     process = context.Process(target=_jitter, args=(seconds, results))
-    process.start()
+    with deaf():
+        process.start()
     try:
         granted, late = results.get(timeout=seconds + 30.0)
     except queue.Empty:
         yield Finding(BAD, "real time", "the test did not end", "see the messages above")
         return
     finally:
+        process.terminate()  # it has said all, or nobody waits for it
         process.join(1.0)
     fifo = granted.startswith("SCHED_FIFO")
     advice = "permit real-time priority (deploy/lightleash.service does), or only simulate"

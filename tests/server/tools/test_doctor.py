@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import socket
+from multiprocessing import active_children
+from multiprocessing.queues import Queue
 
 import pytest
 
@@ -124,3 +128,21 @@ def test_a_report_for_others_holds_the_same_and_the_machine(monkeypatch, capsys)
     assert told["system"]["machine"]
     with pytest.raises(SystemExit):
         doctor.main(["--json", "--phone"])
+
+
+@pytest.mark.slow
+def test_an_interruption_is_heard_by_doctor_alone_and_leaves_no_process(monkeypatch):
+    survived = []
+
+    def interrupted(_queue, timeout):
+        (child,) = active_children()
+        os.kill(child.pid, signal.SIGINT)  # a terminal's reaches both
+        child.join(0.5)
+        survived.append(child.is_alive())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Queue, "get", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        next(doctor.realtime(60.0))
+    assert survived == [True]
+    assert active_children() == []
