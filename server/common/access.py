@@ -47,8 +47,10 @@ class Access:
     """How the server smooths the phone's turns: its lag is no tracking error."""
 
 
-def run_of(directory: Path | None = None) -> dict[str, object]:
+def run_of(directory: Path | None = None, or_else: str = "") -> dict[str, object]:
     """The run file of the server in `directory`, else of the one here that has no name.
+
+    `or_else` is what whoever asks can do but start one, in words.
 
     Raises:
         PhoneClientError: there is none, or it makes no sense.
@@ -57,16 +59,16 @@ def run_of(directory: Path | None = None) -> dict[str, object]:
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, object])
     except FileNotFoundError as error:
-        raise PhoneClientError(_nobody(path)) from error
+        raise PhoneClientError(_nobody(path, or_else)) from error
     except (OSError, msgspec.MsgspecError) as error:
         raise PhoneClientError(f"{path}: not a run file of `lightleash serve`: {error}") from error
 
 
-def _nobody(path: Path) -> str:
+def _nobody(path: Path, or_else: str) -> str:
     """Why there is no run file, and where there is one."""
     others = [name for name, one in servers_here().items() if (one / RUN_FILE).exists()]
     if not others:
-        return "no server is running here: start `lightleash serve`, or name one with --url"
+        return f"no server is running here: start `lightleash serve`{or_else}"
     words = (f"--name {name}" if name else "one without --name" for name in others)
     return f"no server is running in {path.parent}; there is {', '.join(words)}"
 
@@ -77,7 +79,7 @@ def running_server(directory: Path | None = None) -> Access:
     Raises:
         PhoneClientError: there is none, or its run file makes no sense.
     """
-    run = run_of(directory)
+    run = run_of(directory, ", or name one with --url")
     try:
         url = run["http_url"] or run["https_url"]
         knobs = run.get("virtual_camera")

@@ -10,6 +10,7 @@ import pytest
 
 import server
 from server import cli
+from tests.server.export.recordings import FLIGHT
 
 
 def test_help_names_every_command(capsys):
@@ -131,3 +132,14 @@ def test_serve_refuses_in_one_line_before_anything_starts(
     told = capsys.readouterr().err
     assert said in told
     assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [["invite"], ["replay", str(FLIGHT)]], ids=["invite", "replay"])
+def test_without_a_server_only_options_that_there_are_are_named(
+    words, capsys, monkeypatch, tmp_path
+):
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert cli.main(words) == 1
+    told = capsys.readouterr().err
+    assert "no server is running here: start `lightleash serve`" in told
+    assert ("--url" in told) == (words[0] == "replay")
