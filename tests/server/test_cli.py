@@ -143,3 +143,20 @@ def test_without_a_server_only_options_that_there_are_are_named(
     told = capsys.readouterr().err
     assert "no server is running here: start `lightleash serve`" in told
     assert ("--url" in told) == (words[0] == "replay")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["tune", "ames", "--latency-ms", "90"],
+        ["robot", "identify", str(FLIGHT)],
+        ["robot", "bring-up", "ames"],
+    ],
+    ids=lambda words: " ".join(words[:2]),
+)
+def test_a_file_that_has_no_folder_is_refused_before_the_work(words, capsys, tmp_path):
+    assert cli.main([*words, "--out", str(tmp_path / "none" / "x.toml")]) == 2
+    told = capsys.readouterr()
+    assert told.err.endswith(f"--out: there is no folder {tmp_path / 'none'}\n")
+    assert told.err.count("\n") == 1
+    assert told.out == ""

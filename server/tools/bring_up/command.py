@@ -142,6 +142,8 @@ def _out(path: Path, out: Path | None) -> Path:
     place = out or beside / f"{path.stem}-brought-up.toml"
     if place.suffix != ".toml" or place.exists():
         raise RobotTextError("--out", f"{place}: allowed: a new path ending in .toml")
+    if not place.parent.is_dir():
+        raise RobotTextError("--out", f"there is no folder {place.parent}")
     return place
 
 

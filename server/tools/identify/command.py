@@ -57,6 +57,8 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path | None = arguments.out
     if out is not None and (out.suffix != ".toml" or out.exists()):
         raise RobotTextError("--out", f"{out}: allowed: a new path ending in .toml")
+    if out is not None and not out.parent.is_dir():
+        raise RobotTextError("--out", f"there is no folder {out.parent}")
     recordings = [DecodedRecording(read(path)) for path in arguments.recordings]
     robot_file = load_robot(arguments.robot) if arguments.robot else recordings[0].robot
     if robot_file.robot.twist is not None:

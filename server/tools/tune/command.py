@@ -115,6 +115,8 @@ def _target(path: Path, arguments: argparse.Namespace) -> Path:
         return path
     if out.suffix != ".toml":
         raise TuneError(f"--out: {out}: allowed: a path ending in .toml")
+    if not out.parent.is_dir():
+        raise TuneError(f"--out: there is no folder {out.parent}")
     if out.exists() and out.resolve() != path.resolve():
         raise TuneError(f"--out: {out} is there already; allowed: a new file, or: tune {out}")
     return out
