@@ -88,7 +88,8 @@ def judge_views(
     if found < SEEN_SHARE * pictures:
         reason = f"The board was found in {found} of {pictures} pictures."
         verdict.worsen("refused", reason, UNSEEN)
-    if sharp < max(1.0, SHARP_SHARE * found) or choice.blur_px > 2.0 * BLUR_PX * scale_of(size):
+    blurred = sharp < max(1.0, SHARP_SHARE * found)
+    if found and (blurred or choice.blur_px > 2.0 * BLUR_PX * scale_of(size)):
         reason = (
             f"{found - sharp} of {found} views are blurred: the board's edges are"
             f" {choice.blur_px:.0f} pixels wide."

@@ -63,3 +63,12 @@ def test_a_board_is_written_without_a_film(tmp_path):
     for suffix in ("svg", "pdf", "png"):
         assert main(["--board-svg", str(tmp_path / f"board.{suffix}")]) == 0
         assert (tmp_path / f"board.{suffix}").stat().st_size > 1000
+
+
+def test_of_a_board_that_was_never_found_no_blur_is_told(tmp_path, capsys):
+    for k in range(3):
+        cv2.imwrite(str(tmp_path / f"{k}.png"), np.full((240, 320), 90, np.uint8))
+    assert main([str(tmp_path)]) == 1
+    said = capsys.readouterr().out
+    assert "The board was found in 0 of 3 pictures." in said
+    assert "blurred:" not in said
