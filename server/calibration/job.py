@@ -14,7 +14,7 @@ from server.calibration.lens import COEFFICIENTS
 from server.calibration.solve import CalibrationSolution, solve
 from server.calibration.verdict import TOO_FEW, Verdict, judge, judge_views
 from server.calibration.views import BoardView
-from server.common.child import raise_niceness
+from server.common.child import be_ordinary, raise_niceness
 
 KINDER = 10
 """Less urgent than what keeps a robot flying: `nice`."""
@@ -88,6 +88,8 @@ class Solving:
         self._answer, far = context.Pipe(duplex=False)
         self._process = context.Process(target=_work, args=(job, far), daemon=True)
         self._process.start()
+        if self._process.pid is not None:
+            be_ordinary(self._process.pid)
         far.close()
 
     @property

@@ -150,8 +150,9 @@ def set_oom_score(score: int) -> None:
 def go_before_others() -> None:
     """Let this process and its threads run before all that have no real time.
 
-    Takes CAP_SYS_NICE or LimitRTPRIO; without it niceness is asked for. Who uses this ends its
-    children's share in it by `set_niceness` or `raise_niceness`: they inherit it.
+    Takes CAP_SYS_NICE or LimitRTPRIO; without it niceness is asked for. Children inherit it: who
+    uses this takes it from them by `be_ordinary` as they start, or they share its turns while they
+    load.
     """
     set_niceness(PROMPT_NICENESS)
     with contextlib.suppress(AttributeError, OSError):
@@ -165,7 +166,7 @@ def set_niceness(niceness: int) -> None:
     equal turns whatever the niceness of those within, so the group is told, too. Behind is always
     permitted, before takes CAP_SYS_NICE: without it things stay as they are.
     """
-    _be_ordinary()
+    be_ordinary()
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, niceness)
         Path("/proc/self/autogroup").write_text(str(niceness))
@@ -173,14 +174,14 @@ def set_niceness(niceness: int) -> None:
 
 def raise_niceness(least: int) -> None:
     """Let this process run no sooner than so, whatever it inherited: a server's own goes before."""
-    _be_ordinary()
+    be_ordinary()
     os.nice(max(0, least - os.getpriority(os.PRIO_PROCESS, 0)))
 
 
-def _be_ordinary() -> None:
-    """Without real time that was inherited."""
+def be_ordinary(pid: int = 0) -> None:
+    """Let this process, or the child `pid`, have no real time that it inherited."""
     with contextlib.suppress(AttributeError, OSError):
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ import numpy as np
 
 from hardware.codec import CODECS, DecodeError
 from pipeline.signals import Image
-from server.common.child import BACKOFF_S, STEADY_S
+from server.common.child import BACKOFF_S, STEADY_S, be_ordinary
 from server.common.clock import now
 from server.media.decoder_process import ANSWER, DECODED, DIED, REFUSED, REQUEST
 from server.protocol.wire import MAX_PIXELS, MAX_RECORD_BYTES
@@ -77,6 +77,7 @@ class _Running:
                 stdin=subprocess.DEVNULL,
                 stdout=sys.stderr,
             )
+            be_ordinary(self.process.pid)
             ours.pop_all()
 
     def ask(self, request: bytes, number: int, data: bytes) -> int:

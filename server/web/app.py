@@ -21,6 +21,7 @@ from starlette.routing import BaseRoute, Mount, Route
 
 from pipeline.config import FailsafeConfig
 from server import __version__
+from server.common.child import be_ordinary
 from server.common.clock import now
 from server.diagnostics.link_check import check
 from server.diagnostics.link_log import KEPT_S
@@ -104,6 +105,7 @@ class VirtualPhoneProcess:
             command = [sys.executable, "-m", "server.virtual_phone.command", "--hand", "demo"]
             command += ["--name", self._server]
             self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+            be_ordinary(self._process.pid)
 
     def stop(self) -> None:
         """Ask it to leave; it lets go of the button first."""

@@ -239,6 +239,33 @@ def test_no_child_keeps_real_time_that_it_inherited(by):
     assert int(asked(*inherited, ask, by, CLASS)) == os.SCHED_OTHER
 
 
+@pytest.mark.parametrize(
+    "start",
+    [
+        ("from server.media.decoding import _Running", "pid = _Running(1.0).process.pid"),
+        (
+            "from server.web.app import VirtualPhoneProcess",
+            "phone = VirtualPhoneProcess()",
+            "phone.start()",
+            "pid = phone._process.pid",
+        ),
+    ],
+    ids=["decoder", "virtual phone"],
+)
+def test_no_child_loads_its_modules_in_real_time(start):
+    """A decoder that is started anew in flight would take whole turns from who hears the phone."""
+    inherited = ["import contextlib", "with contextlib.suppress(OSError):", f"    {RR_1}"]
+    told = asked(
+        "import signal",
+        *start[:1],
+        *inherited,
+        *start[1:],
+        "print(os.sched_getscheduler(pid))",
+        "os.kill(pid, signal.SIGKILL)",
+    )
+    assert int(told) == os.SCHED_OTHER
+
+
 @pytest.mark.parametrize("inherited", [-10, 0, 15])
 def test_what_only_computes_runs_behind_others_whatever_it_inherited(inherited):
     lines = [
