@@ -56,3 +56,10 @@ def test_a_coarse_one_by_older_pictures_says_nothing_of_dates_that_have_changed(
         assert watch.complaint == ""
     watch.coarse = StampOffset(0.03, 0.002, since=5.0)
     assert watch.must_begin_again(0.015, 1e-4, 10.0)
+
+
+def test_one_that_knows_nothing_yet_has_agreed_with_nobody() -> None:
+    watch = OffsetMonitor()
+    watch.coarse = StampOffset(0.005, 0.002)
+    assert not watch.must_begin_again(0.0, 0.02, 1.0)
+    assert watch.must_begin_again(0.02, 1e-3, 2.0)
