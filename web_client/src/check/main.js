@@ -8,6 +8,8 @@ import { speak, write } from '../words/say.js';
 import { LONG_MS, MINUTE_MS, PhoneCheck, fileName, gradeWords, wordsOf } from './check.js';
 
 const TURN_MS = 250;
+/** What is saved is kept for: an iPhone first asks its owner where to. */
+const SAVED_MS = 60_000;
 
 await speak(document, navigator.languages, () => window.localStorage);
 const { fetchHere, later } = browserOf(window);
@@ -65,7 +67,7 @@ function save(text, type, name) {
   link.href = URL.createObjectURL(new Blob([text], { type }));
   link.download = name;
   link.click();
-  later(() => URL.revokeObjectURL(link.href), 1000);
+  later(() => URL.revokeObjectURL(link.href), SAVED_MS);
 }
 
 function turn() {
