@@ -127,7 +127,14 @@ class ChromiumPhone(PlayedPhone):
         )
         for kind, at in (("touchStart", 0.5), ("touchMove", share)):
             self._touch(kind, thumb, {"x": x + at * width, "y": y, "id": 1})
-        self._touch("touchMove", thumb)  # a finger that is missing has left
+        self._touch("touchEnd", {"x": x + share * width, "y": y, "id": 1})
+
+    def tap_beside(self, selector: str) -> None:
+        """Touch an element shortly with another finger, while one is on the big button."""
+        thumb = {**self._middle("#hold"), "id": 0}
+        other = {**self._middle(selector), "id": 1}
+        self._touch("touchStart", thumb, other)
+        self._touch("touchEnd", other)
 
     def _middle(self, selector: str) -> dict[str, float]:
         """Of an element [px], asked without waiting for anything, which would still the hand."""

@@ -1,4 +1,4 @@
-"""A real Chromium leads a robot, and opens and closes its tool with another finger."""
+"""A real Chromium leads a robot; another finger opens and closes its tool, and disarms."""
 
 from __future__ import annotations
 
@@ -74,3 +74,7 @@ def test_a_robot_s_tool_follows_the_slider_while_the_button_is_held(
         phone.play_until("document.body.innerText.includes('HOLD')", 3.0)
         phone.play(0.3)
         assert tool()["opening"] is None
+        phone.hold()
+        phone.play(0.3)
+        phone.tap_beside("#wish")  # of which no browser makes a click
+        phone.play_until("document.body.innerText.includes('RAMP')", 2.0)

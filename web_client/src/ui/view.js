@@ -38,6 +38,9 @@ export class View {
     this.start.addEventListener('click', requests.onStart);
     find('reload').addEventListener('click', requests.onReload);
     this.requestButton.addEventListener('click', requests.onRequest);
+    this.requestButton.addEventListener('pointerup', ({ isPrimary }) => {
+      if (!isPrimary && !this.requestButton.disabled) requests.onRequest(); // beside a finger that holds there is no click
+    });
     find('sound').addEventListener('click', requests.onSound);
     for (const type of ['pointerdown', 'click']) {
       for (const id of ['stop', 'last-stop-button']) find(id).addEventListener(type, requests.onStop);
