@@ -118,7 +118,7 @@ def test_a_camera_that_is_taken_away_from_a_page_in_sight_is_opened_again(
 ) -> None:
     with browser(chromium, **PHONE) as context:
         context.add_init_script(LOSES_CAMERA)
-        page = joined(context, server, "Anna")
+        page = joined(context, server, "Eva")
         page.evaluate("lose()")
         expect(page.locator("#notice")).to_contain_text("does not come back", timeout=WAIT_MS)
         until(lambda: bool(page.evaluate("tracks.length === 2")), 30.0, "another track")
