@@ -178,6 +178,17 @@ def new_private_file(path: Path) -> IO[bytes]:
     return open(path, "xb", opener=private_opener)
 
 
+@contextmanager
+def whole_private_file(path: Path) -> Iterator[IO[bytes]]:
+    """The same; it is removed again if it does not get to its end."""
+    with new_private_file(path) as file:
+        try:
+            yield file
+        except BaseException:  # half of it is of no use, and may be all that was left of the disk
+            path.unlink()
+            raise
+
+
 def private_opener(path: str, flags: int) -> int:
     """For `open`: what it makes is for this user alone, whatever the umask."""
     return os.open(path, flags, 0o600)

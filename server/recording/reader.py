@@ -18,7 +18,7 @@ from mcap.records import Channel, Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from server.common.runtime import new_private_file
+from server.common.runtime import whole_private_file
 from server.protocol.messages import Status, decode_from_server
 from server.protocol.wire import VERSION
 from server.recording.writer import (
@@ -188,15 +188,10 @@ def recover(part: Path) -> Path:
             raise RecordingError(part, "is not an MCAP file", "name a *.mcap.part of a recording")
         source.seek(0)
         temporary.unlink(missing_ok=True)
-        try:
-            with new_private_file(temporary) as target:
-                copied = _copy_complete(source, target)
-            if not copied:
+        with whole_private_file(temporary) as target:
+            if not _copy_complete(source, target):
                 what = "holds nothing of Lightleash that can be rescued"
                 raise RecordingError(part, what, "name a *.mcap.part of a recording")
-        except BaseException:  # half of it is of no use, and may be all that was left of the disk
-            temporary.unlink(missing_ok=True)
-            raise
     temporary.rename(path)
     if part != path:
         part.unlink()
