@@ -28,6 +28,7 @@ from hardware.sim.truth import TruthClient
 from pipeline.frames import Array
 from pipeline.signals import Mode
 from server.common import clock
+from server.common.access import direct
 from server.common.child import die_with
 from server.common.runtime import RUN_FILE
 from server.experiments.faults.catalogue import (
@@ -164,7 +165,7 @@ class LiveServer:
         headers = {"Authorization": f"Bearer {self._run['supervisor_token']}"}
         url = f"{self._run['http_url']}{path}"
         request = urllib.request.Request(url, headers=headers, method=method)
-        with urllib.request.urlopen(request, timeout=ASK_S) as answer:
+        with direct().open(request, timeout=ASK_S) as answer:
             return bytes(answer.read())
 
     def until(self, condition: Callable[[], bool], seconds: float, what: str) -> None:
