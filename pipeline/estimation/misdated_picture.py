@@ -37,8 +37,7 @@ class MisdatedPictures:
     def __init__(self) -> None:
         """None so far."""
         self._was_far = False
-        self._late_s = inf
-        """By its date, if that explains the picture before; inf: it was not far, or else."""
+        self._dates = RunningDates()
         self.are_redated = False
         """The same date explains the last two pictures."""
 
@@ -55,11 +54,11 @@ class MisdatedPictures:
             passing: (6,) how the predicted pose passes: ṗ in c [m/s], attitude in b [rad/s].
         """
         was_far, self._was_far = self._was_far, misfit(e, S) > FAR
-        before_s, self._late_s = self._late_s, late_by(e, S, passing) if self._was_far else inf
-        self.are_redated = are_alike(before_s, self._late_s)
-        if was_far or seen.pose is None or isinf(self._late_s):
+        late_s = late_by(e, S, passing) if self._was_far else inf
+        self.are_redated = self._dates.are_alike(late_s)
+        if was_far or seen.pose is None or isinf(late_s):
             return None
-        moved = self._late_s * passing
+        moved = late_s * passing
         pose, rays = widened(seen.pose, seen.rays, leds_in_b, moved[:3], moved[3:])
         return replace(seen, pose=pose, rays=rays)
 
@@ -75,6 +74,14 @@ def late_by(e: Array, S: Array, passing: Array) -> float:
     return STUMBLE_S**2 * float(passing @ np.linalg.solve(misdated, e))
 
 
-def are_alike(before_s: float, late_s: float) -> bool:
-    """Whether the same date explains two pictures running."""
-    return isfinite(before_s) and abs(late_s - before_s) < ALIKE_S
+class RunningDates:
+    """How much later than dated the picture before was taken."""
+
+    def __init__(self) -> None:
+        """Not known."""
+        self._late_s = inf
+
+    def are_alike(self, late_s: float) -> bool:
+        """Take a picture's own [s], or inf; tells whether it is that of the one before."""
+        before_s, self._late_s = self._late_s, late_s
+        return isfinite(before_s) and abs(late_s - before_s) < ALIKE_S

@@ -30,7 +30,7 @@ import numpy as np
 
 from pipeline.camera.verdict import FOCAL, SURE
 from pipeline.estimation.believed_less import widened
-from pipeline.estimation.misdated_picture import STUMBLE_S, are_alike, late_by
+from pipeline.estimation.misdated_picture import STUMBLE_S, RunningDates, late_by
 from pipeline.estimation.out_of_sequence import Checkpoint
 from pipeline.estimation.relative_kernels import BIASES, X_BIASES, X_OFFSET
 from pipeline.estimation.relative_start import Learnt, can_start, first_checkpoint
@@ -125,8 +125,7 @@ class PictureCheck:
         """Of what is predicted, for a robot that shakes more than the model says."""
         self._was_beside = False
         """The picture before was beside its place."""
-        self._late_s = inf
-        """By its date, if that explains the picture before; inf: it was not beside, or else."""
+        self._dates = RunningDates()
         self._t_begun = -np.inf
         self._right_s = 0.0
         """So long pictures were right since that could have been wrong."""
@@ -232,13 +231,10 @@ class PictureCheck:
 
     def _are_redated(self, near: Missed) -> bool:
         """Whether this picture and the one before are beside their places by the same date."""
+        if not near.chi2 > LONE_CHI2:
+            return self._dates.are_alike(inf)
         passing = self._track.passing(near.predicted)[:3]
-        is_beside = near.chi2 > LONE_CHI2
-        before_s, self._late_s = (
-            self._late_s,
-            late_by(near.off, near.S, passing) if is_beside else inf,
-        )
-        return are_alike(before_s, self._late_s)
+        return self._dates.are_alike(late_by(near.off, near.S, passing))
 
     def _missed(self, pose: RelativePose, predicted: Checkpoint[VisionMeasurement]) -> Missed:
         """Where it is seen from where it was predicted."""
