@@ -37,7 +37,7 @@ class JointOdometry:
         if -1 in order or len(joints.positions) != len(joints.names):
             return None
         q = np.array([joints.positions[k] for k in order])
-        stamp_us, rates = joints.stamp_us, _told_rates(joints, order)
+        stamp_us, rates = joints.stamp_us, _joint_velocities(joints, order)
         if rates is None:
             before, self._before = self._before, (joints.writer, stamp_us, q)
             if before is None or before[0] != joints.writer:
@@ -55,7 +55,7 @@ class JointOdometry:
         return HeardOdometry(joints.writer, twist_in_b, stamp_us, pose=pose)
 
 
-def _told_rates(joints: HeardJoints, order: list[int]) -> Array | None:
+def _joint_velocities(joints: HeardJoints, order: list[int]) -> Array | None:
     """(n,) [rad/s]; None: it tells none, or NaN, as ros2_control does of who measures none."""
     if len(joints.velocities) != len(joints.names):
         return None
