@@ -7,6 +7,8 @@
 
 /** @import {ScreenAngle} from '../wire/protocol.js' */
 
+import { smallest } from '../wire/clock.js';
+
 /**
  * @typedef {object} Capture
  * @property {number} captureUs On the page's clock.
@@ -29,9 +31,7 @@ const OLD_US = 200_000;
 const FAR_US = 5000;
 /** Where cameras are too regular to tell, the quicker encoder is believed: a period costs half a ms. */
 const DELAY_COST = 0.015;
-/** None leaves before it was taken, but a busy page's first captures are told of so much later than it knows [µs], */
-const EARLY_US = 5000;
-/** at a cost. */
+/** None leaves before it was taken, but a busy page takes captures for later than it knows: at a cost. */
 const EARLY_COST = 0.2;
 
 export class CaptureMatcher {
@@ -42,6 +42,8 @@ export class CaptureMatcher {
     this.frames = [];
     /** How far RTP's clock is ahead of the camera's [µs]. @type {number | null} */
     this.aheadUs = null;
+    /** How far the page's is: a busy page takes its first captures for up to 70 ms later than they were. */
+    this.pageAheadUs = 0;
     this.isSure = false;
     /** @type {number | null} */
     this.lastStamp = null;
@@ -51,16 +53,14 @@ export class CaptureMatcher {
     this.lateUs = 0;
     /** and are, by the quickest frame. */
     this.foundLateUs = 0;
-    /** @type {ScreenAngle} */
-    this.screenAngle = 0;
   }
 
   /** @param {Capture} capture In the order of time. */
   captured(capture) {
     this.captures.push(capture);
-    this.screenAngle = capture.screenAngle;
     this.lateUs = capture.lateUs;
     if (this.captures.length > KEPT_CAPTURES) this.captures.shift();
+    this.pageAheadUs = Number(smallest(this.captures.map(({ captureUs, stampUs }) => captureUs - stampUs)).at(-1));
   }
 
   /**
@@ -75,19 +75,18 @@ export class CaptureMatcher {
     if (this.frames.length > KEPT_FRAMES) this.frames.shift();
     this.aheadUs = this.ahead(nowUs);
     if (this.aheadUs === null) return null;
-    const found = this.taken(stampUs - this.aheadUs);
-    const captureUs = Math.max(found.captureUs - this.foundLateUs, this.lastUs + 1);
-    this.lastUs = captureUs;
-    return { captureUs, screenAngle: found.screenAngle };
+    const near = nearest(this.captures, stampUs - this.aheadUs);
+    this.lastUs = Math.max(this.takenUs(stampUs - this.aheadUs) - this.foundLateUs, this.lastUs + 1);
+    return { captureUs: this.lastUs, screenAngle: near?.screenAngle ?? 0 };
   }
 
-  /** @param {number} stampUs By the camera's clock: of a capture, or of one that the page has skipped. */
-  taken(stampUs) {
-    const near = nearest(this.captures, stampUs);
-    if (near === null) return { captureUs: stampUs, screenAngle: this.screenAngle };
-    const { captureUs, screenAngle } = near;
-    const skippedUs = stampUs - near.stampUs;
-    return Math.abs(skippedUs) <= FAR_US ? near : { captureUs: captureUs + skippedUs, screenAngle };
+  /**
+   * On the page's clock.
+   * @param {number} stampUs By the camera's: of a capture, or of one that the page has skipped.
+   */
+  takenUs(stampUs) {
+    const offUs = offset(this.captures, stampUs);
+    return stampUs + this.pageAheadUs - (Math.abs(offUs) <= FAR_US ? offUs : 0);
   }
 
   /**
@@ -114,8 +113,11 @@ export class CaptureMatcher {
   /** How far RTP's clock would be ahead by each capture that a frame may be. @param {Encoded} frame */
   possible({ stampUs, outUs }) {
     return this.captures
-      .filter(({ captureUs }) => captureUs <= outUs + this.lateUs + EARLY_US && captureUs > outUs - OLD_US)
-      .map((capture) => stampUs - capture.stampUs);
+      .map((capture) => stampUs - capture.stampUs)
+      .filter((aheadUs) => {
+        const delayUs = outUs - stampUs + aheadUs - this.pageAheadUs;
+        return delayUs < OLD_US && delayUs >= -this.lateUs;
+      });
   }
 
   /**
@@ -130,7 +132,7 @@ export class CaptureMatcher {
     for (const { stampUs, outUs } of frames) {
       const wayUs = stampUs - aheadUs;
       misfit += Math.min(Math.abs(offset(this.captures, wayUs)), FAR_US) / frames.length;
-      delayUs = Math.min(delayUs, outUs - this.taken(wayUs).captureUs);
+      delayUs = Math.min(delayUs, outUs - this.takenUs(wayUs));
     }
     const earlyUs = Math.max(0, -this.lateUs - delayUs);
     return { aheadUs, delayUs, misfit: misfit + DELAY_COST * delayUs + EARLY_COST * earlyUs };
