@@ -27,6 +27,8 @@ LANDSCAPE = {
     "device_scale_factor": 1,
 }
 
+WAYS = {"WebRTC": "WebRTC", "WebSocket": "websocket, H264", "JPEG": "websocket, JPEG"}
+"""Of pictures, as the page names them, and as the server says them."""
 MAY_ARM = """
 (({disabled, dataset}) => !disabled && dataset.what === 'arm')(document.querySelector('#wish'))
 """

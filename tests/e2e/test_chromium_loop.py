@@ -9,15 +9,13 @@ from pathlib import Path
 import pytest
 
 from server.diagnostics.meter import WINDOW_S
-from tests.e2e.chromium_rig import flown, led_server, start
+from tests.e2e.chromium_rig import WAYS, flown, led_server, start
 from tests.e2e.flight_log import Flight
 from tests.e2e.page_scripts import COUNT_GIVEN
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
 LEARNT_S, STEADY_S, CHANGED_S = 8.0, 14.0, 4.0
 """Of tracking: the suspension is learnt; then pictures go on by another way, each so long."""
-WAYS = {"WebRTC": "WebRTC", "WebSocket": "websocket, H264", "JPEG": "websocket, JPEG"}
-"""What the server says of the page's ways."""
 CHANGES = ("WebSocket", "JPEG", "WebRTC")
 SEED = 1
 """A hand that never leads farther than the thrusters hold: there the leash keeps the robot back, 20
