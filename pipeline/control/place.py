@@ -106,6 +106,15 @@ class SuspendedPlace:
         """From here on its displacement is counted."""
         self._p_start_in_f = self._p_in_f
 
+    def turn(self, turn_of_f: Array) -> None:
+        """The axes of f were put right by (3, 3), or begin anew by another phone's."""
+        self._thrust_in_f, self._bias_in_f = (
+            turn_of_f @ self._thrust_in_f,
+            turn_of_f @ self._bias_in_f,
+        )
+        self._p_in_f, self._p_start_in_f = turn_of_f @ self._p_in_f, turn_of_f @ self._p_start_in_f
+        self._rest_in_f, self.v_in_f = turn_of_f @ self._rest_in_f, turn_of_f @ self.v_in_f
+
     def propagate(
         self, f_bf_in_b: Array, R_fb: Array, force_in_b: Array, h: float, knows_vertical: bool
     ) -> None:

@@ -71,6 +71,12 @@ class StationKeeping:
         """Begin again after a gap of samples: where it is now is as good as any place."""
         self._integrated_in_f = self.v_in_f = self._offset_in_f = np.zeros(3)
 
+    def turn(self, turn_of_f: Array) -> None:
+        """The axes of f were put right by (3, 3), or begin anew by another phone's."""
+        self._a_slow_in_f = turn_of_f @ self._a_slow_in_f
+        self._integrated_in_f = turn_of_f @ self._integrated_in_f
+        self.v_in_f, self._offset_in_f = turn_of_f @ self.v_in_f, turn_of_f @ self._offset_in_f
+
     def error(self, view: VirtualView) -> PoseError:
         """To the place where it is to stay; its attitude is the gyroscope's own."""
         return PoseError(

@@ -47,6 +47,7 @@ class ThrustActing:
         self._place = SuspendedPlace(robot)
         self._leash = leash_of(robot, config.leash, config.resumption)
         self._force_in_b = self._mean_force_in_f = np.zeros(3)
+        self._coasts = False
         self._told_in_b = np.zeros(6)
 
     @property
@@ -92,14 +93,26 @@ class ThrustActing:
         if now.is_deaf:
             self._station.reset()
             self._hold.R_fb = R_fb
-        f_bf_in_b, place, x_before_in_f = known.relative.f_bf_in_b, self._place, self._place.x_in_f
-        if now.mode == Mode.COAST:  # nothing of an estimate that may be in doubt, biases neither
-            R_fb = self._hold.R_fb
+        f_bf_in_b = known.relative.f_bf_in_b
+        if now.mode != Mode.COAST:
+            self._take_up(R_fb)
+        else:  # nothing of an estimate that may be in doubt, biases neither
+            self._coasts, R_fb = True, self._hold.R_fb
             f_bf_in_b = self._hold.specific_force_in_b(now.body.a_m_bf_in_b)
+        place, x_before_in_f = self._place, self._place.x_in_f
         place.propagate(f_bf_in_b, R_fb, self._told_in_b[:3], now.h, now.knows_vertical)
         suspended = (place.x_in_f - x_before_in_f, place.v_in_f)
         is_known = place.is_known and not now.is_deaf
         self._station.propagate(f_bf_in_b, R_fb, now.h, suspended if is_known else None)
+
+    def _take_up(self, R_fb: Array) -> None:
+        """After a gap f's axes are put right, or another phone's; what was kept goes along."""
+        if not self._coasts:
+            return
+        turn_of_f, self._coasts = R_fb @ self._hold.R_fb.T, False
+        self._station.turn(turn_of_f)
+        self._place.turn(turn_of_f)
+        self._mean_force_in_f = turn_of_f @ self._mean_force_in_f
 
     def coast_error(self, view: VirtualView) -> PoseError | None:
         """What is missing to the station that it keeps."""
@@ -128,7 +141,9 @@ class ThrustActing:
 
     def start(self, known: Situation, from_rest: bool) -> None:
         """Begin to track, from rest or from the force that was held."""
-        held_in_f = known.view.R_fv @ known.view.R_vb @ self._force_in_b
+        R_fb = known.view.R_fv @ known.view.R_vb
+        self._take_up(R_fb)
+        held_in_f = R_fb @ self._force_in_b
         self._tracking.start(None if from_rest else held_in_f)
 
     def change_mode(

@@ -16,7 +16,7 @@ from pipeline.control.pid import PoseError, Reference
 from pipeline.control.place import SETTLED_S
 from pipeline.control.thrust_acting import ThrustActing
 from pipeline.control.tracking import Situation
-from pipeline.frames import GRAVITY, Array
+from pipeline.frames import GRAVITY, Array, exp
 from pipeline.signals import BodyImu, Mode, RelativeState, VirtualView
 
 H, STILL, AHEAD = 0.005, np.zeros(3), np.array([1.5, 0.0, 0.0])
@@ -100,6 +100,38 @@ def test_a_place_that_is_lost_in_doubt_is_lost_until_it_follows_again() -> None:
     assert acting._place.is_known  # again, but where it went meanwhile is not
     acting.change_mode(Mode.TRACK, Mode.COAST, KNOWN, ERROR)
     assert acting.coast_error(KNOWN.view) is not None
+
+
+def seen_by(R_fc: Array) -> Situation:
+    """The same robot, by a phone whose f has other axes."""
+    return Situation(KNOWN.relative, R_fc, replace(KNOWN.view, R_fv=R_fc))
+
+
+@pytest.mark.parametrize("robot", ["ames", "quadrotor"])
+@pytest.mark.parametrize("mode", [Mode.TRACK, Mode.HOLD])
+def test_after_a_gap_that_another_phone_ends_it_goes_where_it_went(robot: str, mode: Mode) -> None:
+    pushed = replace(BODY, a_m_bf_in_b=BODY.a_m_bf_in_b + np.array([0.4, 0.0, 0.0]))
+    heading = seen_by(exp(np.array([0.0, 0.0, 2.5])))
+    known, unknown = (_went_in_b(robot, mode, pushed, after) for after in (KNOWN, heading))
+    np.testing.assert_allclose(unknown, known, atol=1e-9)
+    assert np.linalg.norm(known[0]) > 0.02
+
+
+def _went_in_b(robot: str, mode: Mode, pushed: BodyImu, after: Situation) -> Array:
+    """Velocities and places (4, 3) after a gap, as the station and the suspension know them."""
+    acting = coasting(robot, SETTLED_S + 1.0, ERROR)
+    for _ in range(round(0.3 / H)):
+        acting.observe(KNOWN, moment(Mode.COAST, pushed))
+        acting.act(KNOWN, None, moment(Mode.COAST, pushed), 1.0)
+    if mode == Mode.TRACK:
+        acting.start_place()
+        acting.start(after, False)
+    else:
+        acting.change_mode(Mode.COAST, mode, after, None)
+    acting.observe(after, moment(mode))
+    station, place = acting._station, acting._place
+    kept_in_f = (station.v_in_f, place.v_in_f, place.from_rest_in_f, place.x_in_f)
+    return np.array(kept_in_f) @ after.view.R_fv
 
 
 def test_a_doubt_begins_with_what_was_given_of_late_and_not_with_the_last_lie() -> None:
