@@ -3,7 +3,8 @@
 Servos are told where they shall be after their lag, so that the arm is where it shall be now, and
 stands as soon as it shall. Going on from what it shall do, and not from what was measured, nothing
 drifts by what servos bend under their load or by encoders' steps. An arm that is held back is told
-no more than `AHEAD_RAD` beyond where it is, so that let go it does not leap.
+no more than `AHEAD_RAD` beyond where it is, so that let go it does not leap; nor does it for an
+encoder that tells a wild angle: what is told changes no faster than joints turn.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ class JointSetpoints:
         arm, before = self._kinematics.arm, self.wanted
         wanted = before + h * self._kinematics.rates(before, twist_in_b, h)
         near = np.clip(wanted, measured - AHEAD_RAD, measured + AHEAD_RAD)
-        self.wanted = np.clip(near, arm.low, arm.high)
+        most = arm.parameters.rate * h
+        self.wanted = np.clip(np.clip(near, before - most, before + most), arm.low, arm.high)
         self.rates = (self.wanted - before) / h
         return np.clip(self.wanted + arm.parameters.servo_lag_s * self.rates, arm.low, arm.high)

@@ -56,6 +56,16 @@ def test_an_arm_that_begins_beyond_its_range_is_told_to_be_in_it():
     assert (told <= ARM.high).all()
 
 
+def test_an_encoder_that_tells_a_wild_angle_once_moves_no_servo_faster_than_it_turns():
+    one = setpoints()
+    before = one.follow(np.zeros(6), HOME, H_S)
+    wild = HOME + np.array([0.0, -3.0, 3.0, 0.0, 0.0])
+    told = one.follow(np.zeros(6), wild, H_S)
+    most = PARAMETERS.rate * (H_S + PARAMETERS.servo_lag_s)
+    assert np.abs(told - before).max() <= most + 1e-9
+    assert one.follow(np.zeros(6), HOME, H_S) == pytest.approx(one.wanted)
+
+
 def observed(speed_rad_s, told):
     """Twists known of joints that truly turn so, from rest, by encoders' steps."""
     q, rates, odometry, known, true = HOME.copy(), np.zeros(5), None, [], []
