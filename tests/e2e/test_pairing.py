@@ -133,6 +133,28 @@ def test_a_supervisors_browser_that_opens_a_lesser_link_is_asked_and_may_keep_wh
             expect(other.locator("body")).to_have_attribute("data-role", role, timeout=WAIT_MS)
 
 
+def test_a_screen_that_was_left_while_it_waited_takes_no_place_when_it_is_let_in(
+    chromium: str, server: Serving
+) -> None:
+    with browser(chromium, **SCREEN) as context:
+        screen, opened = context.new_page(), list[str]()
+        screen.on("websocket", lambda socket: opened.append(socket.url))
+        screen.goto(f"{server.local_https}/screen{server.link()}")
+        screen.click("#start")
+        expect(screen.locator("#why")).to_contain_text("Waiting to be let in", timeout=WAIT_MS)
+        screen.evaluate("document.exitFullscreen()")
+        expect(screen.locator("#setup")).to_be_visible()
+        people = server.request("GET", "/api/status")["people"]
+        assert isinstance(people, list)
+        [waiting] = [one for one in people if one["state"] == "waiting"]
+        told = {"id": waiting["id"], "code": waiting["code"]}
+        server.request("POST", "/api/people/confirm", told)
+        screen.wait_for_timeout(3e3)  # it asks each second
+        assert not opened
+        with screen.expect_websocket(timeout=WAIT_MS):
+            screen.click("#start")
+
+
 def test_a_viewers_page_shows_all_and_offers_stop_alone(chromium: str, server: Serving) -> None:
     with browser(chromium, **SCREEN) as context:
         page = context.new_page()

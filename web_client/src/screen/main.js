@@ -140,7 +140,7 @@ async function start() {
       say('This browser is not let in yet: open a link of “lightleash invite --role viewer” in it first.');
       return;
     }
-    link.open();
+    if (shows) link.open(); // else somebody has left it meanwhile
   } catch (error) {
     const problem = problemOf(error);
     say(problem.detail || adviceFor(problem, platform, window.location.port).title);
