@@ -170,15 +170,25 @@ def _check_ends(path: Path, stream: IO[bytes]) -> None:
     stream.seek(0)
 
 
+def before(path: Path) -> Path:
+    """Where a recording that was closed stays as it was when it is recovered."""
+    return path.with_name(path.name + ".before")
+
+
 def recover(part: Path) -> Path:
     """Make a readable recording of one that was never closed; the unfinished file is removed.
 
+    One that was closed, and is damaged, stays beside it as `*.mcap.before`: what follows the damage
+    is not copied.
+
     Raises:
-        RecordingError: it is being written right now, not an MCAP file, or nothing of it is ours to
-            be read: it stays as it is.
+        RecordingError: it is being written right now, not an MCAP file, was recovered before, or
+            nothing of it is ours to be read: it stays as it is.
     """
     path = part.with_name(part.name.removesuffix(".part"))
     temporary = path.with_name(path.name + ".recovering")
+    if part == path and before(path).exists():
+        raise RecordingError(path, "was recovered before", f"move {before(path)} away first")
     with _opened(part) as source:
         try:
             fcntl.flock(source, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -192,6 +202,8 @@ def recover(part: Path) -> Path:
             if not _copy_complete(source, target):
                 what = "holds nothing of Lightleash that can be rescued"
                 raise RecordingError(part, what, "name a *.mcap.part of a recording")
+    if part == path:
+        path.rename(before(path))
     temporary.rename(path)
     if part != path:
         part.unlink()

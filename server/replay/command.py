@@ -18,7 +18,7 @@ from server.common.options import Parser
 from server.common.ranges import whole
 from server.protocol.messages import Command, Status
 from server.protocol.wire_records import Picture, Pong, Record, Touch
-from server.recording.reader import Recording, device_of, read, recover
+from server.recording.reader import Recording, before, device_of, read, recover
 from server.recording.writer import RecordingError
 from server.replay.dates import Timed, timed
 from server.replay.many import SUMMARY, ReplayResults, recordings_in, replay_all
@@ -162,7 +162,9 @@ def _run(arguments: argparse.Namespace) -> str:
     """Do what is asked of one recording; gives a line about it."""
     path: Path = arguments.recordings[0]
     if arguments.recover:
-        return f"recovered: {recover(path)}"
+        recovered = recover(path)
+        kept = f"; as it was: {before(path)}" if recovered == path else ""
+        return f"recovered: {recovered}{kept}"
     recording = read(path)
     if arguments.offline:
         out = arguments.out or path.with_suffix(".csv")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from server.common import clock
@@ -19,7 +20,7 @@ from server.protocol.wire import VERSION, encode
 from server.protocol.wire_records import Ping, Pong, Record, Touch
 from server.recording.control import Recordings
 from server.recording.folder import RecordingFolder
-from server.recording.reader import read, recover, recover_all
+from server.recording.reader import before, read, recover, recover_all
 from server.recording.writer import (
     CAMERA_KEY,
     CAPACITY,
@@ -306,10 +307,30 @@ def test_a_killed_recording_loses_no_more_than_is_promised(tmp_path, count):
 def test_recovering_twice_changes_nothing(tmp_path):
     recorder = make(tmp_path, touches=50)
     recorder.close()
-    before = list(read(recorder.path).entries())
+    entries = list(read(recorder.path).entries())
     recover(recorder.path)
-    assert list(read(recorder.path).entries()) == before
+    assert list(read(recorder.path).entries()) == entries
     assert recover_all(tmp_path) == []
+
+
+def test_a_closed_recording_that_is_damaged_is_kept_beside_what_was_rescued_of_it(tmp_path):
+    recorder = make(tmp_path, touches=20_000)
+    recorder.close()
+    path, count = recorder.path, len(list(read(recorder.path).entries()))
+    damaged = bytearray(path.read_bytes())
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    second = summary.chunk_indexes[1]
+    end = second.chunk_start_offset + second.chunk_length
+    damaged[end - 100 : end] = bytes(100)
+    path.write_bytes(damaged)
+    assert recover(path) == path
+    assert 0 < len(list(read(path).entries())) < count
+    assert before(path).read_bytes() == damaged
+    with pytest.raises(RecordingError, match="was recovered before"):
+        recover(path)
+    assert before(path).read_bytes() == damaged
 
 
 def finished_bytes(tmp_path):
