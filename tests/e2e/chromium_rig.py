@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import time
+import urllib.request
 from collections.abc import Callable, Iterator, Sequence
 from itertools import count
 from pathlib import Path
 
-from playwright.sync_api import BrowserContext
+from playwright.sync_api import BrowserContext, Route
 
 from hardware.robot_file import COMMANDS, load_robot
 from hardware.sim.hand import make_hand
@@ -35,6 +36,32 @@ MAY_ARM = """
 IS_ARMED = r"/\bARMED\b/.test(document.body.innerText)"
 MOST_TAPS = 3
 """On Arm: a page that has just begun stutters, and a robot is not armed on a stutter."""
+
+
+def hearing(name: str) -> str:
+    """A page's script: what its worker says on the channel of that `name` is in `window[name]`."""
+    channel = f"new BroadcastChannel('{name}')"
+    return f"window.{name} = []; {channel}.onmessage = ({{data}}) => {name}.push(data);"
+
+
+def telling(server: Serving, name: str, after: str, what: str) -> Callable[[Route], None]:
+    """The worker as it is served, but after a piece of its code it says `what` on a channel.
+
+    Each request by a connection of its own: `route.fetch` keeps one, and a second request on it
+    meets the server's closing of one that was silent for `timeout_keep_alive`.
+    """
+
+    trusting = server.trusting()
+
+    def answer(route: Route) -> None:
+        with urllib.request.urlopen(route.request.url, timeout=5.0, context=trusting) as response:
+            code, headers = response.read().decode(), dict(response.headers)
+        assert after in code
+        body = code.replace(after, f"{after}\n  {name}.postMessage({what});")
+        body += f"\nconst {name} = new BroadcastChannel('{name}');\n"
+        route.fulfill(headers=headers | {"content-length": str(len(body.encode()))}, body=body)
+
+    return answer
 
 
 def calibrate(folder: Path, device: str = DEVICE) -> Path:

@@ -71,6 +71,7 @@ STAMP_SENSORS = """
 """Chromium's sensors read what is felt at their stamps, as hardware does, rounded as it rounds:
 what it is fed it stamps when it hears of it, on a busy machine 10 to 25 ms late."""
 NO_WEBRTC = "delete window.RTCPeerConnection;"
+STREAMS_ONLY = "delete window.RTCRtpScriptTransform;"
 NO_ENCODER = "delete window.VideoEncoder;"
 LACKING = {"WebRTC": (), "WebCodecs": (NO_WEBRTC,), "JPEG": (NO_WEBRTC, NO_ENCODER)}
 """What a page lacks whose pictures can't come by a better path than this."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 import contextlib
 import itertools
 import time
-import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page, Route
+from playwright.sync_api import Page
 
 from hardware.codec import Decoder
 from server.phone.decoder import CODEC_NAMES
@@ -20,9 +19,9 @@ from server.protocol.wire import decode
 from server.protocol.wire_records import Codec, Picture, Record, Touch
 from server.recording.reader import read
 from tests.e2e.chromium_phone import browser
-from tests.e2e.chromium_rig import LANDSCAPE, calibrate
+from tests.e2e.chromium_rig import LANDSCAPE, calibrate, hearing, telling
 from tests.e2e.clock_canvas import clock_canvas, painted_ms
-from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264
+from tests.e2e.page_scripts import KEEP_CONNECTIONS, NO_H264, STREAMS_ONLY
 from tests.e2e.serving import Serving, serving
 
 pytestmark = [pytest.mark.e2e, pytest.mark.flight]
@@ -30,16 +29,8 @@ FILM_S = 6.0
 WIDTH, HEIGHT = 640, 360
 FRAME_MS = 1000.0 / 30.0
 FAIL = "made.at(-1).close(); made.at(-1).dispatchEvent(new Event('connectionstatechange'))"
-STREAMS_ONLY = "delete window.RTCRtpScriptTransform;"
-LISTEN = """
-window.left = [];
-new BroadcastChannel('left').onmessage = ({data}) => left.push(data);
-"""
-CHANNEL = "\nconst leaving = new BroadcastChannel('left');\n"
 LEAVE = "worker.postMessage(told);"
-TELL_LEAVING = """
-  leaving.postMessage([sequence, performance.timeOrigin + performance.now()]);
-"""
+LEFT = "[sequence, performance.timeOrigin + performance.now()]"
 
 
 @dataclass
@@ -76,25 +67,6 @@ def becomes(page: Page, condition: str, seconds: float = 20.0) -> None:
         page.wait_for_timeout(50)
 
 
-def telling_of_leaving(server: Serving) -> Callable[[Route], None]:
-    """The worker as it is served, but it says when each picture leaves it.
-
-    Each request by a connection of its own: `route.fetch` keeps one, and a second request on it
-    meets the server's closing of one that was silent for `timeout_keep_alive`.
-    """
-
-    trusting = server.trusting()
-
-    def answer(route: Route) -> None:
-        with urllib.request.urlopen(route.request.url, timeout=5.0, context=trusting) as response:
-            code, headers = response.read().decode(), dict(response.headers)
-        assert LEAVE in code
-        body = code.replace(LEAVE, LEAVE + TELL_LEAVING) + CHANNEL
-        route.fulfill(headers=headers | {"content-length": str(len(body.encode()))}, body=body)
-
-    return answer
-
-
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     folder = tmp_path_factory.mktemp("rtc")
@@ -108,9 +80,9 @@ def filming(
 ) -> Iterator[Page]:
     """A page that films its clock, tapped."""
     with browser(chromium, flags=flags, **LANDSCAPE) as context:
-        context.route("**/rtc_worker.js", telling_of_leaving(server))
+        context.route("**/rtc_worker.js", telling(server, "left", LEAVE, LEFT))
         page = context.new_page()
-        for script in (clock_canvas(WIDTH), LISTEN, KEEP_CONNECTIONS, *scripts):
+        for script in (clock_canvas(WIDTH), hearing("left"), KEEP_CONNECTIONS, *scripts):
             page.add_init_script(script)
         page.goto(f"{server.local_https}/{server.link()}")
         page.tap("#start")
