@@ -47,6 +47,7 @@ from tests.bench.attacks import (
     slow_loris,
     stray_answers,
 )
+from tests.bench.judgement import verdict
 from tests.bench.replay_attack import replayed
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import processes
@@ -195,10 +196,7 @@ def main() -> int:
         print(part.row())
     print(f"load {os.getloadavg()[0]:.1f}; attackers: {outcome.tally}")
     print(f"who led: {outcome.did}; its pictures in the decoder: {outcome.undecodable}")
-    judgement = list(outcome.goals())
-    for met, words in judgement:
-        print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if all(met for met, _ in judgement) else 1
+    return verdict(outcome.goals())
 
 
 if __name__ == "__main__":

@@ -27,7 +27,8 @@ from server.common.text import table
 from server.experiments.vision.verdicts import REFERENCE
 from tests.bench.browser_eyes import CHROMIUM, RAW, WAYS, Row, Seen, look, row
 from tests.bench.browser_film import Speed, Studio, studio
-from tests.e2e.conftest import find_chromium
+from tests.bench.judgement import verdict
+from tests.e2e.conftest import wanted_chromium
 from tests.e2e.page_scripts import LACKING
 
 USUAL = ("clean", "typical", "motion_blur", "rolling_shutter", "clutter", "low_light")
@@ -95,18 +96,13 @@ def goals(rows: list[Row]) -> list[tuple[bool, str]]:
 
 
 def main() -> int:
-    told, executable = arguments(), find_chromium()
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
+    told, executable = arguments(), wanted_chromium()
     warm_up()
     with studio(executable, Speed(told.slower, told.bitrate, told.path)) as films:
         rows = [one for name in told.scenes for one in rows_of(name, told, films)]
     print(table(COLUMNS, rows))
     print(f"\ngoals: {ADDED_PX} px in the median; poses (lateral / depth / rotation) {POSES} × raw")
-    judged = goals(rows)
-    for met, words in judged:
-        print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if all(met for met, _ in judged) else 1
+    return verdict(goals(rows))
 
 
 if __name__ == "__main__":

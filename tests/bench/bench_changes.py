@@ -28,8 +28,9 @@ import numpy as np
 
 from server.common.options import Parser
 from server.common.text import table
+from tests.bench.judgement import verdict
 from tests.e2e.chromium_rig import WAYS, flight, led_server, start
-from tests.e2e.conftest import find_chromium
+from tests.e2e.conftest import wanted_chromium
 from tests.e2e.flight_log import Flight
 
 HAND, SEED, REST_S = "moving", 1, 15.0
@@ -131,9 +132,7 @@ def main() -> int:
     """Fly, tell, judge."""
     parser = Parser(prog="python -m tests.bench.bench_changes", description=__doc__)
     parser.add_argument("--flights", type=int, default=5)
-    executable, told = find_chromium(), parser.parse_args()
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
+    told, executable = parser.parse_args(), wanted_chromium()
     changes: list[Change] = []
     ends = ways = 0
     for n in range(told.flights):
@@ -153,9 +152,7 @@ def main() -> int:
         (ways == wanted, f"{ways} of {wanted} times pictures came by the way that was chosen"),
         (worst <= MOST_RMS_MM, f"RMS after a change {worst:.1f} mm, at most {MOST_RMS_MM:g}"),
     )
-    for met, words in goals:
-        print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if all(met for met, _ in goals) else 1
+    return verdict(goals)
 
 
 if __name__ == "__main__":

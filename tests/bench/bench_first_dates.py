@@ -26,10 +26,11 @@ import numpy as np
 
 from server.common.options import Parser
 from server.common.text import table
+from tests.bench.judgement import verdict
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE, calibrate, hearing, telling
 from tests.e2e.clock_canvas import clock_canvas
-from tests.e2e.conftest import find_chromium
+from tests.e2e.conftest import wanted_chromium
 from tests.e2e.page_scripts import NO_H264, STREAMS_ONLY
 from tests.e2e.serving import Serving, serving
 
@@ -90,9 +91,7 @@ def main() -> int:
     parser = Parser(prog="python -m tests.bench.bench_first_dates", description=__doc__)
     parser.add_argument("--connections", type=int, default=20)
     parser.add_argument("--busy", type=int, default=2, metavar="LOOPS")
-    told, executable = parser.parse_args(), find_chromium()
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
+    told, executable = parser.parse_args(), wanted_chromium()
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -102,10 +101,8 @@ def main() -> int:
                 print(rows[-1], file=sys.stderr, flush=True)
     print(table(COLUMNS, rows))
     silent, wrong = (sum(not row.dated for row in rows), sum(row.wrong > 0 for row in rows))
-    met = not silent and not wrong
     words = f"{wrong} of {len(rows)} connections dated wrongly, {silent} dated nothing; none may"
-    print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if met else 1
+    return verdict([(not silent and not wrong, words)])
 
 
 if __name__ == "__main__":

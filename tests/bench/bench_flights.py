@@ -29,8 +29,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from server.common.options import Parser
 from server.common.text import flights
+from tests.bench.judgement import verdict
 from tests.e2e.chromium_rig import flight, led_server, start
-from tests.e2e.conftest import find_chromium
+from tests.e2e.conftest import wanted_chromium
 from tests.e2e.flight_log import SHOWN_S, Flight
 from tests.e2e.page_scripts import LACKING
 from tests.e2e.played_phone import PlayedPhone
@@ -160,9 +161,7 @@ def arguments() -> argparse.Namespace:
 
 def main() -> int:
     """Fly, tell, judge."""
-    told, executable = arguments(), find_chromium()
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
+    told, executable = arguments(), wanted_chromium()
     rows: list[Row] = []
     for n, way in product(range(told.flights), told.by):
         kept = told.record and told.record / f"{way.lower()}_{n + 1}.mcap"
@@ -174,10 +173,7 @@ def main() -> int:
             words = pause.words(one.said[0].t, one.holes)
             print(f"  {words}", file=sys.stderr, flush=True)
     print(f"{flights(COLUMNS, rows)}")
-    judgement = list(goals(rows))
-    for met, words in judgement:
-        print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if all(met for met, _ in judgement) else 1
+    return verdict(goals(rows))
 
 
 if __name__ == "__main__":

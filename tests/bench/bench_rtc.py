@@ -30,12 +30,13 @@ from playwright.sync_api import BrowserContext
 
 from server.common.settings import VideoSettings
 from server.common.text import table
+from tests.bench.judgement import verdict
 from tests.bench.rtc_figures import COLUMNS, SETTLED_S, Row, goals, judged, median
 from tests.e2e.chromium_channel import SENSORS, address
 from tests.e2e.chromium_phone import browser
 from tests.e2e.chromium_rig import LANDSCAPE
 from tests.e2e.clock_canvas import clock_canvas
-from tests.e2e.conftest import find_chromium
+from tests.e2e.conftest import wanted_chromium
 from tests.e2e.fed_sensors import FedSensors
 from tests.e2e.page_scripts import KEEP_CONNECTIONS, LACKING, NO_H264
 
@@ -136,9 +137,7 @@ def run(context: BrowserContext, way: str, seconds: float, result: Path) -> Row:
 
 
 def main() -> int:
-    told, executable = arguments(), find_chromium()
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
+    told, executable = arguments(), wanted_chromium()
     rows: dict[str, list[Row]] = {way: [] for way in told.ways}
     with tempfile.TemporaryDirectory() as folder, browser(executable, **LANDSCAPE) as context:
         for number in range(told.rounds):
@@ -150,9 +149,7 @@ def main() -> int:
     print(f"\nmedians of {told.rounds}")
     print(table(COLUMNS, medians.values()))
     judgement = list(goals(medians)) if "tuned" in medians else []
-    for met, words in judgement:
-        print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if all(met for met, _ in judgement) else 1
+    return verdict(judgement)
 
 
 if __name__ == "__main__":

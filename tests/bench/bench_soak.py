@@ -30,6 +30,7 @@ import numpy as np
 
 from server.common.options import Parser
 from server.common.text import table
+from tests.bench.judgement import verdict
 from tests.e2e.flight_log import FlightLog
 from tests.e2e.serving import Serving, serving
 from tests.e2e.test_serve import processes
@@ -208,10 +209,7 @@ def main() -> int:
             writer.writerows(map(asdict, samples))
     rows = growth(samples)
     print(table(COLUMNS, rows))
-    judgement = list(goals(rows, followed, flown))
-    for met, words in judgement:
-        print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if all(met for met, _ in judgement) else 1
+    return verdict(goals(rows, followed, flown))
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ import numpy as np
 
 from hardware.contract import FollowerContract
 from server.common.options import Parser
+from tests.bench.judgement import verdict
 from tests.e2e.robot_rig import (
     compiled_watchdog,
     connect,
@@ -76,9 +77,7 @@ def main() -> int:
     judgement = [
         goal for robot in told.robots for goal in goals(robot, *flooded(robot, told.stops))
     ]
-    for met, words in judgement:
-        print(f"{'met   ' if met else 'MISSED'}  {words}")
-    return 0 if all(met for met, _ in judgement) else 1
+    return verdict(judgement)
 
 
 if __name__ == "__main__":

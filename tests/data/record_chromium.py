@@ -11,16 +11,14 @@ import tempfile
 from pathlib import Path
 
 from tests.e2e.chromium_rig import lead, led_server, start
-from tests.e2e.conftest import find_chromium
+from tests.e2e.conftest import wanted_chromium
 
 TARGET = Path(__file__).with_name("chromium.mcap")
 
 
 def main() -> None:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 5.0
-    executable = find_chromium()
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
+    executable = wanted_chromium()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with led_server(executable, folder, "moving", seed=3, rest_s=8.0) as (server, _, phone):

@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -42,6 +43,11 @@ def pytest_runtest_makereport(
 
 def find_chromium() -> str | None:
     return find(NAMES)
+
+
+def wanted_chromium() -> str:
+    """For a command; it ends here where there is none."""
+    return find_chromium() or sys.exit("no Chromium found: apt-get install chromium")
 
 
 def find(names: tuple[str, ...]) -> str | None:

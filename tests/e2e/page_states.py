@@ -10,7 +10,7 @@ from pathlib import Path
 
 from playwright.sync_api import BrowserContext, Page
 
-from tests.e2e.conftest import find_chromium
+from tests.e2e.conftest import wanted_chromium
 from tests.e2e.written_pages import FRENCH, opened, written_pages
 
 PHONES = ((360, 640), (412, 915), (915, 412), (667, 375))
@@ -245,10 +245,8 @@ def shown(
 
 def main() -> None:
     """A picture of each state, at each size of screen and of letters, in one language or in all."""
-    target, executable = Path(sys.argv[1]), find_chromium()
+    target, executable = Path(sys.argv[1]), wanted_chromium()
     languages = sys.argv[2:] or ["en", "fr"]
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
     target.mkdir(parents=True, exist_ok=True)
     for px in LETTERS_PX:
         with written_pages(executable, letters(px)) as context:

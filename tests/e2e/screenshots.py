@@ -11,16 +11,14 @@ import time
 from pathlib import Path
 
 from tests.e2e.chromium_rig import lead, led_server, start
-from tests.e2e.conftest import find_chromium
+from tests.e2e.conftest import wanted_chromium
 
 DESKTOP, PHONE = (1440, 900), (412, 915)
 
 
 def main() -> None:
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "docs")
-    executable = find_chromium()
-    if executable is None:
-        sys.exit("no Chromium found: apt-get install chromium")
+    executable = wanted_chromium()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with led_server(executable, folder, "demo", rest_s=10.0) as (server, context, phone):
