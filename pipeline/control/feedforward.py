@@ -17,6 +17,7 @@ high end its rounding and the hand's tremor. F_pull is low-passed.
 from __future__ import annotations
 
 from math import pi
+from typing import Final
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from pipeline.frames import GRAVITY, Array, cross
 from pipeline.robot import Robot
 from pipeline.signals import RelativeState, VirtualView
 
+LASTING_S: Final = 1.0
+"""Time constant of what of the pull is no gust."""
 G_IN_F = np.array([0.0, 0.0, -GRAVITY])
 G_IN_F.setflags(write=False)
 
@@ -48,6 +51,7 @@ class FeedForward:
         if self._weight_in_f.any():
             self._pull_in_f = self._weight_in_f
         self._pull_at_start_in_f = self._pull_in_f
+        self._lasting_in_f = np.zeros(3)
         self.inertial_in_b = np.zeros(6)
         """What of the last wrench carries the body along with the hand (6,) [N, N m]."""
         self._omega_v: Array | None = None
@@ -68,6 +72,18 @@ class FeedForward:
         measured = self._m * (R_fb @ f_bf_in_b + G_IN_F) - thrust_in_f
         share = low_pass.share(2.0 * pi * self._config.pull_hz * h)
         self._pull_in_f = self._pull_in_f + share * (measured - self._pull_in_f)
+        changed_in_f = self._pull_in_f - self._pull_at_start_in_f
+        slow = low_pass.share(h / LASTING_S)
+        self._lasting_in_f = self._lasting_in_f + slow * (changed_in_f - self._lasting_in_f)
+
+    @property
+    def balanced_in_f(self) -> Array:
+        """(3,) [N]: what it has found to be lasting of the pull of a robot that carries itself.
+
+        Its thrusters may give less or more than they are told, and so must be told more or less for
+        the same weight. Of what hangs the place says what the suspension pulls.
+        """
+        return -self._lasting_in_f if self._weight_in_f.any() else np.zeros(3)
 
     def wrench(
         self,

@@ -43,7 +43,8 @@ class Tracking:
     @property
     def constant_force_in_f(self) -> Array:
         """(3,) [N]: what it has found to need without any error."""
-        return self._pid.constant_force_in_f
+        learnt_in_f = self._pid.constant_force_in_f
+        return learnt_in_f + self._ahead.balanced_in_f if self._looks_ahead else learnt_in_f
 
     def reset(self) -> None:
         """Forget what was learnt: the robot is at rest without thrust."""

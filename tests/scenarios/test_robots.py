@@ -124,6 +124,22 @@ def after_a_loss(
     return places
 
 
+def test_a_quadrotor_whose_thrusters_give_more_than_they_are_told_does_not_rise_alone() -> None:
+    """What it was found to need in flight counts, not what it weighs by its file."""
+    loop = loop_of("quadrotor", "moving", RAYS_PX)
+    loop.follower.plant.thruster_health[:] = 1.06
+    while loop.t < TAKEN_OFF_S + 1.0:
+        loop.advance()
+        assert not loop.trace.left
+    loop._script.operator.leaving = True
+    lose_the_phone(loop)
+    began, highest = float(loop.follower.plant.p_bf_in_f[2]), 0.0
+    while loop.t < TAKEN_OFF_S + 6.0:
+        loop.advance()
+        highest = max(highest, float(loop.follower.plant.p_bf_in_f[2]))
+    assert highest < began + 0.15
+
+
 @pytest.mark.parametrize("lose", LOSSES, ids=WHICH)
 def test_a_quadrotor_that_loses_what_leads_it_lands_upright_nearby(
     lose: Callable[[VirtualTimeSimulation], None],

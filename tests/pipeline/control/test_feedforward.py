@@ -166,3 +166,26 @@ def test_without_the_pull_a_hanging_robot_follows_worse(ames: Robot) -> None:
     without, _ = fly(ames, 26.0, None)
     error, _ = fly(ames, 26.0, FeedForwardConfig(pull_hz=0.0))
     assert error > without
+
+
+def test_thrusters_that_give_more_than_they_are_told_are_to_be_told_less_for_the_same_weight() -> (
+    None
+):
+    robot = load_robot("quadrotor").robot
+    ahead, weight = FeedForward(robot, FeedForwardConfig()), np.array([0, 0, robot.weight_to_carry])
+    ahead.start()
+    for _ in range(1000):
+        ahead.observe(UP, EYE, weight / 1.06, H)
+    np.testing.assert_allclose(ahead.balanced_in_f, weight / 1.06 - weight, atol=0.02)
+    ahead.start()
+    np.testing.assert_array_equal(ahead.balanced_in_f, ZERO)
+    for _ in range(40):
+        ahead.observe(UP, EYE, 1.2 * weight, H)
+    assert ahead.balanced_in_f[2] < 0.25 * 0.2 * weight[2], "a gust is none"
+
+
+def test_what_hangs_has_nothing_to_balance_for_long(ames: Robot) -> None:
+    ahead = FeedForward(ames, FeedForwardConfig())
+    for _ in range(400):
+        ahead.observe(UP, EYE, np.array([0.0, 0.0, 5.0]), H)
+    np.testing.assert_array_equal(ahead.balanced_in_f, ZERO)
